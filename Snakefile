@@ -1,0 +1,54 @@
+# From a study file to decks, runs, tables and a report.
+#   snakemake all --config study=uhlmann2015 fidelity=standard
+from snakemake.utils import min_version
+
+min_version("9.0")
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/decks.smk"
+include: "workflow/rules/simulate.smk"
+include: "workflow/rules/tables.smk"
+include: "workflow/rules/network.smk"
+include: "workflow/rules/report.smk"
+
+
+localrules:
+    all,
+    drop,
+    fill,
+    process,
+    report,
+
+
+# The whole study: runs, tables, chains, figures and the report.
+rule all:
+    default_target: True
+    input:
+        rules.write_report.output,
+        every("drop", "figures/drop.png"),
+        every("fill", "figures/fill.png"),
+
+
+# The drop tests.
+rule drop:
+    input:
+        every("drop", "tables/impacts.parquet"),
+
+
+# The settled beds.
+rule fill:
+    input:
+        every("fill", "tables/fill.json"),
+
+
+# The process runs with their tables.
+rule process:
+    input:
+        every("process", "tables/rod_force.parquet"),
+
+
+# summary.csv, summary.parquet and report.html.
+rule report:
+    input:
+        rules.write_report.output,

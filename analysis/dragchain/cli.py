@@ -1,0 +1,88 @@
+"""The command ``dragchain``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from .errors import DragchainError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        The arguments, without the command's name; those of the process if None.
+
+    Returns
+    -------
+    int
+        The exit status: 0, or 1 after an error that is printed to stderr. A
+        wrong use of the command exits with 2.
+    """
+    options = _parser().parse_args(arguments)
+    try:
+        options.action(options)
+    except (DragchainError, OSError) as error:
+        print(f"dragchain: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="dragchain", description="Make tables, figures and reports of what the engine wrote."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    run_dir = argparse.ArgumentParser(add_help=False)
+    run_dir.add_argument("run_dir", type=Path, metavar="RUN_DIR", help="folder of one run")
+
+    tables = commands.add_parser(
+        "tables", parents=[run_dir], help="make the tables of a run from its raw outputs"
+    )
+    tables.set_defaults(action=_tables)
+    chains = commands.add_parser(
+        "chains", parents=[run_dir], help="make the network and chain tables from the tables"
+    )
+    chains.set_defaults(action=_chains)
+    figures = commands.add_parser(
+        "figures", parents=[run_dir], help="draw the figures of a run from its tables"
+    )
+    figures.set_defaults(action=_figures)
+    report = commands.add_parser("report", help="write the report on several runs")
+    report.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
+    report.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
+    report.set_defaults(action=_report)
+    return parser
+
+
+def _tables(options: argparse.Namespace) -> None:
+    from .tables import write_tables
+
+    write_tables(options.run_dir)
+
+
+def _chains(options: argparse.Namespace) -> None:
+    from .network import write_chains
+
+    write_chains(options.run_dir)
+
+
+def _figures(options: argparse.Namespace) -> None:
+    from .figures import write_figures
+
+    write_figures(options.run_dir)
+
+
+def _report(options: argparse.Namespace) -> None:
+    from .report import write_report
+
+    write_report(options.out, options.run_dirs)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

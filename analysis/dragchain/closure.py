@@ -1,0 +1,127 @@
+"""The force closure gate: the forces on the balls must add up to the force on the tool."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .rod import RodFrame
+
+Floats = NDArray[np.float64]
+
+LIMIT = 1e-6
+"""Largest relative error that passes: far above rounding, far below physics."""
+
+MESH_BOWL_LIMIT = 0.05
+"""The same where the bowl is a mesh: the engine then writes one force for both
+meshes, and a ball that touches both has its force shared by estimate."""
+
+FLOOR_N = 1e-3
+"""Smaller forces on the tool do not serve as the scale of the error."""
+
+
+@dataclass
+class Closure:
+    """Collects how far the contacts on the tool add up to its total force.
+
+    By Newton's third law the forces on the balls and the force on the tool add
+    up to zero at every step. The error of a step is ``|sum of forces on the
+    balls + force on the tool| / max(|force on the tool|, 1 mN)``.
+
+    Parameters
+    ----------
+    limit : float
+        Largest error that passes.
+    """
+
+    limit: float = LIMIT
+    frames: int = 0
+    contacts: int = 0
+    silent: int = 0
+    unplaced: int = 0
+    worst_step: int | None = None
+    worst: float = 0.0
+    worst_n: float = 0.0
+    unplaced_max_n: float = 0.0
+    silent_max_n: float = 0.0
+    evaluated_max_n: float = 0.0
+    _evaluated: list[float] = field(default_factory=list)
+
+    def add(self, frame: RodFrame, tool_force_n: Floats | None, *, counted: bool) -> None:
+        """Take in the contacts of one step.
+
+        Parameters
+        ----------
+        frame : RodFrame
+            The contacts.
+        tool_force_n : (3,) ndarray or None
+            Force on the tool at this step; None if it was not written.
+        counted : bool
+            Whether statistics use this step.
+        """
+        self._add_contacts(frame)
+        if tool_force_n is None:
+            return
+        self.frames += 1
+        scale = max(float(np.linalg.norm(tool_force_n)), FLOOR_N)
+        applied = frame.rod.force_n.sum(axis=0) + frame.unplaced_n.sum(axis=0)
+        gap_n = float(np.linalg.norm(applied + tool_force_n))
+        if self.worst_step is None or gap_n / scale > self.worst:
+            self.worst_step, self.worst, self.worst_n = frame.step, gap_n / scale, gap_n
+        evaluated_n = float(np.linalg.norm(frame.rod.evaluated_n.sum(axis=0) + tool_force_n))
+        self.evaluated_max_n = max(self.evaluated_max_n, evaluated_n)
+        if counted:
+            self._evaluated.append(evaluated_n / scale)
+
+    def _add_contacts(self, frame: RodFrame) -> None:
+        rod = frame.rod
+        self.contacts += len(rod.ball_id)
+        self.silent += int(rod.silent.sum())
+        self.silent_max_n = max(self.silent_max_n, _largest(rod.evaluated_n[rod.silent]))
+        self.unplaced += len(frame.unplaced_n)
+        self.unplaced_max_n = max(self.unplaced_max_n, _largest(frame.unplaced_n))
+
+    def problem(self) -> str | None:
+        """Return what is wrong, or None if the gate holds."""
+        if self.frames == 0:
+            return "no step has both rod_force and rod_balls, so closure cannot be tested"
+        if self.worst > self.limit:
+            return (
+                f"at step {self.worst_step} the forces on the balls miss the force on the tool"
+                f" by {self.worst_n:.3g} N, {self.worst:.3g} of it (limit {self.limit:g})"
+            )
+        if self.unplaced_max_n > FLOOR_N:
+            return (
+                f"{self.unplaced} forces on balls have no contact in rod_contacts,"
+                f" the largest {self.unplaced_max_n:.3g} N (limit {FLOOR_N:g} N)"
+            )
+        return None
+
+    def content(self) -> dict[str, object]:
+        """Return what ``closure.json`` holds."""
+        problem = self.problem()
+        relative = np.array(self._evaluated)
+        return {
+            "verdict": "pass" if problem is None else "fail",
+            "problem": problem,
+            "limit": self.limit,
+            "force_floor_n": FLOOR_N,
+            "frames": self.frames,
+            "worst_step": self.worst_step,
+            "max_relative": self.worst,
+            "max_n": self.worst_n,
+            "contacts": self.contacts,
+            "unplaced_forces": self.unplaced,
+            "unplaced_max_n": self.unplaced_max_n,
+            "silent_contacts": self.silent,
+            "silent_evaluated_max_n": self.silent_max_n,
+            "evaluated_max_n": self.evaluated_max_n,
+            "evaluated_counted_max_relative": float(relative.max()) if relative.size else None,
+            "evaluated_counted_mean_relative": float(relative.mean()) if relative.size else None,
+        }
+
+
+def _largest(vectors: Floats) -> float:
+    return float(np.linalg.norm(vectors, axis=1).max()) if len(vectors) else 0.0

@@ -1,0 +1,277 @@
+"""Collect the findings of one run: what its figures show and what the report says of it.
+
+The numbers are written to ``tables/figures.json``; figures and report read them there.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from .case import Case, load_case, load_outputs
+from .drop import effective_restitution
+from .errors import TableError
+from .findings import (
+    CONFIDENCE,
+    Estimate,
+    ahead_behind,
+    association,
+    bearing_profile,
+    depth_profile,
+    depth_slope,
+    finite,
+    near_any,
+)
+from .forces import (
+    drag_phase,
+    find_drag_peaks,
+    peak_separation_s,
+    read_counted,
+    summarise_forces,
+)
+from .frames import Floats, Ints, read_table
+from .parquet import write_json
+from .stats import MeanEstimate
+
+SCHEMA = 1
+FILE = Path("tables") / "figures.json"
+
+Findings = dict[str, Any]
+
+
+def drag_start_s(case: Case) -> float:
+    """Return the simulated time at which the drag begins, the zero of process time."""
+    return drag_phase(case).start_step * case.timestep_s
+
+
+def write_findings(run_dir: Path) -> Findings:
+    """Compute the findings of a run, write them to ``tables/figures.json`` and return them.
+
+    Raises
+    ------
+    TableError
+        If a table that the run's scene has is missing.
+    SeriesError
+        If the run is too short for its statistics.
+    """
+    case = load_case(run_dir)
+    collect = {"process": _process, "fill": _fill, "drop": _drop}[case.scene]
+    findings = {"schema": SCHEMA, "scene": case.scene, "run": case.run} | collect(run_dir, case)
+    write_json(run_dir / FILE, findings)
+    return findings
+
+
+def read_findings(run_dir: Path) -> Findings:
+    """Read what `write_findings` wrote.
+
+    Raises
+    ------
+    TableError
+        If it is not there.
+    """
+    file = run_dir / FILE
+    if not file.is_file():
+        raise TableError(f"{file}: there is no such file; run `dragchain figures` first")
+    findings: Findings = json.loads(file.read_text(encoding="utf-8"))
+    return findings
+
+
+# --- process ---------------------------------------------------------------------------------
+
+
+def _process(run_dir: Path, case: Case) -> Findings:
+    samples = read_counted(run_dir)
+    forces = summarise_forces(run_dir)
+    network = read_table(run_dir / "tables" / "network.parquet")
+    chains = read_table(run_dir / "tables" / "chains.parquet")
+    peaks_s, peaks = _peaks(samples, case)
+    return {
+        "process_time_zero_s": drag_start_s(case),
+        "forces": {name: _mean(estimate) for name, estimate in forces.items()},
+        "comparison": compare(forces["drag_n"], case.reference),
+        "peaks": peaks,
+        "network": _network(network),
+        "chains": _chains(chains, len(network)),
+        "association": _association(samples, network, chains, peaks_s),
+        **_around_tool(run_dir, samples),
+    }
+
+
+def _mean(estimate: MeanEstimate) -> Findings:
+    known = asdict(estimate)
+    return {name: finite(value) if name != "reliable" else value for name, value in known.items()}
+
+
+def compare(ours: MeanEstimate, reference: Mapping[str, object] | None) -> list[Findings]:
+    """Set the mean drag beside every reference figure, ``<label>_drag_mean_n``.
+
+    Returns
+    -------
+    list of dict
+        ``label``, ``mean_n``, ``sd_n`` (None if not given), ``difference_percent`` (ours over the
+        reference, less one) with ``low`` and ``high`` from the interval of our mean alone, and
+        ``source``.
+    """
+    found = []
+    known = {} if reference is None else dict(reference)
+    for key in sorted(name for name in known if name.endswith("_drag_mean_n")):
+        label = key.removesuffix("_drag_mean_n")
+        mean, sd = known[key], known.get(f"{label}_drag_sd_n")
+        if not isinstance(mean, int | float) or mean == 0.0:
+            raise TableError(f"case.json: reference.{key} is {mean!r}, not a force to compare with")
+        low, high = sorted(100.0 * (edge / mean - 1.0) for edge in (ours.ci_low, ours.ci_high))
+        found.append(
+            {
+                "label": label,
+                "mean_n": float(mean),
+                "sd_n": float(sd) if isinstance(sd, int | float) else None,
+                "difference_percent": 100.0 * (ours.mean / mean - 1.0),
+                "low": low,
+                "high": high,
+                "source": str(known.get("source", "")),
+            }
+        )
+    return found
+
+
+def _peaks(samples: pd.DataFrame, case: Case) -> tuple[Floats, Findings]:
+    separation = peak_separation_s(case)
+    peaks = find_drag_peaks(
+        samples["time_s"].to_numpy(np.float64),
+        samples["drag_n"].to_numpy(np.float64),
+        min_separation_s=separation,
+    )
+    process_s = peaks.time_s - drag_start_s(case)
+    return peaks.time_s, {
+        "count": len(peaks.index),
+        "process_time_s": process_s.tolist(),
+        "drag_n": peaks.drag_n.tolist(),
+        "largest_n": finite(peaks.drag_n.min(initial=np.inf)),
+        "separation_s": separation,
+    }
+
+
+def _network(network: pd.DataFrame) -> Findings:
+    means = network.drop(columns=["step", "time_s"]).mean()
+    return {"frames": len(network)} | {str(key): finite(mean) for key, mean in means.items()}
+
+
+def _chains(chains: pd.DataFrame, frames: int) -> Findings:
+    peters = chains[chains["definition"] == "peters"]
+    paths = chains[chains["definition"] == "rod_path"]
+    dominant = paths[paths["dominant"]]
+    whole = paths[paths["reaches_bowl"]]
+    azimuth = np.exp(1j * dominant["azimuth_rad"].to_numpy(np.float64))
+    return {
+        "peters_per_frame": len(peters) / frames,
+        "peters_balls_mean": finite(peters["n_balls"].mean()),
+        "rod_paths_per_frame": len(whole) / frames,
+        "rod_contacts_without_path_per_frame": (len(paths) - len(whole)) / frames,
+        "rod_paths_to_side_share": finite((whole["end_kind"] == "side").mean()),
+        "dominant_frames": len(dominant),
+        "dominant_bottleneck_mean_n": finite(dominant["bottleneck_n"].mean()),
+        "dominant_bottleneck_max_n": finite(dominant["bottleneck_n"].max()),
+        "dominant_balls_mean": finite(dominant["n_balls"].mean()),
+        "dominant_altitude_mean_m": finite(dominant["altitude_m"].mean()),
+        "dominant_altitude_sd_m": finite(dominant["altitude_m"].std()),
+        "dominant_azimuth_mean_rad": finite(np.angle(azimuth.mean())) if len(azimuth) else None,
+        "dominant_azimuth_resultant": finite(np.abs(azimuth.mean())) if len(azimuth) else None,
+    }
+
+
+def dominant_bottlenecks(network: pd.DataFrame, chains: pd.DataFrame) -> Floats:
+    """Return the dominant rod path's bottleneck in each network frame in N, 0 without a path."""
+    dominant = chains[chains["dominant"]].set_index("step")["bottleneck_n"]
+    return dominant.reindex(network["step"]).fillna(0.0).to_numpy(np.float64)
+
+
+def _association(
+    samples: pd.DataFrame, network: pd.DataFrame, chains: pd.DataFrame, peaks_s: Floats
+) -> Findings:
+    bottleneck = dominant_bottlenecks(network, chains)
+    time_s = network["time_s"].to_numpy(np.float64)
+    resistance = -np.interp(
+        time_s, samples["time_s"].to_numpy(np.float64), samples["drag_n"].to_numpy(np.float64)
+    )
+    found = association(resistance, bottleneck)
+    reach_s = float(np.median(np.diff(time_s))) / 2.0
+    near = near_any(time_s, peaks_s, reach_s)
+    return {
+        "rank_correlation": finite(found.correlation),
+        "p_value": finite(found.p_value),
+        "frames": found.samples,
+        "frames_at_peaks": int(near.sum()),
+        "bottleneck_at_peaks_mean_n": finite(bottleneck[near].mean()) if near.any() else None,
+        "bottleneck_elsewhere_mean_n": finite(bottleneck[~near].mean()) if any(~near) else None,
+    }
+
+
+def _around_tool(run_dir: Path, samples: pd.DataFrame) -> Findings:
+    columns = ["step", "bearing_rad", "depth_m", "normal_force_n", "counted"]
+    contacts = read_table(run_dir / "tables" / "rod_contacts.parquet", columns)
+    contacts = contacts[contacts["counted"]]
+    frame, frames = _frame_numbers(run_dir, samples, contacts["step"].to_numpy(np.int64))
+    bearing = contacts["bearing_rad"].to_numpy(np.float64)
+    depth = contacts["depth_m"].to_numpy(np.float64)
+    force = contacts["normal_force_n"].to_numpy(np.float64)
+    edges, around = bearing_profile(frame, frames, bearing, force)
+    levels, contact, line = depth_profile(frame, frames, depth, force)
+    ratio = ahead_behind(frame, frames, bearing, force)
+    slope = depth_slope(frame, frames, depth, force)
+    return {
+        "confidence": CONFIDENCE,
+        "rod_frames": frames,
+        "ahead_behind": {name: estimate.as_json() for name, estimate in ratio.items()},
+        "bearing": {"edges_rad": edges.tolist(), "force_n": _columns(around)},
+        "depth": {
+            "edges_m": levels.tolist(),
+            "contact_n": _columns(contact),
+            "line_n_m": _columns(line),
+            "slope_n_m": slope.as_json(),
+        },
+    }
+
+
+def _columns(estimates: list[Estimate]) -> dict[str, list[float | None]]:
+    rows = [estimate.as_json() for estimate in estimates]
+    return {name: [row[name] for row in rows] for name in ("value", "low", "high")}
+
+
+def _frame_numbers(run_dir: Path, samples: pd.DataFrame, steps: Ints) -> tuple[Ints, int]:
+    """Return the frame of each step and the number of counted frames, those without contact too."""
+    output = load_outputs(run_dir)["rod_contacts"]
+    if output.period_steps is None:
+        raise TableError("columns.json gives rod_contacts no period_steps to count frames by")
+    counted = samples["step"].to_numpy(np.int64)
+    first, last = (
+        np.searchsorted(np.arange(output.first_step, counted[-1] + 1, output.period_steps), edge)
+        for edge in (counted[0], counted[-1] + 1)
+    )
+    numbers = (steps - output.first_step) // output.period_steps - first
+    return numbers.astype(np.int64), int(last - first)
+
+
+# --- fill and drop ---------------------------------------------------------------------------
+
+
+def _fill(run_dir: Path, case: Case) -> Findings:
+    file = run_dir / "tables" / "fill.json"
+    if not file.is_file():
+        raise TableError(f"{file}: there is no such file; run `dragchain tables` first")
+    bed: Findings = json.loads(file.read_text(encoding="utf-8"))
+    return {"bed": bed}
+
+
+def _drop(run_dir: Path, case: Case) -> Findings:
+    impacts = read_table(run_dir / "tables" / "impacts.parquet")
+    names = ["start_time_s", "duration_s", "peak_force_n", "restitution", "time_since_first_s"]
+    return {
+        "restitution": asdict(effective_restitution(run_dir)) | {"input": case.restitution},
+        "impacts": {name: impacts[name].tolist() for name in names},
+    }

@@ -1,0 +1,103 @@
+"""The errors that reading and analysing a run can end in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class DragchainError(Exception):
+    """Base of every error that dragchain raises on purpose."""
+
+
+def _joined(lines: list[str], remedy: str | None) -> str:
+    if remedy is not None:
+        lines.append(f"remedy: {remedy}")
+    return "\n  ".join(lines)
+
+
+class CaseError(DragchainError):
+    """A ``case.json`` or ``columns.json`` that cannot be used.
+
+    Parameters
+    ----------
+    file : Path
+        The file.
+    field : str or None
+        Dotted name of the offending key, None for the file as a whole.
+    problem : str
+        What is wrong, without a full stop.
+    remedy : str, optional
+        What the user can do.
+    """
+
+    def __init__(
+        self, file: Path, field: str | None, problem: str, *, remedy: str | None = None
+    ) -> None:
+        self.file = file
+        self.field = field
+        self.problem = problem
+        self.remedy = remedy
+        where = f"{file}: {field}" if field is not None else f"{file}"
+        super().__init__(_joined([f"{where}: {problem}"], remedy))
+
+
+class DumpError(DragchainError):
+    """A raw output that does not hold what ``columns.json`` promises.
+
+    Parameters
+    ----------
+    file : Path
+        The output file.
+    problem : str
+        What was found.
+    frame : int, optional
+        Number of the frame (of the data row in a ``fix print`` file), from 0.
+    offset : int, optional
+        Byte offset into the file at which the frame or the row starts.
+    expected : str, optional
+        What should have stood there.
+    remedy : str, optional
+        What the user can do.
+    """
+
+    def __init__(
+        self,
+        file: Path,
+        problem: str,
+        *,
+        frame: int | None = None,
+        offset: int | None = None,
+        expected: str | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        self.file = file
+        self.problem = problem
+        self.frame = frame
+        self.offset = offset
+        self.expected = expected
+        self.remedy = remedy
+        place = [f"{file}"]
+        if frame is not None:
+            place.append(f"frame {frame}")
+        if offset is not None:
+            place.append(f"byte {offset}")
+        lines = [f"{', '.join(place)}: {problem}"]
+        if expected is not None:
+            lines.append(f"expected: {expected}")
+        super().__init__(_joined(lines, remedy))
+
+
+class TruncatedDumpError(DumpError):
+    """A raw output that ends inside a frame; the frames before it are whole."""
+
+
+class TableError(DragchainError):
+    """Raw outputs that are whole one by one but contradict each other."""
+
+
+class SeriesError(DragchainError):
+    """A series of samples that carries no statistics."""
+
+
+class GateError(DragchainError):
+    """A run whose outputs are whole but cannot be trusted."""

@@ -1,0 +1,420 @@
+"""The figures of a run, as PNG files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+
+from . import scene
+from .case import Case, load_case, load_outputs
+from .collect import Findings, dominant_bottlenecks, drag_start_s, write_findings
+from .dumps import iter_prints
+from .frames import Floats, read_table
+
+BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#6b7480"
+"""After Okabe and Ito (2008): told apart with any kind of colour vision."""
+
+CHAIN = "#1f4fa3"
+
+STYLE: dict[str, Any] = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.grid": True,
+    "grid.color": "#e3e6ea",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "lines.linewidth": 1.2,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+}
+WIDTH_IN = 7.6
+DPI = 150
+
+
+def write_figures(run_dir: Path) -> list[Path]:
+    """Draw the figures of a run into ``figures/`` and their numbers into ``tables/figures.json``.
+
+    Parameters
+    ----------
+    run_dir
+        The folder of a run of any scene, with its tables made; for a process, chains too.
+
+    Returns
+    -------
+    list of Path
+        The pictures: for a process ``forces.png``, ``network_xy.png``, ``network_xz.png``,
+        ``force_around_rod.png``, ``force_depth.png`` and ``chains_peaks.png``; for a fill
+        ``fill.png`` if it has a thermo table; for a drop ``drop.png``.
+
+    Raises
+    ------
+    DragchainError
+        If a table is missing, a series is too short, or pictures cannot be rendered here.
+    """
+    case = load_case(run_dir)
+    findings = write_findings(run_dir)
+    draw = {"process": _draw_process, "fill": _draw_fill, "drop": _draw_drop}[case.scene]
+    with matplotlib.rc_context(STYLE):
+        return draw(run_dir, case, findings)
+
+
+def _draw_process(run_dir: Path, case: Case, findings: Findings) -> list[Path]:
+    written = [
+        _save(run_dir, "forces", _forces(run_dir, case, findings)),
+        _save(run_dir, "force_around_rod", _around_tool(findings)),
+        _save(run_dir, "force_depth", _depth(findings)),
+        _save(run_dir, "chains_peaks", _chains_peaks(run_dir, findings)),
+    ]
+    scene.check_rendering()
+    shown = scene.load_scene(run_dir, case)
+    views: tuple[scene.View, ...] = ("xy", "xz")
+    for view in views:
+        image, extent = scene.render(run_dir, case, shown, view)
+        written.append(_save(run_dir, f"network_{view}", _network(shown, view, image, extent)))
+    return written
+
+
+def _draw_fill(run_dir: Path, case: Case, findings: Findings) -> list[Path]:
+    if not (run_dir / "tables" / "thermo.parquet").is_file():
+        return []
+    return [_save(run_dir, "fill", _fill(run_dir, case, findings))]
+
+
+def _draw_drop(run_dir: Path, case: Case, findings: Findings) -> list[Path]:
+    return [_save(run_dir, "drop", _drop(run_dir, findings))]
+
+
+def _save(run_dir: Path, name: str, figure: Figure) -> Path:
+    """Write a picture to a temporary file and then put it in its place."""
+    path = run_dir / "figures" / f"{name}.png"
+    path.parent.mkdir(exist_ok=True)
+    draft = path.with_name(f".{path.name}.tmp")
+    figure.savefig(draft, format="png", dpi=DPI)
+    draft.replace(path)
+    return path
+
+
+def _figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
+    """Return a figure without a window: such a figure is drawn by Agg wherever it is saved."""
+    return Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+# --- forces over time ------------------------------------------------------------------------
+
+
+def _forces(run_dir: Path, case: Case, findings: Findings) -> Figure:
+    """Drag and lateral force over process time, as Fig. 4a of Uhlmann et al. (2015)."""
+    time_s, drag, lateral, counted = _drag_trace(run_dir, case)
+    figure = _figure(3.6)
+    axes = figure.subplots()
+    axes.plot(time_s, lateral, color=ORANGE, linewidth=0.7, label="lateral (left of motion)")
+    axes.plot(time_s, drag, color=BLUE, linewidth=0.8, label="drag (along motion)")
+    run_in = float(time_s[counted][0])
+    axes.axvspan(float(time_s[0]), run_in, color="#d9dde2", alpha=0.6, linewidth=0, label="run-in")
+    ours = findings["forces"]["drag_n"]
+    stretch = [run_in, float(time_s[-1])]
+    axes.fill_between(stretch, ours["ci_low"], ours["ci_high"], color="black", alpha=0.15, lw=0)
+    label = f"mean drag {ours['mean']:.2f} N, 95 % interval {_span(ours, 'ci_low', 'ci_high')} N"
+    axes.plot(stretch, [ours["mean"]] * 2, color="black", label=label)
+    for row, colour in zip(findings["comparison"], cycle((RED, GREEN, GREY)), strict=False):
+        text = f"{row['label']} mean {row['mean_n']:.2f} N" + _spread(row)
+        axes.plot(stretch, [row["mean_n"]] * 2, linestyle="--", color=colour, label=text)
+    axes.set(xlabel="process time in s", ylabel="force on the tool in N", xlim=(0, time_s[-1]))
+    axes.set_title(_reliability(ours))
+    _legend_below(figure, axes)
+    return figure
+
+
+def _spread(row: Findings) -> str:
+    source = f" ({row['source']})" if row["source"] else ""
+    return source if row["sd_n"] is None else f" ± {row['sd_n']:.2f} N{source}"
+
+
+def _span(row: Findings, low: str = "low", high: str = "high") -> str:
+    return f"{row[low]:.2f} to {row[high]:.2f}"
+
+
+def _reliability(ours: Findings) -> str:
+    text = f"drag {ours['mean']:.2f} ± {ours['sd']:.2f} N (± standard deviation)"
+    effective = f"{ours['effective_samples']:.0f} effective samples"
+    return f"{text}, {effective}" + ("" if ours["reliable"] else ": short series, interval unsure")
+
+
+def _legend_below(figure: Figure, axes: Axes, columns: int = 2) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower left", ncols=columns)
+
+
+def _drag_trace(run_dir: Path, case: Case) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
+    """Return process time, drag, lateral force and what counts, of the drag alone."""
+    columns = ["time_s", "phase", "drag_n", "lateral_n", "counted"]
+    table = read_table(run_dir / "tables" / "rod_force.parquet", columns)
+    table = table[table["phase"] == "drag"]
+    drag, lateral = (table[name].to_numpy(np.float64) for name in ("drag_n", "lateral_n"))
+    time_s = table["time_s"].to_numpy(np.float64) - drag_start_s(case)
+    return time_s, drag, lateral, table["counted"].to_numpy(bool)
+
+
+# --- around the tool -------------------------------------------------------------------------
+
+
+def _around_tool(findings: Findings) -> Figure:
+    """Mean normal force by bearing, ahead up."""
+    edges = np.asarray(findings["bearing"]["edges_rad"])
+    value, low, high = _bars(findings["bearing"]["force_n"])
+    figure = _figure(4.6, 5.4)
+    axes: Any = figure.add_subplot(projection="polar")
+    axes.set_theta_zero_location("N")
+    middle = (edges[:-1] + edges[1:]) / 2
+    colours = np.where(np.abs(middle) < np.pi / 2, BLUE, ORANGE)
+    axes.bar(middle, value, width=np.diff(edges), color=colours, edgecolor="white", linewidth=0.6)
+    axes.errorbar(
+        middle, value, [value - low, high - value], fmt="none", ecolor="black", elinewidth=0.8
+    )
+    names = ["ahead", "45°", "left", "135°", "behind", "-135°", "right", "-45°"]
+    axes.set_thetagrids(np.arange(0, 360, 45), names)
+    axes.set_rlabel_position(112.5)
+    sums = findings["ahead_behind"]
+    figure.suptitle(
+        "normal force on the tool by bearing from the direction of motion,\n"
+        f"mean of a frame in N per {np.degrees(edges[1] - edges[0]):.0f}° (bars: 95 % interval)\n"
+        f"ahead {sums['ahead_n']['value']:.2f} N, behind {sums['behind_n']['value']:.2f} N, "
+        + _ratio(sums["ratio"]),
+        fontsize=9,
+        x=0.02,
+        ha="left",
+    )
+    return figure
+
+
+def _ratio(ratio: Findings) -> str:
+    if ratio["value"] is None:
+        return "no contact behind"
+    high = "unbounded" if ratio["high"] is None else f"{ratio['high']:.1f}"
+    return f"ratio {ratio['value']:.1f} (95 %: {ratio['low']:.1f} to {high})"
+
+
+def _bars(columns: Findings) -> tuple[Floats, Floats, Floats]:
+    value, low, high = (np.array(columns[k], dtype=np.float64) for k in ("value", "low", "high"))
+    return value, np.minimum(low, value), np.maximum(high, value)
+
+
+def _depth(findings: Findings) -> Figure:
+    """Normal force of a contact, and of all contacts together, against depth."""
+    depth = findings["depth"]
+    edges = np.asarray(depth["edges_m"]) * 1e3
+    slope = depth["slope_n_m"]
+    figure = _figure(3.9)
+    left, right = figure.subplots(1, 2, sharey=True)
+    _depth_panel(left, edges, depth["contact_n"], 1.0, BLUE)
+    left.set(xlabel="mean normal force of a contact in N", ylabel="depth below the surface in mm")
+    left.set_title(
+        f"slope {slope['value'] * 1e-3:.4f} N/mm\n"
+        f"(95 %: {slope['low'] * 1e-3:.4f} to {slope['high'] * 1e-3:.4f})"
+    )
+    _depth_panel(right, edges, depth["line_n_m"], 1e-3, GREEN)
+    right.set(xlabel="normal force of all contacts in N per mm of depth")
+    right.set_title("the deepest bin holds the contacts\nof the tool's edge and end")
+    left.invert_yaxis()
+    return figure
+
+
+def _depth_panel(axes: Axes, edges: Floats, columns: Findings, unit: float, colour: str) -> None:
+    value, low, high = (numbers * unit for numbers in _bars(columns))
+    middle = (edges[:-1] + edges[1:]) / 2
+    axes.barh(middle, value, height=0.9 * np.diff(edges), color=colour, alpha=0.75)
+    axes.errorbar(
+        value, middle, xerr=[value - low, high - value], fmt="none", ecolor="black", elinewidth=0.9
+    )
+
+
+# --- chains against peaks --------------------------------------------------------------------
+
+
+def _chains_peaks(run_dir: Path, findings: Findings) -> Figure:
+    """Resistance with its peaks over the bottleneck of the dominant rod path."""
+    case = load_case(run_dir)
+    time_s, drag, _, counted = _drag_trace(run_dir, case)
+    network = read_table(run_dir / "tables" / "network.parquet", ["step", "time_s"])
+    chains = read_table(run_dir / "tables" / "chains.parquet", ["step", "dominant", "bottleneck_n"])
+    figure = _figure(4.4)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    peaks = findings["peaks"]
+    upper.plot(time_s[counted], drag[counted], color=BLUE, linewidth=0.8)
+    upper.plot(peaks["process_time_s"], peaks["drag_n"], "v", color=RED, label="peaks")
+    upper.invert_yaxis()
+    upper.set(ylabel="drag in N (downwards: less)")
+    upper.set_title(f"{peaks['count']} peaks, at least {peaks['separation_s']:.2f} s apart")
+    frame_s = network["time_s"].to_numpy(np.float64) - drag_start_s(case)
+    lower.plot(frame_s, dominant_bottlenecks(network, chains), ".-", color=GREEN, markersize=4)
+    for moment in peaks["process_time_s"]:
+        lower.axvline(moment, color=RED, linewidth=0.7, linestyle=":")
+        upper.axvline(moment, color=RED, linewidth=0.7, linestyle=":")
+    lower.set(xlabel="process time in s", ylabel="bottleneck of the\ndominant rod path in N")
+    lower.set_ylim(bottom=0)
+    lower.set_title(_link(findings["association"]))
+    return figure
+
+
+def _link(found: Findings) -> str:
+    if found["rank_correlation"] is None:
+        return "one of the two series is constant: no correlation"
+    return (
+        f"rank correlation of resistance and bottleneck {found['rank_correlation']:+.2f}, "
+        f"p = {found['p_value']:.3f} (circular shifts of {found['frames']} frames)"
+    )
+
+
+# --- the network -----------------------------------------------------------------------------
+
+
+def _network(
+    shown: scene.Scene, view: scene.View, image: NDArray[np.uint8], extent: Floats
+) -> Figure:
+    """Set a rendered view on axes in mm, with what it shows named."""
+    height = 5.6 * (extent[3] - extent[2]) / (extent[1] - extent[0]) + 0.9
+    figure = _figure(height, 6.9)
+    axes = figure.subplots()
+    axes.imshow(image, extent=tuple(extent.tolist()), interpolation="antialiased")
+    axes.grid(False)
+    axes.set(xlabel="x in mm", ylabel=f"{view[1]} in mm", xlim=extent[:2], ylim=extent[2:])
+    pick = [0, 1] if view == "xy" else [0, 2]
+    _mark_chain(axes, shown, pick)
+    _mark_motion(axes, shown, pick)
+    largest = float(shown.frame.normal_force.max(initial=0.0))
+    scale = ScalarMappable(Normalize(0.0, largest), scene.colour_map())
+    bar = figure.colorbar(scale, ax=axes, shrink=0.8, pad=0.02)
+    bar.set_label("normal force of a contact in N; cylinder radius in proportion")
+    side = "from above" if view == "xy" else "from the side"
+    axes.set_title(
+        f"contact network {side}, process time {shown.process_time_s:.2f} s; "
+        f"largest normal force {largest:.2f} N\n" + _chain_text(shown)
+    )
+    return figure
+
+
+def _chain_text(shown: scene.Scene) -> str:
+    if shown.dominant is None:
+        return "no path of strong contacts from tool to bowl"
+    forces = shown.frame.normal_force[list(shown.dominant.contacts)]
+    return (
+        f"outlined: dominant path from tool to bowl, {len(shown.dominant.balls)} balls, "
+        f"weakest contact {forces.min():.2f} N"
+    )
+
+
+def _mark_chain(axes: Axes, shown: scene.Scene, pick: Sequence[int]) -> None:
+    if shown.dominant is None:
+        return
+    frame, path = shown.frame, shown.dominant
+    balls = list(path.balls)
+    ends = frame.point[[path.contacts[0], path.contacts[-1]]]
+    line = np.vstack([ends[:1], frame.centre[balls], ends[1:]])[:, pick] * 1e3
+    axes.plot(*line.T, color="white", linewidth=3.0, alpha=0.9)
+    axes.plot(*line.T, color=CHAIN, linewidth=1.6)
+    for centre, radius in zip(frame.centre[balls][:, pick], frame.radius[balls], strict=True):
+        for colour, width in (("white", 3.0), (CHAIN, 1.6)):
+            axes.add_patch(
+                Circle(centre * 1e3, radius * 1e3, fill=False, edgecolor=colour, linewidth=width)
+            )
+
+
+def _mark_motion(axes: Axes, shown: scene.Scene, pick: Sequence[int]) -> None:
+    """Draw the direction of motion from the tool, as far as this view shows it."""
+    heading = shown.frame.heading_rad
+    direction = np.array([np.cos(heading), np.sin(heading), 0.0])
+    start = shown.tool_m[pick] * 1e3
+    end = start + 12.0 * direction[pick]
+    if np.linalg.norm(end - start) < 1.0:
+        return
+    arrow = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.8}
+    axes.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=arrow)
+    axes.annotate("motion", xy=tuple(end), xytext=(3, 4), textcoords="offset points", weight="bold")
+
+
+# --- fill and drop ---------------------------------------------------------------------------
+
+
+def kinetic_energy_ratio(kinetic_energy_j: Floats, balls: Floats, case: Case) -> Floats:
+    """Return the mean kinetic energy of a ball over the one gained by falling its diameter.
+
+    As ``kinetic_energy_ratio`` of ``fill.json``, with mean mass and radius from the study.
+    """
+    mean, sd = case.media.radius_mean_m, case.media.radius_sd_m
+    mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * (mean**3 + 3.0 * mean * sd**2)
+    return np.asarray(kinetic_energy_j / balls / (mass * case.gravity_m_s2 * 2.0 * mean))
+
+
+def _fill(run_dir: Path, case: Case, findings: Findings) -> Figure:
+    """Kinetic energy ratio over time, with the bed that came of it."""
+    table = read_table(run_dir / "tables" / "thermo.parquet")
+    table = table[table["balls"] > 0]
+    ratio = kinetic_energy_ratio(
+        table["kinetic_energy_j"].to_numpy(np.float64), table["balls"].to_numpy(np.float64), case
+    )
+    bed = findings["bed"]
+    figure = _figure(3.2)
+    axes = figure.subplots()
+    axes.semilogy(table["time_s"], ratio, color=BLUE)
+    axes.axhline(bed["kinetic_energy_ratio"], color=GREEN, linestyle="--", linewidth=1.0)
+    for phase in case.phases[1:]:
+        moment = phase.start_step * case.timestep_s
+        axes.axvline(moment, color=GREY, linewidth=0.8, linestyle=":")
+        axes.annotate(
+            phase.name, (moment, 0.98), xycoords=("data", "axes fraction"), va="top", rotation=90
+        )
+    axes.set(xlabel="simulated time in s", ylabel="kinetic energy ratio")
+    axes.set_title(
+        f"{bed['balls']} balls, height {bed['fill_height_m'] * 1e3:.1f} mm, solid fraction "
+        f"{bed['solid_fraction']:.3f}; at the end the mean kinetic energy of a ball is "
+        f"{bed['kinetic_energy_ratio']:.1e}\nof that gained by falling its own diameter"
+    )
+    return figure
+
+
+def _drop(run_dir: Path, findings: Findings) -> Figure:
+    """Force over time of each impact."""
+    output = load_outputs(run_dir)["impacts"]
+    blocks = list(iter_prints(run_dir, output))
+    time_s, force_n = (
+        np.concatenate([np.asarray(block[name], dtype=np.float64) for block in blocks])
+        for name in ("time_s", "force_n")
+    )
+    impacts, ratio = findings["impacts"], findings["restitution"]
+    figure = _figure(3.2)
+    panels = np.atleast_1d(figure.subplots(1, len(impacts["start_time_s"]), sharey=True))
+    for number, axes in enumerate(panels):
+        start = impacts["start_time_s"][number]
+        duration = impacts["duration_s"][number]
+        near = (time_s >= start - 0.3 * duration) & (time_s <= start + 1.3 * duration)
+        axes.plot((time_s[near] - start) * 1e6, force_n[near], color=BLUE)
+        axes.set_title(
+            f"impact {number + 1}: peak {impacts['peak_force_n'][number]:.2f} N\n"
+            f"{impacts['time_since_first_s'][number] * 1e3:.1f} ms after the first, "
+            f"e = {impacts['restitution'][number]:.3f}",
+            fontsize=8,
+        )
+        axes.set_xlabel("time in µs")
+    panels[0].set_ylabel("force on the ball in N")
+    figure.suptitle(
+        f"restitution {ratio['mean']:.3f} ({ratio['lowest']:.3f} to {ratio['highest']:.3f}) "
+        f"with {ratio['input']:.3f} in the deck",
+        fontsize=9.5,
+        x=0.02,
+        ha="left",
+    )
+    return figure

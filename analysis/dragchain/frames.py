@@ -1,0 +1,196 @@
+"""The contact network frame by frame, as arrays that the network and chain measures share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from .errors import TableError
+
+BALL, ROD, FLOOR, SIDE = 1, 0, -1, -2
+"""The other body of a contact; the last three are the ``b_id`` of the contacts table."""
+
+KINDS = {BALL: "ball", ROD: "rod", FLOOR: "floor", SIDE: "side"}
+
+_POINT = ["point_x_m", "point_y_m", "point_z_m"]
+_FORCE = ["force_x_n", "force_y_n", "force_z_n"]
+_CONTACTS = ["step", "time_s", "a_id", "b_id", *_POINT, *_FORCE, "normal_force_n"]
+_BALLS = ["step", "ball_id", "x_m", "y_m", "z_m", "radius_m"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class NetworkFrame:
+    """One frame of the contact network; N balls and M contacts.
+
+    Attributes
+    ----------
+    step, time_s, heading_rad
+        When the frame was written, and the tool's direction of motion in the xy plane then.
+    ball_id : (N,) int
+        The balls, sorted.
+    centre, radius : (N, 3) and (N,) float
+        Their centres and radii in m.
+    a, b : (M,) int
+        A contact's ball and its other body, as rows of the ball arrays; ``b`` is -1 where the
+        other body is no ball.
+    other : (M,) int
+        What the other body is: `ROD`, `FLOOR`, `SIDE` or `BALL`.
+    point, force : (M, 3) float
+        Contact point in m and the force on ball ``a`` in N.
+    normal_force : (M,) float
+        Normal force in N, positive in compression.
+    """
+
+    step: int
+    time_s: float
+    heading_rad: float
+    ball_id: Ints
+    centre: Floats
+    radius: Floats
+    a: Ints
+    b: Ints
+    other: Ints
+    point: Floats
+    force: Floats
+    normal_force: Floats
+
+    def between_balls(self) -> NDArray[np.bool_]:
+        """Tell which contacts are between two balls, (M,) bool."""
+        return np.equal(self.other, BALL)
+
+    def mean_force_n(self) -> float:
+        """Return the mean normal force of all contacts in N, 0 for a frame without contacts."""
+        return float(self.normal_force.mean()) if self.normal_force.size else 0.0
+
+
+def frame_of(
+    contacts: pd.DataFrame, balls: pd.DataFrame, step: int, time_s: float, heading_rad: float
+) -> NetworkFrame:
+    """Return the frame that rows of the contacts and balls tables of one step describe.
+
+    Raises
+    ------
+    TableError
+        If a contact names a ball that the frame does not have.
+    """
+    balls = balls.sort_values("ball_id")
+    ball_id = balls["ball_id"].to_numpy(np.int64)
+    b_id = contacts["b_id"].to_numpy(np.int64)
+    b = np.full(b_id.shape, -1, dtype=np.int64)
+    b[b_id > 0] = _rows_of(b_id[b_id > 0], ball_id, step)
+    return NetworkFrame(
+        step=step,
+        time_s=time_s,
+        heading_rad=heading_rad,
+        ball_id=ball_id,
+        centre=balls[["x_m", "y_m", "z_m"]].to_numpy(np.float64),
+        radius=balls["radius_m"].to_numpy(np.float64),
+        a=_rows_of(contacts["a_id"].to_numpy(np.int64), ball_id, step),
+        b=b,
+        other=np.where(b_id > 0, BALL, b_id),
+        point=contacts[_POINT].to_numpy(np.float64),
+        force=contacts[_FORCE].to_numpy(np.float64),
+        normal_force=contacts["normal_force_n"].to_numpy(np.float64),
+    )
+
+
+def _rows_of(ids: Ints, ball_id: Ints, step: int) -> Ints:
+    """Return the row of each id in the sorted `ball_id`."""
+    unknown = ids[~np.isin(ids, ball_id)]
+    if unknown.size:
+        raise TableError(
+            f"contacts of step {step} name ball {unknown[0]}, which balls.parquet does not have "
+            "in that step: make the tables again from whole dumps"
+        )
+    return np.searchsorted(ball_id, ids)
+
+
+def counted_range(rod_force: pd.DataFrame) -> tuple[int, int]:
+    """Return the first and the last step of the drag that statistics count.
+
+    Raises
+    ------
+    TableError
+        If no sample is counted, or if the counted samples are not one stretch.
+    """
+    counted = rod_force["counted"].to_numpy(bool)
+    where = np.flatnonzero(counted)
+    if not where.size:
+        raise TableError(
+            "rod_force.parquet holds no counted sample: the run ended before the drag's run-in "
+            "was over; run longer or set a shorter statistics.run_in_s"
+        )
+    if not counted[where[0] : where[-1] + 1].all():
+        raise TableError("the counted samples of rod_force.parquet are not one stretch")
+    step = rod_force["step"].to_numpy(np.int64)
+    return int(step[where[0]]), int(step[where[-1]])
+
+
+def read_frames(run_dir: Path, steps: tuple[int, int] | None = None) -> Iterator[NetworkFrame]:
+    """Yield the network frames of a process run in the order of their steps.
+
+    Parameters
+    ----------
+    run_dir
+        The folder of the run, with ``tables/`` made.
+    steps
+        First and last step to read; by default the stretch that statistics count.
+
+    Raises
+    ------
+    TableError
+        If a table is missing or the tables contradict each other.
+    """
+    tables = run_dir / "tables"
+    rod_force = read_table(tables / "rod_force.parquet", ["step", "heading_rad", "counted"])
+    first, last = counted_range(rod_force) if steps is None else steps
+    contacts = _stretch(tables / "contacts.parquet", _CONTACTS, first, last)
+    balls = _stretch(tables / "balls.parquet", [*_BALLS, "time_s"], first, last)
+    contact_rows = contacts.groupby("step").indices
+    ball_rows = balls.groupby("step").indices
+    heading_step = rod_force["step"].to_numpy(np.int64)
+    heading = np.unwrap(rod_force["heading_rad"].to_numpy(np.float64))
+    for step in np.unique(balls["step"].to_numpy(np.int64)).tolist():
+        of_step = balls.iloc[ball_rows[step]]
+        yield frame_of(
+            contacts.iloc[contact_rows.get(step, [])],
+            of_step,
+            step,
+            float(of_step["time_s"].iloc[0]),
+            float(np.interp(step, heading_step, heading)),
+        )
+
+
+def read_table(path: Path, columns: list[str] | None = None) -> pd.DataFrame:
+    """Read a table, or say which command makes it.
+
+    Raises
+    ------
+    TableError
+        If the file is not there.
+    """
+    if not path.is_file():
+        raise TableError(f"{path} is not there: run `dragchain tables {path.parent.parent}`")
+    return pd.read_parquet(path, columns=columns)
+
+
+def _stretch(path: Path, columns: list[str], first: int, last: int) -> pd.DataFrame:
+    if not path.is_file():
+        return read_table(path)
+    limits = [("step", ">=", first), ("step", "<=", last)]
+    return pd.read_parquet(path, columns=columns, filters=limits)
+
+
+def write_parquet(table: pd.DataFrame, path: Path) -> None:
+    """Write a table to a temporary file beside `path` and then put it in its place."""
+    draft = path.with_name(path.name + ".part")
+    table.to_parquet(draft, index=False)
+    draft.replace(path)

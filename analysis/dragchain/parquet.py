@@ -1,0 +1,122 @@
+"""Parquet tables that are either whole or not there."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from .formats import is_integer_column
+
+GROUP_ROWS = 131_072
+"""Rows of a row group: what a table holds in memory while it is written."""
+
+CATEGORY = pa.dictionary(pa.int8(), pa.string())
+"""Type of a column that holds one of a few texts."""
+
+
+def table_schema(columns: Mapping[str, pa.DataType]) -> pa.Schema:
+    """Make the schema of a table whose columns are never empty."""
+    return pa.schema([pa.field(name, kind, nullable=False) for name, kind in columns.items()])
+
+
+def column_type(name: str) -> pa.DataType:
+    """Tell a column's type by its name: ids int64, labels text, flags bool, else float64."""
+    if name in ("phase", "kind"):
+        return CATEGORY
+    if name == "counted":
+        return pa.bool_()
+    if name == "impact" or is_integer_column(name):
+        return pa.int64()
+    return pa.float64()
+
+
+class TableWriter:
+    """A Parquet file that appears under its name only once it is whole.
+
+    Use it as a context manager. Rows are collected into row groups, so memory
+    does not grow with the table. If the block ends in an exception, nothing is
+    left behind, and an older table of that name stays as it was.
+
+    Parameters
+    ----------
+    file : Path
+        The table's final name; its folder is made if need be.
+    columns : sequence of str
+        Its columns in order; `column_type` gives their types.
+    """
+
+    def __init__(self, file: Path, columns: tuple[str, ...]) -> None:
+        self.file = file
+        self.schema = table_schema({name: column_type(name) for name in columns})
+        self.rows = 0
+        self._temporary = file.with_name(f".{file.name}.{os.getpid()}.tmp")
+        self._batches: list[pa.RecordBatch] = []
+        self._held = 0
+
+    def __enter__(self) -> Self:
+        """Open the temporary file."""
+        self.file.parent.mkdir(parents=True, exist_ok=True)
+        self._writer = pq.ParquetWriter(self._temporary, self.schema, compression="zstd")
+        return self
+
+    def write(self, columns: Mapping[str, Any]) -> None:
+        """Append rows; `columns` maps every column's name to an array of one length."""
+        arrays = [
+            value if isinstance(value, pa.Array) else pa.array(value, type=kind)
+            for value, kind in ((columns[field.name], field.type) for field in self.schema)
+        ]
+        batch = pa.RecordBatch.from_arrays(arrays, schema=self.schema)
+        if batch.num_rows == 0:
+            return
+        self._batches.append(batch)
+        self._held += batch.num_rows
+        if self._held >= GROUP_ROWS:
+            self._flush()
+
+    def _flush(self) -> None:
+        if self._batches:
+            table = pa.Table.from_batches(self._batches, schema=self.schema)
+            self._writer.write_table(table, row_group_size=max(self._held, 1))
+        self.rows += self._held
+        self._batches, self._held = [], 0
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Give the file its name, or remove it after an exception."""
+        try:
+            if kind is None:
+                self._flush()
+            self._writer.close()
+            if kind is None:
+                os.replace(self._temporary, self.file)
+        finally:
+            self._temporary.unlink(missing_ok=True)
+
+
+def category(codes: Any, labels: tuple[str, ...]) -> pa.Array:
+    """Make a dictionary column from indices into `labels`, shape (N,)."""
+    indices = pa.array(codes, type=pa.int8())
+    return pa.DictionaryArray.from_arrays(indices, pa.array(labels, type=pa.string()))
+
+
+def write_json(file: Path, content: Mapping[str, object]) -> None:
+    """Write a JSON file that appears under its name only once it is whole."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    temporary = file.with_name(f".{file.name}.{os.getpid()}.tmp")
+    try:
+        text = json.dumps(content, indent=1, allow_nan=False)
+        temporary.write_text(text + "\n", encoding="utf-8")
+        os.replace(temporary, file)
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,225 @@
+"""Contacts on the tool: their geometry joined with the forces that were applied.
+
+``rod_contacts`` says where the balls touch the tool, but its forces are
+evaluated a second time for output; ``rod_balls`` says what force each ball
+received. One `RodFrame` joins the two for one step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .case import Output
+from .dumps import iter_frames
+from .errors import TableError
+from .formats import Frame
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ROD_MESH, BOWL_MESH = 0, 1
+"""``mesh_id`` of a contact when the bowl is a mesh too."""
+
+_POINT = ("point_x_m", "point_y_m", "point_z_m")
+_CENTRE = ("x_m", "y_m", "z_m")
+_FORCE = ("force_x_n", "force_y_n", "force_z_n")
+
+
+@dataclass(frozen=True)
+class WallContacts:
+    """N contacts of balls with one body, forces **on the balls**.
+
+    Attributes
+    ----------
+    ball_id, facet_id : (N,) ndarray of int64
+        The ball and the facet of the body.
+    point_m : (N, 3) ndarray
+        Contact point.
+    force_n, evaluated_n : (N, 3) ndarray
+        Force on the ball as applied, and as the engine evaluated it for output.
+    normal : (N, 3) ndarray
+        Unit vector from the contact point to the ball's centre; zero where the
+        ball received no force, because no centre is written then.
+    overlap_m : (N,) ndarray
+        Overlap.
+    silent : (N,) ndarray of bool
+        Contacts of balls that received no force: they overlap, but damping
+        would have made the force attractive and the engine cuts that to zero.
+    """
+
+    ball_id: Ints
+    facet_id: Ints
+    point_m: Floats
+    force_n: Floats
+    evaluated_n: Floats
+    normal: Floats
+    overlap_m: Floats
+    silent: NDArray[np.bool_]
+
+    def select(self, mask: NDArray[np.bool_]) -> WallContacts:
+        """Keep the contacts of a mask of shape (N,)."""
+        return WallContacts(*(getattr(self, name)[mask] for name in self.__dataclass_fields__))
+
+    def normal_force_n(self) -> Floats:
+        """Component of the force along the normal, shape (N,), positive in compression."""
+        return np.asarray(np.einsum("ij,ij->i", self.force_n, self.normal))
+
+    def tangential_force_n(self) -> Floats:
+        """Magnitude of what remains of the force, shape (N,)."""
+        return tangential_force(self.force_n, self.normal)
+
+
+@dataclass(frozen=True)
+class RodFrame:
+    """What touches the meshes at one step.
+
+    Attributes
+    ----------
+    step : int
+        The step.
+    rod, bowl : WallContacts
+        Contacts on the tool and, if the bowl is a mesh, on the bowl.
+    unplaced_n : (K, 3) ndarray
+        Forces applied to balls for which no contact was written.
+    """
+
+    step: int
+    rod: WallContacts
+    bowl: WallContacts
+    unplaced_n: Floats
+
+
+def tangential_force(force_n: Floats, normal: Floats) -> Floats:
+    """Magnitude of the part of (N, 3) forces that is normal to (N, 3) unit vectors."""
+    along = np.einsum("ij,ij->i", force_n, normal)[:, None] * normal
+    return np.asarray(np.linalg.norm(force_n - along, axis=1))
+
+
+def iter_rod_frames(run_dir: Path, outputs: Mapping[str, Output]) -> Iterator[RodFrame]:
+    """Contacts on the tool, step by step.
+
+    Parameters
+    ----------
+    run_dir : Path
+        The run folder.
+    outputs : mapping of str to Output
+        Must hold ``rod_balls`` and ``rod_contacts``.
+
+    Yields
+    ------
+    RodFrame
+        One for each step of the two outputs.
+
+    Raises
+    ------
+    TableError
+        If the two outputs hold different steps, or a ball comes twice.
+    DumpError
+        If one of them cannot be read.
+    """
+    balls = iter_frames(run_dir, outputs["rod_balls"])
+    contacts = iter_frames(run_dir, outputs["rod_contacts"])
+    for ball_frame, contact_frame in zip_longest(balls, contacts):
+        if ball_frame is None or contact_frame is None:
+            raise TableError("one of rod_balls and rod_contacts ends before the other")
+        yield join_rod_frame(ball_frame, contact_frame)
+
+
+def join_rod_frame(balls: Frame, contacts: Frame) -> RodFrame:
+    """Give every contact the force that its ball received.
+
+    The force of a ball with one contact is that contact's. A ball with k
+    contacts received A in all while E_1 ... E_k were evaluated for output:
+    contact i gets E_i + (A - sum of E) / k, so that the contacts of a ball add
+    up to what moved it.
+
+    Parameters
+    ----------
+    balls, contacts : Frame
+        ``rod_balls`` and ``rod_contacts`` of one step.
+
+    Returns
+    -------
+    RodFrame
+        The contacts, sorted by ball and facet.
+
+    Raises
+    ------
+    TableError
+        If the frames are of different steps, or a ball comes twice.
+    """
+    if balls.step != contacts.step:
+        raise TableError(
+            f"rod_balls has step {balls.step} where rod_contacts has step {contacts.step};"
+            " both must be written with one period"
+        )
+    ball_ids = np.asarray(balls.columns["ball_id"], dtype=np.int64)
+    order = np.argsort(ball_ids)
+    order = order[(balls.vectors(*_FORCE)[order] != 0.0).any(axis=1)]
+    known = ball_ids[order]
+    if (np.diff(known) == 0).any():
+        raise TableError(f"step {balls.step}: rod_balls holds a ball more than once")
+    applied = balls.vectors(*_FORCE)[order]
+    centres = balls.vectors(*_CENTRE)[order]
+    all_contacts = _place(_sorted(contacts), known, applied, centres)
+    unplaced = ~np.isin(known, all_contacts.ball_id)
+    on_bowl = _sorted(contacts).columns.get("mesh_id", np.zeros(contacts.rows)) == BOWL_MESH
+    return RodFrame(
+        balls.step,
+        all_contacts.select(~on_bowl),
+        all_contacts.select(on_bowl),
+        applied[unplaced],
+    )
+
+
+def _sorted(contacts: Frame) -> Frame:
+    order = np.lexsort((contacts.columns["facet_id"], contacts.columns["ball_id"]))
+    return Frame(contacts.step, {name: col[order] for name, col in contacts.columns.items()})
+
+
+def _place(contacts: Frame, known: Ints, applied: Floats, centres: Floats) -> WallContacts:
+    """Join contacts with the balls `known`, whose forces and centres are given in that order."""
+    ids = np.asarray(contacts.columns["ball_id"], dtype=np.int64)
+    at = np.searchsorted(known, ids)
+    silent = ~np.isin(ids, known)
+    at[silent] = 0
+    evaluated = contacts.vectors(*_FORCE)
+    force = np.zeros_like(evaluated)
+    normal = np.zeros_like(evaluated)
+    points = contacts.vectors(*_POINT)
+    loud = ~silent
+    force[loud] = _share(evaluated[loud], at[loud], applied)
+    normal[loud] = _unit(centres[at[loud]] - points[loud])
+    return WallContacts(
+        ball_id=ids,
+        facet_id=np.asarray(contacts.columns["facet_id"], dtype=np.int64),
+        point_m=points,
+        force_n=force,
+        evaluated_n=evaluated,
+        normal=normal,
+        overlap_m=np.asarray(contacts.columns["overlap_m"], dtype=np.float64),
+        silent=silent,
+    )
+
+
+def _share(evaluated: Floats, at: Ints, applied: Floats) -> Floats:
+    """Correct (N, 3) evaluated forces to add up to (K, 3) applied ones, ball by ball."""
+    count = np.bincount(at, minlength=len(applied))
+    total = np.column_stack(
+        [np.bincount(at, weights=evaluated[:, k], minlength=len(applied)) for k in range(3)]
+    )
+    missing = (applied - total)[at] / count[at][:, None]
+    return np.where(count[at][:, None] == 1, applied[at], evaluated + missing)
+
+
+def _unit(vectors: Floats) -> Floats:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    if (length == 0.0).any():
+        raise TableError("a contact point on the tool coincides with a ball's centre")
+    return np.asarray(vectors / length)

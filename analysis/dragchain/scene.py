@@ -1,0 +1,272 @@
+"""Pictures of the interaction network, as in Fig. 4b and 4c of Uhlmann et al. (2015).
+
+One cylinder a contact: from centre to centre of two balls, or from a ball's centre to its contact
+point with rod or bowl. Its colour runs from green (no force) to red (the frame's largest normal
+force), its radius is proportional to the normal force and reaches the mean ball radius at the
+largest.
+
+The pictures are rendered off screen by VTK. On a machine without a display that needs EGL with a
+software driver: on Debian and Ubuntu the packages ``libegl1`` and ``libgl1-mesa-dri``.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from .case import Case
+from .chains import RodPath, dominant_path, rod_paths
+from .collect import drag_start_s
+from .errors import DragchainError, TableError
+from .forces import needed
+from .frames import Floats, NetworkFrame, read_frames, read_table
+
+View = Literal["xy", "xz"]
+
+PICTURE_TIME_S = 4.5
+"""Process time, counted from the start of the drag, at which the paper shows the network."""
+
+COLOURS = ("#1e8f4e", "#f0c929", "#c8102e")
+_PIXELS_PER_MM = 14
+_SIDES = 18
+_MARGIN_M = 0.004
+
+
+class RenderError(DragchainError):
+    """Off-screen rendering does not work on this machine."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What one picture shows; lengths in m, forces in N.
+
+    Attributes
+    ----------
+    frame : NetworkFrame
+        The network frame.
+    tool_m : (3,) float
+        Centre of the tool's bottom face at the frame.
+    tool_start_m : (3,) float
+        The same at step 0, where the tool's STL file stands.
+    dominant : RodPath or None
+        The frame's dominant rod path.
+    process_time_s : float
+        Time since the drag began.
+    """
+
+    frame: NetworkFrame
+    tool_m: Floats
+    tool_start_m: Floats
+    dominant: RodPath | None
+    process_time_s: float
+
+
+def segments(frame: NetworkFrame) -> Floats:
+    """Return the axis of each contact's cylinder, (M, 2, 3) in m."""
+    end = frame.point.copy()
+    inner = frame.between_balls()
+    end[inner] = frame.centre[frame.b[inner]]
+    return np.stack([frame.centre[frame.a], end], axis=1)
+
+
+def cylinder_radii(normal_force_n: Floats, radius_mean_m: float) -> Floats:
+    """Return radii proportional to the force, the largest being the mean ball radius, (M,) in m."""
+    largest = normal_force_n.max(initial=0.0)
+    if largest <= 0.0:
+        return np.zeros_like(normal_force_n)
+    return np.asarray(np.clip(normal_force_n, 0.0, None) / largest * radius_mean_m)
+
+
+def picture_step(steps: Floats, process_time_s: Floats, wanted_s: float = PICTURE_TIME_S) -> int:
+    """Return the step nearest to `wanted_s`, or the last one if the frames do not reach that far.
+
+    Parameters
+    ----------
+    steps, process_time_s : (N,) array
+        The counted network frames; N is at least 1.
+    wanted_s
+        Time since the drag began.
+    """
+    period = np.diff(process_time_s).max(initial=0.0)
+    inside = process_time_s[0] - period <= wanted_s <= process_time_s[-1] + period
+    row = int(np.abs(process_time_s - wanted_s).argmin()) if inside else -1
+    return int(steps[row])
+
+
+def load_scene(run_dir: Path, case: Case) -> Scene:
+    """Read what the picture of a process run shows.
+
+    Raises
+    ------
+    TableError
+        If a table is missing or holds no counted network frame.
+    """
+    tables = run_dir / "tables"
+    network = read_table(tables / "network.parquet", ["step", "time_s"])
+    start_s = drag_start_s(case)
+    step = picture_step(
+        network["step"].to_numpy(np.float64), network["time_s"].to_numpy(np.float64) - start_s
+    )
+    frame = next(read_frames(run_dir, (step, step)), None)
+    if frame is None:
+        raise TableError(f"balls.parquet lacks step {step}, which network.parquet has")
+    rod = read_table(tables / "rod_force.parquet", ["step", "ref_x_m", "ref_y_m", "ref_z_m"])
+    return Scene(
+        frame=frame,
+        tool_m=_reference_point(rod, step),
+        tool_start_m=_reference_point(rod, 0),
+        dominant=dominant_path(frame, rod_paths(frame)),
+        process_time_s=frame.time_s - start_s,
+    )
+
+
+def _reference_point(rod: pd.DataFrame, step: int) -> Floats:
+    """Return the reference point at a step; before the first sample along its first motion."""
+    at = rod["step"].to_numpy(np.float64)
+    point = rod[["ref_x_m", "ref_y_m", "ref_z_m"]].to_numpy(np.float64)
+    if step < at[0] and len(at) > 1:
+        return np.asarray(point[0] + (step - at[0]) / (at[1] - at[0]) * (point[1] - point[0]))
+    return np.array([np.interp(step, at, column) for column in point.T])
+
+
+def check_rendering() -> None:
+    """Render one empty picture in a process of its own, for VTK ends the process where it cannot.
+
+    Raises
+    ------
+    RenderError
+        If that process fails.
+    """
+    _prefer_egl()
+    code = "import pyvista; pyvista.Plotter(off_screen=True, window_size=(8, 8)).screenshot()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise RenderError(
+            f"off-screen rendering ended with status {done.returncode}: "
+            f"{done.stderr[-300:].strip()}\n  remedy: "
+            "install EGL with a software driver (Debian, Ubuntu: libegl1 and libgl1-mesa-dri)"
+        )
+
+
+def _prefer_egl() -> None:
+    """Spare VTK the search for an X server where there is none."""
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+
+def render(run_dir: Path, case: Case, scene: Scene, view: View) -> tuple[NDArray[np.uint8], Floats]:
+    """Render one view in parallel projection.
+
+    Returns
+    -------
+    image : (H, W, 3) array of uint8
+        The picture.
+    extent : (4,) array
+        Its left, right, lower and upper edge in mm along the axes of `view`.
+    """
+    _prefer_egl()
+    import pyvista as pv
+
+    low, high = _limits(case, view)
+    size = np.ceil((high - low) * 1e3 * _PIXELS_PER_MM).astype(int)
+    plotter: Any = pv.Plotter(off_screen=True, window_size=size.tolist(), lighting="light kit")
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.enable_depth_peeling(number_of_peels=8)
+    _add_bowl(plotter, case, view)
+    _add_tool(plotter, run_dir, case, scene)
+    _add_contacts(plotter, scene.frame, case.media.radius_mean_m)
+    _look(plotter, (low + high) / 2, float(high[1] - low[1]), view)
+    image: NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
+    plotter.close()
+    return image, np.array([low[0], high[0], low[1], high[1]]) * 1e3
+
+
+def _limits(case: Case, view: View) -> tuple[Floats, Floats]:
+    reach = needed(case.bowl, "bowl").radius_m + _MARGIN_M
+    if view == "xy":
+        return np.array([-reach, -reach]), np.array([reach, reach])
+    return np.array([-reach, -_MARGIN_M]), np.array(
+        [reach, 1.25 * needed(case.surface_m, "surface_m")]
+    )
+
+
+def _look(plotter: Any, middle: Floats, height: float, view: View) -> None:
+    x, other = middle
+    camera = plotter.camera
+    camera.focal_point = (x, other, 0.0) if view == "xy" else (x, 0.0, other)
+    camera.position = (x, other, 1.0) if view == "xy" else (x, -1.0, other)
+    camera.up = (0.0, 1.0, 0.0) if view == "xy" else (0.0, 0.0, 1.0)
+    camera.parallel_projection = True
+    camera.parallel_scale = height / 2
+    plotter.renderer.reset_camera_clipping_range()
+
+
+def _add_bowl(plotter: Any, case: Case, view: View) -> None:
+    import pyvista as pv
+
+    radius = needed(case.bowl, "bowl").radius_m
+    height = 1.2 * needed(case.surface_m, "surface_m")
+    wall = pv.Cylinder(
+        center=(0, 0, height / 2),
+        direction=(0, 0, 1),
+        radius=radius,
+        height=height,
+        resolution=120,
+        capping=False,
+    )
+    floor = pv.Disc(inner=0.0, outer=radius, c_res=120)
+    plotter.add_mesh(wall, color="#7a8694", opacity=0.04)
+    plotter.add_mesh(floor, color="#7a8694", opacity=0.06 if view == "xy" else 0.5)
+    ring = pv.Disc(inner=radius, outer=radius + 0.0006, c_res=120)
+    plotter.add_mesh(ring, color="#4a5561")
+
+
+def _add_tool(plotter: Any, run_dir: Path, case: Case, scene: Scene) -> None:
+    import pyvista as pv
+
+    path = run_dir / needed(case.tool, "tool").mesh
+    if not path.is_file():
+        raise TableError(f"{path} is not there, though case.json names it as the tool's mesh")
+    tool: Any = pv.read(path)
+    tool = tool.translate(scene.tool_m - scene.tool_start_m, inplace=False)
+    plotter.add_mesh(tool, color="#59636e", opacity=0.45)
+
+
+def _add_contacts(plotter: Any, frame: NetworkFrame, radius_mean_m: float) -> None:
+    import pyvista as pv
+
+    shown = np.flatnonzero(frame.normal_force > 0.0)
+    if not shown.size:
+        return
+    force = frame.normal_force[shown]
+    axis = segments(frame)[shown]
+    lines = np.arange(2 * shown.size).reshape(-1, 2)
+    mesh = pv.PolyData(axis.reshape(-1, 3), lines=np.insert(lines, 0, 2, axis=1).ravel())
+    mesh["force"] = np.repeat(force, 2)
+    mesh["radius"] = np.repeat(cylinder_radii(force, radius_mean_m), 2)
+    tubes = mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES, capping=True)
+    plotter.add_mesh(
+        tubes,
+        scalars="force",
+        cmap=colour_map(),
+        clim=(0.0, force.max()),
+        ambient=0.35,
+        diffuse=0.7,
+        show_scalar_bar=False,
+    )
+
+
+def colour_map() -> Any:
+    """Return the colour map of the pictures, green over yellow to red."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("network", list(COLOURS))

@@ -1,0 +1,184 @@
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from dragchain.errors import TableError
+from dragchain.frames import NetworkFrame, counted_range, frame_of, read_frames
+from dragchain.network import (
+    contact_counts,
+    coordination_number,
+    frame_statistics,
+    mechanical_coordination_number,
+    write_chains,
+)
+
+CONTACT_COLUMNS = [
+    "step", "time_s", "kind", "a_id", "b_id", "point_x_m", "point_y_m", "point_z_m",
+    "force_x_n", "force_y_n", "force_z_n", "normal_force_n", "tangential_force_n", "overlap_m",
+]  # fmt: skip
+BALL_COLUMNS = ["step", "time_s", "ball_id", "x_m", "y_m", "z_m", "radius_m"]
+KIND = {0: "ball-rod", -1: "ball-floor", -2: "ball-side"}
+
+
+def contact_rows(step: int, rows: list[tuple[int, int, float]]) -> pd.DataFrame:
+    return pd.DataFrame(
+        [
+            [
+                step,
+                step * 1e-3,
+                KIND.get(b, "ball-ball"),
+                a,
+                b,
+                0.0,
+                0.0,
+                0.0,
+                f,
+                0.0,
+                0.0,
+                f,
+                0.0,
+                1e-6,
+            ]
+            for a, b, f in rows
+        ],
+        columns=CONTACT_COLUMNS,
+    )
+
+
+def ball_rows(step: int, ids: list[int]) -> pd.DataFrame:
+    rows = [[step, step * 1e-3, ball, 0.01 * ball, 0.0, 0.03, 0.003] for ball in ids]
+    return pd.DataFrame(rows, columns=BALL_COLUMNS)
+
+
+def a_frame(rows: list[tuple[int, int, float]], ids: list[int]) -> NetworkFrame:
+    return frame_of(contact_rows(1, rows), ball_rows(1, ids), 1, 0.001, 0.0)
+
+
+# ball 7 touches four balls and the rod, the others fewer; ball 9 touches nothing
+STAR = [(7, 1, 4.0), (2, 7, 3.0), (7, 3, 2.0), (7, 4, 1.0), (7, 0, 5.0), (1, -1, 2.0), (4, -2, 4.0)]
+STAR_IDS = [9, 7, 1, 2, 3, 4]
+
+
+def test_counts_of_a_star() -> None:
+    frame = a_frame(STAR, STAR_IDS)
+    assert dict(zip(frame.ball_id.tolist(), contact_counts(frame).tolist(), strict=True)) == {
+        1: 2, 2: 1, 3: 1, 4: 2, 7: 5, 9: 0,
+    }  # fmt: skip
+
+
+def test_statistics_of_a_star() -> None:
+    found = frame_statistics(a_frame(STAR, STAR_IDS))
+    assert found["balls"] == 6
+    assert found["contacts"] == 7
+    assert found["ball_ball_contacts"] == 4
+    assert found["ball_rod_contacts"] == 1
+    assert found["ball_floor_contacts"] == 1
+    assert found["ball_side_contacts"] == 1
+    assert found["coordination_number"] == pytest.approx(11 / 6)
+    assert found["mechanical_coordination_number"] == pytest.approx(5.0)
+    assert found["rattler_share"] == pytest.approx(5 / 6)
+    assert found["normal_force_mean_n"] == pytest.approx(3.0)
+    assert found["normal_force_max_n"] == 5.0
+    assert found["above_mean_share"] == pytest.approx(3 / 7)
+
+
+def test_least_of_two_is_the_formula_of_thornton() -> None:
+    # N = 6, N0 = 1 and N1 = 2 by hand; 11 ends of contacts
+    counts = contact_counts(a_frame(STAR, STAR_IDS))
+    assert mechanical_coordination_number(counts, least=2) == pytest.approx((11 - 2) / (6 - 1 - 2))
+
+
+def test_a_frame_without_contacts_is_not_zero_but_unknown() -> None:
+    found = frame_statistics(a_frame([], [1, 2]))
+    assert found["coordination_number"] == 0.0
+    assert math.isnan(found["mechanical_coordination_number"])
+    assert math.isnan(found["normal_force_mean_n"])
+    assert math.isnan(found["above_mean_share"])
+
+
+def test_no_balls_have_no_coordination() -> None:
+    assert math.isnan(coordination_number(np.array([], dtype=np.int64)))
+
+
+def test_a_contact_with_an_unknown_ball_is_refused() -> None:
+    with pytest.raises(TableError, match="step 1 name ball 5"):
+        a_frame([(1, 5, 1.0)], [1, 2])
+
+
+def samples(steps: list[int], counted: list[bool]) -> pd.DataFrame:
+    heading = np.linspace(3.0, 3.0 + 0.1 * len(steps), len(steps))
+    wrapped = np.angle(np.exp(1j * heading))
+    return pd.DataFrame({"step": steps, "heading_rad": wrapped, "counted": counted})
+
+
+def test_counted_range_is_first_and_last_counted_step() -> None:
+    assert counted_range(samples([0, 10, 20, 30], [False, True, True, False])) == (10, 20)
+
+
+def test_an_uncounted_run_is_refused() -> None:
+    with pytest.raises(TableError, match="no counted sample"):
+        counted_range(samples([0, 10], [False, False]))
+
+
+def test_a_gap_in_the_counted_stretch_is_refused() -> None:
+    with pytest.raises(TableError, match="one stretch"):
+        counted_range(samples([0, 10, 20], [True, False, True]))
+
+
+@pytest.fixture
+def run_dir(tmp_path: Path) -> Path:
+    """Return a run folder with frames at 0, 10, 20 and 30, of which 10 and 20 are counted."""
+    tables = tmp_path / "tables"
+    tables.mkdir()
+    steps = list(range(0, 40, 5))
+    samples(steps, [10 <= step <= 25 for step in steps]).to_parquet(tables / "rod_force.parquet")
+    frames = {0: STAR, 10: STAR, 20: [], 30: STAR}
+    contacts = [contact_rows(step, rows) for step, rows in frames.items()]
+    pd.concat([table for table in contacts if len(table)]).to_parquet(tables / "contacts.parquet")
+    balls = [ball_rows(step, STAR_IDS if step != 20 else [1, 2]) for step in frames]
+    pd.concat(balls).to_parquet(tables / "balls.parquet")
+    return tmp_path
+
+
+def test_frames_follow_the_count_of_balls_and_may_be_empty(run_dir: Path) -> None:
+    frames = list(read_frames(run_dir))
+    assert [frame.step for frame in frames] == [10, 20]
+    assert [frame.ball_id.size for frame in frames] == [6, 2]
+    assert [frame.normal_force.size for frame in frames] == [7, 0]
+
+
+def test_a_frame_has_the_heading_of_its_step(run_dir: Path) -> None:
+    table = pd.read_parquet(run_dir / "tables" / "rod_force.parquet")
+    for frame in read_frames(run_dir):
+        expected = table.loc[table["step"] == frame.step, "heading_rad"].iloc[0]
+        assert math.cos(frame.heading_rad - expected) == pytest.approx(1.0)
+
+
+def test_write_chains_writes_counted_frames_only(run_dir: Path) -> None:
+    write_chains(run_dir)
+    network = pd.read_parquet(run_dir / "tables" / "network.parquet")
+    chains = pd.read_parquet(run_dir / "tables" / "chains.parquet")
+    assert network["step"].tolist() == [10, 20]
+    assert network["contacts"].tolist() == [7, 0]
+    assert set(chains["step"]) == {10}
+    path = chains[chains["definition"] == "rod_path"].iloc[0]
+    assert list(path["ball_ids"]) == [7, 1] or not path["reaches_bowl"]
+    assert not list((run_dir / "tables").glob("*.part"))
+
+
+def test_a_missing_table_names_the_command(run_dir: Path) -> None:
+    (run_dir / "tables" / "contacts.parquet").unlink()
+    with pytest.raises(TableError, match="dragchain tables"):
+        write_chains(run_dir)
+
+
+def test_a_stretch_without_frames_is_refused(run_dir: Path) -> None:
+    tables = run_dir / "tables"
+    samples([11, 15], [True, True]).to_parquet(tables / "rod_force.parquet")
+    with pytest.raises(TableError, match="no network frame"):
+        write_chains(run_dir)

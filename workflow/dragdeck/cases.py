@@ -1,0 +1,238 @@
+"""Cases of a study and the names of its engine runs.
+
+A case is one combination of the matrix at one fidelity. Each scene of a case
+is an engine run, named by what it depends on and nothing more: cases that
+share a fill share its run.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import itertools
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+from dragdeck.errors import InputError
+from dragdeck.study import STUDY_FILE, MeshShape, Study, read_yaml, validate
+
+SceneName = Literal["drop", "fill", "process"]
+SCENES: tuple[SceneName, ...] = ("drop", "fill", "process")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One combination of a study's matrix.
+
+    Attributes
+    ----------
+    file : Path
+        The study file.
+    settings : mapping
+        The matrix fields and their values in this case.
+    study : Study
+        With those values in place; its matrix is empty.
+    """
+
+    file: Path
+    settings: Mapping[str, Any]
+    study: Study
+
+    @property
+    def study_name(self) -> str:
+        """Name of the study: its folder's."""
+        return self.file.parent.name
+
+    @property
+    def name(self) -> str:
+        """Readable name: the fidelity and the matrix values."""
+        parts = [f"{field.rsplit('.', 1)[-1]}-{value}" for field, value in self.settings.items()]
+        return _slug("_".join([self.study.fidelity, *parts]))
+
+    @cached_property
+    def run_ids(self) -> Mapping[SceneName, str]:
+        """Run id of each scene: a readable slug and 8 hex digits of what the run depends on."""
+        study = self.study
+        slugs: dict[SceneName, str] = {
+            "drop": f"{study.media.material}-on-{study.workpiece.material}",
+            "fill": f"{study.media.count}-balls",
+            "process": self.name,
+        }
+        return {scene: f"{_slug(slugs[scene])}-{_digest(self.content(scene))}" for scene in SCENES}
+
+    def content(self, scene: SceneName) -> dict[str, Any]:
+        """The plain values that one scene of this case depends on."""
+        builders = {"drop": _drop_content, "fill": _fill_content, "process": self._process_content}
+        return builders[scene](self.study)
+
+    def _process_content(self, study: Study) -> dict[str, Any]:
+        fidelity = study.chosen_fidelity().model_dump(mode="json")
+        content: dict[str, Any] = {
+            "fill": _fill_content(study),
+            "materials": _materials(study, study.workpiece.material),
+            "pair": study.pair(study.media.material, study.workpiece.material).model_dump(),
+            "workpiece": study.workpiece.model_dump(mode="json"),
+            "motion": study.motion.model_dump(mode="json"),
+            "outputs": study.outputs.model_dump(mode="json"),
+            "fidelity": fidelity,
+        }
+        if isinstance(study.workpiece.shape, MeshShape):
+            content["mesh"] = _file_digest(mesh_file(self, study.workpiece.shape))
+        return content
+
+
+def load_cases(file: Path, fidelity: str | None = None) -> list[Case]:
+    """All cases of a study file.
+
+    Parameters
+    ----------
+    file : Path
+        The study file.
+    fidelity : str, optional
+        Instead of the study's own.
+
+    Raises
+    ------
+    InputError
+        The file cannot be used; the message names field, value and limit.
+    """
+    data = read_yaml(file)
+    if fidelity is not None:
+        data["fidelity"] = fidelity
+    validate({**data, "matrix": {}}, file)
+    matrix = validate(data, file).matrix
+    found = []
+    for settings in _combinations(matrix, file):
+        combined = copy.deepcopy({**data, "matrix": {}})
+        for field, value in settings.items():
+            _set(combined, field, value, file)
+        found.append(Case(file, settings, validate(combined, file)))
+    return found
+
+
+def study_file(studies: Path, name: str) -> Path:
+    """The file of a study by name.
+
+    Raises
+    ------
+    InputError
+        No such study; lists those there are.
+    """
+    file = studies / name / STUDY_FILE
+    if not file.is_file():
+        known = sorted(found.parent.name for found in studies.glob(f"*/{STUDY_FILE}"))
+        raise InputError(
+            f"unknown study {name!r}",
+            file=studies,
+            limit=f"one of: {', '.join(known) or 'none here'}",
+            remedy=f"choose one of these, or make {file}",
+        )
+    return file
+
+
+def mesh_file(case: Case, shape: MeshShape) -> Path:
+    """The file of a mesh: beside the study, in its meshes/, or in the project's meshes/.
+
+    Raises
+    ------
+    InputError
+        No such file in any of these places.
+    """
+    folder = case.file.parent
+    places = (folder, folder / "meshes", folder.parent.parent / "meshes")
+    for place in places:
+        if (place / shape.file).is_file():
+            return place / shape.file
+    raise InputError(
+        "no such mesh file",
+        file=case.file,
+        field="workpiece.shape.file",
+        value=shape.file,
+        limit="a file in " + ", ".join(str(place) for place in places),
+        remedy="put the mesh there, or correct the name",
+    )
+
+
+def _combinations(matrix: Mapping[str, list[Any]], file: Path) -> Iterator[dict[str, Any]]:
+    for field, values in matrix.items():
+        if not values:
+            raise InputError("no values", file=file, field=f"matrix.{field}", remedy="give some")
+        if len({json.dumps(value, sort_keys=True) for value in values}) < len(values):
+            raise InputError(
+                "a value is given twice",
+                file=file,
+                field=f"matrix.{field}",
+                value=values,
+                remedy="remove one",
+            )
+    for combination in itertools.product(*matrix.values()):
+        yield dict(zip(matrix, combination, strict=True))
+
+
+def _set(data: dict[str, Any], field: str, value: Any, file: Path) -> None:
+    *parents, last = field.split(".")
+    place = data
+    for name in parents:
+        place = place.setdefault(name, {})
+        if not isinstance(place, dict):
+            raise InputError(
+                "leads through a value",
+                file=file,
+                field=f"matrix.{field}",
+                remedy="give the dotted name of one field",
+            )
+    place[last] = value
+
+
+def _drop_content(study: Study) -> dict[str, Any]:
+    ball, plate = study.media.material, study.workpiece.material
+    return {
+        "materials": _materials(study, ball, plate),
+        "pair": study.pair(ball, plate).model_dump(mode="json"),
+        "radius_m": study.media.radius_mean_m,
+        "gravity_m_s2": study.gravity_m_s2,
+        "contact": study.contact.model_dump(mode="json"),
+        "drop": study.drop.model_dump(mode="json"),
+    }
+
+
+def _fill_content(study: Study) -> dict[str, Any]:
+    ball, bowl = study.media.material, study.bowl.material
+    fidelity = study.chosen_fidelity()
+    return {
+        "materials": _materials(study, ball, bowl),
+        "pairs": [study.pair(ball, other).model_dump(mode="json") for other in (ball, bowl)],
+        "types": len(study.type_names()),
+        "media": study.media.model_dump(mode="json"),
+        "bowl": study.bowl.model_dump(mode="json"),
+        "gravity_m_s2": study.gravity_m_s2,
+        "contact": study.contact.model_dump(mode="json"),
+        "fill": study.fill.model_dump(mode="json"),
+        "seed": study.seed,
+        "fidelity": fidelity.model_dump(
+            mode="json",
+            include={"youngs_modulus_scale", "fill_timestep_fraction", "skin_m", "ranks"},
+        ),
+    }
+
+
+def _materials(study: Study, *names: str) -> dict[str, Any]:
+    return {name: study.materials[name].model_dump(mode="json") for name in sorted(set(names))}
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+
+def _file_digest(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def _slug(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.")

@@ -1,0 +1,157 @@
+"""The ``dragdeck`` command."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from dragdeck import __version__
+from dragdeck.cases import SCENES, Case, SceneName
+from dragdeck.errors import DragdeckError, InputError
+from dragdeck.project import Project, by_run, find_project, study_templates
+from dragdeck.scenes import Scene, drop_scene, fill_scene, process_scene
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; errors of the user's go to standard error without a traceback."""
+    options = _parser().parse_args(arguments)
+    try:
+        options.action(options)
+    except DragdeckError as error:
+        print(f"dragdeck: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="dragdeck", description="Decks and runs for LIGGGHTS.")
+    parser.add_argument("--version", action="version", version=f"dragdeck {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    check = commands.add_parser("check", help="check a study and the engine, run nothing")
+    check.set_defaults(action=_check)
+    explain = commands.add_parser("explain", help="what the decks model, leave out and cost")
+    explain.set_defaults(action=_explain)
+    cases = commands.add_parser("cases", help="list the cases of a study and their runs")
+    cases.set_defaults(action=_cases)
+    render = commands.add_parser("render", help="write the deck of one run")
+    render.set_defaults(action=_render)
+    for command in (check, explain, cases, render):
+        command.add_argument("study", help="name of a folder in studies/")
+        command.add_argument("--fidelity", help="instead of the study's own")
+    explain.add_argument("scene", nargs="?", choices=SCENES, help="one scene only")
+    render.add_argument("scene", choices=SCENES)
+    render.add_argument("run", help="run id, as `dragdeck cases` lists it")
+    render.add_argument("--fill-table", type=Path, help="fill.json of the settled bed (process)")
+
+    run = commands.add_parser("run", help="run the deck in a folder, or go on with it")
+    run.set_defaults(action=_run)
+    run.add_argument("folder", type=Path)
+    run.add_argument("--again", action="store_true", help="start anew, even if it failed before")
+    run.add_argument(
+        "--every", type=float, default=10.0, metavar="S", help="seconds between reports"
+    )
+    return parser
+
+
+def _scene(case: Case, scene: SceneName, surface_m: float | None = None) -> Scene:
+    if scene == "drop":
+        return drop_scene(case)
+    if scene == "fill":
+        return fill_scene(case)
+    return process_scene(case, surface_m)
+
+
+def _check(options: argparse.Namespace) -> None:
+    from dragdeck.engine import find_engine
+    from dragdeck.render import deck_text, environment
+
+    project = find_project(Path.cwd())
+    cases = project.cases(options.study, options.fidelity)
+    templates = environment(project.templates, study_templates(cases[0]))
+    warnings: dict[str, None] = {}
+    for name in SCENES:
+        for case in by_run(cases, name).values():
+            scene = _scene(case, name)
+            deck_text(scene, templates)
+            warnings.update(dict.fromkeys(f"{case.name}: {text}" for text in scene.warnings))
+    for warning in warnings:
+        print(f"warning: {warning}")
+    print(f"{options.study}: {len(cases)} case(s) can be run; LIGGGHTS {find_engine().version}")
+
+
+def _explain(options: argparse.Namespace) -> None:
+    from dragdeck.explain import expected_cost, explanation, show
+
+    project = find_project(Path.cwd())
+    cases = project.cases(options.study, options.fidelity)
+    names: tuple[SceneName, ...] = (options.scene,) if options.scene else SCENES
+    scenes = [_scene(case, name) for name in names for case in by_run(cases, name).values()]
+    results = project.root / "results" / options.study
+    show(explanation(scene, expected_cost(scene, results / scene.deck.scene)) for scene in scenes)
+
+
+def _cases(options: argparse.Namespace) -> None:
+    from rich.table import Table
+
+    from dragdeck.explain import show
+
+    project = find_project(Path.cwd())
+    table = Table("case", *SCENES)
+    for case in project.cases(options.study, options.fidelity):
+        table.add_row(case.name, *(case.run_ids[scene] for scene in SCENES))
+    show([table])
+
+
+def _render(options: argparse.Namespace) -> None:
+    from dragdeck.render import environment, write_run
+
+    project = find_project(Path.cwd())
+    case = _case_of_run(project, options)
+    scene = _scene(case, options.scene, _surface(options))
+    for warning in scene.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    templates = environment(project.templates, study_templates(case))
+    write_run(scene, project.run_folder(case, options.scene), templates)
+
+
+def _case_of_run(project: Project, options: argparse.Namespace) -> Case:
+    runs = by_run(project.cases(options.study, options.fidelity), options.scene)
+    if options.run not in runs:
+        raise InputError(
+            f"no {options.scene} run of this name",
+            file=f"studies/{options.study}",
+            value=options.run,
+            limit=f"one of: {', '.join(runs)}",
+            remedy="list them with: dragdeck cases",
+        )
+    return runs[options.run]
+
+
+def _surface(options: argparse.Namespace) -> float | None:
+    """Height of the settled bed; a process deck is never written on a guess."""
+    if options.scene != "process":
+        return None
+    if options.fill_table is None:
+        raise InputError(
+            "a process needs the settled bed",
+            field="--fill-table",
+            remedy="give the fill.json that dragchain made of the fill",
+        )
+    return float(json.loads(options.fill_table.read_text(encoding="utf-8"))["fill_height_m"])
+
+
+def _run(options: argparse.Namespace) -> None:
+    from dragdeck.runner import run
+
+    def report(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    run(options.folder, report, again=options.again, every_s=options.every)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

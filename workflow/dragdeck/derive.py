@@ -1,0 +1,77 @@
+"""Numbers that follow from a study: moduli, time steps, contact times.
+
+Every function is plain arithmetic on SI values.
+"""
+
+from __future__ import annotations
+
+import math
+
+from dragdeck.study import Material
+
+SOLID_FRACTION_ESTIMATE = 0.59
+"""Solid fraction of a poured bed about twelve balls wide, an estimate used only
+for expectations before the bed exists (measured beds replace it)."""
+
+DENSEST_RANDOM_PACKING = 0.64
+"""Random close packing of equal balls (Scott and Kilgour 1969, 0.6366)."""
+
+
+def shear_modulus(material: Material, scale: float = 1.0) -> float:
+    """Shear modulus G = E / (2 (1 + nu)), Pa, with E scaled by `scale`."""
+    return scale * material.youngs_modulus_pa / (2 * (1 + material.poissons_ratio))
+
+
+def effective_modulus(first: Material, second: Material, scale: float = 1.0) -> float:
+    """Effective modulus of a contact, Pa (Johnson 1985, Contact Mechanics, eq. 4.21 ff.)."""
+    compliance = sum(
+        (1 - material.poissons_ratio**2) / (scale * material.youngs_modulus_pa)
+        for material in (first, second)
+    )
+    return 1 / compliance
+
+
+def rayleigh_time(material: Material, radius_m: float, scale: float = 1.0) -> float:
+    """Time of a Rayleigh wave over half a ball's circumference, s.
+
+    Thornton and Randall 1988; Sheng et al. 2004, Powder Technology 139, eq. 12:
+    pi R sqrt(rho / G) / (0.1631 nu + 0.8766).
+    """
+    wave = math.sqrt(material.density_kg_m3 / shear_modulus(material, scale))
+    return math.pi * radius_m * wave / (0.1631 * material.poissons_ratio + 0.8766)
+
+
+def ball_mass(material: Material, radius_m: float) -> float:
+    """Mass of a ball, kg."""
+    return 4 / 3 * math.pi * radius_m**3 * material.density_kg_m3
+
+
+def hertz_contact_time(
+    mass_kg: float, radius_m: float, modulus_pa: float, speed_m_s: float
+) -> float:
+    """Duration of an elastic impact, s (Johnson 1985, eq. 11.24).
+
+    Parameters
+    ----------
+    mass_kg, radius_m, modulus_pa : float
+        Effective mass, radius and modulus of the two bodies.
+    speed_m_s : float
+        Relative normal speed.
+    """
+    stiffness = mass_kg**2 / (radius_m * modulus_pa**2 * speed_m_s)
+    return 2.87 * float(stiffness**0.2)
+
+
+def hertz_overlap(force_n: float, radius_m: float, modulus_pa: float) -> float:
+    """Overlap under a static normal force, m (Johnson 1985, eq. 4.23)."""
+    return float((3 * force_n / (4 * modulus_pa * math.sqrt(radius_m))) ** (2 / 3))
+
+
+def fall_speed(height_m: float, gravity_m_s2: float) -> float:
+    """Speed after a free fall from rest, m/s."""
+    return math.sqrt(2 * gravity_m_s2 * height_m)
+
+
+def bed_height(volume_m3: float, bowl_radius_m: float, solid_fraction: float) -> float:
+    """Height of a bed of balls of that total volume, m."""
+    return volume_m3 / (solid_fraction * math.pi * bowl_radius_m**2)

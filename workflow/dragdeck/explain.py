@@ -1,0 +1,85 @@
+"""What a deck models, what it leaves out, and what it is expected to cost."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from dragdeck.scenes import Scene
+
+ASSUMED_BALL_STEPS_PER_S = {"drop": 1.5e6, "fill": 9e6, "process": 7e6}
+"""Balls times steps a second, seen on two shared cores with two ranks. Stands
+in until a run of the same study and scene has been measured here."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """An expected cost and where the expectation comes from."""
+
+    steps: int
+    wall_time_s: float
+    source: str
+
+
+def expected_cost(scene: Scene, results: Path) -> Cost:
+    """Steps and wall time to expect.
+
+    Parameters
+    ----------
+    scene : Scene
+    results : Path
+        The folder of the study's runs of this scene: measured ones are used.
+    """
+    count = 1 if scene.deck.scene == "drop" else scene.case["media"]["count"]
+    measured = list(_measured(results))
+    if measured:
+        rate = sum(measured) / len(measured)
+        return Cost(scene.steps, scene.steps / rate, f"{len(measured)} run(s) of this study here")
+    rate = ASSUMED_BALL_STEPS_PER_S[scene.deck.scene] / count
+    return Cost(scene.steps, scene.steps / rate, "assumed: no run of this study measured here")
+
+
+def _measured(results: Path) -> Iterable[float]:
+    for file in results.glob("*/run.json"):
+        speed = json.loads(file.read_text(encoding="utf-8"))["steps_per_s"]
+        if speed:
+            yield float(speed)
+
+
+def explanation(scene: Scene, cost: Cost) -> Table:
+    """The table of one scene."""
+    deck = scene.deck
+    table = Table(title=f"{deck.study}: {deck.scene} {deck.run}", title_justify="left")
+    table.add_column("")
+    table.add_column("what", style="bold")
+    table.add_column("why or how much")
+    for what, why in scene.models.items():
+        table.add_row("models", what, why)
+    table.add_section()
+    for what, why in scene.leaves_out.items():
+        table.add_row("leaves out", what, why)
+    table.add_section()
+    rayleigh = scene.case["rayleigh_time_s"]
+    share = deck.timestep_s / rayleigh
+    table.add_row("costs", "time step", f"{deck.timestep_s:.3g} s, {100 * share:.3g} % of Rayleigh")
+    table.add_row("", "steps", f"about {cost.steps:,}")
+    minutes, seconds = divmod(round(cost.wall_time_s), 60)
+    table.add_row("", "wall time", f"about {minutes} min {seconds:02d} s ({cost.source})")
+    for warning in scene.warnings:
+        table.add_section()
+        table.add_row("warning", warning, "", style="yellow")
+    return table
+
+
+def show(tables: Iterable[Table]) -> None:
+    """Print tables, wide enough for their text when nobody looks at a terminal."""
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=120)
+    for table in tables:
+        console.print(table)

@@ -1,0 +1,122 @@
+"""The balls before they fall: their radii and first positions.
+
+The engine gets every ball by name from a data file instead of inserting them at
+random: exactly the asked number with exactly the asked mean and spread, without
+a chance to fall short, at a cost that grows linearly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from dragdeck.errors import InputError
+
+Array = NDArray[np.float64]
+
+CUTOFF_SD = 2.5
+"""Radii lie within this many standard deviations of the untruncated normal."""
+
+SPACING = 1.2
+"""Lattice spacing over the largest diameter: room to jitter, and to fall."""
+
+FIRST_SPEED_M_S = 0.3
+"""Standard deviation of each component of the balls' first velocities."""
+
+
+@dataclass(frozen=True)
+class Balls:
+    """Balls in the air above the bowl's floor.
+
+    Attributes
+    ----------
+    radii_m : (N,) array
+    positions_m : (N, 3) array
+        Centres; no two balls touch.
+    velocities_m_s : (N, 3) array
+    """
+
+    radii_m: Array
+    positions_m: Array
+    velocities_m_s: Array
+
+    @property
+    def top_m(self) -> float:
+        """Height of the highest point, m."""
+        return float((self.positions_m[:, 2] + self.radii_m).max())
+
+    @property
+    def volume_m3(self) -> float:
+        """Total volume of the balls, m3."""
+        return float((4 / 3 * np.pi * self.radii_m**3).sum())
+
+
+def radii(count: int, mean_m: float, sd_m: float) -> Array:
+    """Radii of a truncated normal distribution whose sample mean and spread are exact.
+
+    Quantiles of the normal distribution cut at `CUTOFF_SD`, then centred and
+    scaled: their mean is `mean_m` and their standard deviation (population
+    form) is `sd_m`, to rounding.
+
+    Returns
+    -------
+    (count,) array
+        In ascending order, m.
+    """
+    if count == 1 or sd_m == 0:
+        return np.full(count, mean_m)
+    tail = stats.norm.cdf(-CUTOFF_SD)
+    levels = tail + (1 - 2 * tail) * (np.arange(count) + 0.5) / count
+    scores = stats.norm.ppf(levels)
+    scores = (scores - scores.mean()) / scores.std()
+    return np.asarray(mean_m + sd_m * scores, dtype=np.float64)
+
+
+def pour(ball_radii_m: Array, bowl_radius_m: float, seed: int) -> Balls:
+    """Place balls on a jittered lattice inside a cylinder, in random order.
+
+    Parameters
+    ----------
+    ball_radii_m : (N,) array
+    bowl_radius_m : float
+    seed : int
+        Of the order of the radii, the jitter and the first velocities.
+
+    Raises
+    ------
+    InputError
+        The largest ball does not fit into the bowl.
+    """
+    random = np.random.default_rng(seed)
+    largest = float(ball_radii_m.max())
+    sites = _sites(len(ball_radii_m), bowl_radius_m, largest)
+    jitter = (SPACING - 1) * largest * 0.999
+    return Balls(
+        radii_m=random.permutation(ball_radii_m),
+        positions_m=sites + random.uniform(-jitter, jitter, sites.shape),
+        velocities_m_s=random.normal(0.0, FIRST_SPEED_M_S, sites.shape),
+    )
+
+
+def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Array:
+    """The lowest `count` points of a square lattice in the bowl, (count, 3)."""
+    step = 2 * SPACING * largest_m
+    reach = bowl_radius_m - SPACING * largest_m
+    if reach < 0:
+        raise InputError(
+            "the largest ball does not fit into the bowl with room to fall",
+            field="media.radius_mean_m",
+            value=f"largest radius {largest_m:.6g} m",
+            limit=f"below {bowl_radius_m / SPACING:.6g} m in a bowl of radius {bowl_radius_m:g} m",
+            remedy="use smaller balls or a wider bowl",
+        )
+    line = np.arange(-np.floor(reach / step), np.floor(reach / step) + 1) * step
+    x, y = (grid.ravel() for grid in np.meshgrid(line, line))
+    inside = x**2 + y**2 <= reach**2
+    layer = np.column_stack([x[inside], y[inside]])
+    layers = -(-count // len(layer))
+    heights = np.repeat(SPACING * largest_m + step * np.arange(layers), len(layer))
+    return np.column_stack([np.tile(layer, (layers, 1)), heights])[:count]

@@ -1,0 +1,177 @@
+"""From a scene to the files of its run folder."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import jinja2.meta
+
+from dragdeck.errors import InputError
+from dragdeck.mesh import write_stl
+from dragdeck.scenes import Scene
+
+DECK_FILE = "in.liggghts"
+CASE_FILE = "case.json"
+COLUMNS_FILE = "columns.json"
+
+
+def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
+    """The Jinja environment: a study's own templates first, then the project's.
+
+    Parameters
+    ----------
+    project : Path
+        The project's folder of templates. Its files are also known as
+        ``base/<name>``, so that a study's template of the same name can extend
+        the one it replaces.
+    study : Path, optional
+        The study's folder of templates.
+    """
+    folders = [str(study)] if study is not None and study.is_dir() else []
+    loader = jinja2.ChoiceLoader(
+        [
+            jinja2.FileSystemLoader([*folders, str(project)]),
+            jinja2.PrefixLoader({"base": jinja2.FileSystemLoader(str(project))}),
+        ]
+    )
+    found = jinja2.Environment(
+        loader=loader,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    found.filters["num"] = number
+    found.filters["nums"] = numbers
+    return found
+
+
+def number(value: float) -> str:
+    """A number that reads back exactly."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError(f"{value!r} is not a number")
+    return repr(value)
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Numbers that read back exactly, with spaces between."""
+    return " ".join(number(value) for value in values)
+
+
+def deck_text(scene: Scene, templates: jinja2.Environment) -> str:
+    """The deck of a scene.
+
+    Raises
+    ------
+    InputError
+        A template cannot be used: names template, line and what is missing.
+    """
+    name = f"{scene.deck.scene}.in.j2"
+    try:
+        template = templates.get_template(name)
+        deck = replace(scene.deck, templates=_used(templates, name))
+        return template.render(deck=deck)
+    except jinja2.TemplateSyntaxError as error:
+        raise InputError(
+            f"template syntax: {error.message}",
+            file=error.filename or error.name,
+            field=f"line {error.lineno}",
+        ) from None
+    except jinja2.TemplateNotFound as error:
+        raise InputError(
+            "no such template",
+            file=name,
+            value=error.name,
+            remedy="put it into the study's templates/",
+        ) from None
+    except (jinja2.UndefinedError, TypeError) as error:
+        file, line = _place(error, templates)
+        raise InputError(
+            f"a value is missing: {error}",
+            file=file,
+            field=f"line {line}",
+            remedy="correct the name, or set it in the template; docs/templates.md lists the values",
+        ) from None
+
+
+def _place(error: Exception, templates: jinja2.Environment) -> tuple[str, int | str]:
+    """Template file and line where a rendering error arose."""
+    trace, found = error.__traceback__, ("template", "?")
+    place: tuple[str, int | str] = found
+    while trace is not None:
+        file = trace.tb_frame.f_code.co_filename
+        if file.endswith(".j2"):
+            place = (file, trace.tb_lineno)
+        trace = trace.tb_next
+    return place
+
+
+def _used(templates: jinja2.Environment, name: str) -> str:
+    """Names of the templates a deck is made of, marking a study's own."""
+    used: list[str] = []
+    waiting = [name]
+    while waiting:
+        current = waiting.pop(0)
+        if current in used:
+            continue
+        used.append(current)
+        waiting.extend(_references(templates, current))
+    return "templates: " + ", ".join(used)
+
+
+def _references(templates: jinja2.Environment, name: str) -> list[str]:
+    assert templates.loader is not None
+    source, _, _ = templates.loader.get_source(templates, name)
+    found = jinja2.meta.find_referenced_templates(templates.parse(source))
+    return [reference for reference in found if reference is not None]
+
+
+def write_run(scene: Scene, folder: Path, templates: jinja2.Environment) -> list[Path]:
+    """Write a run's input files: deck, case.json, columns.json, balls, meshes.
+
+    Everything is made before anything is written, and a file replaces its old
+    version in one step.
+
+    Returns
+    -------
+    list of Path
+        The files.
+    """
+    texts = {
+        DECK_FILE: deck_text(scene, templates),
+        CASE_FILE: _json(scene.case),
+        COLUMNS_FILE: _json(
+            {"schema": 1, "outputs": {out.name: out.as_json() for out in scene.deck.outputs}}
+        ),
+        **scene.files,
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        replace_text(folder / name, text)
+    for name, mesh in scene.meshes.items():
+        write_stl(mesh, folder / name)
+    return [folder / name for name in (*texts, *scene.meshes)]
+
+
+def replace_text(file: Path, text: str) -> None:
+    """Write a text file in one step: readers see the old version or the new one."""
+    waiting = file.with_name(f".{file.name}.{os.getpid()}")
+    waiting.write_text(text, encoding="utf-8")
+    waiting.replace(file)
+
+
+def _json(data: Any) -> str:
+    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def template_files(project: Path, study: Path | None) -> Sequence[Path]:
+    """Every template that a deck of a study could use."""
+    folders = [project, *([study] if study is not None and study.is_dir() else [])]
+    return sorted(file for folder in folders for file in folder.glob("**/*.j2"))

@@ -1,0 +1,354 @@
+"""A run folder from its deck to ``run.json``: start, go on, keep what there was.
+
+``state.json`` says at any time how far the run is. ``run.json`` has the same
+content and exists only for a run that is complete and passed every gate, so
+that nothing unfinished can be taken for a result.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from dragdeck.engine import Engine, command, engine_errors, execute, find_engine
+from dragdeck.errors import EngineError, GateError, InputError
+from dragdeck.gates import Gate, check_run
+from dragdeck.render import CASE_FILE, COLUMNS_FILE, DECK_FILE, replace_text
+
+STATE_FILE = "state.json"
+RESULT_FILE = "run.json"
+ARCHIVE = "archive"
+AS_RUN = "as_run"
+CHECKPOINTS_KEPT = 2
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a running engine is."""
+
+    step: int
+    steps: int | None
+    steps_per_s: float
+
+    def __str__(self) -> str:
+        speed = f"{self.steps_per_s:,.0f} steps/s"
+        if not self.steps or not self.steps_per_s:
+            return f"step {self.step:,}, {speed}"
+        left = (self.steps - self.step) / self.steps_per_s
+        share = 100 * self.step / self.steps
+        return (
+            f"step {self.step:,} of {self.steps:,} ({share:.0f} %), {speed}, "
+            f"{left // 60:.0f} min {left % 60:02.0f} s left"
+        )
+
+
+def run(folder: Path, report: Report, *, again: bool = False, every_s: float = 10.0) -> Path:
+    """Bring a run folder to its ``run.json``.
+
+    A complete run of the same inputs is left as it is. An interrupted one goes
+    on from its last checkpoint. A run of other inputs is moved to ``archive/``
+    and started anew. A run that failed is not repeated unless `again`.
+
+    Parameters
+    ----------
+    folder : Path
+        With deck, case.json and columns.json.
+    report : callable
+        Gets a line about every `every_s` seconds.
+    again : bool
+        Start anew even if these inputs failed before.
+
+    Returns
+    -------
+    Path
+        The ``run.json``.
+
+    Raises
+    ------
+    InputError
+        The folder holds no deck.
+    EngineError
+        No engine; or it was stopped or killed: the message says how to go on.
+    GateError
+        The run ended but a gate did not hold.
+    """
+    case, columns = _read(folder, CASE_FILE), _read(folder, COLUMNS_FILE)
+    inputs = fingerprint(folder)
+    state = _state(folder)
+    if state and (state["inputs"] != inputs or (again and state["state"] != "complete")):
+        _archive(folder, state["inputs"], report)
+        state = None
+    if state and state["state"] == "complete":
+        report("these inputs were run before and the run is complete")
+        return _write_result(folder, state)
+    if state and state["state"] == "failed":
+        raise GateError(_failed(folder, state) + "\n  remedy: change the study, or run it --again")
+    engine = find_engine()
+    state = _begin_part(folder, state, inputs, engine, case["fidelity"]["ranks"], case["scene"])
+    state = _execute_part(folder, state, engine, case, columns, report, every_s)
+    return _write_result(folder, state)
+
+
+def fingerprint(folder: Path) -> str:
+    """Hash of all that a run depends on: deck, data, meshes and the file it starts from.
+
+    Raises
+    ------
+    InputError
+        The deck, or the file it starts from, is missing.
+    """
+    deck = folder / DECK_FILE
+    if not deck.is_file():
+        raise InputError("no deck here", file=folder, remedy="render it first: dragdeck render")
+    text = deck.read_text(encoding="utf-8")
+    files = {deck, *folder.glob("*.data"), *folder.glob("*.stl")} - set(_checkpoints(folder))
+    source = re.search(r"^variable from index (\S+)", text, flags=re.MULTILINE)
+    if source is not None:
+        files.add(folder / source.group(1))
+    total = hashlib.sha256()
+    for file in sorted(files):
+        if not file.is_file():
+            raise InputError(
+                "a file that the deck starts from is missing",
+                file=file,
+                remedy="run the scene that makes it first",
+            )
+        total.update(file.name.encode() + hashlib.sha256(file.read_bytes()).digest())
+    return total.hexdigest()
+
+
+def _read(folder: Path, name: str) -> Any:
+    try:
+        return json.loads((folder / name).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"no {name} here", file=folder, remedy="dragdeck render") from None
+
+
+def _state(folder: Path) -> dict[str, Any] | None:
+    file = folder / STATE_FILE
+    return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
+
+
+def _save(folder: Path, state: Mapping[str, Any]) -> None:
+    replace_text(folder / STATE_FILE, json.dumps(state, indent=1) + "\n")
+
+
+def _write_result(folder: Path, state: Mapping[str, Any]) -> Path:
+    result = folder / RESULT_FILE
+    replace_text(result, json.dumps(state, indent=1) + "\n")
+    return result
+
+
+def _begin_part(
+    folder: Path,
+    state: dict[str, Any] | None,
+    inputs: str,
+    engine: Engine,
+    ranks: int,
+    scene: str,
+) -> dict[str, Any]:
+    """Note that a part begins, before it does."""
+    if state is None:
+        _keep_inputs(folder)
+        state = {
+            "schema": 1,
+            "state": "running",
+            "inputs": inputs,
+            "started": datetime.now(UTC).isoformat(timespec="seconds"),
+            "parts": [],
+        }
+    newest = _newest_checkpoint(folder)
+    state["parts"].append(
+        {
+            "part": len(state["parts"]) + 1,
+            "from": newest.name if newest else None,
+            "from_step": _checkpoint_step(newest) if newest else 0,
+        }
+    )
+    ranks = 1 if scene == "drop" else ranks
+    state.update(state="running", engine_version=engine.version, ranks=ranks, gates=[])
+    _save(folder, state)
+    return state
+
+
+def _execute_part(
+    folder: Path,
+    state: dict[str, Any],
+    engine: Engine,
+    case: Mapping[str, Any],
+    columns: Mapping[str, Any],
+    report: Report,
+    every_s: float,
+) -> dict[str, Any]:
+    part = state["parts"][-1]
+    number = part["part"]
+    source = folder / part["from"] if part["from"] else None
+    steps = case["phases"][-1]["end_step"] if case["phases"] else None
+    watcher = _Watcher(folder, columns, number, part["from_step"], steps, report, every_s)
+    words = command(engine, DECK_FILE, state["ranks"], number, source)
+    report(f"{case['scene']} {case['run']}: part {number}, {state['ranks']} rank(s)")
+    screen = folder / f"screen.{number}.txt"
+    ending = execute(words, folder, screen, watcher)
+    part.update(
+        wall_time_s=round(ending.wall_time_s, 3),
+        exit_status=ending.exit_status,
+        to_step=_last_step(screen),
+    )
+    return _conclude(folder, state, case, columns, ending.asked, report)
+
+
+def _conclude(
+    folder: Path,
+    state: dict[str, Any],
+    case: Mapping[str, Any],
+    columns: Mapping[str, Any],
+    asked: bool,
+    report: Report,
+) -> dict[str, Any]:
+    part = state["parts"][-1]
+    screen = (folder / f"screen.{part['part']}.txt").read_text(errors="replace")
+    killed = part["exit_status"] < 0 or part["exit_status"] >= 128
+    if "DRAGDECK END" not in screen and (asked or (killed and not engine_errors(screen))):
+        state["state"] = "stopped"
+        _save(folder, state)
+        raise EngineError(_stopped(folder, asked, part["exit_status"]))
+    gates = check_run(folder, case, columns, part["exit_status"], part["part"])
+    state["gates"] = [gate.as_json() for gate in gates]
+    state.update(_totals(state["parts"]))
+    if not all(gate.passed for gate in gates):
+        state["state"] = "failed"
+        _save(folder, state)
+        raise GateError(_failed(folder, state))
+    state["state"] = "complete"
+    _save(folder, state)
+    for checkpoint in _checkpoints(folder):
+        checkpoint.unlink()
+    report(f"complete: {state['steps']:,} steps in {state['wall_time_s']:.1f} s")
+    return state
+
+
+def _totals(parts: list[dict[str, Any]]) -> dict[str, Any]:
+    """Steps that counted, and the time all parts took."""
+    wall = sum(part["wall_time_s"] for part in parts if "wall_time_s" in part)
+    steps = parts[-1]["to_step"] or 0
+    done = sum(max(0, part["to_step"] - part["from_step"]) for part in parts if part.get("to_step"))
+    return {
+        "steps": steps,
+        "wall_time_s": round(wall, 3),
+        "steps_per_s": round(done / wall, 1) if wall > 0 else None,
+    }
+
+
+def _stopped(folder: Path, asked: bool, exit_status: int) -> str:
+    newest = _newest_checkpoint(folder)
+    why = "stopped as asked" if asked else f"the engine was killed (exit status {exit_status})"
+    if newest is None:
+        return f"{folder}: {why}\n  remedy: there is no checkpoint yet; run it again from its start"
+    return (
+        f"{folder}: {why}\n  value:  checkpoint at step {_checkpoint_step(newest):,}\n"
+        "  remedy: run it again, and it goes on from there"
+    )
+
+
+def _failed(folder: Path, state: Mapping[str, Any]) -> str:
+    lines = [f"{folder}: the run failed and is no result"]
+    for gate in state["gates"]:
+        if not gate["passed"]:
+            lines.append(f"  gate:   {gate['name']}: {gate['seen']} (limit: {gate['limit']})")
+    last = state["parts"][-1]["part"]
+    lines.append(f"  log:    {folder / f'screen.{last}.txt'}")
+    return "\n".join(lines)
+
+
+def _keep_inputs(folder: Path) -> None:
+    """Keep the deck as it was run: a later render may replace it."""
+    kept = folder / AS_RUN
+    kept.mkdir(exist_ok=True)
+    for name in (DECK_FILE, CASE_FILE, COLUMNS_FILE):
+        shutil.copy2(folder / name, kept / name)
+
+
+def _archive(folder: Path, inputs: str, report: Report) -> None:
+    """Move what a run of other inputs left out of the way; delete nothing."""
+    place = folder / ARCHIVE / inputs[:8]
+    number = 1
+    while place.exists():
+        number += 1
+        place = folder / ARCHIVE / f"{inputs[:8]}-{number}"
+    place.mkdir(parents=True)
+    new = {DECK_FILE, CASE_FILE, COLUMNS_FILE, ARCHIVE}
+    sources = {file.name for file in (*folder.glob("*.data"), *folder.glob("*.stl"))}
+    sources -= {file.name for file in _checkpoints(folder)}
+    for file in folder.iterdir():
+        if file.name not in new | sources:
+            shutil.move(str(file), str(place / file.name))
+    report(f"an earlier run of other inputs was moved to {place}")
+
+
+def _checkpoints(folder: Path) -> list[Path]:
+    """Restart points, oldest first: the regular ones and those written when asked to stop."""
+    found = [*folder.glob("checkpoint.*.restart"), *folder.glob("restart_forced_*_*.data")]
+    return sorted(found, key=_checkpoint_step)
+
+
+def _checkpoint_step(file: Path) -> int:
+    digits = re.search(r"(\d+)\.(?:restart|data)$", file.name)
+    return int(digits.group(1)) if digits else -1
+
+
+def _newest_checkpoint(folder: Path) -> Path | None:
+    """The newest restart point that is whole, judged by its size against the largest."""
+    found = _checkpoints(folder)
+    if not found:
+        return None
+    largest = max(file.stat().st_size for file in found)
+    whole = [file for file in found if file.stat().st_size > 0.8 * largest]
+    return whole[-1]
+
+
+def _last_step(screen: Path) -> int | None:
+    """The last step that the engine's thermo table names."""
+    rows = re.findall(r"^ *(\d+) +\d+ ", screen.read_text(errors="replace"), flags=re.MULTILINE)
+    return int(rows[-1]) if rows else None
+
+
+class _Watcher:
+    """Reads how far a run is, reports it now and then, keeps few checkpoints."""
+
+    def __init__(
+        self,
+        folder: Path,
+        columns: Mapping[str, Any],
+        part: int,
+        first: int,
+        steps: int | None,
+        report: Report,
+        every_s: float,
+    ) -> None:
+        output = columns["outputs"].get("thermo")
+        self._file = folder / output["pattern"].format(part=part) if output else None
+        self._folder, self._first, self._steps = folder, first, steps
+        self._report, self._every_s, self._next = report, every_s, every_s
+
+    def __call__(self, seconds: float) -> None:
+        if seconds < self._next or self._file is None or not self._file.is_file():
+            return
+        self._next = seconds + self._every_s
+        for old in _checkpoints(self._folder)[:-CHECKPOINTS_KEPT]:
+            old.unlink()
+        last = self._file.read_text(errors="replace").splitlines()[-1].split()
+        if last and last[0].isdigit():
+            step = int(last[0])
+            self._report(str(Progress(step, self._steps, (step - self._first) / seconds)))
+
+
+__all__ = ["Gate", "Progress", "fingerprint", "run"]

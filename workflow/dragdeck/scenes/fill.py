@@ -1,0 +1,221 @@
+"""The fill: the balls fall into the bowl and come to rest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from dragdeck import outputs
+from dragdeck.cases import Case
+from dragdeck.derive import (
+    DENSEST_RANDOM_PACKING,
+    SOLID_FRACTION_ESTIMATE,
+    ball_mass,
+    bed_height,
+    fall_speed,
+)
+from dragdeck.errors import InputError
+from dragdeck.packing import Balls, pour, radii
+from dragdeck.scenes.common import (
+    Deck,
+    Scene,
+    ball_material,
+    base_case,
+    bed_rayleigh_time,
+    material_table,
+    skin,
+    timestep,
+)
+from dragdeck.scenes.tool import tool_length
+from dragdeck.study import Study
+
+CHECK_INTERVAL_S = 0.02
+"""Time between two looks at the kinetic energy, about the fall over one ball."""
+
+SETTLING_ESTIMATE_S = 0.5
+"""Time from the last ball's arrival to rest, an estimate used for expectations only."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FillDeck(Deck):
+    """What the fill template sees."""
+
+    bowl_type: int
+    bowl_radius_m: float
+    bowl_facets: bool = False
+    energy_ratio: float
+    energy_unit_j: float
+    check_steps: int
+    most_checks: int
+    longest_s: float
+
+
+def fill_scene(case: Case) -> Scene:
+    """The fill of a case.
+
+    Raises
+    ------
+    InputError
+        More balls than the bowl holds; a ball wider than the bowl; a modulus
+        that the engine refuses.
+    """
+    study = case.study
+    check_capacity(case)
+    fidelity = study.chosen_fidelity()
+    rayleigh = bed_rayleigh_time(study)
+    dt = timestep(rayleigh, fidelity.fill_timestep_fraction)
+    check_steps = max(1, math.ceil(CHECK_INTERVAL_S / dt))
+    balls = first_balls(study)
+    top = box_top(case, balls)
+    longest = study.fill.longest_s
+    types = _fill_types(study)
+    deck = FillDeck(
+        title=f"Fill: {study.title}",
+        study=case.study_name,
+        scene="fill",
+        run=case.run_ids["fill"],
+        source="balls.data",
+        materials=material_table(study, types, fidelity.youngs_modulus_scale, case),
+        limit_force=study.contact.limit_force,
+        gravity_m_s2=study.gravity_m_s2,
+        skin_m=skin(study),
+        timestep_s=dt,
+        outputs=(outputs.thermo(check_steps, None), outputs.settled_balls()),
+        thermo_steps=check_steps,
+        checkpoint_steps=50 * check_steps,
+        bowl_type=types.index(study.bowl.material) + 1,
+        bowl_radius_m=study.bowl.radius_m,
+        energy_ratio=study.fill.energy_ratio,
+        energy_unit_j=_energy_unit(study),
+        check_steps=check_steps,
+        most_checks=math.ceil(longest / (check_steps * dt)),
+        longest_s=longest,
+    )
+    return Scene(
+        deck=deck,
+        case={
+            **base_case(case, "fill", dt, rayleigh),
+            "phases": [{"name": "settle", "start_step": 0, "end_step": None}],
+            "settled": {"energy_ratio": study.fill.energy_ratio},
+        },
+        steps=round(_expected_time(study, balls) / dt),
+        files={"balls.data": _balls_data(balls, study, top, len(types))},
+        models={
+            "every ball by name": "exactly the asked number, mean and spread of radii",
+            "rest by a criterion": f"kinetic energy below {study.fill.energy_ratio:g} m g d a ball",
+            "a step of its own": "balls in flight collide faster than a bed at rest",
+        },
+        leaves_out={
+            "the tool": "it comes later; cases that differ in it share this fill",
+            "contact output": "nobody reads contacts before the drag",
+            "facets of the bowl": "balls fall the same onto an exact plane and cylinder",
+        },
+    )
+
+
+def _fill_types(study: Study) -> list[str]:
+    """A material for each engine type; a type the fill has no use for repeats the bowl's."""
+    ball, bowl = study.media.material, study.bowl.material
+    used = list(dict.fromkeys((ball, bowl)))
+    return used + [bowl] * (len(study.type_names()) - len(used))
+
+
+def first_balls(study: Study) -> Balls:
+    """The balls of a study before they fall."""
+    media = study.media
+    sizes = radii(media.count, media.radius_mean_m, media.radius_sd_m)
+    return pour(sizes, study.bowl.radius_m, study.seed)
+
+
+def check_capacity(case: Case) -> None:
+    """Refuse more balls than the bowl can hold.
+
+    Raises
+    ------
+    InputError
+        Even the densest random packing would stand above the rim.
+    """
+    study = case.study
+    media, bowl = study.media, study.bowl
+    sizes = radii(media.count, media.radius_mean_m, media.radius_sd_m)
+    volume = float((4 / 3 * np.pi * sizes**3).sum())
+    height = bed_height(volume, bowl.radius_m, DENSEST_RANDOM_PACKING)
+    if height > bowl.height_m:
+        most = math.floor(media.count * bowl.height_m / height)
+        raise InputError(
+            "more balls than the bowl holds",
+            file=case.file,
+            field="media.count",
+            value=f"{media.count}, which stand at least {height:.4g} m high",
+            limit=f"{most} balls in a bowl {bowl.height_m:g} m high, at a solid fraction of "
+            f"{DENSEST_RANDOM_PACKING} (random close packing)",
+            remedy="take fewer balls, or a wider or higher bowl",
+        )
+
+
+def expected_surface(study: Study) -> float:
+    """Height of the settled bed before it exists, m: an estimate."""
+    media = study.media
+    sizes = radii(media.count, media.radius_mean_m, media.radius_sd_m)
+    volume = float((4 / 3 * np.pi * sizes**3).sum())
+    return bed_height(volume, study.bowl.radius_m, SOLID_FRACTION_ESTIMATE)
+
+
+def box_top(case: Case, balls: Balls) -> float:
+    """Top of the simulation box, m: room for the falling balls and the tool above the bed.
+
+    The process inherits the box from the fill's restart file.
+    """
+    study = case.study
+    tool_top = 1.2 * expected_surface(study) + 2 * study.media.radius_mean_m + tool_length(case)
+    return math.ceil(max(balls.top_m, tool_top) * 100 + 1) / 100
+
+
+def _energy_unit(study: Study) -> float:
+    """Number of balls times m g d of the mean ball, J."""
+    media = study.media
+    mass = ball_mass(ball_material(study), media.radius_mean_m)
+    return media.count * mass * study.gravity_m_s2 * 2 * media.radius_mean_m
+
+
+def _expected_time(study: Study, balls: Balls) -> float:
+    drop = balls.top_m - expected_surface(study)
+    return fall_speed(max(drop, 0.0), study.gravity_m_s2) / study.gravity_m_s2 + SETTLING_ESTIMATE_S
+
+
+def _balls_data(balls: Balls, study: Study, top_m: float, types: int) -> str:
+    """The engine's data file: one line a ball, numbers that read back exactly."""
+    side = study.bowl.radius_m + 2 * study.media.radius_mean_m
+    density = ball_material(study).density_kg_m3
+    count = len(balls.radii_m)
+    atoms = (
+        f"{i + 1} 1 {2 * balls.radii_m[i]:.17g} {density!r} {x:.17g} {y:.17g} {z:.17g}"
+        for i, (x, y, z) in enumerate(balls.positions_m)
+    )
+    speeds = (
+        f"{i + 1} {u:.17g} {v:.17g} {w:.17g} 0 0 0"
+        for i, (u, v, w) in enumerate(balls.velocities_m_s)
+    )
+    return "\n".join(
+        [
+            "balls before they fall",
+            "",
+            f"{count} atoms",
+            f"{types} atom types",
+            "",
+            f"{-side!r} {side!r} xlo xhi",
+            f"{-side!r} {side!r} ylo yhi",
+            f"{-study.media.radius_mean_m!r} {top_m!r} zlo zhi",
+            "",
+            "Atoms",
+            "",
+            *atoms,
+            "",
+            "Velocities",
+            "",
+            *speeds,
+            "",
+        ]
+    )
