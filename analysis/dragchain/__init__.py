@@ -7,9 +7,9 @@ tables that everything else starts from.
 
 from __future__ import annotations
 
-from .case import Case, Output, load_case, load_outputs
-from .dumps import iter_frames, iter_prints
-from .errors import (
+from dragchain.case import Case, Output, load_case, load_outputs
+from dragchain.dumps import iter_frames, iter_prints
+from dragchain.errors import (
     CaseError,
     DragchainError,
     DumpError,
@@ -18,9 +18,9 @@ from .errors import (
     TableError,
     TruncatedDumpError,
 )
-from .formats import Frame
-from .stats import MeanEstimate, estimate_mean
-from .tables import write_tables
+from dragchain.formats import Frame
+from dragchain.stats import MeanEstimate, estimate_mean
+from dragchain.tables import write_tables
 
 __all__ = [
     "Case",

@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, cast
 
-from .errors import CaseError
+from dragchain.errors import CaseError
 
 SCHEMA = 1
 """The version of both files that this package understands."""

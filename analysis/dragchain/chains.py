@@ -21,8 +21,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .forces import wrap_angle
-from .frames import FLOOR, KINDS, ROD, SIDE, Floats, Ints, NetworkFrame
+from dragchain.forces import wrap_angle
+from dragchain.frames import FLOOR, KINDS, ROD, SIDE, Floats, Ints, NetworkFrame
 
 ALPHA_RAD = np.pi / 4
 """Largest angle between a ball's principal direction and the line to the next ball of a chain."""

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from .errors import DragchainError
+from dragchain.errors import DragchainError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -61,25 +61,25 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _tables(options: argparse.Namespace) -> None:
-    from .tables import write_tables
+    from dragchain.tables import write_tables
 
     write_tables(options.run_dir)
 
 
 def _chains(options: argparse.Namespace) -> None:
-    from .network import write_chains
+    from dragchain.network import write_chains
 
     write_chains(options.run_dir)
 
 
 def _figures(options: argparse.Namespace) -> None:
-    from .figures import write_figures
+    from dragchain.figures import write_figures
 
     write_figures(options.run_dir)
 
 
 def _report(options: argparse.Namespace) -> None:
-    from .report import write_report
+    from dragchain.report import write_report
 
     write_report(options.out, options.run_dirs)
 

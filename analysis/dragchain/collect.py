@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .case import Case, load_case, load_outputs
-from .drop import effective_restitution
-from .errors import TableError
-from .findings import (
+from dragchain.case import Case, load_case, load_outputs
+from dragchain.drop import effective_restitution
+from dragchain.errors import TableError
+from dragchain.findings import (
     CONFIDENCE,
     Estimate,
     ahead_behind,
@@ -28,16 +28,16 @@ from .findings import (
     finite,
     near_any,
 )
-from .forces import (
+from dragchain.forces import (
     drag_phase,
     find_drag_peaks,
     peak_separation_s,
     read_counted,
     summarise_forces,
 )
-from .frames import Floats, Ints, read_table
-from .parquet import write_json
-from .stats import MeanEstimate
+from dragchain.frames import Floats, Ints, read_table
+from dragchain.parquet import write_json
+from dragchain.stats import MeanEstimate
 
 SCHEMA = 1
 FILE = Path("tables") / "figures.json"
@@ -246,15 +246,10 @@ def _columns(estimates: list[Estimate]) -> dict[str, list[float | None]]:
 def _frame_numbers(run_dir: Path, samples: pd.DataFrame, steps: Ints) -> tuple[Ints, int]:
     """Return the frame of each step and the number of counted frames, those without contact too."""
     output = load_outputs(run_dir)["rod_contacts"]
-    if output.period_steps is None:
-        raise TableError("columns.json gives rod_contacts no period_steps to count frames by")
     counted = samples["step"].to_numpy(np.int64)
-    first, last = (
-        np.searchsorted(np.arange(output.first_step, counted[-1] + 1, output.period_steps), edge)
-        for edge in (counted[0], counted[-1] + 1)
-    )
-    numbers = (steps - output.first_step) // output.period_steps - first
-    return numbers.astype(np.int64), int(last - first)
+    written = np.arange(output.first_step, counted[-1] + 1, output.period_steps)
+    written = written[written >= counted[0]]
+    return np.searchsorted(written, steps), len(written)
 
 
 # --- fill and drop ---------------------------------------------------------------------------
@@ -265,7 +260,9 @@ def _fill(run_dir: Path, case: Case) -> Findings:
     if not file.is_file():
         raise TableError(f"{file}: there is no such file; run `dragchain tables` first")
     bed: Findings = json.loads(file.read_text(encoding="utf-8"))
-    return {"bed": bed}
+    content: Findings = json.loads((run_dir / "case.json").read_text(encoding="utf-8"))
+    settled = content.get("settled")
+    return {"bed": bed, "rest_energy_ratio": settled["energy_ratio"] if settled else None}
 
 
 def _drop(run_dir: Path, case: Case) -> Findings:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import TableError
-from .formats import Frame
-from .rod import WallContacts, tangential_force
+from dragchain.errors import TableError
+from dragchain.formats import Frame
+from dragchain.rod import WallContacts, tangential_force
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

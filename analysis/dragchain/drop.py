@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .errors import TableError
-from .formats import Columns
+from dragchain.errors import TableError
+from dragchain.formats import Columns
 
 Floats = NDArray[np.float64]
 

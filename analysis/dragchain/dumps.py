@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from .case import Output
-from .errors import DumpError, TruncatedDumpError
-from .formats import Columns, Frame, read_dump_file, read_print_file
+from dragchain.case import Output
+from dragchain.errors import DumpError, TruncatedDumpError
+from dragchain.formats import Columns, Frame, read_dump_file, read_print_file
 
 __all__ = ["Columns", "Frame", "iter_frames", "iter_prints", "part_files"]
 
@@ -80,9 +80,10 @@ def iter_frames(run_dir: Path | str, output: Output) -> Iterator[Frame]:
 
     def read(file: Path) -> Iterator[_Piece]:
         for frame in read_dump_file(file, output):
-            yield _Piece(frame.step, frame.step, frame.columns)
+            yield _Piece(frame.step, frame.step, frame.columns, frame.opening)
 
-    return (Frame(piece.first, piece.columns) for piece in _merged(run_dir, output, read))
+    pieces = _merged(run_dir, output, read)
+    return (Frame(piece.first, piece.columns, piece.opening) for piece in pieces)
 
 
 def iter_prints(run_dir: Path | str, output: Output) -> Iterator[Columns]:
@@ -120,6 +121,7 @@ class _Piece:
     first: int
     last: int
     columns: Columns
+    opening: bool = False
 
     def before(self, limit: int | None) -> _Piece | None:
         """Keep what comes before a step; None when nothing does."""

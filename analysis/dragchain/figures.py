@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from itertools import cycle
 from pathlib import Path
 from typing import Any
@@ -14,20 +15,23 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
+from matplotlib.typing import RcKeyType
 from numpy.typing import NDArray
+from PIL import Image
 
-from . import scene
-from .case import Case, load_case, load_outputs
-from .collect import Findings, dominant_bottlenecks, drag_start_s, write_findings
-from .dumps import iter_prints
-from .frames import Floats, read_table
+from dragchain import scene
+from dragchain.case import Case, load_case, load_outputs
+from dragchain.collect import Findings, dominant_bottlenecks, drag_start_s, write_findings
+from dragchain.dumps import iter_prints
+from dragchain.frames import Floats, read_table
 
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#6b7480"
 """After Okabe and Ito (2008): told apart with any kind of colour vision."""
 
 CHAIN = "#1f4fa3"
 
-STYLE: dict[str, Any] = {
+STYLE: dict[RcKeyType, Any] = {
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -103,9 +107,18 @@ def _save(run_dir: Path, name: str, figure: Figure) -> Path:
     path = run_dir / "figures" / f"{name}.png"
     path.parent.mkdir(exist_ok=True)
     draft = path.with_name(f".{path.name}.tmp")
-    figure.savefig(draft, format="png", dpi=DPI)
+    draft.write_bytes(png(figure))
     draft.replace(path)
     return path
+
+
+def png(figure: Figure) -> bytes:
+    """Return a figure as PNG without transparency."""
+    drawn, small = BytesIO(), BytesIO()
+    figure.savefig(drawn, format="png", dpi=DPI)
+    with Image.open(drawn) as picture:
+        picture.convert("RGB").save(small, format="png", optimize=True)
+    return small.getvalue()
 
 
 def _figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
@@ -151,7 +164,9 @@ def _span(row: Findings, low: str = "low", high: str = "high") -> str:
 def _reliability(ours: Findings) -> str:
     text = f"drag {ours['mean']:.2f} ± {ours['sd']:.2f} N (± standard deviation)"
     effective = f"{ours['effective_samples']:.0f} effective samples"
-    return f"{text}, {effective}" + ("" if ours["reliable"] else ": short series, interval unsure")
+    return f"{text}, {effective}" + (
+        "" if ours["reliable"] else ": too few to rely on the interval"
+    )
 
 
 def _legend_below(figure: Figure, axes: Axes, columns: int = 2) -> None:
@@ -187,7 +202,7 @@ def _around_tool(findings: Findings) -> Figure:
     )
     names = ["ahead", "45°", "left", "135°", "behind", "-135°", "right", "-45°"]
     axes.set_thetagrids(np.arange(0, 360, 45), names)
-    axes.set_rlabel_position(112.5)
+    axes.set_rlabel_position(157.5)
     sums = findings["ahead_behind"]
     figure.suptitle(
         "normal force on the tool by bearing from the direction of motion,\n"
@@ -214,7 +229,7 @@ def _bars(columns: Findings) -> tuple[Floats, Floats, Floats]:
 
 
 def _depth(findings: Findings) -> Figure:
-    """Normal force of a contact, and of all contacts together, against depth."""
+    """Draw the normal force of a contact, and of all contacts together, against depth."""
     depth = findings["depth"]
     edges = np.asarray(depth["edges_m"]) * 1e3
     slope = depth["slope_n_m"]
@@ -254,11 +269,12 @@ def _chains_peaks(run_dir: Path, findings: Findings) -> Figure:
     figure = _figure(4.4)
     upper, lower = figure.subplots(2, 1, sharex=True)
     peaks = findings["peaks"]
-    upper.plot(time_s[counted], drag[counted], color=BLUE, linewidth=0.8)
-    upper.plot(peaks["process_time_s"], peaks["drag_n"], "v", color=RED, label="peaks")
-    upper.invert_yaxis()
-    upper.set(ylabel="drag in N (downwards: less)")
-    upper.set_title(f"{peaks['count']} peaks, at least {peaks['separation_s']:.2f} s apart")
+    upper.plot(time_s[counted], -drag[counted], color=BLUE, linewidth=0.8)
+    upper.plot(peaks["process_time_s"], [-force for force in peaks["drag_n"]], "v", color=RED)
+    upper.set(ylabel="resistance (minus\nthe drag) in N")
+    upper.set_title(
+        f"{peaks['count']} peaks (marked), at least {peaks['separation_s']:.2f} s apart"
+    )
     frame_s = network["time_s"].to_numpy(np.float64) - drag_start_s(case)
     lower.plot(frame_s, dominant_bottlenecks(network, chains), ".-", color=GREEN, markersize=4)
     for moment in peaks["process_time_s"]:
@@ -294,7 +310,7 @@ def _network(
     axes.set(xlabel="x in mm", ylabel=f"{view[1]} in mm", xlim=extent[:2], ylim=extent[2:])
     pick = [0, 1] if view == "xy" else [0, 2]
     _mark_chain(axes, shown, pick)
-    _mark_motion(axes, shown, pick)
+    _mark_motion(axes, shown, view)
     largest = float(shown.frame.normal_force.max(initial=0.0))
     scale = ScalarMappable(Normalize(0.0, largest), scene.colour_map())
     bar = figure.colorbar(scale, ax=axes, shrink=0.8, pad=0.02)
@@ -333,66 +349,74 @@ def _mark_chain(axes: Axes, shown: scene.Scene, pick: Sequence[int]) -> None:
             )
 
 
-def _mark_motion(axes: Axes, shown: scene.Scene, pick: Sequence[int]) -> None:
-    """Draw the direction of motion from the tool, as far as this view shows it."""
+def _mark_motion(axes: Axes, shown: scene.Scene, view: scene.View) -> None:
+    """Draw the direction of motion where it hides little: behind the tool, or above the bed."""
     heading = shown.frame.heading_rad
-    direction = np.array([np.cos(heading), np.sin(heading), 0.0])
-    start = shown.tool_m[pick] * 1e3
-    end = start + 12.0 * direction[pick]
-    if np.linalg.norm(end - start) < 1.0:
-        return
-    arrow = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.8}
+    direction = np.array([np.cos(heading), np.sin(heading)]) * 11.0
+    tool = shown.tool_m[:2] * 1e3
+    if view == "xy":
+        start, end = tool - 1.6 * direction, tool - 0.6 * direction
+    else:
+        level = axes.get_ylim()[1] - 3.0
+        start, end = np.array([tool[0], level]), np.array([tool[0] + direction[0], level])
+        if abs(direction[0]) < 1.0:
+            return
+    arrow = {"arrowstyle": "-|>", "color": "black", "linewidth": 2.0, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=arrow)
-    axes.annotate("motion", xy=tuple(end), xytext=(3, 4), textcoords="offset points", weight="bold")
+    label = axes.annotate(
+        "motion", tuple(start), (0, -11), textcoords="offset points", ha="center", weight="bold"
+    )
+    label.set_path_effects([withStroke(linewidth=3, foreground="white")])
 
 
 # --- fill and drop ---------------------------------------------------------------------------
 
 
-def kinetic_energy_ratio(kinetic_energy_j: Floats, balls: Floats, case: Case) -> Floats:
-    """Return the mean kinetic energy of a ball over the one gained by falling its diameter.
+def energy_ratio(energy_j: Floats, balls: Floats, case: Case) -> Floats:
+    """Return the mean energy of a ball over m g d, (N,): what the mean ball gains falling by d.
 
-    As ``kinetic_energy_ratio`` of ``fill.json``, with mean mass and radius from the study.
+    Parameters
+    ----------
+    energy_j : (N,) array
+        Kinetic energy of all balls in J, spin included.
+    balls : (N,) array
+        Number of balls.
+    case : Case
+        The fill; mass and diameter are those of its mean ball.
     """
-    mean, sd = case.media.radius_mean_m, case.media.radius_sd_m
-    mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * (mean**3 + 3.0 * mean * sd**2)
-    return np.asarray(kinetic_energy_j / balls / (mass * case.gravity_m_s2 * 2.0 * mean))
+    radius = case.media.radius_mean_m
+    mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * radius**3
+    return np.asarray(energy_j / balls / (mass * case.gravity_m_s2 * 2.0 * radius))
 
 
 def _fill(run_dir: Path, case: Case, findings: Findings) -> Figure:
-    """Kinetic energy ratio over time, with the bed that came of it."""
+    """Energy ratio over time, with the level below which the bed counts as at rest."""
     table = read_table(run_dir / "tables" / "thermo.parquet")
     table = table[table["balls"] > 0]
-    ratio = kinetic_energy_ratio(
-        table["kinetic_energy_j"].to_numpy(np.float64), table["balls"].to_numpy(np.float64), case
-    )
-    bed = findings["bed"]
+    energy = (table["kinetic_energy_j"] + table["rotational_energy_j"]).to_numpy(np.float64)
+    ratio = energy_ratio(energy, table["balls"].to_numpy(np.float64), case)
+    bed, rest = findings["bed"], findings["rest_energy_ratio"]
     figure = _figure(3.2)
     axes = figure.subplots()
     axes.semilogy(table["time_s"], ratio, color=BLUE)
-    axes.axhline(bed["kinetic_energy_ratio"], color=GREEN, linestyle="--", linewidth=1.0)
-    for phase in case.phases[1:]:
-        moment = phase.start_step * case.timestep_s
-        axes.axvline(moment, color=GREY, linewidth=0.8, linestyle=":")
-        axes.annotate(
-            phase.name, (moment, 0.98), xycoords=("data", "axes fraction"), va="top", rotation=90
-        )
-    axes.set(xlabel="simulated time in s", ylabel="kinetic energy ratio")
+    if rest is not None:
+        axes.axhline(rest, color=RED, linestyle="--", label=f"at rest below {rest:g}")
+        axes.legend(loc="upper right")
+    axes.set(xlabel="simulated time in s", ylabel="mean kinetic energy of a ball\nover m g d")
     axes.set_title(
-        f"{bed['balls']} balls, height {bed['fill_height_m'] * 1e3:.1f} mm, solid fraction "
-        f"{bed['solid_fraction']:.3f}; at the end the mean kinetic energy of a ball is "
-        f"{bed['kinetic_energy_ratio']:.1e}\nof that gained by falling its own diameter"
+        f"{bed['balls']} balls, height {bed['fill_height_m'] * 1e3:.1f} mm, "
+        f"solid fraction {bed['solid_fraction']:.3f}"
     )
     return figure
 
 
 def _drop(run_dir: Path, findings: Findings) -> Figure:
-    """Force over time of each impact."""
+    """Force and speed over time of each impact."""
     output = load_outputs(run_dir)["impacts"]
     blocks = list(iter_prints(run_dir, output))
-    time_s, force_n = (
+    time_s, speed_m_s, force_n = (
         np.concatenate([np.asarray(block[name], dtype=np.float64) for block in blocks])
-        for name in ("time_s", "force_n")
+        for name in ("time_s", "vz_m_s", "force_n")
     )
     impacts, ratio = findings["impacts"], findings["restitution"]
     figure = _figure(3.2)
@@ -409,7 +433,15 @@ def _drop(run_dir: Path, findings: Findings) -> Figure:
             fontsize=8,
         )
         axes.set_xlabel("time in µs")
-    panels[0].set_ylabel("force on the ball in N")
+        right = axes.twinx()
+        right.plot((time_s[near] - start) * 1e6, speed_m_s[near], color=RED, linewidth=1.0)
+        right.grid(False)
+        right.spines["right"].set_visible(True)
+        limit = 1.1 * float(np.abs(speed_m_s).max())
+        right.set_ylim(-limit, limit)
+        right.tick_params(labelright=number == len(panels) - 1, colors=RED)
+    right.set_ylabel("speed upwards in m/s", color=RED)
+    panels[0].set_ylabel("force on the ball in N", color=BLUE)
     figure.suptitle(
         f"restitution {ratio['mean']:.3f} ({ratio['lowest']:.3f} to {ratio['highest']:.3f}) "
         f"with {ratio['input']:.3f} in the deck",
@@ -417,4 +449,36 @@ def _drop(run_dir: Path, findings: Findings) -> Figure:
         x=0.02,
         ha="left",
     )
+    return figure
+
+
+# --- all cases -------------------------------------------------------------------------------
+
+
+def drag_of_cases(
+    names: Sequence[str], forces: Sequence[Findings], references: Sequence[tuple[str, float]]
+) -> Figure:
+    """Return the mean drag of each case with its interval, beside reference means.
+
+    Parameters
+    ----------
+    names, forces
+        Name and ``forces.drag_n`` findings of each case.
+    references
+        Label and mean in N of each figure to compare with.
+    """
+    with matplotlib.rc_context(STYLE):
+        figure = _figure(1.2 + 0.32 * len(names))
+        axes = figure.subplots()
+        place = np.arange(len(names))
+        mean, low, high = (
+            np.array([force[key] for force in forces]) for key in ("mean", "ci_low", "ci_high")
+        )
+        axes.errorbar(mean, place, xerr=[mean - low, high - mean], fmt="o", color=BLUE, capsize=3)
+        for (label, value), colour in zip(references, cycle((RED, GREEN, GREY)), strict=False):
+            axes.axvline(value, color=colour, linestyle="--", label=f"{label} {value:.2f} N")
+        axes.set_yticks(place, names)
+        axes.set(xlabel="mean drag in N with its 95 % interval", ylim=(len(names) - 0.5, -0.5))
+        if references:
+            _legend_below(figure, axes)
     return figure

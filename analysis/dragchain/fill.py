@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .case import Case
-from .errors import TableError
-from .forces import needed
-from .formats import Frame
+from dragchain.case import Case
+from dragchain.errors import TableError
+from dragchain.forces import needed
+from dragchain.formats import Frame
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ def describe_bed(balls: Frame, case: Case) -> dict[str, object]:
     -------
     dict
         The content of ``fill.json``: ``fill_height_m`` (see `fill_height`),
-        ``solid_fraction`` (volume of the balls over that of the bowl up to the
+        ``top_m`` (the highest point of any ball), ``solid_fraction`` (volume of the balls over that of the bowl up to the
         fill height), ``balls``, ``radius_mean_m``, ``radius_sd_m`` (divisor
         N - 1; 0 for one ball), and ``kinetic_energy_ratio``, the mean
         translational kinetic energy of a ball over what the mean ball gains
@@ -49,6 +49,7 @@ def describe_bed(balls: Frame, case: Case) -> dict[str, object]:
     scale = mass.mean() * case.gravity_m_s2 * 2.0 * radius.mean()
     return {
         "fill_height_m": height,
+        "top_m": float((balls.columns["z_m"] + radius).max()),
         "solid_fraction": float(volume.sum() / (np.pi * bowl_radius**2 * height)),
         "balls": balls.rows,
         "radius_mean_m": float(radius.mean()),

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
-from .errors import SeriesError
-from .frames import Floats, Ints
-from .stats import MIN_SAMPLES, autocorrelation_time
+from dragchain.errors import SeriesError
+from dragchain.frames import Floats, Ints
+from dragchain.stats import MIN_SAMPLES, autocorrelation_time
 
 CONFIDENCE = 0.95
 RESAMPLES = 2000
@@ -100,9 +100,20 @@ def estimates(sums: Floats, statistic: Callable[[Floats], Floats]) -> list[Estim
     with np.errstate(divide="ignore", invalid="ignore"):
         value = statistic(sums.mean(axis=0))
         resampled = statistic(bootstrap_means(sums, block_length(sums)))
+    return [
+        Estimate(number, *_interval(column))
+        for number, column in zip(value.tolist(), resampled.T, strict=True)
+    ]
+
+
+def _interval(resampled: Floats) -> tuple[float, float]:
+    """Return the percentile interval of the resamples that have a value, NaN if none has."""
+    known = resampled[~np.isnan(resampled)]
+    if not known.size:
+        return float("nan"), float("nan")
     tail = (1.0 - CONFIDENCE) / 2.0
-    low, high = np.nanquantile(resampled, [tail, 1.0 - tail], axis=0, method="nearest")
-    return [Estimate(*numbers) for numbers in zip(value.tolist(), low, high, strict=True)]
+    low, high = np.quantile(known, [tail, 1.0 - tail], method="nearest")
+    return float(low), float(high)
 
 
 def frame_sums(frame: Ints, frames: int, weights: Floats) -> Floats:

@@ -12,9 +12,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.signal import find_peaks
 
-from .case import Case, Circle, Line, Phase
-from .errors import SeriesError, TableError
-from .stats import MeanEstimate, estimate_mean
+from dragchain.case import Case, Circle, Line, Phase
+from dragchain.errors import SeriesError, TableError
+from dragchain.stats import MeanEstimate, estimate_mean
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")

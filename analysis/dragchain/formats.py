@@ -16,8 +16,8 @@ from typing import BinaryIO, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from .case import Output
-from .errors import DumpError, TruncatedDumpError
+from dragchain.case import Output
+from dragchain.errors import DumpError, TruncatedDumpError
 
 Columns = dict[str, NDArray[np.float64] | NDArray[np.int64]]
 
@@ -43,10 +43,15 @@ class Frame:
     columns : dict of str to (N,) ndarray
         The columns by our names, N rows in no particular order; ids are int64,
         all else is float64. N may be zero and may change between frames.
+    opening : bool
+        Whether it is the first frame of its file. If a run starts on a step at
+        which frames are due, the engine writes one before it makes a step, and
+        the forces in it are evaluated anew rather than the applied ones.
     """
 
     step: int
     columns: Columns
+    opening: bool = False
 
     @property
     def rows(self) -> int:
@@ -182,7 +187,7 @@ def _read_binary_frame(at: _Cursor) -> Frame:
     values = np.concatenate([_read_rank(at, width) for _ in range(ranks)])
     if len(values) != rows:
         at.fail(f"the ranks wrote {len(values)} rows", f"{rows} rows, as the header says")
-    return Frame(step, _split(values, at))
+    return Frame(step, _split(values, at), at.frame == 0)
 
 
 def _read_rank(at: _Cursor, width: int) -> NDArray[np.float64]:
@@ -205,7 +210,7 @@ def _read_text_frame(at: _Cursor) -> Frame:
     lines = list(islice(at.stream, rows))
     if len(lines) < rows or (lines and not lines[-1].endswith(b"\n")):
         at.cut_short(f"{rows} whole rows of {len(at.output.columns)} numbers")
-    return Frame(step, _split(_parse(lines, at), at))
+    return Frame(step, _split(_parse(lines, at), at), at.frame == 0)
 
 
 def _check_header(at: _Cursor, line: str) -> None:

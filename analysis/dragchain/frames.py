@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .errors import TableError
+from dragchain.errors import TableError
 
 BALL, ROD, FLOOR, SIDE = 1, 0, -1, -2
 """The other body of a contact; the last three are the ``b_id`` of the contacts table."""

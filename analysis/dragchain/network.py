@@ -13,9 +13,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from . import chains
-from .errors import TableError
-from .frames import KINDS, Ints, NetworkFrame, read_frames, write_parquet
+from dragchain import chains
+from dragchain.errors import TableError
+from dragchain.frames import KINDS, Ints, NetworkFrame, read_frames, write_parquet
 
 LEAST_CONTACTS = 4
 """A ball with fewer contacts is a rattler. Four is the mean number with which frictional spheres

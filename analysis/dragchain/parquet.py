@@ -12,7 +12,7 @@ from typing import Any, Self
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from .formats import is_integer_column
+from dragchain.formats import is_integer_column
 
 GROUP_ROWS = 131_072
 """Rows of a row group: what a table holds in memory while it is written."""

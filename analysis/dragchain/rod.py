@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .case import Output
-from .dumps import iter_frames
-from .errors import TableError
-from .formats import Frame
+from dragchain.case import Output
+from dragchain.dumps import iter_frames
+from dragchain.errors import TableError
+from dragchain.formats import Frame
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -62,6 +62,10 @@ class WallContacts:
     overlap_m: Floats
     silent: NDArray[np.bool_]
 
+    def __len__(self) -> int:
+        """Return the number of contacts N."""
+        return len(self.ball_id)
+
     def select(self, mask: NDArray[np.bool_]) -> WallContacts:
         """Keep the contacts of a mask of shape (N,)."""
         return WallContacts(*(getattr(self, name)[mask] for name in self.__dataclass_fields__))
@@ -87,12 +91,15 @@ class RodFrame:
         Contacts on the tool and, if the bowl is a mesh, on the bowl.
     unplaced_n : (K, 3) ndarray
         Forces applied to balls for which no contact was written.
+    opening : bool
+        Whether its forces may have been evaluated anew; see `Frame`.
     """
 
     step: int
     rod: WallContacts
     bowl: WallContacts
     unplaced_n: Floats
+    opening: bool
 
 
 def tangential_force(force_n: Floats, normal: Floats) -> Floats:
@@ -175,6 +182,7 @@ def join_rod_frame(balls: Frame, contacts: Frame) -> RodFrame:
         all_contacts.select(~on_bowl),
         all_contacts.select(on_bowl),
         applied[unplaced],
+        balls.opening,
     )
 
 

@@ -12,6 +12,7 @@ software driver: on Debian and Ubuntu the packages ``libegl1`` and ``libgl1-mesa
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -22,12 +23,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .case import Case
-from .chains import RodPath, dominant_path, rod_paths
-from .collect import drag_start_s
-from .errors import DragchainError, TableError
-from .forces import needed
-from .frames import Floats, NetworkFrame, read_frames, read_table
+from dragchain.case import Case
+from dragchain.chains import RodPath, dominant_path, rod_paths
+from dragchain.collect import drag_start_s
+from dragchain.errors import DragchainError, TableError
+from dragchain.forces import needed
+from dragchain.frames import Floats, NetworkFrame, read_frames, read_table
 
 View = Literal["xy", "xz"]
 
@@ -149,10 +150,11 @@ def check_rendering() -> None:
     code = "import pyvista; pyvista.Plotter(off_screen=True, window_size=(8, 8)).screenshot()"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     if done.returncode != 0:
+        said = re.sub(r"\x1b\[[0-9;]*m", "", done.stderr).strip().splitlines()
         raise RenderError(
             f"off-screen rendering ended with status {done.returncode}: "
-            f"{done.stderr[-300:].strip()}\n  remedy: "
-            "install EGL with a software driver (Debian, Ubuntu: libegl1 and libgl1-mesa-dri)"
+            f"{said[-1] if said else 'no message'}\n  remedy: install EGL with a software driver "
+            "(Debian, Ubuntu: libegl1 and libgl1-mesa-dri)"
         )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats as distributions
 
-from .errors import SeriesError
+from dragchain.errors import SeriesError
 
 MIN_SAMPLES = 8
 """Fewer samples carry no autocorrelation worth estimating."""
@@ -101,7 +101,7 @@ def estimate_mean(series: ArrayLike, *, confidence: float = 0.95) -> MeanEstimat
         ci_low=float(mean - quantile * error),
         ci_high=float(mean + quantile * error),
         confidence=confidence,
-        reliable=bool(sd > 0.0 and count >= RELIABLE_TIMES * tau),
+        reliable=bool(np.ptp(samples) > 0.0 and count >= RELIABLE_TIMES * tau),
     )
 
 
@@ -136,9 +136,9 @@ def autocorrelation_time(series: ArrayLike) -> float:
     less errors, Comput. Phys. Commun. 156, 143-153.
     """
     samples = _checked(series)
-    covariance = autocovariance(samples)
-    if covariance[0] <= _rounding(samples):
+    if np.ptp(samples) == 0.0:
         return 0.5
+    covariance = autocovariance(samples)
     sums = np.cumsum(covariance) / covariance[0] - 0.5
     window = int(np.argmax(np.arange(len(sums)) >= WINDOW * sums))
     count = len(samples)
@@ -164,11 +164,6 @@ def autocovariance(series: ArrayLike) -> NDArray[np.float64]:
     spectrum = np.fft.rfft(samples - samples.mean(), n=2 * count)
     products = np.fft.irfft(np.abs(spectrum) ** 2, n=2 * count)[:count]
     return np.asarray(products / np.arange(count, 0, -1))
-
-
-def _rounding(samples: NDArray[np.float64]) -> float:
-    """Variance below which a series counts as constant."""
-    return float((4.0 * np.finfo(np.float64).eps * np.abs(samples).max()) ** 2)
 
 
 def _checked(series: ArrayLike) -> NDArray[np.float64]:

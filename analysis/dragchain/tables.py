@@ -11,17 +11,24 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .case import Case, Output, load_case, load_outputs
-from .closure import LIMIT, MESH_BOWL_LIMIT, Closure
-from .contacts import KINDS, ContactRows, contact_rows
-from .drop import IMPACTS, find_impacts
-from .dumps import iter_frames, iter_prints
-from .errors import GateError, TableError
-from .fill import describe_bed
-from .forces import counted_mask, headings, needed, phase_codes, workpiece_frame, wrap_angle
-from .formats import Columns, Frame
-from .parquet import TableWriter, category, write_json
-from .rod import RodFrame, WallContacts, iter_rod_frames
+from dragchain.case import Case, Output, load_case, load_outputs
+from dragchain.closure import LIMIT, SHARED_LIMIT, Closure
+from dragchain.contacts import KINDS, ContactRows, contact_rows
+from dragchain.drop import IMPACTS, find_impacts
+from dragchain.dumps import iter_frames, iter_prints
+from dragchain.errors import GateError, TableError
+from dragchain.fill import describe_bed
+from dragchain.forces import (
+    counted_mask,
+    headings,
+    needed,
+    phase_codes,
+    workpiece_frame,
+    wrap_angle,
+)
+from dragchain.formats import Columns, Frame
+from dragchain.parquet import TableWriter, category, write_json
+from dragchain.rod import RodFrame, WallContacts, iter_rod_frames
 
 FORCES = ("force_x_n", "force_y_n", "force_z_n")
 POINT = ("point_x_m", "point_y_m", "point_z_m")
@@ -192,13 +199,15 @@ class ToolSamples:
 
 
 def _write_rod_contacts(run: Run, file: Path) -> None:
-    closure = Closure(limit=MESH_BOWL_LIMIT if _mesh_bowl(run.case) else LIMIT)
+    shared = "mesh_id" in run.outputs["rod_contacts"].columns
+    closure = Closure(limit=SHARED_LIMIT if shared else LIMIT)
     samples = ToolSamples(run.prints("rod_force"))
     with TableWriter(file, ROD_CONTACTS) as table:
         for frame in iter_rod_frames(run.folder, run.outputs):
             reference = samples.reference(frame.step)
-            table.write(rod_contact_rows(frame.step, frame.rod, reference, run.case))
-            _close(closure, frame, samples, run.case)
+            applied = _close(closure, frame, samples, run.case)
+            rows = rod_contact_rows(frame.step, frame.rod, reference, run.case)
+            table.write(rows if applied else {**rows, "counted": np.full(len(frame.rod), False)})
         write_json(run.table("closure.json"), closure.content())
         if (problem := closure.problem()) is not None:
             raise GateError(
@@ -207,15 +216,11 @@ def _write_rod_contacts(run: Run, file: Path) -> None:
             )
 
 
-def _mesh_bowl(case: Case) -> bool:
-    return case.bowl is not None and case.bowl.walls == "mesh"
-
-
-def _close(closure: Closure, frame: RodFrame, samples: ToolSamples, case: Case) -> None:
+def _close(closure: Closure, frame: RodFrame, samples: ToolSamples, case: Case) -> bool:
     sample = samples.row(frame.step) if frame.step >= samples.first_step else None
     force = None if sample is None else np.array([sample[name] for name in FORCES])
     counted = bool(counted_mask(np.array([frame.step]), case)[0])
-    closure.add(frame, force, counted=counted)
+    return closure.add(frame, force, counted=counted)
 
 
 def rod_contact_rows(
@@ -239,7 +244,7 @@ def rod_contact_rows(
     dict of str to (N,) array
         The columns; forces are on the tool.
     """
-    steps = np.full(len(contacts.ball_id), step)
+    steps = np.full(len(contacts), step)
     heading = headings(steps, np.tile(ref_xy_m, (len(steps), 1)), case)
     x, y = (contacts.point_m[:, :2] - ref_xy_m).T
     return {

@@ -274,7 +274,7 @@ def test_numbering_and_order_change_nothing(seed: int) -> None:
     random.shuffle(shuffled)
     plain = chain_table(make_frame(centres, contacts))
     mixed = chain_table(make_frame({new[k]: c for k, c in centres.items()}, shuffled))
-    plain["ball_ids"] = [[new[ball] for ball in balls] for balls in plain["ball_ids"]]
+    plain["ball_ids"] = plain["ball_ids"].map(lambda balls: [new[ball] for ball in balls])
     keys = ["definition", "mean_force_n", "altitude_m"]
     pd.testing.assert_frame_equal(
         plain.sort_values(keys, ignore_index=True), mixed.sort_values(keys, ignore_index=True)

@@ -61,7 +61,7 @@ def test_tetrahedron_by_hand():
 
 
 def test_volume_does_not_depend_on_the_place():
-    far = m.Mesh(TETRAHEDRON.points + [3.0, -5.0, 7.0], TETRAHEDRON.triangles)
+    far = m.Mesh(TETRAHEDRON.points + np.array([3.0, -5.0, 7.0]), TETRAHEDRON.triangles)
     assert far.volume == pytest.approx(TETRAHEDRON.volume, rel=1e-9)
 
 
@@ -307,13 +307,28 @@ def test_formats_come_back_in_metres(tmp_path: Path, name: str, options: dict[st
     assert again.bounds == pytest.approx(rod.bounds, abs=1e-9)
 
 
-def test_vtk_polygon_data_is_read(tmp_path: Path):
+def test_vtk_polygon_data_is_refused_with_a_way_out(tmp_path: Path):
     import pyvista
 
-    pyvista.Cylinder(radius=5, height=20, resolution=12).save(tmp_path / "body.vtk")
-    body = m.read(tmp_path / "body.vtk", "mm")
-    assert body.closed
-    assert body.volume == pytest.approx(6 * 0.005**2 * math.sin(math.tau / 12) * 0.02, rel=1e-6)
+    pyvista.Cylinder().save(tmp_path / "body.vtk")
+    with pytest.raises(InputError) as caught:
+        m.read(tmp_path / "body.vtk", "mm")
+    assert "POLYDATA" in str(caught.value.value)
+    assert "unstructured grid" in str(caught.value.remedy)
+
+
+@settings(max_examples=60, deadline=None)
+@given(part=st.floats(0.0, 0.99), suffix=st.sampled_from([".stl", ".obj", ".ply", ".vtk"]))
+def test_a_file_cut_short_never_passes(
+    tmp_path_factory: pytest.TempPathFactory, part: float, suffix: str
+):
+    whole, cut = (tmp_path_factory.mktemp("cut") / f"{name}{suffix}" for name in ("whole", "cut"))
+    cells = [("triangle", TETRAHEDRON.triangles.astype(np.int32))]
+    meshio.Mesh(TETRAHEDRON.points, cells).write(whole)
+    content = whole.read_bytes()
+    cut.write_bytes(content[: int(part * len(content))])
+    with pytest.raises(InputError):
+        m.check(m.read(cut, "m"))
 
 
 def test_binary_stl_whose_header_says_solid(tmp_path: Path):
@@ -440,6 +455,7 @@ hard_particles yes
 region box block -0.06 0.06 -0.06 0.06 -0.02 0.15 units box
 create_box 2 box
 neighbor 0.001 bin
+neigh_modify delay 0
 fix m1 all property/global youngsModulus peratomtype 77e7 210e7
 fix m2 all property/global poissonsRatio peratomtype 0.19 0.30
 fix m3 all property/global coefficientRestitution peratomtypepair 2 0.86 0.68 0.68 0.68

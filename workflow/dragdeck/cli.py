@@ -12,7 +12,7 @@ from dragdeck import __version__
 from dragdeck.cases import SCENES, Case, SceneName
 from dragdeck.errors import DragdeckError, InputError
 from dragdeck.project import Project, by_run, find_project, study_templates
-from dragdeck.scenes import Scene, drop_scene, fill_scene, process_scene
+from dragdeck.scenes import Bed, Scene, drop_scene, fill_scene, process_scene
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -57,12 +57,12 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _scene(case: Case, scene: SceneName, surface_m: float | None = None) -> Scene:
+def scene_of(case: Case, scene: SceneName, bed: Bed | None = None) -> Scene:
     if scene == "drop":
         return drop_scene(case)
     if scene == "fill":
         return fill_scene(case)
-    return process_scene(case, surface_m)
+    return process_scene(case, bed)
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -75,7 +75,7 @@ def _check(options: argparse.Namespace) -> None:
     warnings: dict[str, None] = {}
     for name in SCENES:
         for case in by_run(cases, name).values():
-            scene = _scene(case, name)
+            scene = scene_of(case, name)
             deck_text(scene, templates)
             warnings.update(dict.fromkeys(f"{case.name}: {text}" for text in scene.warnings))
     for warning in warnings:
@@ -89,7 +89,7 @@ def _explain(options: argparse.Namespace) -> None:
     project = find_project(Path.cwd())
     cases = project.cases(options.study, options.fidelity)
     names: tuple[SceneName, ...] = (options.scene,) if options.scene else SCENES
-    scenes = [_scene(case, name) for name in names for case in by_run(cases, name).values()]
+    scenes = [scene_of(case, name) for name in names for case in by_run(cases, name).values()]
     results = project.root / "results" / options.study
     show(explanation(scene, expected_cost(scene, results / scene.deck.scene)) for scene in scenes)
 
@@ -111,7 +111,7 @@ def _render(options: argparse.Namespace) -> None:
 
     project = find_project(Path.cwd())
     case = _case_of_run(project, options)
-    scene = _scene(case, options.scene, _surface(options))
+    scene = scene_of(case, options.scene, _bed(options))
     for warning in scene.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     templates = environment(project.templates, study_templates(case))
@@ -131,8 +131,8 @@ def _case_of_run(project: Project, options: argparse.Namespace) -> Case:
     return runs[options.run]
 
 
-def _surface(options: argparse.Namespace) -> float | None:
-    """Height of the settled bed; a process deck is never written on a guess."""
+def _bed(options: argparse.Namespace) -> Bed | None:
+    """The settled bed; a process deck is never written on a guess."""
     if options.scene != "process":
         return None
     if options.fill_table is None:
@@ -141,7 +141,8 @@ def _surface(options: argparse.Namespace) -> float | None:
             field="--fill-table",
             remedy="give the fill.json that dragchain made of the fill",
         )
-    return float(json.loads(options.fill_table.read_text(encoding="utf-8"))["fill_height_m"])
+    measured = json.loads(options.fill_table.read_text(encoding="utf-8"))
+    return Bed(surface_m=measured["fill_height_m"], top_m=measured["top_m"])
 
 
 def _run(options: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""The engine as a process: find it, start it, watch it, stop it kindly."""
+"""The engine as a process: find it, start it, watch it, stop it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 
 import psutil
 
@@ -25,9 +24,6 @@ OLDEST_VERSION = (3, 8, 0)
 """Oldest engine that the decks were run on."""
 
 POLL_S = 0.2
-PATIENCE_S = 60.0
-"""How long a run that was asked to stop may take to write its checkpoint."""
-
 Watch = Callable[[float], None]
 
 
@@ -132,8 +128,10 @@ def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | Non
 def execute(words: Sequence[str], folder: Path, screen: Path, watch: Watch) -> Ending:
     """Run the engine to its end.
 
-    SIGINT or SIGTERM to this process asks the engine's ranks to write a
-    checkpoint and stop.
+    SIGINT or SIGTERM to this process ends the engine at once; its last
+    checkpoint stays. (The engine can write one more when it gets the signal
+    itself, but each rank heeds the signal in a step of its own, and two ranks
+    in different steps wait for each other for ever.)
 
     Parameters
     ----------
@@ -155,19 +153,17 @@ def execute(words: Sequence[str], folder: Path, screen: Path, watch: Watch) -> E
             stdout=sink,
             stderr=subprocess.STDOUT,
             env=_environment(),
-            start_new_session=True,  # a Ctrl-C reaches us first, and we ask kindly
+            start_new_session=True,  # a Ctrl-C reaches us, not the engine
         )
-        with _asking(process, Path(words[0]).name) as asked:
+        with _heeding_signals() as asked:
             try:
-                while process.poll() is None:
+                while process.poll() is None and not asked:
                     watch(time.monotonic() - begun)
-                    if asked and time.monotonic() - asked[0] > PATIENCE_S:
-                        os.killpg(process.pid, signal.SIGKILL)
                     time.sleep(POLL_S if time.monotonic() - begun > 1 else 0.02)
-            except BaseException:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
-                raise
+            finally:
+                if process.poll() is None:
+                    end_all(process.pid)
+                    process.wait()
     return Ending(process.returncode, bool(asked), time.monotonic() - begun)
 
 
@@ -177,19 +173,13 @@ def _environment() -> dict[str, str]:
 
 
 @contextlib.contextmanager
-def _asking(process: subprocess.Popen[bytes], name: str) -> Iterator[list[float]]:
-    """While inside, a stop signal is handed on to the ranks; its time is noted."""
-    asked: list[float] = []
-
-    def hand_on(number: int, frame: FrameType | None) -> None:
-        if not asked:
-            asked.append(time.monotonic())
-            ask_to_stop(process.pid, name)
-
+def _heeding_signals() -> Iterator[list[int]]:
+    """While inside, SIGINT and SIGTERM are noted in the list instead of acting."""
+    asked: list[int] = []
     before = {}
     with contextlib.suppress(ValueError):  # not the main thread: nobody signals us here
         for number in (signal.SIGINT, signal.SIGTERM):
-            before[number] = signal.signal(number, hand_on)
+            before[number] = signal.signal(number, lambda got, _: asked.append(got))
     try:
         yield asked
     finally:
@@ -197,22 +187,13 @@ def _asking(process: subprocess.Popen[bytes], name: str) -> Iterator[list[float]
             signal.signal(number, handler)
 
 
-def ask_to_stop(pid: int, launcher: str) -> None:
-    """Send SIGTERM to the ranks of a run, not to mpirun, which would kill them.
-
-    Parameters
-    ----------
-    pid : int
-        Of the process that `execute` started.
-    launcher : str
-        Its name: ``mpirun``, or the engine itself when it runs alone.
-    """
+def end_all(pid: int) -> None:
+    """Kill a process and all that it started: mpirun's ranks have groups of their own."""
     with contextlib.suppress(psutil.NoSuchProcess):
         top = psutil.Process(pid)
-        ranks = top.children(recursive=True) if launcher == "mpirun" else [top]
-        for rank in ranks:
+        for process in (*top.children(recursive=True), top):
             with contextlib.suppress(psutil.NoSuchProcess):
-                rank.send_signal(signal.SIGTERM)
+                process.kill()
 
 
 def engine_errors(text: str) -> list[str]:

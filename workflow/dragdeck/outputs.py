@@ -138,10 +138,15 @@ def rod_balls(period: int, first: int, last: int) -> Output:
     return Output("rod_balls", "custom", columns, period, first, last, binary=True)
 
 
-def rod_contacts(period: int, first: int, last: int) -> Output:
-    """Contacts of the tool's facets, with the force as evaluated again."""
+def rod_contacts(period: int, first: int, last: int, bowl_facets: bool) -> Output:
+    """Contacts of the tool's facets, with the force as evaluated again.
+
+    With `bowl_facets`, the bowl's too, told apart by the mesh id.
+    """
+    mesh = (Column("mesh_id", "c_tool_contacts[7]", whole=True),) if bowl_facets else ()
     columns = (
         *_vector("point", "m", "c_tool_contacts", 1),
+        *mesh,
         Column("facet_id", "c_tool_contacts[8]", whole=True),
         Column("ball_id", "c_tool_contacts[9]", whole=True),
         *_vector("force", "n", "c_tool_contacts", 10),
@@ -161,17 +166,13 @@ def contacts(period: int, first: int, last: int) -> Output:
     return Output("contacts", "local", columns, period, first, last)
 
 
-def balls(period: int, first: int, last: int) -> Output:
-    """Every ball, with the forces of the bowl on it as applied."""
-    columns = (
-        _ID,
-        *_POSITION,
-        *_VELOCITY,
-        *_SPIN,
-        _RADIUS,
+def balls(period: int, first: int, last: int, bowl_facets: bool) -> Output:
+    """Every ball, with the forces of an exact bowl on it as applied."""
+    bowl = (
         *_vector("floor_force", "n", "f_force_floor"),
         *_vector("side_force", "n", "f_force_side"),
     )
+    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *(() if bowl_facets else bowl))
     return Output("balls", "custom", columns, period, first, last, binary=True)
 
 

@@ -24,7 +24,8 @@ SPACING = 1.2
 """Lattice spacing over the largest diameter: room to jitter, and to fall."""
 
 FIRST_SPEED_M_S = 0.3
-"""Standard deviation of each component of the balls' first velocities."""
+"""Standard deviation of each component of the balls' first velocities, m/s; the
+vertical one points down."""
 
 
 @dataclass(frozen=True)
@@ -94,10 +95,12 @@ def pour(ball_radii_m: Array, bowl_radius_m: float, seed: int) -> Balls:
     largest = float(ball_radii_m.max())
     sites = _sites(len(ball_radii_m), bowl_radius_m, largest)
     jitter = (SPACING - 1) * largest * 0.999
+    velocities = random.normal(0.0, FIRST_SPEED_M_S, sites.shape)
+    velocities[:, 2] = -np.abs(velocities[:, 2])  # none leaves through the top
     return Balls(
         radii_m=random.permutation(ball_radii_m),
         positions_m=sites + random.uniform(-jitter, jitter, sites.shape),
-        velocities_m_s=random.normal(0.0, FIRST_SPEED_M_S, sites.shape),
+        velocities_m_s=velocities,
     )
 
 

@@ -101,6 +101,8 @@ def run(folder: Path, report: Report, *, again: bool = False, every_s: float = 1
 def fingerprint(folder: Path) -> str:
     """Hash of all that a run depends on: deck, data, meshes and the file it starts from.
 
+    Comments in the deck do not count.
+
     Raises
     ------
     InputError
@@ -110,11 +112,12 @@ def fingerprint(folder: Path) -> str:
     if not deck.is_file():
         raise InputError("no deck here", file=folder, remedy="render it first: dragdeck render")
     text = deck.read_text(encoding="utf-8")
-    files = {deck, *folder.glob("*.data"), *folder.glob("*.stl")} - set(_checkpoints(folder))
+    files = {*folder.glob("*.data"), *folder.glob("*.stl")}
     source = re.search(r"^variable from index (\S+)", text, flags=re.MULTILINE)
     if source is not None:
         files.add(folder / source.group(1))
-    total = hashlib.sha256()
+    commands = [line for line in text.splitlines() if line and not line.startswith("#")]
+    total = hashlib.sha256("\n".join(commands).encode())
     for file in sorted(files):
         if not file.is_file():
             raise InputError(
@@ -287,7 +290,6 @@ def _archive(folder: Path, inputs: str, report: Report) -> None:
     place.mkdir(parents=True)
     new = {DECK_FILE, CASE_FILE, COLUMNS_FILE, ARCHIVE}
     sources = {file.name for file in (*folder.glob("*.data"), *folder.glob("*.stl"))}
-    sources -= {file.name for file in _checkpoints(folder)}
     for file in folder.iterdir():
         if file.name not in new | sources:
             shutil.move(str(file), str(place / file.name))
@@ -295,24 +297,24 @@ def _archive(folder: Path, inputs: str, report: Report) -> None:
 
 
 def _checkpoints(folder: Path) -> list[Path]:
-    """Restart points, oldest first: the regular ones and those written when asked to stop."""
-    found = [*folder.glob("checkpoint.*.restart"), *folder.glob("restart_forced_*_*.data")]
-    return sorted(found, key=_checkpoint_step)
+    """Restart points, oldest first."""
+    return sorted(folder.glob("checkpoint.*.restart"), key=_checkpoint_step)
 
 
 def _checkpoint_step(file: Path) -> int:
-    digits = re.search(r"(\d+)\.(?:restart|data)$", file.name)
-    return int(digits.group(1)) if digits else -1
+    return int(file.name.split(".")[1])
 
 
 def _newest_checkpoint(folder: Path) -> Path | None:
-    """The newest restart point that is whole, judged by its size against the largest."""
-    found = _checkpoints(folder)
-    if not found:
-        return None
-    largest = max(file.stat().st_size for file in found)
-    whole = [file for file in found if file.stat().st_size > 0.8 * largest]
-    return whole[-1]
+    """The newest restart point that is whole.
+
+    The engine writes one thing after another: a restart file is whole if a
+    text output was written after it, and may be cut short if it was the last.
+    """
+    texts = [*folder.glob("*.*.txt"), *folder.glob("engine.*.log")]
+    latest = max((file.stat().st_mtime_ns for file in texts), default=0)
+    whole = [file for file in _checkpoints(folder) if file.stat().st_mtime_ns < latest]
+    return whole[-1] if whole else None
 
 
 def _last_step(screen: Path) -> int | None:

@@ -209,7 +209,7 @@ class Outputs(Model):
     tool_contacts_hz: Positive = Field(default=200.0, description="contacts on the tool, Hz")
     network_hz: Positive = Field(default=20.0, description="all contacts and balls, Hz")
     checkpoints: Annotated[Whole, Field(ge=0)] = Field(
-        default=20, description="restart points over the run"
+        default=50, description="restart points over the run"
     )
 
     @model_validator(mode="after")

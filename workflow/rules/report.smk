@@ -12,6 +12,7 @@ rule draw_drop:
             category="Drop test",
             labels={"run": "{run}", "figure": "impacts"},
         ),
+        DROP + "tables/figures.json",
     params:
         source=source_hash("dragchain.figures"),
     log:
@@ -34,6 +35,7 @@ rule draw_fill:
             category="Fill",
             labels={"run": "{run}", "figure": "settling"},
         ),
+        FILL + "tables/figures.json",
     params:
         source=source_hash("dragchain.figures"),
     log:
@@ -60,6 +62,7 @@ rule draw_process:
             PROCESS + "tables/",
             "rod_force.parquet",
             "rod_contacts.parquet",
+            "balls.parquet",
             "contacts.parquet",
             "network.parquet",
             "chains.parquet",
@@ -89,12 +92,15 @@ rule draw_process:
 def of_every_run(wildcards):
     """All that the report reads."""
     return [
+        *every("process", "run.json"),
         *every("process", "tables/figures.json"),
         *every("process", "tables/closure.json"),
+        *every("fill", "run.json"),
         *every("fill", "tables/fill.json"),
-        *every("fill", "figures/fill.png"),
+        *every("fill", "tables/figures.json"),
+        *every("drop", "run.json"),
         *every("drop", "tables/impacts.parquet"),
-        *every("drop", "figures/drop.png"),
+        *every("drop", "tables/figures.json"),
     ]
 
 

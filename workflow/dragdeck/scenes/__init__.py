@@ -3,6 +3,6 @@
 from dragdeck.scenes.common import Deck, Scene
 from dragdeck.scenes.drop import drop_scene
 from dragdeck.scenes.fill import fill_scene
-from dragdeck.scenes.process import process_scene
+from dragdeck.scenes.process import Bed, process_scene
 
-__all__ = ["Deck", "Scene", "drop_scene", "fill_scene", "process_scene"]
+__all__ = ["Bed", "Deck", "Scene", "drop_scene", "fill_scene", "process_scene"]

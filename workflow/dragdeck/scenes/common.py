@@ -167,6 +167,12 @@ def smallest_radius(study: Study) -> float:
     return float(radii(media.count, media.radius_mean_m, media.radius_sd_m).min())
 
 
+def largest_radius(study: Study) -> float:
+    """Radius of the largest ball of the bed, m."""
+    media = study.media
+    return float(radii(media.count, media.radius_mean_m, media.radius_sd_m).max())
+
+
 def bed_rayleigh_time(study: Study) -> float:
     """Rayleigh time of the bed's smallest ball at the fidelity's modulus, s."""
     scale = study.chosen_fidelity().youngs_modulus_scale

@@ -28,7 +28,6 @@ from dragdeck.scenes.common import (
     skin,
     timestep,
 )
-from dragdeck.scenes.tool import tool_length
 from dragdeck.study import Study
 
 CHECK_INTERVAL_S = 0.02
@@ -68,7 +67,7 @@ def fill_scene(case: Case) -> Scene:
     dt = timestep(rayleigh, fidelity.fill_timestep_fraction)
     check_steps = max(1, math.ceil(CHECK_INTERVAL_S / dt))
     balls = first_balls(study)
-    top = box_top(case, balls)
+    top = box_top(study, balls)
     longest = study.fill.longest_s
     types = _fill_types(study)
     deck = FillDeck(
@@ -84,7 +83,7 @@ def fill_scene(case: Case) -> Scene:
         timestep_s=dt,
         outputs=(outputs.thermo(check_steps, None), outputs.settled_balls()),
         thermo_steps=check_steps,
-        checkpoint_steps=50 * check_steps,
+        checkpoint_steps=5 * check_steps,
         bowl_type=types.index(study.bowl.material) + 1,
         bowl_radius_m=study.bowl.radius_m,
         energy_ratio=study.fill.energy_ratio,
@@ -97,7 +96,7 @@ def fill_scene(case: Case) -> Scene:
         deck=deck,
         case={
             **base_case(case, "fill", dt, rayleigh),
-            "phases": [{"name": "settle", "start_step": 0, "end_step": None}],
+            "phases": [],
             "settled": {"energy_ratio": study.fill.energy_ratio},
         },
         steps=round(_expected_time(study, balls) / dt),
@@ -163,14 +162,15 @@ def expected_surface(study: Study) -> float:
     return bed_height(volume, study.bowl.radius_m, SOLID_FRACTION_ESTIMATE)
 
 
-def box_top(case: Case, balls: Balls) -> float:
-    """Top of the simulation box, m: room for the falling balls and the tool above the bed.
+def box_top(study: Study, balls: Balls) -> float:
+    """Top of the simulation box, m: room for the falling balls, and for a tool above the bed.
 
-    The process inherits the box from the fill's restart file.
+    It must not depend on the tool: cases with other tools share this fill, and
+    their runs inherit the box from its restart file.
     """
-    study = case.study
-    tool_top = 1.2 * expected_surface(study) + 2 * study.media.radius_mean_m + tool_length(case)
-    return math.ceil(max(balls.top_m, tool_top) * 100 + 1) / 100
+    diameter = 2 * study.media.radius_mean_m
+    above_bed = 2 * expected_surface(study) + 8 * diameter
+    return math.ceil(100 * max(balls.top_m, above_bed, 2 * study.bowl.height_m) + 5) / 100
 
 
 def _energy_unit(study: Study) -> float:

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from dragdeck import outputs
 from dragdeck.cases import Case
 from dragdeck.derive import ball_mass, effective_modulus, hertz_contact_time
@@ -22,6 +20,7 @@ from dragdeck.scenes.common import (
     ball_material,
     base_case,
     bed_rayleigh_time,
+    largest_radius,
     material_table,
     round_to,
     skin,
@@ -88,15 +87,31 @@ class Periods:
     network: int
 
 
-def process_scene(case: Case, surface_m: float | None = None) -> Scene:
+@dataclass(frozen=True)
+class Bed:
+    """A settled bed, as measured in the fill.
+
+    Attributes
+    ----------
+    surface_m : float
+        Its mean height above the floor.
+    top_m : float
+        The highest point of any ball.
+    """
+
+    surface_m: float
+    top_m: float
+
+
+def process_scene(case: Case, bed: Bed | None = None) -> Scene:
     """The process run of a case.
 
     Parameters
     ----------
     case : Case
-    surface_m : float, optional
-        Height of the settled bed as measured in the fill, m. Without it the
-        expected height stands in: good for `explain` and `check`, not for a run.
+    bed : Bed, optional
+        As measured in the fill. Without it an expected height stands in: good
+        for `explain` and `check`, not for a run.
 
     Raises
     ------
@@ -106,18 +121,20 @@ def process_scene(case: Case, surface_m: float | None = None) -> Scene:
     """
     study = case.study
     fidelity = study.chosen_fidelity()
-    surface = expected_surface(study) if surface_m is None else surface_m
+    bed = bed or _expected_bed(study)
+    surface = bed.surface_m
     check_fit(case, surface)
     rayleigh = bed_rayleigh_time(study)
     dt = timestep(rayleigh, fidelity.timestep_fraction)
     periods = output_periods(study, dt)
-    clear = round_to(surface + 2 * study.media.radius_mean_m, 6)
+    clear = round_to(bed.top_m + study.media.radius_mean_m, 6)
     start = (*plunge_point(study.motion), clear)
     dive = start[2] - (surface - study.motion.submersion_m)
     timed = timed_legs(legs(study.motion, dive, fidelity.speed_factor), study, dt, periods.network)
     drag, last = timed[-1], timed[-1].end_step
     types = study.type_names()
-    top = box_top(case, first_balls(study))
+    top = box_top(study, first_balls(study))
+    check_headroom(case, clear, top)
     deck = ProcessDeck(
         title=study.title,
         study=case.study_name,
@@ -129,7 +146,7 @@ def process_scene(case: Case, surface_m: float | None = None) -> Scene:
         gravity_m_s2=study.gravity_m_s2,
         skin_m=skin(study),
         timestep_s=dt,
-        outputs=_outputs(periods, drag.start_step, last),
+        outputs=_outputs(periods, drag.start_step, last, study.bowl.facet_size_m is not None),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, last),
         bowl_type=types.index(study.bowl.material) + 1,
@@ -147,8 +164,13 @@ def process_scene(case: Case, surface_m: float | None = None) -> Scene:
         meshes={"tool.stl": tool_mesh(case), **bowl_meshes(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
-        warnings=_warnings(case, surface, dt),
+        warnings=_warnings(case, dt),
     )
+
+
+def _expected_bed(study: Study) -> Bed:
+    surface = expected_surface(study)
+    return Bed(surface, surface + 2 * study.media.radius_mean_m)
 
 
 def check_fit(case: Case, surface_m: float) -> None:
@@ -171,15 +193,38 @@ def check_fit(case: Case, surface_m: float) -> None:
             limit=f"together below the bowl's radius {study.bowl.radius_m:g} m",
             remedy="use a smaller path or tool, or a wider bowl",
         )
-    tip = surface_m - study.motion.submersion_m
-    if tip <= 0:
+    deepest = surface_m - 2 * largest_radius(study)
+    if study.motion.submersion_m > deepest:
+        below = study.motion.submersion_m > surface_m
         raise InputError(
-            "the tool would reach below the floor",
+            "the tool would reach below the floor"
+            if below
+            else "the tool would crush balls between its tip and the floor",
             file=case.file,
             field="motion.submersion_m",
             value=study.motion.submersion_m,
-            limit=f"below the height of the bed, {surface_m:.4g} m",
+            limit=f"at most {deepest:.4g} m: a bed {surface_m:.4g} m high less one largest ball",
             remedy="submerge the tool less, or fill in more balls",
+        )
+
+
+def check_headroom(case: Case, tip_m: float, top_m: float) -> None:
+    """Refuse a tool that would stick out of the simulation box before it goes in.
+
+    Raises
+    ------
+    InputError
+        The tool is too long.
+    """
+    longest = top_m - tip_m - 0.001
+    if tool_length(case) > longest:
+        raise InputError(
+            "the tool is longer than the simulation box above the bed",
+            file=case.file,
+            field="workpiece.shape",
+            value=f"length {tool_length(case):.4g} m",
+            limit=f"at most {longest:.4g} m",
+            remedy="cut the mesh off higher up, or state a higher bowl (bowl.height_m)",
         )
 
 
@@ -214,13 +259,13 @@ def timed_legs(plan: Sequence[Leg], study: Study, timestep_s: float, period: int
     return found
 
 
-def _outputs(periods: Periods, first: int, last: int) -> tuple[Output, ...]:
+def _outputs(periods: Periods, first: int, last: int, facets: bool) -> tuple[Output, ...]:
     return (
         outputs.thermo(periods.network, last),
         outputs.rod_force(periods.force, last),
         outputs.rod_balls(periods.contacts, first, last),
-        outputs.rod_contacts(periods.contacts, first, last),
-        outputs.balls(periods.network, first, last),
+        outputs.rod_contacts(periods.contacts, first, last, facets),
+        outputs.balls(periods.network, first, last, facets),
         outputs.contacts(periods.network, first, last),
     )
 
@@ -274,17 +319,11 @@ def _path(study: Study) -> dict[str, Any]:
 
 
 def bowl_meshes(study: Study, top_m: float) -> dict[str, Mesh]:
-    """The bowl's floor and side as two meshes, if the study asks for facets.
-
-    Two, so that each has its own force on every ball, as the exact walls do.
-    """
+    """The bowl as a mesh, if the study asks for facets."""
     size = study.bowl.facet_size_m
     if size is None:
         return {}
-    whole = bowl(study.bowl.radius_m, min(study.bowl.height_m, 0.99 * top_m), size)
-    is_floor = np.abs(whole.normals[:, 2]) > 0.5
-    parts = {"bowl_floor.stl": is_floor, "bowl_side.stl": ~is_floor}
-    return {name: Mesh(whole.points, whole.triangles[part]) for name, part in parts.items()}
+    return {"bowl.stl": bowl(study.bowl.radius_m, min(study.bowl.height_m, 0.99 * top_m), size)}
 
 
 def _models(study: Study) -> dict[str, str]:
@@ -311,16 +350,13 @@ def _leaves_out(study: Study) -> dict[str, str]:
     return found
 
 
-def _warnings(case: Case, surface_m: float, timestep_s: float) -> list[str]:
+def _warnings(case: Case, timestep_s: float) -> list[str]:
     study = case.study
     diameter = 2 * study.media.radius_mean_m
     found = []
     gap = study.bowl.radius_m - farthest_reach(study.motion) - tool_radius(case)
     if gap < diameter:
         found.append(f"the gap between tool and bowl, {gap:.4g} m, is less than one ball: they jam")
-    tip = surface_m - study.motion.submersion_m
-    if tip < diameter:
-        found.append(f"the tip stays {tip:.4g} m above the floor, less than one ball: they jam")
     steps = contact_steps(study, timestep_s)
     if steps < FEWEST_STEPS_PER_CONTACT:
         found.append(

@@ -1,0 +1,368 @@
+"""The summary of a study's runs: a table and one self-contained page."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import pandas as pd
+from PIL import Image
+
+from dragchain.case import Assumption, Case, Scene, load_case
+from dragchain.collect import Findings, read_findings
+from dragchain.errors import GateError, TableError
+from dragchain.frames import write_parquet
+from dragchain.stats import RELIABLE_TIMES
+
+RUN_SCHEMA = 1
+LARGE_PICTURE = 200_000
+"""Bytes above which the page holds a picture as WebP; ``figures/`` keeps the PNG."""
+
+DASH, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
+
+FIGURES: dict[Scene, dict[str, str]] = {
+    "process": {
+        "forces": "Force on the tool along and across its motion, over process time (from the "
+        "start of the drag). Statistics leave out the run-in.",
+        "network_xy": "Interaction network from above: one cylinder a contact, green (no force) to "
+        "red (the frame's largest normal force), radius proportional to the force.",
+        "network_xz": "The same frame from the side.",
+        "force_around_rod": "Normal force on the tool by bearing.",
+        "force_depth": "Normal force on the tool by depth below the settled surface.",
+        "chains_peaks": "Resistance and its peaks above the weakest contact of the dominant path "
+        "from tool to bowl.",
+    },
+    "fill": {"fill": "Settling of the fill."},
+    "drop": {"drop": "Impacts of the drop."},
+}
+"""Figures of the page by scene, with their captions."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that counts: its folder, case, findings and ``run.json``."""
+
+    folder: Path
+    case: Case
+    findings: Findings
+    record: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A process run with the fill and the drop it belongs to, None where it names none."""
+
+    process: Run
+    fill: Run | None
+    drop: Run | None
+
+    @property
+    def runs(self) -> list[Run]:
+        """Return the runs that there are, the process first."""
+        return [run for run in (self.process, self.fill, self.drop) if run is not None]
+
+
+def write_report(out_dir: Path, run_dirs: Sequence[Path]) -> None:
+    """Write ``summary.csv``, ``summary.parquet`` and ``report.html`` on process runs.
+
+    Parameters
+    ----------
+    out_dir
+        Where they go; made if need be.
+    run_dirs
+        Folders of process runs, ``results/<study>/<scene>/<run id>``. The fill and the drop that
+        a run names are looked up beside it; their folders may be given too and are then used only
+        that way.
+
+    Raises
+    ------
+    GateError
+        If a run is not complete or a gate of it failed: no report is written at all.
+    TableError
+        If no process run is given, or the findings or figures of a run are missing.
+    """
+    cases = {folder: load_case(folder) for folder in run_dirs}
+    studies = [read_study(folder) for folder, case in cases.items() if case.scene == "process"]
+    if not studies:
+        raise TableError("no folder of a process run is given, so there is nothing to report")
+    summary = pd.DataFrame([summary_row(study) for study in studies])
+    page = render_page(studies, summary)
+    out_dir.mkdir(parents=True, exist_ok=True)
+    write_parquet(summary, out_dir / "summary.parquet")
+    _write_text(out_dir / "summary.csv", summary.to_csv(index=False, lineterminator="\n"))
+    _write_text(out_dir / "report.html", page)
+
+
+def _write_text(path: Path, text: str) -> None:
+    draft = path.with_name(f".{path.name}.tmp")
+    draft.write_text(text, encoding="utf-8")
+    draft.replace(path)
+
+
+# --- reading ---------------------------------------------------------------------------------
+
+
+def read_study(run_dir: Path) -> Study:
+    """Read a process run with its fill and drop."""
+    process = read_run(run_dir)
+    results = run_dir.resolve().parent.parent
+    upstream = process.case.upstream
+    fill, drop = (
+        read_run(results / scene / upstream[scene]) if scene in upstream else None
+        for scene in ("fill", "drop")
+    )
+    return Study(process, fill, drop)
+
+
+def read_run(run_dir: Path) -> Run:
+    """Read a run, if it counts.
+
+    Raises
+    ------
+    GateError
+        If ``run.json`` is missing, or says that the run did not end or that a gate failed.
+    """
+    file = run_dir / "run.json"
+    if not file.is_file():
+        raise GateError(f"{file}: there is no such file, so nothing says that the run is complete")
+    record: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    if (reason := refusal(record)) is not None:
+        raise GateError(f"{run_dir} is refused: {reason}")
+    return Run(run_dir, load_case(run_dir), read_findings(run_dir), record)
+
+
+def refusal(record: Mapping[str, Any]) -> str | None:
+    """Say why a run with this ``run.json`` does not count, or return None if it does."""
+    if record.get("schema") != RUN_SCHEMA:
+        return f"schema of run.json is {record.get('schema')!r}, this dragchain reads {RUN_SCHEMA}"
+    if record.get("state") != "complete":
+        return f"its state is {record.get('state')!r}, not 'complete'"
+    gates = record.get("gates")
+    if not gates:
+        return "run.json lists no gates, so nothing says that its outputs can be trusted"
+    failed = [
+        f"{gate['name']} (saw {gate['seen']}, limit {gate['limit']})"
+        for gate in gates
+        if gate["passed"] is not True
+    ]
+    return f"gates failed: {'; '.join(failed)}" if failed else None
+
+
+# --- the summary -----------------------------------------------------------------------------
+
+
+def summary_row(study: Study) -> dict[str, object]:
+    """Return the row of a process run; a None is a number that there is none of."""
+    case, found, record = study.process.case, study.process.findings, study.process.record
+    return {
+        "study": case.study,
+        "case": case.case,
+        "run": case.run,
+        **{input_column(name): _plain(value) for name, value in case.inputs.items()},
+        **{f"fidelity_{name}": value for name, value in vars(case.fidelity).items()},
+        "timestep_s": case.timestep_s,
+        "ranks": record["ranks"],
+        "steps_per_s": record["steps_per_s"],
+        "wall_time_s": record["wall_time_s"],
+        "engine_version": record["engine_version"],
+        **_force_columns(found["forces"]),
+        **_comparison_columns(found["comparison"]),
+        "peak_count": found["peaks"]["count"],
+        "peak_max_n": found["peaks"]["largest_n"],
+        **_network_columns(found),
+        **_chain_columns(found),
+        **_upstream_columns(study),
+    }
+
+
+def input_column(name: str) -> str:
+    """Return the summary's column of a dotted input name."""
+    return "input_" + name.replace(".", "_")
+
+
+def _plain(value: object) -> object:
+    return value if isinstance(value, str | int | float | None) else json.dumps(value)
+
+
+def _force_columns(forces: Findings) -> dict[str, object]:
+    columns: dict[str, object] = {}
+    for key, force in forces.items():
+        name = key.removesuffix("_n")
+        columns |= {
+            f"{name}_mean_n": force["mean"],
+            f"{name}_sd_n": force["sd"],
+            f"{name}_ci95_low_n": force["ci_low"],
+            f"{name}_ci95_high_n": force["ci_high"],
+            f"{name}_effective_samples": force["effective_samples"],
+            f"{name}_reliable": force["reliable"],
+        }
+    return columns
+
+
+def _comparison_columns(comparison: Sequence[Findings]) -> dict[str, object]:
+    columns: dict[str, object] = {}
+    for row in comparison:
+        name = f"drag_against_{row['label']}"
+        columns[f"{name}_percent"] = row["difference_percent"]
+        columns[f"{name}_ci95_low_percent"] = row["low"]
+        columns[f"{name}_ci95_high_percent"] = row["high"]
+    return columns
+
+
+def _network_columns(found: Findings) -> dict[str, object]:
+    network, sides, slope = found["network"], found["ahead_behind"], found["depth"]["slope_n_m"]
+    names = ("coordination_number", "mechanical_coordination_number", "rattler_share")
+    return {
+        "network_frames": network["frames"],
+        **{name: network[name] for name in names},
+        "contact_normal_force_mean_n": network["normal_force_mean_n"],
+        "rod_contacts_per_frame": network["ball_rod_contacts"],
+        "ahead_mean_n": sides["ahead_n"]["value"],
+        "behind_mean_n": sides["behind_n"]["value"],
+        "ahead_behind_ratio": sides["ratio"]["value"],
+        "ahead_behind_ratio_ci95_low": sides["ratio"]["low"],
+        "ahead_behind_ratio_ci95_high": sides["ratio"]["high"],
+        "depth_slope_n_m": slope["value"],
+        "depth_slope_ci95_low_n_m": slope["low"],
+        "depth_slope_ci95_high_n_m": slope["high"],
+    }
+
+
+def _chain_columns(found: Findings) -> dict[str, object]:
+    chains, link = found["chains"], found["association"]
+    return {
+        "peters_chains_per_frame": chains["peters_per_frame"],
+        "peters_chain_balls_mean": chains["peters_balls_mean"],
+        "rod_paths_per_frame": chains["rod_paths_per_frame"],
+        "rod_paths_to_side_share": chains["rod_paths_to_side_share"],
+        "dominant_bottleneck_mean_n": chains["dominant_bottleneck_mean_n"],
+        "dominant_bottleneck_max_n": chains["dominant_bottleneck_max_n"],
+        "dominant_balls_mean": chains["dominant_balls_mean"],
+        "dominant_altitude_mean_m": chains["dominant_altitude_mean_m"],
+        "dominant_azimuth_mean_rad": chains["dominant_azimuth_mean_rad"],
+        "chain_drag_rank_correlation": link["rank_correlation"],
+        "chain_drag_p_value": link["p_value"],
+    }
+
+
+def _upstream_columns(study: Study) -> dict[str, object]:
+    bed = study.fill.findings["bed"] if study.fill else {}
+    ratio = study.drop.findings["restitution"] if study.drop else {}
+    return {
+        "fill_height_m": bed.get("fill_height_m"),
+        "solid_fraction": bed.get("solid_fraction"),
+        "restitution_effective": ratio.get("mean"),
+        "restitution_input": ratio.get("input"),
+    }
+
+
+# --- the page --------------------------------------------------------------------------------
+
+
+def render_page(studies: Sequence[Study], summary: pd.DataFrame) -> str:
+    """Return the page: HTML that needs no other file and no network."""
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= {"number": number, "measured": measured, "percent": percent}
+    source = resources.files("dragchain").joinpath("report.html.j2").read_text(encoding="utf-8")
+    columns = {str(name): summary[name].tolist() for name in summary}
+    return environment.from_string(source).render(
+        title=", ".join(dict.fromkeys(study.process.case.study for study in studies)),
+        studies=[_section(study) for study in studies],
+        overview=_overview(studies) if len(studies) > 1 else None,
+        columns=columns,
+        reliable_times=RELIABLE_TIMES,
+    )
+
+
+def _section(study: Study) -> dict[str, object]:
+    """Return what the page shows of one process run."""
+    process = study.process
+    assumptions: dict[str, Assumption] = {}
+    for run in reversed(study.runs):
+        assumptions |= {assumption.field: assumption for assumption in run.case.assumptions}
+    return {
+        "case": process.case,
+        "found": process.findings,
+        "runs": study.runs,
+        "assumptions": [assumptions[field] for field in sorted(assumptions)],
+        "pictures": [picture for run in study.runs for picture in pictures(run)],
+        "fill": study.fill.findings["bed"] if study.fill else None,
+        "drop": study.drop.findings if study.drop else None,
+    }
+
+
+def pictures(run: Run) -> list[dict[str, str]]:
+    """Return name, caption and data URI of a run's figures.
+
+    Raises
+    ------
+    TableError
+        If a figure of a process or a drop is missing; a fill without thermo table has none.
+    """
+    found = []
+    for name, caption in FIGURES[run.case.scene].items():
+        file = run.folder / "figures" / f"{name}.png"
+        if file.is_file():
+            found.append({"name": name, "caption": caption, "uri": data_uri(file.read_bytes())})
+        elif run.case.scene != "fill":
+            raise TableError(f"{file}: there is no such file; run `dragchain figures` first")
+    return found
+
+
+def data_uri(png: bytes) -> str:
+    """Return a PNG picture as a data URI, a large one as the smaller WebP."""
+    kind = "png"
+    if len(png) > LARGE_PICTURE:
+        small = io.BytesIO()
+        with Image.open(io.BytesIO(png)) as picture:
+            picture.save(small, format="webp", quality=90)
+        kind, png = "webp", small.getvalue()
+    return f"data:image/{kind};base64,{base64.b64encode(png).decode('ascii')}"
+
+
+def _overview(studies: Sequence[Study]) -> str:
+    from dragchain.figures import drag_of_cases, png
+
+    rows = [row for study in studies for row in study.process.findings["comparison"]]
+    references = list(dict.fromkeys((row["label"], row["mean_n"]) for row in rows))
+    names = [study.process.case.case or study.process.case.run for study in studies]
+    forces = [study.process.findings["forces"]["drag_n"] for study in studies]
+    return data_uri(png(drag_of_cases(names, forces, references)))
+
+
+def measured(value: object, digits: int = 3) -> str:
+    """Return a number as `number` does, with its zeros at the end."""
+    if not isinstance(value, float) or value == 0.0 or not 1e-4 <= abs(value) < 10**digits:
+        return number(value, digits)
+    return f"{value:#.{digits}g}".rstrip(".").replace("-", MINUS)
+
+
+def number(value: object, digits: int = 3) -> str:
+    """Return a number with that many significant digits, a dash for none, text as it is."""
+    if value is None:
+        return DASH
+    if isinstance(value, bool | str) or not isinstance(value, int | float):
+        return str(value)
+    if not math.isfinite(value):
+        return DASH
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", " ") if abs(value) >= 10_000 else str(value)
+    text = f"{value:.{digits}g}"
+    if "e" in text and 1e-4 <= abs(value) < 1e7:
+        text = f"{value:.0f}"
+    return text.replace("-", MINUS) if "e" not in text else text
+
+
+def percent(value: float | None) -> str:
+    """Return a signed percentage with one decimal, a dash for none."""
+    return DASH if value is None else f"{value:+.1f} %".replace("-", MINUS)

@@ -1,0 +1,61 @@
+"""What the tests of both packages share."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from dragdeck.cases import Case, load_cases
+from dragdeck.project import Project
+
+ROOT = Path(__file__).parents[1]
+SMALL_STUDY = Path(__file__).with_name("small_study.yaml")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--update", action="store_true", help="write the golden decks anew")
+
+
+@pytest.fixture
+def small() -> dict[str, Any]:
+    """The small study as plain data, free to change."""
+    from dragdeck.study import read_yaml
+
+    return copy.deepcopy(read_yaml(SMALL_STUDY))
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Project:
+    """An empty project with the real templates and meshes."""
+    for name in ("templates", "meshes"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    (tmp_path / "studies").mkdir()
+    return Project(tmp_path)
+
+
+WriteStudy = Callable[..., Path]
+
+
+@pytest.fixture
+def write_study(project: Project) -> WriteStudy:
+    """Write a study into the project and return its file."""
+
+    def write(data: dict[str, Any], name: str = "small") -> Path:
+        file = project.studies / name / "study.yaml"
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(yaml.safe_dump(data, sort_keys=False))
+        return file
+
+    return write
+
+
+@pytest.fixture
+def case(small: dict[str, Any], write_study: WriteStudy) -> Case:
+    """The one case of the small study."""
+    (only,) = load_cases(write_study(small))
+    return only

@@ -1,0 +1,51 @@
+"""Fixtures: writers of raw outputs, and a run small enough to check by hand."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tiny_run_files import Raw, case_json, outputs_json, raw_files
+
+
+@pytest.fixture
+def raw() -> type[Raw]:
+    """Writers of single frames and files."""
+    return Raw
+
+
+@pytest.fixture
+def tiny_run(tmp_path: Path) -> Path:
+    """Folder of a process run with four balls, without its tables.
+
+    The tool, a cylinder of 5 mm, moves along +x from the bowl's axis at 0.1 mm/s
+    from step 20 to 100, a step being 1 ms. Ball 1 touches it, ball 2 touches
+    ball 1 and the bowl's side: a straight chain at z = 30 mm whose three
+    contacts share the overlap ``40 um + tool_x`` equally and carry 100 N/mm of
+    it: (4 N + 1e5 N/m tool_x) / 3. The tool holds ball 1 up, the side ball 2.
+    Ball 4 lies on ball 3 and that on the floor. Nothing touches the tool at
+    step 0; the forces in ``rod_contacts`` are 5 % above the applied ones.
+    Samples count from step 40 on.
+    """
+    folder = tmp_path / "tiny"
+    folder.mkdir()
+    (folder / "case.json").write_text(json.dumps(case_json()))
+    (folder / "columns.json").write_text(json.dumps(outputs_json()))
+    for name, content in raw_files().items():
+        (folder / name).write_bytes(content)
+    return folder
+
+
+@pytest.fixture
+def edit_json() -> Callable[[Path, Callable[[dict[str, Any]], object]], None]:
+    """Change a JSON file in place with a function of its content."""
+
+    def edit(file: Path, change: Callable[[dict[str, Any]], object]) -> None:
+        content = json.loads(file.read_text())
+        change(content)
+        file.write_text(json.dumps(content))
+
+    return edit

@@ -1,0 +1,130 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dragchain.contacts import KINDS, contact_rows
+from dragchain.errors import TableError
+from dragchain.formats import Frame
+from dragchain.rod import WallContacts
+
+BALLS = (
+    *("ball_id", "x_m", "y_m", "z_m", "radius_m"),
+    *(f"{wall}_force_{axis}_n" for wall in ("floor", "side") for axis in "xyz"),
+)
+CONTACTS = ("ball1_id", "ball2_id", "force_x_n", "force_y_n", "force_z_n", "overlap_m")
+CALM = [0.0] * 6
+
+
+def frame(names, rows, step=100):
+    table = np.array(rows, dtype=float).reshape(-1, len(names))
+    return Frame(step, {name: table[:, i] for i, name in enumerate(names)})
+
+
+def wall(points=(), forces=(), normals=(), silent=()):
+    count = len(points)
+    return WallContacts(
+        ball_id=np.arange(1, count + 1),
+        facet_id=np.zeros(count, dtype=np.int64),
+        point_m=np.array(points, dtype=float).reshape(-1, 3),
+        force_n=np.array(forces, dtype=float).reshape(-1, 3),
+        evaluated_n=np.zeros((count, 3)),
+        normal=np.array(normals, dtype=float).reshape(-1, 3),
+        overlap_m=np.full(count, 1e-6),
+        silent=np.array(silent, dtype=bool),
+    )
+
+
+def rows_of(balls, contacts=(), rod=None, bowl=None, radius=10.0):
+    return contact_rows(
+        frame(BALLS, balls), frame(CONTACTS, contacts), rod or wall(), bowl or wall(), radius
+    )
+
+
+def test_two_unequal_balls_along_x() -> None:
+    """Radii 2 and 1, centres 2.9 apart: the point is 2 - 0.05 from the larger one's centre."""
+    balls = [[1, 0, 0, 5, 2, *CALM], [2, 2.9, 0, 5, 1, *CALM]]
+    rows = rows_of(balls, [[1, 2, -3, 0, 4, 0.1]])
+    assert KINDS[rows.kind[0]] == "ball-ball"
+    np.testing.assert_allclose(rows.point_m, [[1.95, 0, 5]])
+    np.testing.assert_allclose(rows.normal_force_n, [3])
+    np.testing.assert_allclose(rows.tangential_force_n, [4])
+    np.testing.assert_array_equal(rows.force_n, [[-3, 0, 4]])
+
+
+def test_a_contact_seen_from_the_other_ball_is_the_same() -> None:
+    balls = [[1, 0, 0, 5, 2, *CALM], [2, 2.9, 0, 5, 1, *CALM]]
+    one = rows_of(balls, [[1, 2, -3, 0, 4, 0.1]])
+    other = rows_of(balls, [[2, 1, 3, 0, -4, 0.1]])
+    np.testing.assert_allclose(one.point_m, other.point_m)
+    np.testing.assert_allclose(one.normal_force_n, other.normal_force_n)
+    assert (other.a_id[0], other.b_id[0]) == (2, 1)
+
+
+def test_a_pull_is_negative() -> None:
+    balls = [[1, 0, 0, 5, 2, *CALM], [2, 2.9, 0, 5, 1, *CALM]]
+    assert rows_of(balls, [[1, 2, 0.5, 0, 0, 0.1]]).normal_force_n == pytest.approx(-0.5)
+
+
+def test_a_ball_on_the_floor() -> None:
+    rows = rows_of([[7, 1, 2, 0.8, 1, 0.3, 0, 6, 0, 0, 0]])
+    assert (KINDS[rows.kind[0]], rows.a_id[0], rows.b_id[0]) == ("ball-floor", 7, -1)
+    np.testing.assert_allclose(rows.overlap_m, [0.2])
+    np.testing.assert_allclose(rows.point_m, [[1, 2, -0.1]])
+    np.testing.assert_allclose(rows.normal_force_n, [6])
+    np.testing.assert_allclose(rows.tangential_force_n, [0.3])
+
+
+def test_a_ball_at_the_side() -> None:
+    """Centre at distance 9.5 along (0.6, 0.8), radius 1, bowl 10: overlap 0.5."""
+    rows = rows_of([[7, 5.7, 7.6, 3, 1, 0, 0, 0, -1.2, -1.6, 0.7]])
+    assert (KINDS[rows.kind[0]], rows.b_id[0]) == ("ball-side", -2)
+    np.testing.assert_allclose(rows.overlap_m, [0.5])
+    np.testing.assert_allclose(rows.point_m, [[5.7 + 0.45, 7.6 + 0.6, 3]])
+    np.testing.assert_allclose(rows.normal_force_n, [2])
+    np.testing.assert_allclose(rows.tangential_force_n, [0.7])
+
+
+def test_a_ball_in_the_corner_has_two_contacts() -> None:
+    rows = rows_of([[7, 9, 0, 1, 1, 0, 0, 2, -1, 0, 0]])
+    assert [KINDS[kind] for kind in rows.kind] == ["ball-floor", "ball-side"]
+
+
+def test_contacts_with_the_tool_that_carry_nothing_are_left_out() -> None:
+    rod = wall(
+        [[1, 0, 5], [0, 1, 5]], [[2, 0, 1], [0, 0, 0]], [[1, 0, 0], [0, 0, 0]], [False, True]
+    )
+    rows = rows_of([[1, 2, 0, 5, 1, *CALM]], rod=rod)
+    assert (KINDS[rows.kind[0]], rows.a_id.tolist(), rows.b_id.tolist()) == ("ball-rod", [1], [0])
+    assert (rows.normal_force_n[0], rows.tangential_force_n[0]) == (2, 1)
+
+
+def test_a_meshed_bowl_is_split_into_floor_and_side() -> None:
+    bowl = wall([[1, 0, 0], [10, 0, 1]], [[0, 0, 3], [-2, 0, 0]], [[0, 0, 1], [-1, 0, 0]], [0, 0])
+    rows = rows_of([[1, 1, 0, 1, 1, *CALM], [2, 9, 0, 1, 1, *CALM]], bowl=bowl)
+    assert [(KINDS[k], f) for k, f in zip(rows.kind, rows.normal_force_n, strict=True)] == [
+        ("ball-floor", 3),
+        ("ball-side", 2),
+    ]
+
+
+def test_rows_are_sorted_by_kind_and_ids() -> None:
+    balls = [[3, 0, 0, 5, 1, *CALM], [1, 1.9, 0, 5, 1, *CALM], [2, 3.8, 0, 1, 1, 0, 0, 1, 0, 0, 0]]
+    rows = rows_of(balls, [[3, 1, -1, 0, 0, 0.1], [1, 3, 1, 0, 0, 0.1]])
+    assert rows.kind.tolist() == [0, 0, 2]
+    assert rows.a_id.tolist() == [1, 3, 2]
+
+
+def test_an_empty_frame_has_no_contacts() -> None:
+    assert len(rows_of([]).kind) == 0
+
+
+@pytest.mark.parametrize("balls", [[], [[1, 0, 0, 5, 2, *CALM]]])
+def test_a_contact_of_an_unknown_ball_is_an_error(balls) -> None:
+    with pytest.raises(TableError, match=r"step 100: ball [12] is in a contact but not in balls"):
+        rows_of(balls, [[1, 2, -3, 0, 4, 0.1]])
+
+
+def test_frames_of_different_steps_are_an_error() -> None:
+    with pytest.raises(TableError, match="contacts has step 9 where balls has step 100"):
+        contact_rows(frame(BALLS, []), frame(CONTACTS, [], step=9), wall(), wall(), 10.0)

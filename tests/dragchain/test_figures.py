@@ -1,0 +1,396 @@
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import pyvista as pv
+from PIL import Image
+
+from dragchain import scene
+from dragchain.case import Case, load_case
+from dragchain.collect import compare, dominant_bottlenecks, read_findings, write_findings
+from dragchain.errors import SeriesError, TableError
+from dragchain.figures import drag_of_cases, energy_ratio, write_figures
+from dragchain.frames import NetworkFrame
+from dragchain.network import write_chains
+from dragchain.stats import estimate_mean
+
+R = 0.003
+STEP_S = 1e-3
+DRAG_START = 100
+LAST = 500
+PERIOD = 20
+
+
+def case_json(scene_name: str) -> dict[str, Any]:
+    return {
+        "schema": 1, "study": "made", "scene": scene_name, "run": f"made-{scene_name}",
+        "case": "made case", "upstream": {}, "timestep_s": STEP_S, "rayleigh_time_s": 2e-3,
+        "gravity_m_s2": 10.0,
+        "fidelity": {
+            "name": "draft", "youngs_modulus_scale": 0.01, "timestep_fraction": 0.5,
+            "speed_factor": 1.0, "skin_m": 0.001, "ranks": 1,
+        },
+        "inputs": {"media.count": 3},
+        "media": {"count": 3, "radius_mean_m": R, "radius_sd_m": 0.0, "density_kg_m3": 2500.0},
+        "bowl": {"radius_m": 0.02, "walls": "primitive"},
+        "tool": {"kind": "cylinder", "radius_m": 0.002, "length_m": 0.05, "mesh": "tool.stl",
+                 "submersion_m": 0.02},
+        "surface_m": 0.03,
+        "motion": {"kind": "line", "speed_m_s": 0.1, "start_m": [-0.01, 0.0], "heading_rad": 0.0},
+        "phases": [
+            {"name": "plunge", "start_step": 0, "end_step": DRAG_START},
+            {"name": "drag", "start_step": DRAG_START, "end_step": LAST},
+        ],
+        "statistics": {"run_in_s": 0.1}, "restitution": 0.7, "assumptions": [],
+        "reference": {"source": "a paper", "measured_drag_mean_n": -4.0},
+        "versions": {"dragdeck": "0.1.0"},
+    }  # fmt: skip
+
+
+def columns_json(run_dir: Path, outputs: dict[str, Any]) -> None:
+    content = {"schema": 1, "outputs": outputs}
+    (run_dir / "columns.json").write_text(json.dumps(content))
+
+
+def printed(columns: list[str], period: int, last: int | None = LAST) -> dict[str, Any]:
+    return {
+        "kind": "print", "binary": False, "pattern": "out.{part}.txt", "columns": columns,
+        "engine_columns": None, "period_steps": period, "first_step": 0, "last_step": last,
+    }  # fmt: skip
+
+
+def save(table: pd.DataFrame, run_dir: Path, name: str) -> None:
+    (run_dir / "tables").mkdir(exist_ok=True)
+    table.to_parquet(run_dir / "tables" / f"{name}.parquet", index=False)
+
+
+def resistance(steps: Any) -> Any:
+    """Return 2 N with a bump of 3 N around step 330."""
+    return 2.0 + 3.0 * np.exp(-(((np.asarray(steps) - 330) / 30.0) ** 2))
+
+
+def tool_x(steps: Any) -> Any:
+    return -0.01 + 5e-5 * np.clip(np.asarray(steps) - DRAG_START, 0, None)
+
+
+def rod_force_table() -> pd.DataFrame:
+    steps = np.arange(2, LAST + 1, 2)
+    plunge = np.clip(steps, 0, DRAG_START) / DRAG_START
+    return pd.DataFrame(
+        {
+            "step": steps, "time_s": steps * STEP_S,
+            "phase": np.where(steps <= DRAG_START, "plunge", "drag"),
+            "ref_x_m": tool_x(steps), "ref_y_m": 0.0, "ref_z_m": 0.04 - 0.03 * plunge,
+            "heading_rad": 0.0, "drag_n": -resistance(steps),
+            "lateral_n": 0.1 * np.sin(steps), "vertical_n": 0.2 * np.cos(steps),
+            "counted": steps >= 200,
+        }
+    )  # fmt: skip
+
+
+def network_tables() -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return contacts and balls: a chain of two balls from the tool to the side, and a third."""
+    contacts, balls = [], []
+    for step in range(0, LAST + 1, PERIOD):
+        force = float(resistance(step))
+        time_s = step * STEP_S
+        for ball, (x, y) in {1: (0.011, 0.0), 2: (0.017, 0.0), 3: (0.0, -0.016)}.items():
+            balls.append([step, time_s, ball, x, y, 0.015, R])
+        for a, b, x, y, pull in [
+            (1, 0, 0.008, 0.0, force), (1, 2, 0.014, 0.0, -force), (2, -2, 0.02, 0.0, -force),
+            (3, -1, 0.0, -0.016, 0.01),
+        ]:  # fmt: skip
+            row = [step, time_s, a, b, x, y, 0.015 if b != -1 else 0.012, pull, 0.0, 0.0]
+            contacts.append([*row, abs(pull)])
+    axes = ("x", "y", "z")
+    head = ["step", "time_s"]
+    columns = [*head, "a_id", "b_id", *(f"point_{i}_m" for i in axes)]
+    columns += [*(f"force_{i}_n" for i in axes), "normal_force_n"]
+    return (
+        pd.DataFrame(contacts, columns=columns),
+        pd.DataFrame(balls, columns=[*head, "ball_id", "x_m", "y_m", "z_m", "radius_m"]),
+    )
+
+
+def rod_contacts_table() -> pd.DataFrame:
+    steps = np.arange(0, LAST + 1, 10)
+    ahead = pd.DataFrame(
+        {"step": steps, "bearing_rad": 0.0, "depth_m": 0.015, "normal_force_n": 3.0}
+    )
+    behind = ahead.assign(bearing_rad=3.0, depth_m=0.005, normal_force_n=1.0)
+    table = pd.concat([ahead, behind], ignore_index=True)
+    return table.assign(counted=table["step"] >= 200)
+
+
+@pytest.fixture(scope="module")
+def process(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a made process run with tables and chains."""
+    run_dir = tmp_path_factory.mktemp("process")
+    (run_dir / "case.json").write_text(json.dumps(case_json("process")))
+    columns_json(run_dir, {"rod_contacts": printed(["step"], 10)})
+    contacts, balls = network_tables()
+    save(rod_force_table(), run_dir, "rod_force")
+    save(contacts, run_dir, "contacts")
+    save(balls, run_dir, "balls")
+    save(rod_contacts_table(), run_dir, "rod_contacts")
+    tool = pv.Cylinder(center=(-0.01, 0, 0.065), direction=(0, 0, 1), radius=0.002, height=0.05)
+    tool.triangulate().save(run_dir / "tool.stl")
+    write_chains(run_dir)
+    return run_dir
+
+
+def test_findings_of_a_process_are_those_of_its_tables(process: Path) -> None:
+    found = write_findings(process)
+    assert found == read_findings(process)
+    steps = np.arange(200, LAST + 1, 2)
+    assert found["forces"]["drag_n"]["mean"] == pytest.approx(-resistance(steps).mean())
+    assert found["process_time_zero_s"] == pytest.approx(0.1)
+    assert found["peaks"]["count"] == 1
+    assert found["peaks"]["process_time_s"] == pytest.approx([0.23])
+    assert found["peaks"]["largest_n"] == pytest.approx(-5.0)
+    assert found["rod_frames"] == 31
+    assert found["ahead_behind"]["ratio"]["value"] == pytest.approx(3.0)
+    assert found["ahead_behind"]["ahead_n"]["value"] == pytest.approx(3.0)
+    assert found["depth"]["slope_n_m"]["value"] == pytest.approx(200.0)
+    assert found["network"]["frames"] == 16
+    assert found["chains"]["rod_paths_per_frame"] == 1.0
+    assert found["chains"]["rod_paths_to_side_share"] == 1.0
+    assert found["chains"]["dominant_azimuth_mean_rad"] == pytest.approx(0.0)
+
+
+def test_a_chain_that_carries_the_drag_is_associated_with_it(process: Path) -> None:
+    found = write_findings(process)["association"]
+    assert found["rank_correlation"] == pytest.approx(1.0)
+    # no other shift fits as well
+    assert found["p_value"] == pytest.approx(1 / 16)
+    assert found["frames_at_peaks"] == 2
+    assert found["bottleneck_at_peaks_mean_n"] > found["bottleneck_elsewhere_mean_n"]
+
+
+def test_a_frame_without_a_path_has_no_bottleneck() -> None:
+    network = pd.DataFrame({"step": [1, 2, 3]})
+    chains = pd.DataFrame(
+        {"step": [1, 1, 3], "dominant": [False, True, True], "bottleneck_n": [9.0, 2.0, 4.0]}
+    )
+    assert dominant_bottlenecks(network, chains).tolist() == [2.0, 0.0, 4.0]
+
+
+def test_comparison_is_relative_to_the_reference() -> None:
+    ours = estimate_mean(np.array([-1.98, -2.0] * 8))
+    row = compare(ours, {"measured_drag_mean_n": -2.59, "measured_drag_sd_n": 0.66, "source": "x"})
+    assert row[0]["label"] == "measured"
+    assert row[0]["difference_percent"] == pytest.approx(100 * (1.99 / 2.59 - 1))
+    assert row[0]["low"] < row[0]["difference_percent"] < row[0]["high"]
+    assert row[0]["sd_n"] == 0.66
+    assert compare(ours, None) == []
+
+
+def test_a_reference_of_zero_is_refused() -> None:
+    with pytest.raises(TableError, match="measured_drag_mean_n is 0"):
+        compare(estimate_mean(np.arange(8.0)), {"measured_drag_mean_n": 0})
+
+
+def test_process_figures_are_whole_pictures(process: Path) -> None:
+    written = write_figures(process)
+    names = [
+        "forces",
+        "force_around_rod",
+        "force_depth",
+        "chains_peaks",
+        "network_xy",
+        "network_xz",
+    ]
+    assert [path.stem for path in written] == names
+    assert sorted(path.name for path in (process / "figures").iterdir()) == sorted(
+        f"{name}.png" for name in names
+    )
+    for path in written:
+        with Image.open(path) as picture:
+            picture.load()
+            assert min(picture.size) > 400
+            assert len(picture.convert("RGB").getcolors(1 << 24) or []) > 20
+
+
+def test_a_run_without_chains_names_the_missing_table(process: Path, tmp_path: Path) -> None:
+    for name in ("case.json", "columns.json"):
+        (tmp_path / name).write_bytes((process / name).read_bytes())
+    save(rod_force_table(), tmp_path, "rod_force")
+    with pytest.raises(TableError, match=r"network\.parquet"):
+        write_figures(tmp_path)
+
+
+def test_a_short_drag_has_no_statistics(process: Path, tmp_path: Path) -> None:
+    (tmp_path / "case.json").write_bytes((process / "case.json").read_bytes())
+    table = rod_force_table()
+    save(table.assign(counted=table["step"] > LAST - 10), tmp_path, "rod_force")
+    with pytest.raises(SeriesError):
+        write_figures(tmp_path)
+
+
+# --- the network's pictures ------------------------------------------------------------------
+
+
+def network_frame(normal_force: list[float], *, heading_rad: float = 0.0) -> NetworkFrame:
+    """Return two balls on the x axis in contact with each other and with the side."""
+    return NetworkFrame(
+        step=300, time_s=0.3, heading_rad=heading_rad, ball_id=np.array([4, 7]),
+        centre=np.array([[-R, 0.0, 0.015], [R, 0.0, 0.015]]), radius=np.array([R, R]),
+        a=np.array([0, 1]), b=np.array([1, -1]), other=np.array([1, -2]),
+        point=np.array([[0.0, 0.0, 0.015], [2 * R, 0.0, 0.015]]), force=np.zeros((2, 3)),
+        normal_force=np.array(normal_force),
+    )  # fmt: skip
+
+
+def test_cylinders_join_centres_or_end_at_the_wall() -> None:
+    assert scene.segments(network_frame([1.0, 2.0])).tolist() == [
+        [[-R, 0.0, 0.015], [R, 0.0, 0.015]],
+        [[R, 0.0, 0.015], [2 * R, 0.0, 0.015]],
+    ]
+
+
+def test_the_largest_force_has_the_mean_ball_radius() -> None:
+    radii = scene.cylinder_radii(np.array([0.0, 1.0, 4.0]), R)
+    assert radii == pytest.approx([0.0, R / 4, R])
+    assert scene.cylinder_radii(np.zeros(2), R).tolist() == [0.0, 0.0]
+    assert scene.cylinder_radii(np.array([]), R).size == 0
+
+
+@pytest.mark.parametrize(
+    ("wanted", "expected"), [(4.6, 3), (4.4, 2), (3.0, 1), (5.4, 3), (9.0, 3), (1.0, 3)]
+)
+def test_picture_is_of_the_nearest_frame_or_the_last(wanted: float, expected: int) -> None:
+    times = np.array([3.6, 4.2, 4.8])
+    assert scene.picture_step(np.array([1.0, 2.0, 3.0]), times, wanted) == expected
+
+
+def test_the_tool_moves_by_its_reference_point(process: Path) -> None:
+    shown = scene.load_scene(process, load_case(process))
+    assert shown.frame.step == LAST
+    assert shown.tool_start_m == pytest.approx([-0.01, 0.0, 0.04])
+    assert shown.tool_m == pytest.approx([0.01, 0.0, 0.01])
+    assert shown.process_time_s == pytest.approx(0.4)
+    assert shown.dominant is not None
+    assert shown.dominant.balls == (0, 1)
+
+
+def pixel(image: Any, extent: Any, across_mm: float, up_mm: float) -> Any:
+    """Return the colour at a place of the picture."""
+    rows, columns = image.shape[:2]
+    column = int((across_mm - extent[0]) / (extent[1] - extent[0]) * columns)
+    row = int((extent[3] - up_mm) / (extent[3] - extent[2]) * rows)
+    return image[row, column].astype(int)
+
+
+def is_red(colour: Any) -> bool:
+    return bool(colour[0] > 130 and colour[1] < 90 and colour[2] < 90)
+
+
+@pytest.mark.parametrize(("view", "level_mm"), [("xy", 0.0), ("xz", 15.0)])
+def test_a_rendered_contact_is_where_its_axes_say(
+    process: Path, view: scene.View, level_mm: float
+) -> None:
+    case = load_case(process)
+    far = np.array([0.015, 0.012, 0.01])
+    start = np.array([-0.01, 0.0, 0.04])
+    shown = scene.Scene(network_frame([2.0, 0.5]), far, start, None, 0.2)
+    image, extent = scene.render(process, case, shown, view)
+    assert is_red(pixel(image, extent, 0.0, level_mm))
+    assert is_red(pixel(image, extent, -2.5, level_mm + 2.0))
+    assert not is_red(pixel(image, extent, 0.0, level_mm + 3.5))
+    assert not is_red(pixel(image, extent, -4.0, level_mm))
+    # the weaker contact, a quarter as thick, goes on to the side
+    weak = pixel(image, extent, 5.0, level_mm)
+    assert weak[1] > weak[2] + 40 and not is_red(weak)
+    assert min(pixel(image, extent, 5.0, level_mm + 1.5)) > 200
+
+
+def test_a_missing_tool_mesh_is_named(process: Path, tmp_path: Path) -> None:
+    case = load_case(process)
+    shown = scene.Scene(network_frame([1.0, 1.0]), np.zeros(3), np.zeros(3), None, 0.2)
+    with pytest.raises(TableError, match=r"tool\.stl"):
+        scene.render(tmp_path, case, shown, "xy")
+
+
+def test_a_machine_that_cannot_render_is_told_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere.json")
+    with pytest.raises(scene.RenderError, match="libgl1-mesa-dri"):
+        scene.check_rendering()
+
+
+# --- fill and drop ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def fill(tmp_path: Path) -> Path:
+    content = case_json("fill")
+    content["phases"] = [{"name": "settle", "start_step": 0, "end_step": LAST}]
+    content["settled"] = {"energy_ratio": 1e-5}
+    (tmp_path / "case.json").write_text(json.dumps(content))
+    bed = {"fill_height_m": 0.07, "solid_fraction": 0.59, "balls": 3, "kinetic_energy_ratio": 1e-7}
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables" / "fill.json").write_text(json.dumps(bed))
+    return tmp_path
+
+
+def test_a_fill_without_thermo_has_no_figure(fill: Path) -> None:
+    assert write_figures(fill) == []
+    assert read_findings(fill)["bed"]["solid_fraction"] == 0.59
+    assert read_findings(fill)["rest_energy_ratio"] == 1e-5
+
+
+def test_a_fill_is_drawn_from_its_thermo_table(fill: Path) -> None:
+    energy = 1e-3 * np.exp(-np.arange(30.0))
+    table = pd.DataFrame({"time_s": np.arange(30.0), "balls": 3, "kinetic_energy_j": energy})
+    table["rotational_energy_j"] = 0.0
+    table.loc[0, "balls"] = 0
+    save(table, fill, "thermo")
+    assert [path.name for path in write_figures(fill)] == ["fill.png"]
+
+
+def test_energy_ratio_of_balls_that_fell_their_diameter_is_one(fill: Path) -> None:
+    case: Case = load_case(fill)
+    mass = 2500.0 * 4 / 3 * math.pi * R**3
+    ratio = energy_ratio(np.array([2 * mass * 10.0 * 2 * R]), np.array([2.0]), case)
+    assert ratio == pytest.approx([1.0])
+
+
+def test_a_drop_is_drawn_with_its_restitution(tmp_path: Path) -> None:
+    content = case_json("drop")
+    content["phases"] = []
+    (tmp_path / "case.json").write_text(json.dumps(content))
+    columns = ["step", "time_s", "z_m", "vz_m_s", "force_n"]
+    columns_json(tmp_path, {"impacts": printed(columns, 1, None)})
+    lines = [" ".join(columns)]
+    for first in (10, 200, 300):
+        lines += [
+            f"{first + k} {(first + k) * STEP_S} 0 {k - 6} {max(0, 9 - (k - 6) ** 2)}"
+            for k in range(13)
+        ]
+    (tmp_path / "out.1.txt").write_text("\n".join(lines) + "\n")
+    impacts = {
+        "impact": [1, 2, 3], "start_time_s": [0.014, 0.204, 0.304], "duration_s": 0.005,
+        "peak_force_n": 9.0, "speed_in_m_s": 1.0, "speed_out_m_s": 0.7,
+        "restitution": [0.70, 0.72, 0.74], "time_since_first_s": [0.0, 0.19, 0.29],
+    }  # fmt: skip
+    save(pd.DataFrame(impacts), tmp_path, "impacts")
+    assert [path.name for path in write_figures(tmp_path)] == ["drop.png"]
+    ratio = read_findings(tmp_path)["restitution"]
+    assert ratio["mean"] == pytest.approx(0.72)
+    assert ratio["input"] == 0.7
+
+
+def test_overview_has_a_row_a_case() -> None:
+    force = {"mean": -2.0, "ci_low": -2.2, "ci_high": -1.8}
+    figure = drag_of_cases(["a", "b"], [force, force], [("measured", -2.59)])
+    axes = figure.axes[0]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["a", "b"]
+    assert axes.get_xlabel().endswith("interval")

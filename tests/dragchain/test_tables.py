@@ -1,0 +1,274 @@
+from __future__ import annotations
+
+import json
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from tiny_run_files import (
+    COLUMNS,
+    LAST,
+    RADIUS_M,
+    SURFACE_M,
+    WEIGHT_N,
+    chain_n,
+    rod_balls,
+    tool_x_m,
+)
+
+from dragchain import DumpError, GateError, TableError, load_case, load_outputs, write_tables
+from dragchain.dumps import iter_prints
+from dragchain.forces import read_counted, summarise_forces
+from dragchain.tables import ToolSamples
+
+CONTRACT = {
+    "rod_force": (
+        "step time_s phase force_x_n force_y_n force_z_n torque_x_nm torque_y_nm torque_z_nm"
+        " ref_x_m ref_y_m ref_z_m heading_rad drag_n lateral_n vertical_n counted"
+    ),
+    "rod_contacts": (
+        "step time_s phase ball_id facet_id point_x_m point_y_m point_z_m force_x_n force_y_n"
+        " force_z_n normal_force_n tangential_force_n overlap_m bearing_rad depth_m counted"
+    ),
+    "balls": (
+        "step time_s ball_id x_m y_m z_m vx_m_s vy_m_s vz_m_s wx_rad_s wy_rad_s wz_rad_s radius_m"
+    ),
+    "contacts": (
+        "step time_s kind a_id b_id point_x_m point_y_m point_z_m force_x_n force_y_n force_z_n"
+        " normal_force_n tangential_force_n overlap_m"
+    ),
+    "thermo": "step time_s balls kinetic_energy_j rotational_energy_j",
+}
+
+
+@pytest.fixture
+def tables(tiny_run: Path) -> dict[str, pd.DataFrame]:
+    write_tables(tiny_run)
+    return {name: pd.read_parquet(tiny_run / "tables" / f"{name}.parquet") for name in CONTRACT}
+
+
+def closure(run: Path) -> dict:
+    return json.loads((run / "tables" / "closure.json").read_text())
+
+
+def test_the_tables_have_the_columns_of_the_contract(tables) -> None:
+    assert {name: " ".join(table.columns) for name, table in tables.items()} == CONTRACT
+
+
+def test_it_says_what_it_made_and_leaves_nothing_else(tiny_run: Path) -> None:
+    made = write_tables(tiny_run)
+    assert sorted(path.name for path in (tiny_run / "tables").iterdir()) == sorted(
+        [*(path.name for path in made), "closure.json"]
+    )
+
+
+def test_rod_force_is_turned_into_the_workpiece_frame(tables) -> None:
+    force = tables["rod_force"]
+    assert force["step"].tolist() == list(range(2, LAST + 1, 2))
+    assert force["phase"].tolist() == ["plunge"] * 10 + ["drag"] * 40
+    np.testing.assert_allclose(force["drag_n"], [-chain_n(step) for step in force["step"]])
+    np.testing.assert_allclose(force["vertical_n"].iloc[4:], -WEIGHT_N)
+    assert (force["lateral_n"] == 0).all()
+    assert force.loc[force["counted"], "step"].tolist() == list(range(40, LAST + 1, 2))
+
+
+def test_the_counted_samples_alone_make_the_statistics(tiny_run: Path) -> None:
+    write_tables(tiny_run)
+    mean = -np.mean([chain_n(step) for step in range(40, LAST + 1, 2)])
+    assert len(read_counted(tiny_run)) == 31
+    assert summarise_forces(tiny_run)["drag_n"].mean == pytest.approx(mean)
+
+
+def test_rod_contacts_hold_the_applied_force_on_the_tool(tables) -> None:
+    contacts = tables["rod_contacts"]
+    steps = list(range(10, LAST + 1, 10))
+    assert contacts["step"].tolist() == steps
+    np.testing.assert_allclose(contacts["force_x_n"], [-chain_n(step) for step in steps])
+    np.testing.assert_allclose(contacts["force_z_n"], -WEIGHT_N)
+    np.testing.assert_allclose(contacts["normal_force_n"], [chain_n(step) for step in steps])
+    np.testing.assert_allclose(contacts["tangential_force_n"], WEIGHT_N)
+    np.testing.assert_allclose(contacts["depth_m"], SURFACE_M - 0.03)
+    assert (contacts["bearing_rad"] == 0).all()
+    assert (contacts["facet_id"] == 7).all()
+    assert contacts["counted"].tolist() == [step >= 40 for step in steps]
+
+
+def test_the_bearing_is_measured_from_the_direction_of_motion(tiny_run: Path, edit_json) -> None:
+    """The ball lies in +x; a tool that heads along +y has it on its right."""
+    edit_json(tiny_run / "case.json", lambda case: case["motion"].update(heading_rad=pi / 2))
+    write_tables(tiny_run)
+    contacts = pd.read_parquet(tiny_run / "tables" / "rod_contacts.parquet")
+    np.testing.assert_allclose(contacts["bearing_rad"], -pi / 2)
+    force = pd.read_parquet(tiny_run / "tables" / "rod_force.parquet")
+    np.testing.assert_allclose(force["lateral_n"], -force["force_x_n"])
+
+
+def test_the_contacts_of_a_frame_are_the_chain_and_the_pile(tables) -> None:
+    frame = tables["contacts"].query("step == 60")
+    found = frame[["kind", "a_id", "b_id"]].apply(tuple, axis=1).tolist()
+    assert found == [
+        *(("ball-ball", 2, 1), ("ball-ball", 4, 3)),
+        *(("ball-rod", 1, 0), ("ball-floor", 3, -1), ("ball-side", 2, -2)),
+    ]
+    force = chain_n(60)
+    exact = [force, WEIGHT_N, force, 2 * WEIGHT_N, force]
+    np.testing.assert_allclose(frame["normal_force_n"], exact, rtol=1e-8)
+    np.testing.assert_allclose(frame["overlap_m"], np.array(exact) / 1e5, rtol=1e-6)
+    np.testing.assert_allclose(
+        frame["point_x_m"],
+        [
+            *(tool_x_m(60) + 0.005 + 2 * RADIUS_M - 1.5 * force / 100000.0, -0.01),
+            tool_x_m(60) + 0.005,
+            -0.01,
+            0.04 + 0.5 * force / 100000.0,
+        ],
+        rtol=1e-6,
+    )
+
+
+def test_forces_on_every_ball_of_a_frame_balance(tables) -> None:
+    """Weight included only for the pile; the chain hangs on tool and side."""
+    frame = tables["contacts"].query("step == 60")
+    axes = ["force_x_n", "force_z_n"]
+    on_a = frame.groupby("a_id")[axes].sum()
+    on_b = frame[frame["b_id"] > 0].groupby("b_id")[axes].sum()
+    net = on_a.sub(on_b, fill_value=0.0)
+    np.testing.assert_allclose(net["force_x_n"], 0.0, atol=1e-8)
+    np.testing.assert_allclose(net["force_z_n"], WEIGHT_N, rtol=1e-8)
+
+
+def test_before_the_tool_arrives_only_the_pile_touches(tables) -> None:
+    frame = tables["contacts"].query("step == 0")
+    assert frame["kind"].tolist() == ["ball-ball", "ball-floor"]
+    assert 0 not in tables["rod_contacts"]["step"].to_numpy()
+
+
+def test_balls_are_sorted_by_id(tables) -> None:
+    balls = tables["balls"]
+    assert balls["ball_id"].tolist() == [1, 2, 3, 4] * 6
+    assert balls["time_s"].unique().tolist() == [0.0, 0.02, 0.04, 0.06, 0.08, 0.1]
+
+
+def test_closure_holds_and_the_second_evaluation_is_5_percent_off(tiny_run: Path) -> None:
+    write_tables(tiny_run)
+    found = closure(tiny_run)
+    assert (found["verdict"], found["frames"], found["contacts"]) == ("pass", 10, 10)
+    assert found["max_relative"] < 1e-12
+    assert found["evaluated_counted_mean_relative"] == pytest.approx(0.05)
+
+
+def test_a_force_that_does_not_add_up_closes_the_gate(tiny_run: Path, raw) -> None:
+    outputs = load_outputs(tiny_run)
+    (rows,) = iter_prints(tiny_run, outputs["rod_force"])
+    rows["force_x_n"][24] *= 1.01
+    table = np.column_stack(list(rows.values())).tolist()
+    (tiny_run / "rod_force.1.txt").write_bytes(raw.prints(table, list(rows)))
+    with pytest.raises(GateError, match="at step 50 the forces on the balls miss"):
+        write_tables(tiny_run)
+    assert closure(tiny_run)["verdict"] == "fail"
+    assert not (tiny_run / "tables" / "rod_contacts.parquet").exists()
+
+
+def resume(run: Path, raw, step: int, factor: float) -> None:
+    """Add a second part to rod_balls whose first frame, at `step`, has other forces."""
+    (balls,) = rod_balls(step)
+    balls[5] *= factor
+    rest = [raw.binary(later, rod_balls(later), 8) for later in range(step + 10, LAST + 1, 10)]
+    (run / "rod_balls.2.bin").write_bytes(raw.binary(step, [balls], 8) + b"".join(rest))
+
+
+def test_a_frame_evaluated_anew_after_a_resume_does_not_count(tiny_run: Path, raw) -> None:
+    resume(tiny_run, raw, 60, 1.1)
+    write_tables(tiny_run)
+    contacts = pd.read_parquet(tiny_run / "tables" / "rod_contacts.parquet")
+    assert contacts.loc[contacts["counted"], "step"].tolist() == [40, 50, 70, 80, 90, 100]
+    found = closure(tiny_run)
+    assert (found["verdict"], found["frames"], found["opening_frames"]) == ("pass", 9, 1)
+
+
+def test_a_frame_that_a_resume_only_repeats_counts(tiny_run: Path, raw) -> None:
+    resume(tiny_run, raw, 60, 1.0)
+    write_tables(tiny_run)
+    contacts = pd.read_parquet(tiny_run / "tables" / "rod_contacts.parquet")
+    assert 60 in contacts.loc[contacts["counted"], "step"].to_numpy()
+
+
+def test_an_output_that_was_not_written_makes_no_table(tiny_run: Path, edit_json) -> None:
+    edit_json(tiny_run / "columns.json", lambda c: c["outputs"].pop("rod_balls"))
+    made = [path.name for path in write_tables(tiny_run)]
+    assert made == ["thermo.parquet", "rod_force.parquet", "balls.parquet"]
+
+
+def test_a_truncated_output_leaves_no_table_of_it(tiny_run: Path) -> None:
+    file = tiny_run / "contacts.1.dump"
+    file.write_bytes(file.read_bytes()[:-20])
+    with pytest.raises(DumpError, match=r"contacts\.1\.dump, frame 5, byte"):
+        write_tables(tiny_run)
+    names = {path.name for path in (tiny_run / "tables").iterdir()}
+    assert "rod_force.parquet" in names
+    assert not {name for name in names if "contacts.parquet" in name and "rod" not in name}
+
+
+def test_a_period_that_does_not_divide_is_an_error(tiny_run: Path, edit_json, raw) -> None:
+    rows = [[step, *[0] * 10] for step in range(3, LAST + 1, 3)]
+    content = raw.prints(rows, COLUMNS["rod_force"])
+    (tiny_run / "rod_force.1.txt").write_bytes(content)
+    schedule = {"period_steps": 3, "first_step": 3, "last_step": 99}
+    edit_json(tiny_run / "columns.json", lambda c: c["outputs"]["rod_force"].update(schedule))
+    with pytest.raises(TableError, match="rod_balls has step 10 but rod_force does not"):
+        write_tables(tiny_run)
+
+
+def test_samples_are_found_in_blocks_and_gaps_are_not() -> None:
+    blocks = [{"step": np.array([2, 4]), "f": np.array([1.0, 2.0])}]
+    blocks.append({"step": np.array([6, 8]), "f": np.array([3.0, 4.0])})
+    samples = ToolSamples(blocks)
+    assert samples.first_step == 2
+    assert samples.row(4) == {"step": 4, "f": 2.0}
+    assert samples.row(5) is None
+    assert samples.row(8) == {"step": 8, "f": 4.0}
+    assert samples.row(10) is None
+    with pytest.raises(TableError, match="no samples"):
+        ToolSamples([])
+
+
+def to_scene(run: Path, edit_json, scene: str, outputs: dict) -> None:
+    edit_json(run / "case.json", lambda case: case.update(scene=scene, restitution=0.68))
+    edit_json(run / "columns.json", lambda columns: columns.update(outputs=outputs))
+
+
+def test_a_drop_gives_impacts(tiny_run: Path, edit_json, raw) -> None:
+    columns = ["step", "time_s", "z_m", "vz_m_s", "force_n"]
+    impacts = {"kind": "print", "binary": False, "pattern": "impacts.{part}.txt"}
+    impacts |= {"columns": columns, "engine_columns": None}
+    impacts |= {"period_steps": 1, "first_step": 0, "last_step": None}
+    to_scene(tiny_run, edit_json, "drop", {"impacts": impacts})
+    first = raw.prints([[10, 0.01, 0, -4, 0], [11, 0.011, 0, 0, 9], [12, 0.012, 0, 3, 0]], columns)
+    second = raw.prints([[30, 0.03, 0, -3, 0], [31, 0.031, 0, 0, 5], [32, 0.032, 0, 2, 0]], columns)
+    (tiny_run / "impacts.1.txt").write_bytes(first + second)
+    (made,) = write_tables(tiny_run)
+    table = pd.read_parquet(made)
+    assert " ".join(table.columns) == (
+        "impact start_time_s duration_s peak_force_n speed_in_m_s speed_out_m_s restitution"
+        " time_since_first_s"
+    )
+    np.testing.assert_allclose(table["restitution"], [0.75, 2 / 3])
+    np.testing.assert_allclose(table["time_since_first_s"], [0, 0.02])
+    assert load_case(tiny_run).restitution == 0.68
+
+
+def test_a_fill_gives_a_bed(tiny_run: Path, edit_json, raw) -> None:
+    names = CONTRACT["balls"].split()[2:]
+    balls = {"kind": "custom", "binary": True, "pattern": "balls.{part}.bin", "columns": names}
+    balls |= {"engine_columns": None, "period_steps": 1, "first_step": 0, "last_step": None}
+    to_scene(tiny_run, edit_json, "fill", {"balls": balls})
+    frames = raw.binary(5, [[1, 0, 0, 0.5, *[0] * 6, 0.03]], 11)
+    frames += raw.binary(700, [[1, 0, 0, 0.03, *[0] * 6, 0.03]], 11)
+    (tiny_run / "balls.1.bin").write_bytes(frames)
+    made = write_tables(tiny_run)
+    assert [path.name for path in made] == ["balls.parquet", "fill.json"]
+    bed = json.loads(made[1].read_text())
+    assert bed["fill_height_m"] == pytest.approx(0.06)
+    assert bed["balls"] == 1

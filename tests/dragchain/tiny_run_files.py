@@ -1,0 +1,244 @@
+"""What the engine writes, made by hand, and the files of a run small enough to check by hand."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+BOX = "ITEM: BOX BOUNDS ff ff ff\n-0.05 0.05\n-0.05 0.05\n0 0.4\n"
+
+
+class Raw:
+    """Writes what the engine writes."""
+
+    @staticmethod
+    def binary(step: int, rows: Sequence[Sequence[float]], width: int, ranks: int = 2) -> bytes:
+        """One frame of a binary ``dump custom``; the rows are dealt out to the ranks."""
+        shares = [rows[rank::ranks] for rank in range(ranks)]
+        chunks = [
+            struct.pack(f"<i{width * len(share)}d", width * len(share), *np.ravel(share))
+            for share in shares
+        ]
+        box = (-0.05, 0.05, -0.05, 0.05, 0.0, 0.4)
+        head = struct.pack("<qqi6i6dii", step, len(rows), 0, *[1] * 6, *box, width, ranks)
+        return head + b"".join(chunks)
+
+    @staticmethod
+    def text(step: int, rows: Iterable[Iterable[float]], names: Sequence[str], kind: str) -> bytes:
+        """One frame of a text dump of kind ``custom`` or ``local``."""
+        noun = {"custom": "ATOMS", "local": "ENTRIES"}[kind]
+        lines = [" ".join(f"{value:.9g}" for value in row) + " \n" for row in rows]
+        head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF {noun}\n{len(lines)}\n{BOX}"
+        return (head + f"ITEM: {noun} {' '.join(names)} \n" + "".join(lines)).encode()
+
+    @staticmethod
+    def prints(rows: Iterable[Iterable[float]], names: Sequence[str]) -> bytes:
+        """A ``fix print`` file."""
+        lines = [" ".join(f"{value:.15g}" for value in row) + "\n" for row in rows]
+        return (" ".join(names) + "\n" + "".join(lines)).encode()
+
+
+TIMESTEP_S = 1e-3
+GRAVITY_M_S2 = 9.81
+DENSITY_KG_M3 = 2500.0
+RADIUS_M = 8.76e-3
+WEIGHT_N = 4 / 3 * np.pi * RADIUS_M**3 * DENSITY_KG_M3 * GRAVITY_M_S2
+STIFFNESS_N_M = 1e5
+TOOL_RADIUS_M = 5e-3
+BOWL_RADIUS_M = 40e-3
+CHAIN_Z_M = 0.03
+SURFACE_M = 0.05
+SPEED_M_S = 1e-4
+DRAG_START = 20
+LAST = 100
+
+VECTOR = ("x", "y", "z")
+FORCE = [f"force_{axis}_n" for axis in VECTOR]
+COLUMNS: dict[str, list[str]] = {
+    "thermo": ["step", "time_s", "balls", "kinetic_energy_j", "rotational_energy_j"],
+    "rod_force": [
+        *("step", "time_s", *FORCE),
+        *(f"torque_{axis}_nm" for axis in VECTOR),
+        *(f"ref_{axis}_m" for axis in VECTOR),
+    ],
+    "rod_balls": ["ball_id", "x_m", "y_m", "z_m", "radius_m", *FORCE],
+    "rod_contacts": [
+        *(f"point_{axis}_m" for axis in VECTOR),
+        *("facet_id", "ball_id", *FORCE, "overlap_m"),
+    ],
+    "contacts": ["ball1_id", "ball2_id", *FORCE, "overlap_m"],
+    "balls": [
+        *("ball_id", "x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s"),
+        *("wx_rad_s", "wy_rad_s", "wz_rad_s", "radius_m"),
+        *(f"floor_force_{axis}_n" for axis in VECTOR),
+        *(f"side_force_{axis}_n" for axis in VECTOR),
+    ],
+}
+KINDS = {
+    "thermo": ("print", False, "txt", 20, 20),
+    "rod_force": ("print", False, "txt", 2, 2),
+    "rod_balls": ("custom", True, "bin", 10, 0),
+    "rod_contacts": ("local", False, "dump", 10, 0),
+    "contacts": ("local", False, "dump", 20, 0),
+    "balls": ("custom", True, "bin", 20, 0),
+}
+
+
+def tool_x_m(step: int) -> float:
+    """Where the tool is: it moves along +x from the bowl's axis."""
+    return SPEED_M_S * TIMESTEP_S * max(0, step - DRAG_START)
+
+
+def overlap_m(step: int) -> float:
+    """Overlap of each of the three contacts of the chain."""
+    gap = BOWL_RADIUS_M - tool_x_m(step) - TOOL_RADIUS_M - 4 * RADIUS_M
+    return -gap / 3
+
+
+def chain_n(step: int) -> float:
+    """Force that the chain carries; the tool arrives with step 10."""
+    return STIFFNESS_N_M * overlap_m(step) if step >= 10 else 0.0
+
+
+def _rod_force(step: int) -> list[float]:
+    force = [-chain_n(step), 0.0, -WEIGHT_N if step >= 10 else 0.0]
+    return [step, step * TIMESTEP_S, *force, 0, 0, 0, tool_x_m(step), 0.0, 0.02]
+
+
+def _centre_1(step: int) -> float:
+    return tool_x_m(step) + TOOL_RADIUS_M + RADIUS_M - overlap_m(step)
+
+
+def rod_balls(step: int) -> list[list[float]]:
+    """Rows of rod_balls: ball 1, once the tool is there."""
+    if step < 10:
+        return []
+    return [[1, _centre_1(step), 0, CHAIN_Z_M, RADIUS_M, chain_n(step), 0, WEIGHT_N]]
+
+
+def _rod_contacts(step: int) -> list[list[float]]:
+    if step < 10:
+        return []
+    point = [tool_x_m(step) + TOOL_RADIUS_M, 0, CHAIN_Z_M]
+    return [[*point, 7, 1, 1.05 * chain_n(step), 0, 1.05 * WEIGHT_N, overlap_m(step)]]
+
+
+def _contacts(step: int) -> list[list[float]]:
+    pile = [4, 3, 0, 0, WEIGHT_N, WEIGHT_N / STIFFNESS_N_M]
+    return [[2, 1, chain_n(step), 0, 0, overlap_m(step)], pile] if step >= 10 else [pile]
+
+
+def _balls(step: int) -> list[list[float]]:
+    press = WEIGHT_N / STIFFNESS_N_M
+    side_x = BOWL_RADIUS_M - RADIUS_M + overlap_m(step)
+    side = [-chain_n(step), 0, WEIGHT_N] if step >= 10 else [0, 0, 0]
+    low, high = RADIUS_M - 2 * press, 3 * RADIUS_M - 3 * press
+    still = [0.0] * 6
+    return [
+        [4, -0.01, 0.02, high, *still, RADIUS_M, 0, 0, 0, 0, 0, 0],
+        [2, side_x, 0, CHAIN_Z_M, *still, RADIUS_M, 0, 0, 0, *side],
+        [1, _centre_1(step), 0, CHAIN_Z_M, *still, RADIUS_M, 0, 0, 0, 0, 0, 0],
+        [3, -0.01, 0.02, low, *still, RADIUS_M, 0, 0, 2 * WEIGHT_N, 0, 0, 0],
+    ]
+
+
+def outputs_json() -> dict[str, Any]:
+    """Content of ``columns.json``."""
+    outputs = {
+        name: {
+            "kind": kind,
+            "binary": binary,
+            "pattern": f"{name}.{{part}}.{ending}",
+            "columns": COLUMNS[name],
+            "engine_columns": [f"c_x[{i}]" for i in range(len(COLUMNS[name]))]
+            if kind == "local"
+            else None,
+            "period_steps": period,
+            "first_step": first,
+            "last_step": LAST,
+        }
+        for name, (kind, binary, ending, period, first) in KINDS.items()
+    }
+    return {"schema": 1, "outputs": outputs}
+
+
+def case_json() -> dict[str, Any]:
+    """Content of ``case.json``."""
+    return {
+        "schema": 1,
+        "study": "tiny",
+        "scene": "process",
+        "run": "tiny-00000000",
+        "case": "tiny",
+        "upstream": {"fill": "fill-00000000", "drop": "drop-00000000"},
+        "timestep_s": TIMESTEP_S,
+        "rayleigh_time_s": 2e-3,
+        "gravity_m_s2": GRAVITY_M_S2,
+        "fidelity": {
+            "name": "draft",
+            "youngs_modulus_scale": 0.01,
+            "timestep_fraction": 0.5,
+            "speed_factor": 1.0,
+            "skin_m": 0.001,
+            "ranks": 2,
+        },
+        "inputs": {"media.count": 4, "motion.speed_m_s": SPEED_M_S},
+        "media": {
+            "count": 4,
+            "radius_mean_m": RADIUS_M,
+            "radius_sd_m": 0.0,
+            "density_kg_m3": DENSITY_KG_M3,
+        },
+        "bowl": {"radius_m": BOWL_RADIUS_M, "walls": "primitive"},
+        "tool": {
+            "kind": "cylinder",
+            "radius_m": TOOL_RADIUS_M,
+            "length_m": 0.06,
+            "mesh": "rod.stl",
+            "submersion_m": 0.03,
+        },
+        "surface_m": SURFACE_M,
+        "motion": {
+            "kind": "line",
+            "speed_m_s": SPEED_M_S,
+            "start_m": [0.0, 0.0],
+            "heading_rad": 0.0,
+            "start_heading_rad": 0.0,
+        },
+        "phases": [
+            {"name": "plunge", "start_step": 0, "end_step": DRAG_START},
+            {"name": "drag", "start_step": DRAG_START, "end_step": LAST},
+        ],
+        "statistics": {"run_in_s": 0.02},
+        "assumptions": [{"field": "bowl.radius_m", "value": BOWL_RADIUS_M, "why": "by hand"}],
+        "reference": None,
+        "versions": {"dragdeck": "0.1.0"},
+    }
+
+
+def raw_files() -> Mapping[str, bytes]:
+    """Names and contents of the raw outputs."""
+    outputs = outputs_json()["outputs"]
+    steps = {
+        name: range(output["first_step"], LAST + 1, output["period_steps"])
+        for name, output in outputs.items()
+    }
+    engine = {name: output["engine_columns"] for name, output in outputs.items()}
+    thermo = [[step, step * TIMESTEP_S, 4, 0, 0] for step in steps["thermo"]]
+    rod_force = [_rod_force(step) for step in steps["rod_force"]]
+    return {
+        "thermo.1.txt": Raw.prints(thermo, COLUMNS["thermo"]),
+        "rod_force.1.txt": Raw.prints(rod_force, COLUMNS["rod_force"]),
+        "rod_balls.1.bin": b"".join(Raw.binary(s, rod_balls(s), 8) for s in steps["rod_balls"]),
+        "balls.1.bin": b"".join(Raw.binary(s, _balls(s), 17) for s in steps["balls"]),
+        "rod_contacts.1.dump": b"".join(
+            Raw.text(s, _rod_contacts(s), engine["rod_contacts"], "local")
+            for s in steps["rod_contacts"]
+        ),
+        "contacts.1.dump": b"".join(
+            Raw.text(s, _contacts(s), engine["contacts"], "local") for s in steps["contacts"]
+        ),
+    }

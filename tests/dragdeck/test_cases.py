@@ -1,0 +1,129 @@
+"""Cases, and what their runs are named by."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dragdeck.cases import SCENES, Case, load_cases, study_file
+from dragdeck.errors import InputError
+from dragdeck.project import Project, by_run
+
+
+@pytest.fixture
+def ids(small: dict[str, Any], write_study: Callable[..., Path]) -> Callable[..., dict[str, str]]:
+    """Run ids of the small study after a change."""
+
+    def changed(change: Callable[[dict[str, Any]], object] = lambda data: None) -> dict[str, str]:
+        data = copy.deepcopy(small)
+        change(data)
+        (case,) = load_cases(write_study(data))
+        return dict(case.run_ids)
+
+    return changed
+
+
+def put(path: str, value: Any) -> Callable[[dict[str, Any]], None]:
+    def change(data: dict[str, Any]) -> None:
+        *parents, last = path.split(".")
+        for name in parents:
+            data = data.setdefault(name, {})
+        data[last] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "scenes"),
+    [
+        ("title", "another", set()),
+        ("assumptions", [{"field": "seed", "why": "any"}], set()),
+        ("reference", {"source": "somebody"}, set()),
+        ("motion.speed_m_s", 0.03, {"process"}),
+        ("motion.submersion_m", 0.01, {"process"}),
+        ("outputs.network_hz", 10, {"process"}),
+        ("bowl.facet_size_m", 0.005, {"process"}),
+        ("drop.height_m", 0.02, {"drop"}),
+        ("seed", 2, {"fill", "process"}),
+        ("media.count", 200, {"fill", "process"}),
+        ("pairs.ceramic-ceramic.friction", 0.5, {"fill", "process"}),
+        ("contact.limit_force", False, {"drop", "fill", "process"}),
+        ("fidelities.quick.timestep_fraction", 0.4, {"process"}),
+        ("fidelities.quick.youngs_modulus_scale", 0.01, {"fill", "process"}),
+    ],
+)
+def test_a_run_is_named_by_what_it_depends_on(
+    ids: Callable[..., dict[str, str]], field: str, value: Any, scenes: set[str]
+) -> None:
+    before, after = ids(), ids(put(field, value))
+    assert {scene for scene in SCENES if before[scene] != after[scene]} == scenes
+
+
+def test_the_order_of_keys_does_not_matter(ids: Callable[..., dict[str, str]]) -> None:
+    def reverse(data: dict[str, Any]) -> None:
+        for key in reversed(list(data)):
+            data[key] = data.pop(key)
+
+    assert ids(reverse) == ids()
+
+
+def test_a_matrix_makes_every_combination(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    small["matrix"] = {"motion.speed_m_s": [0.01, 0.02], "seed": [1, 2, 3]}
+    cases = load_cases(write_study(small))
+    assert len(cases) == len({case.run_ids["process"] for case in cases}) == 6
+    assert cases[3].name == "quick_speed_m_s-0.02_seed-1"
+    assert cases[3].study.motion.speed_m_s == 0.02
+    assert len(by_run(cases, "fill")) == 3
+    assert len(by_run(cases, "drop")) == 1
+
+
+@pytest.mark.parametrize(
+    ("matrix", "words"),
+    [
+        ({"motion.colour": [1]}, "motion.colour: unknown key"),
+        ({"seed": []}, "matrix.seed: no values"),
+        ({"seed": [1, 1]}, "given twice"),
+        ({"bowl.radius_m.deeper": [1]}, "leads through a value"),
+        ({"motion.speed_m_s": [0.01, -1]}, "motion.speed_m_s"),
+    ],
+)
+def test_a_wrong_matrix_is_explained(
+    small: dict[str, Any], write_study: Callable[..., Path], matrix: dict[str, Any], words: str
+) -> None:
+    small["matrix"] = matrix
+    with pytest.raises(InputError) as caught:
+        load_cases(write_study(small))
+    assert words in str(caught.value)
+
+
+def test_the_fidelity_of_the_command_line_goes_first(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    (case,) = load_cases(write_study(small), "draft")
+    assert case.study.fidelity == "draft"
+    assert case.run_ids["process"].startswith("draft-")
+
+
+def test_an_unknown_study_lists_the_known(project: Project, case: Case) -> None:
+    with pytest.raises(InputError, match="one of: small"):
+        study_file(project.studies, "large")
+
+
+def test_an_edited_mesh_names_another_run(
+    project: Project, small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    small["workpiece"]["shape"] = {"kind": "mesh", "file": "tool.stl", "unit": "mm"}
+    file = write_study(small)
+    (file.parent / "tool.stl").write_text("one")
+    (before,) = load_cases(file)
+    first = before.run_ids["process"]
+    (file.parent / "tool.stl").write_text("two")
+    (after,) = load_cases(file)
+    assert first != after.run_ids["process"]
+    assert before.run_ids["fill"] == after.run_ids["fill"]

@@ -1,0 +1,45 @@
+"""Triangle surfaces for the engine: made, read, checked, placed and written.
+
+Everything inside is in metres. A *tool* stands upright: +z points along its
+axis, away from the floor, and its reference point, the origin, is the middle
+of its bounding box in x and y at its lowest z. `cylinder` makes meshes that
+stand so; `place` moves a user's mesh there.
+"""
+
+from dragdeck.mesh.checks import (
+    ANGLE_WARNING_DEG,
+    CURVATURE_DEG,
+    MAX_NEIGHBOURS,
+    Finding,
+    Surroundings,
+    check,
+    findings,
+)
+from dragdeck.mesh.files import UNITS, read, stl_text, write_stl
+from dragdeck.mesh.shapes import bowl, cylinder, polygon_radius, polygon_sides, prism
+from dragdeck.mesh.surface import NODE_PRECISION_M, Envelope, Mesh, envelope, place, weld
+
+__all__ = [
+    "ANGLE_WARNING_DEG",
+    "CURVATURE_DEG",
+    "MAX_NEIGHBOURS",
+    "NODE_PRECISION_M",
+    "UNITS",
+    "Envelope",
+    "Finding",
+    "Mesh",
+    "Surroundings",
+    "bowl",
+    "check",
+    "cylinder",
+    "envelope",
+    "findings",
+    "place",
+    "polygon_radius",
+    "polygon_sides",
+    "prism",
+    "read",
+    "stl_text",
+    "weld",
+    "write_stl",
+]

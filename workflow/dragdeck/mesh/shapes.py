@@ -1,0 +1,205 @@
+"""Surfaces made from a few lengths: the round tool, a bar with edges, the bowl."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from dragdeck.errors import InputError
+from dragdeck.mesh.surface import Floats, Integers, Mesh, weld
+
+MAX_FACETS = 200_000
+"""More facets than any tool needs: a facet size in the wrong unit."""
+
+MIN_SIDES = 8
+"""The coarsest polygon that still passes for a circle."""
+
+
+def polygon_sides(radius_m: float, facet_size_m: float) -> int:
+    """Sides of the polygon that stands for a circle: a multiple of four, at least eight.
+
+    Four-fold symmetry keeps the axis in the middle of the bounding box.
+
+    Parameters
+    ----------
+    radius_m, facet_size_m : float
+        The circle, and the longest side wanted, in metres.
+    """
+    quarter = math.ceil(math.pi * radius_m / (2.0 * facet_size_m) - 1e-9)
+    return max(MIN_SIDES, 4 * quarter)
+
+
+def polygon_radius(radius_m: float, sides: int) -> float:
+    """Distance of the corners from the axis if the polygon is as long as the circle.
+
+    By Cauchy's theorem (1841) the mean width of a convex outline is its
+    perimeter over pi, so a polygon of the circle's perimeter is, averaged over
+    the directions of motion, exactly as wide as the circle; a ball's radius
+    adds to both alike. Width is what a tool shows to the bed it is dragged
+    through, hence this choice and not the inscribed polygon, which is too
+    narrow, nor the one of equal area, which is too wide. The corners stand out
+    by (pi / sides)^2 / 6 of the radius and the middles of the sides lie inside
+    by (pi / sides)^2 / 3, to leading order: 0.16 % and 0.32 % for 32 sides.
+    """
+    return radius_m * (math.pi / sides) / math.sin(math.pi / sides)
+
+
+def cylinder(radius_m: float, length_m: float, facet_size_m: float) -> Mesh:
+    """Make a closed upright cylinder, its bottom's centre in the origin.
+
+    The outline is a polygon of the circle's perimeter (see `polygon_radius`).
+    The side is made of flat strips, one for each side of the polygon, cut into
+    right triangles, so that a ball which slides along the axis keeps its
+    contact history; the caps are Delaunay triangulations.
+
+    Parameters
+    ----------
+    radius_m, length_m : float
+        In metres.
+    facet_size_m : float
+        The longest leg of a triangle on the side, in metres; at most the radius.
+
+    Raises
+    ------
+    InputError
+        If a length is not a positive number, or the facets are coarser than
+        the radius or too many.
+    """
+    _require_positive(radius_m=radius_m, length_m=length_m, facet_size_m=facet_size_m)
+    _require_facet_size(facet_size_m, radius_m, length_m)
+    sides = polygon_sides(radius_m, facet_size_m)
+    return prism(sides, polygon_radius(radius_m, sides), length_m, facet_size_m)
+
+
+def prism(sides: int, corner_radius_m: float, length_m: float, facet_size_m: float) -> Mesh:
+    """Make a closed upright bar with a regular polygon as its section.
+
+    Parameters
+    ----------
+    sides : int
+        Corners of the section; the first lies on the x axis.
+    corner_radius_m : float
+        Distance of the corners from the axis, in metres.
+    length_m, facet_size_m : float
+        Length, and longest facet edge along the axis, in metres.
+    """
+    plane, disc = _disc(sides, corner_radius_m, facet_size_m)
+    side = _side(sides, corner_radius_m, length_m, facet_size_m)
+    bottom = Mesh(_lift(plane, 0.0), disc[:, ::-1])
+    top = Mesh(_lift(plane, length_m), disc)
+    return _join(bottom, side, top)
+
+
+def bowl(radius_m: float, height_m: float, facet_size_m: float) -> Mesh:
+    """Make an open bowl: a floor in z = 0 and a side, the normals pointing in.
+
+    The sides of the polygon touch the circle from outside, so a bed that was
+    filled into the round bowl of the same radius fits without an overlap. The
+    corners stand out by (pi / sides)^2 / 2 of the radius: the simulation box
+    must hold them.
+
+    Parameters
+    ----------
+    radius_m, height_m : float
+        In metres.
+    facet_size_m : float
+        The longest leg of a triangle on the side, in metres; at most the radius.
+
+    Raises
+    ------
+    InputError
+        As `cylinder`.
+    """
+    _require_positive(radius_m=radius_m, height_m=height_m, facet_size_m=facet_size_m)
+    _require_facet_size(facet_size_m, radius_m, height_m)
+    sides = polygon_sides(radius_m, facet_size_m)
+    corner_radius_m = radius_m / math.cos(math.pi / sides)
+    plane, disc = _disc(sides, corner_radius_m, facet_size_m)
+    outside = _side(sides, corner_radius_m, height_m, facet_size_m)
+    inside = replace(outside, triangles=outside.triangles[:, ::-1])
+    return _join(Mesh(_lift(plane, 0.0), disc), inside)
+
+
+def _require_positive(**lengths_m: float) -> None:
+    for field, value in lengths_m.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise InputError(
+                "a mesh needs a positive length",
+                field=field,
+                value=value,
+                limit="a finite number above 0, in metres",
+            )
+
+
+def _require_facet_size(facet_size_m: float, radius_m: float, length_m: float) -> None:
+    if facet_size_m > radius_m:
+        raise InputError(
+            "the facets are too coarse for the curve they stand for",
+            field="facet_size_m",
+            value=facet_size_m,
+            limit=f"at most the radius, {radius_m:g} m",
+            remedy="ask for a smaller facet size",
+        )
+    facets = 2.0 * math.tau * radius_m * (length_m + radius_m) / facet_size_m**2
+    if facets > MAX_FACETS:
+        raise InputError(
+            f"about {facets:.3g} facets would be needed",
+            field="facet_size_m",
+            value=facet_size_m,
+            limit=f"at most {MAX_FACETS} facets",
+            remedy="ask for a larger facet size, in metres",
+        )
+
+
+def _ring(count: int, radius_m: float, start_rad: float = 0.0) -> Floats:
+    angle = start_rad + math.tau * np.arange(count) / count
+    return np.column_stack([radius_m * np.cos(angle), radius_m * np.sin(angle)])
+
+
+def _lift(plane: Floats, z_m: float) -> Floats:
+    return np.column_stack([plane, np.full(len(plane), z_m)])
+
+
+def _disc(sides: int, corner_radius_m: float, facet_size_m: float) -> tuple[Floats, Integers]:
+    """Triangulate a polygon: (N, 2) points on rings, outermost last, and (M, 3) triangles."""
+    import pyvista
+
+    rings = max(1, round(corner_radius_m / facet_size_m))
+    parts = [np.zeros((1, 2))]
+    for ring in range(1, rings):
+        count = max(5, round(sides * ring / rings))
+        parts.append(_ring(count, corner_radius_m * ring / rings, math.pi * (ring % 2) / count))
+    parts.append(_ring(sides, corner_radius_m))
+    plane = np.concatenate(parts)
+    scaled = pyvista.PolyData(_lift(plane / corner_radius_m, 0.0))
+    triangles = np.asarray(scaled.delaunay_2d().faces, dtype=np.int64).reshape(-1, 4)[:, 1:]
+    if len(triangles) != 2 * len(plane) - 2 - sides:
+        raise RuntimeError(f"the triangulation of a cap of {sides} sides failed")
+    return plane, _counter_clockwise(plane, triangles)
+
+
+def _counter_clockwise(plane: Floats, triangles: Integers) -> Integers:
+    first, second, third = np.moveaxis(plane[triangles], 1, 0)
+    (ax, ay), (bx, by) = (second - first).T, (third - first).T
+    clockwise = ax * by - ay * bx < 0.0
+    return np.where(clockwise[:, None], triangles[:, ::-1], triangles)
+
+
+def _side(sides: int, corner_radius_m: float, length_m: float, facet_size_m: float) -> Mesh:
+    levels = math.ceil(length_m / facet_size_m - 1e-9)
+    ring = _ring(sides, corner_radius_m)
+    points = np.concatenate([_lift(ring, length_m * k / levels) for k in range(levels + 1)])
+    lower = np.arange(levels * sides).reshape(levels, sides)
+    beside = np.roll(lower, -1, axis=1)
+    one = np.stack([lower, beside, beside + sides], axis=-1)
+    other = np.stack([lower, beside + sides, lower + sides], axis=-1)
+    return Mesh(points, np.stack([one, other], axis=2).reshape(-1, 3))
+
+
+def _join(*meshes: Mesh) -> Mesh:
+    offsets = np.cumsum([0, *(len(mesh.points) for mesh in meshes[:-1])])
+    points = np.concatenate([mesh.points for mesh in meshes])
+    triangles = [mesh.triangles + offset for mesh, offset in zip(meshes, offsets, strict=True)]
+    return weld(Mesh(points, np.concatenate(triangles)))
