@@ -15,7 +15,9 @@ HERE = Path(__file__).parent
 
 def hex_bar() -> str:
     """Return the STL text, in millimetres, of a hexagonal bar: 10 mm over corners, 80 mm long."""
-    bar = mesh.prism(sides=6, corner_radius_m=0.005, length_m=0.080, facet_size_m=0.005)
+    bar = mesh.prism(
+        sides=6, corner_radius_m=0.005, length_m=0.080, facet_size_m=0.005, facet_length_m=0.005
+    )
     return mesh.stl_text(bar, factor=1e3)
 
 

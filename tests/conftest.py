@@ -9,12 +9,11 @@ from typing import Any
 
 import pytest
 import yaml
+from paths import ROOT, SMALL_STUDY
 
 from dragdeck.cases import Case, load_cases
 from dragdeck.project import Project
-
-ROOT = Path(__file__).parents[1]
-SMALL_STUDY = Path(__file__).with_name("small_study.yaml")
+from dragdeck.study import read_yaml
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -24,8 +23,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.fixture
 def small() -> dict[str, Any]:
     """The small study as plain data, free to change."""
-    from dragdeck.study import read_yaml
-
     return copy.deepcopy(read_yaml(SMALL_STUDY))
 
 

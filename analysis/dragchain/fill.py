@@ -27,11 +27,12 @@ def describe_bed(balls: Frame, case: Case) -> dict[str, object]:
     -------
     dict
         The content of ``fill.json``: ``fill_height_m`` (see `fill_height`),
-        ``top_m`` (the highest point of any ball), ``solid_fraction`` (volume of the balls over that of the bowl up to the
-        fill height), ``balls``, ``radius_mean_m``, ``radius_sd_m`` (divisor
-        N - 1; 0 for one ball), and ``kinetic_energy_ratio``, the mean
-        translational kinetic energy of a ball over what the mean ball gains
-        in a fall through its own diameter, ``mean(m v^2 / 2) / (mean(m) g d)``.
+        ``top_m`` (the highest point of any ball), ``solid_fraction`` (volume of
+        the balls over that of the bowl up to the fill height), ``balls``,
+        ``radius_mean_m``, ``radius_sd_m`` (divisor N, as the study states it)
+        and ``kinetic_energy_ratio``, the mean translational kinetic energy of a
+        ball over what the mean ball gains in a fall through its own diameter,
+        ``mean(m v^2 / 2) / (mean(m) g d)``.
 
     Raises
     ------
@@ -53,7 +54,7 @@ def describe_bed(balls: Frame, case: Case) -> dict[str, object]:
         "solid_fraction": float(volume.sum() / (np.pi * bowl_radius**2 * height)),
         "balls": balls.rows,
         "radius_mean_m": float(radius.mean()),
-        "radius_sd_m": float(radius.std(ddof=1)) if balls.rows > 1 else 0.0,
+        "radius_sd_m": float(radius.std()),
         "kinetic_energy_ratio": float(energy.mean() / scale),
     }
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import ROOT
+from paths import ROOT
 
 from dragdeck.cases import SCENES, Case, load_cases
 from dragdeck.cli import scene_of

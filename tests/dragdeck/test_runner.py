@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import signal
@@ -201,7 +202,7 @@ def test_a_drop_has_three_impacts(case: Case, project: Project) -> None:
     assert rows.count(rows[0]) == 3
     forces = [float(row.split()[-1]) for row in rows if row != rows[0]]
     touching = [force > 0 for force in forces]
-    starts = sum(now and not before for before, now in zip([False, *touching], touching))
+    starts = sum(now and not before for before, now in itertools.pairwise([False, *touching]))
     assert starts == 3
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import ROOT
+from paths import ROOT
 
 from dragdeck.errors import InputError
 from dragdeck.study import BUILT_IN_FIDELITIES, read_yaml, validate
@@ -67,7 +67,7 @@ def test_a_wrong_value_is_explained(
     small: dict[str, Any], field: str, value: Any, words: str
 ) -> None:
     put(small, field, value)
-    with pytest.raises(InputError, match="study.yaml") as caught:
+    with pytest.raises(InputError, match=r"study\.yaml") as caught:
         validate(small, FILE)
     assert words in str(caught.value)
 

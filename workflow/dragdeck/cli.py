@@ -58,6 +58,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def scene_of(case: Case, scene: SceneName, bed: Bed | None = None) -> Scene:
+    """Build a scene of a case; `bed` matters to a process only."""
     if scene == "drop":
         return drop_scene(case)
     if scene == "fill":

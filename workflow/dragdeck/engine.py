@@ -122,7 +122,8 @@ def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | Non
             f"{ranks} ranks were asked for, but there is no mpirun\n"
             "  remedy: install Open MPI (it comes with Debian's liggghts), or set ranks to 1"
         )
-    return [launcher, "-np", str(ranks), "--bind-to", "none", "--oversubscribe", *words]
+    idle = ["--mca", "mpi_yield_when_idle", "1"]  # free, and kind to whoever shares the cores
+    return [launcher, "-np", str(ranks), "--bind-to", "none", "--oversubscribe", *idle, *words]
 
 
 def execute(words: Sequence[str], folder: Path, screen: Path, watch: Watch) -> Ending:

@@ -97,7 +97,7 @@ def deck_text(scene: Scene, templates: jinja2.Environment) -> str:
             f"a value is missing: {error}",
             file=file,
             field=f"line {line}",
-            remedy="correct the name, or set it in the template; docs/templates.md lists the values",
+            remedy="correct the name, or set it there; docs/templates.md lists the values",
         ) from None
 
 

@@ -114,7 +114,8 @@ class CylinderShape(Model):
 
     kind: Literal["cylinder"]
     radius_m: Positive = Field(description="radius, m")
-    facet_size_m: Positive = Field(default=0.0015, description="edge length of its facets, m")
+    facet_size_m: Positive = Field(default=0.0015, description="facet edges around the axis, m")
+    facet_length_m: Positive = Field(default=0.01, description="facet edges along the axis, m")
 
 
 class MeshShape(Model):
@@ -262,7 +263,7 @@ class Reference(Model):
 
 BUILT_IN_FIDELITIES: Mapping[str, Fidelity] = {
     "draft": Fidelity(youngs_modulus_scale=1e-3, timestep_fraction=0.8),
-    "standard": Fidelity(youngs_modulus_scale=1e-2, timestep_fraction=0.8),
+    "standard": Fidelity(youngs_modulus_scale=1e-2, timestep_fraction=0.5),
     "fine": Fidelity(youngs_modulus_scale=0.1, timestep_fraction=0.8),
     "full": Fidelity(youngs_modulus_scale=1.0, timestep_fraction=0.8),
     "reference": Fidelity(youngs_modulus_scale=1.0, timestep_fraction=0.2),
@@ -431,7 +432,7 @@ def _explained(error: ValidationError, file: Path | str) -> InputError:
         problem, remedy = "unknown key", "remove it, or check its spelling against docs/study.md"
     elif kind == "missing":
         problem, remedy, value = "a required key is missing", "add it", None
-    elif isinstance(value, Mapping) or isinstance(value, BaseModel):
+    elif isinstance(value, Mapping | BaseModel):
         value = None
     if len(issues) > 1:
         more = f"{len(issues) - 1} more problem(s) stand in this file"

@@ -17,24 +17,40 @@ try:
 except DragdeckError as error:
     raise WorkflowError(str(error))
 
-RUN = "results/{study}/{scene}/{run}/"
-DROP = RUN.replace("{scene}", "drop")
-FILL = RUN.replace("{scene}", "fill")
-PROCESS = RUN.replace("{scene}", "process")
-REPORT = "results/{study}/report/"
-
 
 wildcard_constraints:
     study="[A-Za-z0-9._-]+",
-    scene="drop|fill|process",
     run="[A-Za-z0-9._-]+",
+
+
+def of_drop(file):
+    """Path of a file of a drop test, as a pattern."""
+    return f"results/{{study}}/drop/{{run}}/{file}"
+
+
+def of_fill(file):
+    """Path of a file of a fill, as a pattern."""
+    return f"results/{{study}}/fill/{{run}}/{file}"
+
+
+def of_process(file):
+    """Path of a file of a process run, as a pattern."""
+    return f"results/{{study}}/process/{{run}}/{file}"
+
+
+def of_report(file):
+    """Path of a file of the study's report."""
+    return f"results/{STUDY}/report/{file}"
+
+
+def every_folder(scene):
+    """The folder of every run of a scene."""
+    return [f"results/{STUDY}/{scene}/{run}" for run in by_run(CASES, scene)]
 
 
 def every(scene, file):
     """One file of every run of a scene."""
-    return [
-        (RUN + file).format(study=STUDY, scene=scene, run=run) for run in by_run(CASES, scene)
-    ]
+    return [f"{folder}/{file}" for folder in every_folder(scene)]
 
 
 def case_of(scene, run):
@@ -59,3 +75,24 @@ def fidelity_option(wildcards):
 def ranks(scene):
     """Number of engine processes of a run, as a function of its wildcards."""
     return lambda wildcards: case_of(scene, wildcards.run).study.chosen_fidelity().ranks
+
+
+def fill_of(wildcards, file):
+    """A file of the fill that a process run starts from."""
+    fill = case_of("process", wildcards.run).run_ids["fill"]
+    return f"results/{wildcards.study}/fill/{fill}/{file}"
+
+
+def of_every_run(wildcards):
+    """All that the report reads."""
+    return [
+        *every("process", "run.json"),
+        *every("process", "tables/figures.json"),
+        *every("process", "tables/closure.json"),
+        *every("fill", "run.json"),
+        *every("fill", "tables/fill.json"),
+        *every("fill", "tables/figures.json"),
+        *every("drop", "run.json"),
+        *every("drop", "tables/impacts.parquet"),
+        *every("drop", "tables/figures.json"),
+    ]

@@ -5,17 +5,19 @@ rule render_drop:
     input:
         deck_inputs,
     output:
-        deck=DROP + "in.liggghts",
-        case=DROP + "case.json",
-        columns=DROP + "columns.json",
-        balls=DROP + "ball.data",
+        deck=of_drop("in.liggghts"),
+        case=of_drop("case.json"),
+        columns=of_drop("columns.json"),
+        balls=of_drop("ball.data"),
+    log:
+        of_drop("logs/render.log"),
+    benchmark:
+        of_drop("benchmarks/render.tsv")
+    conda:
+        "../envs/python.yaml"
     params:
         fidelity=fidelity_option,
         source=source_hash("dragdeck.render"),
-    log:
-        DROP + "logs/render.log",
-    benchmark:
-        DROP + "benchmarks/render.tsv"
     shell:
         "dragdeck render {wildcards.study} drop {wildcards.run} {params.fidelity} > {log} 2>&1"
 
@@ -24,43 +26,41 @@ rule render_fill:
     input:
         deck_inputs,
     output:
-        deck=FILL + "in.liggghts",
-        case=FILL + "case.json",
-        columns=FILL + "columns.json",
-        balls=FILL + "balls.data",
+        deck=of_fill("in.liggghts"),
+        case=of_fill("case.json"),
+        columns=of_fill("columns.json"),
+        balls=of_fill("balls.data"),
+    log:
+        of_fill("logs/render.log"),
+    benchmark:
+        of_fill("benchmarks/render.tsv")
+    conda:
+        "../envs/python.yaml"
     params:
         fidelity=fidelity_option,
         source=source_hash("dragdeck.render"),
-    log:
-        FILL + "logs/render.log",
-    benchmark:
-        FILL + "benchmarks/render.tsv"
     shell:
         "dragdeck render {wildcards.study} fill {wildcards.run} {params.fidelity} > {log} 2>&1"
-
-
-def fill_table(wildcards):
-    """The settled bed that a process run starts from."""
-    fill = case_of("process", wildcards.run).run_ids["fill"]
-    return (FILL + "tables/fill.json").format(study=wildcards.study, run=fill)
 
 
 rule render_process:
     input:
         deck_inputs,
-        bed=fill_table,
+        bed=lambda wildcards: fill_of(wildcards, "tables/fill.json"),
     output:
-        deck=PROCESS + "in.liggghts",
-        case=PROCESS + "case.json",
-        columns=PROCESS + "columns.json",
-        tool=PROCESS + "tool.stl",
+        deck=of_process("in.liggghts"),
+        case=of_process("case.json"),
+        columns=of_process("columns.json"),
+        tool=of_process("tool.stl"),
+    log:
+        of_process("logs/render.log"),
+    benchmark:
+        of_process("benchmarks/render.tsv")
+    conda:
+        "../envs/python.yaml"
     params:
         fidelity=fidelity_option,
         source=source_hash("dragdeck.render"),
-    log:
-        PROCESS + "logs/render.log",
-    benchmark:
-        PROCESS + "benchmarks/render.tsv"
     shell:
         "dragdeck render {wildcards.study} process {wildcards.run} {params.fidelity}"
         " --fill-table {input.bed} > {log} 2>&1"

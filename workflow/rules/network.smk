@@ -4,21 +4,23 @@
 rule find_chains:
     input:
         multiext(
-            PROCESS + "tables/",
+            of_process("tables/"),
             "rod_force.parquet",
             "rod_contacts.parquet",
             "balls.parquet",
             "contacts.parquet",
         ),
-        run=PROCESS + "run.json",
+        run=of_process("run.json"),
     output:
-        PROCESS + "tables/network.parquet",
-        PROCESS + "tables/chains.parquet",
+        of_process("tables/network.parquet"),
+        of_process("tables/chains.parquet"),
+    log:
+        of_process("logs/chains.log"),
+    benchmark:
+        of_process("benchmarks/chains.tsv")
+    conda:
+        "../envs/python.yaml"
     params:
         source=source_hash("dragchain.network", "dragchain.chains"),
-    log:
-        PROCESS + "logs/chains.log",
-    benchmark:
-        PROCESS + "benchmarks/chains.tsv"
     shell:
         "dragchain chains $(dirname {input.run}) > {log} 2>&1"

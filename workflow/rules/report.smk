@@ -3,45 +3,49 @@
 
 rule draw_drop:
     input:
-        DROP + "tables/impacts.parquet",
-        run=DROP + "run.json",
+        of_drop("tables/impacts.parquet"),
+        run=of_drop("run.json"),
     output:
         report(
-            DROP + "figures/drop.png",
+            of_drop("figures/drop.png"),
             caption="../report/drop.rst",
             category="Drop test",
             labels={"run": "{run}", "figure": "impacts"},
         ),
-        DROP + "tables/figures.json",
+        of_drop("tables/figures.json"),
+    log:
+        of_drop("logs/figures.log"),
+    benchmark:
+        of_drop("benchmarks/figures.tsv")
+    conda:
+        "../envs/python.yaml"
     params:
         source=source_hash("dragchain.figures"),
-    log:
-        DROP + "logs/figures.log",
-    benchmark:
-        DROP + "benchmarks/figures.tsv"
     shell:
         "dragchain figures $(dirname {input.run}) > {log} 2>&1"
 
 
 rule draw_fill:
     input:
-        FILL + "tables/fill.json",
-        FILL + "tables/thermo.parquet",
-        run=FILL + "run.json",
+        of_fill("tables/fill.json"),
+        of_fill("tables/thermo.parquet"),
+        run=of_fill("run.json"),
     output:
         report(
-            FILL + "figures/fill.png",
+            of_fill("figures/fill.png"),
             caption="../report/fill.rst",
             category="Fill",
             labels={"run": "{run}", "figure": "settling"},
         ),
-        FILL + "tables/figures.json",
+        of_fill("tables/figures.json"),
+    log:
+        of_fill("logs/figures.log"),
+    benchmark:
+        of_fill("benchmarks/figures.tsv")
+    conda:
+        "../envs/python.yaml"
     params:
         source=source_hash("dragchain.figures"),
-    log:
-        FILL + "logs/figures.log",
-    benchmark:
-        FILL + "benchmarks/figures.tsv"
     shell:
         "dragchain figures $(dirname {input.run}) > {log} 2>&1"
 
@@ -59,7 +63,7 @@ FIGURES = [
 rule draw_process:
     input:
         multiext(
-            PROCESS + "tables/",
+            of_process("tables/"),
             "rod_force.parquet",
             "rod_contacts.parquet",
             "balls.parquet",
@@ -67,41 +71,28 @@ rule draw_process:
             "network.parquet",
             "chains.parquet",
         ),
-        run=PROCESS + "run.json",
+        run=of_process("run.json"),
     output:
         [
             report(
-                PROCESS + f"figures/{name}.png",
+                of_process(f"figures/{name}.png"),
                 caption=f"../report/{name}.rst",
                 category="Process",
                 labels={"run": "{run}", "figure": name},
             )
             for name in FIGURES
         ],
-        PROCESS + "tables/figures.json",
+        of_process("tables/figures.json"),
+    log:
+        of_process("logs/figures.log"),
+    benchmark:
+        of_process("benchmarks/figures.tsv")
+    conda:
+        "../envs/python.yaml"
     params:
         source=source_hash("dragchain.figures"),
-    log:
-        PROCESS + "logs/figures.log",
-    benchmark:
-        PROCESS + "benchmarks/figures.tsv"
     shell:
         "dragchain figures $(dirname {input.run}) > {log} 2>&1"
-
-
-def of_every_run(wildcards):
-    """All that the report reads."""
-    return [
-        *every("process", "run.json"),
-        *every("process", "tables/figures.json"),
-        *every("process", "tables/closure.json"),
-        *every("fill", "run.json"),
-        *every("fill", "tables/fill.json"),
-        *every("fill", "tables/figures.json"),
-        *every("drop", "run.json"),
-        *every("drop", "tables/impacts.parquet"),
-        *every("drop", "tables/figures.json"),
-    ]
 
 
 rule write_report:
@@ -109,20 +100,22 @@ rule write_report:
         of_every_run,
         template=str(PROJECT.root / "analysis/dragchain/report.html.j2"),
     output:
-        multiext(f"results/{STUDY}/report/", "summary.csv", "summary.parquet"),
-        report(
-            f"results/{STUDY}/report/report.html",
+        csv=of_report("summary.csv"),
+        parquet=of_report("summary.parquet"),
+        page=report(
+            of_report("report.html"),
             caption="../report/report.rst",
             category="Report",
             labels={"run": "all", "figure": "report"},
         ),
-    params:
-        folder=f"results/{STUDY}/report",
-        runs=lambda wildcards: [folder.rstrip("/") for folder in every("process", "")],
-        source=source_hash("dragchain.report"),
     log:
-        f"results/{STUDY}/report/logs/report.log",
+        of_report("logs/report.log"),
     benchmark:
-        f"results/{STUDY}/report/benchmarks/report.tsv"
+        of_report("benchmarks/report.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        runs=lambda wildcards: every_folder("process"),
+        source=source_hash("dragchain.report"),
     shell:
-        "dragchain report --out {params.folder} {params.runs} > {log} 2>&1"
+        "dragchain report --out $(dirname {output.csv}) {params.runs} > {log} 2>&1"

@@ -4,62 +4,62 @@
 
 rule run_drop:
     input:
-        DROP + "in.liggghts",
-        DROP + "case.json",
-        DROP + "columns.json",
-        DROP + "ball.data",
+        of_drop("in.liggghts"),
+        of_drop("case.json"),
+        of_drop("columns.json"),
+        of_drop("ball.data"),
     output:
-        DROP + "run.json",
+        of_drop("run.json"),
+    log:
+        of_drop("logs/run.log"),
+    benchmark:
+        of_drop("benchmarks/run.tsv")
+    conda:
+        "../envs/python.yaml"
     params:
         source=source_hash("dragdeck.runner"),
-    log:
-        DROP + "logs/run.log",
-    benchmark:
-        DROP + "benchmarks/run.tsv"
     shell:
         "dragdeck run $(dirname {output}) 2>&1 | tee -i {log}"
 
 
 rule run_fill:
     input:
-        FILL + "in.liggghts",
-        FILL + "case.json",
-        FILL + "columns.json",
-        FILL + "balls.data",
+        of_fill("in.liggghts"),
+        of_fill("case.json"),
+        of_fill("columns.json"),
+        of_fill("balls.data"),
     output:
-        FILL + "run.json",
+        of_fill("run.json"),
+    log:
+        of_fill("logs/run.log"),
+    benchmark:
+        of_fill("benchmarks/run.tsv")
+    conda:
+        "../envs/python.yaml"
+    threads: ranks("fill")
     params:
         source=source_hash("dragdeck.runner"),
-    log:
-        FILL + "logs/run.log",
-    benchmark:
-        FILL + "benchmarks/run.tsv"
-    threads: ranks("fill")
     shell:
         "dragdeck run $(dirname {output}) 2>&1 | tee -i {log}"
 
 
-def fill_run(wildcards):
-    """The fill that a process run starts from."""
-    fill = case_of("process", wildcards.run).run_ids["fill"]
-    return (FILL + "run.json").format(study=wildcards.study, run=fill)
-
-
 rule run_process:
     input:
-        PROCESS + "in.liggghts",
-        PROCESS + "case.json",
-        PROCESS + "columns.json",
-        PROCESS + "tool.stl",
-        fill=fill_run,
+        of_process("in.liggghts"),
+        of_process("case.json"),
+        of_process("columns.json"),
+        of_process("tool.stl"),
+        fill=lambda wildcards: fill_of(wildcards, "run.json"),
     output:
-        PROCESS + "run.json",
+        of_process("run.json"),
+    log:
+        of_process("logs/run.log"),
+    benchmark:
+        of_process("benchmarks/run.tsv")
+    conda:
+        "../envs/python.yaml"
+    threads: ranks("process")
     params:
         source=source_hash("dragdeck.runner"),
-    log:
-        PROCESS + "logs/run.log",
-    benchmark:
-        PROCESS + "benchmarks/run.tsv"
-    threads: ranks("process")
     shell:
         "dragdeck run $(dirname {output}) 2>&1 | tee -i {log}"

@@ -3,41 +3,45 @@
 
 rule tabulate_drop:
     input:
-        DROP + "run.json",
+        of_drop("run.json"),
     output:
-        DROP + "tables/impacts.parquet",
+        of_drop("tables/impacts.parquet"),
+    log:
+        of_drop("logs/tables.log"),
+    benchmark:
+        of_drop("benchmarks/tables.tsv")
+    conda:
+        "../envs/python.yaml"
     params:
         source=source_hash("dragchain.tables"),
-    log:
-        DROP + "logs/tables.log",
-    benchmark:
-        DROP + "benchmarks/tables.tsv"
     shell:
         "dragchain tables $(dirname {input}) > {log} 2>&1"
 
 
 rule tabulate_fill:
     input:
-        FILL + "run.json",
+        of_fill("run.json"),
     output:
-        FILL + "tables/fill.json",
-        FILL + "tables/thermo.parquet",
+        of_fill("tables/fill.json"),
+        of_fill("tables/thermo.parquet"),
+    log:
+        of_fill("logs/tables.log"),
+    benchmark:
+        of_fill("benchmarks/tables.tsv")
+    conda:
+        "../envs/python.yaml"
     params:
         source=source_hash("dragchain.tables"),
-    log:
-        FILL + "logs/tables.log",
-    benchmark:
-        FILL + "benchmarks/tables.tsv"
     shell:
         "dragchain tables $(dirname {input}) > {log} 2>&1"
 
 
 rule tabulate_process:
     input:
-        PROCESS + "run.json",
+        of_process("run.json"),
     output:
         multiext(
-            PROCESS + "tables/",
+            of_process("tables/"),
             "thermo.parquet",
             "rod_force.parquet",
             "rod_contacts.parquet",
@@ -45,11 +49,13 @@ rule tabulate_process:
             "contacts.parquet",
             "closure.json",
         ),
+    log:
+        of_process("logs/tables.log"),
+    benchmark:
+        of_process("benchmarks/tables.tsv")
+    conda:
+        "../envs/python.yaml"
     params:
         source=source_hash("dragchain.tables"),
-    log:
-        PROCESS + "logs/tables.log",
-    benchmark:
-        PROCESS + "benchmarks/tables.tsv"
     shell:
         "dragchain tables $(dirname {input}) > {log} 2>&1"

@@ -46,7 +46,9 @@ def polygon_radius(radius_m: float, sides: int) -> float:
     return radius_m * (math.pi / sides) / math.sin(math.pi / sides)
 
 
-def cylinder(radius_m: float, length_m: float, facet_size_m: float) -> Mesh:
+def cylinder(
+    radius_m: float, length_m: float, facet_size_m: float, facet_length_m: float | None = None
+) -> Mesh:
     """Make a closed upright cylinder, its bottom's centre in the origin.
 
     The outline is a polygon of the circle's perimeter (see `polygon_radius`).
@@ -59,7 +61,11 @@ def cylinder(radius_m: float, length_m: float, facet_size_m: float) -> Mesh:
     radius_m, length_m : float
         In metres.
     facet_size_m : float
-        The longest leg of a triangle on the side, in metres; at most the radius.
+        The longest leg of a triangle around the axis and on the caps, in
+        metres; at most the radius.
+    facet_length_m : float, optional
+        The longest leg along the axis, in metres; `facet_size_m` if not given.
+        Long facets are as round and cost the engine less.
 
     Raises
     ------
@@ -67,13 +73,22 @@ def cylinder(radius_m: float, length_m: float, facet_size_m: float) -> Mesh:
         If a length is not a positive number, or the facets are coarser than
         the radius or too many.
     """
-    _require_positive(radius_m=radius_m, length_m=length_m, facet_size_m=facet_size_m)
+    along_m = facet_size_m if facet_length_m is None else facet_length_m
+    _require_positive(
+        radius_m=radius_m, length_m=length_m, facet_size_m=facet_size_m, facet_length_m=along_m
+    )
     _require_facet_size(facet_size_m, radius_m, length_m)
     sides = polygon_sides(radius_m, facet_size_m)
-    return prism(sides, polygon_radius(radius_m, sides), length_m, facet_size_m)
+    return prism(sides, polygon_radius(radius_m, sides), length_m, facet_size_m, along_m)
 
 
-def prism(sides: int, corner_radius_m: float, length_m: float, facet_size_m: float) -> Mesh:
+def prism(
+    sides: int,
+    corner_radius_m: float,
+    length_m: float,
+    facet_size_m: float,
+    facet_length_m: float,
+) -> Mesh:
     """Make a closed upright bar with a regular polygon as its section.
 
     Parameters
@@ -82,11 +97,11 @@ def prism(sides: int, corner_radius_m: float, length_m: float, facet_size_m: flo
         Corners of the section; the first lies on the x axis.
     corner_radius_m : float
         Distance of the corners from the axis, in metres.
-    length_m, facet_size_m : float
-        Length, and longest facet edge along the axis, in metres.
+    length_m, facet_size_m, facet_length_m : float
+        Length, and longest facet legs on the caps and along the axis, in metres.
     """
     plane, disc = _disc(sides, corner_radius_m, facet_size_m)
-    side = _side(sides, corner_radius_m, length_m, facet_size_m)
+    side = _side(sides, corner_radius_m, length_m, facet_length_m)
     bottom = Mesh(_lift(plane, 0.0), disc[:, ::-1])
     top = Mesh(_lift(plane, length_m), disc)
     return _join(bottom, side, top)

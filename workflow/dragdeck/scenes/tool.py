@@ -24,7 +24,7 @@ def tool_mesh(case: Case) -> Mesh:
     """
     shape = case.study.workpiece.shape
     if isinstance(shape, CylinderShape):
-        return _rod(shape.radius_m, tool_length(case), shape.facet_size_m)
+        return _rod(shape, tool_length(case))
     media = case.study.media
     surroundings = Surroundings(case.study.bowl.radius_m, media.radius_mean_m)
     return _from_file(mesh_file(case, shape), shape.unit, surroundings)
@@ -41,19 +41,16 @@ def tool_length(case: Case) -> float:
 
 def tool_radius(case: Case) -> float:
     """Radius of the upright cylinder around the tool, m."""
-    shape = case.study.workpiece.shape
-    if isinstance(shape, CylinderShape):
-        return shape.radius_m
     return envelope(tool_mesh(case)).radius_m
 
 
 @lru_cache(maxsize=8)
-def _rod(radius_m: float, length_m: float, facet_size_m: float) -> Mesh:
-    return cylinder(radius_m, length_m, facet_size_m)
+def _rod(shape: CylinderShape, length_m: float) -> Mesh:
+    return cylinder(shape.radius_m, length_m, shape.facet_size_m, shape.facet_length_m)
 
 
 @lru_cache(maxsize=8)
 def _from_file(file: Path, unit: str, surroundings: Surroundings) -> Mesh:
-    mesh = place(read(file, unit))
+    mesh = read(file, unit)
     check(mesh, file=file, field="workpiece.shape", surroundings=surroundings)
-    return mesh
+    return place(mesh)

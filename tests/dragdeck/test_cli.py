@@ -1,0 +1,81 @@
+"""The command: what it prints, what it exits with, what it leaves alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dragdeck.cases import Case
+from dragdeck.cli import main
+from dragdeck.project import Project
+
+
+@pytest.fixture(autouse=True)
+def inside(project: Project, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(project.root)
+
+
+@pytest.mark.parametrize("command", ["check", "explain", "cases"])
+def test_an_unknown_study_exits_with_one_and_no_traceback(
+    command: str, case: Case, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, "large"]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("dragdeck: ")
+    assert "one of: small" in said
+
+
+def test_bad_input_writes_nothing(
+    project: Project, small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    small["media"]["count"] = -5
+    write_study(small)
+    assert main(["render", "small", "drop", "any"]) == 1
+    assert not (project.root / "results").exists()
+
+
+@pytest.mark.engine
+def test_check_says_how_many_cases(case: Case, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "small"]) == 0
+    assert "1 case(s) can be run; LIGGGHTS 3." in capsys.readouterr().out
+
+
+def test_explain_shows_what_is_left_out_and_the_cost(
+    case: Case, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["explain", "small", "process"]) == 0
+    said = capsys.readouterr().out
+    for words in ("leaves out", "facets of the bowl", "% of Rayleigh", "wall time", "assumed"):
+        assert words in said
+
+
+def test_a_process_is_never_rendered_on_a_guess(
+    case: Case, project: Project, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["render", "small", "process", case.run_ids["process"]]) == 1
+    assert "needs the settled bed" in capsys.readouterr().err
+    assert not project.run_folder(case, "process").exists()
+
+
+def test_render_writes_all_that_a_run_needs(case: Case, project: Project) -> None:
+    assert main(["render", "small", "fill", case.run_ids["fill"]]) == 0
+    names = {file.name for file in project.run_folder(case, "fill").iterdir()}
+    assert names == {"in.liggghts", "case.json", "columns.json", "balls.data"}
+
+
+def test_an_unknown_run_lists_the_known(case: Case, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["render", "small", "fill", "none"]) == 1
+    assert case.run_ids["fill"] in capsys.readouterr().err
+
+
+def test_outside_a_project(
+    tmp_path_factory: pytest.TempPathFactory,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
+    assert main(["cases", "small"]) == 1
+    assert "not inside a dragdeck project" in capsys.readouterr().err
