@@ -200,7 +200,7 @@ def _association(
         time_s, samples["time_s"].to_numpy(np.float64), samples["drag_n"].to_numpy(np.float64)
     )
     found = association(resistance, bottleneck)
-    reach_s = float(np.median(np.diff(time_s))) / 2.0
+    reach_s = float(np.median(np.diff(time_s))) / 2.0 if len(time_s) > 1 else 0.0
     near = near_any(time_s, peaks_s, reach_s)
     return {
         "rank_correlation": finite(found.correlation),

@@ -288,7 +288,7 @@ def _chains_peaks(run_dir: Path, findings: Findings) -> Figure:
 
 def _link(found: Findings) -> str:
     if found["rank_correlation"] is None:
-        return "one of the two series is constant: no correlation"
+        return f"{found['frames']} frames, or a constant series: no correlation can be told"
     return (
         f"rank correlation of resistance and bottleneck {found['rank_correlation']:+.2f}, "
         f"p = {found['p_value']:.3f} (circular shifts of {found['frames']} frames)"

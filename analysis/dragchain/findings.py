@@ -220,7 +220,7 @@ class Association:
     Attributes
     ----------
     correlation
-        Spearman's rank correlation, NaN if one series is constant.
+        Spearman's rank correlation, NaN if one series is constant or too short to tell.
     p_value
         Share of circular shifts of one series against the other, the true position included, with
         a rank correlation at least as far from zero; NaN with the correlation.
@@ -243,13 +243,14 @@ def association(first: Floats, second: Floats) -> Association:
     Raises
     ------
     SeriesError
-        If the series differ in length or hold too few samples.
+        If the series differ in length.
     """
-    if len(first) != len(second) or len(first) < MIN_SAMPLES:
+    if len(first) != len(second):
         raise SeriesError(
-            f"an association needs two series of one length of at least {MIN_SAMPLES}, "
-            f"not {len(first)} and {len(second)}"
+            f"an association needs two series of one length, not {len(first)} and {len(second)}"
         )
+    if len(first) < MIN_SAMPLES:
+        return Association(float("nan"), float("nan"), len(first))
     ranks = [rankdata(series) - (len(series) + 1) / 2 for series in (first, second)]
     scale = float(np.sqrt((ranks[0] @ ranks[0]) * (ranks[1] @ ranks[1])))
     if scale == 0.0:

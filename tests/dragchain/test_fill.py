@@ -84,10 +84,10 @@ def test_describes_a_bed_of_one_ball_by_hand(tiny_run: Path) -> None:
     assert (bed["balls"], bed["radius_mean_m"], bed["radius_sd_m"]) == (1, 0.03, 0.0)
 
 
-def test_the_spread_of_radii_is_the_unbiased_one(tiny_run: Path) -> None:
+def test_the_spread_of_radii_is_that_of_the_bed(tiny_run: Path) -> None:
     rows = [[0, 0, 0.01, 0, 0, 0, r] for r in (0.009, 0.010, 0.011)]
     bed = describe_bed(frame(rows), load_case(tiny_run))
-    assert bed["radius_sd_m"] == pytest.approx(0.001)
+    assert bed["radius_sd_m"] == pytest.approx(0.001 * (2 / 3) ** 0.5)
     assert bed["kinetic_energy_ratio"] == 0.0
 
 

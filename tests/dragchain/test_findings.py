@@ -174,6 +174,11 @@ def test_slow_waves_are_not_called_associated() -> None:
     assert found.p_value > 0.3
 
 
+def test_too_few_frames_tell_nothing() -> None:
+    found = association(noise(7), noise(7))
+    assert (np.isnan(found.correlation), np.isnan(found.p_value), found.samples) == (True, True, 7)
+
+
 def test_a_constant_has_no_association() -> None:
     found = association(np.ones(10), noise(10))
     assert math.isnan(found.correlation) and math.isnan(found.p_value)

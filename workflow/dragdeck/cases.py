@@ -70,6 +70,15 @@ class Case:
         builders = {"drop": _drop_content, "fill": _fill_content, "process": self._process_content}
         return builders[scene](self.study)
 
+    def digest(self, scene: SceneName) -> str:
+        """Hash of all that a scene's files say, remarks included.
+
+        Two cases that share a run of this scene have the same digest, and a
+        study's edit that does not concern the scene does not change it.
+        """
+        study = self.study.model_dump(mode="json", include={"title", "assumptions", "reference"})
+        return _digest({"study": study, "content": self.content(scene)})
+
     def _process_content(self, study: Study) -> dict[str, Any]:
         fidelity = study.chosen_fidelity().model_dump(mode="json")
         content: dict[str, Any] = {

@@ -47,6 +47,9 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("run", help="run id, as `dragdeck cases` lists it")
     render.add_argument("--fill-table", type=Path, help="fill.json of the settled bed (process)")
 
+    fields = commands.add_parser("fields", help="print the fields of a study file as a page")
+    fields.set_defaults(action=_fields)
+
     run = commands.add_parser("run", help="run the deck in a folder, or go on with it")
     run.set_defaults(action=_run)
     run.add_argument("folder", type=Path)
@@ -93,6 +96,12 @@ def _explain(options: argparse.Namespace) -> None:
     scenes = [scene_of(case, name) for name in names for case in by_run(cases, name).values()]
     results = project.root / "results" / options.study
     show(explanation(scene, expected_cost(scene, results / scene.deck.scene)) for scene in scenes)
+
+
+def _fields(options: argparse.Namespace) -> None:
+    from dragdeck.fields import page
+
+    print(page(), end="")
 
 
 def _cases(options: argparse.Namespace) -> None:

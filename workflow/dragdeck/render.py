@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -74,10 +75,17 @@ def deck_text(scene: Scene, templates: jinja2.Environment) -> str:
         A template cannot be used: names template, line and what is missing.
     """
     name = f"{scene.deck.scene}.in.j2"
-    try:
+    with _explained():
         template = templates.get_template(name)
-        deck = replace(scene.deck, templates=_used(templates, name))
-        return template.render(deck=deck)
+        used = "templates: " + ", ".join(_used(templates, name))
+        return template.render(deck=replace(scene.deck, templates=used))
+
+
+@contextlib.contextmanager
+def _explained() -> Iterator[None]:
+    """Turn what Jinja raises into an error that names template and line."""
+    try:
+        yield
     except jinja2.TemplateSyntaxError as error:
         raise InputError(
             f"template syntax: {error.message}",
@@ -87,12 +95,11 @@ def deck_text(scene: Scene, templates: jinja2.Environment) -> str:
     except jinja2.TemplateNotFound as error:
         raise InputError(
             "no such template",
-            file=name,
-            value=error.name,
-            remedy="put it into the study's templates/",
+            file=str(error.name),
+            remedy="put it into the study's templates/, or correct the name",
         ) from None
     except (jinja2.UndefinedError, TypeError) as error:
-        file, line = _place(error, templates)
+        file, line = _place(error)
         raise InputError(
             f"a value is missing: {error}",
             file=file,
@@ -101,10 +108,10 @@ def deck_text(scene: Scene, templates: jinja2.Environment) -> str:
         ) from None
 
 
-def _place(error: Exception, templates: jinja2.Environment) -> tuple[str, int | str]:
+def _place(error: Exception) -> tuple[str, int | str]:
     """Template file and line where a rendering error arose."""
-    trace, found = error.__traceback__, ("template", "?")
-    place: tuple[str, int | str] = found
+    trace = error.__traceback__
+    place: tuple[str, int | str] = ("template", "?")
     while trace is not None:
         file = trace.tb_frame.f_code.co_filename
         if file.endswith(".j2"):
@@ -113,8 +120,8 @@ def _place(error: Exception, templates: jinja2.Environment) -> tuple[str, int | 
     return place
 
 
-def _used(templates: jinja2.Environment, name: str) -> str:
-    """Names of the templates a deck is made of, marking a study's own."""
+def _used(templates: jinja2.Environment, name: str) -> list[str]:
+    """Names of the templates that a template is made of, itself first."""
     used: list[str] = []
     waiting = [name]
     while waiting:
@@ -123,7 +130,7 @@ def _used(templates: jinja2.Environment, name: str) -> str:
             continue
         used.append(current)
         waiting.extend(_references(templates, current))
-    return "templates: " + ", ".join(used)
+    return used
 
 
 def _references(templates: jinja2.Environment, name: str) -> list[str]:
@@ -171,7 +178,16 @@ def _json(data: Any) -> str:
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
-def template_files(project: Path, study: Path | None) -> Sequence[Path]:
-    """Every template that a deck of a study could use."""
-    folders = [project, *([study] if study is not None and study.is_dir() else [])]
-    return sorted(file for folder in folders for file in folder.glob("**/*.j2"))
+def template_files(templates: jinja2.Environment, scene: str) -> list[Path]:
+    """Return the template files that a scene's deck is made of, in no order that matters.
+
+    Raises
+    ------
+    InputError
+        One of them is missing or cannot be parsed.
+    """
+    assert templates.loader is not None
+    with _explained():
+        names = _used(templates, f"{scene}.in.j2")
+        sources = [templates.loader.get_source(templates, name)[1] for name in names]
+    return sorted({Path(source) for source in sources if source is not None})

@@ -82,7 +82,7 @@ class Pair(Model):
 class Media(Model):
     """The balls."""
 
-    material: str
+    material: str = Field(description="name among materials")
     count: Annotated[Whole, Field(ge=1)] = Field(description="number of balls")
     radius_mean_m: Positive = Field(description="mean radius, m")
     radius_sd_m: NonNegative = Field(default=0.0, description="standard deviation of the radii, m")
@@ -100,7 +100,7 @@ class Media(Model):
 class Bowl(Model):
     """A flat-bottomed cylindrical bowl about the z axis, floor at z = 0."""
 
-    material: str
+    material: str = Field(description="name among materials")
     radius_m: Positive = Field(description="inner radius, m")
     height_m: Positive = Field(description="inner height from the floor to the rim, m")
     facet_size_m: Positive | None = Field(
@@ -112,7 +112,7 @@ class Bowl(Model):
 class CylinderShape(Model):
     """A generated round tool with flat ends."""
 
-    kind: Literal["cylinder"]
+    kind: Literal["cylinder"] = Field(description="a generated rod")
     radius_m: Positive = Field(description="radius, m")
     facet_size_m: Positive = Field(default=0.0015, description="facet edges around the axis, m")
     facet_length_m: Positive = Field(default=0.01, description="facet edges along the axis, m")
@@ -121,7 +121,7 @@ class CylinderShape(Model):
 class MeshShape(Model):
     """A tool from a mesh file, its axis along z, its lowest point the tip."""
 
-    kind: Literal["mesh"]
+    kind: Literal["mesh"] = Field(description="a mesh from a file")
     file: str = Field(description="STL, OBJ, PLY or VTK; relative to the study or to meshes/")
     unit: Literal["m", "cm", "mm", "um", "in"] = Field(description="unit of the file's numbers")
 
@@ -129,14 +129,14 @@ class MeshShape(Model):
 class Workpiece(Model):
     """The tool that is dragged."""
 
-    material: str
+    material: str = Field(description="name among materials")
     shape: Annotated[CylinderShape | MeshShape, Field(discriminator="kind")]
 
 
 class CirclePath(Model):
     """A circle about the bowl's axis, begun on the +x axis."""
 
-    kind: Literal["circle"]
+    kind: Literal["circle"] = Field(description="about the bowl's axis, begun on +x")
     radius_m: Positive = Field(description="radius of the path of the tool's axis, m")
     revolutions: Positive = Field(default=1.0, description="how far, revolutions")
     sense: Literal[1, -1] = Field(default=1, description="1 counter-clockwise from above, -1 not")
@@ -145,7 +145,7 @@ class CirclePath(Model):
 class LinePath(Model):
     """A straight line."""
 
-    kind: Literal["line"]
+    kind: Literal["line"] = Field(description="a straight line")
     start_m: tuple[Number, Number] = Field(description="x and y where the drag begins, m")
     heading_deg: Number = Field(default=0.0, description="direction of motion from +x, degrees")
     length_m: Positive = Field(description="length of the drag, m")
@@ -247,25 +247,33 @@ class Fidelity(Model):
 class Assumption(Model):
     """A value that the source of the study does not give."""
 
-    field: str
-    why: str
+    field: str = Field(description="dotted name of the assumed value")
+    why: str = Field(description="what the source says or does not, and why this value")
 
 
 class Reference(Model):
     """Published figures to stand beside the results."""
 
-    source: str
-    measured_drag_mean_n: Number | None = Field(default=None, description="N")
-    measured_drag_sd_n: NonNegative | None = Field(default=None, description="N")
-    published_drag_mean_n: Number | None = Field(default=None, description="N")
-    published_drag_sd_n: NonNegative | None = Field(default=None, description="N")
+    source: str = Field(description="where the figures come from")
+    measured_drag_mean_n: Number | None = Field(
+        default=None, description="measured mean drag, N; negative: against the motion"
+    )
+    measured_drag_sd_n: NonNegative | None = Field(
+        default=None, description="its standard deviation, N"
+    )
+    published_drag_mean_n: Number | None = Field(
+        default=None, description="simulated mean drag as published, N"
+    )
+    published_drag_sd_n: NonNegative | None = Field(
+        default=None, description="its standard deviation, N"
+    )
 
 
 BUILT_IN_FIDELITIES: Mapping[str, Fidelity] = {
     "draft": Fidelity(youngs_modulus_scale=1e-3, timestep_fraction=0.8),
     "standard": Fidelity(youngs_modulus_scale=1e-2, timestep_fraction=0.5),
-    "fine": Fidelity(youngs_modulus_scale=0.1, timestep_fraction=0.8),
-    "full": Fidelity(youngs_modulus_scale=1.0, timestep_fraction=0.8),
+    "fine": Fidelity(youngs_modulus_scale=0.1, timestep_fraction=0.5),
+    "full": Fidelity(youngs_modulus_scale=1.0, timestep_fraction=0.5),
     "reference": Fidelity(youngs_modulus_scale=1.0, timestep_fraction=0.2),
 }
 
@@ -273,7 +281,7 @@ BUILT_IN_FIDELITIES: Mapping[str, Fidelity] = {
 class Study(Model):
     """A whole study file."""
 
-    title: str
+    title: str = Field(description="for headings")
     gravity_m_s2: Positive = Field(default=9.81, description="gravity along -z, m/s2")
     materials: dict[str, Material]
     pairs: dict[str, Pair] = Field(description="'a-b': what materials a and b do to each other")

@@ -5,7 +5,7 @@ from snakemake.exceptions import WorkflowError
 
 from dragdeck.errors import DragdeckError
 from dragdeck.project import Project, by_run, study_templates
-from dragdeck.render import template_files
+from dragdeck.render import environment, template_files
 from dragdeck.sources import source_hash
 
 PROJECT = Project(Path(workflow.basedir))
@@ -58,13 +58,23 @@ def case_of(scene, run):
     return by_run(CASES, scene)[run]
 
 
-def deck_inputs(wildcards):
-    """The study file and every template that its decks could use."""
-    case = CASES[0]
-    return [
-        str(path.relative_to(PROJECT.root))
-        for path in (case.file, *template_files(PROJECT.templates, study_templates(case)))
-    ]
+def templates_of(scene):
+    """Every template that a scene's deck is made of."""
+    try:
+        templates = environment(PROJECT.templates, study_templates(CASES[0]))
+        return [str(relative(file)) for file in template_files(templates, scene)]
+    except DragdeckError as error:
+        raise WorkflowError(str(error))
+
+
+def relative(file):
+    """Path from the project, where the workflow runs; other paths stay as they are."""
+    return file.relative_to(PROJECT.root) if file.is_relative_to(PROJECT.root) else file
+
+
+def digest_of(scene):
+    """Hash of what a run's files say, as a function of its wildcards."""
+    return lambda wildcards: case_of(scene, wildcards.run).digest(scene)
 
 
 def fidelity_option(wildcards):

@@ -3,7 +3,7 @@
 
 rule render_drop:
     input:
-        deck_inputs,
+        templates_of("drop"),
     output:
         deck=of_drop("in.liggghts"),
         case=of_drop("case.json"),
@@ -16,6 +16,7 @@ rule render_drop:
     conda:
         "../envs/python.yaml"
     params:
+        case=digest_of("drop"),
         fidelity=fidelity_option,
         source=source_hash("dragdeck.render"),
     shell:
@@ -24,7 +25,7 @@ rule render_drop:
 
 rule render_fill:
     input:
-        deck_inputs,
+        templates_of("fill"),
     output:
         deck=of_fill("in.liggghts"),
         case=of_fill("case.json"),
@@ -37,6 +38,7 @@ rule render_fill:
     conda:
         "../envs/python.yaml"
     params:
+        case=digest_of("fill"),
         fidelity=fidelity_option,
         source=source_hash("dragdeck.render"),
     shell:
@@ -45,7 +47,7 @@ rule render_fill:
 
 rule render_process:
     input:
-        deck_inputs,
+        templates_of("process"),
         bed=lambda wildcards: fill_of(wildcards, "tables/fill.json"),
     output:
         deck=of_process("in.liggghts"),
@@ -59,6 +61,7 @@ rule render_process:
     conda:
         "../envs/python.yaml"
     params:
+        case=digest_of("process"),
         fidelity=fidelity_option,
         source=source_hash("dragdeck.render"),
     shell:

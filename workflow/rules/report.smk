@@ -98,7 +98,7 @@ rule draw_process:
 rule write_report:
     input:
         of_every_run,
-        template=str(PROJECT.root / "analysis/dragchain/report.html.j2"),
+        template="analysis/dragchain/report.html.j2",
     output:
         csv=of_report("summary.csv"),
         parquet=of_report("summary.parquet"),

@@ -200,12 +200,11 @@ def base_case(case: Case, scene: SceneName, timestep_s: float, rayleigh_s: float
         "title": study.title,
         "scene": scene,
         "run": case.run_ids[scene],
-        "case": case.name,
         "timestep_s": timestep_s,
         "rayleigh_time_s": rayleigh_s,
         "gravity_m_s2": study.gravity_m_s2,
         "fidelity": {"name": study.fidelity, **fidelity, "skin_m": skin(study)},
-        "inputs": flat(study.model_dump(mode="json", include=_INPUTS)),
+        "inputs": flat(case.content(scene)),
         "media": {
             "count": study.media.count,
             "radius_mean_m": study.media.radius_mean_m,
@@ -220,12 +219,6 @@ def base_case(case: Case, scene: SceneName, timestep_s: float, rayleigh_s: float
         "reference": study.reference.model_dump(mode="json") if study.reference else None,
         "versions": {"dragdeck": __version__},
     }
-
-
-_INPUTS = {
-    "materials", "pairs", "media", "bowl", "workpiece", "motion", "contact", "drop", "fill",
-    "gravity_m_s2", "seed",
-}  # fmt: skip
 
 
 def _assumptions(study: Study) -> list[dict[str, Any]]:

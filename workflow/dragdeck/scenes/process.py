@@ -20,6 +20,7 @@ from dragdeck.scenes.common import (
     ball_material,
     base_case,
     bed_rayleigh_time,
+    flat,
     largest_radius,
     material_table,
     round_to,
@@ -287,6 +288,8 @@ def _process_case(case: Case, surface_m: float, timed: Sequence[TimedLeg]) -> Ma
     fidelity = study.chosen_fidelity()
     speed = study.motion.speed_m_s * fidelity.speed_factor
     return {
+        "case": case.name,
+        "inputs": flat(study.model_dump(mode="json", include=_INPUTS)),
         "upstream": {scene: case.run_ids[scene] for scene in ("fill", "drop")},
         "surface_m": surface_m,
         "tool": {
@@ -307,6 +310,12 @@ def _process_case(case: Case, surface_m: float, timed: Sequence[TimedLeg]) -> Ma
         ],
         "statistics": {"run_in_s": study.motion.run_in_m / speed},
     }
+
+
+_INPUTS = {
+    "materials", "pairs", "media", "bowl", "workpiece", "motion", "contact", "drop", "fill",
+    "gravity_m_s2", "seed",
+}  # fmt: skip
 
 
 def _path(study: Study) -> dict[str, Any]:

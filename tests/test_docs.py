@@ -1,0 +1,48 @@
+"""The pages say what is true."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from paths import ROOT
+
+from dragdeck.fields import page
+from dragdeck.scenes.drop import DropDeck
+from dragdeck.scenes.fill import FillDeck
+from dragdeck.scenes.process import ProcessDeck
+
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+
+
+def test_the_study_page_is_made_from_the_model() -> None:
+    shown = (ROOT / "docs/study.md").read_text()
+    assert shown == page(), "run: dragdeck fields > docs/study.md"
+
+
+def test_every_field_has_a_meaning() -> None:
+    rows = [row.split("|") for row in page().splitlines() if row.startswith("| `")]
+    assert len(rows) > 50
+    missing = [row[1].strip() for row in rows if len(row) == 6 and not row[4].strip()]
+    assert not missing or missing == ["`draft`"]
+
+
+@pytest.mark.parametrize("deck", [DropDeck, FillDeck, ProcessDeck])
+def test_every_value_of_a_deck_is_on_the_page(deck: type) -> None:
+    text = (ROOT / "docs/templates.md").read_text()
+    names = set(re.findall(r"[`.](\w+)`", text))
+    assert set(deck.__dataclass_fields__) - {"materials"} <= names
+
+
+@pytest.mark.parametrize("file", PAGES, ids=lambda file: file.name)
+def test_every_link_leads_somewhere(file) -> None:
+    links = re.findall(r"\]\(([^)#:]+)\)", file.read_text())
+    missing = [link for link in links if not (file.parent / link).exists()]
+    assert not missing
+
+
+def test_every_block_is_on_the_page() -> None:
+    text = (ROOT / "docs/templates.md").read_text()
+    for template in (ROOT / "templates").glob("*.in.j2"):
+        for block in re.findall(r"{% block (\w+) %}", template.read_text()):
+            assert f"`{block}`" in text, f"{template.name}: block {block}"

@@ -1,0 +1,138 @@
+"""The whole workflow on the real engine: a small study from its file to its report."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+import yaml
+from paths import ROOT, SMALL_STUDY
+
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+
+def snakemake(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    words = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
+    paths = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis")])
+    scripts = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    environment = {**os.environ, "PYTHONPATH": paths, "PATH": scripts}
+    environment.pop("DISPLAY", None)
+    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
+
+
+def jobs(folder: Path, *arguments: str) -> set[str]:
+    """Names of the rules that would run."""
+    shown = snakemake(folder, "--dry-run", *arguments)
+    assert shown.returncode == 0, shown.stdout + shown.stderr
+    table = shown.stdout
+    if "Job stats:" not in table:
+        return set()
+    rows = table.split("Job stats:")[1].split("total")[0].splitlines()[3:]
+    return {row.split()[0] for row in rows if row.strip()} - {"all"}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the project in which the small study was run."""
+    folder = tmp_path_factory.mktemp("project")
+    for name in ("workflow", "analysis", "meshes", "profiles", "Snakefile"):
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "templates").mkdir()
+    for file in (ROOT / "templates").iterdir():
+        (folder / "templates" / file.name).write_bytes(file.read_bytes())
+    data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
+    data["matrix"] = {"motion.submersion_m": [0.012, 0.016]}
+    (folder / "studies/small").mkdir(parents=True)
+    (folder / "studies/small/study.yaml").write_text(yaml.safe_dump(data))
+    done = snakemake(folder, "all", "--config", "study=small")
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+STUDY = ("all", "--config", "study=small")
+
+
+def test_the_report_has_a_row_a_case(finished: Path) -> None:
+    report = finished / "results/small/report"
+    summary = pd.read_parquet(report / "summary.parquet")
+    assert len(summary) == len(pd.read_csv(report / "summary.csv")) == 2
+    assert (summary.drag_ci95_low_n < summary.drag_mean_n).all()
+    assert (summary.drag_mean_n < summary.drag_ci95_high_n).all()
+    assert summary.fill_height_m.nunique() == 1
+    assert 0.5 < summary.solid_fraction[0] < 0.64
+    assert "<img" in (report / "report.html").read_text()
+
+
+def test_cases_share_their_fill_and_drop(finished: Path) -> None:
+    results = finished / "results/small"
+    assert len(list((results / "fill").iterdir())) == 1
+    assert len(list((results / "drop").iterdir())) == 1
+    assert len(list((results / "process").iterdir())) == 2
+
+
+def test_the_forces_on_the_tool_close(finished: Path) -> None:
+    for run in (finished / "results/small/process").iterdir():
+        closure = yaml.safe_load((run / "tables/closure.json").read_text())
+        assert closure["verdict"] == "pass"
+
+
+def test_the_tool_goes_where_it_should(finished: Path) -> None:
+    (run,) = (finished / "results/small/process").glob("*0.016*")
+    force = pd.read_parquet(run / "tables/rod_force.parquet")
+    fill = yaml.safe_load(
+        next((finished / "results/small/fill").iterdir()).joinpath("tables/fill.json").read_text()
+    )
+    drag = force[force.phase == "drag"]
+    assert abs(drag.ref_z_m - (fill["fill_height_m"] - 0.016)).max() < 1e-6
+    radius = (drag.ref_x_m**2 + drag.ref_y_m**2) ** 0.5
+    assert abs(radius - 0.010).max() < 1e-6
+
+
+def test_the_readmes_pandas_lines_run(finished: Path) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert len(code.splitlines()) == 5
+    stand_in = code.replace("uhlmann2015", "small")
+    done = subprocess.run(
+        [sys.executable, "-c", stand_in], cwd=finished, capture_output=True, text=True, check=True
+    )
+    assert "drag_mean_n" in done.stdout
+
+
+def test_nothing_is_left_to_do(finished: Path) -> None:
+    assert jobs(finished, *STUDY) == set()
+
+
+def test_an_edited_template_runs_what_depends_on_it(finished: Path) -> None:
+    template = finished / "templates/process.in.j2"
+    text = template.read_text()
+    template.write_text(text.replace("{% block run %}", "{% block run %}\n# a remark"))
+    done = snakemake(finished, *STUDY)
+    assert done.returncode == 0, done.stderr
+    told = done.stdout + done.stderr
+    assert "rule run_process" in told
+    assert "rule run_fill" not in told
+    assert "rule render_fill" not in told
+    assert told.count("these inputs were run before") == 2  # a remark changes no result
+    assert jobs(finished, *STUDY) == set()
+
+
+def test_a_new_case_runs_alone(finished: Path) -> None:
+    file = finished / "studies/small/study.yaml"
+    data = yaml.safe_load(file.read_text())
+    data["matrix"]["motion.submersion_m"].append(0.014)
+    file.write_text(yaml.safe_dump(data))
+    wanted = jobs(finished, "process", "--config", "study=small")
+    assert wanted == {"render_process", "run_process", "tabulate_process", "process"}
+
+
+def test_an_unknown_study_stops_before_anything_runs(finished: Path) -> None:
+    done = snakemake(finished, "all", "--config", "study=large")
+    assert done.returncode != 0
+    assert "unknown study 'large'" in done.stdout + done.stderr
+    assert not (finished / "results/large").exists()

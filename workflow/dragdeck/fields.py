@@ -1,0 +1,90 @@
+"""The fields of a study file as a page, made from the model itself."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Iterator
+from typing import Any, Literal, Union, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from dragdeck.study import BUILT_IN_FIDELITIES, Fidelity, Study
+
+_INTRODUCTION = """# The study file
+
+`studies/<name>/study.yaml` is YAML. All values are SI; numbers may be written
+`5e6`. A key that is not listed here is refused. `*` stands for a name of yours.
+A dotted name, such as `motion.speed_m_s`, is how errors, `matrix` and
+`assumptions` name a field.
+
+This page is made from the model: `./run dragdeck fields > docs/study.md`.
+"""
+
+
+def page() -> str:
+    """Return the page as Markdown."""
+    lines = [_INTRODUCTION, "| field | limits | default | meaning |", "| --- | --- | --- | --- |"]
+    for name, limits, default, meaning in _rows(Study, ""):
+        lines.append(f"| `{name}` | {limits} | {default} | {meaning} |")
+    lines += ["", "## Built-in fidelities", "", _fidelities(), ""]
+    return "\n".join(lines)
+
+
+def _rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, str]]:
+    """Name, limits, default and meaning of every field, depth first."""
+    for name, field in model.model_fields.items():
+        path = f"{prefix}{name}"
+        inner = list(_models(field.annotation))
+        if not inner:
+            yield path, _limits(field), _default(field), field.description or ""
+        for part, many in inner:
+            kind = f"[{_kind(part)}]" if len(inner) > 1 else ""
+            yield from _rows(part, f"{path}{kind}.{'*.' if many else ''}")
+
+
+def _kind(model: type[BaseModel]) -> str:
+    """Return the word by which a model is told from its alternatives."""
+    return str(get_args(model.model_fields["kind"].annotation)[0])
+
+
+def _models(annotation: Any, many: bool = False) -> Iterator[tuple[type[BaseModel], bool]]:
+    """The models within a type, and whether there can be several of each."""
+    origin = get_origin(annotation)
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation, many
+    elif origin in (Union, types.UnionType):
+        for part in get_args(annotation):
+            yield from _models(part, many)
+    elif origin in (list, dict):
+        yield from _models(get_args(annotation)[-1], True)
+
+
+_SIGNS = {Gt: ("above", "gt"), Ge: ("at least", "ge"), Lt: ("below", "lt"), Le: ("at most", "le")}
+
+
+def _limits(field: FieldInfo) -> str:
+    if get_origin(field.annotation) is Literal:
+        return " or ".join(repr(value) for value in get_args(field.annotation))
+    bounds = [(_SIGNS[type(item)], item) for item in field.metadata if type(item) in _SIGNS]
+    return ", ".join(f"{words} {getattr(item, name):g}" for (words, name), item in bounds)
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    if field.default is PydanticUndefined or field.default is None:
+        return "none"
+    return f"{field.default!r}"
+
+
+def _fidelities() -> str:
+    names = list(Fidelity.model_fields)
+    lines = ["| name | " + " | ".join(names) + " |", "| --- " * (len(names) + 1) + "|"]
+    for name, fidelity in BUILT_IN_FIDELITIES.items():
+        values = [getattr(fidelity, field) for field in names]
+        shown = ["none" if value is None else f"{value:g}" for value in values]
+        lines.append(f"| `{name}` | " + " | ".join(shown) + " |")
+    return "\n".join(lines)
