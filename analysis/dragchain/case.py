@@ -67,13 +67,16 @@ class Circle:
     """A drag on a circle about the bowl's axis.
 
     ``sense`` is +1 for counter-clockwise seen from above; ``start_heading_rad``
-    is the direction of motion when the drag begins, from x towards y.
+    is the direction of motion when the drag begins, from x towards y;
+    ``turns_with_path`` says whether the tool turns with it or keeps its
+    orientation.
     """
 
     speed_m_s: float
     radius_m: float
     sense: int
     start_heading_rad: float
+    turns_with_path: bool
 
 
 @dataclass(frozen=True)
@@ -382,7 +385,13 @@ def _motion(fields: _Fields) -> Circle | Line:
         return Line(speed, fields.numbers("start_m"), fields.number("heading_rad"))
     if (sense := fields.integer("sense")) not in (-1, 1):
         raise fields.error("sense", f"is {sense}, not +1 or -1")
-    return Circle(speed, fields.positive("radius_m"), sense, fields.number("start_heading_rad"))
+    return Circle(
+        speed,
+        fields.positive("radius_m"),
+        sense,
+        fields.number("start_heading_rad"),
+        fields.boolean("turns_with_path"),
+    )
 
 
 def _phases(top: _Fields) -> tuple[Phase, ...]:

@@ -25,8 +25,9 @@ def find_impacts(rows: Columns, timestep_s: float) -> dict[str, NDArray[np.gener
     """Measure every impact in the samples around them.
 
     The samples are split where steps are missing. In each stretch an impact is
-    an unbroken run of samples with a force; it starts with the first of them
-    and lasts as many steps as there are. The speeds are those of the sample
+    an unbroken run of samples with a force, the short pull at the end included
+    that an unlimited damper gives; it starts with the first of them and lasts
+    as many steps as there are. The speeds are those of the sample
     before and of the sample after it, both in free flight, so one step of
     gravity off at the most.
 
@@ -51,7 +52,7 @@ def find_impacts(rows: Columns, timestep_s: float) -> dict[str, NDArray[np.gener
     """
     steps = np.asarray(rows["step"], dtype=np.int64)
     stretch = np.cumsum(np.diff(steps, prepend=steps[:1] - 1) != 1)
-    touching = np.asarray(rows["force_n"]) > 0.0
+    touching = np.asarray(rows["force_n"]) != 0.0
     _check_stretches(steps, stretch, touching)
     first, last = _runs(touching)
     speed = np.asarray(rows["vz_m_s"], dtype=np.float64)

@@ -23,7 +23,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from dragchain.case import Case
+from dragchain.case import Case, Circle
 from dragchain.chains import RodPath, dominant_path, rod_paths
 from dragchain.collect import drag_start_s
 from dragchain.errors import DragchainError, TableError
@@ -55,8 +55,9 @@ class Scene:
         The network frame.
     tool_m : (3,) float
         Centre of the tool's bottom face at the frame.
-    tool_start_m : (3,) float
-        The same at step 0, where the tool's STL file stands.
+    tool_turn_rad : float
+        Angle about the vertical by which the tool is turned from its STL file,
+        where it looks along +x.
     dominant : RodPath or None
         The frame's dominant rod path.
     process_time_s : float
@@ -65,7 +66,7 @@ class Scene:
 
     frame: NetworkFrame
     tool_m: Floats
-    tool_start_m: Floats
+    tool_turn_rad: float
     dominant: RodPath | None
     process_time_s: float
 
@@ -119,23 +120,32 @@ def load_scene(run_dir: Path, case: Case) -> Scene:
     frame = next(read_frames(run_dir, (step, step)), None)
     if frame is None:
         raise TableError(f"balls.parquet lacks step {step}, which network.parquet has")
-    rod = read_table(tables / "rod_force.parquet", ["step", "ref_x_m", "ref_y_m", "ref_z_m"])
+    rod = read_table(
+        tables / "rod_force.parquet", ["step", "ref_x_m", "ref_y_m", "ref_z_m", "heading_rad"]
+    )
     return Scene(
         frame=frame,
         tool_m=_reference_point(rod, step),
-        tool_start_m=_reference_point(rod, 0),
+        tool_turn_rad=_tool_turn(rod, step, case),
         dominant=dominant_path(frame, rod_paths(frame)),
         process_time_s=frame.time_s - start_s,
     )
 
 
 def _reference_point(rod: pd.DataFrame, step: int) -> Floats:
-    """Return the reference point at a step; before the first sample along its first motion."""
+    """Return the reference point at a step, between the samples around it."""
     at = rod["step"].to_numpy(np.float64)
     point = rod[["ref_x_m", "ref_y_m", "ref_z_m"]].to_numpy(np.float64)
-    if step < at[0] and len(at) > 1:
-        return np.asarray(point[0] + (step - at[0]) / (at[1] - at[0]) * (point[1] - point[0]))
     return np.array([np.interp(step, at, column) for column in point.T])
+
+
+def _tool_turn(rod: pd.DataFrame, step: int, case: Case) -> float:
+    """Return the tool's angle at a step: its heading, or the first one if it keeps that."""
+    motion = case.motion
+    if isinstance(motion, Circle) and not motion.turns_with_path:
+        return motion.start_heading_rad
+    nearest = int(np.abs(rod["step"].to_numpy(np.int64) - step).argmin())
+    return float(rod["heading_rad"].iloc[nearest])
 
 
 def check_rendering() -> None:
@@ -239,7 +249,8 @@ def _add_tool(plotter: Any, run_dir: Path, case: Case, scene: Scene) -> None:
     if not path.is_file():
         raise TableError(f"{path} is not there, though case.json names it as the tool's mesh")
     tool: Any = pv.read(path)
-    tool = tool.translate(scene.tool_m - scene.tool_start_m, inplace=False)
+    tool = tool.rotate_z(np.degrees(scene.tool_turn_rad), inplace=False)
+    tool = tool.translate(scene.tool_m, inplace=False)
     plotter.add_mesh(tool, color="#59636e", opacity=0.45)
 
 

@@ -20,11 +20,17 @@ def test_reads_a_process(tiny_run: Path) -> None:
 
 
 def test_reads_a_circle(tiny_run: Path, edit_json) -> None:
-    circle = {"kind": "circle", "speed_m_s": 0.01, "radius_m": 0.02, "sense": -1}
+    circle = {
+        "kind": "circle",
+        "speed_m_s": 0.01,
+        "radius_m": 0.02,
+        "sense": -1,
+        "turns_with_path": True,
+    }
     edit_json(
         tiny_run / "case.json", lambda c: c.update(motion={**circle, "start_heading_rad": 1.5})
     )
-    assert load_case(tiny_run).motion == Circle(0.01, 0.02, -1, 1.5)
+    assert load_case(tiny_run).motion == Circle(0.01, 0.02, -1, 1.5, True)
 
 
 def test_a_drop_needs_neither_bowl_nor_tool(tiny_run: Path, edit_json) -> None:

@@ -42,6 +42,13 @@ def test_two_impacts_in_one_stretch_are_two() -> None:
     assert find_impacts(rows(FIRST + close), DT)["restitution"].tolist() == [0.75, 0.5]
 
 
+def test_a_pull_at_the_end_belongs_to_the_impact() -> None:
+    pulled = [(0, -2, 0), (1, 0, 8), (2, 1.9, -1), (3, 1.5, 0)]
+    found = find_impacts(rows(pulled), DT)
+    assert found["restitution"].tolist() == [0.75]
+    assert found["duration_s"].tolist() == [1.0]
+
+
 def test_a_ball_without_loss_rebounds_as_fast() -> None:
     found = find_impacts(rows([(0, -2, 0), (1, 0, 8), (2, 2, 0)]), DT)
     assert found["restitution"].tolist() == [1]

@@ -139,7 +139,7 @@ def process(tmp_path_factory: pytest.TempPathFactory) -> Path:
     save(contacts, run_dir, "contacts")
     save(balls, run_dir, "balls")
     save(rod_contacts_table(), run_dir, "rod_contacts")
-    tool = pv.Cylinder(center=(-0.01, 0, 0.065), direction=(0, 0, 1), radius=0.002, height=0.05)
+    tool = pv.Cylinder(center=(0, 0, 0.025), direction=(0, 0, 1), radius=0.002, height=0.05)
     tool.triangulate().save(run_dir / "tool.stl")
     write_chains(run_dir)
     return run_dir
@@ -272,7 +272,7 @@ def test_picture_is_of_the_nearest_frame_or_the_last(wanted: float, expected: in
 def test_the_tool_moves_by_its_reference_point(process: Path) -> None:
     shown = scene.load_scene(process, load_case(process))
     assert shown.frame.step == LAST
-    assert shown.tool_start_m == pytest.approx([-0.01, 0.0, 0.04])
+    assert shown.tool_turn_rad == pytest.approx(0.0)
     assert shown.tool_m == pytest.approx([0.01, 0.0, 0.01])
     assert shown.process_time_s == pytest.approx(0.4)
     assert shown.dominant is not None
@@ -297,8 +297,7 @@ def test_a_rendered_contact_is_where_its_axes_say(
 ) -> None:
     case = load_case(process)
     far = np.array([0.015, 0.012, 0.01])
-    start = np.array([-0.01, 0.0, 0.04])
-    shown = scene.Scene(network_frame([2.0, 0.5]), far, start, None, 0.2)
+    shown = scene.Scene(network_frame([2.0, 0.5]), far, 0.0, None, 0.2)
     image, extent = scene.render(process, case, shown, view)
     assert is_red(pixel(image, extent, 0.0, level_mm))
     assert is_red(pixel(image, extent, -2.5, level_mm + 2.0))
@@ -312,7 +311,7 @@ def test_a_rendered_contact_is_where_its_axes_say(
 
 def test_a_missing_tool_mesh_is_named(process: Path, tmp_path: Path) -> None:
     case = load_case(process)
-    shown = scene.Scene(network_frame([1.0, 1.0]), np.zeros(3), np.zeros(3), None, 0.2)
+    shown = scene.Scene(network_frame([1.0, 1.0]), np.zeros(3), 0.0, None, 0.2)
     with pytest.raises(TableError, match=r"tool\.stl"):
         scene.render(tmp_path, case, shown, "xy")
 

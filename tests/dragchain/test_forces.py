@@ -32,7 +32,7 @@ def case(tiny_run: Path) -> Case:
 
 @pytest.fixture
 def circling(case: Case) -> Case:
-    return replace(case, motion=Circle(0.01, 0.02, 1, pi / 2))
+    return replace(case, motion=Circle(0.01, 0.02, 1, pi / 2, True))
 
 
 def test_a_step_belongs_to_the_phase_that_computed_it() -> None:

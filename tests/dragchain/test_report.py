@@ -47,7 +47,7 @@ def case_json(scene: str, run: str, **more: Any) -> dict[str, Any]:
                  "submersion_m": 0.05},
         "surface_m": 0.07,
         "motion": {"kind": "circle", "speed_m_s": 0.01, "radius_m": 0.02, "sense": 1,
-                   "start_heading_rad": 1.57},
+                   "turns_with_path": True, "start_heading_rad": 1.57},
         "phases": [], "statistics": {"run_in_s": 0.5}, "restitution": 0.68,
         "assumptions": [{"field": "bowl.radius_m", "value": 0.04, "why": "a plausible fraction"}],
         "reference": None, "versions": {"dragdeck": "0.1.0"},
