@@ -7,6 +7,7 @@ a chance to fall short, at a cost that grows linearly.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,13 +108,14 @@ def pour(ball_radii_m: Array, bowl_radius_m: float, seed: int) -> Balls:
 def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Array:
     """The lowest `count` points of a square lattice in the bowl, (count, 3)."""
     step = 2 * SPACING * largest_m
-    reach = bowl_radius_m - SPACING * largest_m
+    room = largest_m * (1 + math.sqrt(2) * (SPACING - 1))  # the jitter is along x and along y
+    reach = bowl_radius_m - room
     if reach < 0:
         raise InputError(
             "the largest ball does not fit into the bowl with room to fall",
             field="media.radius_mean_m",
             value=f"largest radius {largest_m:.6g} m",
-            limit=f"below {bowl_radius_m / SPACING:.6g} m in a bowl of radius {bowl_radius_m:g} m",
+            limit=f"below {largest_m * bowl_radius_m / room:.6g} m in a bowl of radius {bowl_radius_m:g} m",
             remedy="use smaller balls or a wider bowl",
         )
     line = np.arange(-np.floor(reach / step), np.floor(reach / step) + 1) * step
