@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from hypothesis import settings
 from paths import ROOT, SMALL_STUDY
 
 from dragdeck.cases import Case, load_cases
 from dragdeck.project import Project
 from dragdeck.study import read_yaml
+
+# A build that nobody watches tries the same examples every time.
+settings.register_profile("ci", derandomize=True)
+if os.environ.get("CI"):
+    settings.load_profile("ci")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -111,11 +111,12 @@ def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Array:
     room = largest_m * (1 + math.sqrt(2) * (SPACING - 1))  # the jitter is along x and along y
     reach = bowl_radius_m - room
     if reach < 0:
+        widest = largest_m * bowl_radius_m / room
         raise InputError(
             "the largest ball does not fit into the bowl with room to fall",
             field="media.radius_mean_m",
             value=f"largest radius {largest_m:.6g} m",
-            limit=f"below {largest_m * bowl_radius_m / room:.6g} m in a bowl of radius {bowl_radius_m:g} m",
+            limit=f"at most {widest:.6g} m in a bowl of radius {bowl_radius_m:g} m",
             remedy="use smaller balls or a wider bowl",
         )
     line = np.arange(-np.floor(reach / step), np.floor(reach / step) + 1) * step
