@@ -81,7 +81,8 @@ class DropRun:
     restitution : float
         In the deck.
     limit_force : bool
-    height_m : float
+    height_m, youngs_modulus_scale, timestep_s, timestep_fraction : float
+        The last is the step over the Rayleigh time of this ball at this modulus.
     speeds_m_s : (K + 1,) ndarray
         Speed at the plate's surface before the first impact and after each.
     impacts : tuple of Waveform
@@ -92,6 +93,9 @@ class DropRun:
     restitution: float
     limit_force: bool
     height_m: float
+    youngs_modulus_scale: float
+    timestep_s: float
+    timestep_fraction: float
     speeds_m_s: Floats
     impacts: tuple[Waveform, ...]
 
@@ -140,7 +144,9 @@ def _read_drop(folder: Path, row: Mapping[str, Any]) -> DropRun:
     case = load_case(folder)
     blocks = list(iter_prints(folder, load_outputs(folder)["impacts"]))
     names = ("step", "time_s", "z_m", "vz_m_s", "force_n")
-    columns = {name: np.concatenate([np.asarray(b[name], np.float64) for b in blocks]) for name in names}
+    columns = {
+        name: np.concatenate([np.asarray(b[name], np.float64) for b in blocks]) for name in names
+    }
     split = np.flatnonzero(np.diff(columns["step"]) != 1) + 1
     windows = [dict(zip(names, part, strict=True)) for part in _split(columns, names, split)]
     if len(windows) < IMPACTS:
@@ -152,6 +158,9 @@ def _read_drop(folder: Path, row: Mapping[str, Any]) -> DropRun:
         restitution=row["restitution"],
         limit_force=row["limit_force"],
         height_m=row["height_m"],
+        youngs_modulus_scale=row["youngs_modulus_scale"],
+        timestep_s=row["timestep_s"],
+        timestep_fraction=row["timestep_fraction"],
         speeds_m_s=np.array([pieces[0][1], *(piece[2] for piece in pieces)]),
         impacts=tuple(piece[0] for piece in pieces),
     )
@@ -228,10 +237,11 @@ class Emulator:
         Natural logarithm of the peak of impact 2 and 3 over that of impact 1.
     rebound : Polynomial
         Speed after over before, mean of the impacts.
-    scatter : float
-        Standard deviation of one drop's rebound about `rebound`.
+    scatter, rebound_error : float
+        Standard deviation of one drop's rebound about `rebound`, and standard
+        uncertainty of `rebound`.
     errors : (4,) ndarray
-        Standard error of flights (s) and logarithms, from the scatter of the drops.
+        Standard uncertainty of flights (s) and logarithms.
     contact_s : tuple of Polynomial
         Time in contact between the centroids of impacts k and k + 1, s.
     """
@@ -242,6 +252,7 @@ class Emulator:
     log_peaks: tuple[Polynomial, ...]
     rebound: Polynomial
     scatter: float
+    rebound_error: float
     errors: Floats
     contact_s: tuple[Polynomial, ...]
 
@@ -253,12 +264,23 @@ class Emulator:
         return float(brentq(lambda e: self.rebound(e) - rebound, self.low, self.high))
 
 
-def emulate(runs: Sequence[DropRun], height_m: float, gravity_m_s2: float) -> Emulator:
+def emulate(
+    runs: Sequence[DropRun], height_m: float, gravity_m_s2: float, *, single: bool = False
+) -> Emulator:
     """Fit polynomials in the deck's restitution through a sweep of drops.
 
     Flight times are 2 v / g (free flight), scaled to the study's height by the
     root of the ratio of heights: the rebound of a Hertz contact with damping
     after Tsuji et al. (1992) does not depend on the speed.
+
+    Parameters
+    ----------
+    runs : sequence of DropRun
+    height_m, gravity_m_s2 : float
+    single : bool
+        `errors` are the scatter of a single drop, not the smaller standard
+        error of the polynomial: for drops at so fine a step that what is left
+        of the step's error is of that size.
 
     Raises
     ------
@@ -274,7 +296,9 @@ def emulate(runs: Sequence[DropRun], height_m: float, gravity_m_s2: float) -> Em
     flights = 2.0 * speeds[:, 1:IMPACTS] / gravity_m_s2 * scale[:, None]
     contact = np.array([_contact_parts(run) for run in runs])
     columns = [*flights.T, *(peaks[:, 1:] - peaks[:, :1]).T]
-    rebound, scatter, _ = _polynomial(value, np.array([run.rebound[:IMPACTS].mean() for run in runs]))
+    rebound, scatter, mean_error = _polynomial(
+        value, np.array([run.rebound[:IMPACTS].mean() for run in runs])
+    )
     fitted = [_polynomial(value, column) for column in columns]
     return Emulator(
         low=float(value.min()),
@@ -283,7 +307,8 @@ def emulate(runs: Sequence[DropRun], height_m: float, gravity_m_s2: float) -> Em
         log_peaks=tuple(f[0] for f in fitted[IMPACTS - 1 :]),
         rebound=rebound,
         scatter=scatter,
-        errors=np.array([f[2] for f in fitted]),
+        rebound_error=scatter if single else mean_error,
+        errors=np.array([f[1 if single else 2] for f in fitted]),
         contact_s=tuple(_polynomial(value, column)[0] for column in contact.T),
     )
 
@@ -413,7 +438,9 @@ def observe(measured: Measured, samplings: Sequence[Sampling], *, with_peaks: bo
     time = np.array(
         [i.centroid_s - s.time_bias_s for i, s in zip(measured.impacts, samplings, strict=True)]
     )
-    peak = np.array([i.peak_n / s.peak_ratio for i, s in zip(measured.impacts, samplings, strict=True)])
+    peak = np.array(
+        [i.peak_n / s.peak_ratio for i, s in zip(measured.impacts, samplings, strict=True)]
+    )
     peak_sd = np.array([s.peak_sd / s.peak_ratio for s in samplings])
     blocks = [_since_first(np.array([s.time_sd_s for s in samplings]))]
     logs = np.log(peak[1:] / peak[0]) if with_peaks else np.empty(0)
@@ -641,7 +668,7 @@ def prepare(drops: Drops) -> Sweep:
         known,
         reference,
         emulate(drops.select("production", option), height, gravity),
-        emulate(reference, height, gravity),
+        emulate(reference, height, gravity, single=True),
     )
 
 
@@ -662,7 +689,9 @@ def calibrate(measured: Measured, sweep: Sweep) -> Calibration:
     observed = observe(measured, samplings, with_peaks=with_peaks)
     height, spread = sweep.known["height_m"], sweep.known["height_sd_m"]
     contact = sweep.reference.contact_s
-    misfits = [Misfit(observed, e, contact, height, spread) for e in (sweep.production, sweep.reference)]
+    misfits = [
+        Misfit(observed, e, contact, height, spread) for e in (sweep.production, sweep.reference)
+    ]
     return Calibration(
         measured=measured,
         samplings=samplings,
@@ -699,9 +728,10 @@ def _compare_peaks(
 def bias_rows(drops: Drops) -> list[dict[str, Any]]:
     """Effective against deck restitution for each purpose and contact option."""
     rows = []
-    for purpose in ("production", "reference"):
+    purposes: tuple[Purpose, ...] = ("production", "reference")
+    for purpose in purposes:
         for option in (True, False):
-            runs = drops.select(purpose, option)  # type: ignore[arg-type]
+            runs = drops.select(purpose, option)
             for value in sorted({run.restitution for run in runs}):
                 found = np.array([r.rebound[:IMPACTS] for r in runs if r.restitution == value])
                 rows.append(

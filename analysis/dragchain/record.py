@@ -288,8 +288,11 @@ def measure(record: Record, *, fall_time_s: float) -> Measured:
 
 
 def _baseline(time: Floats, force: Floats, dead: int) -> tuple[float, float, float]:
-    """Offset, drift and noise of the quiet samples: a line through them, fitted again
-    without what stands out, until that changes nothing."""
+    """Offset, drift and noise of the quiet samples.
+
+    A line through them, fitted again without what stands out, until that
+    changes nothing.
+    """
     quiet = np.ones(len(force), dtype=bool)
     line = np.array([0.0, float(np.median(force))])
     noise = MAD_TO_SD * float(np.median(np.abs(force - line[1])))

@@ -81,7 +81,9 @@ def some_sensor(peak_n: float, random: np.random.Generator) -> Sensor:
     )
 
 
-def run_trials(runs: Sequence[DropRun], sweep: Sweep, seed: int, sensors: int = 1) -> list[dict[str, Any]]:
+def run_trials(
+    runs: Sequence[DropRun], sweep: Sweep, seed: int, sensors: int = 1
+) -> list[dict[str, Any]]:
     """Recover the known restitution of simulated drops from records of them.
 
     Parameters

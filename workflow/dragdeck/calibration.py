@@ -39,13 +39,21 @@ IMPACTS = 3
 RESTITUTIONS = tuple(round(0.05 * k, 2) for k in range(8, 21))
 """Deck values of the sweep: 0.40, 0.45, ... 1.00."""
 
+OTHER_RESTITUTIONS = RESTITUTIONS[::2]
+"""With the contact option that the study does not use."""
+
 PHASES = 4
-"""Production drops per deck value, half as many with the contact option that the
-study does not use. Their heights differ by a share of a step's
+"""Production drops per deck value. Their heights differ by a share of a step's
 path, so that the first contact begins at another place within a time step."""
 
-TRIAL_FRACTION = 0.01
+REFERENCE_FRACTION = 0.01
+"""Finest time step of the sweep over the Rayleigh time: restitution converged to 1e-4."""
+
+TRIAL_FRACTION = 0.005
 """Time step of a trial's record over the Rayleigh time: half the sweep's finest."""
+
+GOLDEN = 0.618
+"""Share of a step between the phases of reference drops, one a deck value."""
 
 TRIAL_RANGE = (0.5, 0.9)
 """Deck values of the trials' records."""
@@ -126,35 +134,36 @@ def production(study: Study) -> DropFidelity:
     return DropFidelity(fidelity.youngs_modulus_scale, dt)
 
 
-def sweep(study: Study, restitutions: Sequence[float] = RESTITUTIONS) -> Iterator[Drop]:
+def sweep(study: Study) -> Iterator[Drop]:
     """Drops over a range of deck values, with limitForce on and off.
 
     At production several drops a value, over the phase of the first contact in
-    its step; at the reference, where the step is fine, one.
+    its step; at the reference, where the step is fine, one, each at another
+    phase.
     """
-    coarse, fine = production(study), DropFidelity()
-    path_m = _step_path(study, coarse)
+    coarse, fine = production(study), full(study, REFERENCE_FRACTION)
     for limit_force in (True, False):
+        used = limit_force == study.contact.limit_force
         word = "limited" if limit_force else "free"
-        phases = PHASES if limit_force == study.contact.limit_force else PHASES // 2
-        for value in restitutions:
-            for phase in range(phases):
-                height = study.drop.height_m + (phase - (phases - 1) / 2) / phases * path_m
+        for number, value in enumerate(RESTITUTIONS if used else OTHER_RESTITUTIONS):
+            for phase in range(PHASES):
+                height = _height(study, coarse, (phase + 0.5) / PHASES)
                 name = f"production-{word}-{value:.2f}-{phase}"
                 yield Drop(name, "production", value, limit_force, height, coarse)
+            height = _height(study, fine, (number * GOLDEN) % 1.0)
             name = f"reference-{word}-{value:.2f}"
-            yield Drop(name, "reference", value, limit_force, study.drop.height_m, fine)
+            yield Drop(name, "reference", value, limit_force, height, fine)
 
 
-def confirmation(study: Study, restitution: float) -> Iterator[Drop]:
-    """Production drops at one deck value, over the phase of the first contact."""
-    coarse = production(study)
-    path_m = _step_path(study, coarse)
+def confirmation(study: Study, restitution: float, full_restitution: float) -> Iterator[Drop]:
+    """Drops at the fitted values: production over the phases, and one at full modulus."""
+    coarse, option = production(study), study.contact.limit_force
     for phase in range(2 * PHASES):
-        height = study.drop.height_m + (phase / (2 * PHASES) - 0.5) * path_m
-        yield Drop(
-            f"confirm-{phase}", "confirm", restitution, study.contact.limit_force, height, coarse
-        )
+        height = _height(study, coarse, (phase + 0.25) / (2 * PHASES))
+        yield Drop(f"confirm-{phase}", "confirm", restitution, option, height, coarse)
+    fine = full(study, REFERENCE_FRACTION)
+    height = study.drop.height_m
+    yield Drop("confirm-full", "reference", full_restitution, option, height, fine)
 
 
 def trials(study: Study, count: int, seed: int) -> Iterator[Drop]:
@@ -166,13 +175,23 @@ def trials(study: Study, count: int, seed: int) -> Iterator[Drop]:
     random = np.random.default_rng(seed)
     section = study.calibration
     spread = section.height_sd_m if section else 0.0
-    rayleigh = rayleigh_time(ball_material(study), study.media.radius_mean_m)
-    finer = DropFidelity(1.0, timestep(rayleigh, TRIAL_FRACTION))
+    finer = full(study, TRIAL_FRACTION)
     for number in range(1, count + 1):
         value = round(float(random.uniform(*TRIAL_RANGE)), 4)
         height = study.drop.height_m + float(random.normal(0.0, spread))
-        limit_force = study.contact.limit_force
-        yield Drop(f"trial-{number:03d}", "trial", value, limit_force, height, finer)
+        option = study.contact.limit_force
+        yield Drop(f"trial-{number:03d}", "trial", value, option, height, finer)
+
+
+def full(study: Study, fraction: float) -> DropFidelity:
+    """Full modulus, and a step that is a share of the mean ball's Rayleigh time."""
+    rayleigh = rayleigh_time(ball_material(study), study.media.radius_mean_m)
+    return DropFidelity(1.0, timestep(rayleigh, fraction))
+
+
+def _height(study: Study, fidelity: DropFidelity, phase: float) -> float:
+    """The study's height, less or more by up to half of a step's path at the plate, m."""
+    return study.drop.height_m + (phase - 0.5) * _step_path(study, fidelity)
 
 
 def _step_path(study: Study, fidelity: DropFidelity) -> float:

@@ -168,7 +168,8 @@ def _drops(options: argparse.Namespace) -> None:
         drops = list(trials(case.study, options.count, options.seed))
     elif options.fit is not None:
         fitted = json.loads(options.fit.read_text(encoding="utf-8"))
-        drops = list(confirmation(case.study, fitted["fit"]["restitution"]))
+        values = (fitted[name]["restitution"] for name in ("fit", "fit_full"))
+        drops = list(confirmation(case.study, *values))
     else:
         raise InputError("nothing to confirm", field="--fit", remedy="give the fit's result.json")
     templates = environment(project.templates, study_templates(case))
