@@ -98,7 +98,10 @@ def result(found: Calibration, drops: Drops) -> dict[str, Any]:
         "peaks_why": found.why,
         "direct": direct(found, settings),
         "correction": deck - measured["value"],
-        "put_for": put_for(drops, measured),
+        "put_for": [
+            {**row, **_interval(found.fit)} if row["used"] else row
+            for row in put_for(drops, measured)
+        ],
         "scatter_of_one_drop": found.production.scatter,
         "settings": settings_of(drops),
         "record": as_json(found.measured),
@@ -189,6 +192,7 @@ def impact_rows(found: Calibration) -> list[dict[str, Any]]:
                 "time_since_first_s": since,
                 "time_since_first_sd_s": math.sqrt(observed.covariance[k - 1, k - 1]) if k else 0.0,
                 "simulated_time_since_first_s": simulated,
+                "simulated_time_since_first_sd_s": float(np.linalg.norm(model.errors[:k])),
                 "peak_force_n": float(observed.peaks_n[k]),
                 "peak_force_sd_n": float(observed.peaks_n[k] * observed.peaks_sd[k]),
                 "peak_over_first": float(observed.peaks_n[k] / observed.peaks_n[0]),

@@ -29,14 +29,14 @@ MINUS = "\N{MINUS SIGN}"
 CAPTIONS = {
     "impacts": "Above: the record, its offset and drift taken away, with the impacts found. "
     "Below: each impact, measured samples against the simulated force. Solid: a drop at full "
-    "modulus that rebounds as the measured ball. Dashed: the production drop, whose soft ball "
+    "modulus that rebounds as the measured ball. Dotted: the production drop, whose soft ball "
     "stays longer and pushes less; its rebound is what is fitted, not its peak. The simulated "
     "impacts are laid on the measured ones by their mean time.",
     "fit": "Misfit by the deck's restitution, with the best drop height for each; the interval is "
     "where it has risen by the marked amount. Right: what is left of each compared quantity.",
-    "bias": "Effective restitution (speed after over speed before) by the deck's. The distance from "
-    "the diagonal is the bias of modulus, step and limitForce. A bar runs from the lowest to the "
-    "highest single impact; it shows what the phase of the contact within a time step does.",
+    "bias": "Effective restitution (speed after over speed before) by the deck's. The distance "
+    "from the diagonal is the bias of modulus, step and limitForce. A bar runs from the lowest "
+    "to the highest single impact; it shows what the phase of the contact within a time step does.",
     "trials": "Records of simulated drops with a known answer: recovered less known value, with "
     "the stated interval. Left: the deck value, by the drops at full modulus. Right: the rebound "
     "of the production drop at the recovered deck value.",
@@ -247,7 +247,9 @@ def draw_bias(bias: pd.DataFrame, result: Mapping[str, Any]) -> Figure:
             deck, out = (
                 rows[name].to_numpy() for name in ("restitution_deck", "restitution_effective")
             )
-            label = f"modulus × {scale:g}, step {step:.0%}, limitForce {'on' if option else 'off'}"
+            label = (
+                f"modulus times {scale:g}, step {step:.0%}, limitForce {'on' if option else 'off'}"
+            )
             left.plot(deck, out, mark, ms=3, color=colour, label=label)
             low, high = (rows[name].to_numpy() for name in ("lowest", "highest"))
             bars = np.clip([out - low, high - out], 0.0, None)
