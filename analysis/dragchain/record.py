@@ -269,12 +269,11 @@ def measure(record: Record, *, fall_time_s: float) -> Measured:
     time = record.time_s - record.time_s[0]
     offset, drift, noise = _baseline(time, record.force_n, dead)
     force = record.force_n - offset - drift * time
-    noise = max(noise, _quantum(record.force_n) / math.sqrt(12.0))
     threshold = THRESHOLD_SDS * noise
-    first, last = _pulses(force > threshold, dead)
-    _check_count(first, force, noise)
+    pulses = _pulses(force, threshold, dead)
+    _check_count(pulses, force, noise)
     # at most three, the last of them whole
-    whole = [(a, b) for a, b in zip(first, last, strict=True) if b + 2 < len(force)][:IMPACTS]
+    whole = [(a, b) for a, b in pulses if b + 2 < len(force)][:IMPACTS]
     if len(whole) < 2:
         raise _too_few(len(whole))
     impacts = tuple(pulse(record.time_s, force, a, b, record.interval_s) for a, b in whole)
@@ -290,24 +289,27 @@ def measure(record: Record, *, fall_time_s: float) -> Measured:
 def _baseline(time: Floats, force: Floats, dead: int) -> tuple[float, float, float]:
     """Offset, drift and noise of the quiet samples.
 
-    A line through them, fitted again without what stands out, until that
-    changes nothing.
+    A line through them, begun with the median and fitted again without what
+    stands out, until that changes nothing. What stands out is told by the
+    median absolute deviation, which the impacts do not touch, or by the
+    sensor's resolution where that is coarser. The noise is the standard
+    deviation of what is left.
     """
-    quiet = np.ones(len(force), dtype=bool)
+    coarse = _quantum(force) / 2.0
     line = np.array([0.0, float(np.median(force))])
-    noise = MAD_TO_SD * float(np.median(np.abs(force - line[1])))
+    spread = MAD_TO_SD * float(np.median(np.abs(force - line[1])))
+    out = np.zeros(len(force), dtype=bool)
     for _ in range(20):
+        before = out
         rest = force - np.polyval(line, time)
-        out = _widened(np.abs(rest) > max(THRESHOLD_SDS * noise, 1e-300), dead)
-        if out.sum() > 0.9 * len(force) or (~out).sum() < QUIET_SAMPLES:
+        out = _widened(np.abs(rest) > THRESHOLD_SDS * max(spread, coarse), dead)
+        if len(out) - out.sum() < QUIET_SAMPLES or np.array_equal(out, before):
             break
         line = np.polyfit(time[~out], force[~out], 1)
-        rest = force - np.polyval(line, time)
-        noise = MAD_TO_SD * float(np.median(np.abs(rest[~out])))
-        if np.array_equal(out, ~quiet):
-            break
-        quiet = ~out
-    return float(line[1]), float(line[0]), noise
+        spread = MAD_TO_SD * float(np.median(np.abs((force - np.polyval(line, time))[~out])))
+    quiet = (force - np.polyval(line, time))[~out]
+    noise = float(quiet.std()) if len(quiet) >= QUIET_SAMPLES else spread
+    return float(line[1]), float(line[0]), max(noise, coarse / math.sqrt(3.0))
 
 
 def _widened(mask: NDArray[np.bool_], after: int) -> NDArray[np.bool_]:
@@ -325,18 +327,27 @@ def _quantum(force: Floats) -> float:
     return float(steps.min()) if len(steps) else 0.0
 
 
-def _pulses(above: NDArray[np.bool_], dead: int) -> tuple[list[int], list[int]]:
-    """First and last sample of each pulse; what rings within `dead` of its start is no pulse."""
-    first: list[int] = []
-    last: list[int] = []
-    edges = np.diff(above.astype(np.int8), prepend=0, append=0)
-    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-    for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
-        if first and begin - first[-1] <= dead:
+def _pulses(force: Floats, threshold: float, dead: int) -> list[tuple[int, int]]:
+    """First and last sample of each pulse above the threshold.
+
+    What follows its first sample within `dead` samples belongs to a pulse: its
+    unbroken run about the largest of these counts, so that neither noise at its
+    foot nor the sensor's ringing makes another one.
+    """
+    above = force > threshold
+    below = np.flatnonzero(~above)
+    found: list[tuple[int, int]] = []
+    place = 0
+    for begin in np.flatnonzero(above & ~np.roll(above, 1)).tolist():
+        if begin < place:
             continue
-        first.append(begin)
-        last.append(end)
-    return first, last
+        place = begin + dead + 1
+        top = begin + int(np.argmax(force[begin:place]))
+        at = int(np.searchsorted(below, top))
+        first = int(below[at - 1]) + 1 if at > 0 else 0
+        last = int(below[at]) - 1 if at < len(below) else len(force) - 1
+        found.append((first, last))
+    return found
 
 
 def _too_few(count: int) -> RecordError:
@@ -349,14 +360,15 @@ def _too_few(count: int) -> RecordError:
     )
 
 
-def _check_count(first: list[int], force: Floats, noise: float) -> None:
-    if not first:
+def _check_count(pulses: list[tuple[int, int]], force: Floats, noise: float) -> None:
+    if not pulses:
         raise _too_few(0)
-    if first[0] < QUIET_SAMPLES:
+    first = pulses[0][0]
+    if first < QUIET_SAMPLES:
         raise RecordError(
             "baseline",
             "no quiet baseline before the first impact",
-            value=f"{first[0]} samples",
+            value=f"{first} samples",
             limit=f"at least {QUIET_SAMPLES}",
             remedy="trigger earlier, so that the record begins before the ball lands",
         )
@@ -431,7 +443,7 @@ def _check_tops(tops: list[Floats], raw: list[Floats], noise: float, record: Rec
     """Refuse clipped peaks.
 
     Three signs, each enough: four equal samples in a row at the top, though
-    the noise is larger than the resolution; a top too flat for an impact; the
+    the noise is four times the resolution; a top too flat for an impact; the
     same largest value in two impacts, which a rebound cannot have.
     """
     quantum = _quantum(record.force_n)
@@ -440,7 +452,7 @@ def _check_tops(tops: list[Floats], raw: list[Floats], noise: float, record: Rec
         high = samples[samples >= samples.max() - 0.5 * top.max()]
         flat = int(np.sum(high >= samples.max() - 0.01 * top.max()))
         equal = _longest_run(samples == samples.max())
-        if (equal >= 4 and noise > quantum) or (flat >= 4 and flat > FLAT_TOP * len(high)):
+        if (equal >= 4 and noise > 4 * quantum) or (flat >= 4 and flat > FLAT_TOP * len(high)):
             raise _clipped(f"impact {number} has {max(flat, equal)} samples at its top", largest)
     if len(largest) > 1 and len(set(largest[:2])) == 1:
         raise _clipped("impacts 1 and 2 have the same largest value", largest)
