@@ -198,7 +198,7 @@ def impact_rows(found: Calibration) -> list[dict[str, Any]]:
                 "peak_over_first": float(observed.peaks_n[k] / observed.peaks_n[0]),
                 "peak_over_first_sd": _ratio_sd(found, k),
                 "simulated_peak_over_first": (
-                    float(math.exp(model.log_peaks[k - 1](fit.restitution))) if k else 1.0
+                    float(math.exp(model.log_peaks[k - 1](math.log(fit.restitution)))) if k else 1.0
                 ),
                 "largest_sample_n": impact.peak_n,
                 "peak_correction": 1.0 / found.samplings[k].peak_ratio,

@@ -44,6 +44,10 @@ sensor rings, and a ball with restitution 0.05 flies for twice as long."""
 MAD_TO_SD = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 
+CENTROID_SHARE = 0.2
+"""Force over peak that counts nothing for the time of an impact: a slow sensor's
+tail would be cut by the noise at another share of each impact."""
+
 FLAT_TOP = 0.4
 """Share of a pulse's samples above half its height that may lie within 1 % of its
 top; 0.13 for an elastic Hertz impact, whose force is nearly (sin)^1.5."""
@@ -82,7 +86,8 @@ class Impact:
     peak_time_s : float
         Time of the largest sample, s.
     centroid_s : float
-        Mean time of the pulse weighted with its force, s.
+        Mean time of the pulse, weighted with what its force has above a fifth
+        of its peak, s: the same share of a large and of a small impact.
     peak_n : float
         Largest sample above the baseline, N.
     width_s : float
@@ -118,6 +123,8 @@ class Measured:
         Least force of an impact above the baseline, N.
     impacts : tuple of Impact
         The first two or three.
+    shape : (M, 2) ndarray
+        Times, s, and forces above the baseline, N, of the first impact.
     notes : tuple of str
         What was done, and what the user should know.
     """
@@ -128,7 +135,8 @@ class Measured:
     noise_n: float
     threshold_n: float
     impacts: tuple[Impact, ...]
-    notes: tuple[str, ...] = field(default=())
+    shape: Floats = field(compare=False, repr=False)
+    notes: tuple[str, ...] = ()
 
     def baseline(self, time_s: Floats, start_s: float) -> Floats:
         """Baseline at times, for a record that starts at `start_s`, N."""
@@ -283,7 +291,11 @@ def measure(record: Record, *, fall_time_s: float) -> Measured:
     _check_order(impacts)
     if len(impacts) < IMPACTS:
         notes.append(f"only {len(impacts)} impacts could be used: no test of the fit is possible")
-    return Measured(record.interval_s, offset, drift, noise, threshold, impacts, tuple(notes))
+    first = slice(max(whole[0][0] - 1, 0), whole[0][1] + 2)
+    shape = np.column_stack([record.time_s[first], force[first]])
+    return Measured(
+        record.interval_s, offset, drift, noise, threshold, impacts, shape, tuple(notes)
+    )
 
 
 def _baseline(time: Floats, force: Floats, dead: int) -> tuple[float, float, float]:
@@ -409,7 +421,7 @@ def pulse(time: Floats, force: Floats, first: int, last: int, interval: float) -
         )
     top = first + int(np.argmax(force[first : last + 1]))
     near = slice(max(first - 1, 0), last + 2)
-    weight = np.maximum(force[near], 0.0)
+    weight = np.maximum(force[near] - CENTROID_SHARE * force[top], 0.0)
     return Impact(
         start_s=float(time[first]),
         peak_time_s=float(time[top]),
