@@ -21,10 +21,9 @@ from dragchain.calibration import calibrate_file, confirmed, full_drop
 from dragchain.errors import TableError
 from dragchain.figures import BLUE, GREEN, GREY, ORANGE, RED, STYLE, png
 from dragchain.record import Floats, read_record
-from dragchain.report import data_uri, measured, number, percent
+from dragchain.report import data_uri, number
 
 WIDTH_IN = 7.6
-MINUS = "\N{MINUS SIGN}"
 
 CAPTIONS = {
     "impacts": "Above: the record, its offset and drift taken away, with the impacts found. "
@@ -117,8 +116,7 @@ def render_page(
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters |= {"number": number, "measured": measured, "percent": percent}
-    environment.filters["signed"] = lambda value: f"{value:+.4f}".replace("-", MINUS)
+    environment.filters["number"] = number
     source = resources.files("dragchain").joinpath("calibration.html.j2").read_text("utf-8")
     return environment.from_string(source).render(
         result=result,
