@@ -52,7 +52,7 @@ def of_calibration(file):
 def drop_record(wildcards):
     """The measured drop test of the study."""
     try:
-        return str(record_file(CASES[0]))
+        return str(record_file(CASES[0]).relative_to(PROJECT.root))
     except DragdeckError as error:
         raise WorkflowError(str(error))
 
