@@ -11,10 +11,12 @@ include: "workflow/rules/simulate.smk"
 include: "workflow/rules/tables.smk"
 include: "workflow/rules/network.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/calibrate.smk"
 
 
 localrules:
     all,
+    calibrate,
     drop,
     fill,
     process,
@@ -52,3 +54,9 @@ rule process:
 rule report:
     input:
         rules.write_report.output,
+
+
+# The restitution that a measured drop test asks for.
+rule calibrate:
+    input:
+        rules.write_calibration_report.output,

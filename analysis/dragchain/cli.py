@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from dragchain.calibration_cli import add_calibration
 from dragchain.errors import DragchainError
 
 
@@ -57,6 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     report.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
     report.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
     report.set_defaults(action=_report)
+    add_calibration(commands)
     return parser
 
 

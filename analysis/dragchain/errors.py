@@ -101,3 +101,36 @@ class SeriesError(DragchainError):
 
 class GateError(DragchainError):
     """A run whose outputs are whole but cannot be trusted."""
+
+
+class RecordError(DragchainError):
+    """A measured record that cannot be used.
+
+    Parameters
+    ----------
+    reason : str
+        One word for what is wrong, for example ``clipped``.
+    problem : str
+        What is wrong, without a full stop.
+    value, limit, remedy : str, optional
+        What was found, what would do, what the user can do.
+    """
+
+    def __init__(
+        self,
+        reason: str,
+        problem: str,
+        *,
+        value: str | None = None,
+        limit: str | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        self.reason = reason
+        self.problem = problem
+        self.value = value
+        self.limit = limit
+        self.remedy = remedy
+        lines = [f"the record cannot be used ({reason}): {problem}"]
+        lines += [f"value:  {value}"] if value is not None else []
+        lines += [f"limit:  {limit}"] if limit is not None else []
+        super().__init__(_joined(lines, remedy))

@@ -49,6 +49,15 @@ def _parser() -> argparse.ArgumentParser:
 
     fields = commands.add_parser("fields", help="print the fields of a study file as a page")
     fields.set_defaults(action=_fields)
+    drops = commands.add_parser("drops", help="run the drops that a calibration needs")
+    drops.set_defaults(action=_drops)
+    drops.add_argument("study", help="name of a folder in studies/")
+    drops.add_argument("set", choices=("sweep", "confirm", "trials"))
+    drops.add_argument("--fidelity", help="instead of the study's own")
+    drops.add_argument("--out", type=Path, required=True, metavar="DIR", help="their folder")
+    drops.add_argument("--fit", type=Path, help="result.json of the fit (confirm)")
+    drops.add_argument("--count", type=int, default=10, help="number of trials")
+    drops.add_argument("--seed", type=int, default=1, help="seed of the trials")
 
     run = commands.add_parser("run", help="run the deck in a folder, or go on with it")
     run.set_defaults(action=_run)
@@ -153,6 +162,26 @@ def _bed(options: argparse.Namespace) -> Bed | None:
         )
     measured = json.loads(options.fill_table.read_text(encoding="utf-8"))
     return Bed(surface_m=measured["fill_height_m"], top_m=measured["top_m"])
+
+
+def _drops(options: argparse.Namespace) -> None:
+    from dragdeck.calibration import confirmation, run_drops, sweep, trials
+    from dragdeck.render import environment
+
+    project = find_project(Path.cwd())
+    case = project.cases(options.study, options.fidelity)[0]
+    if options.set == "sweep":
+        drops = list(sweep(case.study))
+    elif options.set == "trials":
+        drops = list(trials(case.study, options.count, options.seed))
+    elif options.fit is not None:
+        fitted = json.loads(options.fit.read_text(encoding="utf-8"))
+        values = (fitted[name]["restitution"] for name in ("fit", "fit_full"))
+        drops = list(confirmation(case.study, *values))
+    else:
+        raise InputError("nothing to confirm", field="--fit", remedy="give the fit's result.json")
+    templates = environment(project.templates, study_templates(case))
+    run_drops(case, drops, options.out, templates, lambda line: print(line, file=sys.stderr))
 
 
 def _run(options: argparse.Namespace) -> None:

@@ -186,6 +186,19 @@ class Drop(Model):
     )
 
 
+class Calibration(Model):
+    """A measured drop test, to find the restitution of ball on workpiece material."""
+
+    record: str = Field(description="CSV of force over time; relative to the study's folder")
+    height_sd_m: Positive = Field(
+        default=1e-4, description="standard uncertainty of drop.height_m in the test, m"
+    )
+    peaks: Literal["auto", "yes", "no"] = Field(
+        default="auto",
+        description="fit the ratios of the peak forces too; auto: if the sensor was fast enough",
+    )
+
+
 class Fill(Model):
     """When a bed counts as settled."""
 
@@ -291,6 +304,7 @@ class Study(Model):
     motion: Motion
     contact: Contact = Contact()
     drop: Drop = Drop()
+    calibration: Calibration | None = None
     fill: Fill = Fill()
     outputs: Outputs = Outputs()
     fidelity: str = Field(default="standard", description="name of the fidelity to run at")

@@ -3,6 +3,7 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
+from dragdeck.calibration import record_file
 from dragdeck.errors import DragdeckError
 from dragdeck.project import Project, by_run, study_templates
 from dragdeck.render import environment, template_files
@@ -41,6 +42,25 @@ def of_process(file):
 def of_report(file):
     """Path of a file of the study's report."""
     return f"results/{STUDY}/report/{file}"
+
+
+def of_calibration(file):
+    """Path of a file of the study's calibration."""
+    return f"results/{STUDY}/calibration/{file}"
+
+
+def drop_record(wildcards):
+    """The measured drop test of the study."""
+    try:
+        return str(record_file(CASES[0]).relative_to(PROJECT.root))
+    except DragdeckError as error:
+        raise WorkflowError(str(error))
+
+
+def fall_time(wildcards):
+    """Free fall before the first impact of the drop test, s."""
+    study = CASES[0].study
+    return (2 * study.drop.height_m / study.gravity_m_s2) ** 0.5
 
 
 def every_folder(scene):

@@ -31,8 +31,30 @@ class DropDeck(Deck):
     impact_steps: int
 
 
-def drop_scene(case: Case) -> Scene:
-    """The drop test of a case, at the full modulus: one ball costs nothing.
+@dataclass(frozen=True)
+class DropFidelity:
+    """What a drop gives up so that it runs as another scene does.
+
+    Attributes
+    ----------
+    youngs_modulus_scale : float
+        Factor on every Young's modulus, dimensionless.
+    timestep_s : float, optional
+        Time step, s; None: the study's `drop.timestep_fraction` of the Rayleigh time.
+    """
+
+    youngs_modulus_scale: float = 1.0
+    timestep_s: float | None = None
+
+
+def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene:
+    """The drop test of a case, by default at the full modulus: one ball costs nothing.
+
+    Parameters
+    ----------
+    case : Case
+    fidelity : DropFidelity, optional
+        To see what another modulus and step make of the same drop.
 
     Raises
     ------
@@ -40,11 +62,13 @@ def drop_scene(case: Case) -> Scene:
         A modulus that the engine refuses.
     """
     study = case.study
+    fidelity = fidelity or DropFidelity()
+    scale = fidelity.youngs_modulus_scale
     radius = study.media.radius_mean_m
     names = list(dict.fromkeys((study.media.material, study.workpiece.material)))
-    rayleigh = rayleigh_time(ball_material(study), radius)
-    dt = timestep(rayleigh, study.drop.timestep_fraction)
-    contact_steps = slowest_contact_time(study) / dt
+    rayleigh = rayleigh_time(ball_material(study), radius, scale)
+    dt = fidelity.timestep_s or timestep(rayleigh, study.drop.timestep_fraction)
+    contact_steps = slowest_contact_time(study, scale) / dt
     margin = max(10, round(MARGIN * contact_steps))
     deck = DropDeck(
         title=f"Drop test: {study.title}",
@@ -52,7 +76,7 @@ def drop_scene(case: Case) -> Scene:
         scene="drop",
         run=case.run_ids["drop"],
         source="ball.data",
-        materials=material_table(study, names, 1.0, case),
+        materials=material_table(study, names, scale, case),
         limit_force=study.contact.limit_force,
         gravity_m_s2=study.gravity_m_s2,
         skin_m=radius,
@@ -69,13 +93,14 @@ def drop_scene(case: Case) -> Scene:
         case={
             **base_case(case, "drop", dt, rayleigh),
             "restitution": study.pair(study.media.material, study.workpiece.material).restitution,
+            "youngs_modulus_scale": scale,
             "phases": [],
         },
         steps=round(_duration(study) / dt),
         files={"ball.data": _ball_data(study, len(names))},
         models={
             "ball against plate": "the only contact there is",
-            "full Young's modulus": "one ball is cheap at any stiffness",
+            **_modulus(scale),
             "every step near an impact": "peak force and rebound are read from it",
         },
         leaves_out={
@@ -87,14 +112,20 @@ def drop_scene(case: Case) -> Scene:
     )
 
 
-def slowest_contact_time(study: Study) -> float:
+def _modulus(scale: float) -> dict[str, str]:
+    if scale == 1.0:
+        return {"full Young's modulus": "one ball is cheap at any stiffness"}
+    return {f"Young's modulus times {scale:g}": "as asked, to see what it changes"}
+
+
+def slowest_contact_time(study: Study, scale: float = 1.0) -> float:
     """Hertz time of the last impact, the slowest and so the longest, s."""
     ball, plate = ball_material(study), study.materials[study.workpiece.material]
     radius = study.media.radius_mean_m
     pair = study.pair(study.media.material, study.workpiece.material)
     speed = fall_speed(study.drop.height_m, study.gravity_m_s2)
     last = speed * pair.restitution ** (study.drop.impacts - 1)
-    modulus = effective_modulus(ball, plate)
+    modulus = effective_modulus(ball, plate, scale)
     return hertz_contact_time(ball_mass(ball, radius), radius, modulus, last)
 
 
