@@ -11,6 +11,7 @@ include: "workflow/rules/simulate.smk"
 include: "workflow/rules/tables.smk"
 include: "workflow/rules/network.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/verify.smk"
 
 
 localrules:
@@ -19,6 +20,7 @@ localrules:
     fill,
     process,
     report,
+    verify,
 
 
 # The whole study: runs, tables, chains, figures and the report.
@@ -52,3 +54,10 @@ rule process:
 rule report:
     input:
         rules.write_report.output,
+
+
+# The contact law against exact formulae and published impacts.
+rule verify:
+    input:
+        rules.judge_verification.output,
+        rules.pass_verdict.output,

@@ -229,6 +229,10 @@ class Suite:
         """What two of the study's materials do to each other."""
         return self.study.pair(self._own[first], self._own[second])
 
+    def series(self, first: str, second: str) -> str:
+        """Name of a series: the study's materials by their own names."""
+        return f"{self._own.get(first, first)} on {self._own.get(second, second)}"
+
     def _experiment(self, name: str, number: int, slug: Sequence[str], **fields: Any) -> Experiment:
         """An experiment with its run id: a slug and 8 hex digits of all it depends on."""
         facts = {"test": name, "number": number, **fields.pop("facts")}
@@ -292,7 +296,7 @@ class Suite:
             name,
             test.number,
             [*slug, *([f"{steps}-steps"] if test.steps_per_contact else [])],
-            title=f"{test.title}: {series.material} on {partner_name}",
+            title=f"{test.title}: {self.series(series.material, partner_name)}",
             types=types,
             pairs={(at, at if same else last): pair for at, pair in enumerate(distinct, start=1)},
             bodies=bodies,
@@ -303,7 +307,7 @@ class Suite:
             steps=math.ceil(LONGEST_CONTACTS * max(times) / dt + 4 * APPROACH_STEPS),
             facts={
                 "heading": test.title,
-                "series": f"{series.material} on {partner_name}",
+                "series": self.series(series.material, partner_name),
                 "vary": test.kind,
                 "steps_per_contact": steps,
                 "contacts": contacts,
@@ -346,7 +350,7 @@ class Suite:
             period=max(1, steps // 5),
             facts={
                 "heading": test.title,
-                "series": f"{test.material} on {test.against}",
+                "series": self.series(test.material, test.against),
                 "vary": "impact",
                 "steps_per_contact": steps,
                 "impacts": test.impacts,
@@ -386,7 +390,7 @@ class Suite:
             steps=math.ceil(LONGEST_CONTACTS * max(times) / dt),
             facts={
                 "heading": test.title,
-                "series": f"{test.material} on {test.material}",
+                "series": self.series(test.material, test.material),
                 "vary": "collision",
                 "steps_per_contact": self.file.steps_per_contact,
                 "contacts": [
@@ -420,7 +424,7 @@ class Suite:
             gravity_m_s2=(0.0, 0.0, -gravity),
             facts={
                 "heading": test.title,
-                "series": f"{test.material} on {test.against}",
+                "series": self.series(test.material, test.against),
                 "vary": "ball",
                 "steps_per_contact": test.steps_per_contact[0],
                 "contacts": [
@@ -462,7 +466,7 @@ class Suite:
             gravity_m_s2=(size * math.sin(angle), 0.0, -size * math.cos(angle)),
             facts={
                 "heading": test.title,
-                "series": f"{test.material} on {test.against}",
+                "series": self.series(test.material, test.against),
                 "vary": "slip_ratio",
                 "angle_deg": test.angle_deg,
                 "steps_per_contact": test.steps_per_contact[0],

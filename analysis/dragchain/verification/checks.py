@@ -149,7 +149,8 @@ def series_name(run: Recording) -> str:
     """Materials, and whether attraction is cut off where a test has both."""
     both = run.case["test"] in ("restitution", "oblique_study", "spin_plane", "time_step")
     limit = "limitForce on" if run.case["limit_force"] else "limitForce off"
-    name = f"{run.case['series']}, {limit}" if both else str(run.case["series"])
+    series = str(run.case["series"]).replace("_", " ")
+    name = f"{series}, {limit}" if both else series
     steps = run.case["test"] in ("time_step", "bounce")
     return f"{name}, {run.steps_per_contact} steps a contact" if steps else name
 

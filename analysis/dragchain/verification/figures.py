@@ -51,11 +51,12 @@ ABSCISSAE = {
     "oblique_angle": LABELS["angle_deg"],
     "oblique_study": LABELS["angle_deg"],
     "oblique_tangential": "patch velocity in / (friction x normal speed in)",
-    "spin_plane": "7/2 friction (1 + e) x normal speed / patch velocity",
-    "spin_unequal": "7/2 friction (1 + e) x normal speed / patch velocity",
+    "patch_restitution": "7/2 friction (1 + e) x normal speed\n/ patch velocity in",
+    "recoil_tangent": "tangent of the angle of incidence",
     "spin_pair": "spin before in rad/s",
     "spin_pair_same": "spin before in rad/s",
 }
+_REFERENCES = ("line: the law integrated by scipy", "Coulomb sliding of rigid bodies")
 OTHERS = {
     "oblique_angle": ("experiment (Kharaz et al. 2001)",),
     "oblique_tangential": ("finite elements (Wu)",),
@@ -91,7 +92,7 @@ def _elastic(runs: Sequence[Recording]) -> Figure:
         line = np.linspace(0, largest_overlap(contact, before.normal_m_s), 100)
         left.plot(line * 1e6, hertz_force(contact, line) / 1e3, color=colour)
         left.plot(overlap[some] * 1e6, force[some] / 1e3, "o", color=colour, ms=3,
-                  label=f"{run.case['series']}, engine")  # fmt: skip
+                  label=f"{series_name(run)}: engine")  # fmt: skip
         time = (run.time_s - run.time_s[inside[0]]) * 1e6
         right.plot(time[some], force[some] / 1e3, "o", color=colour, ms=3)
         end = elastic_time(contact, before.normal_m_s) * 1e6
@@ -99,9 +100,9 @@ def _elastic(runs: Sequence[Recording]) -> Figure:
         peak = float(hertz_force(contact, line[-1])) / 1e3
         right.plot([end / 2], [peak], "+", color="black", ms=9)
     left.set(xlabel="overlap in µm", ylabel="normal force in kN")
-    left.set_title("line: Hertz (Johnson 1985, eq. 4.23)")
+    left.set_title("line: Hertz (Johnson 1985, eq. 4.23)", fontsize=8.5)
     right.set(xlabel="time since touching in µs")
-    right.set_title("+: Hertz's largest force, --: his contact time")
+    right.set_title("+: Hertz's largest force, dashed: his contact time", fontsize=8.5)
     return _legend(figure, left, 3)
 
 
@@ -121,7 +122,7 @@ def _restitution(runs: Sequence[Recording]) -> Figure:
         left.plot(value, ratio, marker, color=colour, ms=4, mfc="none", label=series_name(run))
         right.plot(value, np.array(error) * 1e3, marker + "-", color=colour, ms=4, lw=0.8)
     left.set(xlabel="restitution in the deck", ylabel="speed out over speed in")
-    right.set(xlabel="restitution in the deck", ylabel="engine minus exact, in thousandths")
+    right.set(xlabel="restitution in the deck", ylabel="engine minus exact\nin thousandths")
     return _legend(figure, left)
 
 
@@ -130,7 +131,7 @@ def _impacts(runs: Sequence[Recording]) -> Figure:
     quantities = QUANTITIES[test]
     figure, panels = _figure(len(quantities), 3.9)
     for axes, (quantity, derive) in zip(panels, quantities.items(), strict=True):
-        for run, colour, marker in zip(runs, COLOURS, MARKERS, strict=False):
+        for at, (run, colour, marker) in enumerate(zip(runs, COLOURS, MARKERS, strict=False)):
             rows = []
             for entry in run.case["contacts"]:
                 contact, (before, after) = run.contact(entry), run.impact(entry)
@@ -147,16 +148,17 @@ def _impacts(runs: Sequence[Recording]) -> Figure:
             x, engine, law_line, rigid_line = np.array(sorted(rows), dtype=np.float64).T
             name = series_name(run)
             axes.plot(x, engine, marker, color=colour, ms=5, mfc="none", label=f"{name}: engine")
-            axes.plot(x, law_line, "-", color=colour, lw=0.9, label="  the law integrated")
-            axes.plot(x, rigid_line, "--", color="black", lw=0.9,
-                      label="  Coulomb sliding of rigid bodies")  # fmt: skip
+            law_name, rigid_name = _REFERENCES if at == 0 else (None, None)
+            axes.plot(x, law_line, "-", color=colour, lw=0.9, label=law_name)
+            if not np.isnan(rigid_line).all():
+                axes.plot(x, rigid_line, "--", color="black", lw=0.9, label=rigid_name)
         _published(axes, test, runs, quantity)
-        axes.set(xlabel=ABSCISSAE[test], ylabel=LABELS[quantity])
+        axes.set(xlabel=ABSCISSAE.get(quantity) or ABSCISSAE[test], ylabel=LABELS[quantity])
         if quantity == "patch_restitution":
             axes.set_xscale("log")
         if test.startswith("oblique_tan"):
             axes.set_xlim(-0.3, 14)
-    return _legend(figure, panels[0], 3)
+    return _legend(figure, panels[0], len(panels))
 
 
 def _published(axes: Axes, test: str, runs: Sequence[Recording], quantity: str) -> None:
@@ -165,7 +167,7 @@ def _published(axes: Axes, test: str, runs: Sequence[Recording], quantity: str) 
         curve = published(test, name, quantity)
         if len(curve.x):
             shade = "black" if name in OTHERS.get(test, ()) else GREY
-            label = f"published, {name}"
+            label = f"published: {name}".replace("_", " ")
             axes.plot(curve.x, curve.y, marker, color=shade, ms=5, mew=0.9, label=label)
 
 

@@ -12,9 +12,9 @@ import jinja2
 import matplotlib
 import pandas as pd
 
-from dragchain.errors import TableError
+from dragchain.errors import GateError, TableError
 from dragchain.figures import STYLE, png
-from dragchain.frames import write_parquet
+from dragchain.frames import read_table, write_parquet
 from dragchain.report import data_uri, number
 from dragchain.verification.checks import JUDGED, Check, judge
 from dragchain.verification.figures import draw
@@ -87,6 +87,29 @@ def counts(summary: pd.DataFrame) -> dict[str, int]:
     return {name: verdicts.count(name) for name in ("pass", "fail", "agrees", "differs")}
 
 
+def verdict(report_dir: Path) -> str:
+    """How many quantities have each verdict, in words.
+
+    Raises
+    ------
+    GateError
+        At least one failed: names each, with its error.
+    TableError
+        There is no summary.
+    """
+    summary = read_table(report_dir / "verification.parquet")
+    found = ", ".join(f"{number} {name}" for name, number in counts(summary).items())
+    bad = summary[summary["verdict"] == "fail"]
+    if bad.empty:
+        return found
+    lines = [
+        f"{row.test}, {row.series}, {row.quantity}: error {row.error:.2g}"
+        f" (allowed: {row.tolerance:.2g})"
+        for row in bad.itertuples()
+    ]
+    raise GateError("\n  ".join([f"{report_dir / 'verification.html'}: {found}", *lines]))
+
+
 def render(runs: Sequence[Recording], summary: pd.DataFrame) -> str:
     """The page: HTML that needs no other file and no network."""
     ordered = sorted(runs, key=lambda run: (run.case["number"], _place(str(run.case["test"]))))
@@ -111,9 +134,7 @@ def _place(test: str) -> int:
     return list(WORDS).index(test)
 
 
-def _section(
-    test: str, runs: Sequence[Recording], summary: pd.DataFrame
-) -> Mapping[str, object]:
+def _section(test: str, runs: Sequence[Recording], summary: pd.DataFrame) -> Mapping[str, object]:
     rows = summary[summary["test"] == test]
     with matplotlib.rc_context(STYLE):
         picture = data_uri(png(draw(test, runs)))

@@ -207,7 +207,8 @@ def _case(experiment: Experiment, deck: CollideDeck) -> dict[str, Any]:
         "fidelity": {"ranks": 1, "skin_m": deck.skin_m},
         "media": {"count": len(experiment.bodies)},
         "types": [
-            {"name": name, **material.model_dump(mode="json")} for name, material in experiment.types
+            {"name": name, **material.model_dump(mode="json")}
+            for name, material in experiment.types
         ],
         "pairs": [
             {"types": list(types), **pair.model_dump(mode="json")}
