@@ -74,9 +74,9 @@ class Impacts(Model):
     restitution: Number | None = Field(default=None, description="none: the study's")
     friction: Number | None = Field(default=None, description="none: the study's")
     vary: dict[Kind, list[Number]]
-    limit_force: list[bool] = [True]
+    limit_force: tuple[bool, ...] = (True,)
     series: list[Series]
-    steps_per_contact: list[Annotated[Whole, Field(ge=10)]] = []
+    steps_per_contact: tuple[Annotated[Whole, Field(ge=10)], ...] = ()
 
     @model_validator(mode="after")
     def _one_variable(self) -> Impacts:
@@ -249,7 +249,7 @@ class Suite:
     def _impacts(self, name: str, test: Impacts) -> Iterator[Experiment]:
         for series in test.series:
             for limit_force in test.limit_force:
-                for steps in test.steps_per_contact or [self.file.steps_per_contact]:
+                for steps in test.steps_per_contact or (self.file.steps_per_contact,):
                     yield self._rack(name, test, series, limit_force, steps)
 
     def _rack(

@@ -148,7 +148,7 @@ def limited_restitution(restitution: float) -> float:
     Damping in proportion to overlap^(1/4) turns into a linear spring and dashpot
     under the change of variable of Antypov and Elliott (2011), in which force
     and speed vanish at the same moments; for the linear law Schwager and
-    Poeschel (2007, eq. 21 ff.) give the speed at which the force vanishes. With
+    Poeschel (2007) give the speed at which the force vanishes. With
     x = -ln(e)/pi, the damping over the frequency, that is
     exp(-x (pi - 2 arctan x)). The speed of impact does not matter.
     """
@@ -161,7 +161,7 @@ def sliding_impact(contact: Contact, before: Motion) -> Motion | None:
 
     Coulomb's law in impulses: the tangential impulse is the friction times the
     normal one. None if the surfaces would stop sliding before the end, where
-    rigid bodies say nothing (Walton 1993; Kharaz et al. 2001, eq. 5 ff.).
+    rigid bodies say nothing (Kharaz et al. 2001, Powder Technology 120, 281).
     """
     way = math.copysign(1.0, before.patch_m_s(contact))
     drop = contact.friction * (1 + contact.rebound) * before.normal_m_s
@@ -218,7 +218,7 @@ class _Law:
         self.contact = contact
         root = math.sqrt(contact.radius_m)
         logarithm = math.log(contact.restitution)
-        # Tsuji et al. 1992 with the exact coefficient of Antypov and Elliott 2011, eq. 17
+        # Tsuji et al. 1992 with the exact coefficient of Antypov and Elliott 2011
         alpha = -math.sqrt(5) * logarithm / math.hypot(math.pi, logarithm)
         self.normal = 4 / 3 * contact.modulus_pa * root
         self.normal_damping = alpha * math.sqrt(contact.mass_kg * self.normal)
@@ -262,7 +262,7 @@ class _Law:
             - damped * overlap**-0.25 * force / self.contact.mass_kg
         )
         way = 1.0 if self.contact.limit_force else math.copysign(1.0, force)
-        return self.contact.friction * way * change
+        return float(self.contact.friction * way * change)
 
     def friction_force(self, state: Floats, way: int) -> float:
         """Tangential force on the ball, N; `way` is 0 for sticking, else the way of sliding."""
@@ -331,7 +331,7 @@ def integrated_impact(contact: Contact, before: Motion) -> Impact:
         time, state = float(solved.t[-1]), np.asarray(solved.y[:, -1], dtype=np.float64)
         overlap = max(overlap, float(solved.y[0].max()))
         force = max(force, max(law.normal_force(column) for column in solved.y.T))
-        fired = {name for name, at in zip(stops, solved.t_events, strict=True) if len(at)}
+        fired = {name for name, at in zip(stops, solved.t_events or [], strict=True) if len(at)}
         vanished = contact.limit_force and law.whole_force(state) < 1e-9 * force
         if vanished or "parted" in fired:
             return _end(state, time, overlap, force, switches)
@@ -358,7 +358,7 @@ def _begin(law: _Law, before: Motion, unit_m: float) -> tuple[Floats, int]:
 
 
 def _stops(law: _Law, way: int, least_m: float, repels: bool) -> dict[str, Any]:
-    """Events that end a stretch: parting, the end of repulsion, from sticking to sliding or back."""
+    """Events that end a stretch: parting, sticking or sliding anew, the end of repulsion."""
 
     def parted(_: float, state: Floats) -> float:
         return float(state[0] - least_m)
@@ -372,7 +372,7 @@ def _stops(law: _Law, way: int, least_m: float, repels: bool) -> dict[str, Any]:
             return 1.0
         if way:
             return way * law.patch(state) - law.spring_limit_rate(state)
-        return abs(state[2]) - law.spring_limit(state)
+        return float(abs(state[2])) - law.spring_limit(state)
 
     events: dict[str, Any] = {"parted": parted, "switched": switched}
     if repels:

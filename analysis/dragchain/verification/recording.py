@@ -139,19 +139,21 @@ class Recording:
 
 def effective_modulus(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
     """Effective Young's modulus, Pa (Johnson 1985, eq. 4.21 ff.)."""
-    return 1 / sum(
+    compliance: float = sum(
         (1 - material["poissons_ratio"] ** 2) / material["youngs_modulus_pa"]
         for material in (first, second)
     )
+    return 1 / compliance
 
 
 def effective_shear(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
-    """Effective shear modulus 1/G* = sum (2 - nu)/G, Pa (Mindlin 1949; Johnson 1985, eq. 7.43)."""
-    return 1 / sum(
+    """Effective shear modulus 1/G* = sum (2 - nu)/G, Pa (Mindlin 1949)."""
+    compliance: float = sum(
         2 * (2 - nu) * (1 + nu) / material["youngs_modulus_pa"]
         for material in (first, second)
         for nu in (material["poissons_ratio"],)
     )
+    return 1 / compliance
 
 
 def read_recording(run_dir: Path) -> Recording:

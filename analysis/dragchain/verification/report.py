@@ -76,7 +76,7 @@ def summarise(checks: Sequence[Check]) -> pd.DataFrame:
     table = pd.DataFrame([vars(check) for check in checks])
     rows = []
     for _, group in table.groupby(BY_SERIES, sort=False):
-        worst = group.loc[group["error"].idxmax()].to_dict()
+        worst = group.sort_values("error", kind="stable").iloc[-1].to_dict()
         rows.append({**worst, "points": len(group)})
     return pd.DataFrame(rows)
 

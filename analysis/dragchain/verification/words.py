@@ -99,8 +99,8 @@ WORDS: dict[str, tuple[str, ...]] = {
         DAMPER,
     ),
     "spin_unequal": (
-        "The larger ball has five times the radius. A rigid one is also 1,000 times denser, so that "
-        "it hardly moves and the test becomes test 6; the second ball of the paper was not "
+        "The larger ball has five times the radius. A rigid one is also 1,000 times denser, so "
+        "that it hardly moves and the test becomes test 6; the second ball of the paper was not "
         "available here. The last series has one material.",
         DAMPER,
     ),

@@ -169,8 +169,9 @@ def bodies_data(experiment: Experiment) -> str:
         atoms += f"{number} {body.type} {2 * body.radius_m!r} {density!r} {place}\n"
         motion = " ".join(repr(float(x)) for x in (*body.velocity_m_s, *body.spin_rad_s))
         velocities += f"{number} {motion}\n"
+    count, types = len(experiment.bodies), len(experiment.types)
     return (
-        f"{experiment.title}\n\n{len(experiment.bodies)} atoms\n{len(experiment.types)} atom types\n"
+        f"{experiment.title}\n\n{count} atoms\n{types} atom types\n"
         f"\n{box}\nAtoms\n\n{atoms}\nVelocities\n\n{velocities}"
     )
 
