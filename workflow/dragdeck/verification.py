@@ -237,7 +237,7 @@ class Suite:
         """An experiment with its run id: a slug and 8 hex digits of all it depends on."""
         facts = {"test": name, "number": number, **fields.pop("facts")}
         plain = Experiment(group=GROUP, run="", facts=facts, **fields)
-        content = asdict(plain)
+        content = {**asdict(plain), "title": "", "facts": {**facts, "heading": ""}}
         content["types"] = [(n, m.model_dump(mode="json")) for n, m in plain.types]
         content["pairs"] = [(k, p.model_dump(mode="json")) for k, p in plain.pairs.items()]
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:8]

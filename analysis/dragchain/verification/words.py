@@ -87,7 +87,9 @@ WORDS: dict[str, tuple[str, ...]] = {
         DAMPER,
         LIMIT,
         "The published curves have a normal restitution of 0.50 exactly and slide with Coulomb's "
-        "impulse (left of 1 in the left panel), so they come from a law whose damper is capped.",
+        "impulse (left of 1 in the left panel): the law behind them caps the damper, or has none. "
+        "Right of 1 the contact sticks, and spring and damper decide.",
+        SPRING,
     ),
     "spin_pair": (
         "The surfaces of two balls with opposite spins roll on each other like two gears: nothing "
@@ -95,13 +97,16 @@ WORDS: dict[str, tuple[str, ...]] = {
     ),
     "spin_pair_same": (
         "Two balls with the same spin rub. The line of centres turns a little during the "
-        "impact, which the reference leaves out: hence errors above those of the plane.",
+        "impact, which the reference leaves out: hence the error of the normal rebound is above "
+        "that on a plane. The tangential error is largest for fast slip, which uses up the "
+        "spring within a few time steps.",
         DAMPER,
     ),
     "spin_unequal": (
         "The larger ball has five times the radius. A rigid one is also 1,000 times denser, so "
         "that it hardly moves and the test becomes test 6; the second ball of the paper was not "
         "available here. The last series has one material.",
+        "The published points differ for the reasons given in test 6.",
         DAMPER,
     ),
     "time_step": (
