@@ -6,7 +6,7 @@ VERIFICATION_RUNS = list(suite_of(CASES[0].study))
 rule render_verification:
     input:
         deck_inputs,
-        suite=str(PROJECT.root / "workflow/dragdeck/verification.yaml"),
+        suite="workflow/dragdeck/verification.yaml",
     output:
         [
             of_experiment(run, file)
@@ -50,8 +50,8 @@ rule run_verification:
 rule judge_verification:
     input:
         [of_experiment(run, "run.json") for run in VERIFICATION_RUNS],
-        template=str(PROJECT.root / "analysis/dragchain/verification/verification.html.j2"),
-        published=str(PROJECT.root / "analysis/dragchain/verification/published.csv"),
+        template="analysis/dragchain/verification/verification.html.j2",
+        published="analysis/dragchain/verification/published.csv",
     output:
         multiext(
             "results/verification/report/",
