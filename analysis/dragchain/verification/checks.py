@@ -1,8 +1,9 @@
 """What each test of the suite must show: quantity, reference, engine, error, verdict.
 
-Every tolerance below was set before the suite was run, from what the engine's
-integration can be expected to do. None was widened to make a row pass; that of
-the normal rebound was narrowed afterwards, from 5 to 1 over the steps.
+Every tolerance below states what the engine's integration can be expected to
+do. They were written down after a first look at its numbers; none was widened
+to make a row pass, and that of the normal rebound was narrowed afterwards, from
+5 to 1 over the steps.
 """
 
 from __future__ import annotations
