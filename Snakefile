@@ -12,6 +12,7 @@ include: "workflow/rules/tables.smk"
 include: "workflow/rules/network.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/calibrate.smk"
+include: "workflow/rules/verify.smk"
 
 
 localrules:
@@ -21,6 +22,7 @@ localrules:
     fill,
     process,
     report,
+    verify,
 
 
 # The whole study: runs, tables, chains, figures and the report.
@@ -60,3 +62,10 @@ rule report:
 rule calibrate:
     input:
         rules.write_calibration_report.output,
+
+
+# The contact law against exact formulae and published impacts.
+rule verify:
+    input:
+        rules.judge_verification.output,
+        rules.pass_verdict.output,

@@ -59,6 +59,13 @@ def _parser() -> argparse.ArgumentParser:
     report.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
     report.set_defaults(action=_report)
     add_calibration(commands)
+    verify = commands.add_parser("verify", help="judge the runs of the verification suite")
+    verify.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
+    verify.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
+    verify.set_defaults(action=_verify)
+    verdict = commands.add_parser("verdict", help="fail if a quantity of the suite failed")
+    verdict.add_argument("report_dir", type=Path, metavar="DIR", help="what `verify` wrote")
+    verdict.set_defaults(action=_verdict)
     return parser
 
 
@@ -84,6 +91,18 @@ def _report(options: argparse.Namespace) -> None:
     from dragchain.report import write_report
 
     write_report(options.out, options.run_dirs)
+
+
+def _verify(options: argparse.Namespace) -> None:
+    from dragchain.verification.report import write_verification
+
+    write_verification(options.out, options.run_dirs)
+
+
+def _verdict(options: argparse.Namespace) -> None:
+    from dragchain.verification.report import verdict
+
+    print(verdict(options.report_dir))
 
 
 if __name__ == "__main__":

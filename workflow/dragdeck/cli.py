@@ -39,7 +39,9 @@ def _parser() -> argparse.ArgumentParser:
     cases.set_defaults(action=_cases)
     render = commands.add_parser("render", help="write the deck of one run")
     render.set_defaults(action=_render)
-    for command in (check, explain, cases, render):
+    verify = commands.add_parser("verify", help="write the decks of the verification suite")
+    verify.set_defaults(action=_verify)
+    for command in (check, explain, cases, render, verify):
         command.add_argument("study", help="name of a folder in studies/")
         command.add_argument("--fidelity", help="instead of the study's own")
     explain.add_argument("scene", nargs="?", choices=SCENES, help="one scene only")
@@ -135,6 +137,19 @@ def _render(options: argparse.Namespace) -> None:
         print(f"warning: {warning}", file=sys.stderr)
     templates = environment(project.templates, study_templates(case))
     write_run(scene, project.run_folder(case, options.scene), templates)
+
+
+def _verify(options: argparse.Namespace) -> None:
+    from dragdeck.render import environment, write_run
+    from dragdeck.scenes.collide import collide_scene
+    from dragdeck.verification import suite_of
+
+    project = find_project(Path.cwd())
+    case = project.cases(options.study, options.fidelity)[0]
+    templates = environment(project.templates, study_templates(case))
+    for run, experiment in suite_of(case.study).items():
+        folder = project.experiment_folder(experiment.group, run)
+        write_run(collide_scene(experiment), folder, templates)
 
 
 def _case_of_run(project: Project, options: argparse.Namespace) -> Case:

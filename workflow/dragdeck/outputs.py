@@ -6,6 +6,7 @@ definitions, so that no reader has to guess a column.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -174,6 +175,17 @@ def balls(period: int, first: int, last: int, bowl_facets: bool) -> Output:
     )
     columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *(() if bowl_facets else bowl))
     return Output("balls", "custom", columns, period, first, last, binary=True)
+
+
+def bodies(period: int, last: int, walls: Sequence[str]) -> Output:
+    """Every ball of a small scene: motion, the force and torque on it, that of each wall."""
+    columns = (
+        *(_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS),
+        *(Column(f"force_{axis}_n", f"f{axis}") for axis in "xyz"),
+        *(Column(f"torque_{axis}_nm", f"tq{axis}") for axis in "xyz"),
+        *(column for wall in walls for column in _vector(f"{wall}_force", "n", f"f_force_{wall}")),
+    )
+    return Output("bodies", "custom", columns, period, 0, last, binary=True)
 
 
 def impacts() -> Output:

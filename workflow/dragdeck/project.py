@@ -42,6 +42,10 @@ class Project:
         """The folder of one engine run."""
         return self.root / "results" / case.study_name / scene / case.run_ids[scene]
 
+    def experiment_folder(self, group: str, run: str) -> Path:
+        """The folder of a run of the `collide` scene, which belongs to no case of a study."""
+        return self.root / "results" / group / "collide" / run
+
 
 def find_project(start: Path) -> Project:
     """The project that a folder belongs to: the nearest with templates/ and studies/.

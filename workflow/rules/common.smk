@@ -8,6 +8,7 @@ from dragdeck.errors import DragdeckError
 from dragdeck.project import Project, by_run, study_templates
 from dragdeck.render import environment, template_files
 from dragdeck.sources import source_hash
+from dragdeck.verification import suite_of
 
 PROJECT = Project(Path(workflow.basedir))
 STUDY = config.get("study", "uhlmann2015")
@@ -37,6 +38,11 @@ def of_fill(file):
 def of_process(file):
     """Path of a file of a process run, as a pattern."""
     return f"results/{{study}}/process/{{run}}/{file}"
+
+
+def of_experiment(run, file):
+    """Path of a file of a run of the verification suite."""
+    return f"results/verification/collide/{run}/{file}"
 
 
 def of_report(file):

@@ -52,13 +52,15 @@ class Deck:
     ----------
     source : str
         The data or restart file that the run starts from.
+    gravity_direction : (float, float, float)
+        Unit vector of gravity.
     checkpoint_steps : int
         Steps between restart points; 0 for none.
     """
 
     title: str
     study: str
-    scene: SceneName
+    scene: str
     run: str
     source: str
     materials: Materials
@@ -67,6 +69,7 @@ class Deck:
     skin_m: float
     timestep_s: float
     outputs: Sequence[Output]
+    gravity_direction: tuple[float, float, float] = (0, 0, -1)
     thermo_steps: int = 0
     checkpoint_steps: int = 0
     version: str = __version__

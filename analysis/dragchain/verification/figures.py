@@ -1,0 +1,261 @@
+"""One figure a test: the engine's points over the references."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from dragchain.figures import BLUE, GREEN, GREY, ORANGE, RED
+from dragchain.verification.checks import (
+    QUANTITIES,
+    abscissa,
+    column_loads,
+    convergence,
+    fitted_order,
+    flight_energy,
+    incline_reference,
+    incline_slopes,
+    momenta,
+    series_name,
+)
+from dragchain.verification.law import (
+    elastic_time,
+    hertz_force,
+    hertz_overlap,
+    integrated_impact,
+    largest_overlap,
+    limited_restitution,
+    sliding_impact,
+)
+from dragchain.verification.published import published
+from dragchain.verification.recording import Recording
+
+COLOURS = (BLUE, ORANGE, GREEN, RED, "#7a4fa3", "#5b8a99")
+MARKERS = "os^vDP"
+
+LABELS = {
+    "angle_deg": "angle of incidence from the normal in degrees",
+    "tangential_restitution": "tangential velocity out over in",
+    "spin_rad_s": "spin after in rad/s",
+    "rebound_angle_deg": "rebound angle of the\ncontact patch in degrees",
+    "scaled_patch": "patch velocity out /\n(friction x normal speed out)",
+    "scaled_spin": "surface speed by spin out /\n(friction x normal speed in)",
+    "patch_restitution": "minus patch velocity out over in",
+    "recoil_tangent": "tangent of the recoil angle",
+    "tangential_m_s": "relative tangential velocity\nof the centres after in m/s",
+}
+ABSCISSAE = {
+    "oblique_angle": LABELS["angle_deg"],
+    "oblique_study": LABELS["angle_deg"],
+    "oblique_tangential": "patch velocity in / (friction x normal speed in)",
+    "patch_restitution": "7/2 friction (1 + e) x normal speed\n/ patch velocity in",
+    "recoil_tangent": "tangent of the angle of incidence",
+    "spin_pair": "spin before in rad/s",
+    "spin_pair_same": "spin before in rad/s",
+}
+_REFERENCES = ("line: the law integrated by scipy", "Coulomb sliding of rigid bodies")
+OTHERS = {
+    "oblique_angle": ("experiment (Kharaz et al. 2001)",),
+    "oblique_tangential": ("finite elements (Wu)",),
+}
+"""Series that the paper draws and nobody here models."""
+
+
+def draw(test: str, runs: Sequence[Recording]) -> Figure:
+    """The figure of a test from all its runs."""
+    return _DRAW[test](runs)
+
+
+def _figure(panels: int, height_in: float = 3.4) -> tuple[Figure, list[Axes]]:
+    figure = Figure(figsize=(3.7 * max(panels, 2), height_in), layout="constrained")
+    return figure, list(np.atleast_1d(figure.subplots(1, panels)))
+
+
+def _legend(figure: Figure, axes: Axes, columns: int = 2) -> Figure:
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower left", ncols=columns)
+    return figure
+
+
+def _elastic(runs: Sequence[Recording]) -> Figure:
+    figure, (left, right) = _figure(2)
+    for run, colour in zip(runs, COLOURS, strict=False):
+        (entry,) = run.case["contacts"]
+        contact, (before, _) = run.contact(entry), run.impact(entry)
+        overlap = run.overlap_m(entry)
+        force = np.abs(run.force_n[:, entry["ball"] - 1, 2])
+        inside = np.flatnonzero(overlap > 0)
+        some = inside[:: max(1, len(inside) // 30)]
+        line = np.linspace(0, largest_overlap(contact, before.normal_m_s), 100)
+        left.plot(line * 1e6, hertz_force(contact, line) / 1e3, color=colour)
+        left.plot(overlap[some] * 1e6, force[some] / 1e3, "o", color=colour, ms=3,
+                  label=f"{series_name(run)}: engine")  # fmt: skip
+        time = (run.time_s - run.time_s[inside[0]]) * 1e6
+        right.plot(time[some], force[some] / 1e3, "o", color=colour, ms=3)
+        end = elastic_time(contact, before.normal_m_s) * 1e6
+        right.axvline(end, color=colour, lw=0.8, ls="--")
+        peak = float(hertz_force(contact, line[-1])) / 1e3
+        right.plot([end / 2], [peak], "+", color="black", ms=9)
+    left.set(xlabel="overlap in µm", ylabel="normal force in kN")
+    left.set_title("line: Hertz (Johnson 1985, eq. 4.23)", fontsize=8.5)
+    right.set(xlabel="time since touching in µs")
+    right.set_title("+: Hertz's largest force, dashed: his contact time", fontsize=8.5)
+    return _legend(figure, left, 3)
+
+
+def _restitution(runs: Sequence[Recording]) -> Figure:
+    figure, (left, right) = _figure(2)
+    line = np.linspace(0.055, 1, 200)
+    exact = np.array([limited_restitution(value) for value in line])
+    left.plot(line, line, color="black", lw=0.9, label="what the deck says")
+    left.plot(line, exact, color=GREY, label="exp(-x (π - 2 arctan x)), x = -ln(e)/π")
+    for run, colour, marker in zip(runs, COLOURS, MARKERS, strict=False):
+        value, ratio, error = [], [], []
+        for entry in run.case["contacts"]:
+            contact, (before, after) = run.contact(entry), run.impact(entry)
+            value.append(contact.restitution)
+            ratio.append(after.normal_m_s / before.normal_m_s)
+            error.append(ratio[-1] - contact.rebound)
+        left.plot(value, ratio, marker, color=colour, ms=4, mfc="none", label=series_name(run))
+        right.plot(value, np.array(error) * 1e3, marker + "-", color=colour, ms=4, lw=0.8)
+    left.set(xlabel="restitution in the deck", ylabel="speed out over speed in")
+    right.set(xlabel="restitution in the deck", ylabel="engine minus exact\nin thousandths")
+    return _legend(figure, left)
+
+
+def _impacts(runs: Sequence[Recording]) -> Figure:
+    test = str(runs[0].case["test"])
+    quantities = QUANTITIES[test]
+    figure, panels = _figure(len(quantities), 3.9)
+    for axes, (quantity, derive) in zip(panels, quantities.items(), strict=True):
+        for at, (run, colour, marker) in enumerate(zip(runs, COLOURS, MARKERS, strict=False)):
+            rows = []
+            for entry in run.case["contacts"]:
+                contact, (before, after) = run.contact(entry), run.impact(entry)
+                law = integrated_impact(contact, before).after
+                rigid = sliding_impact(contact, before)
+                rows.append(
+                    (
+                        abscissa(test, contact, before, float(entry["value"]), quantity),
+                        derive(contact, before, after),
+                        derive(contact, before, law),
+                        derive(contact, before, rigid) if rigid is not None else np.nan,
+                    )
+                )
+            x, engine, law_line, rigid_line = np.array(sorted(rows), dtype=np.float64).T
+            name = series_name(run)
+            axes.plot(x, engine, marker, color=colour, ms=5, mfc="none", label=f"{name}: engine")
+            law_name, rigid_name = _REFERENCES if at == 0 else (None, None)
+            axes.plot(x, law_line, "-", color=colour, lw=0.9, label=law_name)
+            if not np.isnan(rigid_line).all():
+                axes.plot(x, rigid_line, "--", color="black", lw=0.9, label=rigid_name)
+        _published(axes, test, runs, quantity)
+        axes.set(xlabel=ABSCISSAE.get(quantity) or ABSCISSAE[test], ylabel=LABELS[quantity])
+        if quantity == "patch_restitution":
+            axes.set_xscale("log")
+        if test.startswith("oblique_tan"):
+            axes.set_xlim(-0.3, 14)
+    return _legend(figure, panels[0], len(panels))
+
+
+def _published(axes: Axes, test: str, runs: Sequence[Recording], quantity: str) -> None:
+    series = dict.fromkeys(str(run.case["series"]) for run in runs)
+    for name, marker in zip((*series, *OTHERS.get(test, ())), "xx+", strict=False):
+        curve = published(test, name, quantity)
+        if len(curve.x):
+            shade = "black" if name in OTHERS.get(test, ()) else GREY
+            label = f"published: {name}".replace("_", " ")
+            axes.plot(curve.x, curve.y, marker, color=shade, ms=5, mew=0.9, label=label)
+
+
+def _time_step(runs: Sequence[Recording]) -> Figure:
+    figure, (left, right) = _figure(2)
+    colours = {True: BLUE, False: ORANGE}
+    for limit, rows in convergence(runs).items():
+        steps, error = np.array(rows, dtype=np.float64).T
+        name = f"limitForce {'on' if limit else 'off'}, order {fitted_order(rows):.2f}"
+        left.loglog(steps, error, "o-", color=colours[limit], ms=4, label=name)
+        left.loglog(steps, 1 / steps, ":", color=GREY, label="tolerance" if limit else None)
+        share = [
+            100 * run.case["timestep_s"] / run.case["rayleigh_time_s"]
+            for run in sorted(runs, key=lambda run: run.steps_per_contact)
+            if run.case["limit_force"] == limit
+        ]
+        right.loglog(share, error, "o-", color=colours[limit], ms=4)
+    left.set(xlabel="time steps in a contact", ylabel="error of speed out over speed in")
+    right.set(xlabel="time step in % of the Rayleigh time")
+    return _legend(figure, left, 3)
+
+
+def _bounce(runs: Sequence[Recording]) -> Figure:
+    figure, (axes,) = _figure(1)
+    for run, colour in zip(runs, COLOURS, strict=False):
+        impacts, energy = flight_energy(run)
+        name = f"{run.steps_per_contact} steps a contact"
+        axes.plot(impacts, (energy - 1) * 1e6, ".", ms=2, color=colour, label=name)
+    axes.set(xlabel="impacts", ylabel="change of the energy of flight, ppm")
+    return _legend(figure, axes)
+
+
+def _momentum(runs: Sequence[Recording]) -> Figure:
+    figure, panels = _figure(2)
+    (run,) = runs
+    for axes, at, what in zip(panels, (0, 1), ("linear", "angular"), strict=True):
+        for entry, colour in zip(run.case["contacts"], COLOURS, strict=False):
+            change = np.linalg.norm(momenta(run, entry)[at], axis=1)
+            label = f"collision {entry['value']}"
+            axes.semilogy(run.time_s * 1e6, np.maximum(change, 1e-18), color=colour, label=label)
+        axes.set(xlabel="time in µs", ylabel=f"change of {what} momentum, share")
+        axes.set_ylim(1e-18, 1e-8)
+    return _legend(figure, panels[0], 3)
+
+
+def _column(runs: Sequence[Recording]) -> Figure:
+    figure, (left, right) = _figure(2)
+    (run,) = runs
+    loads = column_loads(run)
+    floor = run.wall_force_n["plane"][:, 0, 2]
+    left.plot(run.time_s * 1e3, floor / loads[0][1], color=BLUE, lw=0.8)
+    left.axhline(1.0, color="black", lw=0.8)
+    left.set(xlabel="time in ms", ylabel="floor force over weight")
+    height = np.arange(1, len(loads) + 1)
+    exact = np.array([hertz_overlap(contact, weight) for contact, weight, _ in loads])
+    right.plot(exact * 1e9, height, "k+", ms=10, label="Hertz under the weight above")
+    overlap = np.array([row[2] for row in loads])
+    right.plot(overlap * 1e9, height, "o", color=BLUE, mfc="none", label="engine")
+    right.set(xlabel="overlap in nm", ylabel="contact, from the floor up", yticks=height)
+    return _legend(figure, right)
+
+
+def _incline(runs: Sequence[Recording]) -> Figure:
+    figure, (left, right) = _figure(2)
+    (run,) = runs
+    entries = run.case["contacts"]
+    x = [float(entry["value"]) for entry in entries]
+    for axes, at, label in (
+        (left, 0, "acceleration down the slope in m/s²"),
+        (right, 1, "acceleration of the spin in rad/s²"),
+    ):
+        reference = [incline_reference(run, entry)[at] for entry in entries]
+        engine = [incline_slopes(run, entry)[at] for entry in entries]
+        axes.plot(x, reference, "-", color="black", lw=0.9, label="rolling, then slipping")
+        axes.plot(x, engine, "o", color=BLUE, mfc="none", label="engine")
+        axes.axvline(1.0, color=GREY, lw=0.8, ls=":")
+        axes.set(xlabel="tan(angle) / (7/2 friction)", ylabel=label, xscale="log")
+    return _legend(figure, left)
+
+
+_DRAW: dict[str, Callable[[Sequence[Recording]], Figure]] = {
+    "elastic_pair": _elastic,
+    "elastic_plane": _elastic,
+    "restitution": _restitution,
+    **dict.fromkeys(QUANTITIES, _impacts),
+    "time_step": _time_step,
+    "bounce": _bounce,
+    "momentum": _momentum,
+    "column": _column,
+    "incline": _incline,
+}

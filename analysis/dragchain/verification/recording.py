@@ -1,0 +1,204 @@
+"""A run of the `collide` scene as arrays, with its contacts as the references see them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dragchain.case import load_outputs
+from dragchain.dumps import iter_frames
+from dragchain.errors import CaseError, GateError, TableError
+from dragchain.report import refusal
+from dragchain.verification.law import Ball, Contact, Motion
+
+Floats = NDArray[np.float64]
+
+_VECTORS = {
+    "position_m": ("x_m", "y_m", "z_m"),
+    "velocity_m_s": ("vx_m_s", "vy_m_s", "vz_m_s"),
+    "spin_rad_s": ("wx_rad_s", "wy_rad_s", "wz_rad_s"),
+    "force_n": ("force_x_n", "force_y_n", "force_z_n"),
+}
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What a run did.
+
+    Attributes
+    ----------
+    case : mapping
+        Content of ``case.json``.
+    time_s : (T,) ndarray
+    position_m, velocity_m_s, spin_rad_s, force_n : (T, N, 3) ndarray
+        Of N balls in the order of their ids; the force includes gravity.
+    wall_force_n : mapping of str to (T, N, 3) ndarray
+        Of each wall on each ball.
+    """
+
+    case: Mapping[str, Any]
+    time_s: Floats
+    position_m: Floats
+    velocity_m_s: Floats
+    spin_rad_s: Floats
+    force_n: Floats
+    wall_force_n: Mapping[str, Floats]
+
+    @property
+    def steps_per_contact(self) -> int:
+        """Time steps in the shortest contact of the run."""
+        return int(self.case["steps_per_contact"])
+
+    def ball(self, number: int) -> Ball:
+        """Mass and radius of a ball by its id."""
+        body = self.case["bodies"][number - 1]
+        density = self.case["types"][body["type"] - 1]["density_kg_m3"]
+        radius = float(body["radius_m"])
+        return Ball(4 / 3 * math.pi * radius**3 * density, radius)
+
+    def contact(self, entry: Mapping[str, Any]) -> Contact:
+        """The constants of a contact, from those of its two materials."""
+        kinds = [self._type(entry["ball"]), self._type(entry["partner"])]
+        own, other = (self.case["types"][kind - 1] for kind in kinds)
+        wall = isinstance(entry["partner"], str)
+        pair = self._pair(sorted(kinds))
+        return Contact(
+            ball=self.ball(entry["ball"]),
+            partner=None if wall else self.ball(entry["partner"]),
+            modulus_pa=effective_modulus(own, other),
+            shear_pa=effective_shear(own, other),
+            restitution=float(pair["restitution"]),
+            friction=float(pair["friction"]),
+            limit_force=bool(self.case["limit_force"]),
+        )
+
+    def _type(self, name: int | str) -> int:
+        if isinstance(name, int):
+            return int(self.case["bodies"][name - 1]["type"])
+        return int(next(wall["type"] for wall in self.case["walls"] if wall["name"] == name))
+
+    def _pair(self, kinds: list[int]) -> Mapping[str, Any]:
+        return next(pair for pair in self.case["pairs"] if pair["types"] == kinds)
+
+    def overlap_m(self, entry: Mapping[str, Any]) -> Floats:
+        """Overlap of a contact, negative where there is a gap, shape (T,), m."""
+        ball, partner = entry["ball"] - 1, entry["partner"]
+        radius = self.case["bodies"][ball]["radius_m"]
+        if isinstance(partner, str):
+            return np.asarray(radius - self.position_m[:, ball, 2])
+        apart = self.position_m[:, ball] - self.position_m[:, partner - 1]
+        radii = radius + self.case["bodies"][partner - 1]["radius_m"]
+        return np.asarray(radii - np.linalg.norm(apart, axis=1))
+
+    def motion(self, entry: Mapping[str, Any], at: int) -> Motion:
+        """Relative motion of a contact along z at a frame; normal: the speed of approach."""
+        ball, partner = entry["ball"] - 1, entry["partner"]
+        velocity, spin = self.velocity_m_s[at, ball], -self.spin_rad_s[at, ball, 1]
+        if isinstance(partner, str):
+            return Motion(-float(velocity[2]), float(velocity[0]), float(spin))
+        relative = velocity - self.velocity_m_s[at, partner - 1]
+        second = -self.spin_rad_s[at, partner - 1, 1]
+        return Motion(-float(relative[2]), float(relative[0]), float(spin), float(second))
+
+    def impact(self, entry: Mapping[str, Any]) -> tuple[Motion, Motion]:
+        """Motion before and after an impact; normal: approach, then separation.
+
+        Raises
+        ------
+        TableError
+            If the surfaces touch in the first or the last frame, or never.
+        """
+        overlap = self.overlap_m(entry)
+        if overlap[0] >= 0 or overlap[-1] >= 0 or not (overlap > 0).any():
+            raise TableError(
+                f"{self.case['run']}: the impact of ball {entry['ball']} is not whole in it"
+            )
+        before, after = self.motion(entry, 0), self.motion(entry, -1)
+        return before, Motion(
+            -after.normal_m_s, after.tangential_m_s, after.spin_rad_s, after.partner_spin_rad_s
+        )
+
+    def duration_s(self, entry: Mapping[str, Any]) -> float:
+        """Time with an overlap, by linear interpolation between frames, s."""
+        overlap = self.overlap_m(entry)
+        inside = np.flatnonzero(overlap > 0)
+        first, last = int(inside[0]), int(inside[-1])
+        return self._crossing(overlap, last) - self._crossing(overlap, first - 1)
+
+    def _crossing(self, overlap: Floats, at: int) -> float:
+        share = overlap[at] / (overlap[at] - overlap[at + 1])
+        return float(self.time_s[at] + share * (self.time_s[at + 1] - self.time_s[at]))
+
+
+def effective_modulus(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
+    """Effective Young's modulus, Pa (Johnson 1985, eq. 4.21 ff.)."""
+    compliance: float = sum(
+        (1 - material["poissons_ratio"] ** 2) / material["youngs_modulus_pa"]
+        for material in (first, second)
+    )
+    return 1 / compliance
+
+
+def effective_shear(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
+    """Effective shear modulus 1/G* = sum (2 - nu)/G, Pa (Mindlin 1949)."""
+    compliance: float = sum(
+        2 * (2 - nu) * (1 + nu) / material["youngs_modulus_pa"]
+        for material in (first, second)
+        for nu in (material["poissons_ratio"],)
+    )
+    return 1 / compliance
+
+
+def read_recording(run_dir: Path) -> Recording:
+    """Read a complete run.
+
+    Raises
+    ------
+    GateError
+        The run is not complete, or a gate of it failed.
+    CaseError, DumpError
+        A file of it cannot be used.
+    """
+    record = _json(run_dir / "run.json")
+    if (reason := refusal(record)) is not None:
+        raise GateError(f"{run_dir} is refused: {reason}")
+    case = _json(run_dir / "case.json")
+    if case.get("scene") != "collide":
+        raise CaseError(run_dir / "case.json", "scene", "is not 'collide'")
+    frames = [
+        (frame.step, frame.columns, np.argsort(frame.columns["ball_id"]))
+        for frame in iter_frames(run_dir, load_outputs(run_dir)["bodies"])
+    ]
+
+    def stacked(names: tuple[str, ...]) -> Floats:
+        return np.array(
+            [np.column_stack([columns[name][order] for name in names])
+             for _, columns, order in frames],
+            dtype=np.float64,
+        )  # fmt: skip
+
+    walls = {
+        wall["name"]: stacked(tuple(f"{wall['name']}_force_{axis}_n" for axis in "xyz"))
+        for wall in case["walls"]
+    }
+    return Recording(
+        case=case,
+        time_s=np.array([step for step, _, _ in frames]) * case["timestep_s"],
+        wall_force_n=walls,
+        **{name: stacked(columns) for name, columns in _VECTORS.items()},
+    )
+
+
+def _json(file: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise CaseError(file, None, "there is no such file", remedy="run the suite first") from None
+    return dict(content)
