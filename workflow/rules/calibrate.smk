@@ -22,7 +22,7 @@ rule read_drop_record:
 
 rule sweep_drops:
     input:
-        deck_inputs,
+        calibration_inputs(),
         of_calibration("record.json"),
     output:
         of_calibration("sweep/drops.json"),
@@ -64,7 +64,7 @@ rule fit_restitution:
 
 rule confirm_restitution:
     input:
-        deck_inputs,
+        calibration_inputs(),
         fit=of_calibration("result.json"),
     output:
         of_calibration("confirm/drops.json"),
@@ -85,7 +85,7 @@ rule confirm_restitution:
 
 rule drop_for_trials:
     input:
-        deck_inputs,
+        calibration_inputs(),
         of_calibration("record.json"),
     output:
         of_calibration("trials/drops.json"),

@@ -93,6 +93,11 @@ def templates_of(scene):
         raise WorkflowError(str(error))
 
 
+def calibration_inputs():
+    """What the drops of a calibration are made from: the study and the drop's templates."""
+    return [str(relative(CASES[0].file)), *templates_of("drop")]
+
+
 def relative(file):
     """Path from the project, where the workflow runs; other paths stay as they are."""
     return file.relative_to(PROJECT.root) if file.is_relative_to(PROJECT.root) else file
