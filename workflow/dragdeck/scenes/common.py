@@ -58,7 +58,7 @@ class Deck:
 
     title: str
     study: str
-    scene: SceneName
+    scene: str
     run: str
     source: str
     materials: Materials
