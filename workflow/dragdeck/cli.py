@@ -47,6 +47,11 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("run", help="run id, as `dragdeck cases` lists it")
     render.add_argument("--fill-table", type=Path, help="fill.json of the settled bed (process)")
 
+    batch = commands.add_parser("stability", help="run one regime of the stability map")
+    batch.set_defaults(action=_stability)
+    batch.add_argument("regime", help="impact, settle, beds, column or drag")
+    batch.add_argument("--map", type=Path, required=True, help="the points: a map.yaml")
+
     run = commands.add_parser("run", help="run the deck in a folder, or go on with it")
     run.set_defaults(action=_run)
     run.add_argument("folder", type=Path)
@@ -144,6 +149,18 @@ def _bed(options: argparse.Namespace) -> Bed | None:
         )
     measured = json.loads(options.fill_table.read_text(encoding="utf-8"))
     return Bed(surface_m=measured["fill_height_m"], top_m=measured["top_m"])
+
+
+def _stability(options: argparse.Namespace) -> None:
+    from dragdeck.stability_map import run_batch
+
+    def report(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    project = find_project(Path.cwd())
+    study = project.studies / "stability" / "study.yaml"
+    results = project.root / "results" / "stability"
+    run_batch(study, options.map, options.regime, results, project.templates, report)
 
 
 def _run(options: argparse.Namespace) -> None:
