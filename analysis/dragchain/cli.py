@@ -57,6 +57,10 @@ def _parser() -> argparse.ArgumentParser:
     report.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
     report.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
     report.set_defaults(action=_report)
+    stability = commands.add_parser("stability", help="write the report on a stability map")
+    stability.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
+    stability.add_argument("lists", type=Path, nargs="+", metavar="POINTS", help="lists of points")
+    stability.set_defaults(action=_stability)
     return parser
 
 
@@ -82,6 +86,12 @@ def _report(options: argparse.Namespace) -> None:
     from dragchain.report import write_report
 
     write_report(options.out, options.run_dirs)
+
+
+def _stability(options: argparse.Namespace) -> None:
+    from dragchain.stability_report import write_stability
+
+    write_stability(options.out, options.lists)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,562 @@
+"""What the runs of a stability map show: numbers from their folders, then classes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from dragchain.case import load_outputs
+from dragchain.critical import (
+    Network,
+    critical_step,
+    damped_share,
+    hertz_stiffness,
+    largest_frequency,
+)
+from dragchain.dumps import iter_frames, iter_prints
+from dragchain.errors import DragchainError, TableError
+from dragchain.formats import Frame
+from dragchain.stability import CONFIDENCE_SCORES, REST_FLOOR, Error, Seen, classify
+from dragchain.stats import estimate_mean
+from dragchain.tables import write_tables
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Numbers = dict[str, float]
+
+SMALL_STEP = 0.4
+"""Steps over the Rayleigh time up to which the heights of settled beds differ by chance."""
+
+LAST_SAMPLES = 50
+"""Samples at the end of a resting bed's run whose mean energy counts: a quarter of them."""
+
+NETWORK_FRAMES = 8
+"""Frames of a drag whose networks are looked at; the stiffest counts."""
+
+
+@dataclass(frozen=True)
+class PointRun:
+    """A point of the list, with its folder."""
+
+    row: Mapping[str, Any]
+    folder: Path
+
+    @property
+    def regime(self) -> str:
+        """Regime of the point."""
+        return str(self.row["regime"])
+
+    @property
+    def case(self) -> dict[str, Any]:
+        """Content of ``case.json``."""
+        return _json(self.folder / "case.json")
+
+
+def _json(file: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    return content
+
+
+def read_points(lists: Sequence[Path]) -> list[PointRun]:
+    """The points of lists that ``dragdeck stability`` wrote.
+
+    Raises
+    ------
+    TableError
+        A list is of another kind.
+    """
+    found = []
+    for file in lists:
+        content = _json(file)
+        if content.get("schema") != 1 or "points" not in content:
+            raise TableError(f"{file}: this is no list of points; make it with dragdeck stability")
+        results = file.parent.parent
+        found += [
+            PointRun(row, results / row["folder"]) for row in content["points"] if "regime" in row
+        ]
+    return found
+
+
+def point_table(points: Sequence[PointRun]) -> pd.DataFrame:
+    """Numbers and class of every point, one row a point."""
+    groups: dict[str, list[PointRun]] = {}
+    for point in points:
+        groups.setdefault(str(point.row["condition"]), []).append(point)
+    rows = [row for group in groups.values() for row in _condition_rows(group)]
+    return pd.DataFrame(rows)
+
+
+def _condition_rows(group: Sequence[PointRun]) -> list[dict[str, Any]]:
+    """Rows of one condition; its reference is measured first."""
+    group = sorted(group, key=lambda point: not point.row["reference"])
+    reference = group[0]
+    numbers = [measure(point) for point in group]
+    static = _static(reference, numbers[0])
+    if numbers[0] is not None and reference.regime == "settle":
+        numbers[0]["height_scatter"] = _height_scatter(group, numbers)
+    return [
+        _point_row(point, numbers[0], static, own)
+        for point, own in zip(group, numbers, strict=True)
+    ]
+
+
+def _height_scatter(group: Sequence[PointRun], numbers: Sequence[Numbers | None]) -> float:
+    """Relative standard deviation of bed heights that differ by chance, from the small steps."""
+    heights = [
+        own["height_m"]
+        for point, own in zip(group, numbers, strict=True)
+        if own is not None and point.row["fraction"] <= SMALL_STEP
+    ]
+    return float(np.std(heights, ddof=1) / np.mean(heights)) if len(heights) > 2 else math.inf
+
+
+def _static(reference: PointRun, own: Numbers | None) -> Numbers:
+    """What belongs to a condition whatever the step: Rayleigh time, critical step."""
+    if not (reference.folder / "case.json").is_file():
+        return {"rayleigh_time_s": math.nan, "critical_step_s": math.nan}
+    frequency = own.get("frequency_rad_s", 0.0) if own else 0.0
+    step = critical_step(frequency)
+    return {
+        "rayleigh_time_s": float(reference.case["rayleigh_time_s"]),
+        "critical_step_s": step if math.isfinite(step) else math.nan,
+    }
+
+
+def _point_row(
+    point: PointRun, reference: Numbers | None, static: Numbers, numbers: Numbers | None
+) -> dict[str, Any]:
+    seen = _seen(point, numbers, reference)
+    kind, why = classify(seen)
+    settings = {f"setting_{name}": value for name, value in point.row["settings"].items()}
+    case = point.case if (point.folder / "case.json").is_file() else {}
+    step = float(case.get("timestep_s", math.nan))
+    contact = case.get("impact", {}).get("contact_time_s", math.nan)
+    return {
+        "regime": point.regime,
+        "condition": point.row["condition"],
+        "axis": point.row["axis"],
+        "label": _label(point.row),
+        "fraction": point.row["fraction"],
+        "reference": point.row["reference"],
+        "state": seen.state,
+        "class": kind,
+        "why": why,
+        "timestep_s": step,
+        **static,
+        "share_of_critical": step / static["critical_step_s"],
+        "damped_share": damped_share(point.row["settings"]["restitution"]),
+        "steps_per_contact": contact / step,
+        "steps": seen.steps,
+        "energy_ratio": _or_nan(seen.energy_ratio),
+        "overlap_ratio": _or_nan(seen.overlap_ratio),
+        **_error_columns(seen.errors),
+        **{name: numbers.get(name, math.nan) if numbers else math.nan for name in _KEPT},
+        **settings,
+        "folder": point.row["folder"],
+    }
+
+
+_KEPT = (
+    *("restitution_mean", "restitution_low", "restitution_high", "peak_force_n"),
+    *("height_m", "peak_energy_j", "rest_energy_ratio", "drag_mean_n", "drag_se_n"),
+    *("energy_after_over_before", "frequency_rad_s"),
+)
+_ERRORS = ("restitution", "peak force", "tangential speed", "height", "mean drag")
+
+
+def _error_columns(errors: Mapping[str, Error]) -> Numbers:
+    found: Numbers = {}
+    for name in _ERRORS:
+        column = name.replace(" ", "_")
+        error = errors.get(name, Error(math.nan, math.nan, math.nan))
+        found[f"{column}_error"] = error.value
+        if name == "mean drag":
+            found |= {f"{column}_error_low": error.low, f"{column}_error_high": error.high}
+    return found
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+_SHOWN = {
+    "youngs_modulus_pa": "E {:g} Pa",
+    "speed_m_s": "{:g} m/s",
+    "restitution": "e {:g}",
+    "friction": "friction {:g}",
+    "size_ratio": "size ratio {:g}",
+    "angle_deg": "{:g} degrees",
+    "load_factor": "load {:g} g",
+    "packing": "{}",
+    "rod_speed_m_s": "tool {:g} m/s",
+}
+
+
+def _label(row: Mapping[str, Any]) -> str:
+    """What sets a condition apart, in words."""
+    changed = row["settings"].items()
+    if row["axis"] not in ("base", "more"):
+        shown = [(row["axis"], row["settings"][row["axis"]])]
+    else:
+        shown = [(name, value) for name, value in changed if row["axis"] == "more"]
+    return ", ".join(_SHOWN[name].format(value) for name, value in shown) or "base point"
+
+
+# --- one run ---------------------------------------------------------------------------------
+
+
+def measure(point: PointRun) -> Numbers | None:
+    """Numbers of a run that ended; None of one that did not."""
+    state = _state(point)
+    if state["state"] != "complete":
+        return None
+    measured = {
+        "impact": _measure_impact,
+        "settle": _measure_settle,
+        "column": _measure_column,
+        "drag": _measure_drag,
+    }[point.regime](point)
+    return measured
+
+
+def _state(point: PointRun) -> dict[str, Any]:
+    file = point.folder / "state.json"
+    if not file.is_file():
+        return {"state": "refused"}
+    state = _json(file)
+    if state["state"] in ("running", "stopped"):
+        raise TableError(
+            f"{point.folder}: this run was interrupted; run `dragdeck stability` once more"
+        )
+    return state
+
+
+def _seen(point: PointRun, numbers: Numbers | None, reference: Numbers | None) -> Seen:
+    """What classifies a point."""
+    state = _state(point)
+    failed = {gate["name"]: gate["seen"] for gate in state.get("gates", []) if not gate["passed"]}
+    parts = state.get("parts", [])
+    energy = _energy_ratio(point.regime, numbers, reference) if numbers else None
+    return Seen(
+        regime=point.regime,
+        state=state["state"],
+        steps=int(parts[-1].get("to_step") or 0) if parts else 0,
+        failed=failed,
+        refused=point.row["refused"],
+        energy_ratio=energy,
+        overlap_ratio=numbers.get("overlap_ratio") if numbers else None,
+        errors=_errors(numbers, reference) if numbers and reference else {},
+    )
+
+
+def _energy_ratio(regime: str, numbers: Numbers, reference: Numbers | None) -> float | None:
+    if regime == "impact":
+        return numbers["energy_ratio"] / max(1.0, reference["energy_ratio"] if reference else 1.0)
+    name = {"settle": "peak_energy_j", "column": "rest_energy_ratio", "drag": "drag_energy_j"}
+    if reference is None:
+        return None
+    allowed = reference[name[regime]]
+    if regime == "column":
+        allowed = max(allowed, REST_FLOOR)
+    return numbers[name[regime]] / allowed
+
+
+def _errors(numbers: Numbers, reference: Numbers) -> dict[str, Error]:
+    """Errors against the reference; of impacts, the largest of all phases counts."""
+    found = {}
+    if "restitution_mean" in numbers:
+        for name, key, relative in (
+            ("restitution", "restitution", False),
+            ("peak force", "peak", True),
+            ("tangential speed", "along", False),
+        ):
+            fine = reference[f"{key}_mean"]
+            scale = fine if relative else 1.0
+            ends = [(numbers[f"{key}_{end}"] - fine) / scale for end in ("low", "high")]
+            worst = max(ends, key=abs)
+            found[name] = Error(worst, worst, worst)
+    if "height_m" in numbers:
+        error = numbers["height_m"] / reference["height_m"] - 1.0
+        half = CONFIDENCE_SCORES * math.sqrt(2.0) * reference.get("height_scatter", 0.0)
+        found["height"] = Error(error, error - half, error + half)
+    if "drag_mean_n" in numbers:
+        fine = abs(reference["drag_mean_n"])
+        error = (numbers["drag_mean_n"] - reference["drag_mean_n"]) / -fine
+        half = CONFIDENCE_SCORES * math.hypot(numbers["drag_se_n"], reference["drag_se_n"]) / fine
+        found["mean drag"] = Error(error, error - half, error + half)
+    return found
+
+
+# --- impacts ---------------------------------------------------------------------------------
+
+
+def _measure_impact(point: PointRun) -> Numbers:
+    case = point.case
+    impact, outputs = case["impact"], load_outputs(point.folder)
+    frames = [_sorted(frame) for frame in iter_frames(point.folder, outputs["balls"])]
+    plate = impact["size_ratio"] == 0.0
+    first, last = frames[0], frames[-1]
+    striking = slice(None) if plate else slice(0, None, 2)
+    velocity = last.vectors("vx_m_s", "vy_m_s", "vz_m_s")
+    speed = velocity if plate else velocity[0::2] - velocity[1::2]
+    before = impact["normal_speed_m_s"]
+    force = np.stack(
+        [
+            np.linalg.norm(frame.vectors("force_x_n", "force_y_n", "force_z_n")[striking], axis=1)
+            for frame in frames
+        ]
+    )
+    overlap = max(float(_impact_overlap(frame, plate).max()) for frame in frames)
+    pairs = 1 if plate else 2
+    energies = [_kinetic(frame, case["media"]["density_kg_m3"]) for frame in (first, last)]
+    gained = energies[1].reshape(-1, pairs).sum(axis=1) / energies[0].reshape(-1, pairs).sum(axis=1)
+    radius = float(first.columns["radius_m"].min())
+    found = {
+        **_spread("restitution", speed[:, 2] / before),
+        **_spread("peak", force.max(axis=0)),
+        **_spread("along", speed[:, 0] / impact["speed_m_s"]),
+        "energy_ratio": float(gained.max()),
+        "overlap_ratio": overlap / radius,
+        "frequency_rad_s": _impact_frequency(case, first, overlap, plate),
+    }
+    return {
+        **found,
+        "peak_force_n": found["peak_mean"],
+        "energy_after_over_before": found["energy_ratio"],
+    }
+
+
+def _spread(name: str, values: Floats) -> Numbers:
+    return {
+        f"{name}_mean": float(values.mean()),
+        f"{name}_low": float(values.min()),
+        f"{name}_high": float(values.max()),
+    }
+
+
+def _sorted(frame: Frame) -> Frame:
+    order = np.argsort(frame.columns["ball_id"])
+    return Frame(frame.step, {name: col[order] for name, col in frame.columns.items()})
+
+
+def _impact_overlap(frame: Frame, plate: bool) -> Floats:
+    centre, radius = frame.vectors("x_m", "y_m", "z_m"), frame.vectors("radius_m")[:, 0]
+    if plate:
+        return np.asarray(radius - centre[:, 2])
+    distance = np.linalg.norm(centre[0::2] - centre[1::2], axis=1)
+    return np.asarray(radius[0::2] + radius[1::2] - distance)
+
+
+def _kinetic(frame: Frame, density: float) -> Floats:
+    """Kinetic energy of each ball, spin included, J."""
+    radius = frame.vectors("radius_m")[:, 0]
+    mass = 4.0 / 3.0 * np.pi * radius**3 * density
+    speed = (frame.vectors("vx_m_s", "vy_m_s", "vz_m_s") ** 2).sum(axis=1)
+    spin = (frame.vectors("wx_rad_s", "wy_rad_s", "wz_rad_s") ** 2).sum(axis=1)
+    return np.asarray(0.5 * mass * (speed + 0.4 * radius**2 * spin))
+
+
+def _impact_frequency(case: Mapping[str, Any], frame: Frame, overlap: float, plate: bool) -> float:
+    """Of the contact at its largest overlap."""
+    bodies = 1 if plate else 2
+    radius = frame.vectors("radius_m")[:bodies, 0]
+    modulus, shear = _moduli(case, "media", "media")
+    effective = np.array([case["impact"]["effective_radius_m"]])
+    normal, tangential = hertz_stiffness(
+        np.array([overlap]), effective, np.array([modulus]), np.array([shear])
+    )
+    return largest_frequency(
+        Network(
+            radius_m=radius,
+            mass_kg=4.0 / 3.0 * np.pi * radius**3 * case["media"]["density_kg_m3"],
+            a=np.array([0]),
+            b=np.array([-1 if plate else 1]),
+            normal=np.array([[0.0, 0.0, -1.0]]),
+            normal_stiffness_n_m=normal,
+            tangential_stiffness_n_m=tangential if case_friction(case) > 0 else 0.0 * tangential,
+        )
+    )
+
+
+def case_friction(case: Mapping[str, Any]) -> float:
+    """Largest friction of a case's pairs."""
+    found = [
+        float(value)
+        for name, value in case["inputs"].items()
+        if name.startswith("pairs.") and name.endswith(".friction")
+    ]
+    return max(found)
+
+
+def _moduli(case: Mapping[str, Any], first: str, second: str) -> tuple[float, float]:
+    """Effective moduli E* and G* of two owners' materials, Pa (Johnson 1985; Mindlin 1949)."""
+    inputs, scale = case["inputs"], case["fidelity"]["youngs_modulus_scale"]
+    compliance = shear = 0.0
+    for owner in (first, second):
+        name = inputs[f"{owner}.material"]
+        young = scale * inputs[f"materials.{name}.youngs_modulus_pa"]
+        poisson = inputs[f"materials.{name}.poissons_ratio"]
+        compliance += (1 - poisson**2) / young
+        shear += 2 * (2 - poisson) * (1 + poisson) / young
+    return 1 / compliance, 1 / shear
+
+
+# --- beds ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Contacts:
+    """Contacts of a bed; ``b`` is -1 for bowl and tool."""
+
+    a: Ints
+    b: Ints
+    normal: Floats
+    overlap: Floats
+
+
+def _touching(centre: Floats, radius: Floats, bowl_radius: float) -> _Contacts:
+    """Overlaps of balls with each other, the floor and the side, from where they are."""
+    tree = KDTree(centre)
+    pairs = tree.query_pairs(2.0 * float(radius.max()), output_type="ndarray").astype(np.int64)
+    away = centre[pairs[:, 1]] - centre[pairs[:, 0]]
+    distance = np.linalg.norm(away, axis=1)
+    overlap = radius[pairs].sum(axis=1) - distance
+    hit = overlap > 0.0
+    across = np.linalg.norm(centre[:, :2], axis=1)
+    side = radius - (bowl_radius - across)
+    floor = radius - centre[:, 2]
+    at_side, at_floor = np.flatnonzero(side > 0.0), np.flatnonzero(floor > 0.0)
+    outward = np.zeros((len(at_side), 3))
+    outward[:, :2] = centre[at_side, :2] / across[at_side, None]
+    down = np.tile([0.0, 0.0, -1.0], (len(at_floor), 1))
+    walls = np.full(len(at_side) + len(at_floor), -1)
+    return _Contacts(
+        np.concatenate([pairs[hit, 0], at_side, at_floor]),
+        np.concatenate([pairs[hit, 1], walls]),
+        np.concatenate([away[hit] / distance[hit, None], outward, down]),
+        np.concatenate([overlap[hit], side[at_side], floor[at_floor]]),
+    )
+
+
+def _bed_network(case: Mapping[str, Any], radius: Floats, contacts: _Contacts) -> Network:
+    ball = _moduli(case, "media", "media")
+    wall = _moduli(case, "media", "bowl")  # the tool is of the bowl's material
+    at_wall = contacts.b < 0
+    other = np.where(at_wall, 0, contacts.b)
+    own = radius[contacts.a]
+    effective = np.where(at_wall, own, own * radius[other] / (own + radius[other]))
+    modulus, shear = (np.where(at_wall, wall[k], ball[k]) for k in (0, 1))
+    normal, tangential = hertz_stiffness(contacts.overlap, effective, modulus, shear)
+    return Network(
+        radius_m=radius,
+        mass_kg=4.0 / 3.0 * np.pi * radius**3 * case["media"]["density_kg_m3"],
+        a=contacts.a,
+        b=contacts.b,
+        normal=contacts.normal,
+        normal_stiffness_n_m=normal,
+        tangential_stiffness_n_m=tangential if case_friction(case) > 0 else 0.0 * tangential,
+    )
+
+
+def _thermo(folder: Path) -> dict[str, Floats]:
+    blocks = list(iter_prints(folder, load_outputs(folder)["thermo"]))
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+
+
+def _energy(rows: Mapping[str, Floats]) -> Floats:
+    return np.asarray(rows["kinetic_energy_j"] + rows["rotational_energy_j"])
+
+
+def _frame_numbers(case: Mapping[str, Any], frame: Frame) -> Numbers:
+    """Overlap and frequency of a bed of balls in a bowl."""
+    centre, radius = frame.vectors("x_m", "y_m", "z_m"), frame.vectors("radius_m")[:, 0]
+    contacts = _touching(centre, radius, case["bowl"]["radius_m"])
+    network = _bed_network(case, radius, contacts)
+    return {
+        "overlap_ratio": float((contacts.overlap / radius[contacts.a]).max(initial=0.0)),
+        "frequency_rad_s": largest_frequency(network),
+    }
+
+
+def _measure_settle(point: PointRun) -> Numbers:
+    case, outputs = point.case, load_outputs(point.folder)
+    *_, last = iter_frames(point.folder, outputs["balls"])
+    return {
+        **_frame_numbers(case, last),
+        "height_m": float(last.columns["z_m"].mean()),
+        "peak_energy_j": float(_energy(_thermo(point.folder)).max()),
+    }
+
+
+def _measure_column(point: PointRun) -> Numbers:
+    case, outputs = point.case, load_outputs(point.folder)
+    first, *_, last = iter_frames(point.folder, outputs["balls"])
+    media = case["media"]
+    mass = 4.0 / 3.0 * np.pi * media["radius_mean_m"] ** 3 * media["density_kg_m3"]
+    unit = media["count"] * mass * case["gravity_m_s2"] * 2.0 * media["radius_mean_m"]
+    return {
+        **_frame_numbers(case, first),
+        "height_m": float(last.columns["z_m"].mean()),
+        "rest_energy_ratio": float(_energy(_thermo(point.folder))[-LAST_SAMPLES:].mean()) / unit,
+    }
+
+
+def _measure_drag(point: PointRun) -> Numbers:
+    tables = point.folder / "tables"
+    if not (tables / "contacts.parquet").is_file():
+        try:
+            write_tables(point.folder)
+        except DragchainError as error:
+            raise TableError(f"{point.folder}: {error}") from error
+    force = pd.read_parquet(tables / "rod_force.parquet", columns=["drag_n", "counted"])
+    drag = estimate_mean(force.loc[force["counted"], "drag_n"].to_numpy())
+    start = point.case["phases"][-1]["start_step"]
+    thermo = _thermo(point.folder)
+    during = thermo["step"] > start
+    return {
+        **_drag_network(point),
+        "drag_mean_n": drag.mean,
+        "drag_se_n": drag.standard_error,
+        "drag_energy_j": float(_energy(thermo)[during].mean()),
+    }
+
+
+def _drag_network(point: PointRun) -> Numbers:
+    tables, case = point.folder / "tables", point.case
+    balls = pd.read_parquet(tables / "balls.parquet")
+    rows = pd.read_parquet(tables / "contacts.parquet")
+    steps = rows["step"].unique()
+    some = steps[np.linspace(0, len(steps) - 1, min(len(steps), NETWORK_FRAMES)).astype(int)]
+    radius = balls.groupby("ball_id")["radius_m"].first()
+    overlap = rows["overlap_m"].to_numpy() / radius.loc[rows["a_id"]].to_numpy()
+    frequency = max(
+        largest_frequency(_frame_network(case, balls, rows, int(step)))
+        for step in (some if point.row["reference"] else some[:1])
+    )
+    return {"overlap_ratio": float(overlap.max()), "frequency_rad_s": frequency}
+
+
+def _frame_network(
+    case: Mapping[str, Any], balls: pd.DataFrame, rows: pd.DataFrame, step: int
+) -> Network:
+    """Network of one frame of a drag, from the engine's contact output."""
+    balls = balls[balls["step"] == step].sort_values("ball_id")
+    rows = rows[(rows["step"] == step) & (rows["overlap_m"] > 0.0)]
+    ids = balls["ball_id"].to_numpy()
+    centre = balls[["x_m", "y_m", "z_m"]].to_numpy(np.float64)
+    a = np.searchsorted(ids, rows["a_id"].to_numpy())
+    to_ball = rows["b_id"].to_numpy() > 0
+    b = np.where(to_ball, np.searchsorted(ids, rows["b_id"].to_numpy()), -1)
+    towards = rows[["point_x_m", "point_y_m", "point_z_m"]].to_numpy(np.float64) - centre[a]
+    normal = towards / np.linalg.norm(towards, axis=1, keepdims=True)
+    contacts = _Contacts(a, b, normal, rows["overlap_m"].to_numpy(np.float64))
+    return _bed_network(case, balls["radius_m"].to_numpy(np.float64), contacts)
