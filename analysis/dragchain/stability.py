@@ -24,11 +24,11 @@ OVERLAP_LIMIT = 0.1
 small beside R (Johnson 1985, section 4.2); the overlap is a^2/R, so 0.1 is a/R = 0.32. An
 assumption: no sharp limit is known."""
 
-ENERGY_LIMITS: Mapping[str, float] = {"impact": 1.01, "settle": 1.2, "column": 10.0, "drag": 2.0}
+ENERGY_LIMITS: Mapping[str, float] = {"impact": 1.01, "settle": 1.2, "column": 10.0, "drag": 10.0}
 """Largest ratio of energies of a run that gains none: after an impact over before, or over
 what the reference has after it where the contact law itself gains; the settling
 bed's largest over the reference's; the resting bed's at the end over the reference's (or over
-`REST_FLOOR`); the dragged bed's mean over the reference's. Assumptions, above the scatter that
+`REST_FLOOR`); the dragged bed's median over the reference's. Assumptions, above the scatter that
 runs with small steps show."""
 
 REST_FLOOR = 1e-7

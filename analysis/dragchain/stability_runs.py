@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from dragchain.case import load_outputs
+from dragchain.contacts import contact_rows
 from dragchain.critical import (
     Network,
     critical_step,
@@ -23,11 +24,13 @@ from dragchain.critical import (
     largest_frequency,
 )
 from dragchain.dumps import iter_frames, iter_prints
-from dragchain.errors import DragchainError, TableError
+from dragchain.errors import TableError
+from dragchain.forces import drag_phase, needed
 from dragchain.formats import Frame
+from dragchain.rod import RodFrame, iter_rod_frames
 from dragchain.stability import CONFIDENCE_SCORES, REST_FLOOR, Error, Seen, classify
 from dragchain.stats import estimate_mean
-from dragchain.tables import write_tables
+from dragchain.tables import Run, rod_force_rows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -215,9 +218,13 @@ def _label(row: Mapping[str, Any]) -> str:
 
 
 def measure(point: PointRun) -> Numbers | None:
-    """Numbers of a run that ended; None of one that did not."""
+    """Numbers of a run that ended; None of one that did not.
+
+    A run that only built its neighbour lists too late has numbers too: its energy counts.
+    """
     state = _state(point)
-    if state["state"] != "complete":
+    failed = {gate["name"] for gate in state.get("gates", []) if not gate["passed"]}
+    if state["state"] != "complete" and failed != {"no dangerous neighbour builds"}:
         return None
     measured = {
         "impact": _measure_impact,
@@ -511,52 +518,53 @@ def _measure_column(point: PointRun) -> Numbers:
 
 
 def _measure_drag(point: PointRun) -> Numbers:
-    tables = point.folder / "tables"
-    if not (tables / "contacts.parquet").is_file():
-        try:
-            write_tables(point.folder)
-        except DragchainError as error:
-            raise TableError(f"{point.folder}: {error}") from error
-    force = pd.read_parquet(tables / "rod_force.parquet", columns=["drag_n", "counted"])
-    drag = estimate_mean(force.loc[force["counted"], "drag_n"].to_numpy())
-    start = point.case["phases"][-1]["start_step"]
+    run = Run.open(point.folder)
+    blocks = [rod_force_rows(rows, run.case) for rows in run.prints("rod_force")]
+    drag, counted = (
+        np.concatenate([np.asarray(block[name]) for block in blocks])
+        for name in ("drag_n", "counted")
+    )
+    mean = estimate_mean(drag[counted])
     thermo = _thermo(point.folder)
-    during = thermo["step"] > start
+    during = thermo["step"] > drag_phase(run.case).start_step
     return {
-        **_drag_network(point),
-        "drag_mean_n": drag.mean,
-        "drag_se_n": drag.standard_error,
-        "drag_energy_j": float(_energy(thermo)[during].mean()),
+        **_drag_network(point, run),
+        "drag_mean_n": mean.mean,
+        "drag_se_n": mean.standard_error if mean.reliable else math.inf,
+        "drag_energy_j": float(np.median(_energy(thermo)[during])),
     }
 
 
-def _drag_network(point: PointRun) -> Numbers:
-    tables, case = point.folder / "tables", point.case
-    balls = pd.read_parquet(tables / "balls.parquet")
-    rows = pd.read_parquet(tables / "contacts.parquet")
-    steps = rows["step"].unique()
-    some = steps[np.linspace(0, len(steps) - 1, min(len(steps), NETWORK_FRAMES)).astype(int)]
-    radius = balls.groupby("ball_id")["radius_m"].first()
-    overlap = rows["overlap_m"].to_numpy() / radius.loc[rows["a_id"]].to_numpy()
-    frequency = max(
-        largest_frequency(_frame_network(case, balls, rows, int(step)))
-        for step in (some if point.row["reference"] else some[:1])
-    )
-    return {"overlap_ratio": float(overlap.max()), "frequency_rad_s": frequency}
+def _drag_network(point: PointRun, run: Run) -> Numbers:
+    """Largest overlap of the drag, and frequency of the stiffest of some frames."""
+    balls = {frame.step: frame for frame in run.frames("balls")}
+    pairs = {frame.step: frame for frame in run.frames("contacts")}
+    steps = np.array(sorted(pairs))
+    every = steps[np.linspace(0, len(steps) - 1, min(len(steps), NETWORK_FRAMES)).astype(int)]
+    some = set(every.tolist() if point.row["reference"] else every[:1].tolist())
+    largest = frequency = 0.0
+    for rod in iter_rod_frames(run.folder, run.outputs):
+        if rod.step not in pairs:
+            continue
+        frame = _sorted(balls[rod.step])
+        radius = frame.vectors("radius_m")[:, 0]
+        contacts = _engine_contacts(frame, pairs[rod.step], rod, run)
+        own = contacts.overlap / radius[contacts.a]
+        largest = max(largest, float(own.max(initial=0.0)))
+        if rod.step in some:
+            network = _bed_network(point.case, radius, contacts)
+            frequency = max(frequency, largest_frequency(network))
+    return {"overlap_ratio": largest, "frequency_rad_s": frequency}
 
 
-def _frame_network(
-    case: Mapping[str, Any], balls: pd.DataFrame, rows: pd.DataFrame, step: int
-) -> Network:
-    """Network of one frame of a drag, from the engine's contact output."""
-    balls = balls[balls["step"] == step].sort_values("ball_id")
-    rows = rows[(rows["step"] == step) & (rows["overlap_m"] > 0.0)]
-    ids = balls["ball_id"].to_numpy()
-    centre = balls[["x_m", "y_m", "z_m"]].to_numpy(np.float64)
-    a = np.searchsorted(ids, rows["a_id"].to_numpy())
-    to_ball = rows["b_id"].to_numpy() > 0
-    b = np.where(to_ball, np.searchsorted(ids, rows["b_id"].to_numpy()), -1)
-    towards = rows[["point_x_m", "point_y_m", "point_z_m"]].to_numpy(np.float64) - centre[a]
+def _engine_contacts(frame: Frame, pairs: Frame, rod: RodFrame, run: Run) -> _Contacts:
+    """The contacts of one frame as the engine wrote them, with bowl and tool."""
+    bowl_radius = needed(run.case.bowl, "bowl").radius_m
+    rows = contact_rows(frame, pairs, rod.rod, rod.bowl, bowl_radius)
+    ids = np.asarray(frame.columns["ball_id"], dtype=np.int64)
+    a = np.searchsorted(ids, rows.a_id)
+    b = np.where(rows.b_id > 0, np.searchsorted(ids, rows.b_id), -1)
+    towards = rows.point_m - frame.vectors("x_m", "y_m", "z_m")[a]
     normal = towards / np.linalg.norm(towards, axis=1, keepdims=True)
-    contacts = _Contacts(a, b, normal, rows["overlap_m"].to_numpy(np.float64))
-    return _bed_network(case, balls["radius_m"].to_numpy(np.float64), contacts)
+    hit = rows.overlap_m > 0.0
+    return _Contacts(a[hit], b[hit], normal[hit], rows.overlap_m[hit])

@@ -38,7 +38,7 @@ BED_ENERGY_RATIO = 1e-4
 SAFE_FILL_FRACTION = 0.1
 """Step over the Rayleigh time of the beds that drags and columns start from."""
 
-DRAG_S, SHORTEST_DRAG_M, LONGEST_DRAG_REVOLUTIONS = 0.4, 0.002, 2.0
+DRAG_S, SHORTEST_DRAG_M, LONGEST_DRAG_REVOLUTIONS = 1.0, 0.005, 2.0
 """A drag lasts this long, but goes this far at the least and at the most."""
 
 RUN_IN_SHARE = 0.2
