@@ -11,6 +11,7 @@ include: "workflow/rules/simulate.smk"
 include: "workflow/rules/tables.smk"
 include: "workflow/rules/network.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/stability.smk"
 
 
 localrules:
@@ -19,6 +20,7 @@ localrules:
     fill,
     process,
     report,
+    stability,
 
 
 # The whole study: runs, tables, chains, figures and the report.
@@ -52,3 +54,9 @@ rule process:
 rule report:
     input:
         rules.write_report.output,
+
+
+# The map of stable and unstable time steps.
+rule stability:
+    input:
+        rules.write_stability.output,

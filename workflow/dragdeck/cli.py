@@ -74,15 +74,19 @@ def scene_of(case: Case, scene: SceneName, bed: Bed | None = None) -> Scene:
 def _check(options: argparse.Namespace) -> None:
     from dragdeck.engine import find_engine
     from dragdeck.render import deck_text, environment
+    from dragdeck.stability import notes
 
     project = find_project(Path.cwd())
     cases = project.cases(options.study, options.fidelity)
     templates = environment(project.templates, study_templates(cases[0]))
     warnings: dict[str, None] = {}
     for name in SCENES:
-        for case in by_run(cases, name).values():
+        for run_id, case in by_run(cases, name).items():
             scene = scene_of(case, name)
             deck_text(scene, templates)
+            print(f"{name} {run_id}: time step {scene.deck.timestep_s:.3g} s")
+            for what, text in notes(case, name, scene):
+                print(f"  {what}: {text}")
             warnings.update(dict.fromkeys(f"{case.name}: {text}" for text in scene.warnings))
     for warning in warnings:
         print(f"warning: {warning}")
@@ -91,13 +95,18 @@ def _check(options: argparse.Namespace) -> None:
 
 def _explain(options: argparse.Namespace) -> None:
     from dragdeck.explain import expected_cost, explanation, show
+    from dragdeck.stability import notes
 
     project = find_project(Path.cwd())
     cases = project.cases(options.study, options.fidelity)
     names: tuple[SceneName, ...] = (options.scene,) if options.scene else SCENES
-    scenes = [scene_of(case, name) for name in names for case in by_run(cases, name).values()]
+    runs = [(case, name) for name in names for case in by_run(cases, name).values()]
     results = project.root / "results" / options.study
-    show(explanation(scene, expected_cost(scene, results / scene.deck.scene)) for scene in scenes)
+    scenes = ((case, name, scene_of(case, name)) for case, name in runs)
+    show(
+        explanation(scene, expected_cost(scene, results / name), notes(case, name, scene))
+        for case, name, scene in scenes
+    )
 
 
 def _cases(options: argparse.Namespace) -> None:
