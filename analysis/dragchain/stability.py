@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 STABLE, INACCURATE, ENERGY = "stable", "inaccurate", "energy gained"
 LOST, OVERLAP, REFUSED = "balls lost", "overlap too large", "engine refused"
@@ -28,7 +29,8 @@ ENERGY_LIMITS: Mapping[str, float] = {"impact": 1.01, "settle": 1.2, "column": 1
 """Largest ratio of energies of a run that gains none: after an impact over before, or over
 what the reference has after it where the contact law itself gains; the settling
 bed's largest over the reference's; the resting bed's at the end over the reference's (or over
-`REST_FLOOR`); the dragged bed's median over the reference's. Assumptions, above the scatter that
+`REST_FLOOR`); the dragged bed's median over what it has if all balls move as
+the tool and one as in a fall through its diameter. Assumptions, above the scatter that
 runs with small steps show."""
 
 REST_FLOOR = 1e-7
@@ -194,7 +196,8 @@ def safe_fraction(points: pd.DataFrame, bad: Sequence[str]) -> float | None:
     return found
 
 
-NOT_SAFE = (INACCURATE, *UNSTABLE, OVERLAP, REFUSED)
+NOT_SAFE = (INACCURATE, *UNSTABLE, REFUSED)
+"""A large overlap comes from load and stiffness, not from the step: it limits no step."""
 
 
 def conditions(points: pd.DataFrame) -> pd.DataFrame:
@@ -204,7 +207,7 @@ def conditions(points: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         ``regime condition axis label usable`` (whether its reference is stable, so that a safe
-        step can be asked for), ``safe_fraction`` (no class but stable up to it),
+        step can be asked for), ``safe_fraction`` (no class of `NOT_SAFE` up to it),
         ``stable_fraction`` (no energy gained and no balls lost up to it), both over the Rayleigh
         time, the same over the critical step (``..._critical``), ``grid_end`` (whether the
         largest step of the grid is the safe one, so the limit lies above), ``restitution``.
@@ -316,8 +319,9 @@ def error_table(points: pd.DataFrame) -> dict[str, list[float]]:
     Returns
     -------
     dict of str to list of float
-        ``steps_per_contact`` (geometric mean of a bin), ``median`` and ``worst`` of the largest
-        error among a run's impacts, ``peak_force_worst``, ``runs``.
+        ``steps_per_contact`` (geometric mean of a bin), ``median`` of the largest error among a
+        run's impacts, ``worst`` of the bin and of all with more steps, ``ordinary_worst`` (the same
+        where the restitution is at least `ORDINARY_RESTITUTION`), ``peak_force_worst``, ``runs``.
     """
     references = points[points["reference"] & (points["class"] == STABLE)]
     chosen = points[
@@ -329,18 +333,24 @@ def error_table(points: pd.DataFrame) -> dict[str, list[float]]:
     ]
     steps = chosen["steps_per_contact"].to_numpy()
     bins = np.floor(np.log10(steps) * ERROR_BINS_PER_DECADE).astype(int)
-    table: dict[str, list[float]] = {
-        name: [] for name in ("steps_per_contact", "median", "worst", "peak_force_worst", "runs")
+    ordinary = (chosen["setting_restitution"] >= ORDINARY_RESTITUTION).to_numpy()
+    groups = [bins == number for number in np.unique(bins)]
+    errors = chosen["restitution_error"].abs().to_numpy()
+    forces = chosen["peak_force_error"].abs().to_numpy()
+    return {
+        "steps_per_contact": [_round(np.exp(np.log(steps[own]).mean())) for own in groups],
+        "median": [_round(np.median(errors[own])) for own in groups],
+        "ordinary_worst": _envelope(errors, [own & ordinary for own in groups]),
+        "worst": _envelope(errors, groups),
+        "peak_force_worst": _envelope(forces, groups),
+        "runs": [int(own.sum()) for own in groups],
     }
-    for number in np.unique(bins):
-        inside = chosen[bins == number]
-        errors = inside["restitution_error"].abs()
-        table["steps_per_contact"].append(_round(np.exp(np.log(steps[bins == number]).mean())))
-        table["median"].append(_round(errors.median()))
-        table["worst"].append(_round(errors.max()))
-        table["peak_force_worst"].append(_round(inside["peak_force_error"].abs().max()))
-        table["runs"].append(len(inside))
-    return table
+
+
+def _envelope(values: NDArray[np.float64], groups: Sequence[NDArray[np.bool_]]) -> list[float]:
+    """Largest value of each group and of all after it: more steps never make it larger."""
+    largest = [values[own].max(initial=0.0) for own in groups]
+    return [_round(value) for value in np.maximum.accumulate(largest[::-1])[::-1]]
 
 
 def _round(value: float) -> float:

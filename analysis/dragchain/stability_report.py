@@ -173,9 +173,9 @@ def _map(points: pd.DataFrame, found: pd.DataFrame, regime: str) -> Figure:
     axes.set_xlim(-0.5, len(steps) - 0.5)
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xticks(range(len(steps)), [f"{100 * step:g}" for step in steps])
-    axes.set_yticks(range(len(rows)), [_short(row) for _, row in rows.iterrows()], fontsize=7.5)
+    axes.set_yticks(range(len(rows)), rows["label"].tolist(), fontsize=7.5)
     axes.set_xlabel("time step in % of the Rayleigh time of the smallest ball")
-    axes.set_title(TITLES[regime])
+    figure.suptitle(TITLES[regime], x=0.01, ha="left", fontsize=9.5)
     axes.grid(False)
     axes.tick_params(length=0)
     _legend(figure, own)
@@ -197,13 +197,6 @@ def _mark_critical(axes: Axes, line: int, row: pd.Series[Any], steps: np.ndarray
         if math.isfinite(at) and steps[0] <= at <= steps[-1]:
             x = float(np.interp(math.log(at), np.log(steps), place))
             axes.plot([x, x], [line - 0.44, line + 0.44], style, color="#1d2733", lw=1.6)
-
-
-def _short(row: pd.Series[Any]) -> str:
-    label = str(row["label"])
-    return (
-        label if len(label) < 48 else label.replace(", size ratio 0", "").replace(", 0 degrees", "")
-    )
 
 
 def _legend(figure: Figure, own: pd.DataFrame) -> None:
@@ -239,8 +232,9 @@ def _errors(points: pd.DataFrame, table: Mapping[str, Sequence[float]]) -> Figur
         vmax=1.0,
     )
     steps = table["steps_per_contact"]
-    axes.plot(steps, table["worst"], color="#D55E00", label="largest of a bin")
-    axes.plot(steps, table["median"], color="#1d2733", label="median of a bin")
+    axes.plot(steps, table["worst"], color="#D55E00", label="largest, any restitution")
+    axes.plot(steps, table["ordinary_worst"], color="#0072B2", label="largest, e of 0.5 or more")
+    axes.plot(steps, table["median"], color="#1d2733", label="median")
     axes.axhline(stability.TOLERANCE, color="#6b7480", ls="--", lw=1, label="tolerance of the map")
     axes.set(xscale="log", yscale="log", ylim=(5e-6, 10))
     axes.set_xlabel("steps per contact (elastic Hertz contact time over time step)")
@@ -288,7 +282,7 @@ CAPTIONS = {
     "loaded contacts before the step under test begins.",
     "map_drag": "The critical step is that of the stiffest of up to eight frames of the drag.",
     "restitution_error": "Head-on impacts of all conditions with a stable reference. The table of "
-    "`dragdeck check` is the line of the largest errors.",
+    "dragdeck check is the two lines of the largest errors.",
     "share_of_critical": "Left: against the Rayleigh time, with the 20 % rule. Right: against the "
     "critical step of the contact network. A line of dots is a condition.",
 }

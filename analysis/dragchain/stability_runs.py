@@ -94,11 +94,14 @@ def point_table(points: Sequence[PointRun]) -> pd.DataFrame:
     groups: dict[str, list[PointRun]] = {}
     for point in points:
         groups.setdefault(str(point.row["condition"]), []).append(point)
-    rows = [row for group in groups.values() for row in _condition_rows(group)]
+    bases = {point.regime: point.row["settings"] for point in points if point.row["axis"] == "base"}
+    rows = [row for group in groups.values() for row in _condition_rows(group, bases)]
     return pd.DataFrame(rows)
 
 
-def _condition_rows(group: Sequence[PointRun]) -> list[dict[str, Any]]:
+def _condition_rows(
+    group: Sequence[PointRun], bases: Mapping[str, Mapping[str, Any]]
+) -> list[dict[str, Any]]:
     """Rows of one condition; its reference is measured first."""
     group = sorted(group, key=lambda point: not point.row["reference"])
     reference = group[0]
@@ -107,7 +110,10 @@ def _condition_rows(group: Sequence[PointRun]) -> list[dict[str, Any]]:
     if numbers[0] is not None and reference.regime == "settle":
         numbers[0]["height_scatter"] = _height_scatter(group, numbers)
     return [
-        _point_row(point, numbers[0], static, own)
+        {
+            **_point_row(point, numbers[0], static, own),
+            "label": _label(point.row, bases.get(point.regime, {})),
+        }
         for point, own in zip(group, numbers, strict=True)
     ]
 
@@ -147,7 +153,7 @@ def _point_row(
         "regime": point.regime,
         "condition": point.row["condition"],
         "axis": point.row["axis"],
-        "label": _label(point.row),
+        "label": "",
         "fraction": point.row["fraction"],
         "reference": point.row["reference"],
         "state": seen.state,
@@ -204,14 +210,14 @@ _SHOWN = {
 }
 
 
-def _label(row: Mapping[str, Any]) -> str:
-    """What sets a condition apart, in words."""
-    changed = row["settings"].items()
-    if row["axis"] not in ("base", "more"):
-        shown = [(row["axis"], row["settings"][row["axis"]])]
-    else:
-        shown = [(name, value) for name, value in changed if row["axis"] == "more"]
-    return ", ".join(_SHOWN[name].format(value) for name, value in shown) or "base point"
+def _label(row: Mapping[str, Any], base: Mapping[str, Any]) -> str:
+    """What sets a condition apart from the base point, in words."""
+    shown = [
+        _SHOWN[name].format(value)
+        for name, value in row["settings"].items()
+        if value != base.get(name) or name == row["axis"]
+    ]
+    return ", ".join(shown) or "base point"
 
 
 # --- one run ---------------------------------------------------------------------------------
@@ -268,7 +274,9 @@ def _seen(point: PointRun, numbers: Numbers | None, reference: Numbers | None) -
 def _energy_ratio(regime: str, numbers: Numbers, reference: Numbers | None) -> float | None:
     if regime == "impact":
         return numbers["energy_ratio"] / max(1.0, reference["energy_ratio"] if reference else 1.0)
-    name = {"settle": "peak_energy_j", "column": "rest_energy_ratio", "drag": "drag_energy_j"}
+    if regime == "drag":
+        return numbers["drag_energy_ratio"]
+    name = {"settle": "peak_energy_j", "column": "rest_energy_ratio"}
     if reference is None:
         return None
     allowed = reference[name[regime]]
@@ -525,13 +533,18 @@ def _measure_drag(point: PointRun) -> Numbers:
         for name in ("drag_n", "counted")
     )
     mean = estimate_mean(drag[counted])
+    media, speed = run.case.media, point.row["settings"]["rod_speed_m_s"]
+    mass = 4.0 / 3.0 * np.pi * media.radius_mean_m**3 * media.density_kg_m3
+    thrown = mass * run.case.gravity_m_s2 * 2.0 * media.radius_mean_m
+    moving = media.count * 0.5 * mass * speed**2
     thermo = _thermo(point.folder)
     during = thermo["step"] > drag_phase(run.case).start_step
+    motion = thermo["kinetic_energy_j"]  # nothing damps a spin about a contact's normal
     return {
         **_drag_network(point, run),
         "drag_mean_n": mean.mean,
         "drag_se_n": mean.standard_error if mean.reliable else math.inf,
-        "drag_energy_j": float(np.median(_energy(thermo)[during])),
+        "drag_energy_ratio": float(np.median(motion[during])) / (moving + thrown),
     }
 
 

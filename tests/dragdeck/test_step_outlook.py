@@ -22,7 +22,11 @@ from dragdeck.stability import expected_error, measured, outlook, safe_share
 from dragdeck.stability_map import load_points, point_case
 
 MAP = ROOT / "studies" / "stability" / "map.yaml"
-TABLE = {"steps_per_contact": [5.0, 50.0], "worst": [1e-1, 1e-3]}
+TABLE = {
+    "steps_per_contact": [5.0, 50.0],
+    "worst": [3e-1, 3e-3],
+    "ordinary_worst": [1e-1, 1e-3],
+}
 
 
 @pytest.mark.parametrize(
@@ -33,9 +37,10 @@ TABLE = {"steps_per_contact": [5.0, 50.0], "worst": [1e-1, 1e-3]}
 def test_errors_are_interpolated_on_logarithmic_scales(
     steps: float, error: float, inside: bool
 ) -> None:
-    found = expected_error(steps, TABLE)
+    found = expected_error(steps, 0.9, TABLE)
     assert found.value == pytest.approx(error, rel=1e-9)
     assert found.measured is inside
+    assert expected_error(steps, 0.2, TABLE).value == pytest.approx(3 * error, rel=1e-9)
 
 
 def test_the_measured_table_is_of_a_real_map() -> None:

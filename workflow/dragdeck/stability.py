@@ -94,17 +94,23 @@ def measured() -> dict[str, Any]:
     return found
 
 
-def expected_error(steps: float, table: Mapping[str, Sequence[float]]) -> Expected:
+def expected_error(
+    steps: float, restitution: float, table: Mapping[str, Sequence[float]]
+) -> Expected:
     """Error of the restitution at a number of steps per contact.
 
     Parameters
     ----------
     steps : float
+    restitution : float
+        From `ORDINARY_RESTITUTION` on, the errors of such impacts count.
     table : mapping
-        ``steps_per_contact``, rising, and the ``worst`` errors seen there.
-        Between them the error is interpolated on logarithmic scales.
+        ``steps_per_contact``, rising, and the errors seen there, ``worst`` and
+        ``ordinary_worst``. Between them the error is interpolated on
+        logarithmic scales.
     """
-    known, errors = table["steps_per_contact"], table["worst"]
+    ordinary = restitution >= ORDINARY_RESTITUTION
+    known, errors = table["steps_per_contact"], table["ordinary_worst" if ordinary else "worst"]
     if steps <= known[0] or steps >= known[-1]:
         end = 0 if steps <= known[0] else -1
         return Expected(errors[end], steps == known[end])
@@ -188,13 +194,14 @@ def _pair(
     modulus = effective_modulus(ball, partner, scale)
     contact = hertz_contact_time(share * mass, share * radius, modulus, speed)
     steps = contact / timestep_s
+    pair = study.pair(study.media.material, other)
     return PairOutlook(
         bodies=f"ball on {name}",
         limiting=limiting,
         rayleigh_share=timestep_s / times[limiting],
         speed_m_s=speed,
         steps_per_contact=steps,
-        error=expected_error(steps, measured()["restitution_error"]),
+        error=expected_error(steps, pair.restitution, measured()["restitution_error"]),
     )
 
 
