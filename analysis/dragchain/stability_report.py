@@ -24,7 +24,7 @@ from dragchain import stability
 from dragchain.figures import STYLE, WIDTH_IN, png
 from dragchain.frames import write_parquet
 from dragchain.parquet import write_json
-from dragchain.report import data_uri, measured
+from dragchain.report import data_uri
 from dragchain.stability import (
     CLASSES,
     ENERGY,
@@ -301,7 +301,7 @@ def render(
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["measured"] = measured
+    environment.filters["short"] = "{:.3g}".format
     source = resources.files("dragchain").joinpath("stability.html.j2").read_text(encoding="utf-8")
     table = summary["restitution_error"]
     return environment.from_string(source).render(
