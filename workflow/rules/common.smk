@@ -100,8 +100,8 @@ def of_every_run(wildcards):
 
 def stability_templates():
     """Every template that a deck of the stability map could use."""
-    files = template_files(PROJECT.templates, None)
-    return [str(path.relative_to(PROJECT.root)) for path in files]
+    files = sorted(PROJECT.templates.glob("*.j2"))
+    return [str(file.relative_to(PROJECT.root)) for file in files]
 
 
 def beds_of_regime(wildcards):
