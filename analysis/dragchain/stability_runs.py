@@ -59,6 +59,11 @@ class PointRun:
         return str(self.row["regime"])
 
     @property
+    def sticks(self) -> bool:
+        """Whether its contacts have friction, and so a tangential stiffness."""
+        return float(self.row["settings"]["friction"]) > 0.0
+
+    @property
     def case(self) -> dict[str, Any]:
         """Content of ``case.json``."""
         return _json(self.folder / "case.json")
@@ -341,7 +346,7 @@ def _measure_impact(point: PointRun) -> Numbers:
         **_spread("along", speed[:, 0] / impact["speed_m_s"]),
         "energy_ratio": float(gained.max()),
         "overlap_ratio": overlap / radius,
-        "frequency_rad_s": _impact_frequency(case, first, overlap, plate),
+        "frequency_rad_s": _impact_frequency(point, first, overlap, plate),
     }
     return {
         **found,
@@ -380,11 +385,12 @@ def _kinetic(frame: Frame, density: float) -> Floats:
     return np.asarray(0.5 * mass * (speed + 0.4 * radius**2 * spin))
 
 
-def _impact_frequency(case: Mapping[str, Any], frame: Frame, overlap: float, plate: bool) -> float:
+def _impact_frequency(point: PointRun, frame: Frame, overlap: float, plate: bool) -> float:
     """Of the contact at its largest overlap."""
+    case = point.case
     bodies = 1 if plate else 2
     radius = frame.vectors("radius_m")[:bodies, 0]
-    modulus, shear = _moduli(case, "media", "media")
+    modulus, shear = _moduli(case, "ball")
     effective = np.array([case["impact"]["effective_radius_m"]])
     normal, tangential = hertz_stiffness(
         np.array([overlap]), effective, np.array([modulus]), np.array([shear])
@@ -397,32 +403,15 @@ def _impact_frequency(case: Mapping[str, Any], frame: Frame, overlap: float, pla
             b=np.array([-1 if plate else 1]),
             normal=np.array([[0.0, 0.0, -1.0]]),
             normal_stiffness_n_m=normal,
-            tangential_stiffness_n_m=tangential if case_friction(case) > 0 else 0.0 * tangential,
+            tangential_stiffness_n_m=tangential if point.sticks else 0.0 * tangential,
         )
     )
 
 
-def case_friction(case: Mapping[str, Any]) -> float:
-    """Largest friction of a case's pairs."""
-    found = [
-        float(value)
-        for name, value in case["inputs"].items()
-        if name.startswith("pairs.") and name.endswith(".friction")
-    ]
-    return max(found)
-
-
-def _moduli(case: Mapping[str, Any], first: str, second: str) -> tuple[float, float]:
-    """Effective moduli E* and G* of two owners' materials, Pa (Johnson 1985; Mindlin 1949)."""
-    inputs, scale = case["inputs"], case["fidelity"]["youngs_modulus_scale"]
-    compliance = shear = 0.0
-    for owner in (first, second):
-        name = inputs[f"{owner}.material"]
-        young = scale * inputs[f"materials.{name}.youngs_modulus_pa"]
-        poisson = inputs[f"materials.{name}.poissons_ratio"]
-        compliance += (1 - poisson**2) / young
-        shear += 2 * (2 - poisson) * (1 + poisson) / young
-    return 1 / compliance, 1 / shear
+def _moduli(case: Mapping[str, Any], partner: str) -> tuple[float, float]:
+    """Effective moduli E* and G* of a ball with a ball or with the bowl, Pa."""
+    moduli = case["contact_moduli"][partner]
+    return moduli["modulus_pa"], moduli["shear_pa"]
 
 
 # --- beds ------------------------------------------------------------------------------------
@@ -462,9 +451,10 @@ def _touching(centre: Floats, radius: Floats, bowl_radius: float) -> _Contacts:
     )
 
 
-def _bed_network(case: Mapping[str, Any], radius: Floats, contacts: _Contacts) -> Network:
-    ball = _moduli(case, "media", "media")
-    wall = _moduli(case, "media", "bowl")  # the tool is of the bowl's material
+def _bed_network(point: PointRun, radius: Floats, contacts: _Contacts) -> Network:
+    case = point.case
+    ball = _moduli(case, "ball")
+    wall = _moduli(case, "bowl")  # the tool is of the bowl's material
     at_wall = contacts.b < 0
     other = np.where(at_wall, 0, contacts.b)
     own = radius[contacts.a]
@@ -478,7 +468,7 @@ def _bed_network(case: Mapping[str, Any], radius: Floats, contacts: _Contacts) -
         b=contacts.b,
         normal=contacts.normal,
         normal_stiffness_n_m=normal,
-        tangential_stiffness_n_m=tangential if case_friction(case) > 0 else 0.0 * tangential,
+        tangential_stiffness_n_m=tangential if point.sticks else 0.0 * tangential,
     )
 
 
@@ -491,11 +481,11 @@ def _energy(rows: Mapping[str, Floats]) -> Floats:
     return np.asarray(rows["kinetic_energy_j"] + rows["rotational_energy_j"])
 
 
-def _frame_numbers(case: Mapping[str, Any], frame: Frame) -> Numbers:
+def _frame_numbers(point: PointRun, frame: Frame) -> Numbers:
     """Overlap and frequency of a bed of balls in a bowl."""
     centre, radius = frame.vectors("x_m", "y_m", "z_m"), frame.vectors("radius_m")[:, 0]
-    contacts = _touching(centre, radius, case["bowl"]["radius_m"])
-    network = _bed_network(case, radius, contacts)
+    contacts = _touching(centre, radius, point.case["bowl"]["radius_m"])
+    network = _bed_network(point, radius, contacts)
     return {
         "overlap_ratio": float((contacts.overlap / radius[contacts.a]).max(initial=0.0)),
         "frequency_rad_s": largest_frequency(network),
@@ -503,10 +493,10 @@ def _frame_numbers(case: Mapping[str, Any], frame: Frame) -> Numbers:
 
 
 def _measure_settle(point: PointRun) -> Numbers:
-    case, outputs = point.case, load_outputs(point.folder)
+    outputs = load_outputs(point.folder)
     *_, last = iter_frames(point.folder, outputs["balls"])
     return {
-        **_frame_numbers(case, last),
+        **_frame_numbers(point, last),
         "height_m": float(last.columns["z_m"].mean()),
         "peak_energy_j": float(_energy(_thermo(point.folder)).max()),
     }
@@ -519,7 +509,7 @@ def _measure_column(point: PointRun) -> Numbers:
     mass = 4.0 / 3.0 * np.pi * media["radius_mean_m"] ** 3 * media["density_kg_m3"]
     unit = media["count"] * mass * case["gravity_m_s2"] * 2.0 * media["radius_mean_m"]
     return {
-        **_frame_numbers(case, first),
+        **_frame_numbers(point, first),
         "height_m": float(last.columns["z_m"].mean()),
         "rest_energy_ratio": float(_energy(_thermo(point.folder))[-LAST_SAMPLES:].mean()) / unit,
     }
@@ -565,7 +555,7 @@ def _drag_network(point: PointRun, run: Run) -> Numbers:
         own = contacts.overlap / radius[contacts.a]
         largest = max(largest, float(own.max(initial=0.0)))
         if rod.step in some:
-            network = _bed_network(point.case, radius, contacts)
+            network = _bed_network(point, radius, contacts)
             frequency = max(frequency, largest_frequency(network))
     return {"overlap_ratio": largest, "frequency_rad_s": frequency}
 

@@ -19,7 +19,7 @@ from dragdeck.scenes.common import ball_material, smallest_radius
 from dragdeck.scenes.impact import Impact, effective_body, impact_scene
 from dragdeck.scenes.tool import tool_radius
 from dragdeck.stability import expected_error, measured, outlook, safe_share
-from dragdeck.stability_map import load_points, point_case
+from dragdeck.stability_map import contact_moduli, load_points, point_case
 
 MAP = ROOT / "studies" / "stability" / "map.yaml"
 TABLE = {
@@ -180,6 +180,15 @@ def test_a_point_sets_its_values(base: Case) -> None:
     assert fidelity.timestep_fraction == fidelity.fill_timestep_fraction == 4.0
     assert study.motion.speed_m_s == 1.0
     assert study.motion.path.revolutions == 2.0  # type: ignore[union-attr]
+
+
+def test_like_balls_have_half_the_modulus_of_one(base: Case) -> None:
+    """E* = E / (2 (1 - nu^2)) and G* = G / (2 (2 - nu)) of two like bodies."""
+    ball = contact_moduli(base.study)["ball"]
+    young, nu = 77e9 * 1e-3, 0.19
+    assert ball["modulus_pa"] == pytest.approx(young / (2 * (1 - nu**2)), rel=1e-12)
+    shear = young / (2 * (1 + nu))
+    assert ball["shear_pa"] == pytest.approx(shear / (2 * (2 - nu)), rel=1e-12)
 
 
 def test_a_large_ball_is_almost_a_plate() -> None:

@@ -15,6 +15,7 @@ from typing import Any
 import jinja2
 
 from dragdeck.cases import Case, load_cases
+from dragdeck.derive import effective_modulus, shear_modulus
 from dragdeck.errors import EngineError, GateError, InputError
 from dragdeck.render import environment, replace_text, write_run
 from dragdeck.runner import run
@@ -175,6 +176,25 @@ def point_case(base: Case, settings: Settings, fraction: float) -> Case:
     return Case(base.file, {}, study.model_copy(update=changes))
 
 
+def contact_moduli(study: Study) -> dict[str, dict[str, float]]:
+    """Effective moduli of a ball with a ball, and with bowl and tool, Pa.
+
+    E* after Johnson 1985, eq. 4.21 ff.; 1 / G* is the sum of (2 - nu) / G over
+    the two bodies (Mindlin 1949).
+    """
+    scale = study.chosen_fidelity().youngs_modulus_scale
+    ball = study.materials[study.media.material]
+    others = {"ball": ball, "bowl": study.materials[study.bowl.material]}
+    return {
+        name: {
+            "modulus_pa": effective_modulus(ball, other, scale),
+            "shear_pa": 1
+            / sum((2 - body.poissons_ratio) / shear_modulus(body, scale) for body in (ball, other)),
+        }
+        for name, other in others.items()
+    }
+
+
 def _motion(study: Study, speed: float) -> Any:
     path = study.motion.path
     if not isinstance(path, CirclePath):
@@ -264,6 +284,8 @@ class _Runs:
             scene = self._scene(point)
         except InputError as error:
             return {**found, "state": "refused", "refused": str(error)}
+        moduli = contact_moduli(point_case(self.base, point.settings, point.fraction).study)
+        scene = replace(scene, case={**scene.case, "contact_moduli": moduli})
         return {**found, "state": self._run(scene, folder)}
 
     def _run(self, scene: Scene, folder: Path) -> str:
