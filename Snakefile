@@ -13,6 +13,7 @@ include: "workflow/rules/network.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/verify.smk"
+include: "workflow/rules/stability.smk"
 
 
 localrules:
@@ -22,6 +23,7 @@ localrules:
     fill,
     process,
     report,
+    stability,
     verify,
 
 
@@ -69,3 +71,9 @@ rule verify:
     input:
         rules.judge_verification.output,
         rules.pass_verdict.output,
+
+
+# The map of stable and unstable time steps.
+rule stability:
+    input:
+        rules.write_stability.output,

@@ -66,6 +66,10 @@ def _parser() -> argparse.ArgumentParser:
     verdict = commands.add_parser("verdict", help="fail if a quantity of the suite failed")
     verdict.add_argument("report_dir", type=Path, metavar="DIR", help="what `verify` wrote")
     verdict.set_defaults(action=_verdict)
+    stability = commands.add_parser("stability", help="write the report on a stability map")
+    stability.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
+    stability.add_argument("lists", type=Path, nargs="+", metavar="POINTS", help="lists of points")
+    stability.set_defaults(action=_stability)
     return parser
 
 
@@ -103,6 +107,12 @@ def _verdict(options: argparse.Namespace) -> None:
     from dragchain.verification.report import verdict
 
     print(verdict(options.report_dir))
+
+
+def _stability(options: argparse.Namespace) -> None:
+    from dragchain.stability_report import write_stability
+
+    write_stability(options.out, options.lists)
 
 
 if __name__ == "__main__":

@@ -178,7 +178,8 @@ def test_a_lost_ball_fails(fill: Path) -> None:
     first = lines.index("Velocities") + 2
     lines[first] = "1 0 0 50.0 0 0 0"  # straight up and out
     data.write_text("\n".join(lines) + "\n")
-    with pytest.raises(GateError, match="Lost atoms"):
+    # whoever sees it first: the engine, or the watcher of the run's limits
+    with pytest.raises(GateError, match=r"Lost atoms|299 balls at step"):
         run(fill, silent)
 
 

@@ -60,6 +60,10 @@ def _parser() -> argparse.ArgumentParser:
     drops.add_argument("--fit", type=Path, help="result.json of the fit (confirm)")
     drops.add_argument("--count", type=int, default=10, help="number of trials")
     drops.add_argument("--seed", type=int, default=1, help="seed of the trials")
+    batch = commands.add_parser("stability", help="run one regime of the stability map")
+    batch.set_defaults(action=_stability)
+    batch.add_argument("regime", help="impact, settle, beds, column or drag")
+    batch.add_argument("--map", type=Path, required=True, help="the points: a map.yaml")
 
     run = commands.add_parser("run", help="run the deck in a folder, or go on with it")
     run.set_defaults(action=_run)
@@ -83,15 +87,19 @@ def scene_of(case: Case, scene: SceneName, bed: Bed | None = None) -> Scene:
 def _check(options: argparse.Namespace) -> None:
     from dragdeck.engine import find_engine
     from dragdeck.render import deck_text, environment
+    from dragdeck.stability import notes
 
     project = find_project(Path.cwd())
     cases = project.cases(options.study, options.fidelity)
     templates = environment(project.templates, study_templates(cases[0]))
     warnings: dict[str, None] = {}
     for name in SCENES:
-        for case in by_run(cases, name).values():
+        for run_id, case in by_run(cases, name).items():
             scene = scene_of(case, name)
             deck_text(scene, templates)
+            print(f"{name} {run_id}: time step {scene.deck.timestep_s:.3g} s")
+            for what, text in notes(case, name, scene):
+                print(f"  {what}: {text}")
             warnings.update(dict.fromkeys(f"{case.name}: {text}" for text in scene.warnings))
     for warning in warnings:
         print(f"warning: {warning}")
@@ -100,13 +108,18 @@ def _check(options: argparse.Namespace) -> None:
 
 def _explain(options: argparse.Namespace) -> None:
     from dragdeck.explain import expected_cost, explanation, show
+    from dragdeck.stability import notes
 
     project = find_project(Path.cwd())
     cases = project.cases(options.study, options.fidelity)
     names: tuple[SceneName, ...] = (options.scene,) if options.scene else SCENES
-    scenes = [scene_of(case, name) for name in names for case in by_run(cases, name).values()]
+    runs = [(case, name) for name in names for case in by_run(cases, name).values()]
     results = project.root / "results" / options.study
-    show(explanation(scene, expected_cost(scene, results / scene.deck.scene)) for scene in scenes)
+    scenes = ((case, name, scene_of(case, name)) for case, name in runs)
+    show(
+        explanation(scene, expected_cost(scene, results / name), notes(case, name, scene))
+        for case, name, scene in scenes
+    )
 
 
 def _fields(options: argparse.Namespace) -> None:
@@ -197,6 +210,18 @@ def _drops(options: argparse.Namespace) -> None:
         raise InputError("nothing to confirm", field="--fit", remedy="give the fit's result.json")
     templates = environment(project.templates, study_templates(case))
     run_drops(case, drops, options.out, templates, lambda line: print(line, file=sys.stderr))
+
+
+def _stability(options: argparse.Namespace) -> None:
+    from dragdeck.stability_map import run_batch
+
+    def report(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    project = find_project(Path.cwd())
+    study = project.studies / "stability" / "study.yaml"
+    results = project.root / "results" / "stability"
+    run_batch(study, options.map, options.regime, results, project.templates, report)
 
 
 def _run(options: argparse.Namespace) -> None:

@@ -11,6 +11,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import psutil
@@ -79,6 +80,7 @@ def find_engine() -> Engine:
     return Engine(path, _version(path))
 
 
+@cache
 def _version(path: str) -> str:
     shown = subprocess.run([path, "-h"], capture_output=True, text=True, check=False, timeout=60)
     found = re.search(r"LIGGGHTS[^\n]*?(\d+)\.(\d+)\.(\d+)", shown.stdout)

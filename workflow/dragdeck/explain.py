@@ -51,8 +51,8 @@ def _measured(results: Path) -> Iterable[float]:
             yield float(speed)
 
 
-def explanation(scene: Scene, cost: Cost) -> Table:
-    """The table of one scene."""
+def explanation(scene: Scene, cost: Cost, notes: Iterable[tuple[str, str]] = ()) -> Table:
+    """The table of one scene; `notes` say what its time step means for each pair of bodies."""
     deck = scene.deck
     table = Table(title=f"{deck.study}: {deck.scene} {deck.run}", title_justify="left")
     table.add_column("")
@@ -70,6 +70,9 @@ def explanation(scene: Scene, cost: Cost) -> Table:
     table.add_row("", "steps", f"about {cost.steps:,}")
     minutes, seconds = divmod(round(cost.wall_time_s), 60)
     table.add_row("", "wall time", f"about {minutes} min {seconds:02d} s ({cost.source})")
+    table.add_section()
+    for what, text in notes:
+        table.add_row("expects", what, text)
     for warning in scene.warnings:
         table.add_section()
         table.add_row("warning", warning, "", style="yellow")

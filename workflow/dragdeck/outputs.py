@@ -198,3 +198,10 @@ def impacts() -> Output:
         Column("force_n", "c_plate_force"),
     )
     return Output("impacts", "print", columns, 1, 0, None)
+
+
+def balls_and_forces(period: int, last: int) -> Output:
+    """Every ball with the total force on it, as applied."""
+    force = tuple(Column(f"force_{axis}_n", f"f{axis}") for axis in "xyz")
+    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *force)
+    return Output("balls", "custom", columns, period, 0, last, binary=True)

@@ -11,6 +11,7 @@ import hashlib
 import json
 import re
 import shutil
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -20,6 +21,7 @@ from typing import Any
 from dragdeck.engine import Engine, command, engine_errors, execute, find_engine
 from dragdeck.errors import EngineError, GateError, InputError
 from dragdeck.gates import Gate, check_run
+from dragdeck.limits import breach, held, read_samples
 from dragdeck.render import CASE_FILE, COLUMNS_FILE, DECK_FILE, replace_text
 
 STATE_FILE = "state.json"
@@ -196,17 +198,47 @@ def _execute_part(
     number = part["part"]
     source = folder / part["from"] if part["from"] else None
     steps = case["phases"][-1]["end_step"] if case["phases"] else None
-    watcher = _Watcher(folder, columns, number, part["from_step"], steps, report, every_s)
+    limits = case.get("limits")
+    watcher = _Watcher(folder, columns, number, part["from_step"], steps, report, every_s, limits)
     words = command(engine, DECK_FILE, state["ranks"], number, source)
     report(f"{case['scene']} {case['run']}: part {number}, {state['ranks']} rank(s)")
     screen = folder / f"screen.{number}.txt"
-    ending = execute(words, folder, screen, watcher)
+    begun = time.monotonic()
+    try:
+        ending = execute(words, folder, screen, watcher)
+    except _LimitMet as met:
+        part.update(wall_time_s=round(time.monotonic() - begun, 3), to_step=_last_step(screen))
+        return _stop_early(folder, state, met.gate)
     part.update(
         wall_time_s=round(ending.wall_time_s, 3),
         exit_status=ending.exit_status,
         to_step=_last_step(screen),
     )
     return _conclude(folder, state, case, columns, ending.asked, report)
+
+
+def _stop_early(folder: Path, state: dict[str, Any], gate: Gate) -> dict[str, Any]:
+    """Note that a run was stopped because it went past a limit: it failed."""
+    state.update(state="failed", gates=[gate.as_json()], stopped_early=True)
+    state.update(_totals(state["parts"]))
+    _save(folder, state)
+    raise GateError(_failed(folder, state))
+
+
+def _limit_gates(
+    folder: Path, case: Mapping[str, Any], columns: Mapping[str, Any], parts: int
+) -> list[Gate]:
+    """The limits once more, on all rows: the watcher may not have looked at the last ones."""
+    output = columns["outputs"].get("thermo")
+    if "limits" not in case or output is None:
+        return []
+    for part in range(1, parts + 1):
+        file = folder / output["pattern"].format(part=part)
+        rows = file.read_text(errors="replace").splitlines() if file.is_file() else []
+        gate = breach(read_samples(rows, output["columns"]), case["limits"])
+        if gate is not None:
+            return [gate]
+    return [held(case["limits"])]
 
 
 def _conclude(
@@ -225,6 +257,7 @@ def _conclude(
         _save(folder, state)
         raise EngineError(_stopped(folder, asked, part["exit_status"]))
     gates = check_run(folder, case, columns, part["exit_status"], part["part"])
+    gates += _limit_gates(folder, case, columns, part["part"])
     state["gates"] = [gate.as_json() for gate in gates]
     state.update(_totals(state["parts"]))
     if not all(gate.passed for gate in gates):
@@ -323,8 +356,19 @@ def _last_step(screen: Path) -> int | None:
     return int(rows[-1]) if rows else None
 
 
+class _LimitMet(Exception):
+    """A running engine went past a limit of its scene."""
+
+    def __init__(self, gate: Gate) -> None:
+        self.gate = gate
+        super().__init__(gate.seen)
+
+
 class _Watcher:
-    """Reads how far a run is, reports it now and then, keeps few checkpoints."""
+    """Reads how far a run is, reports it now and then, keeps few checkpoints.
+
+    A run that goes past a limit of its scene ends with `_LimitMet`.
+    """
 
     def __init__(
         self,
@@ -335,14 +379,20 @@ class _Watcher:
         steps: int | None,
         report: Report,
         every_s: float,
+        limits: Mapping[str, Any] | None = None,
     ) -> None:
         output = columns["outputs"].get("thermo")
+        self._columns: list[str] = output["columns"] if output else []
+        self._limits, self._place = limits, 0
         self._file = folder / output["pattern"].format(part=part) if output else None
         self._folder, self._first, self._steps = folder, first, steps
         self._report, self._every_s, self._next = report, every_s, every_s
 
     def __call__(self, seconds: float) -> None:
-        if seconds < self._next or self._file is None or not self._file.is_file():
+        if self._file is None or not self._file.is_file():
+            return
+        self._check_limits(self._file)
+        if seconds < self._next:
             return
         self._next = seconds + self._every_s
         for old in _checkpoints(self._folder)[:-CHECKPOINTS_KEPT]:
@@ -351,6 +401,19 @@ class _Watcher:
         if last and last[0].isdigit():
             step = int(last[0])
             self._report(str(Progress(step, self._steps, (step - self._first) / seconds)))
+
+    def _check_limits(self, file: Path) -> None:
+        """Look at the rows that came since the last look."""
+        if self._limits is None:
+            return
+        with file.open("rb") as stream:
+            stream.seek(self._place)
+            new, end, _ = stream.read().rpartition(b"\n")
+        self._place += len(new) + len(end)
+        rows = new.decode("ascii", errors="replace").splitlines()
+        gate = breach(read_samples(rows, self._columns), self._limits)
+        if gate is not None:
+            raise _LimitMet(gate)
 
 
 __all__ = ["Gate", "Progress", "fingerprint", "run"]

@@ -137,3 +137,15 @@ def of_every_run(wildcards):
         *every("drop", "tables/impacts.parquet"),
         *every("drop", "tables/figures.json"),
     ]
+
+
+def stability_templates():
+    """Every template that a deck of the stability map could use."""
+    files = sorted(PROJECT.templates.glob("*.j2"))
+    return [str(file.relative_to(PROJECT.root)) for file in files]
+
+
+def beds_of_regime(wildcards):
+    """Columns and drags start from settled beds."""
+    wanted = wildcards.regime in ("column", "drag")
+    return ["results/stability/points/beds.json"] if wanted else []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from dragdeck.derive import (
     fall_speed,
 )
 from dragdeck.errors import InputError
+from dragdeck.limits import run_limits
 from dragdeck.packing import Balls, pour, radii
 from dragdeck.scenes.common import (
     Deck,
@@ -98,6 +100,9 @@ def fill_scene(case: Case) -> Scene:
             **base_case(case, "fill", dt, rayleigh),
             "phases": [],
             "settled": {"energy_ratio": study.fill.energy_ratio},
+            "limits": bed_limits(
+                study, top, float(np.linalg.norm(balls.velocities_m_s, axis=1).max())
+            ),
         },
         steps=round(_expected_time(study, balls) / dt),
         files={"balls.data": _balls_data(balls, study, top, len(types))},
@@ -171,6 +176,12 @@ def box_top(study: Study, balls: Balls) -> float:
     diameter = 2 * study.media.radius_mean_m
     above_bed = 2 * expected_surface(study) + 8 * diameter
     return math.ceil(100 * max(balls.top_m, above_bed, 2 * study.bowl.height_m) + 5) / 100
+
+
+def bed_limits(study: Study, top_m: float, speed_m_s: float) -> dict[str, Any]:
+    """Limits of a run with the whole bed in a box of that height."""
+    mass = ball_mass(ball_material(study), study.media.radius_mean_m)
+    return run_limits(study.media.count, mass, study.gravity_m_s2, top_m, speed_m_s)
 
 
 def _energy_unit(study: Study) -> float:

@@ -27,7 +27,7 @@ from dragdeck.scenes.common import (
     skin,
     timestep,
 )
-from dragdeck.scenes.fill import box_top, expected_surface, first_balls
+from dragdeck.scenes.fill import bed_limits, box_top, expected_surface, first_balls
 from dragdeck.scenes.tool import tool_length, tool_mesh, tool_radius
 from dragdeck.study import CirclePath, MeshShape, Study
 
@@ -160,7 +160,11 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene:
     )
     return Scene(
         deck=deck,
-        case={**base_case(case, "process", dt, rayleigh), **_process_case(case, surface, timed)},
+        case={
+            **base_case(case, "process", dt, rayleigh),
+            **_process_case(case, surface, timed),
+            "limits": bed_limits(study, top, max(leg.speed_m_s for leg in timed)),
+        },
         steps=last,
         meshes={"tool.stl": tool_mesh(case), **bowl_meshes(study, top)},
         models=_models(study),

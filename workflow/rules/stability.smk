@@ -1,0 +1,75 @@
+# The stability map: a job a regime, each with many small runs. A run that fails
+# is a finding; a batch that is interrupted goes on where it was.
+
+STABILITY_MAP = config.get("stability_map", "studies/stability/map.yaml")
+
+
+# Beds that columns and drags start from.
+rule settle_beds:
+    input:
+        points=STABILITY_MAP,
+        study="studies/stability/study.yaml",
+        templates=stability_templates(),
+    output:
+        "results/stability/points/beds.json",
+    log:
+        "results/stability/logs/beds.log",
+    benchmark:
+        "results/stability/benchmarks/beds.tsv"
+    conda:
+        "../envs/python.yaml"
+    params:
+        source=source_hash("dragdeck.stability_map"),
+    shell:
+        "dragdeck stability beds --map {input.points} 2>&1 | tee -i {log}"
+
+
+rule run_points:
+    input:
+        points=STABILITY_MAP,
+        study="studies/stability/study.yaml",
+        templates=stability_templates(),
+        beds=beds_of_regime,
+    output:
+        "results/stability/points/{regime}.json",
+    log:
+        "results/stability/logs/{regime}.log",
+    benchmark:
+        "results/stability/benchmarks/{regime}.tsv"
+    wildcard_constraints:
+        regime="impact|settle|column|drag",
+    conda:
+        "../envs/python.yaml"
+    params:
+        source=source_hash("dragdeck.stability_map"),
+    shell:
+        "dragdeck stability {wildcards.regime} --map {input.points} 2>&1 | tee -i {log}"
+
+
+rule write_stability:
+    input:
+        lists=expand(
+            "results/stability/points/{regime}.json",
+            regime=["impact", "settle", "column", "drag"],
+        ),
+        template=str(PROJECT.root / "analysis/dragchain/stability.html.j2"),
+    output:
+        page=report(
+            "results/stability/report.html",
+            caption="../report/stability.rst",
+            category="Stability",
+            labels={"run": "all", "figure": "stability"},
+        ),
+        tables=multiext("results/stability/", "points.csv", "points.parquet"),
+        conditions=multiext("results/stability/", "conditions.csv", "conditions.parquet"),
+        measured="results/stability/stability.json",
+    log:
+        "results/stability/logs/report.log",
+    benchmark:
+        "results/stability/benchmarks/report.tsv"
+    conda:
+        "../envs/python.yaml"
+    params:
+        source=source_hash("dragchain.stability_report"),
+    shell:
+        "dragchain stability --out $(dirname {output.page}) {input.lists} > {log} 2>&1"
