@@ -86,11 +86,23 @@ def _readers() -> dict[str, Callable[[Path], Any]]:
     import meshio
 
     return {
-        ".stl": meshio.stl.read,
+        ".stl": _read_stl,
         ".obj": meshio.obj.read,
         ".ply": _read_ply,
         ".vtk": meshio.vtk.read,
     }
+
+
+def _read_stl(path: Path) -> Any:
+    """Read STL; meshio takes a text file that was cut off after its last corner."""
+    import meshio
+
+    content = path.read_bytes()
+    facets = int.from_bytes(content[80:84], "little")
+    is_text = content.lstrip().startswith(b"solid") and len(content) != 84 + 50 * facets
+    if is_text and not content.rstrip().splitlines()[-1].strip().startswith(b"endsolid"):
+        raise meshio.ReadError("the last line is not 'endsolid'")
+    return meshio.stl.read(path)
 
 
 def _read_ply(path: Path) -> Any:
