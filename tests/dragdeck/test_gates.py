@@ -60,11 +60,18 @@ THERMO = {
     "kind": "print",
     "binary": False,
     "pattern": "thermo.{part}.txt",
-    "columns": ["step", "time_s", "balls", "kinetic_energy_j", "rotational_energy_j"],
+    "columns": [
+        "step",
+        "time_s",
+        "balls",
+        "kinetic_energy_j",
+        "rotational_energy_j",
+        "fastest_ball_m_s",
+    ],
     "last_step": 20,
 }
-HEAD = "step time_s balls kinetic_energy_j rotational_energy_j\n"
-GOOD = HEAD + "10 0.1 2 1e-9 0\n20 0.2 2 1e-9 0\n"
+HEAD = "step time_s balls kinetic_energy_j rotational_energy_j fastest_ball_m_s\n"
+GOOD = HEAD + "10 0.1 2 1e-9 0 0.1\n20 0.2 2 1e-9 0 0.1\n"
 
 
 @pytest.mark.parametrize(

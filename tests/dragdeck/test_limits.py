@@ -11,13 +11,13 @@ import pytest
 
 from dragdeck.cases import Case, load_cases
 from dragdeck.errors import GateError
-from dragdeck.limits import ENERGY_FACTOR, breach, held, read_samples, run_limits
+from dragdeck.limits import ENERGY_FACTOR, SPEED_FACTOR, breach, held, read_samples, run_limits
 from dragdeck.project import Project
 from dragdeck.render import environment, write_run
 from dragdeck.runner import run
 from dragdeck.scenes import Bed, fill_scene, process_scene
 
-COLUMNS = ["step", "time_s", "balls", "kinetic_energy_j", "rotational_energy_j"]
+COLUMNS = ["step", "time_s", "balls", "kinetic_energy_j", "rotational_energy_j", "fastest_ball_m_s"]
 LIMITS = run_limits(balls=10, mass_kg=1e-3, gravity_m_s2=10.0, height_m=0.5, speed_m_s=2.0)
 
 
@@ -26,27 +26,33 @@ def test_the_energy_limit_is_that_of_a_fall_and_a_push() -> None:
     assert LIMITS["mean_kinetic_energy_j"] == pytest.approx(ENERGY_FACTOR * 7e-3, rel=1e-12)
 
 
+def test_the_speed_limit_is_that_of_the_same_energy() -> None:
+    """Square root of 2 (g H + v^2 / 2) = sqrt(14) m/s."""
+    assert LIMITS["speed_m_s"] == pytest.approx(SPEED_FACTOR * 14**0.5, rel=1e-12)
+
+
 def samples(*rows: str) -> list[Any]:
     return read_samples(rows, COLUMNS)
 
 
 def test_a_calm_run_meets_no_limit() -> None:
-    assert breach(samples("10 0.1 10 0.2 0.07"), LIMITS) is None
+    assert breach(samples("10 0.1 10 0.2 0.07 1.0"), LIMITS) is None
     assert held(LIMITS).passed
 
 
 @pytest.mark.parametrize(
     ("row", "said"),
     [
-        ("20 0.2 10 0.2 0.09", "a mean kinetic energy of 0.029 J a ball at step 20"),
-        ("20 0.2 9 0.1 0.0", "9 balls at step 20"),
-        ("20 0.2 10 nan 0.0", "a kinetic energy of nan at step 20"),
-        ("20 0.2 10 inf 0.0", "a kinetic energy of inf at step 20"),
-        ("20 0.2 0 0.0 0.0", "0 balls at step 20"),
+        ("20 0.2 10 0.2 0.09 1.0", "a mean kinetic energy of 0.029 J a ball at step 20"),
+        ("20 0.2 10 0.2 0.01 15.0", "a ball at 15 m/s at step 20"),
+        ("20 0.2 9 0.1 0.0 1.0", "9 balls at step 20"),
+        ("20 0.2 10 nan 0.0 1.0", "a kinetic energy of nan at step 20"),
+        ("20 0.2 10 inf 0.0 1.0", "a kinetic energy of inf at step 20"),
+        ("20 0.2 0 0.0 0.0 1.0", "0 balls at step 20"),
     ],
 )
 def test_the_first_row_past_a_limit_is_named(row: str, said: str) -> None:
-    gate = breach(samples("10 0.1 10 0.1 0.0", row, "30 0.3 1 9.0 9.0"), LIMITS)
+    gate = breach(samples("10 0.1 10 0.1 0.0 1.0", row, "30 0.3 1 9.0 9.0 1.0"), LIMITS)
     assert gate is not None and not gate.passed
     assert gate.seen == said
 

@@ -17,6 +17,11 @@ ENERGY_FACTOR = 4.0
 assumption: 1 is the physical bound of the mean; the rest is room for a bed
 whose elastic energy is set free and for what a tool gives to single balls."""
 
+SPEED_FACTOR = 4.0
+"""How far above the speed of a fall through the box plus the push from outside a
+single ball may be. An assumption: 1 is what one contact can give; a ball that is
+squeezed out between others gets more."""
+
 GATE = "within its limits"
 
 
@@ -46,6 +51,7 @@ def run_limits(
     return {
         "balls": balls,
         "mean_kinetic_energy_j": ENERGY_FACTOR * available,
+        "speed_m_s": SPEED_FACTOR * math.sqrt(2 * available / mass_kg),
         "why": f"{ENERGY_FACTOR:g} times m (g H + v^2 / 2): a fall of {height_m:.3g} m "
         f"and a speed of {speed_m_s:.3g} m/s",
     }
@@ -53,12 +59,13 @@ def run_limits(
 
 @dataclass(frozen=True)
 class Sample:
-    """One row of ``thermo``: energies are totals of all balls, J."""
+    """One row of ``thermo``: energies are totals of all balls, J; the fastest ball's speed, m/s."""
 
     step: int
     balls: int
     kinetic_energy_j: float
     rotational_energy_j: float
+    fastest_ball_m_s: float
 
     @property
     def mean_energy_j(self) -> float:
@@ -84,6 +91,7 @@ def read_samples(rows: Sequence[str], columns: Sequence[str]) -> list[Sample]:
                 int(values["balls"]) if math.isfinite(values["balls"]) else 0,
                 values["kinetic_energy_j"],
                 values["rotational_energy_j"],
+                values["fastest_ball_m_s"],
             )
         )
     return found
@@ -98,7 +106,7 @@ def breach(samples: Sequence[Sample], limits: Mapping[str, Any]) -> Gate | None:
     limits : mapping
         As `run_limits` makes it.
     """
-    most, balls = limits["mean_kinetic_energy_j"], limits["balls"]
+    most, balls, fastest = limits["mean_kinetic_energy_j"], limits["balls"], limits["speed_m_s"]
     for sample in samples:
         energy = sample.mean_energy_j
         if sample.balls < balls:
@@ -108,6 +116,9 @@ def breach(samples: Sequence[Sample], limits: Mapping[str, Any]) -> Gate | None:
         elif energy > most:
             seen = f"a mean kinetic energy of {energy:.3g} J a ball"
             limit = f"{most:.3g} J, {limits['why']}"
+        elif sample.fastest_ball_m_s > fastest:
+            seen = f"a ball at {sample.fastest_ball_m_s:.3g} m/s"
+            limit = f"{fastest:.3g} m/s, {SPEED_FACTOR:g} times the speed of that energy"
         else:
             continue
         return Gate(GATE, False, f"{seen} at step {sample.step:,}", limit)

@@ -104,13 +104,14 @@ _TIME = Column("time_s", "step*dt")
 
 
 def thermo(period: int, last: int | None) -> Output:
-    """Ball count and kinetic energies over time."""
+    """Ball count, kinetic energies and the largest speed of a ball over time."""
     columns = (
         _STEP,
         _TIME,
         Column("balls", "atoms", whole=True),
         Column("kinetic_energy_j", "c_kinetic"),
         Column("rotational_energy_j", "c_rotation"),
+        Column("fastest_ball_m_s", "c_fastest_ball"),
     )
     return Output("thermo", "print", columns, period, period, last)
 
