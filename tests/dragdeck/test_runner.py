@@ -20,7 +20,7 @@ from dragdeck.cases import Case, load_cases
 from dragdeck.errors import EngineError, GateError, InputError
 from dragdeck.project import Project
 from dragdeck.render import environment, write_run
-from dragdeck.runner import Progress, fingerprint, run
+from dragdeck.runner import Progress, _Watcher, fingerprint, run
 from dragdeck.scenes import drop_scene, fill_scene
 
 pytestmark = pytest.mark.engine
@@ -205,6 +205,20 @@ def test_a_drop_has_three_impacts(case: Case, project: Project) -> None:
     touching = [force > 0 for force in forces]
     starts = sum(now and not before for before, now in itertools.pairwise([False, *touching]))
     assert starts == 3
+
+
+def test_progress_waits_for_the_first_row(tmp_path: Path) -> None:
+    """The engine opens its file before it writes to it."""
+    lines: list[str] = []
+    columns = ["step", "time_s", "balls", "kinetic_energy_j", "rotational_energy_j"]
+    thermo = {"pattern": "thermo.{part}.txt", "columns": columns}
+    watch = _Watcher(tmp_path, {"outputs": {"thermo": thermo}}, 1, 0, 100, lines.append, 1.0)
+    file = tmp_path / "thermo.1.txt"
+    for seconds, text in ((1.0, ""), (2.0, "step time_s\n"), (3.0, "step time_s\n50 0.1 9 0 0\n")):
+        file.write_text(text)
+        watch(seconds)
+    assert len(lines) == 1
+    assert lines[0].startswith("step 50 of 100 (50 %)")
 
 
 def test_progress_says_how_long() -> None:

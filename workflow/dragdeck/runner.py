@@ -397,7 +397,8 @@ class _Watcher:
         self._next = seconds + self._every_s
         for old in _checkpoints(self._folder)[:-CHECKPOINTS_KEPT]:
             old.unlink()
-        last = self._file.read_text(errors="replace").splitlines()[-1].split()
+        rows = self._file.read_text(errors="replace").splitlines()
+        last = rows[-1].split() if rows else []  # the engine may not have written its header yet
         if last and last[0].isdigit():
             step = int(last[0])
             self._report(str(Progress(step, self._steps, (step - self._first) / seconds)))
