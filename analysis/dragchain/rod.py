@@ -23,7 +23,7 @@ from dragchain.formats import Frame
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-ROD_MESH, BOWL_MESH = 0, 1
+BOWL_MESH = 1
 """``mesh_id`` of a contact when the bowl is a mesh too."""
 
 _POINT = ("point_x_m", "point_y_m", "point_z_m")

@@ -51,7 +51,6 @@ class ColumnDeck(Deck):
     stack: bool
     bowl_type: int
     bowl_radius_m: float
-    bowl_facets: bool = False
     load_timestep_s: float
     load_steps: int
     test_steps: int

@@ -13,7 +13,7 @@ from dragdeck.derive import rayleigh_time
 from dragdeck.errors import InputError
 from dragdeck.mesh import Mesh
 from dragdeck.outputs import Output
-from dragdeck.packing import radii
+from dragdeck.packing import Array, radii
 from dragdeck.study import Material, Study
 
 ENGINE_SOFTEST_PA = 5e6
@@ -164,16 +164,15 @@ def _check_modulus(name: str, modulus_pa: float, scale: float, case: Case) -> No
     )
 
 
+def bed_radii(study: Study) -> Array:
+    """Radii of a study's balls in ascending order, (count,), m."""
+    media = study.media
+    return radii(media.count, media.radius_mean_m, media.radius_sd_m)
+
+
 def smallest_radius(study: Study) -> float:
     """Radius of the smallest ball of the bed, m."""
-    media = study.media
-    return float(radii(media.count, media.radius_mean_m, media.radius_sd_m).min())
-
-
-def largest_radius(study: Study) -> float:
-    """Radius of the largest ball of the bed, m."""
-    media = study.media
-    return float(radii(media.count, media.radius_mean_m, media.radius_sd_m).max())
+    return float(bed_radii(study).min())
 
 
 def bed_rayleigh_time(study: Study) -> float:

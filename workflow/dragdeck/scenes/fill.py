@@ -19,12 +19,13 @@ from dragdeck.derive import (
 )
 from dragdeck.errors import InputError
 from dragdeck.limits import run_limits
-from dragdeck.packing import Balls, pour, radii
+from dragdeck.packing import Balls, pour
 from dragdeck.scenes.common import (
     Deck,
     Scene,
     ball_material,
     base_case,
+    bed_radii,
     bed_rayleigh_time,
     material_table,
     skin,
@@ -45,7 +46,6 @@ class FillDeck(Deck):
 
     bowl_type: int
     bowl_radius_m: float
-    bowl_facets: bool = False
     energy_ratio: float
     energy_unit_j: float
     check_steps: int
@@ -128,9 +128,7 @@ def _fill_types(study: Study) -> list[str]:
 
 def first_balls(study: Study) -> Balls:
     """The balls of a study before they fall."""
-    media = study.media
-    sizes = radii(media.count, media.radius_mean_m, media.radius_sd_m)
-    return pour(sizes, study.bowl.radius_m, study.seed)
+    return pour(bed_radii(study), study.bowl.radius_m, study.seed)
 
 
 def check_capacity(case: Case) -> None:
@@ -143,9 +141,7 @@ def check_capacity(case: Case) -> None:
     """
     study = case.study
     media, bowl = study.media, study.bowl
-    sizes = radii(media.count, media.radius_mean_m, media.radius_sd_m)
-    volume = float((4 / 3 * np.pi * sizes**3).sum())
-    height = bed_height(volume, bowl.radius_m, DENSEST_RANDOM_PACKING)
+    height = _height(study, DENSEST_RANDOM_PACKING)
     if height > bowl.height_m:
         most = math.floor(media.count * bowl.height_m / height)
         raise InputError(
@@ -161,10 +157,13 @@ def check_capacity(case: Case) -> None:
 
 def expected_surface(study: Study) -> float:
     """Height of the settled bed before it exists, m: an estimate."""
-    media = study.media
-    sizes = radii(media.count, media.radius_mean_m, media.radius_sd_m)
-    volume = float((4 / 3 * np.pi * sizes**3).sum())
-    return bed_height(volume, study.bowl.radius_m, SOLID_FRACTION_ESTIMATE)
+    return _height(study, SOLID_FRACTION_ESTIMATE)
+
+
+def _height(study: Study, solid_fraction: float) -> float:
+    """Height of the study's balls in its bowl at a solid fraction, m."""
+    volume = float((4 / 3 * np.pi * bed_radii(study) ** 3).sum())
+    return bed_height(volume, study.bowl.radius_m, solid_fraction)
 
 
 def box_top(study: Study, balls: Balls) -> float:

@@ -19,9 +19,9 @@ from dragdeck.scenes.common import (
     Scene,
     ball_material,
     base_case,
+    bed_radii,
     bed_rayleigh_time,
     flat,
-    largest_radius,
     material_table,
     round_to,
     skin,
@@ -198,7 +198,7 @@ def check_fit(case: Case, surface_m: float) -> None:
             limit=f"together below the bowl's radius {study.bowl.radius_m:g} m",
             remedy="use a smaller path or tool, or a wider bowl",
         )
-    deepest = surface_m - 2 * largest_radius(study)
+    deepest = surface_m - 2 * float(bed_radii(study).max())
     if study.motion.submersion_m > deepest:
         below = study.motion.submersion_m > surface_m
         raise InputError(
