@@ -14,6 +14,7 @@ include: "workflow/rules/report.smk"
 include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/verify.smk"
 include: "workflow/rules/stability.smk"
+include: "workflow/rules/trade.smk"
 
 
 localrules:
@@ -24,6 +25,7 @@ localrules:
     process,
     report,
     stability,
+    trade,
     verify,
 
 
@@ -77,3 +79,9 @@ rule verify:
 rule stability:
     input:
         rules.write_stability.output,
+
+
+# What speed costs in accuracy: the points of a plan against the reference.
+rule trade:
+    input:
+        rules.write_trade.output,

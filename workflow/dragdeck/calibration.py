@@ -286,7 +286,7 @@ def _known(case: Case) -> dict[str, Any]:
         "study": case.study_name,
         "title": study.title,
         "pair": f"{ball}-{plate}",
-        "fidelity": study.fidelity,
+        "fidelity": case.fidelity_name,
         "record": section.record,
         "height_m": study.drop.height_m,
         "height_sd_m": section.height_sd_m,

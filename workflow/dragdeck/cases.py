@@ -24,6 +24,9 @@ from dragdeck.study import STUDY_FILE, MeshShape, Study, read_yaml, validate
 SceneName = Literal["drop", "fill", "process"]
 SCENES: tuple[SceneName, ...] = ("drop", "fill", "process")
 
+SAID_BY_NAME = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
+"""The settings that the name of a fidelity without a name says."""
+
 
 @dataclass(frozen=True)
 class Case:
@@ -52,7 +55,17 @@ class Case:
     def name(self) -> str:
         """Readable name: the fidelity and the matrix values."""
         parts = [f"{field.rsplit('.', 1)[-1]}-{value}" for field, value in self.settings.items()]
-        return _slug("_".join([self.study.fidelity, *parts]))
+        return _slug("_".join([self.fidelity_name, *parts]))
+
+    @property
+    def fidelity_name(self) -> str:
+        """Name of the fidelity; settings without a name are called by what they say."""
+        fidelity = self.study.fidelity
+        if isinstance(fidelity, str):
+            return fidelity
+        chosen = self.study.chosen_fidelity()
+        name = f"E{chosen.youngs_modulus_scale:g}_dt{chosen.timestep_fraction:g}"
+        return name if chosen.speed_factor == 1 else f"{name}_v{chosen.speed_factor:g}"
 
     @cached_property
     def run_ids(self) -> Mapping[SceneName, str]:
@@ -116,13 +129,41 @@ def load_cases(file: Path, fidelity: str | None = None) -> list[Case]:
         data["fidelity"] = fidelity
     validate({**data, "matrix": {}}, file)
     matrix = validate(data, file).matrix
-    found = []
-    for settings in _combinations(matrix, file):
-        combined = copy.deepcopy({**data, "matrix": {}})
-        for field, value in settings.items():
-            _set(combined, field, value, file)
-        found.append(Case(file, settings, validate(combined, file)))
-    return found
+    plain = {**data, "matrix": {}}
+    return [settle_case(file, plain, settings) for settings in _combinations(matrix, file)]
+
+
+def settle_case(
+    file: Path,
+    data: Mapping[str, Any],
+    values: Mapping[str, Any],
+    shown: Mapping[str, Any] | None = None,
+    named_in: Path | None = None,
+) -> Case:
+    """A case from a study's plain data with some of its values replaced.
+
+    Parameters
+    ----------
+    file : Path
+        The study file.
+    data : mapping
+        Its content.
+    values : mapping
+        Dotted field: value.
+    shown : mapping, optional
+        The values that name the case, if not all of them.
+    named_in : Path, optional
+        The file that names the values, for error messages, if not `file`.
+
+    Raises
+    ------
+    InputError
+        A value leads nowhere or breaks the study.
+    """
+    combined = copy.deepcopy(dict(data))
+    for field, value in values.items():
+        _set(combined, field, value, named_in or file)
+    return Case(file, values if shown is None else shown, validate(combined, named_in or file))
 
 
 def study_file(studies: Path, name: str) -> Path:
@@ -193,7 +234,7 @@ def _set(data: dict[str, Any], field: str, value: Any, file: Path) -> None:
             raise InputError(
                 "leads through a value",
                 file=file,
-                field=f"matrix.{field}",
+                field=field,
                 remedy="give the dotted name of one field",
             )
     place[last] = value

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from dragdeck import __version__
@@ -47,6 +47,7 @@ def _parser() -> argparse.ArgumentParser:
     explain.add_argument("scene", nargs="?", choices=SCENES, help="one scene only")
     render.add_argument("scene", choices=SCENES)
     render.add_argument("run", help="run id, as `dragdeck cases` lists it")
+    render.add_argument("--plan", help="the run is a point of this trade's plan")
     render.add_argument("--fill-table", type=Path, help="fill.json of the settled bed (process)")
 
     fields = commands.add_parser("fields", help="print the fields of a study file as a page")
@@ -68,6 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="run the deck in a folder, or go on with it")
     run.set_defaults(action=_run)
     run.add_argument("folder", type=Path)
+    run.add_argument("--outcome", type=Path, metavar="FILE", help="a failed run is an outcome too")
     run.add_argument("--again", action="store_true", help="start anew, even if it failed before")
     run.add_argument(
         "--every", type=float, default=10.0, metavar="S", help="seconds between reports"
@@ -144,12 +146,13 @@ def _render(options: argparse.Namespace) -> None:
     from dragdeck.render import environment, write_run
 
     project = find_project(Path.cwd())
-    case = _case_of_run(project, options)
+    runs, folder = _runs(project, options)
+    case = _case_of_run(runs, options)
     scene = scene_of(case, options.scene, _bed(options))
     for warning in scene.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     templates = environment(project.templates, study_templates(case))
-    write_run(scene, project.run_folder(case, options.scene), templates)
+    write_run(scene, folder(case), templates)
 
 
 def _verify(options: argparse.Namespace) -> None:
@@ -165,8 +168,22 @@ def _verify(options: argparse.Namespace) -> None:
         write_run(collide_scene(experiment), folder, templates)
 
 
-def _case_of_run(project: Project, options: argparse.Namespace) -> Case:
-    runs = by_run(project.cases(options.study, options.fidelity), options.scene)
+def _runs(
+    project: Project, options: argparse.Namespace
+) -> tuple[dict[str, Case], Callable[[Case], Path]]:
+    """The runs of a study's cases, or of a plan's points, and where each has its folder."""
+    scene: SceneName = options.scene
+    if options.plan is None:
+        cases = project.cases(options.study, options.fidelity)
+        return by_run(cases, scene), lambda case: project.run_folder(case, scene)
+    points = project.points(options.study, options.plan)
+    if scene == "process":
+        return by_run(points.processes, scene), project.point_folder
+    cases = points.drops if scene == "drop" else points.processes
+    return by_run(cases, scene), lambda case: project.run_folder(case, scene)
+
+
+def _case_of_run(runs: dict[str, Case], options: argparse.Namespace) -> Case:
     if options.run not in runs:
         raise InputError(
             f"no {options.scene} run of this name",
@@ -225,12 +242,15 @@ def _stability(options: argparse.Namespace) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from dragdeck.runner import run
+    from dragdeck.runner import outcome, run
 
     def report(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
-    run(options.folder, report, again=options.again, every_s=options.every)
+    if options.outcome is not None:
+        outcome(options.folder, options.outcome, report, every_s=options.every)
+    else:
+        run(options.folder, report, again=options.again, every_s=options.every)
 
 
 if __name__ == "__main__":

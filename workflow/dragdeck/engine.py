@@ -54,11 +54,14 @@ class Ending:
     asked : bool
         It was asked to stop.
     wall_time_s : float
+    cpu_time_s : float
+        Processor time of all ranks together.
     """
 
     exit_status: int
     asked: bool
     wall_time_s: float
+    cpu_time_s: float
 
 
 def find_engine() -> Engine:
@@ -160,14 +163,24 @@ def execute(words: Sequence[str], folder: Path, screen: Path, watch: Watch) -> E
         )
         with _heeding_signals() as asked:
             try:
-                while process.poll() is None and not asked:
+                while (cpu_time_s := _ended(process)) is None and not asked:
                     watch(time.monotonic() - begun)
                     time.sleep(POLL_S if time.monotonic() - begun > 1 else 0.02)
             finally:
-                if process.poll() is None:
+                if process.returncode is None:
                     end_all(process.pid)
-                    process.wait()
-    return Ending(process.returncode, bool(asked), time.monotonic() - begun)
+                    cpu_time_s = _ended(process, options=0)
+    assert cpu_time_s is not None
+    return Ending(process.returncode, bool(asked), time.monotonic() - begun, cpu_time_s)
+
+
+def _ended(process: subprocess.Popen[bytes], options: int = os.WNOHANG) -> float | None:
+    """Processor time of a process and all it started, s; None while it runs."""
+    pid, status, usage = os.wait4(process.pid, options)
+    if pid == 0:
+        return None
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return usage.ru_utime + usage.ru_stime
 
 
 def _environment() -> dict[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Iterator
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel
@@ -38,16 +38,22 @@ def _rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, 
     for name, field in model.model_fields.items():
         path = f"{prefix}{name}"
         inner = list(_models(field.annotation))
-        if not inner:
+        if not inner or _also_plain(field.annotation):
             yield path, _limits(field), _default(field), field.description or ""
         for part, many in inner:
             kind = f"[{_kind(part)}]" if len(inner) > 1 else ""
             yield from _rows(part, f"{path}{kind}.{'*.' if many else ''}")
 
 
+def _also_plain(annotation: Any) -> bool:
+    """Whether a plain value may stand where a model may."""
+    return any(get_args(part)[:1] == (str,) for part in get_args(annotation))
+
+
 def _kind(model: type[BaseModel]) -> str:
     """Return the word by which a model is told from its alternatives."""
-    return str(get_args(model.model_fields["kind"].annotation)[0])
+    kind = model.model_fields.get("kind")
+    return str(get_args(kind.annotation)[0]) if kind else model.__name__.lower()
 
 
 def _models(annotation: Any, many: bool = False) -> Iterator[tuple[type[BaseModel], bool]]:
@@ -58,6 +64,8 @@ def _models(annotation: Any, many: bool = False) -> Iterator[tuple[type[BaseMode
     elif origin in (Union, types.UnionType):
         for part in get_args(annotation):
             yield from _models(part, many)
+    elif origin is Annotated:
+        yield from _models(get_args(annotation)[0], many)
     elif origin in (list, dict):
         yield from _models(get_args(annotation)[-1], True)
 

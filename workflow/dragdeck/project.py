@@ -10,6 +10,7 @@ from pathlib import Path
 
 from dragdeck.cases import Case, SceneName, load_cases, study_file
 from dragdeck.errors import InputError
+from dragdeck.plan import Points, plan_points, read_plan
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,11 @@ class Project:
         """One folder a study."""
         return self.root / "studies"
 
+    @property
+    def plans(self) -> Path:
+        """The plans of trades."""
+        return self.root / "workflow" / "plans"
+
     def cases(self, study: str, fidelity: str | None = None) -> list[Case]:
         """The cases of a study, by its name.
 
@@ -37,6 +43,29 @@ class Project:
             No such study, or its file cannot be used.
         """
         return load_cases(study_file(self.studies, study), fidelity)
+
+    def points(self, study: str, plan: str) -> Points:
+        """The points of a plan for a study, both by name; a plan may be a path too.
+
+        Raises
+        ------
+        InputError
+            There is no such plan or study, or they do not fit together.
+        """
+        file = Path(plan) if plan.endswith(".yaml") else self.plans / f"{plan}.yaml"
+        if not file.is_file():
+            known = sorted(found.stem for found in self.plans.glob("*.yaml"))
+            raise InputError(
+                "no such plan",
+                file=file,
+                limit=f"one of: {', '.join(known)}; or the path of a .yaml file",
+                remedy="choose one of these, or write one",
+            )
+        return plan_points(read_plan(file), file, self.cases(study)[0])
+
+    def point_folder(self, case: Case) -> Path:
+        """The folder of a process run of a trade."""
+        return self.root / "results" / case.study_name / "trade" / case.run_ids["process"]
 
     def run_folder(self, case: Case, scene: SceneName) -> Path:
         """The folder of one engine run."""

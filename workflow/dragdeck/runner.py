@@ -100,6 +100,26 @@ def run(folder: Path, report: Report, *, again: bool = False, every_s: float = 1
     return _write_result(folder, state)
 
 
+def outcome(folder: Path, file: Path, report: Report, *, every_s: float = 10.0) -> None:
+    """Bring a run to its end, good or bad, and write how it ended to a file.
+
+    For studies of where runs fail: a run that a gate or a limit stopped has an
+    outcome too. One that was interrupted has none yet.
+
+    Raises
+    ------
+    InputError, EngineError
+        As `run` does.
+    """
+    try:
+        run(folder, report, every_s=every_s)
+    except GateError as error:
+        report(str(error))
+    state = _state(folder)
+    assert state is not None
+    replace_text(file, json.dumps(state, indent=1) + "\n")
+
+
 def fingerprint(folder: Path) -> str:
     """Hash of all that a run depends on: deck, data, meshes and the file it starts from.
 
@@ -211,6 +231,7 @@ def _execute_part(
         return _stop_early(folder, state, met.gate)
     part.update(
         wall_time_s=round(ending.wall_time_s, 3),
+        cpu_time_s=round(ending.cpu_time_s, 3),
         exit_status=ending.exit_status,
         to_step=_last_step(screen),
     )
@@ -275,11 +296,13 @@ def _conclude(
 def _totals(parts: list[dict[str, Any]]) -> dict[str, Any]:
     """Steps that counted, and the time all parts took."""
     wall = sum(part["wall_time_s"] for part in parts if "wall_time_s" in part)
+    cpu = sum(part["cpu_time_s"] for part in parts if "cpu_time_s" in part)
     steps = parts[-1]["to_step"] or 0
     done = sum(max(0, part["to_step"] - part["from_step"]) for part in parts if part.get("to_step"))
     return {
         "steps": steps,
         "wall_time_s": round(wall, 3),
+        "cpu_time_s": round(cpu, 3),
         "steps_per_s": round(done / wall, 1) if wall > 0 else None,
     }
 

@@ -169,7 +169,7 @@ def point_case(base: Case, settings: Settings, fraction: float) -> Case:
     )
     changes: dict[str, Any] = {
         "pairs": {name: old.model_copy(update=pair) for name, old in study.pairs.items()},
-        "fidelities": {study.fidelity: fidelity},
+        "fidelity": fidelity,
     }
     if "rod_speed_m_s" in settings:
         changes["motion"] = _motion(study, settings["rod_speed_m_s"])

@@ -16,7 +16,9 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
+    Tag,
     ValidationError,
     field_validator,
     model_validator,
@@ -257,6 +259,45 @@ class Fidelity(Model):
     ranks: Annotated[Whole, Field(ge=1)] = Field(default=2, description="engine processes")
 
 
+Quantity = Literal[
+    "drag_mean",
+    "drag_sd",
+    "vertical_mean",
+    "rod_contacts",
+    "contact_force_mean",
+    "contact_force_p90",
+    "coordination_number",
+    "chain_count",
+    "chain_length",
+    "restitution",
+]
+"""What a tolerance can be about; docs/trade.md defines each."""
+
+
+class Tolerance(Model):
+    """An error to stay within, instead of settings; the advisor finds them."""
+
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        description="largest relative error that the settings may cause, dimensionless"
+    )
+    quantity: Quantity = Field(default="drag_mean", description="what the error is about")
+
+
+def _form(value: object) -> str:
+    """Which of its three forms a fidelity has."""
+    if isinstance(value, Tolerance) or (isinstance(value, Mapping) and "tolerance" in value):
+        return "a-tolerance"
+    return "settings" if isinstance(value, Mapping | Fidelity) else "a-name"
+
+
+AnyFidelity = Annotated[
+    Annotated[str, Tag("a-name")]
+    | Annotated[Fidelity, Tag("settings")]
+    | Annotated[Tolerance, Tag("a-tolerance")],
+    Discriminator(_form),
+]
+
+
 class Assumption(Model):
     """A value that the source of the study does not give."""
 
@@ -307,7 +348,10 @@ class Study(Model):
     calibration: Calibration | None = None
     fill: Fill = Fill()
     outputs: Outputs = Outputs()
-    fidelity: str = Field(default="standard", description="name of the fidelity to run at")
+    fidelity: AnyFidelity = Field(
+        default="standard",
+        description="name of a fidelity; or its settings; or a tolerance to find settings for",
+    )
     fidelities: dict[str, Fidelity] = Field(default_factory=dict)
     seed: Annotated[Whole, Field(ge=0, lt=2**32)] = Field(
         default=1, description="of the first positions and velocities of the balls"
@@ -336,7 +380,8 @@ class Study(Model):
                 )
         for other in self.type_names():
             self.pair(self.media.material, other)
-        self.chosen_fidelity()
+        if not isinstance(self.fidelity, Tolerance):
+            self.chosen_fidelity()
         return self
 
     def type_names(self) -> list[str]:
@@ -358,13 +403,17 @@ class Study(Model):
         raise ValueError(f"pairs has no entry '{first}-{second}', and these two will touch")
 
     def chosen_fidelity(self) -> Fidelity:
-        """The fidelity named by ``fidelity``; the study's own go before the built-in.
+        """The settings in ``fidelity``, or those it names; the study's own go before the built-in.
 
         Raises
         ------
         ValueError
-            No fidelity has that name.
+            No fidelity has that name, or a tolerance was not resolved: `load_cases` does.
         """
+        if isinstance(self.fidelity, Fidelity):
+            return self.fidelity
+        if isinstance(self.fidelity, Tolerance):
+            raise ValueError("the tolerance has not been resolved to settings")
         known = {**BUILT_IN_FIDELITIES, **self.fidelities}
         if self.fidelity not in known:
             raise ValueError(f"unknown fidelity {self.fidelity!r}; known: {', '.join(known)}")
@@ -428,8 +477,11 @@ def validate(data: Mapping[str, Any], file: Path | str) -> Study:
     try:
         return Study.model_validate(data)
     except ValidationError as error:
-        raise _explained(error, file) from None
+        raise explained(error, file) from None
 
+
+_FORMS = ("cylinder", "circle", "line", "a-name", "settings", "a-tolerance")
+"""Names of alternatives, which are no part of a field's dotted name."""
 
 _LIMITS = {
     "greater_than": "greater than {gt}",
@@ -440,13 +492,12 @@ _LIMITS = {
 }
 
 
-def _explained(error: ValidationError, file: Path | str) -> InputError:
+def explained(error: ValidationError, file: Path | str) -> InputError:
+    """The first problem that a model found in a file, as an error for the user."""
     issues = error.errors()
     first = issues[0]
     kind = first["type"]
-    field = ".".join(
-        str(part) for part in first["loc"] if part not in ("cylinder", "circle", "line")
-    )
+    field = ".".join(str(part) for part in first["loc"] if part not in _FORMS)
     limit = _LIMITS[kind].format(**first.get("ctx", {})) if kind in _LIMITS else None
     problem, remedy = first["msg"].removeprefix("Value error, "), None
     value: object = first["input"]

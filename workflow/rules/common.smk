@@ -1,4 +1,5 @@
 # What the rules share: the study, its cases, the paths of its runs.
+from functools import cache
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
@@ -13,6 +14,7 @@ from dragdeck.verification import suite_of
 PROJECT = Project(Path(workflow.basedir))
 STUDY = config.get("study", "uhlmann2015")
 FIDELITY = config.get("fidelity")
+PLAN = config.get("plan", "default")
 
 try:
     CASES = PROJECT.cases(STUDY, FIDELITY)
@@ -38,6 +40,16 @@ def of_fill(file):
 def of_process(file):
     """Path of a file of a process run, as a pattern."""
     return f"results/{{study}}/process/{{run}}/{file}"
+
+
+def of_point(file):
+    """Path of a file of a process run of a trade, as a pattern."""
+    return f"results/{{study}}/trade/{{run}}/{file}"
+
+
+def of_trade(file):
+    """Path of a file of the report on a trade."""
+    return f"results/{STUDY}/trade-report/{file}"
 
 
 def of_experiment(run, file):
@@ -79,9 +91,34 @@ def every(scene, file):
     return [f"{folder}/{file}" for folder in every_folder(scene)]
 
 
+@cache
+def points():
+    """The points of the trade's plan."""
+    try:
+        return PROJECT.points(STUDY, PLAN)
+    except DragdeckError as error:
+        raise WorkflowError(str(error))
+
+
+@cache
+def points_by_run(scene):
+    """A case of the trade's plan for each run of a scene."""
+    return by_run(points().drops if scene == "drop" else points().processes, scene)
+
+
+def every_point(file):
+    """One file of every process run of the trade."""
+    return [f"results/{STUDY}/trade/{run}/{file}" for run in points_by_run("process")]
+
+
+def every_drop_point(file):
+    """One file of every drop test of the trade."""
+    return [f"results/{STUDY}/drop/{run}/{file}" for run in points_by_run("drop")]
+
+
 def case_of(scene, run):
-    """A case that a run belongs to."""
-    return by_run(CASES, scene)[run]
+    """A case that a run belongs to: one of the study's, or else one of the trade's points."""
+    return by_run(CASES, scene).get(run) or points_by_run(scene)[run]
 
 
 def templates_of(scene):
@@ -113,6 +150,17 @@ def fidelity_option(wildcards):
     return f"--fidelity {FIDELITY}" if FIDELITY else ""
 
 
+def case_option(scene):
+    """How to name the cases among which a run is, as a function of its wildcards."""
+
+    def option(wildcards):
+        if wildcards.run in by_run(CASES, scene):
+            return fidelity_option(wildcards)
+        return f"--plan {PLAN}"
+
+    return option
+
+
 def ranks(scene):
     """Number of engine processes of a run, as a function of its wildcards."""
     return lambda wildcards: case_of(scene, wildcards.run).study.chosen_fidelity().ranks
@@ -121,6 +169,12 @@ def ranks(scene):
 def fill_of(wildcards, file):
     """A file of the fill that a process run starts from."""
     fill = case_of("process", wildcards.run).run_ids["fill"]
+    return f"results/{wildcards.study}/fill/{fill}/{file}"
+
+
+def bed_of_point(wildcards, file):
+    """A file of the fill that a point of the trade starts from."""
+    fill = points_by_run("process")[wildcards.run].run_ids["fill"]
     return f"results/{wildcards.study}/fill/{fill}/{file}"
 
 

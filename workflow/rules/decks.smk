@@ -17,10 +17,10 @@ rule render_drop:
         "../envs/python.yaml"
     params:
         case=digest_of("drop"),
-        fidelity=fidelity_option,
+        cases=case_option("drop"),
         source=source_hash("dragdeck.render"),
     shell:
-        "dragdeck render {wildcards.study} drop {wildcards.run} {params.fidelity} > {log} 2>&1"
+        "dragdeck render {wildcards.study} drop {wildcards.run} {params.cases} > {log} 2>&1"
 
 
 rule render_fill:
@@ -39,10 +39,10 @@ rule render_fill:
         "../envs/python.yaml"
     params:
         case=digest_of("fill"),
-        fidelity=fidelity_option,
+        cases=case_option("fill"),
         source=source_hash("dragdeck.render"),
     shell:
-        "dragdeck render {wildcards.study} fill {wildcards.run} {params.fidelity} > {log} 2>&1"
+        "dragdeck render {wildcards.study} fill {wildcards.run} {params.cases} > {log} 2>&1"
 
 
 rule render_process:

@@ -205,7 +205,7 @@ def base_case(case: Case, scene: SceneName, timestep_s: float, rayleigh_s: float
         "timestep_s": timestep_s,
         "rayleigh_time_s": rayleigh_s,
         "gravity_m_s2": study.gravity_m_s2,
-        "fidelity": {"name": study.fidelity, **fidelity, "skin_m": skin(study)},
+        "fidelity": {"name": case.fidelity_name, **fidelity, "skin_m": skin(study)},
         "inputs": flat(case.content(scene)),
         "media": {
             "count": study.media.count,

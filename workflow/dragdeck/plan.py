@@ -1,0 +1,149 @@
+"""The points of a trade: which settings are run on a study's scenes, and how often.
+
+A plan is a YAML file that fits any study: it names fields of the study file
+and the values each shall take, alone or together with others, and always holds
+the reference that errors are measured against.
+"""
+
+from __future__ import annotations
+
+import copy
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, ValidationError
+
+from dragdeck.cases import SAID_BY_NAME, Case, settle_case
+from dragdeck.errors import InputError
+from dragdeck.study import Model, Positive, Study, Whole, explained, read_yaml
+
+Settings = Mapping[str, Any]
+
+PATH_LENGTH = ("motion.path.revolutions", "motion.path.length_m")
+
+
+class Block(Model):
+    """Points that belong together: every combination of the values."""
+
+    vary: dict[str, list[Any]] = Field(description="dotted field: values")
+    seeds: Annotated[Whole, Field(ge=1)] | None = Field(
+        default=None, description="how many, from the study's own on; none: as the plan says"
+    )
+    arc: Positive | None = Field(
+        default=None, description="share of the study's path; none: as the plan says"
+    )
+
+
+class Plan(Model):
+    """What a trade runs."""
+
+    base: dict[str, Any] = Field(description="dotted field: its value where no point says other")
+    reference: Block = Field(description="what errors are measured against; one point")
+    arc: Positive = Field(default=1.0, description="share of the study's path that is dragged")
+    seeds: Annotated[Whole, Field(ge=1)] = Field(default=2, description="beds a point is run on")
+    points: list[Block] = Field(default_factory=list)
+    drop: dict[str, list[Any]] = Field(
+        default_factory=dict, description="dotted field: values, one after the other, in the drop"
+    )
+
+
+@dataclass(frozen=True)
+class Points:
+    """The cases of a plan.
+
+    Attributes
+    ----------
+    processes : list of Case
+        One for each process run.
+    drops : list of Case
+        One for each drop test.
+    """
+
+    processes: list[Case]
+    drops: list[Case]
+
+
+def read_plan(file: Path) -> Plan:
+    """Read a plan.
+
+    Raises
+    ------
+    InputError
+        The file cannot be used; the message names field, value and limit.
+    """
+    data = read_yaml(file)
+    try:
+        return Plan.model_validate(data)
+    except ValidationError as error:
+        raise explained(error, file) from None
+
+
+def plan_points(plan: Plan, plan_file: Path, base: Case) -> Points:
+    """The cases that a plan makes of a study.
+
+    Parameters
+    ----------
+    plan : Plan
+    plan_file : Path
+        For error messages.
+    base : Case
+        A case of the study: its scene, its first seed and its path are kept.
+
+    Raises
+    ------
+    InputError
+        A point names no field of a study, or one beyond its limits.
+    """
+    if _size(plan.reference) != 1:
+        raise InputError("the reference is one point", file=plan_file, field="reference.vary")
+    blocks = [plan.reference, *plan.points]
+    found: dict[str, Case] = {}
+    for block in blocks:
+        for settings in _settings(plan, block, base.study):
+            case = _case(base, {**plan.base, **settings}, _unnamed(settings), plan_file)
+            found.setdefault(case.run_ids["process"], case)
+    drops: dict[str, Case] = {}
+    for settings in [{}, *({field: value} for field, all_ in plan.drop.items() for value in all_)]:
+        case = _case(base, {**plan.base, **settings}, settings, plan_file)
+        drops.setdefault(case.run_ids["drop"], case)
+    return Points(list(found.values()), list(drops.values()))
+
+
+def _size(block: Block) -> int:
+    size = 1
+    for values in block.vary.values():
+        size *= len(values)
+    return size
+
+
+def _settings(plan: Plan, block: Block, study: Study) -> Iterator[dict[str, Any]]:
+    """The fields that each point of a block sets, path and seed included."""
+    field, length = _path_length(study)
+    arc = {field: length * (block.arc or plan.arc)}
+    for values in itertools.product(*block.vary.values()):
+        for number in range(block.seeds or plan.seeds):
+            seed = {"seed": study.seed + number}
+            yield {**dict(zip(block.vary, values, strict=True)), **arc, **seed}
+
+
+def _unnamed(settings: Settings) -> dict[str, Any]:
+    """The fields that the name of a fidelity without a name does not say already."""
+    said = {f"fidelity.{name}" for name in SAID_BY_NAME}
+    return {field: value for field, value in settings.items() if field not in said}
+
+
+def _path_length(study: Study) -> tuple[str, float]:
+    path = study.motion.path
+    if path.kind == "circle":
+        return PATH_LENGTH[0], path.revolutions
+    return PATH_LENGTH[1], path.length_m
+
+
+def _case(base: Case, values: Settings, shown: Settings, plan_file: Path) -> Case:
+    """The base case with other values; fields below ``fidelity`` replace its name."""
+    data = copy.deepcopy(base.study.model_dump(mode="json", exclude_unset=True))
+    data["fidelity"] = {}
+    return settle_case(base.file, data, values, shown, named_in=plan_file)
