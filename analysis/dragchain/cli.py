@@ -70,6 +70,11 @@ def _parser() -> argparse.ArgumentParser:
     stability.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
     stability.add_argument("lists", type=Path, nargs="+", metavar="POINTS", help="lists of points")
     stability.set_defaults(action=_stability)
+    measure = commands.add_parser(
+        "measure", parents=[run_dir], help="measure a run of a trade, tables and chains included"
+    )
+    measure.add_argument("--fill-table", type=Path, required=True, help="fill.json of its bed")
+    measure.set_defaults(action=_measure)
     return parser
 
 
@@ -113,6 +118,12 @@ def _stability(options: argparse.Namespace) -> None:
     from dragchain.stability_report import write_stability
 
     write_stability(options.out, options.lists)
+
+
+def _measure(options: argparse.Namespace) -> None:
+    from dragchain.measures import write_measures
+
+    write_measures(options.run_dir, options.fill_table)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,194 @@
+"""Effects of settings on a quantity, estimated from runs that partly share beds.
+
+A run's value is the sum of the effects of its settings, of its bed and of
+chance. Runs that start from the same bed are alike to some degree; how much is
+estimated too, so that pairing counts exactly as much as it helps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.optimize import minimize_scalar
+
+from dragchain.errors import SeriesError
+
+Floats = NDArray[np.float64]
+K = TypeVar("K", bound=Hashable)
+
+LARGEST_SHARE = 0.98
+"""Largest share of the variance that a bed is allowed to explain."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Effects with their covariance.
+
+    Attributes
+    ----------
+    effects : (P,) ndarray
+    covariance : (P, P) ndarray
+    residual_sd : float
+        Standard deviation of one run about its settings' effects, bed included.
+    bed_share : float
+        The part of that variance which runs from the same bed have in common.
+    degrees : int
+        Degrees of freedom.
+    residuals : (N,) ndarray
+        Whitened: independent and of equal variance if the model holds.
+    """
+
+    effects: Floats
+    covariance: Floats
+    residual_sd: float
+    bed_share: float
+    degrees: int
+    residuals: Floats
+
+    def contrast(self, weights: Floats) -> tuple[float, float]:
+        """A combination of the effects, (P,), and its standard error."""
+        variance = float(weights @ self.covariance @ weights)
+        return float(weights @ self.effects), float(np.sqrt(max(variance, 0.0)))
+
+
+def fit_effects(
+    design: Floats, values: Floats, beds: Sequence[Hashable], bed_share: float | None = None
+) -> Fit:
+    """Generalised least squares with a random effect of the bed.
+
+    The covariance of two runs is ``s^2`` for a run with itself, ``r s^2`` for
+    runs from the same bed and zero otherwise; ``r`` maximises the restricted
+    likelihood (Patterson and Thompson 1971, Biometrika 58, 545-554).
+
+    Parameters
+    ----------
+    design : (N, P) ndarray
+        Of full column rank.
+    values : (N,) ndarray
+    beds : sequence of N labels
+    bed_share : float, optional
+        ``r``, if it is known.
+
+    Raises
+    ------
+    SeriesError
+        If there are not more runs than effects, or effects cannot be told apart.
+    """
+    runs, number = design.shape
+    if runs <= number:
+        raise SeriesError(f"{runs} runs cannot tell {number} effects: run more seeds")
+    if np.linalg.matrix_rank(design) < number:
+        raise SeriesError("the effects cannot be told apart: vary one setting at a time as well")
+    problem = _Problem(design, values, _same(beds))
+    if bed_share is None:
+        bed_share = problem.best_share() if len(set(beds)) < runs else 0.0
+    return problem.solve(bed_share)
+
+
+def _same(labels: Sequence[Hashable]) -> Floats:
+    """1 where two runs have the same label, else 0, (N, N)."""
+    numbers = {label: number for number, label in enumerate(dict.fromkeys(labels))}
+    codes = np.array([numbers[label] for label in labels])
+    return np.asarray(codes[:, None] == codes[None, :], dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    design: Floats
+    values: Floats
+    same_bed: Floats
+
+    def best_share(self) -> float:
+        found = minimize_scalar(
+            self.minus_likelihood, bounds=(0.0, LARGEST_SHARE), method="bounded"
+        )
+        return float(found.x) if found.fun < self.minus_likelihood(0.0) else 0.0
+
+    def minus_likelihood(self, share: float) -> float:
+        """Restricted log likelihood, negative, without constants."""
+        root, design, values = self._whitened(share)
+        _, triangle = np.linalg.qr(design)
+        effects = np.linalg.lstsq(design, values, rcond=None)[0]
+        square = float(np.sum((values - design @ effects) ** 2))
+        degrees = len(values) - design.shape[1]
+        determinants = np.log(np.diag(root)).sum() + np.log(np.abs(np.diag(triangle))).sum()
+        return float(determinants + 0.5 * degrees * np.log(max(square, 1e-300)))
+
+    def solve(self, share: float) -> Fit:
+        _, design, values = self._whitened(share)
+        effects = np.asarray(np.linalg.lstsq(design, values, rcond=None)[0], dtype=np.float64)
+        residuals = values - design @ effects
+        degrees = len(values) - design.shape[1]
+        variance = float(residuals @ residuals) / degrees
+        covariance = np.asarray(variance * np.linalg.inv(design.T @ design))
+        return Fit(effects, covariance, float(np.sqrt(variance)), share, degrees, residuals)
+
+    def _whitened(self, share: float) -> tuple[Floats, Floats, Floats]:
+        size = len(self.values)
+        alike = (1.0 - share) * np.eye(size) + share * self.same_bed
+        root = np.asarray(np.linalg.cholesky(alike), dtype=np.float64)
+        return root, np.linalg.solve(root, self.design), np.linalg.solve(root, self.values)
+
+
+@dataclass(frozen=True)
+class Factors:
+    """How the settings of runs become columns of a design matrix.
+
+    Attributes
+    ----------
+    settings : sequence of N mappings
+        Factor to level, for each run.
+    reference : mapping
+        The levels that have no column of their own.
+    additive : bool
+        A column for every level of every factor; else one for every combination.
+    """
+
+    settings: Sequence[Mapping[str, Hashable]]
+    reference: Mapping[str, Hashable]
+    additive: bool
+
+    @cached_property
+    def columns(self) -> list[tuple[tuple[str, Hashable], ...]]:
+        """What each column after the first stands for: one level, or one combination."""
+        found: dict[tuple[tuple[str, Hashable], ...], None] = {}
+        for setting in self.settings:
+            own = self._own(setting)
+            for column in [(pair,) for pair in own] if self.additive else [own]:
+                if column:
+                    found[column] = None
+        return list(found)
+
+    def _own(self, setting: Mapping[str, Hashable]) -> tuple[tuple[str, Hashable], ...]:
+        return tuple((f, setting[f]) for f in self.reference if setting[f] != self.reference[f])
+
+    def row(self, setting: Mapping[str, Hashable]) -> Floats:
+        """Row of the design matrix for some settings, (1 + columns,)."""
+        own = self._own(setting)
+        terms = {(pair,) for pair in own} if self.additive else {own}
+        return np.array([1.0, *(float(column in terms) for column in self.columns)])
+
+    def design(self) -> Floats:
+        """The design matrix, (N, 1 + columns)."""
+        return np.array([self.row(setting) for setting in self.settings])
+
+
+def lack_of_fit(additive: Fit, full: Fit) -> float:
+    """Probability of so much disagreement with additivity by chance alone.
+
+    F test of the sum of squares that the interactions explain against what is
+    left with them. Both fits must have used the same `bed_share`. 1 if the two
+    models are the same.
+    """
+    more = additive.degrees - full.degrees
+    if more == 0:
+        return 1.0
+    explained = (additive.residuals @ additive.residuals - full.residuals @ full.residuals) / more
+    left = full.residuals @ full.residuals / full.degrees
+    return float(stats.f.sf(explained / left, more, full.degrees))

@@ -1,0 +1,486 @@
+"""The trade of speed against accuracy: every setting's error and cost against the reference.
+
+The runs of a plan, each measured by `dragchain.measures`, are compared over the
+stretch of path that all of them have. For each quantity the effects of modulus,
+time step, speed and everything else are estimated together (`dragchain.effects`):
+added up where the runs do not contradict that, and for every combination by
+itself where they do.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from dragchain.effects import Factors, Fit, fit_effects, lack_of_fit
+from dragchain.errors import SeriesError, TableError
+from dragchain.measures import FILE, QUANTITIES, SCHEMA, Quantity
+from dragchain.stats import autocovariance
+
+KNOBS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
+OTHER = "other"
+"""The factor that holds all else a point changes."""
+
+CONFIDENCE = 0.95
+ADDITIVE_LEVEL = 0.05
+"""Effects are added up unless chance would disagree as much less often than this."""
+
+TOLERANCES = (0.02, 0.05, 0.1, 0.2)
+
+_SILENT = ("seed", "motion.path.revolutions", "motion.path.length_m")
+"""Inputs that differ between runs without being a setting."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a point asks for, apart from seed and path."""
+
+    youngs_modulus_scale: float
+    timestep_fraction: float
+    speed_factor: float
+    other: str = ""
+
+    def factors(self) -> dict[str, Hashable]:
+        """Factor to level, as `Factors` wants them."""
+        return {name: getattr(self, name) for name in (*KNOBS, OTHER)}
+
+    def __str__(self) -> str:
+        parts = [
+            f"E x {self.youngs_modulus_scale:g}",
+            f"{100 * self.timestep_fraction:g} % of Rayleigh",
+        ]
+        if self.speed_factor != 1.0:
+            parts.append(f"speed x {self.speed_factor:g}")
+        return ", ".join([*parts, self.other] if self.other else parts)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run of the trade.
+
+    Attributes
+    ----------
+    setting : Setting
+    bed : str
+        Id of the fill.
+    values : dict of str to float
+        Quantity to the run's value over the common path; empty if it failed.
+    measures : mapping
+        Content of its ``measures.json``.
+    """
+
+    setting: Setting
+    bed: str
+    values: Mapping[str, float]
+    measures: Mapping[str, Any]
+
+    @property
+    def complete(self) -> bool:
+        """Whether it ended well."""
+        return bool(self.measures["complete"])
+
+    @property
+    def cpu_per_m(self) -> float:
+        """Processor time for a metre of path, s/m."""
+        cost = self.measures["cost"]
+        return float(cost["cpu_time_s"] / cost["steps"] * cost["steps_per_m"])
+
+
+@dataclass(frozen=True)
+class Error:
+    """Difference to the reference, relative to it.
+
+    Attributes
+    ----------
+    error, standard_error : float
+    low, high : float
+        Limits of the interval of `CONFIDENCE`.
+    bound : float
+        The true error is smaller than this, in either direction, with that confidence.
+    resolved : bool
+        Zero lies outside of the interval.
+    """
+
+    error: float
+    standard_error: float
+    low: float
+    high: float
+    bound: float
+    resolved: bool
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All settings against the reference in one quantity.
+
+    Attributes
+    ----------
+    quantity : Quantity
+    reference : float
+        Its value at the reference, estimated from all runs.
+    standard_error : float
+        Of that, relative.
+    run_sd : float
+        Relative standard deviation of one run's value over the common path.
+    bed_share : float
+        The part of its square that runs from one bed have in common.
+    additivity : float
+        Probability of so much disagreement with additive effects by chance.
+    additive : bool
+        Whether effects were added up.
+    errors : dict of Setting to Error
+    """
+
+    quantity: Quantity
+    reference: float
+    standard_error: float
+    run_sd: float
+    bed_share: float
+    additivity: float
+    additive: bool
+    errors: Mapping[Setting, Error]
+
+
+@dataclass(frozen=True)
+class Trade:
+    """The outcome of a plan.
+
+    Attributes
+    ----------
+    runs : list of Run
+        Complete and failed ones.
+    reference : Setting
+    arc_m : float
+        The path that is compared, m.
+    comparisons : dict of str to Comparison
+        Quantity to what the settings do to it.
+    skipped : dict of str to str
+        Quantities that could not be compared, and why.
+    """
+
+    runs: list[Run]
+    reference: Setting
+    arc_m: float
+    comparisons: Mapping[str, Comparison]
+    skipped: Mapping[str, str] = field(default_factory=dict)
+
+    def settings(self) -> list[Setting]:
+        """Every setting once, the dearest first."""
+        found = dict.fromkeys(run.setting for run in self.runs)
+        return sorted(found, key=lambda setting: -self.cost(setting))
+
+    def of(self, setting: Setting) -> list[Run]:
+        """The runs of a setting."""
+        return [run for run in self.runs if run.setting == setting]
+
+    def cost(self, setting: Setting) -> float:
+        """Processor time for a metre of path over the reference's; the median of the runs.
+
+        A failed run costs what it did per step until then.
+        """
+        own = float(np.median([run.cpu_per_m for run in self.of(setting)]))
+        return own / float(np.median([run.cpu_per_m for run in self.of(self.reference)]))
+
+
+def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Setting, float]:
+    """Read the runs of a trade.
+
+    Of runs that differ in the length of their path alone the longest counts.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Their ``measures.json``.
+    reference_run : Path
+        Folder of a run at the reference.
+
+    Returns
+    -------
+    runs : list of Run
+    reference : Setting
+    arc_m : float
+        The longest path that all complete runs have, m.
+
+    Raises
+    ------
+    TableError
+        If a file was written by another version, or no run is complete.
+    """
+    content = {file: _read(file) for file in files}
+    if reference_run / FILE not in content:
+        raise TableError(f"{reference_run}: the reference is not among the runs of the trade")
+    standard = _inputs(content[reference_run / FILE])
+    longest: dict[tuple[Setting, str], Mapping[str, Any]] = {}
+    for measures in content.values():
+        key = (_setting(measures, standard), measures["bed"])
+        if key not in longest or measures.get("arc_m", 0.0) > longest[key].get("arc_m", 0.0):
+            longest[key] = measures
+    complete = [measures for measures in longest.values() if measures["complete"]]
+    if not complete:
+        raise TableError("no run of the trade is complete, so there is nothing to compare")
+    arc = min(measures["arc_m"] for measures in complete)
+    runs = [Run(*key, _values(own, arc), own) for key, own in longest.items()]
+    return runs, _setting(content[reference_run / FILE], standard), arc
+
+
+def _read(file: Path) -> dict[str, Any]:
+    measures: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    if measures.get("schema") != SCHEMA:
+        raise TableError(f"{file}: schema {measures.get('schema')}, this dragchain reads {SCHEMA}")
+    return measures
+
+
+def _inputs(measures: Mapping[str, Any]) -> dict[str, Any]:
+    fidelity = {f"fidelity.{name}": value for name, value in measures["fidelity"].items()}
+    inputs = {**measures["inputs"], **fidelity}
+    silent = {*_SILENT, "fidelity.name", *(f"fidelity.{name}" for name in KNOBS)}
+    return {name: value for name, value in inputs.items() if name not in silent}
+
+
+def _setting(measures: Mapping[str, Any], standard: Mapping[str, Any]) -> Setting:
+    own = _inputs(measures)
+    names = sorted({*own, *standard})
+    other = [
+        f"{name} {_shown(own.get(name))}" for name in names if own.get(name) != standard.get(name)
+    ]
+    modulus, step, speed = (float(measures["fidelity"][name]) for name in KNOBS)
+    return Setting(modulus, step, speed, ", ".join(other))
+
+
+def _shown(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _values(measures: Mapping[str, Any], arc_m: float) -> dict[str, float]:
+    """A run's values over the common path; a block that begins within it counts."""
+    if not measures["complete"]:
+        return {}
+    count = max(1, round(arc_m / measures["block_m"]))
+    found = dict(measures["single"])
+    for quantity in QUANTITIES:
+        blocks = np.array(measures["blocks"].get(quantity.name, []), dtype=np.float64)[:count]
+        if blocks.size and np.isfinite(blocks).all():
+            found[quantity.name] = quantity.of_blocks(blocks)
+    return found
+
+
+def compare(runs: Sequence[Run], reference: Setting, arc_m: float) -> Trade:
+    """Every setting against the reference, in every quantity.
+
+    A quantity that cannot be compared, because too few runs have it, is left
+    out with the reason.
+    """
+    found: dict[str, Comparison] = {}
+    skipped: dict[str, str] = {}
+    for quantity in QUANTITIES:
+        try:
+            found[quantity.name] = compare_quantity(quantity, runs, reference)
+        except SeriesError as error:
+            skipped[quantity.name] = str(error)
+    return Trade(list(runs), reference, arc_m, found, skipped)
+
+
+def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting) -> Comparison:
+    """Every setting against the reference in one quantity.
+
+    Logarithms are compared, so that errors are relative; a quantity that may
+    change its sign is compared as it is, in units of the mean drag.
+
+    Raises
+    ------
+    SeriesError
+        If too few runs have the quantity, or none at the reference does.
+    """
+    runs = [run for run in runs if quantity.name in run.values]
+    settings = [run.setting for run in runs]
+    if reference not in settings:
+        raise SeriesError("no run at the reference has it")
+    values = np.array([run.values[quantity.name] for run in runs])
+    if quantity.signed:
+        drags = [run.values["drag_mean"] for run in runs if run.setting == reference]
+        scale = abs(float(np.mean(drags)))
+        values = values / scale
+    elif (values == 0.0).any() or len(set(np.sign(values))) > 1:
+        raise SeriesError("it is zero or changes its sign, so that no relative error exists")
+    else:
+        scale = float(np.sign(values[0]))
+        values = np.log(np.abs(values))
+    factors, fit, additivity = _choose(settings, values, [run.bed for run in runs], reference)
+    level, uncertainty = fit.contrast(factors.row(reference.factors()))
+    return Comparison(
+        quantity=quantity,
+        reference=scale * (level if quantity.signed else math.exp(level)),
+        standard_error=uncertainty,
+        run_sd=fit.residual_sd,
+        bed_share=fit.bed_share,
+        additivity=additivity,
+        additive=factors.additive,
+        errors={
+            setting: _error(fit, factors, setting, reference, quantity.signed)
+            for setting in dict.fromkeys(settings)
+        },
+    )
+
+
+def _choose(
+    settings: Sequence[Setting], values: np.ndarray[Any, Any], beds: list[str], reference: Setting
+) -> tuple[Factors, Fit, float]:
+    """Additive effects, or one for every combination where the runs contradict additivity."""
+    levels = [setting.factors() for setting in settings]
+    full_factors = Factors(levels, reference.factors(), additive=False)
+    factors = Factors(levels, reference.factors(), additive=True)
+    try:
+        full = fit_effects(full_factors.design(), values, beds)
+    except SeriesError:  # no replicates: additivity is taken on trust
+        return factors, fit_effects(factors.design(), values, beds), math.nan
+    try:
+        additive = fit_effects(factors.design(), values, beds, full.bed_share)
+    except SeriesError:
+        return full_factors, full, math.nan
+    probability = lack_of_fit(additive, full)
+    if probability < ADDITIVE_LEVEL:
+        return full_factors, full, probability
+    return factors, fit_effects(factors.design(), values, beds), probability
+
+
+def _error(fit: Fit, factors: Factors, setting: Setting, reference: Setting, signed: bool) -> Error:
+    weights = factors.row(setting.factors()) - factors.row(reference.factors())
+    difference, uncertainty = fit.contrast(weights)
+    shift = uncertainty * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, fit.degrees)
+    one_sided = uncertainty * stats.t.ppf(CONFIDENCE, fit.degrees)
+
+    def relative(value: float) -> float:
+        return value if signed else math.expm1(value)
+
+    low, high = relative(difference - shift), relative(difference + shift)
+    ends = (relative(difference - one_sided), relative(difference + one_sided))
+    return Error(
+        error=relative(difference),
+        standard_error=uncertainty * (1.0 if signed else math.exp(difference)),
+        low=low,
+        high=high,
+        bound=max(abs(end) for end in ends),
+        resolved=bool(low > 0.0 or high < 0.0),
+    )
+
+
+def recommend(trade: Trade, quantity: str, tolerance: float) -> Setting | None:
+    """The cheapest setting whose error is below a tolerance with confidence.
+
+    Only settings that change nothing but the fidelity count, of which every
+    run was complete; None if there is none but the reference.
+    """
+    comparison = trade.comparisons.get(quantity)
+    if comparison is None:
+        return None
+    able = [
+        setting
+        for setting, error in comparison.errors.items()
+        if error.bound <= tolerance
+        and setting != trade.reference
+        and not setting.other
+        and all(run.complete for run in trade.of(setting))
+        and len(trade.of(setting)) > 1
+    ]
+    return min(able, key=trade.cost, default=None)
+
+
+@dataclass(frozen=True)
+class Along:
+    """How a quantity behaves along the path of the longest runs.
+
+    Attributes
+    ----------
+    blocks : int
+        In each of them.
+    runs : int
+    correlation : list of float
+        Between blocks 1, 2 and 3 apart.
+    drift : float
+        Second half less first half of the path, relative to the mean.
+    drift_halfwidth : float
+        Of its interval of `CONFIDENCE`; NaN for a single run.
+    """
+
+    blocks: int
+    runs: int
+    correlation: list[float]
+    drift: float
+    drift_halfwidth: float
+
+
+def along(trade: Trade, quantity: Quantity) -> Along | None:
+    """How a quantity changes along the path; None if runs are too short for that."""
+    complete = [run.measures for run in trade.runs if run.complete]
+    longest = max(measures["arc_m"] for measures in complete)
+    series = [
+        np.array(measures["blocks"][quantity.name])
+        for measures in complete
+        if measures["arc_m"] > 0.99 * longest and quantity.name in measures["blocks"]
+    ]
+    series = [blocks for blocks in series if len(blocks) >= 8 and np.isfinite(blocks).all()]
+    if not series:
+        return None
+    covariance = sum(autocovariance(blocks)[:4] for blocks in series)
+    assert isinstance(covariance, np.ndarray)
+    drifts = np.array([_drift(blocks) for blocks in series])
+    error = stats.sem(drifts) if len(drifts) > 1 else math.nan
+    quantile = stats.t.ppf(0.5 + 0.5 * CONFIDENCE, max(len(drifts) - 1, 1))
+    return Along(
+        blocks=len(series[0]),
+        runs=len(series),
+        correlation=[float(value) for value in covariance[1:] / covariance[0]],
+        drift=float(drifts.mean()),
+        drift_halfwidth=float(quantile * error),
+    )
+
+
+def _drift(blocks: np.ndarray[Any, Any]) -> float:
+    half = len(blocks) // 2
+    return float((blocks[-half:].mean() - blocks[:half].mean()) / abs(blocks.mean()))
+
+
+def run_table(trade: Trade) -> pd.DataFrame:
+    """One row a run: settings, bed, cost, outcome and the value of every quantity."""
+    rows = [
+        {
+            "run": run.measures["run"],
+            **{name: value for name, value in vars(run.setting).items()},
+            "bed": run.bed,
+            "complete": run.complete,
+            "failure": _failure(run),
+            "counted_path_m": run.measures.get("arc_m", math.nan),
+            **run.measures["cost"],
+            **{quantity.name: run.values.get(quantity.name, math.nan) for quantity in QUANTITIES},
+        }
+        for run in trade.runs
+    ]
+    return pd.DataFrame(rows)
+
+
+def _failure(run: Run) -> str:
+    return "; ".join(f"{gate['name']}: {gate['seen']}" for gate in run.measures.get("failure", []))
+
+
+def error_table(trade: Trade) -> pd.DataFrame:
+    """One row a setting and quantity: cost, error, interval and bound."""
+    rows = [
+        {
+            "quantity": name,
+            **vars(setting),
+            "runs": sum(run.complete for run in trade.of(setting)),
+            "relative_cost": trade.cost(setting),
+            **vars(error),
+        }
+        for name, comparison in trade.comparisons.items()
+        for setting, error in comparison.errors.items()
+    ]
+    return pd.DataFrame(rows)
