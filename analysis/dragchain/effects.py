@@ -133,7 +133,8 @@ class _Problem:
         size = len(self.values)
         alike = (1.0 - share) * np.eye(size) + share * self.same_bed
         root = np.asarray(np.linalg.cholesky(alike), dtype=np.float64)
-        return root, np.linalg.solve(root, self.design), np.linalg.solve(root, self.values)
+        design = np.asarray(np.linalg.solve(root, self.design), dtype=np.float64)
+        return root, design, np.asarray(np.linalg.solve(root, self.values), dtype=np.float64)
 
 
 @dataclass(frozen=True)

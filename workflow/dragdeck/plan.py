@@ -45,6 +45,11 @@ class Plan(Model):
     arc: Positive = Field(default=1.0, description="share of the study's path that is dragged")
     seeds: Annotated[Whole, Field(ge=1)] = Field(default=2, description="beds a point is run on")
     points: list[Block] = Field(default_factory=list)
+    scenes: dict[str, dict[str, Any]] = Field(
+        default={"as it is": {}},
+        description="name: dotted fields and values that change the study; every point is run in "
+        "each of them",
+    )
     drop: dict[str, list[Any]] = Field(
         default_factory=dict, description="dotted field: values, one after the other, in the drop"
     )
@@ -101,9 +106,10 @@ def plan_points(plan: Plan, plan_file: Path, base: Case) -> Points:
         raise InputError("the reference is one point", file=plan_file, field="reference.vary")
     blocks = [plan.reference, *plan.points]
     found: dict[str, Case] = {}
-    for block in blocks:
+    for scene, block in itertools.product(plan.scenes.values(), blocks):
         for settings in _settings(plan, block, base.study):
-            case = _case(base, {**plan.base, **settings}, _unnamed(settings), plan_file)
+            shown = {**scene, **_unnamed(settings)}
+            case = _case(base, {**plan.base, **scene, **settings}, shown, plan_file)
             found.setdefault(case.run_ids["process"], case)
     drops: dict[str, Case] = {}
     for settings in [{}, *({field: value} for field, all_ in plan.drop.items() for value in all_)]:
@@ -131,7 +137,7 @@ def _settings(plan: Plan, block: Block, study: Study) -> Iterator[dict[str, Any]
 
 def _unnamed(settings: Settings) -> dict[str, Any]:
     """The fields that the name of a fidelity without a name does not say already."""
-    said = {f"fidelity.{name}" for name in SAID_BY_NAME}
+    said = {"fidelity", *(f"fidelity.{name}" for name in SAID_BY_NAME)}
     return {field: value for field, value in settings.items() if field not in said}
 
 

@@ -49,7 +49,7 @@ def of_point(file):
 
 def of_trade(file):
     """Path of a file of the report on a trade."""
-    return f"results/{STUDY}/trade-report/{file}"
+    return f"results/{STUDY}/trade-report/{Path(PLAN).stem}/{file}"
 
 
 def of_experiment(run, file):

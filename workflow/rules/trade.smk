@@ -68,4 +68,31 @@ rule measure_point:
 
 rule write_trade:
     input:
-        every_point("measures.json"),
+        measures=lambda wildcards: every_point("measures.json"),
+        drops=lambda wildcards: every_drop_point("tables/impacts.parquet"),
+        template=str(PROJECT.root / "analysis/dragchain/trade.html.j2"),
+    output:
+        page=report(
+            of_trade("report.html"),
+            caption="../report/trade.rst",
+            category="Trade",
+            labels={"run": "all", "figure": "report"},
+        ),
+        measured=of_trade("trade.json"),
+        runs=multiext(of_trade(""), "runs.csv", "runs.parquet"),
+        errors=multiext(of_trade(""), "errors.csv", "errors.parquet"),
+    log:
+        of_trade("logs/report.log"),
+    benchmark:
+        of_trade("benchmarks/report.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        reference=lambda wildcards: f"results/{STUDY}/trade/{next(iter(points_by_run('process')))}",
+        drops=lambda wildcards: [f"results/{STUDY}/drop/{run}" for run in points_by_run("drop")],
+        plan=PLAN,
+        source=source_hash("dragchain.trade_report"),
+    shell:
+        "dragchain trade --out $(dirname {output.page}) --plan {params.plan}"
+        " --reference {params.reference} --drops {params.drops}"
+        " -- {input.measures} > {log} 2>&1"

@@ -317,8 +317,8 @@ def _process_case(case: Case, surface_m: float, timed: Sequence[TimedLeg]) -> Ma
 
 
 _INPUTS = {
-    "materials", "pairs", "media", "bowl", "workpiece", "motion", "contact", "drop", "fill", "outputs",
-    "gravity_m_s2", "seed",
+    "materials", "pairs", "media", "bowl", "workpiece", "motion", "contact", "drop", "fill",
+    "outputs", "gravity_m_s2", "seed",
 }  # fmt: skip
 
 
