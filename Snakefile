@@ -20,6 +20,7 @@ include: "workflow/rules/trade.smk"
 localrules:
     all,
     calibrate,
+    checks,
     drop,
     fill,
     process,
@@ -85,3 +86,9 @@ rule stability:
 rule trade:
     input:
         rules.write_trade.output,
+
+
+# Whether the advisor's promises hold on other scenes: --config plan=checks
+rule checks:
+    input:
+        rules.write_checks.output,

@@ -112,7 +112,8 @@ class Case:
 
     ``bowl`` is None in a drop; ``case``, ``tool``, ``motion``, ``surface_m``
     and ``run_in_s`` are None outside a process; ``restitution`` is None
-    outside a drop.
+    outside a drop. ``numbers`` are the dimensionless numbers of a process;
+    ``asked`` is the tolerance that its settings were chosen for, if any.
     """
 
     study: str
@@ -125,6 +126,8 @@ class Case:
     gravity_m_s2: float
     fidelity: Fidelity
     inputs: Mapping[str, object]
+    numbers: Mapping[str, float]
+    asked: Mapping[str, object] | None
     media: Media
     bowl: Bowl | None
     tool: Tool | None
@@ -292,6 +295,8 @@ def parse_case(file: Path) -> Case:
         gravity_m_s2=top.number("gravity_m_s2"),
         fidelity=_fidelity(top.child("fidelity")),
         inputs=top.mapping("inputs"),
+        numbers=top.mapping("numbers") if top.has("numbers") else {},
+        asked=top.mapping("asked") if top.has("asked") else None,
         media=_media(top.child("media")),
         bowl=None if scene == "drop" else _bowl(top.child("bowl")),
         tool=_tool(top.child("tool")) if process else None,

@@ -75,6 +75,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     measure.add_argument("--fill-table", type=Path, required=True, help="fill.json of its bed")
     measure.set_defaults(action=_measure)
+    checks = commands.add_parser("checks", help="check the advisor's promises on other scenes")
+    checks.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="the results' folder"
+    )
+    checks.add_argument("measures", type=Path, nargs="+", metavar="MEASURES", help="measures.json")
+    checks.set_defaults(action=_checks)
     return parser
 
 
@@ -124,6 +130,19 @@ def _measure(options: argparse.Namespace) -> None:
     from dragchain.measures import write_measures
 
     write_measures(options.run_dir, options.fill_table)
+
+
+def _checks(options: argparse.Namespace) -> None:
+    from dragchain.checks import write_checks
+
+    for check in write_checks(options.out, options.measures):
+        scene = ", ".join(f"{name} {value}" for name, value in check.scene.items())
+        error = check.error
+        print(
+            f"{scene or 'other beds'}: {check.quantity} within {check.tolerance:g} by"
+            f" {check.setting}: {error.error:+.3f} ({error.low:+.3f} to {error.high:+.3f}),"
+            f" {check.verdict}"
+        )
 
 
 if __name__ == "__main__":

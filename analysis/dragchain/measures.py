@@ -117,6 +117,8 @@ def write_measures(run_dir: Path, fill_table: Path) -> dict[str, Any]:
         "bed": case.upstream.get("fill"),
         "inputs": dict(case.inputs),
         "fidelity": vars(case.fidelity),
+        "numbers": dict(case.numbers),
+        "asked": case.asked,
         "complete": outcome["state"] == "complete",
         "cost": _cost(case, outcome),
         "versions": {**case.versions, "engine": outcome["engine_version"]},

@@ -35,7 +35,7 @@ ADDITIVE_LEVEL = 0.05
 
 TOLERANCES = (0.02, 0.05, 0.1, 0.2)
 
-_SILENT = ("seed", "motion.path.revolutions", "motion.path.length_m")
+SILENT = ("seed", "motion.path.revolutions", "motion.path.length_m")
 """Inputs that differ between runs without being a setting."""
 
 
@@ -214,7 +214,7 @@ def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Se
     TableError
         If a file was written by another version, or no run is complete.
     """
-    content = {file: _read(file) for file in files}
+    content = {file: read_measures(file) for file in files}
     if reference_run / FILE not in content:
         raise TableError(f"{reference_run}: the reference is not among the runs of the trade")
     standard = _inputs(content[reference_run / FILE])
@@ -227,11 +227,18 @@ def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Se
     if not complete:
         raise TableError("no run of the trade is complete, so there is nothing to compare")
     arc = min(measures["arc_m"] for measures in complete)
-    runs = [Run(*key, _values(own, arc), own) for key, own in longest.items()]
+    runs = [Run(*key, values_within(own, arc), own) for key, own in longest.items()]
     return runs, _setting(content[reference_run / FILE], standard), arc
 
 
-def _read(file: Path) -> dict[str, Any]:
+def read_measures(file: Path) -> dict[str, Any]:
+    """The content of a ``measures.json``.
+
+    Raises
+    ------
+    TableError
+        If another version wrote it.
+    """
     measures: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     if measures.get("schema") != SCHEMA:
         raise TableError(f"{file}: schema {measures.get('schema')}, this dragchain reads {SCHEMA}")
@@ -241,7 +248,7 @@ def _read(file: Path) -> dict[str, Any]:
 def _inputs(measures: Mapping[str, Any]) -> dict[str, Any]:
     fidelity = {f"fidelity.{name}": value for name, value in measures["fidelity"].items()}
     inputs = {**measures["inputs"], **fidelity}
-    silent = {*_SILENT, "fidelity.name", *(f"fidelity.{name}" for name in KNOBS)}
+    silent = {*SILENT, "fidelity.name", *(f"fidelity.{name}" for name in KNOBS)}
     return {name: value for name, value in inputs.items() if name not in silent}
 
 
@@ -259,7 +266,7 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _values(measures: Mapping[str, Any], arc_m: float) -> dict[str, float]:
+def values_within(measures: Mapping[str, Any], arc_m: float) -> dict[str, float]:
     """A run's values over the common path; a block that begins within it counts."""
     if not measures["complete"]:
         return {}

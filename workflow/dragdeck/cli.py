@@ -44,6 +44,7 @@ def _parser() -> argparse.ArgumentParser:
     for command in (check, explain, cases, render, verify):
         command.add_argument("study", help="name of a folder in studies/")
         command.add_argument("--fidelity", help="instead of the study's own")
+    cases.add_argument("--plan", help="the points of this trade's plan instead")
     explain.add_argument("scene", nargs="?", choices=SCENES, help="one scene only")
     render.add_argument("scene", choices=SCENES)
     render.add_argument("run", help="run id, as `dragdeck cases` lists it")
@@ -137,7 +138,11 @@ def _cases(options: argparse.Namespace) -> None:
 
     project = find_project(Path.cwd())
     table = Table("case", *SCENES)
-    for case in project.cases(options.study, options.fidelity):
+    if options.plan is None:
+        cases = project.cases(options.study, options.fidelity)
+    else:
+        cases = project.points(options.study, options.plan).processes
+    for case in cases:
         table.add_row(case.name, *(case.run_ids[scene] for scene in SCENES))
     show([table])
 

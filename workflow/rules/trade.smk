@@ -96,3 +96,21 @@ rule write_trade:
         "dragchain trade --out $(dirname {output.page}) --plan {params.plan}"
         " --reference {params.reference} --drops {params.drops}"
         " -- {input.measures} > {log} 2>&1"
+
+
+# What the advisor promised, in scenes that it was not measured on: plan=checks.
+rule write_checks:
+    input:
+        lambda wildcards: every_point("measures.json"),
+    output:
+        multiext(of_trade("checks"), ".json", ".csv"),
+    log:
+        of_trade("logs/checks.log"),
+    benchmark:
+        of_trade("benchmarks/checks.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        source=source_hash("dragchain.checks"),
+    shell:
+        "dragchain checks --out $(dirname {output[0]}) {input} 2>&1 | tee -i {log}"
