@@ -135,6 +135,9 @@ def measure(
             file=out,
             remedy="move it away, or give another --out",
         )
+    for name, value in (("--rounds", rounds), ("--seconds", seconds)):
+        if not value > 0:
+            raise InputError("nothing to time", field=name, value=value, limit="greater than 0")
     load = os.getloadavg()[0]
     if load > QUIET:
         report(f"warning: the machine is busy (load average {load:.2f}); CPU times will scatter")
@@ -313,18 +316,22 @@ class _Bench:
 
     def _block(self, block: Sequence[Variant], number: int) -> list[Row]:
         """Time a base and then the variants that are compared with it."""
-        base = BASES[block[0].base]
-        beside = asdict(self._timing(base))
-        return [
-            {
-                "name": variant.name,
-                "round": number,
-                "inputs": self.inputs[variant.name],
-                **asdict(self._timing(variant)),
-                "base": beside,
-            }
-            for variant in block
-        ]
+        base = self._timing(BASES[block[0].base])
+        return [self._row(variant, number, base) for variant in block]
+
+    def _row(self, variant: Variant, number: int, base: Timing) -> Row:
+        own = self._timing(variant)
+        self.beds.report(
+            f"round {number + 1}: {variant.name}: {own.cpu_time_s:.3g} s for {own.steps:,} steps,"
+            f" {variant.base}: {base.cpu_time_s:.3g} s for {base.steps:,}"
+        )
+        return {
+            "name": variant.name,
+            "round": number,
+            "inputs": self.inputs[variant.name],
+            **asdict(own),
+            "base": asdict(base),
+        }
 
     def _timing(self, variant: Variant) -> Timing:
         """Time of a variant's steps, its start taken out."""

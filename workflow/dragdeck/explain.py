@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -51,8 +53,49 @@ def _measured(results: Path) -> Iterable[float]:
             yield float(speed)
 
 
-def explanation(scene: Scene, cost: Cost, notes: Iterable[tuple[str, str]] = ()) -> Table:
-    """The table of one scene; `notes` say what its time step means for each pair of bodies."""
+def measured_trade() -> dict[str, Any]:
+    """What was measured of speed and accuracy, ``data/trade.json``; empty if it is not there."""
+    file = resources.files("dragdeck").joinpath("data").joinpath("trade.json")
+    return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+
+
+def price_of(name: str, trade: Mapping[str, Any]) -> str:
+    """What putting a thing back costs, as measured.
+
+    Parameters
+    ----------
+    name : str
+        A variant of `dragdeck.costs`.
+    trade : mapping
+        Its ``costs`` give for each variant the ratio of processor times, with a
+        95 % interval if there were rounds enough for one.
+    """
+    found = next((cost for cost in trade.get("costs", ()) if cost["name"] == name), None)
+    if found is None:
+        return "cost of putting it back: not measured"
+    interval = "" if found["low"] is None else f" ({found['low']:.3g} to {found['high']:.3g})"
+    engine, date = trade["versions"]["engine"], trade["measured"]
+    return f"putting it back costs {found['ratio']:.3g}x{interval}, LIGGGHTS {engine}, {date}"
+
+
+def explanation(
+    scene: Scene,
+    cost: Cost,
+    notes: Iterable[tuple[str, str]] = (),
+    trade: Mapping[str, Any] | None = None,
+) -> Table:
+    """The table of one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    cost : Cost
+    notes : iterable of (str, str)
+        What its time step means for each pair of bodies.
+    trade : mapping, optional
+        Measured costs, if not those of `measured_trade`.
+    """
+    trade = measured_trade() if trade is None else trade
     deck = scene.deck
     table = Table(title=f"{deck.study}: {deck.scene} {deck.run}", title_justify="left")
     table.add_column("")
@@ -61,8 +104,9 @@ def explanation(scene: Scene, cost: Cost, notes: Iterable[tuple[str, str]] = ())
     for what, why in scene.models.items():
         table.add_row("models", what, why)
     table.add_section()
-    for what, why in scene.leaves_out.items():
-        table.add_row("leaves out", what, why)
+    for what, left in scene.leaves_out.items():
+        price = f"; {price_of(left.cost, trade)}" if left.cost else ""
+        table.add_row("leaves out", what, f"{left.why}{price}")
     table.add_section()
     rayleigh = scene.case["rayleigh_time_s"]
     share = deck.timestep_s / rayleigh
