@@ -133,7 +133,7 @@ def test_the_standard_drag_is_the_process_without_what_goes_before(
     scene = process_scene(base, BED)
     text = deck_of(base, "standard", templates).whole
     steps = int(re.findall(r"^if .* then \"run (\d+) upto\"", text, re.MULTILINE)[0])
-    assert STEPS <= steps < STEPS + scene.deck.thermo_steps
+    assert -0.05 <= (steps - STEPS) / scene.deck.thermo_steps < 1
     assert steps % scene.deck.thermo_steps == 0
     start = re.findall(r"reference_point (\S+) (\S+) (\S+)", text)[0]
     study = base.study

@@ -35,9 +35,12 @@ from dragdeck.study import CylinderShape, Study
 Unit = Literal["per_step", "per_second"]
 Settings = Mapping[str, Any]
 
-DAMPED_S, DAMPING_TIME_S, FREE_S = 0.005, 0.001, 0.02
+DAMPED_S, DAMPING_TIME_S, FREE_S = 0.005, 0.001, 0.05
 """How a bed comes to rest with another modulus or other facets: damped for the
 first time, speeds falling with the second, then free for the third, s."""
+
+FRAME_SHARE = 0.05
+"""Share of a frame's steps by which a drag may be shorter than asked, to end with a frame."""
 
 CONTACT_COLUMNS = (
     "pos vel id force force_normal force_tangential torque torque_normal torque_tangential "
@@ -438,7 +441,7 @@ def timed_deck(
     variant : Variant
     templates : jinja2.Environment
     steps : int
-        How many to drag, at least; a drag ends with a whole frame of the network.
+        How many to drag, about; a drag ends with a frame of the network.
     bed : Bed, optional
         The settled bed of a process.
     source : str
@@ -466,7 +469,7 @@ def _timed_process(
 ) -> _Timed:
     scene = process_scene(case, bed)
     period = scene.deck.thermo_steps
-    whole = period * max(1, math.ceil(steps / period))
+    whole = period * max(1, math.ceil(steps / period - FRAME_SHARE))
     first, *others = (deck_text(drag_only(scene, source, end), templates) for end in (whole, 1))
     return scene, first, others[0]
 
