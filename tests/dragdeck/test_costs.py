@@ -29,7 +29,7 @@ from dragdeck.costs import (
 )
 from dragdeck.costs_run import BLOCK, blocks, costs, measure
 from dragdeck.errors import InputError
-from dragdeck.explain import price_of
+from dragdeck.explain import Cost, explanation, price_of
 from dragdeck.project import Project
 from dragdeck.render import environment
 from dragdeck.scenes import Bed, drop_scene, fill_scene, process_scene
@@ -203,6 +203,34 @@ def test_a_price_is_quoted_with_engine_and_date() -> None:
     assert "not measured" in price_of("bowl_facets", {})
     single = {**trade, "costs": [{**cost, "low": None, "high": None}]}
     assert price_of("bowl_facets", single).startswith("putting it back costs 1.9x, LIGGGHTS")
+
+
+@pytest.mark.parametrize(
+    ("high", "unit", "scene", "shown"),
+    [(0.95, "per_second", "process", True), (1.01, "per_second", "process", False),
+     (None, "per_second", "process", False), (0.95, "per_step", "process", False),
+     (0.95, "per_second", "fill", False)],
+)  # fmt: skip
+def test_explain_names_what_is_surely_cheaper(
+    base: Case, high: float | None, unit: str, scene: str, shown: bool
+) -> None:
+    cost = {
+        "name": "rod_wide_facets", "what": "wide facets", "scene": scene, "unit": unit,
+        "ratio": 0.9, "low": None if high is None else 0.85, "high": high,
+    }  # fmt: skip
+    trade = {"versions": {"engine": "3.8.0"}, "measured": "2026-11-21", "costs": [cost]}
+    table = explanation(process_scene(base), Cost(1, 1.0, ""), (), trade)
+    assert ("wide facets" in list(table.columns[1].cells)) == shown
+    assert any("not measured" in str(cell) for cell in table.columns[2].cells)
+
+
+def test_a_fill_is_timed_over_whole_frames(base: Case, templates: jinja2.Environment) -> None:
+    deck = deck_of(base, "fill_contacts", templates)
+    (period,) = re.findall(r"^dump write_contacts all local (\d+) ", deck.whole, re.MULTILINE)
+    (steps,) = re.findall(r"^run (\d+)$", deck.whole, re.MULTILINE)
+    assert int(steps) % int(period) == 0
+    assert 1 / (int(period) * deck.timestep_s) == pytest.approx(20, rel=1e-3)
+    assert re.findall(r"^run (\d+)$", deck.start, re.MULTILINE) == ["1"]
 
 
 def test_a_measurement_is_not_overwritten(

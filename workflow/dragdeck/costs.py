@@ -384,8 +384,7 @@ def _drops() -> list[Variant]:
 
 
 def _fills(study: Study) -> list[Variant]:
-    dt = timestep(bed_rayleigh_time(study), study.chosen_fidelity().fill_timestep_fraction)
-    period = max(1, math.floor(1 / (study.outputs.network_hz * dt)))
+    period = _fill_period(study)
     write = (
         r"\1\ncompute ball_contacts all pair/gran/local id force delta\n"
         rf"dump write_contacts all local {period} contacts.${{part}}.dump {NEEDED_COLUMNS}"
@@ -399,6 +398,17 @@ def _fills(study: Study) -> list[Variant]:
             base="fill",
         )
     ]
+
+
+def _fill_period(study: Study) -> int:
+    """Steps of the fill between frames at the rate of the network."""
+    dt = timestep(bed_rayleigh_time(study), study.chosen_fidelity().fill_timestep_fraction)
+    return max(1, math.floor(1 / (study.outputs.network_hz * dt)))
+
+
+def _whole_frames(steps: int, period: int) -> int:
+    """About that many steps, to the end of a frame."""
+    return period * max(1, math.ceil(steps / period - FRAME_SHARE))
 
 
 @dataclass(frozen=True)
@@ -468,10 +478,9 @@ def _timed_process(
     case: Case, templates: jinja2.Environment, steps: int, bed: Bed | None, source: str
 ) -> _Timed:
     scene = process_scene(case, bed)
-    period = scene.deck.thermo_steps
-    whole = period * max(1, math.ceil(steps / period - FRAME_SHARE))
-    first, *others = (deck_text(drag_only(scene, source, end), templates) for end in (whole, 1))
-    return scene, first, others[0]
+    whole = _whole_frames(steps, scene.deck.thermo_steps)
+    text, start = (deck_text(drag_only(scene, source, end), templates) for end in (whole, 1))
+    return scene, text, start
 
 
 def _timed_drop(
@@ -493,11 +502,9 @@ def _timed_fill(
         deck_text(replace(scene, deck=deck), templates)
     )
     rest = r'^# Rest: (?:.*\n)*?(?=^print "DRAGDECK END")'
-    whole = max(steps, math.ceil(1 / (case.study.outputs.network_hz * deck.timestep_s)))
-    first, *others = (
-        Edit(rest, f"reset_timestep 0\nrun {end}\n").apply(text) for end in (whole, 1)
-    )
-    return scene, first, others[0]
+    whole = _whole_frames(steps, _fill_period(case.study))
+    run, start = (Edit(rest, f"reset_timestep 0\nrun {end}\n").apply(text) for end in (whole, 1))
+    return scene, run, start
 
 
 _TIMED = {"process": _timed_process, "drop": _timed_drop, "fill": _timed_fill}

@@ -36,6 +36,7 @@ from dragdeck.costs import (
 from dragdeck.engine import Engine, command, engine_errors, execute, find_engine
 from dragdeck.errors import EngineError, InputError
 from dragdeck.mesh import Mesh, write_stl
+from dragdeck.project import study_templates
 from dragdeck.render import DECK_FILE, environment, replace_text, write_run
 from dragdeck.runner import fingerprint, run
 from dragdeck.scenes import Bed, fill_scene, process_scene
@@ -143,12 +144,12 @@ def measure(
         report(f"warning: the machine is busy (load average {load:.2f}); CPU times will scatter")
     base = standard_case(case)
     chosen = list(variants(base) if only is None else only)
-    folder = out.parent / "costs"
-    decks = environment(templates, case.file.parent / "templates")
+    folder = out.resolve().parent / "costs"
+    decks = environment(templates, study_templates(case))
     beds = _Beds(base, results, folder, decks, find_engine(), report)
-    bench = _Bench(base, beds, seconds, chosen)
+    bench = _Bench(base, beds, seconds, chosen, load)
     rows = bench.rounds(rounds)
-    replace_text(out, _json(_result(bench, rows, load, seconds)))
+    replace_text(out, _json(_result(bench, rows)))
     return out
 
 
@@ -262,6 +263,7 @@ class _Bench:
     beds: _Beds
     seconds: float
     variants: Sequence[Variant]
+    load: float
 
     @cached_property
     def bases(self) -> list[Variant]:
@@ -285,8 +287,8 @@ class _Bench:
 
     @cached_property
     def inputs(self) -> Mapping[str, str]:
-        """Hash of all that a variant's timing depends on, its base's deck included."""
-        engine, own = self.beds.engine.version, {}
+        """Hash of all that a variant's timing depends on: its base's deck too, engine, processor."""
+        own: dict[str, str] = {}
         for name, deck in self.decks.items():
             folder = self._place(name)
             folder.mkdir(parents=True, exist_ok=True)
@@ -295,8 +297,9 @@ class _Bench:
             texts = {DECK_FILE: deck.whole, START_FILE: deck.start, **deck.files}
             _write(folder, texts, deck.meshes)
             own[name] = f"{fingerprint(folder)} {deck.ranks}"
+        where = f"{self.beds.engine.version} {processor()}"
         return {
-            variant.name: _digest(f"{engine} {own[variant.name]} {own[variant.base]}")
+            variant.name: _digest(f"{where} {own[variant.name]} {own[variant.base]}")
             for variant in self.variants
         }
 
@@ -329,6 +332,8 @@ class _Bench:
             "name": variant.name,
             "round": number,
             "inputs": self.inputs[variant.name],
+            "measured": datetime.now(UTC).date().isoformat(),
+            "load_average_before": round(self.load, 2),
             **asdict(own),
             "base": asdict(base),
         }
@@ -434,7 +439,7 @@ def _scaled(found: Ratio, factor: float) -> dict[str, float | None]:
     return {name: None if value is None else value * factor for name, value in values}
 
 
-def _result(bench: _Bench, rows: Sequence[Row], load: float, seconds: float) -> Row:
+def _result(bench: _Bench, rows: Sequence[Row]) -> Row:
     """Content of ``costs.json``."""
     study, steps_s = bench.base.study, {n: deck.timestep_s for n, deck in bench.decks.items()}
     return {
@@ -442,12 +447,12 @@ def _result(bench: _Bench, rows: Sequence[Row], load: float, seconds: float) -> 
         "study": bench.base.study_name,
         "fidelity": study.chosen_fidelity().model_dump(mode="json"),
         "balls": study.media.count,
-        "seconds": seconds,
-        "measured": datetime.now(UTC).date().isoformat(),
+        "seconds": bench.seconds,
+        "measured": max(row["measured"] for row in rows),
         "command": shlex.join(["dragdeck", *sys.argv[1:]]),
         "versions": {"dragdeck": __version__, "engine": bench.beds.engine.version},
         "machine": {"cores": os.cpu_count(), "processor": processor()},
-        "load_average_before": round(load, 2),
+        "load_average_before": max(row["load_average_before"] for row in rows),
         "bases": [_base(base, bench.variants, rows, steps_s) for base in bench.bases],
         "costs": costs(bench.variants, rows, steps_s),
     }

@@ -73,9 +73,21 @@ def price_of(name: str, trade: Mapping[str, Any]) -> str:
     found = next((cost for cost in trade.get("costs", ()) if cost["name"] == name), None)
     if found is None:
         return "cost of putting it back: not measured"
-    interval = "" if found["low"] is None else f" ({found['low']:.3g} to {found['high']:.3g})"
+    return f"putting it back costs {_ratio(found, trade)}"
+
+
+def cheaper_choices(scene: str, trade: Mapping[str, Any]) -> Iterable[tuple[str, str]]:
+    """What was measured to make a scene cheaper, beyond doubt, by a simulated second."""
+    for cost in trade.get("costs", ()):
+        sure = cost["high"] is not None and cost["high"] < 1
+        if sure and cost["scene"] == scene and cost.get("unit", "per_second") == "per_second":
+            yield cost["what"], f"{_ratio(cost, trade)}; what it does to the results is not said"
+
+
+def _ratio(cost: Mapping[str, Any], trade: Mapping[str, Any]) -> str:
+    interval = "" if cost["low"] is None else f" ({cost['low']:.3g} to {cost['high']:.3g})"
     engine, date = trade["versions"]["engine"], trade["measured"]
-    return f"putting it back costs {found['ratio']:.3g}x{interval}, LIGGGHTS {engine}, {date}"
+    return f"{cost['ratio']:.3g}x{interval}, LIGGGHTS {engine}, {date}"
 
 
 def explanation(
@@ -114,6 +126,8 @@ def explanation(
     table.add_row("", "steps", f"about {cost.steps:,}")
     minutes, seconds = divmod(round(cost.wall_time_s), 60)
     table.add_row("", "wall time", f"about {minutes} min {seconds:02d} s ({cost.source})")
+    for what, text in cheaper_choices(deck.scene, trade):
+        table.add_row("cheaper", what, text)
     table.add_section()
     for what, text in notes:
         table.add_row("expects", what, text)
