@@ -287,7 +287,7 @@ class _Bench:
 
     @cached_property
     def inputs(self) -> Mapping[str, str]:
-        """Hash of all that a variant's timing depends on: its base's deck too, engine, processor."""
+        """Hash of what a timing depends on: decks of variant and base, engine, processor."""
         own: dict[str, str] = {}
         for name, deck in self.decks.items():
             folder = self._place(name)
