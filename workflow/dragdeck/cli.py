@@ -66,6 +66,15 @@ def _parser() -> argparse.ArgumentParser:
     batch.set_defaults(action=_stability)
     batch.add_argument("regime", help="impact, settle, beds, column or drag")
     batch.add_argument("--map", type=Path, required=True, help="the points: a map.yaml")
+    costs = commands.add_parser("costs", help="time what each thing left out would cost")
+    costs.set_defaults(action=_costs)
+    costs.add_argument("study", help="name of a folder in studies/")
+    costs.add_argument("--fidelity", help="instead of the study's own")
+    costs.add_argument("--rounds", type=int, default=3, help="how often each deck is timed")
+    costs.add_argument(
+        "--seconds", type=float, metavar="S", help="drag of the standard deck that is timed"
+    )
+    costs.add_argument("--out", type=Path, required=True, metavar="FILE", help="costs.json")
 
     run = commands.add_parser("run", help="run the deck in a folder, or go on with it")
     run.set_defaults(action=_run)
@@ -244,6 +253,27 @@ def _stability(options: argparse.Namespace) -> None:
     study = project.studies / "stability" / "study.yaml"
     results = project.root / "results" / "stability"
     run_batch(study, options.map, options.regime, results, project.templates, report)
+
+
+def _costs(options: argparse.Namespace) -> None:
+    from dragdeck.costs_run import SECONDS, measure
+
+    def report(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    project = find_project(Path.cwd())
+    case = project.cases(options.study, options.fidelity)[0]
+    results = project.root / "results" / options.study
+    seconds = SECONDS if options.seconds is None else options.seconds
+    measure(
+        case,
+        results,
+        project.templates,
+        options.out,
+        report,
+        rounds=options.rounds,
+        seconds=seconds,
+    )
 
 
 def _run(options: argparse.Namespace) -> None:

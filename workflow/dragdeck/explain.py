@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -51,8 +53,61 @@ def _measured(results: Path) -> Iterable[float]:
             yield float(speed)
 
 
-def explanation(scene: Scene, cost: Cost, notes: Iterable[tuple[str, str]] = ()) -> Table:
-    """The table of one scene; `notes` say what its time step means for each pair of bodies."""
+def measured_trade() -> dict[str, Any]:
+    """What was measured of speed and accuracy, ``data/trade.json``; empty if it is not there."""
+    file = resources.files("dragdeck").joinpath("data").joinpath("trade.json")
+    return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+
+
+def price_of(name: str, trade: Mapping[str, Any]) -> str:
+    """What putting a thing back costs, as measured.
+
+    Parameters
+    ----------
+    name : str
+        A variant of `dragdeck.costs`.
+    trade : mapping
+        Its ``costs`` give for each variant the ratio of processor times, with a
+        95 % interval if there were rounds enough for one.
+    """
+    found = next((cost for cost in trade.get("costs", ()) if cost["name"] == name), None)
+    if found is None:
+        return "cost of putting it back: not measured"
+    return f"putting it back costs {_ratio(found, trade)}"
+
+
+def cheaper_choices(scene: str, trade: Mapping[str, Any]) -> Iterable[tuple[str, str]]:
+    """What was measured to make a scene cheaper, beyond doubt, by a simulated second."""
+    for cost in trade.get("costs", ()):
+        sure = cost["high"] is not None and cost["high"] < 1
+        if sure and cost["scene"] == scene and cost.get("unit", "per_second") == "per_second":
+            yield cost["what"], f"{_ratio(cost, trade)}; what it does to the results is not said"
+
+
+def _ratio(cost: Mapping[str, Any], trade: Mapping[str, Any]) -> str:
+    interval = "" if cost["low"] is None else f" ({cost['low']:.3g} to {cost['high']:.3g})"
+    engine, date = trade["versions"]["engine"], trade["measured"]
+    return f"{cost['ratio']:.3g}x{interval}, LIGGGHTS {engine}, {date}"
+
+
+def explanation(
+    scene: Scene,
+    cost: Cost,
+    notes: Iterable[tuple[str, str]] = (),
+    trade: Mapping[str, Any] | None = None,
+) -> Table:
+    """The table of one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    cost : Cost
+    notes : iterable of (str, str)
+        What its time step means for each pair of bodies.
+    trade : mapping, optional
+        Measured costs, if not those of `measured_trade`.
+    """
+    trade = measured_trade() if trade is None else trade
     deck = scene.deck
     table = Table(title=f"{deck.study}: {deck.scene} {deck.run}", title_justify="left")
     table.add_column("")
@@ -61,8 +116,9 @@ def explanation(scene: Scene, cost: Cost, notes: Iterable[tuple[str, str]] = ())
     for what, why in scene.models.items():
         table.add_row("models", what, why)
     table.add_section()
-    for what, why in scene.leaves_out.items():
-        table.add_row("leaves out", what, why)
+    for what, left in scene.leaves_out.items():
+        price = f"; {price_of(left.cost, trade)}" if left.cost else ""
+        table.add_row("leaves out", what, f"{left.why}{price}")
     table.add_section()
     rayleigh = scene.case["rayleigh_time_s"]
     share = deck.timestep_s / rayleigh
@@ -70,6 +126,8 @@ def explanation(scene: Scene, cost: Cost, notes: Iterable[tuple[str, str]] = ())
     table.add_row("", "steps", f"about {cost.steps:,}")
     minutes, seconds = divmod(round(cost.wall_time_s), 60)
     table.add_row("", "wall time", f"about {minutes} min {seconds:02d} s ({cost.source})")
+    for what, text in cheaper_choices(deck.scene, trade):
+        table.add_row("cheaper", what, text)
     table.add_section()
     for what, text in notes:
         table.add_row("expects", what, text)

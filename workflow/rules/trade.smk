@@ -66,6 +66,30 @@ rule measure_point:
         "dragchain measure $(dirname {output}) --fill-table {input.bed} > {log} 2>&1"
 
 
+# Processor times side by side: no other job may run meanwhile.
+rule measure_costs:
+    input:
+        templates_of("drop"),
+        templates_of("fill"),
+        templates_of("process"),
+    output:
+        of_trade("costs.json"),
+    log:
+        of_trade("logs/costs.log"),
+    benchmark:
+        of_trade("benchmarks/costs.tsv")
+    conda:
+        "../envs/python.yaml"
+    threads: workflow.cores
+    params:
+        study=STUDY,
+        fidelity=fidelity_option,
+        case=CASES[0].digest("process"),
+        source=source_hash("dragdeck.costs_run"),
+    shell:
+        "dragdeck costs {params.study} {params.fidelity} --out {output} 2>&1 | tee -i {log}"
+
+
 rule write_trade:
     input:
         measures=lambda wildcards: every_point("measures.json"),

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from dragdeck import __version__, outputs
-from dragdeck.scenes.common import Deck, Materials, Scene, round_to
+from dragdeck.scenes.common import Deck, LeftOut, Materials, Scene, round_to
 from dragdeck.study import Material, Pair
 
 Vector = tuple[float, float, float]
@@ -122,8 +122,8 @@ def collide_scene(experiment: Experiment) -> Scene:
         files={"bodies.data": bodies_data(experiment)},
         models={"every ball": "placed and set in motion by hand", "exact walls": "planes"},
         leaves_out={
-            "output of pairs": "forces on so few balls say all",
-            "checkpoints": "the run takes seconds",
+            "output of pairs": LeftOut("forces on so few balls say all"),
+            "checkpoints": LeftOut("the run takes seconds"),
         },
     )
 

@@ -82,6 +82,21 @@ class Deck:
 
 
 @dataclass(frozen=True)
+class LeftOut:
+    """Why a deck leaves something out.
+
+    Attributes
+    ----------
+    why : str
+    cost : str, optional
+        The variant of `dragdeck.costs` that puts it back.
+    """
+
+    why: str
+    cost: str | None = None
+
+
+@dataclass(frozen=True)
 class Scene:
     """All that one engine run needs, before any file is written.
 
@@ -96,8 +111,10 @@ class Scene:
         Other input files: name to content.
     meshes : mapping of str to Mesh
         Mesh files, by name.
-    models, leaves_out : mapping of str to str
-        What the deck models and what it leaves out, each with the reason.
+    models : mapping of str to str
+        What the deck models, and why.
+    leaves_out : mapping of str to LeftOut
+        What it leaves out.
     warnings : sequence of str
         What the user should know before the run.
     """
@@ -108,7 +125,7 @@ class Scene:
     files: Mapping[str, str] = field(default_factory=dict)
     meshes: Mapping[str, Mesh] = field(default_factory=dict)
     models: Mapping[str, str] = field(default_factory=dict)
-    leaves_out: Mapping[str, str] = field(default_factory=dict)
+    leaves_out: Mapping[str, LeftOut] = field(default_factory=dict)
     warnings: Sequence[str] = ()
 
 

@@ -13,7 +13,15 @@ from dragdeck.derive import (
     hertz_contact_time,
     rayleigh_time,
 )
-from dragdeck.scenes.common import Deck, Scene, ball_material, base_case, material_table, timestep
+from dragdeck.scenes.common import (
+    Deck,
+    LeftOut,
+    Scene,
+    ball_material,
+    base_case,
+    material_table,
+    timestep,
+)
 from dragdeck.study import Study
 
 MARGIN = 0.5
@@ -104,10 +112,12 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene:
             "every step near an impact": "peak force and rebound are read from it",
         },
         leaves_out={
-            "ball-ball contacts": "there is one ball",
-            "output in flight": "height and speed give the time of the next impact",
-            "facets of the plate": "a plane is exact and faster",
-            "checkpoints": "the run takes seconds",
+            "ball-ball contacts": LeftOut("there is one ball", "drop_contacts"),
+            "output in flight": LeftOut(
+                "height and speed give the time of the next impact", "drop_every_step"
+            ),
+            "facets of the plate": LeftOut("a plane is exact and faster"),
+            "checkpoints": LeftOut("the run takes seconds"),
         },
     )
 

@@ -22,6 +22,7 @@ from dragdeck.limits import run_limits
 from dragdeck.packing import Balls, pour
 from dragdeck.scenes.common import (
     Deck,
+    LeftOut,
     Scene,
     ball_material,
     base_case,
@@ -112,9 +113,9 @@ def fill_scene(case: Case) -> Scene:
             "a step of its own": "balls in flight collide faster than a bed at rest",
         },
         leaves_out={
-            "the tool": "it comes later; cases that differ in it share this fill",
-            "contact output": "nobody reads contacts before the drag",
-            "facets of the bowl": "balls fall the same onto an exact plane and cylinder",
+            "the tool": LeftOut("it comes later; cases that differ in it share this fill"),
+            "contact output": LeftOut("nobody reads contacts before the drag", "fill_contacts"),
+            "facets of the bowl": LeftOut("balls fall the same onto an exact plane and cylinder"),
         },
     )
 

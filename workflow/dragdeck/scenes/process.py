@@ -16,6 +16,7 @@ from dragdeck.motion import Leg, farthest_reach, legs, plunge_point, start_headi
 from dragdeck.outputs import Output
 from dragdeck.scenes.common import (
     Deck,
+    LeftOut,
     Scene,
     ball_material,
     base_case,
@@ -29,7 +30,7 @@ from dragdeck.scenes.common import (
 )
 from dragdeck.scenes.fill import bed_limits, box_top, expected_surface, first_balls
 from dragdeck.scenes.tool import tool_length, tool_mesh, tool_radius
-from dragdeck.study import CirclePath, MeshShape, Study
+from dragdeck.study import CirclePath, CylinderShape, MeshShape, Study
 
 FEWEST_STEPS_PER_CONTACT = 5
 """Below this many steps in a contact at the tool's speed a warning is given."""
@@ -351,15 +352,30 @@ def _models(study: Study) -> dict[str, str]:
     }
 
 
-def _leaves_out(study: Study) -> dict[str, str]:
+def _leaves_out(study: Study) -> dict[str, LeftOut]:
+    tool, network = study.outputs.tool_contacts_hz, study.outputs.network_hz
     found = {
-        "positions in the contact output": "the balls of the same step have them",
-        "network during plunge and approach": "no statistic counts them",
-        "wear, stress and heat of the mesh": "no report reads them",
-        "rolling friction": "the study gives none",
+        "positions, torques, areas of contacts": LeftOut(
+            "the balls of the same step have the positions; no report reads the rest",
+            "contact_columns",
+        ),
+        "network during plunge and approach": LeftOut(
+            "no statistic counts them", "network_before_drag"
+        ),
+        "wear, stress and heat of the mesh": LeftOut("no report reads them"),
+        "rolling friction": LeftOut("the study gives none"),
     }
+    if network < tool:
+        found[f"network at {tool:g} Hz"] = LeftOut("chains need no such rate", "network_rate")
     if study.bowl.facet_size_m is None:
-        found["facets of the bowl"] = "slower, and no report asks for contacts per bowl facet"
+        found["facets of the bowl"] = LeftOut(
+            "slower, and no report asks for contacts per bowl facet", "bowl_facets"
+        )
+    shape = study.workpiece.shape
+    if isinstance(shape, CylinderShape) and shape.facet_length_m > shape.facet_size_m:
+        found["short facets along the rod"] = LeftOut(
+            "a straight side needs none", "rod_short_facets"
+        )
     return found
 
 
