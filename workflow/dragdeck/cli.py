@@ -74,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     costs.add_argument(
         "--seconds", type=float, metavar="S", help="drag of the standard deck that is timed"
     )
+    costs.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these variants only")
     costs.add_argument("--out", type=Path, required=True, metavar="FILE", help="costs.json")
 
     run = commands.add_parser("run", help="run the deck in a folder, or go on with it")
@@ -273,6 +274,7 @@ def _costs(options: argparse.Namespace) -> None:
         report,
         rounds=options.rounds,
         seconds=seconds,
+        only=options.only,
     )
 
 

@@ -343,10 +343,17 @@ def _plain(study: Study) -> list[Variant]:
         "fidelity.ranks": 1,
     }
     what = "the plain deck: bowl as facets of 5 mm, 20 % of Rayleigh, 1 mm skin, one rank"
-    return [
+    found = [
         Variant("plain", what, fields),
         Variant("plain_columns", f"{what}, all contact columns", fields, ALL_COLUMNS),
     ]
+    shape = study.workpiece.shape
+    if isinstance(shape, CylinderShape):
+        wide = shape.facet_size_m
+        even = {"workpiece.shape.facet_length_m": wide}
+        text = f"{what}, facets of the rod as short as they are wide, {1000 * wide:g} mm"
+        found.append(Variant("plain_even_facets", text, {**fields, **even}))
+    return found
 
 
 def _drops() -> list[Variant]:

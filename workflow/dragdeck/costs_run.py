@@ -93,7 +93,7 @@ def measure(
     *,
     rounds: int = 3,
     seconds: float = SECONDS,
-    only: Sequence[Variant] | None = None,
+    only: Sequence[str] = (),
 ) -> Path:
     """Time all variants of a study's standard deck and write their costs.
 
@@ -115,8 +115,8 @@ def measure(
     rounds : int
     seconds : float
         Process time of the standard deck's drag that is timed, s.
-    only : sequence of Variant, optional
-        These instead of all.
+    only : sequence of str
+        Names of variants; none: all.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def measure(
     if load > QUIET:
         report(f"warning: the machine is busy (load average {load:.2f}); CPU times will scatter")
     base = standard_case(case)
-    chosen = list(variants(base) if only is None else only)
+    chosen = _chosen(variants(base), only)
     folder = out.resolve().parent / "costs"
     decks = environment(templates, study_templates(case))
     beds = _Beds(base, results, folder, decks, find_engine(), report)
@@ -151,6 +151,20 @@ def measure(
     rows = bench.rounds(rounds)
     replace_text(out, _json(_result(bench, rows)))
     return out
+
+
+def _chosen(known: Sequence[Variant], names: Sequence[str]) -> list[Variant]:
+    by_name = {variant.name: variant for variant in known}
+    for name in names:
+        if name not in by_name:
+            raise InputError(
+                "no such variant",
+                field="--only",
+                value=name,
+                limit=f"one of: {', '.join(by_name)}",
+                remedy="choose among these",
+            )
+    return [by_name[name] for name in names] or list(known)
 
 
 @dataclass(frozen=True)

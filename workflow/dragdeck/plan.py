@@ -50,6 +50,9 @@ class Plan(Model):
         description="name: dotted fields and values that change the study; every point is run in "
         "each of them",
     )
+    cost_rounds: Annotated[Whole, Field(ge=0)] = Field(
+        default=3, description="rounds of timing what decks leave out; 0: not at all"
+    )
     drop: dict[str, list[Any]] = Field(
         default_factory=dict, description="dotted field: values, one after the other, in the drop"
     )
@@ -65,10 +68,13 @@ class Points:
         One for each process run.
     drops : list of Case
         One for each drop test.
+    cost_rounds : int
+        Rounds of timing what decks leave out.
     """
 
     processes: list[Case]
     drops: list[Case]
+    cost_rounds: int
 
 
 def read_plan(file: Path) -> Plan:
@@ -115,7 +121,7 @@ def plan_points(plan: Plan, plan_file: Path, base: Case) -> Points:
     for settings in [{}, *({field: value} for field, all_ in plan.drop.items() for value in all_)]:
         case = _case(base, {**plan.base, **settings}, settings, plan_file)
         drops.setdefault(case.run_ids["drop"], case)
-    return Points(list(found.values()), list(drops.values()))
+    return Points(list(found.values()), list(drops.values()), plan.cost_rounds)
 
 
 def _size(block: Block) -> int:

@@ -84,16 +84,19 @@ rule measure_costs:
     params:
         study=STUDY,
         fidelity=fidelity_option,
+        rounds=lambda wildcards: points().cost_rounds,
         case=CASES[0].digest("process"),
         source=source_hash("dragdeck.costs_run"),
     shell:
-        "dragdeck costs {params.study} {params.fidelity} --out {output} 2>&1 | tee -i {log}"
+        "dragdeck costs {params.study} {params.fidelity} --rounds {params.rounds}"
+        " --out {output} 2>&1 | tee -i {log}"
 
 
 rule write_trade:
     input:
         measures=lambda wildcards: every_point("measures.json"),
         drops=lambda wildcards: every_drop_point("tables/impacts.parquet"),
+        costs=lambda wildcards: [of_trade("costs.json")] if points().cost_rounds else [],
         template=str(PROJECT.root / "analysis/dragchain/trade.html.j2"),
     output:
         page=report(
@@ -114,11 +117,12 @@ rule write_trade:
     params:
         reference=lambda wildcards: f"results/{STUDY}/trade/{next(iter(points_by_run('process')))}",
         drops=lambda wildcards: [f"results/{STUDY}/drop/{run}" for run in points_by_run("drop")],
+        costs=lambda wildcards, input: f"--costs {input.costs}" if input.costs else "",
         plan=PLAN,
         source=source_hash("dragchain.trade_report"),
     shell:
         "dragchain trade --out $(dirname {output.page}) --plan {params.plan}"
-        " --reference {params.reference} --drops {params.drops}"
+        " --reference {params.reference} {params.costs} --drops {params.drops}"
         " -- {input.measures} > {log} 2>&1"
 
 
