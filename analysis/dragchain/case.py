@@ -112,7 +112,8 @@ class Case:
 
     ``bowl`` is None in a drop; ``case``, ``tool``, ``motion``, ``surface_m``
     and ``run_in_s`` are None outside a process; ``restitution`` is None
-    outside a drop.
+    outside a drop; ``asked`` is None unless the settings were found for a
+    tolerance.
     """
 
     study: str
@@ -136,6 +137,7 @@ class Case:
     assumptions: tuple[Assumption, ...]
     reference: Mapping[str, object] | None
     versions: Mapping[str, str]
+    asked: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -303,6 +305,7 @@ def parse_case(file: Path) -> Case:
         assumptions=tuple(_assumption(item) for item in top.children("assumptions")),
         reference=top.mapping("reference") if top.has("reference") else None,
         versions=top.mapping("versions"),
+        asked=top.mapping("asked") if top.has("asked") else None,
     )
 
 
