@@ -386,6 +386,26 @@ def test_the_kept_advice_names_the_run_of_a_study_that_asks(
     assert kept["cases"][0]["options"][0]["inputs"] == process_scene(asking).case["inputs"]
 
 
+def test_the_studys_own_measured_fidelity_is_shown_too(
+    small: dict[str, Any],
+    write_study: Write,
+    project: Project,
+    trade_here: Trade,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    own = {"youngs_modulus_scale": 1e-2, "timestep_fraction": 0.5, "ranks": 1}
+    write_study(small | {"fidelity": own})
+    monkeypatch.chdir(project.root)
+    (project.root / "results").write_text("a file where the folder should be")
+    assert main(["advise", "small", "--quick", "--tolerance", "0.02"]) == 0
+    shown = capsys.readouterr()
+    said = " ".join(shown.out.split())
+    assert "│ own │ E x 0.01, 50 % of the" in said
+    assert "E0.01_dt0.5: error of mean drag +2.2 % (+0 % to +4.5 %), bound 4.5 %" in said
+    assert "not written: " in shown.err
+
+
 def test_the_command_line_goes_before_the_study(case: Case, asking: Case) -> None:
     assert question(case, None, None) == asked(0.05)
     assert question(asking, 0.2, None) == asked(0.2)

@@ -486,11 +486,11 @@ def _fallback(
         f"no measured setting is known to err by less than {percent(held_to)}{smallest}: "
         f"the reference settings are taken ({reference})"
     )
-    if asked.quantity == "restitution":
+    quantity = trade["quantities"].get(asked.quantity)
+    if asked.quantity == "restitution" or not quantity["reference"]:
         return text
-    quantity = trade["quantities"][asked.quantity]
-    known = abs(quantity["standard_error"] / quantity["reference"])
-    return f"{text}; the reference itself is known only to a standard error of {percent(known)}"
+    known = percent(quantity["standard_error"] / quantity["reference"])
+    return f"{text}; the reference itself is known only to a standard error of {known}"
 
 
 def _spread(study: Study, asked: Tolerance, trade: Trade) -> Spread | None:
