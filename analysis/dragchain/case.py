@@ -127,7 +127,6 @@ class Case:
     fidelity: Fidelity
     inputs: Mapping[str, object]
     numbers: Mapping[str, float]
-    asked: Mapping[str, object] | None
     media: Media
     bowl: Bowl | None
     tool: Tool | None
@@ -139,6 +138,7 @@ class Case:
     assumptions: tuple[Assumption, ...]
     reference: Mapping[str, object] | None
     versions: Mapping[str, str]
+    asked: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -296,7 +296,6 @@ def parse_case(file: Path) -> Case:
         fidelity=_fidelity(top.child("fidelity")),
         inputs=top.mapping("inputs"),
         numbers=top.mapping("numbers") if top.has("numbers") else {},
-        asked=top.mapping("asked") if top.has("asked") else None,
         media=_media(top.child("media")),
         bowl=None if scene == "drop" else _bowl(top.child("bowl")),
         tool=_tool(top.child("tool")) if process else None,
@@ -308,6 +307,7 @@ def parse_case(file: Path) -> Case:
         assumptions=tuple(_assumption(item) for item in top.children("assumptions")),
         reference=top.mapping("reference") if top.has("reference") else None,
         versions=top.mapping("versions"),
+        asked=top.mapping("asked") if top.has("asked") else None,
     )
 
 

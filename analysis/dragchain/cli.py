@@ -57,6 +57,7 @@ def _parser() -> argparse.ArgumentParser:
     report = commands.add_parser("report", help="write the report on several runs")
     report.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
     report.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
+    report.add_argument("--advice", type=Path, metavar="FILE", help="advice.json of the study")
     report.set_defaults(action=_report)
     add_calibration(commands)
     verify = commands.add_parser("verify", help="judge the runs of the verification suite")
@@ -105,7 +106,7 @@ def _figures(options: argparse.Namespace) -> None:
 def _report(options: argparse.Namespace) -> None:
     from dragchain.report import write_report
 
-    write_report(options.out, options.run_dirs)
+    write_report(options.out, options.run_dirs, options.advice)
 
 
 def _verify(options: argparse.Namespace) -> None:

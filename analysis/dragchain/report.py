@@ -20,6 +20,13 @@ from dragchain.case import Assumption, Case, Scene, load_case
 from dragchain.collect import Findings, read_findings
 from dragchain.errors import GateError, TableError
 from dragchain.frames import write_parquet
+from dragchain.prediction import (
+    Entry,
+    actual_interval,
+    cost_rows,
+    prediction_for,
+    read_advice,
+)
 from dragchain.stats import RELIABLE_TIMES
 
 RUN_SCHEMA = 1
@@ -70,7 +77,7 @@ class Study:
         return [run for run in (self.process, self.fill, self.drop) if run is not None]
 
 
-def write_report(out_dir: Path, run_dirs: Sequence[Path]) -> None:
+def write_report(out_dir: Path, run_dirs: Sequence[Path], advice: Path | None = None) -> None:
     """Write ``summary.csv``, ``summary.parquet`` and ``report.html`` on process runs.
 
     Parameters
@@ -94,7 +101,7 @@ def write_report(out_dir: Path, run_dirs: Sequence[Path]) -> None:
     if not studies:
         raise TableError("no folder of a process run is given, so there is nothing to report")
     summary = pd.DataFrame([summary_row(study) for study in studies])
-    page = render_page(studies, summary)
+    page = render_page(studies, summary, read_advice(advice) if advice is not None else [])
     out_dir.mkdir(parents=True, exist_ok=True)
     write_parquet(summary, out_dir / "summary.parquet")
     _write_text(out_dir / "summary.csv", summary.to_csv(index=False, lineterminator="\n"))
@@ -267,26 +274,36 @@ def _upstream_columns(study: Study) -> dict[str, object]:
 # --- the page --------------------------------------------------------------------------------
 
 
-def render_page(studies: Sequence[Study], summary: pd.DataFrame) -> str:
+def render_page(
+    studies: Sequence[Study], summary: pd.DataFrame, options: list[Entry] | None = None
+) -> str:
     """Return the page: HTML that needs no other file and no network."""
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters |= {"number": number, "measured": measured, "percent": percent}
+    environment.filters |= {
+        "number": number,
+        "measured": measured,
+        "percent": percent,
+        "share": share,
+    }
     source = resources.files("dragchain").joinpath("report.html.j2").read_text(encoding="utf-8")
     columns = {str(name): summary[name].tolist() for name in summary}
     return environment.from_string(source).render(
         title=", ".join(dict.fromkeys(study.process.case.study for study in studies)),
-        studies=[_section(study) for study in studies],
+        studies=[_section(study, options or []) for study in studies],
         overview=_overview(studies) if len(studies) > 1 else None,
         columns=columns,
         reliable_times=RELIABLE_TIMES,
     )
 
 
-def _section(study: Study) -> dict[str, object]:
+def _section(study: Study, options: list[Entry]) -> dict[str, object]:
     """Return what the page shows of one process run."""
     process = study.process
+    asked = process.case.asked
+    expected = prediction_for(process.case, options)
+    records = {str(run.case.scene): run.record for run in study.runs}
     assumptions: dict[str, Assumption] = {}
     for run in reversed(study.runs):
         assumptions |= {assumption.field: assumption for assumption in run.case.assumptions}
@@ -298,6 +315,10 @@ def _section(study: Study) -> dict[str, object]:
         "pictures": [picture for run in study.runs for picture in pictures(run)],
         "fill": study.fill.findings["bed"] if study.fill else None,
         "drop": study.drop.findings if study.drop else None,
+        "asked": asked,
+        "interval": actual_interval(asked, process.findings["forces"]) if asked else None,
+        "costs": list(cost_rows(expected, records)) if expected else [],
+        "cost_source": expected["source"] if expected else None,
     }
 
 
@@ -366,3 +387,8 @@ def number(value: object, digits: int = 3) -> str:
 def percent(value: float | None) -> str:
     """Return a signed percentage with one decimal, a dash for none."""
     return DASH if value is None else f"{value:+.1f} %".replace("-", MINUS)
+
+
+def share(value: float | None) -> str:
+    """Return a share of 1 as a signed percentage, a dash for none."""
+    return percent(None if value is None else 100 * value)

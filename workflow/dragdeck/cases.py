@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from dragdeck.errors import InputError
-from dragdeck.study import STUDY_FILE, MeshShape, Study, read_yaml, validate
+from dragdeck.study import STUDY_FILE, MeshShape, Study, Tolerance, read_yaml, validate
 
 SceneName = Literal["drop", "fill", "process"]
 SCENES: tuple[SceneName, ...] = ("drop", "fill", "process")
@@ -40,11 +40,17 @@ class Case:
         The matrix fields and their values in this case.
     study : Study
         With those values in place; its matrix is empty.
+    asked : Tolerance or None
+        What the settings in `study` were found for, if they were.
+    advised : mapping or None
+        What is expected of them then; ``asked`` of the process's ``case.json``.
     """
 
     file: Path
     settings: Mapping[str, Any]
     study: Study
+    asked: Tolerance | None = None
+    advised: Mapping[str, Any] | None = None
 
     @property
     def study_name(self) -> str:
@@ -59,7 +65,11 @@ class Case:
 
     @property
     def fidelity_name(self) -> str:
-        """Name of the fidelity; settings without a name are called by what they say."""
+        """Name of the fidelity; settings without a name are called by what they say or hold."""
+        if self.asked is not None:
+            name = f"tolerance-{self.asked.tolerance:g}"
+            default = self.asked.quantity == Tolerance.model_fields["quantity"].default
+            return name if default else f"{name}-{self.asked.quantity}"
         fidelity = self.study.fidelity
         if isinstance(fidelity, str):
             return fidelity
@@ -90,7 +100,11 @@ class Case:
         study's edit that does not concern the scene does not change it.
         """
         study = self.study.model_dump(mode="json", include={"title", "assumptions", "reference"})
-        return _digest({"study": study, "content": self.content(scene)})
+        return _digest({"study": study, "content": self.content(scene), **self.asked_of(scene)})
+
+    def asked_of(self, scene: SceneName) -> dict[str, Any]:
+        """The entry ``asked`` of a scene's ``case.json``: a process's, if a tolerance was asked."""
+        return {} if self.advised is None or scene != "process" else {"asked": dict(self.advised)}
 
     def _process_content(self, study: Study) -> dict[str, Any]:
         fidelity = study.chosen_fidelity().model_dump(mode="json")
@@ -158,12 +172,19 @@ def settle_case(
     Raises
     ------
     InputError
-        A value leads nowhere or breaks the study.
+        A value leads nowhere or breaks the study; or a tolerance is asked that
+        nothing measured can resolve.
     """
     combined = copy.deepcopy(dict(data))
     for field, value in values.items():
         _set(combined, field, value, named_in or file)
-    return Case(file, values if shown is None else shown, validate(combined, named_in or file))
+    study = validate(combined, named_in or file)
+    case = Case(file, values if shown is None else shown, study)
+    if not isinstance(study.fidelity, Tolerance):
+        return case
+    from dragdeck.advice import resolve  # needs cases itself
+
+    return resolve(case, study.fidelity)
 
 
 def study_file(studies: Path, name: str) -> Path:

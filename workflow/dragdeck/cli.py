@@ -6,13 +6,19 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dragdeck import __version__
 from dragdeck.cases import SCENES, Case, SceneName
 from dragdeck.errors import DragdeckError, InputError
 from dragdeck.project import Project, by_run, find_project, study_templates
 from dragdeck.scenes import Bed, Scene, drop_scene, fill_scene, process_scene
+
+if TYPE_CHECKING:
+    from dragdeck.advice import Advice
+    from dragdeck.speed import Speed
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -50,6 +56,14 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("run", help="run id, as `dragdeck cases` lists it")
     render.add_argument("--plan", help="the run is a point of this trade's plan")
     render.add_argument("--fill-table", type=Path, help="fill.json of the settled bed (process)")
+
+    advise = commands.add_parser("advise", help="settings for a tolerance, their error and cost")
+    advise.set_defaults(action=_advise)
+    advise.add_argument("study", help="name of a folder in studies/")
+    advise.add_argument("--fidelity", help="instead of the study's own")
+    advise.add_argument("--tolerance", type=float, help="instead of the study's own")
+    advise.add_argument("--quantity", help="what the tolerance is about")
+    advise.add_argument("--quick", action="store_true", help="do not measure the engine's speed")
 
     fields = commands.add_parser("fields", help="print the fields of a study file as a page")
     fields.set_defaults(action=_fields)
@@ -133,6 +147,58 @@ def _explain(options: argparse.Namespace) -> None:
         explanation(scene, expected_cost(scene, results / name), notes(case, name, scene))
         for case, name, scene in scenes
     )
+
+
+def _advise(options: argparse.Namespace) -> None:
+    from pydantic import ValidationError
+
+    from dragdeck.advice import advise, measured_trade
+    from dragdeck.explain import show
+    from dragdeck.forecast import advice_json, forecast, own_option, question, roles, tables
+    from dragdeck.study import explained
+
+    project = find_project(Path.cwd())
+    cases = list(by_run(project.cases(options.study, options.fidelity), "process").values())
+    results, trade = project.root / "results" / options.study, measured_trade()
+    try:
+        asked = [question(case, options.tolerance, options.quantity) for case in cases]
+    except ValidationError as error:
+        raise explained(error, "command line") from None
+    advices = [advise(case, wanted) for case, wanted in zip(cases, asked, strict=True)]
+    quick = options.quick or all(wanted.quantity == "restitution" for wanted in asked)
+    speed = None if quick else _speed(project, cases[0], advices[0])
+    found = []
+    for case, advice in zip(cases, advices, strict=True):
+        own = own_option(case, advice.asked, trade)
+        rows = [forecast(case, *row, speed, results) for row in roles(advice, own)]
+        found.append((advice, rows))
+        show(tables(case, advice, rows, own))
+    _keep(results / "advice.json", advice_json(cases[0], found, speed))
+
+
+def _speed(project: Project, case: Case, advice: Advice) -> Speed:
+    """The speed of this machine at the advised settings."""
+    import tempfile
+
+    from dragdeck.advice import with_option
+    from dragdeck.render import environment
+    from dragdeck.speed import calibrate
+
+    chosen = replace(case, study=with_option(case.study, advice.chosen))
+    templates = environment(project.templates, study_templates(case))
+    with tempfile.TemporaryDirectory(prefix="dragdeck-") as folder:
+        return calibrate(chosen, Path(folder), templates, lambda line: print(line, file=sys.stderr))
+
+
+def _keep(file: Path, content: object) -> None:
+    """Write a JSON file where that is possible; what was printed counts without it."""
+    from dragdeck.render import replace_text
+
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        replace_text(file, json.dumps(content, indent=1, allow_nan=False) + "\n")
+    except OSError as error:
+        print(f"not written: {error}", file=sys.stderr)
 
 
 def _fields(options: argparse.Namespace) -> None:

@@ -40,7 +40,7 @@ from dragdeck.project import study_templates
 from dragdeck.render import DECK_FILE, environment, replace_text, write_run
 from dragdeck.runner import fingerprint, run
 from dragdeck.scenes import Bed, fill_scene, process_scene
-from dragdeck.stability_map import write_tables
+from dragdeck.stability_map import tabulate
 
 Report = Callable[[str], None]
 Row = Mapping[str, Any]
@@ -187,7 +187,7 @@ class _Beds:
         self.report(f"filling {run_id}")
         write_run(fill_scene(case), place, self.templates)
         run(place, self.report)
-        write_tables(place)
+        tabulate(place)
         return place.resolve()
 
     def measured(self, case: Case) -> Bed:

@@ -75,3 +75,33 @@ def fall_speed(height_m: float, gravity_m_s2: float) -> float:
 def bed_height(volume_m3: float, bowl_radius_m: float, solid_fraction: float) -> float:
     """Height of a bed of balls of that total volume, m."""
     return volume_m3 / (solid_fraction * math.pi * bowl_radius_m**2)
+
+
+def bed_pressure(density_kg_m3: float, gravity_m_s2: float, depth_m: float) -> float:
+    """Weight of the bed above a depth, Pa, at a solid fraction of `SOLID_FRACTION_ESTIMATE`.
+
+    The wall carries a part of it (Janssen 1895), which is left out: the true
+    pressure is lower.
+    """
+    return SOLID_FRACTION_ESTIMATE * density_kg_m3 * gravity_m_s2 * depth_m
+
+
+def stiffness_number(material: Material, pressure_pa: float) -> float:
+    """How stiff balls are against the pressure on them: (E / ((1 - nu^2) p))^(2/3).
+
+    Agnolin and Roux 2007, Physical Review E 76, 061302: its inverse goes as the
+    overlap of a Hertz contact over the diameter.
+    """
+    modulus = material.youngs_modulus_pa / (1 - material.poissons_ratio**2)
+    return float((modulus / pressure_pa) ** (2 / 3))
+
+
+def inertial_number(
+    shear_rate_per_s: float, diameter_m: float, density_kg_m3: float, pressure_pa: float
+) -> float:
+    """Time in which the pressure moves a ball by its size, over that of the shear.
+
+    I = rate d / sqrt(p / rho): GDR MiDi 2004, European Physical Journal E 14, 341;
+    da Cruz et al. 2005, Physical Review E 72, 021309. Small where flow is quasi-static.
+    """
+    return shear_rate_per_s * diameter_m / math.sqrt(pressure_pa / density_kg_m3)

@@ -52,6 +52,8 @@ def _also_plain(annotation: Any) -> bool:
 
 def _kind(model: type[BaseModel]) -> str:
     """Return the word by which a model is told from its alternatives."""
+    if model is Fidelity:
+        return "settings"
     kind = model.model_fields.get("kind")
     return str(get_args(kind.annotation)[0]) if kind else model.__name__.lower()
 

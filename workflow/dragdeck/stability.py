@@ -211,13 +211,23 @@ def safe_share(case: Case, scene: SceneName) -> tuple[float, str]:
     Strongly damped balls have a limit of their own. The safety factor is not in it.
     """
     known = measured()
-    row = known["regimes"][REGIME[scene]]
     lowest = min(pair.restitution for pair in case.study.pairs.values())
     strong = lowest < ORDINARY_RESTITUTION
-    share = row["safe_fraction"] if strong else row["ordinary_fraction"]
     damping = "any restitution" if strong else f"restitution of {ORDINARY_RESTITUTION:g} or more"
     engine = ", ".join(known["engine_versions"])
-    return float(share), f"{REGIME[scene]}, {damping}; LIGGGHTS {engine}, {known['measured']}"
+    source = f"{REGIME[scene]}, {damping}; LIGGGHTS {engine}, {known['measured']}"
+    return _regime_share(scene, lowest), source
+
+
+def _regime_share(scene: SceneName, lowest_restitution: float) -> float:
+    row = measured()["regimes"][REGIME[scene]]
+    strong = lowest_restitution < ORDINARY_RESTITUTION
+    return float(row["safe_fraction"] if strong else row["ordinary_fraction"])
+
+
+def largest_share(scene: SceneName, lowest_restitution: float) -> float:
+    """Largest step over the Rayleigh time that keeps the safety factor."""
+    return float(measured()["safety_factor"]) * _regime_share(scene, lowest_restitution)
 
 
 def notes(case: Case, name: SceneName, scene: Scene) -> list[tuple[str, str]]:

@@ -335,7 +335,7 @@ class _Runs:
         scene = fill_scene(replace(case, study=case.study.model_copy(update={"fill": fill})))
         if self._run(scene, folder) != "complete":
             raise GateError(f"{folder}: the bed that points start from failed; see its state.json")
-        write_tables(folder)
+        tabulate(folder)
         return str(folder.relative_to(self.results))
 
 
@@ -362,7 +362,7 @@ def _bed_settings(map_file: Path) -> list[dict[str, Any]]:
     return list({_bed_name(point.settings): _own(point.settings) for point in points}.values())
 
 
-def write_tables(folder: Path) -> None:
+def tabulate(folder: Path) -> None:
     """Measure a settled bed with the analysis, which is a program of its own."""
     words = [sys.executable, "-m", "dragchain.cli", "tables", str(folder)]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
@@ -377,5 +377,5 @@ __all__: Sequence[str] = (
     "load_points",
     "point_case",
     "run_batch",
-    "write_tables",
+    "tabulate",
 )

@@ -62,6 +62,20 @@ def of_report(file):
     return f"results/{STUDY}/report/{file}"
 
 
+ADVICE = f"results/{STUDY}/advice.json"
+
+
+def asked_advice(wildcards):
+    """The advice of a study in which a case asks for a tolerance; nothing for others."""
+    return ancient([ADVICE] if any(case.asked for case in CASES) else [])
+
+
+def advice_option(wildcards):
+    """How to name the advice on the command line, if there is or will be one."""
+    known = asked_advice(wildcards) or (PROJECT.root / ADVICE).is_file()
+    return f"--advice {ADVICE}" if known else ""
+
+
 def of_calibration(file):
     """Path of a file of the study's calibration."""
     return f"results/{STUDY}/calibration/{file}"

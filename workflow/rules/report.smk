@@ -98,6 +98,7 @@ rule draw_process:
 rule write_report:
     input:
         of_every_run,
+        advice=asked_advice,
         template="analysis/dragchain/report.html.j2",
     output:
         csv=of_report("summary.csv"),
@@ -116,6 +117,7 @@ rule write_report:
         "../envs/python.yaml"
     params:
         runs=lambda wildcards: every_folder("process"),
+        advice=advice_option,
         source=source_hash("dragchain.report"),
     shell:
-        "dragchain report --out $(dirname {output.csv}) {params.runs} > {log} 2>&1"
+        "dragchain report --out $(dirname {output.csv}) {params.runs} {params.advice} > {log} 2>&1"

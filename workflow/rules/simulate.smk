@@ -28,6 +28,7 @@ rule run_fill:
         of_fill("case.json"),
         of_fill("columns.json"),
         of_fill("balls.data"),
+        advice=asked_advice,
     output:
         of_fill("run.json"),
     log:
@@ -49,6 +50,7 @@ rule run_process:
         of_process("case.json"),
         of_process("columns.json"),
         of_process("tool.stl"),
+        advice=asked_advice,
         fill=lambda wildcards: fill_of(wildcards, "run.json"),
     output:
         of_process("run.json"),

@@ -223,6 +223,7 @@ def base_case(case: Case, scene: SceneName, timestep_s: float, rayleigh_s: float
         "rayleigh_time_s": rayleigh_s,
         "gravity_m_s2": study.gravity_m_s2,
         "fidelity": {"name": case.fidelity_name, **fidelity, "skin_m": skin(study)},
+        **case.asked_of(scene),
         "inputs": flat(case.content(scene)),
         "media": {
             "count": study.media.count,

@@ -30,6 +30,7 @@ from dragdeck.scenes.common import (
 )
 from dragdeck.scenes.fill import bed_limits, box_top, expected_surface, first_balls
 from dragdeck.scenes.tool import tool_length, tool_mesh, tool_radius
+from dragdeck.similarity import describe
 from dragdeck.study import CirclePath, CylinderShape, MeshShape, Study
 
 FEWEST_STEPS_PER_CONTACT = 5
@@ -296,6 +297,7 @@ def _process_case(case: Case, surface_m: float, timed: Sequence[TimedLeg]) -> Ma
         "case": case.name,
         "inputs": flat(study.model_dump(mode="json", include=_INPUTS)),
         "upstream": {scene: case.run_ids[scene] for scene in ("fill", "drop")},
+        "numbers": describe(case),
         "surface_m": surface_m,
         "tool": {
             "kind": study.workpiece.shape.kind,

@@ -1,0 +1,271 @@
+"""What a study's run will take and how far it may err: `dragdeck advise`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from dragdeck import __version__
+from dragdeck.advice import Advice, Option, Spread, percent, process_options, with_option
+from dragdeck.cases import Case
+from dragdeck.explain import Cost, expected_cost
+from dragdeck.scenes import Scene, drop_scene, fill_scene, process_scene
+from dragdeck.speed import Speed
+from dragdeck.study import CirclePath, Study, Tolerance
+
+DEFAULT_TOLERANCE = Tolerance(tolerance=0.05)
+"""What is advised for where a study asks for nothing."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What an option costs on this machine.
+
+    Attributes
+    ----------
+    role : str
+        ``advised``, ``cheaper``, ``dearer``, ``reference`` or ``own``.
+    option : Option
+    case : Case
+        With the option's settings.
+    inputs : mapping
+        Of the process run, as in its ``case.json``: tells which run this is about.
+    steps : mapping of str to int
+        Of each scene that the tolerance concerns: fill and process, or the drop.
+    wall_times_s : mapping of str to float
+        Expected, of the same scenes.
+    source : str
+        Where the speed comes from.
+    """
+
+    role: str
+    option: Option
+    case: Case
+    inputs: Mapping[str, Any]
+    steps: Mapping[str, int]
+    wall_times_s: Mapping[str, float]
+    source: str
+
+    def as_json(self) -> dict[str, Any]:
+        """An entry of ``options`` in ``advice.json``."""
+        error = self.option.error
+        return {
+            "role": self.role,
+            "settings": self.case.study.chosen_fidelity().model_dump(mode="json"),
+            "drop_timestep_fraction": self.option.drop_timestep_fraction,
+            "error": vars(error) if error else None,
+            "relative_cost": self.option.relative_cost,
+            "inputs": dict(self.inputs),
+            "steps": dict(self.steps),
+            "wall_time_s": dict(self.wall_times_s),
+            "steps_per_s": {
+                scene: round(steps / self.wall_times_s[scene], 1)
+                for scene, steps in self.steps.items()
+            },
+            "source": self.source,
+        }
+
+
+def question(case: Case, tolerance: float | None, quantity: str | None) -> Tolerance:
+    """The tolerance that is advised for: of the command line, of the study, or the default.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        The command line asks for what no study may.
+    """
+    base = case.asked or DEFAULT_TOLERANCE
+    named = {"tolerance": tolerance, "quantity": quantity}
+    given = {name: value for name, value in named.items() if value is not None}
+    return Tolerance.model_validate({**base.model_dump(), **given})
+
+
+def own_option(case: Case, asked: Tolerance, trade: Mapping[str, Any]) -> Option | None:
+    """The measured option that a study without a tolerance has chosen itself, if it has."""
+    if case.asked is not None or asked.quantity == "restitution":
+        return None
+    fidelity = case.study.chosen_fidelity()
+    for option in process_options(case, trade, asked):
+        if option.same_settings(fidelity):
+            return replace(option, fidelity=fidelity)
+    return None
+
+
+def roles(advice: Advice, own: Option | None) -> Iterator[tuple[str, Option]]:
+    """Roles and options of an advice, each option once."""
+    found = {
+        "advised": advice.chosen,
+        "cheaper": advice.cheaper,
+        "dearer": advice.dearer,
+        "reference": advice.reference,
+        "own": own,
+    }
+    seen: list[Option] = []
+    for role, option in found.items():
+        if option is not None and option not in seen:
+            seen.append(option)
+            yield role, option
+
+
+def forecast(case: Case, role: str, option: Option, speed: Speed | None, results: Path) -> Forecast:
+    """Steps and wall time of an option.
+
+    Parameters
+    ----------
+    case : Case
+        Of the study.
+    role : str
+    option : Option
+    speed : Speed or None
+        Of this machine; None: what earlier runs took, or an assumption.
+    results : Path
+        The study's results.
+    """
+    chosen = replace(case, study=with_option(case.study, option))
+    process = process_scene(chosen)
+    about_drop = option.drop_timestep_fraction is not None
+    scenes = [drop_scene(chosen)] if about_drop else [fill_scene(chosen), process]
+    costs = {scene.deck.scene: _cost(scene, speed, results) for scene in scenes}
+    return Forecast(
+        role=role,
+        option=option,
+        case=chosen,
+        inputs=process.case["inputs"],
+        steps={scene: cost.steps for scene, cost in costs.items()},
+        wall_times_s={scene: cost.wall_time_s for scene, cost in costs.items()},
+        source=list(costs.values())[-1].source,
+    )
+
+
+def _cost(scene: Scene, speed: Speed | None, results: Path) -> Cost:
+    """Steps and wall time of a scene, by the speed of this machine if it was measured."""
+    name = scene.deck.scene
+    if speed is None or name == "drop":
+        return expected_cost(scene, results / name)
+    here = speed.of(scene.case["media"]["count"])
+    rate = here.fill_steps_per_s if name == "fill" else here.drag_steps_per_s
+    ranks = f"{speed.ranks} rank{'s' if speed.ranks > 1 else ''}"
+    return Cost(scene.steps, scene.steps / rate, f"a short run of this study, {ranks}")
+
+
+def advice_json(
+    case: Case, advices: Sequence[tuple[Advice, Sequence[Forecast]]], speed: Speed | None
+) -> dict[str, Any]:
+    """Content of ``advice.json``."""
+    return {
+        "schema": 1,
+        "study": case.study_name,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": {"dragdeck": __version__, "engine": speed.engine_version if speed else None},
+        "speed": vars(speed) if speed else None,
+        "cases": [
+            {
+                "case": rows[0].case.name,
+                "run": rows[0].case.run_ids["process"],
+                "asked": advice.as_json(),
+                "options": [row.as_json() for row in rows],
+            }
+            for advice, rows in advices
+        ],
+    }
+
+
+def tables(
+    case: Case, advice: Advice, rows: Sequence[Forecast], own: Option | None
+) -> Iterator[Table]:
+    """What `dragdeck advise` prints of a case: the options, and what must be said of them."""
+    asked = advice.asked
+    title = f"{case.study_name} {case.name}: {advice.label} within {percent(asked.tolerance)}"
+    table = Table(title=title, title_justify="left")
+    for name in ("", "settings", "error (95 %)", "bound", "cost", "steps", "wall time"):
+        table.add_column(name)
+    for row in rows:
+        option = row.option
+        error = "errors are against it" if option.error is None else str(option.error)
+        bound = "" if option.error is None else percent(option.error.bound)
+        style = "bold" if row.role == "advised" else None
+        cost, steps = f"{option.relative_cost:.3g}", f"{sum(row.steps.values()):,}"
+        wall = clock(sum(row.wall_times_s.values()))
+        table.add_row(row.role, str(option), error, bound, cost, steps, wall, style=style)
+    yield table
+    said = Table(show_header=False)
+    said.add_column(style="bold")
+    said.add_column()
+    for what, text in [*remarks(advice, case.study), *_about(case, advice, rows[0], own)]:
+        said.add_row(what, text)
+    yield said
+
+
+def _about(
+    case: Case, advice: Advice, advised: Forecast, own: Option | None
+) -> Iterator[tuple[str, str]]:
+    yield "cost", f"processor time over the reference's; advised: 1/{advice.speedup:.3g} of it"
+    yield "errors", f"relative to the reference settings, {advice.source}"
+    yield "wall time", f"{' and '.join(advised.steps)}; speed: {advised.source}"
+    if case.asked is None:
+        yield "asked", "the study asks for no tolerance; it keeps its own fidelity"
+    if case.asked is None and advice.chosen.drop_timestep_fraction is None:
+        yield "its own", _of_own(case, advice, own)
+
+
+def _of_own(case: Case, advice: Advice, own: Option | None) -> str:
+    """What is known of the fidelity of a study that asks for no tolerance."""
+    name, settings = case.fidelity_name, case.study.chosen_fidelity()
+    if advice.reference.same_settings(settings):
+        return f"{name} has the reference settings"
+    if own is None or own.error is None:
+        return f"{name} is none of the measured settings that may be used here"
+    return (
+        f"{name}: error of {advice.label} {own.error}, bound {percent(own.error.bound)}, "
+        f"cost {own.relative_cost:.3g}"
+    )
+
+
+def remarks(advice: Advice, study: Study) -> list[tuple[str, str]]:
+    """What must be said of an advice: a heading and a sentence each."""
+    found = [("outside", str(number)) for number in advice.outside]
+    if advice.outside:
+        text = (
+            f"the error is held to {percent(advice.held_to)} instead (an assumption: nothing "
+            "measured says how it grows there)"
+        )
+        found.append(("safe side", text))
+    if advice.fallback:
+        found.append(("fallback", advice.fallback))
+    cheaper = advice.cheaper
+    if cheaper is not None and cheaper.error is not None:
+        bound = cheaper.error.bound
+        text = f"may err by up to {percent(bound)}, {percent(bound - advice.held_to)} too much"
+        found.append(("cheaper", f"{cheaper}: {text}"))
+    if advice.spread is not None:
+        found.append(("chance", _of_chance(advice, advice.spread, study)))
+    return found
+
+
+def _of_chance(advice: Advice, spread: Spread, study: Study) -> str:
+    """The uncertainty of one run, and what would bring it below the tolerance."""
+    text = (
+        f"one run's {advice.label} is uncertain by {percent(spread.half_width)} either way (95 %) "
+        f"over {spread.counted_m:.3g} m of counted path"
+    )
+    if spread.half_width <= advice.asked.tolerance:
+        return text
+    length = spread.needed_m + study.motion.run_in_m
+    path = study.motion.path
+    whole = f"{length:.3g} m"
+    if isinstance(path, CirclePath):
+        whole = f"{length / (2 * math.pi * path.radius_m):.3g} revolutions"
+    seeds = math.ceil(spread.needed_m / spread.counted_m)
+    return f"{text}: more than the tolerance, which takes {whole}, or the mean over {seeds} seeds"
+
+
+def clock(seconds: float) -> str:
+    """A time in minutes and seconds."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest:02d} s"

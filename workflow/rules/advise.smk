@@ -1,0 +1,21 @@
+# What the runs of a study that asks for a tolerance will take, measured before
+# they begin on a machine that does nothing else.
+
+
+rule advise:
+    output:
+        ADVICE,
+    log:
+        f"results/{STUDY}/logs/advise.log",
+    benchmark:
+        f"results/{STUDY}/benchmarks/advise.tsv"
+    conda:
+        "../envs/python.yaml"
+    threads: workflow.cores
+    params:
+        cases=[case.digest("process") for case in by_run(CASES, "process").values()],
+        fidelity=fidelity_option,
+        study=STUDY,
+        source=source_hash("dragdeck.forecast"),
+    shell:
+        "dragdeck advise {params.study} {params.fidelity} > {log} 2>&1"
