@@ -133,7 +133,8 @@ class _Problem:
         size = len(self.values)
         alike = (1.0 - share) * np.eye(size) + share * self.same_bed
         root = np.asarray(np.linalg.cholesky(alike), dtype=np.float64)
-        return root, np.linalg.solve(root, self.design), np.linalg.solve(root, self.values)
+        design = np.asarray(np.linalg.solve(root, self.design), dtype=np.float64)
+        return root, design, np.asarray(np.linalg.solve(root, self.values), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -173,6 +174,12 @@ class Factors:
         own = self._own(setting)
         terms = {(pair,) for pair in own} if self.additive else {own}
         return np.array([1.0, *(float(column in terms) for column in self.columns)])
+
+    def tells(self, setting: Mapping[str, Hashable]) -> bool:
+        """Whether the runs had what a row for these settings stands for."""
+        own = self._own(setting)
+        terms = [(pair,) for pair in own] if self.additive else [own] * bool(own)
+        return all(term in self.columns for term in terms)
 
     def design(self) -> Floats:
         """The design matrix, (N, 1 + columns)."""

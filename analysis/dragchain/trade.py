@@ -137,6 +137,9 @@ class Comparison:
     additive : bool
         Whether effects were added up.
     errors : dict of Setting to Error
+    fit : Fit
+    factors : Factors
+        What `between` draws on.
     """
 
     quantity: Quantity
@@ -147,6 +150,14 @@ class Comparison:
     additivity: float
     additive: bool
     errors: Mapping[Setting, Error]
+    fit: Fit = field(repr=False)
+    factors: Factors = field(repr=False)
+
+    def between(self, setting: Setting, base: Setting) -> Error | None:
+        """Difference of one setting to another; None if the runs cannot tell it."""
+        if not all(self.factors.tells(one.factors()) for one in (setting, base)):
+            return None
+        return _error(self.fit, self.factors, setting, base, self.quantity.signed)
 
 
 @dataclass(frozen=True)
@@ -327,6 +338,8 @@ def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting
             setting: _error(fit, factors, setting, reference, quantity.signed)
             for setting in dict.fromkeys(settings)
         },
+        fit=fit,
+        factors=factors,
     )
 
 
@@ -372,23 +385,51 @@ def _error(fit: Fit, factors: Factors, setting: Setting, reference: Setting, sig
     )
 
 
-def recommend(trade: Trade, quantity: str, tolerance: float) -> Setting | None:
+def candidates(trade: Trade, quantities: Sequence[str]) -> list[Setting]:
+    """The settings that could be recommended instead of the reference.
+
+    They change nothing but the fidelity, are cheaper, have more than one run of
+    which every one was complete, and an error in each of the quantities.
+    """
+    comparisons = [trade.comparisons.get(name) for name in quantities]
+    return [
+        setting
+        for setting in trade.settings()
+        if setting != trade.reference
+        and not setting.other
+        and trade.cost(setting) < 1.0
+        and len(trade.of(setting)) > 1
+        and all(run.complete for run in trade.of(setting))
+        and all(own is not None and setting in own.errors for own in comparisons)
+    ]
+
+
+def largest_bound(trade: Trade, quantities: Sequence[str], setting: Setting) -> float:
+    """The largest bound of a setting's errors in some quantities."""
+    return max(trade.comparisons[name].errors[setting].bound for name in quantities)
+
+
+def recommend(trade: Trade, quantity: str | Sequence[str], tolerance: float) -> Setting | None:
     """The cheapest setting whose error is below a tolerance with confidence.
 
-    Only settings that change nothing but the fidelity count, of which every
-    run was complete; None if there is none but the reference.
+    Parameters
+    ----------
+    trade : Trade
+    quantity : str or sequence of str
+        If several, each of them has to be within the tolerance.
+    tolerance : float
+        Relative.
+
+    Returns
+    -------
+    Setting or None
+        One of the `candidates`; None if there is none but the reference.
     """
-    comparison = trade.comparisons.get(quantity)
-    if comparison is None:
-        return None
+    names = [quantity] if isinstance(quantity, str) else list(quantity)
     able = [
         setting
-        for setting, error in comparison.errors.items()
-        if error.bound <= tolerance
-        and setting != trade.reference
-        and not setting.other
-        and all(run.complete for run in trade.of(setting))
-        and len(trade.of(setting)) > 1
+        for setting in candidates(trade, names)
+        if largest_bound(trade, names, setting) <= tolerance
     ]
     return min(able, key=trade.cost, default=None)
 
