@@ -191,11 +191,11 @@ def lack_of_fit(additive: Fit, full: Fit) -> float:
 
     F test of the sum of squares that the interactions explain against what is
     left with them. Both fits must have used the same `bed_share`. 1 if the two
-    models are the same.
+    models are the same, or if nothing is left to test against.
     """
     more = additive.degrees - full.degrees
-    if more == 0:
+    left = full.residuals @ full.residuals / full.degrees
+    if more == 0 or left == 0.0:
         return 1.0
     explained = (additive.residuals @ additive.residuals - full.residuals @ full.residuals) / more
-    left = full.residuals @ full.residuals / full.degrees
     return float(stats.f.sf(explained / left, more, full.degrees))

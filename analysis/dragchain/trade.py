@@ -463,7 +463,7 @@ def along(trade: Trade, quantity: Quantity) -> Along | None:
     complete = [run.measures for run in trade.runs if run.complete]
     longest = max(measures["arc_m"] for measures in complete)
     series = [
-        np.array(measures["blocks"][quantity.name])
+        np.array(measures["blocks"][quantity.name], dtype=np.float64)
         for measures in complete
         if measures["arc_m"] > 0.99 * longest and quantity.name in measures["blocks"]
     ]

@@ -28,6 +28,7 @@ from dragchain.trade import (
     Setting,
     Trade,
     candidates,
+    compare_quantity,
     largest_bound,
     recommend,
 )
@@ -228,7 +229,8 @@ def gains(trade: Trade) -> list[Gain]:
             singles = [replace(base, **{name: getattr(setting, name)}) for name in factors]
             if factors and setting != trade.reference and all(map(trade.of, singles)):
                 found.append(_gain(trade, setting, base, factors, singles))
-    return found
+    names = list(trade.reference.factors())
+    return sorted(found, key=lambda gain: [names.index(name) for name in gain.factors])
 
 
 def _gain(
@@ -344,6 +346,50 @@ def reaches(trade: Trade) -> list[Reach]:
         for quantity in QUANTITIES
         if quantity.name in trade.comparisons and quantity.name in along_path
     ]
+
+
+# --- how often intervals hold what they should ----------------------------------------------------
+
+TRIALS = 100
+
+
+def coverage(trade: Trade, name: str, trials: int = TRIALS) -> float | None:
+    """How often an interval of this plan holds the truth, from simulated runs.
+
+    Runs at the same settings and beds get values without any effect, with the
+    scatter and the bed's share of a quantity, and are compared just as the
+    measured ones: the share is estimated and additivity tested anew each time.
+
+    Parameters
+    ----------
+    trade : Trade
+    name : str
+        The quantity.
+    trials : int
+
+    Returns
+    -------
+    float or None
+        Over all settings; None if none was compared with the reference.
+    """
+    own = trade.comparisons.get(name)
+    if own is None or set(own.errors) == {trade.reference}:
+        return None
+    runs = [run for run in trade.runs if name in run.values]
+    beds = list(dict.fromkeys(run.bed for run in runs))
+    number = np.array([beds.index(run.bed) for run in runs])
+    rng = np.random.default_rng(0)
+    held: list[bool] = []
+    for _ in range(trials):
+        scatter = math.sqrt(own.bed_share) * rng.standard_normal(len(beds))[number]
+        scatter += math.sqrt(1.0 - own.bed_share) * rng.standard_normal(len(runs))
+        values = np.exp(own.run_sd * scatter)
+        again = [replace(run, values={name: float(v)}) for run, v in zip(runs, values, strict=True)]
+        errors = compare_quantity(
+            replace(own.quantity, signed=False), again, trade.reference
+        ).errors
+        held += [not error.resolved for one, error in errors.items() if one != trade.reference]
+    return float(np.mean(held))
 
 
 # --- drop ----------------------------------------------------------------------------------------

@@ -42,6 +42,7 @@ from dragchain.trade_findings import (
     MAIN,
     RUINED,
     TOGETHER,
+    TRIALS,
     Choice,
     Costs,
     Drop,
@@ -51,6 +52,7 @@ from dragchain.trade_findings import (
     SpeedUp,
     choose,
     choose_drop,
+    coverage,
     gains,
     hub,
     modulus_levels,
@@ -599,10 +601,10 @@ def _plain_note(found: Findings) -> str:
     entry = next((row for row in found.costs.entries if row["name"] == "plain"), None)
     if entry is None:
         return ""
-    standard = found.costs.standard or hub(found.trade)
+    standard, what = found.costs.standard or hub(found.trade), entry["what"]
     taken = "" if found.costs.standard else ", taken to be the one the file of costs means"
     return (
-        f"The plain deck ({entry['what']}) takes {number(float(entry['ratio']))} times "
+        f"{what[:1].upper()}{what[1:]}: it takes {number(float(entry['ratio']))} times "
         f"({number(float(entry['low']))} to {number(float(entry['high']))}) the time of the "
         f"standard deck ({standard}{taken}); what it costs against other settings is that times "
         "the measured ratio of their costs."
@@ -816,9 +818,18 @@ def _chance_note(trade: Trade) -> str:
         if setting != trade.reference
     ]
     resolved = sum(error.resolved for error in errors)
-    return (
+    note = (
         f"{len(errors)} differences are tested here and {resolved} are resolved; if none existed, "
-        f"chance alone would show about {number(float(round((1.0 - CONFIDENCE) * len(errors))))}."
+        f"chance alone would show about {round((1.0 - CONFIDENCE) * len(errors))}."
+    )
+    held = coverage(trade, MAIN[0])
+    if held is None:
+        return note
+    return (
+        f"{note} The bed's share is estimated, and additivity tested, from the same few runs, "
+        f"which makes intervals somewhat too narrow: in {TRIALS} simulations of this plan without "
+        f"any effect {percent(held, sign=False)} % of the intervals of the "
+        f"{long_label(trade.comparisons[MAIN[0]].quantity)} held the truth."
     )
 
 
