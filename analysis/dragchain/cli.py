@@ -81,7 +81,7 @@ def _parser() -> argparse.ArgumentParser:
         "--reference", type=Path, required=True, metavar="RUN_DIR", help="a run at the reference"
     )
     trade.add_argument(
-        "--drops", type=Path, nargs="+", default=[], metavar="RUN_DIR", help="drop tests"
+        "--drops", type=Path, nargs="*", default=[], metavar="RUN_DIR", help="drop tests"
     )
     trade.add_argument("--costs", type=Path, metavar="FILE", help="costs of what decks leave out")
     trade.add_argument("--plan", default="", metavar="NAME", help="name of the plan")

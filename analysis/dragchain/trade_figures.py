@@ -71,6 +71,12 @@ def _percent_axis(axes: Axes) -> None:
     axes.yaxis.set_major_locator(LogLocator(10.0, numticks=12))
 
 
+def _plain_axis(axes: Axes) -> None:
+    axes.xaxis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0), numticks=12))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
 # --- Pareto fronts -------------------------------------------------------------------------------
 
 
@@ -157,9 +163,7 @@ def _shared_limits(
     axes.set_ylim(FLOOR * 0.8, 1.4 * max(highest, TOLERANCES[-1]))
     costs = [trade.cost(one) for one in settings] or [1.0]
     axes.set_xlim(0.8 * min(costs), 1.25 * max(costs))
-    axes.xaxis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0), numticks=9))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    _plain_axis(axes)
 
 
 def _sizes(error: Error) -> tuple[float, float]:
@@ -251,7 +255,7 @@ def _largest_above(axes: Axes) -> float:
 
 
 def _path(reaches: Sequence[Reach]) -> Figure:
-    figure = Figure(figsize=(WIDTH_IN, 3.7), layout="constrained")
+    figure = Figure(figsize=(1.25 * WIDTH_IN, 3.6), layout="constrained")
     axes = figure.subplots()
     arc = reaches[0].arc_m
     paths: Floats = np.geomspace(arc / 4.0, arc * 16.0, 50)
@@ -269,8 +273,7 @@ def _path(reaches: Sequence[Reach]) -> Figure:
     axes.set_xlabel("counted path of one run in mm (dotted: the path that is compared)")
     axes.set_ylabel("half-width of the 95 % interval in %")
     _percent_axis(axes)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    _plain_axis(axes)
     figure.legend(loc="outside right center", fontsize=8)
     return figure
 
@@ -279,7 +282,7 @@ def _path(reaches: Sequence[Reach]) -> Figure:
 
 
 def _drop(drops: Sequence[Drop]) -> Figure:
-    figure = Figure(figsize=(WIDTH_IN, 3.0), layout="constrained")
+    figure = Figure(figsize=(1.25 * WIDTH_IN, 2.6), layout="constrained")
     axes = figure.subplots()
     own = [drop for drop in drops[1:] if not drop.other]
     step = [100.0 * drop.timestep_fraction for drop in own]
@@ -288,7 +291,6 @@ def _drop(drops: Sequence[Drop]) -> Figure:
     axes.set(xscale="log", yscale="log", ylabel="error of restitution in %")
     axes.set_xlabel("time step in % of the Rayleigh time")
     _percent_axis(axes)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    _plain_axis(axes)
     axes.legend()
     return figure

@@ -208,7 +208,7 @@ class Gain:
     errors : dict of str to Error
         Main quantity to what the change does to it.
     product : float
-        Of the gains of the single changes; NaN for a single one.
+        Of the gains of the single changes; NaN for a single one, or where one was not run.
     """
 
     setting: Setting
@@ -220,14 +220,18 @@ class Gain:
 
 
 def gains(trade: Trade) -> list[Gain]:
-    """Every change of the reference and of the hub whose single changes were all run."""
+    """Every change of the reference and of the hub whose single changes were all run.
+
+    The hub against the reference is among them in any case.
+    """
     centre = hub(trade)
     found: list[Gain] = []
     for base in dict.fromkeys((trade.reference, centre)):
         for setting in trade.settings():
             factors = differing(setting, base)
             singles = [replace(base, **{name: getattr(setting, name)}) for name in factors]
-            if factors and setting != trade.reference and all(map(trade.of, singles)):
+            told = setting == centre or all(map(trade.of, singles))
+            if factors and setting != trade.reference and told:
                 found.append(_gain(trade, setting, base, factors, singles))
     names = list(trade.reference.factors())
     return sorted(found, key=lambda gain: [names.index(name) for name in gain.factors])
@@ -247,7 +251,7 @@ def _gain(
         and (error := trade.comparisons[name].between(setting, base)) is not None
     }
     product = math.nan
-    if len(factors) > 1:
+    if len(factors) > 1 and all(map(trade.of, singles)):
         product = math.prod(speed_up(trade, one, base).ratio for one in singles)
     return Gain(setting, base, factors, speed_up(trade, setting, base), errors, product)
 

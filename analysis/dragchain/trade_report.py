@@ -522,9 +522,11 @@ def _choice_cell(found: Findings, choice: Choice) -> dict[str, str]:
         }
     if choice.nearest is None:
         return {"text": "none", "detail": "no setting has two complete runs", "kind": "none"}
+    inside = all(abs(error.error) <= choice.tolerance for error in choice.errors)
+    more = "; its error is smaller: more runs may certify it" if inside else ""
     return {
         "text": "none",
-        "detail": f"nearest: {choice.nearest}, bound {percent(choice.bound, sign=False)} %",
+        "detail": f"nearest: {choice.nearest}, bound {percent(choice.bound, sign=False)} %{more}",
         "kind": "none",
     }
 
@@ -698,7 +700,9 @@ def _combination_rows(trade: Trade) -> list[dict[str, str]]:
             "product": times(gain.product),
             "gain": times(gain.speed_up.ratio),
             "span": span(gain.speed_up),
-            "share": percent(gain.speed_up.ratio / gain.product - 1.0),
+            "share": DASH
+            if math.isnan(gain.product)
+            else number(gain.speed_up.ratio / gain.product, 2),
         }
         for gain in gains(trade)
         if len(gain.factors) > 1
