@@ -446,7 +446,8 @@ class Along:
     correlation : list of float
         Between blocks 1, 2 and 3 apart.
     drift : float
-        Second half less first half of the path, relative to the mean.
+        Second half less first half of the path, relative to the whole; of a
+        quantity that may change its sign, in mean drags.
     drift_halfwidth : float
         Of its interval of `CONFIDENCE`; NaN for a single run.
     """
@@ -462,17 +463,15 @@ def along(trade: Trade, quantity: Quantity) -> Along | None:
     """How a quantity changes along the path; None if runs are too short for that."""
     complete = [run.measures for run in trade.runs if run.complete]
     longest = max(measures["arc_m"] for measures in complete)
-    series = [
-        np.array(measures["blocks"][quantity.name], dtype=np.float64)
-        for measures in complete
-        if measures["arc_m"] > 0.99 * longest and quantity.name in measures["blocks"]
-    ]
-    series = [blocks for blocks in series if len(blocks) >= 8 and np.isfinite(blocks).all()]
-    if not series:
+    longest_runs = [own for own in complete if own["arc_m"] > 0.99 * longest]
+    pairs = [(_blocks(own, quantity.name), _blocks(own, "drag_mean")) for own in longest_runs]
+    pairs = [(own, drag) for own, drag in pairs if len(own) >= 8 and np.isfinite(own).all()]
+    if not pairs:
         return None
+    series = [own for own, _ in pairs]
     covariance = sum(autocovariance(blocks)[:4] for blocks in series)
     assert isinstance(covariance, np.ndarray)
-    drifts = np.array([_drift(blocks) for blocks in series])
+    drifts = np.array([_drift(quantity, own, drag) for own, drag in pairs])
     error = stats.sem(drifts) if len(drifts) > 1 else math.nan
     quantile = stats.t.ppf(0.5 + 0.5 * CONFIDENCE, max(len(drifts) - 1, 1))
     return Along(
@@ -484,9 +483,15 @@ def along(trade: Trade, quantity: Quantity) -> Along | None:
     )
 
 
-def _drift(blocks: np.ndarray[Any, Any]) -> float:
+def _blocks(measures: Mapping[str, Any], name: str) -> np.ndarray[Any, Any]:
+    return np.array(measures["blocks"].get(name, []), dtype=np.float64)
+
+
+def _drift(quantity: Quantity, blocks: np.ndarray[Any, Any], drag: np.ndarray[Any, Any]) -> float:
     half = len(blocks) // 2
-    return float((blocks[-half:].mean() - blocks[:half].mean()) / abs(blocks.mean()))
+    scale = drag.mean() if quantity.signed else quantity.of_blocks(blocks)
+    change = quantity.of_blocks(blocks[-half:]) - quantity.of_blocks(blocks[:half])
+    return float(change / abs(scale))
 
 
 def run_table(trade: Trade) -> pd.DataFrame:

@@ -215,7 +215,7 @@ def _scene(trade: Trade) -> Mapping[str, Any]:
 
 def _quantity_entry(comparison: Comparison, arc_m: float) -> dict[str, Any]:
     return {
-        "label": comparison.quantity.label,
+        "label": long_label(comparison.quantity),
         "unit": comparison.quantity.unit,
         "signed": comparison.quantity.signed,
         "reference": comparison.reference,

@@ -229,17 +229,24 @@ def test_reach_falls_with_the_root_of_the_path(trade: Trade) -> None:
 
 def test_a_drift_along_the_path_is_seen(tmp_path: Path) -> None:
     found = contents(noise=0.01)
+    growth = 1.0 + 0.05 * np.arange(8)
     for content in found:
-        content["blocks"]["rod_contacts"] = [
-            value * (1.0 + 0.05 * number)
-            for number, value in enumerate(content["blocks"]["rod_contacts"])
-        ]
+        blocks = content["blocks"]
+        blocks["rod_contacts"] = list(growth * blocks["rod_contacts"])
+        blocks["drag_sd"] = list(growth**2 * blocks["drag_sd"])
+        blocks["lateral_mean"] = list(2.6 * growth + blocks["lateral_mean"])
     trade = made(tmp_path, found)
-    quantities = {own.quantity.name: own.quantity for own in trade.comparisons.values()}
-    seen, steady = along(trade, quantities["rod_contacts"]), along(trade, quantities["drag_mean"])
-    assert seen is not None and steady is not None
-    assert seen.drift == pytest.approx(0.2 / 1.175, abs=0.02)
-    assert seen.drift - seen.drift_halfwidth > 0.0 > steady.drift - steady.drift_halfwidth
+    seen = {name: along(trade, own.quantity) for name, own in trade.comparisons.items()}
+    for name, drift in (
+        ("drag_mean", 0.0),
+        ("rod_contacts", 0.2 / 1.175),
+        ("drag_sd", (math.sqrt(1.275**2 + 0.0031) - math.sqrt(1.075**2 + 0.0031)) / 1.18),
+        ("lateral_mean", 0.2),
+    ):
+        own = seen[name]
+        assert own is not None and own.runs == len(found)
+        assert own.drift == pytest.approx(drift, abs=0.02)
+        assert (own.drift > own.drift_halfwidth) == (drift > 0.0)
 
 
 def test_the_share_above_a_force_is_counted_from_above() -> None:
