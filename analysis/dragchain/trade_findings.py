@@ -354,7 +354,7 @@ def reaches(trade: Trade) -> list[Reach]:
 
 # --- how often intervals hold what they should ----------------------------------------------------
 
-TRIALS = 100
+TRIALS = 200
 
 
 def coverage(trade: Trade, name: str, trials: int = TRIALS) -> float | None:

@@ -803,11 +803,11 @@ def _statistic_rows(trade: Trade) -> list[dict[str, str]]:
                 "label": long_label(comparison.quantity),
                 "run_sd": percent(comparison.run_sd, sign=False),
                 "bed_share": percent(share, sign=False),
-                "pairing": number(1.0 / math.sqrt(1.0 - share), 2) if share > 0.0 else "no help",
+                "pairing": number(1.0 / math.sqrt(1.0 - share), 2) if share > 0.0 else "none seen",
                 "additivity": DASH
                 if math.isnan(comparison.additivity)
                 else number(comparison.additivity, 2),
-                "model": "added up" if comparison.additive else "every combination",
+                "model": "added up" if comparison.additive else "each combination",
                 "degrees": str(comparison.fit.degrees),
             }
         )
@@ -831,7 +831,7 @@ def _chance_note(trade: Trade) -> str:
         return note
     return (
         f"{note} The bed's share is estimated, and additivity tested, from the same few runs, "
-        f"which makes intervals somewhat too narrow: in {TRIALS} simulations of this plan without "
+        f"which can make intervals too narrow: in {TRIALS} simulations of this plan without "
         f"any effect {percent(held, sign=False)} % of the intervals of the "
         f"{long_label(trade.comparisons[MAIN[0]].quantity)} held the truth."
     )
