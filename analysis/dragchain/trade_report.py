@@ -807,7 +807,7 @@ def _statistic_rows(trade: Trade) -> list[dict[str, str]]:
                 "additivity": DASH
                 if math.isnan(comparison.additivity)
                 else number(comparison.additivity, 2),
-                "model": "added up" if comparison.additive else "each combination",
+                "model": "added up" if comparison.additive else "separate",
                 "degrees": str(comparison.fit.degrees),
             }
         )
