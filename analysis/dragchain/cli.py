@@ -82,6 +82,20 @@ def _parser() -> argparse.ArgumentParser:
     )
     checks.add_argument("measures", type=Path, nargs="+", metavar="MEASURES", help="measures.json")
     checks.set_defaults(action=_checks)
+    trade = commands.add_parser("trade", help="write the report on a trade of speed and accuracy")
+    trade.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
+    trade.add_argument(
+        "--reference", type=Path, required=True, metavar="RUN_DIR", help="a run at the reference"
+    )
+    trade.add_argument(
+        "--drops", type=Path, nargs="*", default=[], metavar="RUN_DIR", help="drop tests"
+    )
+    trade.add_argument("--costs", type=Path, metavar="FILE", help="costs of what decks leave out")
+    trade.add_argument("--plan", default="", metavar="NAME", help="name of the plan")
+    trade.add_argument(
+        "measures", type=Path, nargs="+", metavar="MEASURES", help="measures.json of the runs"
+    )
+    trade.set_defaults(action=_trade)
     return parser
 
 
@@ -144,6 +158,19 @@ def _checks(options: argparse.Namespace) -> None:
             f" {check.setting}: {error.error:+.3f} ({error.low:+.3f} to {error.high:+.3f}),"
             f" {check.verdict}"
         )
+
+
+def _trade(options: argparse.Namespace) -> None:
+    from dragchain.trade_report import write_trade
+
+    write_trade(
+        options.out,
+        options.measures,
+        options.reference,
+        drops=options.drops,
+        costs=options.costs,
+        plan=options.plan,
+    )
 
 
 if __name__ == "__main__":

@@ -175,6 +175,12 @@ class Factors:
         terms = {(pair,) for pair in own} if self.additive else {own}
         return np.array([1.0, *(float(column in terms) for column in self.columns)])
 
+    def tells(self, setting: Mapping[str, Hashable]) -> bool:
+        """Whether the runs had what a row for these settings stands for."""
+        own = self._own(setting)
+        terms = [(pair,) for pair in own] if self.additive else [own] * bool(own)
+        return all(term in self.columns for term in terms)
+
     def design(self) -> Floats:
         """The design matrix, (N, 1 + columns)."""
         return np.array([self.row(setting) for setting in self.settings])
@@ -185,11 +191,11 @@ def lack_of_fit(additive: Fit, full: Fit) -> float:
 
     F test of the sum of squares that the interactions explain against what is
     left with them. Both fits must have used the same `bed_share`. 1 if the two
-    models are the same.
+    models are the same, or if nothing is left to test against.
     """
     more = additive.degrees - full.degrees
-    if more == 0:
+    left = full.residuals @ full.residuals / full.degrees
+    if more == 0 or left == 0.0:
         return 1.0
     explained = (additive.residuals @ additive.residuals - full.residuals @ full.residuals) / more
-    left = full.residuals @ full.residuals / full.degrees
     return float(stats.f.sf(explained / left, more, full.degrees))

@@ -148,8 +148,8 @@ def measure(run_dir: Path, case: Case, bed: Mapping[str, float]) -> dict[str, An
     -------
     dict
         ``arc_m`` (counted path), ``block_m``, ``blocks`` (quantity to a list of
-        B values), ``bed`` values, and ``force_histogram`` (counts of contacts
-        on the tool between `FORCE_BINS`).
+        B values, None where a block has none), ``single`` (those of the bed), and
+        ``force_histogram`` (counts of contacts on the tool between `FORCE_BINS`).
     """
     force = read_counted(run_dir)
     path = _Path.of(case, force["step"].to_numpy(np.int64))
@@ -164,10 +164,14 @@ def measure(run_dir: Path, case: Case, bed: Mapping[str, float]) -> dict[str, An
     return {
         "arc_m": path.length_m,
         "block_m": path.length_m / path.blocks,
-        "blocks": {name: [float(value) for value in values] for name, values in found.items()},
+        "blocks": {name: _listed(values) for name, values in found.items()},
         "single": {"fill_height": bed["fill_height_m"], "solid_fraction": bed["solid_fraction"]},
         "force_histogram": counts.tolist(),
     }
+
+
+def _listed(values: Floats) -> list[float | None]:
+    return [float(value) if math.isfinite(value) else None for value in values]
 
 
 def _cost(case: Case, outcome: Mapping[str, Any]) -> dict[str, Any]:

@@ -137,6 +137,9 @@ class Comparison:
     additive : bool
         Whether effects were added up.
     errors : dict of Setting to Error
+    fit : Fit
+    factors : Factors
+        What `between` draws on.
     """
 
     quantity: Quantity
@@ -147,6 +150,14 @@ class Comparison:
     additivity: float
     additive: bool
     errors: Mapping[Setting, Error]
+    fit: Fit = field(repr=False)
+    factors: Factors = field(repr=False)
+
+    def between(self, setting: Setting, base: Setting) -> Error | None:
+        """Difference of one setting to another; None if the runs cannot tell it."""
+        if not all(self.factors.tells(one.factors()) for one in (setting, base)):
+            return None
+        return _error(self.fit, self.factors, setting, base, self.quantity.signed)
 
 
 @dataclass(frozen=True)
@@ -334,6 +345,8 @@ def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting
             setting: _error(fit, factors, setting, reference, quantity.signed)
             for setting in dict.fromkeys(settings)
         },
+        fit=fit,
+        factors=factors,
     )
 
 
@@ -379,23 +392,51 @@ def _error(fit: Fit, factors: Factors, setting: Setting, reference: Setting, sig
     )
 
 
-def recommend(trade: Trade, quantity: str, tolerance: float) -> Setting | None:
+def candidates(trade: Trade, quantities: Sequence[str]) -> list[Setting]:
+    """The settings that could be recommended instead of the reference.
+
+    They change nothing but the fidelity, are cheaper, have more than one run of
+    which every one was complete, and an error in each of the quantities.
+    """
+    comparisons = [trade.comparisons.get(name) for name in quantities]
+    return [
+        setting
+        for setting in trade.settings()
+        if setting != trade.reference
+        and not setting.other
+        and trade.cost(setting) < 1.0
+        and len(trade.of(setting)) > 1
+        and all(run.complete for run in trade.of(setting))
+        and all(own is not None and setting in own.errors for own in comparisons)
+    ]
+
+
+def largest_bound(trade: Trade, quantities: Sequence[str], setting: Setting) -> float:
+    """The largest bound of a setting's errors in some quantities."""
+    return max(trade.comparisons[name].errors[setting].bound for name in quantities)
+
+
+def recommend(trade: Trade, quantity: str | Sequence[str], tolerance: float) -> Setting | None:
     """The cheapest setting whose error is below a tolerance with confidence.
 
-    Only settings that change nothing but the fidelity count, of which every
-    run was complete; None if there is none but the reference.
+    Parameters
+    ----------
+    trade : Trade
+    quantity : str or sequence of str
+        If several, each of them has to be within the tolerance.
+    tolerance : float
+        Relative.
+
+    Returns
+    -------
+    Setting or None
+        One of the `candidates`; None if there is none but the reference.
     """
-    comparison = trade.comparisons.get(quantity)
-    if comparison is None:
-        return None
+    names = [quantity] if isinstance(quantity, str) else list(quantity)
     able = [
         setting
-        for setting, error in comparison.errors.items()
-        if error.bound <= tolerance
-        and setting != trade.reference
-        and not setting.other
-        and all(run.complete for run in trade.of(setting))
-        and len(trade.of(setting)) > 1
+        for setting in candidates(trade, names)
+        if largest_bound(trade, names, setting) <= tolerance
     ]
     return min(able, key=trade.cost, default=None)
 
@@ -412,7 +453,8 @@ class Along:
     correlation : list of float
         Between blocks 1, 2 and 3 apart.
     drift : float
-        Second half less first half of the path, relative to the mean.
+        Second half less first half of the path, relative to the whole; of a
+        quantity that may change its sign, in mean drags.
     drift_halfwidth : float
         Of its interval of `CONFIDENCE`; NaN for a single run.
     """
@@ -428,17 +470,15 @@ def along(trade: Trade, quantity: Quantity) -> Along | None:
     """How a quantity changes along the path; None if runs are too short for that."""
     complete = [run.measures for run in trade.runs if run.complete]
     longest = max(measures["arc_m"] for measures in complete)
-    series = [
-        np.array(measures["blocks"][quantity.name])
-        for measures in complete
-        if measures["arc_m"] > 0.99 * longest and quantity.name in measures["blocks"]
-    ]
-    series = [blocks for blocks in series if len(blocks) >= 8 and np.isfinite(blocks).all()]
-    if not series:
+    longest_runs = [own for own in complete if own["arc_m"] > 0.99 * longest]
+    pairs = [(_blocks(own, quantity.name), _blocks(own, "drag_mean")) for own in longest_runs]
+    pairs = [(own, drag) for own, drag in pairs if len(own) >= 8 and np.isfinite(own).all()]
+    if not pairs:
         return None
+    series = [own for own, _ in pairs]
     covariance = sum(autocovariance(blocks)[:4] for blocks in series)
     assert isinstance(covariance, np.ndarray)
-    drifts = np.array([_drift(blocks) for blocks in series])
+    drifts = np.array([_drift(quantity, own, drag) for own, drag in pairs])
     error = stats.sem(drifts) if len(drifts) > 1 else math.nan
     quantile = stats.t.ppf(0.5 + 0.5 * CONFIDENCE, max(len(drifts) - 1, 1))
     return Along(
@@ -450,9 +490,15 @@ def along(trade: Trade, quantity: Quantity) -> Along | None:
     )
 
 
-def _drift(blocks: np.ndarray[Any, Any]) -> float:
+def _blocks(measures: Mapping[str, Any], name: str) -> np.ndarray[Any, Any]:
+    return np.array(measures["blocks"].get(name, []), dtype=np.float64)
+
+
+def _drift(quantity: Quantity, blocks: np.ndarray[Any, Any], drag: np.ndarray[Any, Any]) -> float:
     half = len(blocks) // 2
-    return float((blocks[-half:].mean() - blocks[:half].mean()) / abs(blocks.mean()))
+    scale = drag.mean() if quantity.signed else quantity.of_blocks(blocks)
+    change = quantity.of_blocks(blocks[-half:]) - quantity.of_blocks(blocks[:half])
+    return float(change / abs(scale))
 
 
 def run_table(trade: Trade) -> pd.DataFrame:

@@ -1,0 +1,278 @@
+"""The comparison of a trade on measures whose effects are known."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from trade_files import BLOCK_M, VALUES, measures, write
+
+from dragchain.errors import TableError
+from dragchain.trade import (
+    Setting,
+    Trade,
+    along,
+    compare,
+    error_table,
+    largest_bound,
+    read_runs,
+    recommend,
+    run_table,
+)
+from dragchain.trade_findings import (
+    choose,
+    coverage,
+    exceedance,
+    gains,
+    hub,
+    reaches,
+    softness,
+    speed_up,
+)
+
+REFERENCE, SOFT, COARSE, FAST = (1.0, 0.2, 1.0), (0.01, 0.2, 1.0), (1.0, 0.5, 1.0), (1.0, 0.2, 5.0)
+BOTH = (0.01, 0.5, 1.0)
+SOFTNESS = {"drag_mean": 1.1, "lateral_mean": 0.2, "contact_force_mean": 0.7}
+FAILURE = [{"name": "every ball kept", "passed": False, "seen": "12 balls", "limit": "1422"}]
+
+
+def contents(**changes: Any) -> list[dict[str, Any]]:
+    """Four seeds at the reference and three at each of the others."""
+    rng = np.random.default_rng(1)
+    found = [measures(REFERENCE, seed, rng, cpu_time_s=100.0, **changes) for seed in (1, 2, 3, 4)]
+    for seed in (1, 2, 3):
+        found += [
+            measures(SOFT, seed, rng, effects=SOFTNESS, cpu_time_s=10.0, **changes),
+            measures(COARSE, seed, rng, cpu_time_s=40.0, **changes),
+            measures(BOTH, seed, rng, effects=SOFTNESS, cpu_time_s=5.0, **changes),
+        ]
+    return found
+
+
+def made(folder: Path, found: list[dict[str, Any]]) -> Trade:
+    files = write(folder, found)
+    return compare(*read_runs(files, files[0].parent))
+
+
+@pytest.fixture
+def trade(tmp_path: Path) -> Trade:
+    return made(tmp_path, contents())
+
+
+WITHIN = 0.03
+"""Over four standard errors of a difference here, 3 % / sqrt(8 blocks) / sqrt(3 or so pairs)."""
+
+
+def test_a_known_effect_is_found_and_resolved(trade: Trade) -> None:
+    error = trade.comparisons["drag_mean"].errors[Setting(*SOFT)]
+    assert error.error == pytest.approx(0.1, abs=WITHIN) and error.resolved
+    assert error.low < error.error < error.high < error.low + 2.0 * WITHIN
+    assert trade.comparisons["drag_mean"].reference == pytest.approx(VALUES["drag_mean"], rel=0.03)
+    assert trade.comparisons["drag_sd"].reference == pytest.approx(VALUES["drag_sd"], rel=0.03)
+
+
+def test_no_effect_is_not_resolved_and_its_bound_holds_the_interval(trade: Trade) -> None:
+    error = trade.comparisons["rod_contacts"].errors[Setting(*SOFT)]
+    assert not error.resolved and error.low < 0.0 < error.high
+    assert abs(error.error) < error.bound <= max(-error.low, error.high)
+
+
+def test_the_reference_has_no_error(trade: Trade) -> None:
+    error = trade.comparisons["drag_mean"].errors[trade.reference]
+    assert (error.error, error.bound, error.resolved) == (0.0, 0.0, False)
+
+
+def test_a_signed_quantity_counts_in_mean_drags(trade: Trade) -> None:
+    own = trade.comparisons["lateral_mean"]
+    error = own.errors[Setting(*SOFT)]
+    assert error.error == pytest.approx(SOFTNESS["lateral_mean"], abs=WITHIN) and error.resolved
+    assert own.reference == pytest.approx(VALUES["lateral_mean"], abs=0.05 * 2.6)
+
+
+def test_costs_and_the_certified_choice(trade: Trade) -> None:
+    assert trade.cost(Setting(*SOFT)) == pytest.approx(0.1)
+    assert recommend(trade, "rod_contacts", 0.05) == Setting(*BOTH)
+    assert recommend(trade, "drag_mean", 0.05) == Setting(*COARSE)
+    assert recommend(trade, "drag_mean", 0.2) == Setting(*BOTH)
+    assert recommend(trade, "drag_mean", 1e-6) is None
+    assert recommend(trade, "no such quantity", 1.0) is None
+    assert recommend(trade, ["rod_contacts", "drag_mean"], 0.05) == Setting(*COARSE)
+
+
+def test_a_tolerance_is_compared_with_the_bound(trade: Trade) -> None:
+    bound = largest_bound(trade, ["drag_mean"], Setting(*COARSE))
+    error = trade.comparisons["drag_mean"].errors[Setting(*COARSE)].error
+    between = 0.5 * (abs(error) + bound)
+    assert recommend(trade, "drag_mean", between) is None
+    assert recommend(trade, "drag_mean", bound) == Setting(*COARSE)
+    choice = choose(trade, ["drag_mean"], between)
+    assert choice.setting is None and choice.nearest == Setting(*COARSE)
+    assert choice.bound == bound
+
+
+def test_a_setting_with_one_run_or_a_failed_one_is_not_offered(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    found = [
+        *contents(),
+        measures((0.1, 0.2, 1.0), 1, rng, cpu_time_s=1.0),
+        measures(BOTH, 4, rng, cpu_time_s=5.0, failure=FAILURE),
+    ]
+    trade = made(tmp_path, found)
+    assert recommend(trade, "rod_contacts", 0.2) == Setting(*SOFT)
+    table = run_table(trade)
+    assert table["failure"].tolist()[-1] == "every ball kept: 12 balls"
+    assert table["complete"].sum() == len(found) - 1
+    assert math.isnan(table["drag_mean"].iloc[-1])
+
+
+def test_a_setting_that_only_failed_has_no_errors(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    found = contents() + [measures(FAST, seed, rng, failure=FAILURE) for seed in (1, 2)]
+    trade = made(tmp_path, found)
+    assert Setting(*FAST) in trade.settings()
+    assert all(Setting(*FAST) not in own.errors for own in trade.comparisons.values())
+    assert not (error_table(trade)["speed_factor"] == 5.0).any()
+
+
+def test_the_longest_of_runs_that_differ_in_path_counts(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    long = [measures(REFERENCE, seed, rng, blocks=16) for seed in (1, 2)]
+    files = write(tmp_path, contents() + long)
+    runs, _, arc_m = read_runs(files, files[0].parent)
+    own = [run for run in runs if run.setting == Setting(*REFERENCE)]
+    lengths = sorted(run.measures["arc_m"] / BLOCK_M for run in own)
+    assert lengths == pytest.approx([8, 8, 16, 16])
+    assert arc_m == pytest.approx(8 * BLOCK_M)
+    first = next(run for run in own if run.bed == "bed-1")
+    assert first.values["drag_mean"] == np.mean(first.measures["blocks"]["drag_mean"][:8])
+
+
+def test_a_quantity_that_is_missing_or_changes_sign_is_skipped(tmp_path: Path) -> None:
+    found = contents()
+    for content in found:
+        content["blocks"]["chain_length"] = []
+    found[1]["blocks"]["chain_count"] = [-1.0] * 8
+    trade = made(tmp_path, found)
+    assert set(trade.skipped) == {"chain_length", "chain_count"}
+    assert "no run at the reference" in trade.skipped["chain_length"]
+    assert "changes its sign" in trade.skipped["chain_count"]
+    assert recommend(trade, "chain_length", 1.0) is None
+
+
+def test_an_interaction_gives_every_combination_its_own_error(tmp_path: Path) -> None:
+    found = contents()
+    for content in found:
+        fidelity = content["fidelity"]
+        if (fidelity["youngs_modulus_scale"], fidelity["timestep_fraction"]) == BOTH[:2]:
+            content["blocks"]["rod_contacts"] = [2 * n for n in content["blocks"]["rod_contacts"]]
+    own = made(tmp_path, found).comparisons["rod_contacts"]
+    assert not own.additive and own.additivity < 0.05
+    assert own.errors[Setting(*BOTH)].error == pytest.approx(1.0, abs=2.0 * WITHIN)
+    assert abs(own.errors[Setting(*SOFT)].error) < 0.1
+
+
+def test_softness_alone_and_mixed_with_a_step(tmp_path: Path) -> None:
+    trade = made(tmp_path / "all", contents())
+    alone = softness(trade, trade.comparisons["contact_force_mean"], 0.01)
+    assert alone is not None and alone.mixed == "" and alone.verdict == "ruined"
+    kept = softness(trade, trade.comparisons["rod_contacts"], 0.01)
+    assert kept is not None and kept.verdict == "kept"
+    confounded = [one for one in contents() if _point(one) in (REFERENCE, BOTH)]
+    trade = made(tmp_path / "few", confounded)
+    mixed = softness(trade, trade.comparisons["contact_force_mean"], 0.01)
+    assert mixed is not None and mixed.mixed == str(Setting(*BOTH))
+    assert mixed.error.error == pytest.approx(-0.3, abs=WITHIN)
+
+
+def _point(content: dict[str, Any]) -> tuple[float, ...]:
+    fidelity = content["fidelity"]
+    return tuple(
+        fidelity[name] for name in ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
+    )
+
+
+def test_gains_alone_and_together(trade: Trade) -> None:
+    found = {(gain.base, gain.setting): gain for gain in gains(trade)}
+    reference = Setting(*REFERENCE)
+    assert found[reference, Setting(*SOFT)].speed_up.ratio == pytest.approx(10.0)
+    together = found[reference, Setting(*BOTH)]
+    assert together.product == pytest.approx(25.0) and together.speed_up.ratio == pytest.approx(20)
+    assert math.isnan(found[reference, Setting(*COARSE)].product)
+
+
+def test_the_hub_is_the_setting_most_others_are_near_to(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    near = [(0.1, 0.5, 1.0), (0.01, 0.8, 1.0), (0.01, 0.5, 5.0), BOTH, BOTH]
+    found = contents() + [measures(point, 4, rng) for point in near]
+    assert hub(made(tmp_path, found)) == Setting(*BOTH)
+
+
+def test_a_gain_has_an_interval_from_the_scatter_of_costs(tmp_path: Path) -> None:
+    found = contents()
+    for content, cost in zip(found[:2], (90.0, 110.0), strict=True):
+        content["cost"]["cpu_time_s"] = cost
+    trade = made(tmp_path, found)
+    gain = speed_up(trade, Setting(*SOFT), trade.reference)
+    assert gain.ratio == pytest.approx(10.0) and gain.low < gain.ratio < gain.high
+
+
+def test_reach_falls_with_the_root_of_the_path(trade: Trade) -> None:
+    (reach,) = (one for one in reaches(trade) if one.quantity.name == "drag_mean")
+    assert reach.at(4.0 * reach.arc_m) == pytest.approx(0.5 * reach.halfwidth)
+    assert reach.at(reach.path_m(0.05)) == pytest.approx(0.05)
+    assert reach.seeds(reach.halfwidth / 2.01) == 5
+    assert "fill_height" not in [one.quantity.name for one in reaches(trade)]
+
+
+def test_a_drift_along_the_path_is_seen(tmp_path: Path) -> None:
+    found = contents(noise=0.01)
+    growth = 1.0 + 0.05 * np.arange(8)
+    for content in found:
+        blocks = content["blocks"]
+        blocks["rod_contacts"] = list(growth * blocks["rod_contacts"])
+        blocks["drag_sd"] = list(growth**2 * blocks["drag_sd"])
+        blocks["lateral_mean"] = list(2.6 * growth + blocks["lateral_mean"])
+    trade = made(tmp_path, found)
+    seen = {name: along(trade, own.quantity) for name, own in trade.comparisons.items()}
+    for name, drift in (
+        ("drag_mean", 0.0),
+        ("rod_contacts", 0.2 / 1.175),
+        ("drag_sd", (math.sqrt(1.275**2 + 0.0031) - math.sqrt(1.075**2 + 0.0031)) / 1.18),
+        ("lateral_mean", 0.2),
+    ):
+        own = seen[name]
+        assert own is not None and own.runs == len(found)
+        assert own.drift == pytest.approx(drift, abs=0.02)
+        assert (own.drift > own.drift_halfwidth) == (drift > 0.0)
+
+
+def test_the_share_above_a_force_is_counted_from_above() -> None:
+    counts = np.zeros(70, dtype=int)
+    counts[[10, 20]] = 3, 1
+    force, share, mean = exceedance(counts.tolist())
+    assert share[10] == 1.0 and share[11] == 0.25 and share[21] == 0.0
+    assert mean == pytest.approx((3 * force[10] + force[20]) / 4 * 10**0.05)
+
+
+def test_the_coverage_of_the_plan_is_found_by_simulation(trade: Trade) -> None:
+    found = coverage(trade, "drag_mean", trials=60)
+    assert found is not None and 0.85 < found < 1.0
+    assert coverage(trade, "drag_mean", trials=60) == found
+    assert coverage(trade, "no such quantity", trials=1) is None
+
+
+def test_files_that_cannot_be_used_are_refused(tmp_path: Path) -> None:
+    found = contents()
+    files = write(tmp_path / "a", found)
+    with pytest.raises(TableError, match="reference is not among"):
+        read_runs(files, tmp_path)
+    found[0]["schema"] = 99
+    with pytest.raises(TableError, match="schema 99"):
+        read_runs(write(tmp_path / "b", found), tmp_path)
+    rng = np.random.default_rng(1)
+    failed = write(tmp_path / "c", [measures(REFERENCE, 1, rng, failure=FAILURE)])
+    with pytest.raises(TableError, match="no run of the trade is complete"):
+        read_runs(failed, failed[0].parent)
