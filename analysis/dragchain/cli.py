@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -92,6 +93,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     trade.add_argument("--costs", type=Path, metavar="FILE", help="costs of what decks leave out")
     trade.add_argument("--plan", default="", metavar="NAME", help="name of the plan")
+    trade.add_argument("--command", help="what made it, for the record")
+    trade.add_argument(
+        "--largest-step", type=float, default=math.inf, help="over the Rayleigh time, to recommend"
+    )
     trade.add_argument(
         "measures", type=Path, nargs="+", metavar="MEASURES", help="measures.json of the runs"
     )
@@ -170,6 +175,8 @@ def _trade(options: argparse.Namespace) -> None:
         drops=options.drops,
         costs=options.costs,
         plan=options.plan,
+        commands=[options.command] if options.command else [],
+        largest_step=options.largest_step,
     )
 
 

@@ -88,10 +88,41 @@ class Run:
         return bool(self.measures["complete"])
 
     @property
+    def steps_per_m(self) -> float:
+        """Steps for a metre of path."""
+        return float(self.measures["cost"]["steps_per_m"])
+
+    @property
     def cpu_per_m(self) -> float:
-        """Processor time for a metre of path, s/m."""
+        """Processor time for a metre of path, s/m; NaN for a run that failed at once."""
         cost = self.measures["cost"]
+        if not cost["steps"]:
+            return math.nan
         return float(cost["cpu_time_s"] / cost["steps"] * cost["steps_per_m"])
+
+
+@dataclass(frozen=True)
+class StepCosts:
+    """Processor time of a step, as it was timed side by side, knob by knob.
+
+    Attributes
+    ----------
+    levels : mapping of str to mapping of float to float
+        Knob, level and the time of a step over that at the base. Between
+        levels the logarithm is interpolated over that of the level, beyond
+        them the nearest counts; knobs multiply.
+    """
+
+    levels: Mapping[str, Mapping[float, float]]
+
+    def of(self, setting: Setting) -> float:
+        """Time of a step over that at the base."""
+        logs = []
+        for knob, known in self.levels.items():
+            points = sorted(known.items())
+            at, ratios = np.log([level for level, _ in points]), np.log([r for _, r in points])
+            logs.append(np.interp(math.log(getattr(setting, knob)), at, ratios))
+        return math.exp(sum(logs))
 
 
 @dataclass(frozen=True)
@@ -175,6 +206,10 @@ class Trade:
         Quantity to what the settings do to it.
     skipped : dict of str to str
         Quantities that could not be compared, and why.
+    step_costs : StepCosts or None
+        If steps were timed side by side; else costs are those of the runs.
+    largest_step : float
+        Over the Rayleigh time: no setting with a larger one is recommended.
     """
 
     runs: list[Run]
@@ -182,23 +217,34 @@ class Trade:
     arc_m: float
     comparisons: Mapping[str, Comparison]
     skipped: Mapping[str, str] = field(default_factory=dict)
+    step_costs: StepCosts | None = None
+    largest_step: float = math.inf
 
     def settings(self) -> list[Setting]:
-        """Every setting once, the dearest first."""
+        """Every setting once, that with the most steps first."""
         found = dict.fromkeys(run.setting for run in self.runs)
-        return sorted(found, key=lambda setting: -self.cost(setting))
+        return sorted(found, key=lambda setting: -self._median(setting, "steps_per_m"))
 
     def of(self, setting: Setting) -> list[Run]:
         """The runs of a setting."""
         return [run for run in self.runs if run.setting == setting]
 
     def cost(self, setting: Setting) -> float:
-        """Processor time for a metre of path over the reference's; the median of the runs.
+        """Processor time for a metre of path over the reference's.
 
-        A failed run costs what it did per step until then.
+        The number of steps times what a step costs: as it was timed side by
+        side, where it was and the setting changes nothing but the fidelity;
+        else in the median of the runs, a failed one until it failed.
         """
-        own = float(np.median([run.cpu_per_m for run in self.of(setting)]))
-        return own / float(np.median([run.cpu_per_m for run in self.of(self.reference)]))
+        if self.step_costs is None or setting.other:
+            return self._median(setting, "cpu_per_m") / self._median(self.reference, "cpu_per_m")
+        steps = self._median(setting, "steps_per_m") / self._median(self.reference, "steps_per_m")
+        return steps * self.step_costs.of(setting) / self.step_costs.of(self.reference)
+
+    def _median(self, setting: Setting, name: str) -> float:
+        values = np.array([getattr(run, name) for run in self.of(setting)])
+        known = values[np.isfinite(values)]
+        return float(np.median(known)) if known.size else math.nan
 
 
 def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Setting, float]:
@@ -290,7 +336,13 @@ def values_within(measures: Mapping[str, Any], arc_m: float) -> dict[str, float]
     return found
 
 
-def compare(runs: Sequence[Run], reference: Setting, arc_m: float) -> Trade:
+def compare(
+    runs: Sequence[Run],
+    reference: Setting,
+    arc_m: float,
+    step_costs: StepCosts | None = None,
+    largest_step: float = math.inf,
+) -> Trade:
     """Every setting against the reference, in every quantity.
 
     A quantity that cannot be compared, because too few runs have it, is left
@@ -303,7 +355,7 @@ def compare(runs: Sequence[Run], reference: Setting, arc_m: float) -> Trade:
             found[quantity.name] = compare_quantity(quantity, runs, reference)
         except SeriesError as error:
             skipped[quantity.name] = str(error)
-    return Trade(list(runs), reference, arc_m, found, skipped)
+    return Trade(list(runs), reference, arc_m, found, skipped, step_costs, largest_step)
 
 
 def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting) -> Comparison:
@@ -395,8 +447,9 @@ def _error(fit: Fit, factors: Factors, setting: Setting, reference: Setting, sig
 def candidates(trade: Trade, quantities: Sequence[str]) -> list[Setting]:
     """The settings that could be recommended instead of the reference.
 
-    They change nothing but the fidelity, are cheaper, have more than one run of
-    which every one was complete, and an error in each of the quantities.
+    They change nothing but the fidelity, are cheaper, have a step that is known
+    to be safe and more than one run of which every one was complete, and an
+    error in each of the quantities.
     """
     comparisons = [trade.comparisons.get(name) for name in quantities]
     return [
@@ -406,6 +459,7 @@ def candidates(trade: Trade, quantities: Sequence[str]) -> list[Setting]:
         and not setting.other
         and trade.cost(setting) < 1.0
         and len(trade.of(setting)) > 1
+        and setting.timestep_fraction <= trade.largest_step * (1 + 1e-9)
         and all(run.complete for run in trade.of(setting))
         and all(own is not None and setting in own.errors for own in comparisons)
     ]

@@ -26,6 +26,7 @@ from dragchain.trade import (
     Error,
     Run,
     Setting,
+    StepCosts,
     Trade,
     candidates,
     compare_quantity,
@@ -74,7 +75,7 @@ class SpeedUp:
     ratio : float
     low, high : float
         Limits of the interval of `CONFIDENCE` from the scatter between runs;
-        NaN where either has a single run.
+        NaN where either has a single run, or where steps were timed side by side.
     """
 
     ratio: float
@@ -86,7 +87,7 @@ def speed_up(trade: Trade, setting: Setting, base: Setting) -> SpeedUp:
     """How many times cheaper a metre of path is; the medians of the runs, as `Trade.cost`."""
     ratio = trade.cost(base) / trade.cost(setting)
     logs = [np.log([run.cpu_per_m for run in trade.of(one)]) for one in (setting, base)]
-    if min(map(len, logs)) < 2:
+    if min(map(len, logs)) < 2 or trade.step_costs is not None:
         return SpeedUp(ratio, math.nan, math.nan)
     error = math.hypot(*(float(stats.sem(values)) for values in logs))
     shift = error * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, sum(map(len, logs)) - 2)
@@ -530,6 +531,28 @@ class Costs:
         if not trade.of(standard):
             return math.nan
         return float(ratio * trade.cost(standard) / trade.cost(setting))
+
+
+def step_costs(costs: Costs) -> StepCosts | None:
+    """What a step costs at other moduli, steps and speeds; None if that was not timed."""
+    if costs.standard is None:
+        return None
+    levels: dict[str, dict[float, float]] = {}
+    for row in costs.entries:
+        kind, _, level = str(row["name"]).partition("_")
+        if kind in STEP_COSTS and "per_step" in row:
+            knob = STEP_COSTS[kind]
+            own = levels.setdefault(knob, {float(getattr(costs.standard, knob)): 1.0})
+            own[float(level)] = float(row["per_step"])
+    return StepCosts(levels) if levels else None
+
+
+STEP_COSTS = {
+    "modulus": "youngs_modulus_scale",
+    "step": "timestep_fraction",
+    "speed": "speed_factor",
+}
+"""First word of a cost's name, whose second is a level, and the knob it is about."""
 
 
 def read_costs(file: Path | None) -> Costs:

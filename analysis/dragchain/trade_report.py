@@ -60,6 +60,7 @@ from dragchain.trade_findings import (
     read_costs,
     read_drops,
     softness,
+    step_costs,
 )
 
 TRADE_SCHEMA = 1
@@ -103,6 +104,7 @@ def write_trade(
     costs: Path | None = None,
     plan: str = "",
     commands: Sequence[str] = ("snakemake trade",),
+    largest_step: float = math.inf,
 ) -> None:
     """Write tables, figures and page of a trade whose runs were measured.
 
@@ -121,6 +123,8 @@ def write_trade(
         Costs of what the decks leave out.
     plan : str
         Name of the plan.
+    largest_step : float
+        Over the Rayleigh time: no setting with a larger one is recommended.
     commands : sequence of str
         What the user typed, for ``trade.json``.
 
@@ -129,8 +133,9 @@ def write_trade(
     TableError
         A file was written by another version, no run is complete, or a drop cannot be used.
     """
-    trade = compare(*read_runs(measures, reference_run))
-    found = Findings(trade, read_drops(drops), read_costs(costs), provenance(trade, plan, commands))
+    priced = read_costs(costs)
+    trade = compare(*read_runs(measures, reference_run), step_costs(priced), largest_step)
+    found = Findings(trade, read_drops(drops), priced, provenance(trade, plan, commands))
     out_dir.mkdir(parents=True, exist_ok=True)
     for name, table in (("runs", run_table(trade)), ("errors", error_table(trade))):
         write_parquet(table, out_dir / f"{name}.parquet")

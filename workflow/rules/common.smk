@@ -9,6 +9,7 @@ from dragdeck.errors import DragdeckError
 from dragdeck.project import Project, by_run, study_templates
 from dragdeck.render import environment, template_files
 from dragdeck.sources import source_hash
+from dragdeck.stability import largest_share
 from dragdeck.verification import suite_of
 
 PROJECT = Project(Path(workflow.basedir))
@@ -128,6 +129,12 @@ def every_point(file):
 def every_drop_point(file):
     """One file of every drop test of the trade."""
     return [f"results/{STUDY}/drop/{run}/{file}" for run in points_by_run("drop")]
+
+
+def safe_step(case):
+    """Largest step of a process over the Rayleigh time that is known to be safe."""
+    lowest = min(pair.restitution for pair in case.study.pairs.values())
+    return largest_share("process", lowest)
 
 
 def case_of(scene, run):

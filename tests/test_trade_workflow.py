@@ -1,0 +1,75 @@
+"""A small trade through the workflow, on the real engine."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+import yaml
+from paths import ROOT, SMALL_STUDY
+from test_workflow import jobs, snakemake
+
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+PLAN: dict[str, Any] = {
+    "base": {
+        "fidelity.youngs_modulus_scale": 1e-4,
+        "fidelity.timestep_fraction": 0.6,
+        "fidelity.ranks": 1,
+    },
+    "reference": {"vary": {"fidelity.youngs_modulus_scale": [1e-3]}},
+    "seeds": 2,
+    "cost_rounds": 0,
+    "points": [{"vary": {"fidelity.timestep_fraction": [0.6, 1.9]}}],
+    "drop": {"drop.timestep_fraction": [0.1]},
+}
+TRADE = ("trade", "--config", "study=small", "plan=plan.yaml")
+
+
+@pytest.fixture(scope="module")
+def traded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the project in which the plan was run on the small study."""
+    folder = tmp_path_factory.mktemp("trade")
+    for name in ("workflow", "analysis", "meshes", "profiles", "templates", "Snakefile"):
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "studies/small").mkdir(parents=True)
+    (folder / "studies/small/study.yaml").write_text(SMALL_STUDY.read_text())
+    (folder / "plan.yaml").write_text(yaml.safe_dump(PLAN))
+    done = snakemake(folder, *TRADE)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def test_softer_balls_overlap_more(traded: Path) -> None:
+    errors = pd.read_parquet(traded / "results/small/trade-report/plan/errors.parquet")
+    soft = (errors.youngs_modulus_scale == 1e-4) & (errors.timestep_fraction == 0.6)
+    overlap = errors[soft & (errors.quantity == "rod_overlap")].iloc[0]
+    assert overlap.low > 1.0  # Hertz: by 10 ** (2 / 3) - 1 = 3.6 at the same force
+    assert overlap.resolved and overlap.runs == 2
+    assert overlap.relative_cost < 0.6  # a longer step by the root of ten
+
+
+def test_a_point_that_fails_is_a_finding(traded: Path) -> None:
+    runs = pd.read_parquet(traded / "results/small/trade-report/plan/runs.parquet")
+    failed = runs[runs.timestep_fraction == 1.9]
+    assert len(failed) == 2 and not failed.complete.any()
+    assert failed.failure.str.contains("within its limits").all()
+    assert runs[runs.timestep_fraction == 0.6].complete.all()
+
+
+def test_the_record_says_what_made_it(traded: Path) -> None:
+    folder = traded / "results/small/trade-report/plan"
+    trade = json.loads((folder / "trade.json").read_text())
+    assert trade["commands"] == ["snakemake trade --config study=small plan=plan.yaml"]
+    assert trade["runs"] == 6 and trade["reference"]["youngs_modulus_scale"] == 1e-3
+    assert trade["scene"]["tool_to_ball"] == pytest.approx(0.008 / 0.00654, rel=0.01)
+    assert len(trade["drop"]) == 2
+    page = (folder / "report.html").read_text()
+    assert "<img" in page and "not resolved" in page
+
+
+def test_nothing_is_left_to_do_in_the_trade(traded: Path) -> None:
+    assert jobs(traded, *TRADE) - {"trade"} == set()
