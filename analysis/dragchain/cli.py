@@ -92,6 +92,7 @@ def _parser() -> argparse.ArgumentParser:
         "--drops", type=Path, nargs="*", default=[], metavar="RUN_DIR", help="drop tests"
     )
     trade.add_argument("--costs", type=Path, metavar="FILE", help="costs of what decks leave out")
+    trade.add_argument("--checks", type=Path, metavar="FILE", help="checks on other scenes")
     trade.add_argument("--plan", default="", metavar="NAME", help="name of the plan")
     trade.add_argument("--command", help="what made it, for the record")
     trade.add_argument(
@@ -174,6 +175,7 @@ def _trade(options: argparse.Namespace) -> None:
         options.reference,
         drops=options.drops,
         costs=options.costs,
+        checks=options.checks,
         plan=options.plan,
         commands=[options.command] if options.command else [],
         largest_step=options.largest_step,

@@ -46,7 +46,7 @@ def draw(trade: Trade, reaches: Sequence[Reach], drops: Sequence[Drop]) -> dict[
         drawn["contact_forces"] = _forces(trade)
     if reaches:
         drawn["path"] = _path(reaches)
-    if len(drops) > 1:
+    if any(not drop.other for drop in drops[1:]):
         drawn["drop"] = _drop(drops)
     return drawn
 

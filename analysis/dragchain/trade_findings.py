@@ -468,12 +468,11 @@ def _read_drop(folder: Path) -> dict[str, Any]:
     if record["state"] != "complete":
         raise TableError(f"{folder}: its state is {record['state']!r}, not 'complete'")
     fraction = case.timestep_s / case.rayleigh_time_s
-    inputs = {**case.inputs, "modulus scale": case.fidelity.youngs_modulus_scale}
     return {
         "fraction": float(f"{fraction:.4g}"),
         "inputs": {
             name: value
-            for name, value in inputs.items()
+            for name, value in case.inputs.items()
             if name not in ("seed", "drop.timestep_fraction")
         },
         "ratios": pd.read_parquet(table, columns=["restitution"])["restitution"].to_numpy(),

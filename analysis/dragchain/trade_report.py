@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import platform
@@ -86,6 +87,8 @@ class Findings:
     trade : Trade
     drops : list of Drop
     costs : Costs
+    checks : list of dict
+        What `dragchain.checks` wrote.
     provenance : dict
         Head of ``trade.json``.
     """
@@ -93,6 +96,7 @@ class Findings:
     trade: Trade
     drops: list[Drop]
     costs: Costs
+    checks: list[dict[str, Any]]
     provenance: dict[str, Any]
 
 
@@ -102,6 +106,7 @@ def write_trade(
     reference_run: Path,
     drops: Sequence[Path] = (),
     costs: Path | None = None,
+    checks: Path | None = None,
     plan: str = "",
     commands: Sequence[str] = ("snakemake trade",),
     largest_step: float = math.inf,
@@ -121,6 +126,8 @@ def write_trade(
         Folders of drop tests, with their tables.
     costs : Path, optional
         Costs of what the decks leave out.
+    checks : Path, optional
+        ``checks.json`` of promises on other scenes.
     plan : str
         Name of the plan.
     largest_step : float
@@ -135,7 +142,9 @@ def write_trade(
     """
     priced = read_costs(costs)
     trade = compare(*read_runs(measures, reference_run), step_costs(priced), largest_step)
-    found = Findings(trade, read_drops(drops), priced, provenance(trade, plan, commands))
+    found = Findings(
+        trade, read_drops(drops), priced, _read_checks(checks), provenance(trade, plan, commands)
+    )
     out_dir.mkdir(parents=True, exist_ok=True)
     for name, table in (("runs", run_table(trade)), ("errors", error_table(trade))):
         write_parquet(table, out_dir / f"{name}.parquet")
@@ -149,6 +158,17 @@ def write_trade(
         (folder / f"{name}.png").write_bytes(picture)
     write_json(out_dir / "trade.json", summarise(found))
     (out_dir / "report.html").write_text(render(found, pictures), encoding="utf-8")
+
+
+def _read_checks(file: Path | None) -> list[dict[str, Any]]:
+    if file is None:
+        return []
+    found: list[dict[str, Any]] = json.loads(file.read_text(encoding="utf-8"))["checks"]
+    return found
+
+
+def _scene_words(inputs: Mapping[str, str]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in inputs.items()) or "other beds"
 
 
 # --- trade.json ----------------------------------------------------------------------------------
@@ -208,7 +228,10 @@ def summarise(found: Findings) -> dict[str, Any]:
             if not drop.other
         ],
         "costs": found.costs.entries,
-        "checks": [],
+        "checks": [
+            {**check, "scene": check["numbers"], "met": check["verdict"] == "kept"}
+            for check in found.checks
+        ],
     }
     return {name: _finite(value) for name, value in content.items()}
 
@@ -394,6 +417,7 @@ def render(found: Findings, pictures: Mapping[str, bytes]) -> str:
         failures=_failure_rows(trade),
         drops=found.drops,
         costs=found.costs.entries,
+        checks=[{**check, "scene": _scene_words(check["scene"])} for check in found.checks],
         statistics=_statistic_rows(trade),
         points=_point_rows(trade),
         chance=_chance_note(trade),

@@ -489,7 +489,7 @@ def _fallback(
     quantity = trade["quantities"].get(asked.quantity)
     if asked.quantity == "restitution" or not quantity["reference"]:
         return text
-    known = percent(quantity["standard_error"] / quantity["reference"])
+    known = percent(quantity["standard_error"])
     return f"{text}; the reference itself is known only to a standard error of {known}"
 
 

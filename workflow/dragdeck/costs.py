@@ -42,6 +42,10 @@ first time, speeds falling with the second, then free for the third, s."""
 FRAME_SHARE = 0.05
 """Share of a frame's steps by which a drag may be shorter than asked, to end with a frame."""
 
+LONGEST_STEP = 0.64
+"""Share of the Rayleigh time at which full stiffness is timed against the plain
+deck: the largest that docs/stability.md recommends for a slow drag."""
+
 CONTACT_COLUMNS = (
     "pos vel id force force_normal force_tangential torque torque_normal torque_tangential "
     "history contactArea delta contactPoint"
@@ -353,7 +357,15 @@ def _plain(study: Study) -> list[Variant]:
         even = {"workpiece.shape.facet_length_m": wide}
         text = f"{what}, facets of the rod as short as they are wide, {1000 * wide:g} mm"
         found.append(Variant("plain_even_facets", text, {**fields, **even}))
-    return found
+    stiff = {"fidelity.youngs_modulus_scale": 1.0}
+    longest = {**stiff, "fidelity.timestep_fraction": LONGEST_STEP}
+    return [
+        *found,
+        Variant("plain_full", f"{what}, full stiffness", {**fields, **stiff}),
+        Variant(
+            "full", f"full stiffness at {100 * LONGEST_STEP:g} % of Rayleigh, nothing else", longest
+        ),
+    ]
 
 
 def _drops() -> list[Variant]:

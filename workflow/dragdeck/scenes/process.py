@@ -36,6 +36,10 @@ from dragdeck.study import CirclePath, CylinderShape, MeshShape, Study
 FEWEST_STEPS_PER_CONTACT = 5
 """Below this many steps in a contact at the tool's speed a warning is given."""
 
+JAMMING_GAP = 2.0
+"""Ball diameters between tool and bowl below which a warning is given: an arch of
+two balls at 1.7 diameters held a rod until the force was 190 N, and then left the bowl."""
+
 
 @dataclass(frozen=True)
 class TimedLeg:
@@ -386,8 +390,11 @@ def _warnings(case: Case, timestep_s: float) -> list[str]:
     diameter = 2 * study.media.radius_mean_m
     found = []
     gap = study.bowl.radius_m - farthest_reach(study.motion) - tool_radius(case)
-    if gap < diameter:
-        found.append(f"the gap between tool and bowl, {gap:.4g} m, is less than one ball: they jam")
+    if gap < JAMMING_GAP * diameter:
+        found.append(
+            f"the gap between tool and bowl is {gap / diameter:.2g} ball diameters, less than "
+            f"{JAMMING_GAP:g}: balls can jam in it, with forces far beyond those of the bed"
+        )
     steps = contact_steps(study, timestep_s)
     if steps < FEWEST_STEPS_PER_CONTACT:
         found.append(
