@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dragdeck.cases import Case
-from dragdeck.similarity import describe
+from dragdeck.scenes.numbers import describe
 
 
 def entry(error: float, bound: float) -> dict[str, Any]:
@@ -35,7 +35,7 @@ def made_trade(case: Case, **more: Any) -> dict[str, Any]:
         "reference": {"youngs_modulus_scale": 1.0, "timestep_fraction": 0.2, "speed_factor": 1.0},
         "quantities": {
             "drag_mean": {
-                "label": "mean drag", "unit": "N", "reference": -2.5, "standard_error": 0.05,
+                "label": "mean drag", "unit": "N", "reference": -2.5, "standard_error": 0.02,
                 "run_sd": 0.04, "arc_m": 0.05,
             },
             "drag_sd": {

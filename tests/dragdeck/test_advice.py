@@ -23,7 +23,7 @@ from dragdeck.errors import InputError
 from dragdeck.forecast import question, remarks
 from dragdeck.project import Project
 from dragdeck.scenes import drop_scene, fill_scene, process_scene
-from dragdeck.similarity import describe
+from dragdeck.scenes.numbers import describe
 from dragdeck.study import Fidelity, Tolerance
 
 Trade = dict[str, Any]
@@ -155,7 +155,7 @@ def test_a_tolerance_beyond_all_falls_back_and_says_what_is_known(case: Case, tr
     assert found.chosen.error is None and found.dearer is None
     assert found.fallback is not None
     assert "the smallest bound is 2 %" in found.fallback
-    assert "standard error of 2 %" in found.fallback  # 0.05 N of 2.5 N
+    assert "standard error of 2 %" in found.fallback
 
 
 # --- the step stays within the stability limits --------------------------------------------------

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from dragdeck.cases import Case, load_cases
 from dragdeck.derive import SOLID_FRACTION_ESTIMATE
+from dragdeck.scenes.numbers import describe
 from dragdeck.similarity import (
     carried_scale,
     carried_speed,
-    describe,
     rounded,
     softest_scale,
 )

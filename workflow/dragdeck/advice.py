@@ -17,7 +17,8 @@ from typing import Any
 from dragdeck.cases import Case
 from dragdeck.errors import InputError
 from dragdeck.motion import path_length
-from dragdeck.similarity import carried_scale, carried_speed, describe, softest_scale
+from dragdeck.scenes.numbers import describe
+from dragdeck.similarity import carried_scale, carried_speed, softest_scale
 from dragdeck.stability import largest_share
 from dragdeck.study import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance
 

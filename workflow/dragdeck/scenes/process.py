@@ -29,8 +29,8 @@ from dragdeck.scenes.common import (
     timestep,
 )
 from dragdeck.scenes.fill import bed_limits, box_top, expected_surface, first_balls
+from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.tool import tool_length, tool_mesh, tool_radius
-from dragdeck.similarity import describe
 from dragdeck.study import CirclePath, CylinderShape, MeshShape, Study
 
 FEWEST_STEPS_PER_CONTACT = 5
