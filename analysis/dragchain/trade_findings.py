@@ -45,7 +45,8 @@ MAIN = (
 TOGETHER = ("contact_force_mean", "contact_force_p90")
 """What the distribution of contact forces is judged by."""
 
-PLAIN = "plain"
+PLAIN = ("plain_full", "plain")
+"""Names of the cost of the plain deck, that at full stiffness first."""
 """Name of the plain hand-written deck among the costs."""
 
 
@@ -518,6 +519,12 @@ class Costs:
     entries: list[dict[str, Any]]
     standard: Setting | None
 
+    @property
+    def plain_entry(self) -> dict[str, Any] | None:
+        """The cost of the plain deck, at full stiffness if that was timed."""
+        by_name = {row["name"]: row for row in self.entries}
+        return next((by_name[name] for name in PLAIN if name in by_name), None)
+
     def plain(self, trade: Trade, setting: Setting) -> float:
         """How many times a setting is cheaper than the plain deck; NaN if that is not known.
 
@@ -525,11 +532,11 @@ class Costs:
         setting. A file that does not name the standard's setting is taken to
         mean the `hub`.
         """
-        ratio = next((row["ratio"] for row in self.entries if row["name"] == PLAIN), math.nan)
+        entry = self.plain_entry
         standard = self.standard or hub(trade)
-        if not trade.of(standard):
+        if entry is None or not trade.of(standard):
             return math.nan
-        return float(ratio * trade.cost(standard) / trade.cost(setting))
+        return float(entry["ratio"] * trade.cost(standard) / trade.cost(setting))
 
 
 def step_costs(costs: Costs) -> StepCosts | None:

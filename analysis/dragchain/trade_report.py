@@ -629,7 +629,7 @@ def _advice(label: str, parts: Sequence[tuple[float, str | None]]) -> str:
 
 
 def _plain_note(found: Findings) -> str:
-    entry = next((row for row in found.costs.entries if row["name"] == "plain"), None)
+    entry = found.costs.plain_entry
     if entry is None:
         return ""
     standard, what = found.costs.standard or hub(found.trade), entry["what"]
