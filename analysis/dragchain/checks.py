@@ -8,24 +8,26 @@ lies within the tolerance, broken if it lies outside, and open otherwise.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import pandas as pd
 
 from dragchain.errors import TableError
-from dragchain.measures import QUANTITIES
+from dragchain.frames import Floats
+from dragchain.measures import QUANTITIES, Quantity
 from dragchain.parquet import write_json
 from dragchain.trade import (
     KNOBS,
     SILENT,
     Error,
-    Run,
     Setting,
-    compare_quantity,
     read_measures,
+    relative_error,
     values_within,
 )
 
@@ -72,8 +74,34 @@ def verdict(error: Error, tolerance: float) -> Verdict:
     return "open"
 
 
+@dataclass(frozen=True)
+class _Pair:
+    """The runs of one promise, and those at full stiffness in the same scene."""
+
+    scene: Mapping[str, str]
+    asked: Mapping[str, Any]
+    own: Sequence[Mapping[str, Any]]
+    references: Sequence[Mapping[str, Any]]
+
+    @property
+    def quantity(self) -> Quantity:
+        return next(item for item in QUANTITIES if item.name == self.asked["quantity"])
+
+    def logarithms(self) -> tuple[Floats, Floats]:
+        """Of the quantity in the promised runs and in those at full stiffness."""
+        arc = min(run["arc_m"] for run in (*self.own, *self.references))
+        own, references = (
+            np.log([abs(values_within(run, arc)[self.quantity.name]) for run in runs])
+            for runs in (self.own, self.references)
+        )
+        return own, references
+
+
 def check_promises(files: Sequence[Path]) -> list[Check]:
     """Compare every promise among the runs of a plan with the full stiffness of its scene.
+
+    The scatter of runs is taken to be the same, relatively, in all scenes and
+    settings: it is pooled over them, because few runs are made of each.
 
     Parameters
     ----------
@@ -84,20 +112,37 @@ def check_promises(files: Sequence[Path]) -> list[Check]:
     Raises
     ------
     TableError
-        If a scene has no complete run at its reference.
-    SeriesError
-        If it has too few runs for an interval.
+        If a scene has no complete run at full stiffness, a quantity may change
+        its sign, or there are too few runs for an interval.
     """
+    pairs = list(_pairs([read_measures(file) for file in files]))
+    groups = [group for pair in pairs for group in pair.logarithms()]
+    degrees = sum(len(group) - 1 for group in groups)
+    if degrees < 1:
+        raise TableError("one run of each setting says nothing of their scatter: run more seeds")
+    scatter = math.sqrt(sum(float(((g - g.mean()) ** 2).sum()) for g in groups) / degrees)
+    return [_check(pair, scatter, degrees) for pair in pairs]
+
+
+def _pairs(runs: Sequence[Mapping[str, Any]]) -> Iterator[_Pair]:
     scenes: dict[Scene, list[Mapping[str, Any]]] = {}
-    for file in files:
-        measures = read_measures(file)
-        scenes.setdefault(_scene(measures), []).append(measures)
-    common = set.intersection(*(set(scene) for scene in scenes))
-    return [
-        check
-        for scene, runs in scenes.items()
-        for check in _of_scene(dict(item for item in scene if item not in common), runs)
-    ]
+    for run in runs:
+        if run["complete"]:
+            scenes.setdefault(_scene(run), []).append(run)
+    common = set.intersection(*map(set, scenes)) if scenes else set()
+    for key, own in scenes.items():
+        scene = dict(item for item in key if item not in common)
+        references = [run for run in own if not run.get("asked")]
+        if not references:
+            raise TableError(f"scene {scene}: no complete run at full stiffness to compare with")
+        asked = {json.dumps(run["asked"]): run["asked"] for run in own if run.get("asked")}
+        for wanted in asked.values():
+            pair = _Pair(
+                scene, wanted, [run for run in own if run.get("asked") == wanted], references
+            )
+            if pair.quantity.signed:
+                raise TableError(f"{pair.quantity.name} may change its sign: it has no promise")
+            yield pair
 
 
 def _scene(measures: Mapping[str, Any]) -> Scene:
@@ -105,53 +150,23 @@ def _scene(measures: Mapping[str, Any]) -> Scene:
     return tuple(sorted((name, str(value)) for name, value in inputs if name not in SILENT))
 
 
-def _of_scene(scene: Mapping[str, str], runs: Sequence[Mapping[str, Any]]) -> list[Check]:
-    complete = [run for run in runs if run["complete"]]
-    references = [run for run in complete if not run.get("asked")]
-    if not references:
-        raise TableError(f"scene {dict(scene)}: no complete run at full stiffness to compare with")
-    arc = min(run["arc_m"] for run in complete)
-    found = []
-    for asked in {
-        json.dumps(run["asked"]): run["asked"] for run in runs if run.get("asked")
-    }.values():
-        own = [run for run in complete if run.get("asked") == asked]
-        found += _check(scene, asked, own, references, arc)
-    return found
-
-
-def _check(
-    scene: Mapping[str, str],
-    asked: Mapping[str, Any],
-    own: Sequence[Mapping[str, Any]],
-    references: Sequence[Mapping[str, Any]],
-    arc_m: float,
-) -> list[Check]:
-    if not own:
-        return []
-    both = [Run(_setting(run), run["bed"], values_within(run, arc_m), run) for run in own]
-    reference = _setting(references[0])
-    both += [Run(reference, run["bed"], values_within(run, arc_m), run) for run in references]
-    (quantity,) = (item for item in QUANTITIES if item.name == asked["quantity"])
-    error = compare_quantity(quantity, both, reference).errors[both[0].setting]
-    return [
-        Check(
-            scene=scene,
-            numbers=own[0]["numbers"],
-            quantity=quantity.name,
-            tolerance=asked["tolerance"],
-            setting=both[0].setting,
-            runs=len(own),
-            reference_runs=len(references),
-            error=error,
-            verdict=verdict(error, asked["tolerance"]),
-        )
-    ]
-
-
-def _setting(measures: Mapping[str, Any]) -> Setting:
-    modulus, step, speed = (float(measures["fidelity"][name]) for name in KNOBS)
-    return Setting(modulus, step, speed)
+def _check(pair: _Pair, scatter: float, degrees: int) -> Check:
+    own, references = pair.logarithms()
+    difference = float(own.mean() - references.mean())
+    uncertainty = scatter * math.sqrt(1 / len(own) + 1 / len(references))
+    modulus, step, speed = (float(pair.own[0]["fidelity"][name]) for name in KNOBS)
+    error = relative_error(difference, uncertainty, degrees)
+    return Check(
+        scene=pair.scene,
+        numbers=pair.own[0]["numbers"],
+        quantity=pair.quantity.name,
+        tolerance=float(pair.asked["tolerance"]),
+        setting=Setting(modulus, step, speed),
+        runs=len(own),
+        reference_runs=len(references),
+        error=error,
+        verdict=verdict(error, float(pair.asked["tolerance"])),
+    )
 
 
 def write_checks(out_dir: Path, files: Sequence[Path]) -> list[Check]:

@@ -425,9 +425,25 @@ def _choose(
 
 def _error(fit: Fit, factors: Factors, setting: Setting, reference: Setting, signed: bool) -> Error:
     weights = factors.row(setting.factors()) - factors.row(reference.factors())
-    difference, uncertainty = fit.contrast(weights)
-    shift = uncertainty * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, fit.degrees)
-    one_sided = uncertainty * stats.t.ppf(CONFIDENCE, fit.degrees)
+    return relative_error(*fit.contrast(weights), fit.degrees, signed)
+
+
+def relative_error(
+    difference: float, uncertainty: float, degrees: int, signed: bool = False
+) -> Error:
+    """The relative error that a difference of logarithms is.
+
+    Parameters
+    ----------
+    difference, uncertainty : float
+        Difference to the reference and its standard error: of logarithms, or
+        of values in mean drags if `signed`.
+    degrees : int
+        Degrees of freedom behind the standard error.
+    signed : bool
+    """
+    shift = uncertainty * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, degrees)
+    one_sided = uncertainty * stats.t.ppf(CONFIDENCE, degrees)
 
     def relative(value: float) -> float:
         return value if signed else math.expm1(value)
