@@ -141,6 +141,6 @@ def show(tables: Iterable[Table]) -> None:
     """Print tables, wide enough for their text when nobody looks at a terminal."""
     console = Console()
     if not console.is_terminal:
-        console = Console(width=120)
+        console = Console(width=150)
     for table in tables:
         console.print(table)
