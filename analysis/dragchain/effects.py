@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,8 @@ from scipy.optimize import minimize_scalar
 from dragchain.errors import SeriesError
 
 Floats = NDArray[np.float64]
-K = TypeVar("K", bound=Hashable)
+Combination = tuple[tuple[str, Hashable], ...]
+"""Factors and their levels, those of the reference left out."""
 
 LARGEST_SHARE = 0.98
 """Largest share of the variance that a bed is allowed to explain."""
@@ -149,37 +149,40 @@ class Factors:
         The levels that have no column of their own.
     additive : bool
         A column for every level of every factor; else one for every combination.
+    apart : frozenset of combinations
+        Those that have a column of their own all the same, and take no part in others.
     """
 
     settings: Sequence[Mapping[str, Hashable]]
     reference: Mapping[str, Hashable]
     additive: bool
+    apart: frozenset[Combination] = frozenset()
 
     @cached_property
-    def columns(self) -> list[tuple[tuple[str, Hashable], ...]]:
+    def columns(self) -> list[Combination]:
         """What each column after the first stands for: one level, or one combination."""
-        found: dict[tuple[tuple[str, Hashable], ...], None] = {}
-        for setting in self.settings:
-            own = self._own(setting)
-            for column in [(pair,) for pair in own] if self.additive else [own]:
-                if column:
-                    found[column] = None
-        return list(found)
+        terms = (term for setting in self.settings for term in self._terms(setting))
+        return list(dict.fromkeys(terms))
 
-    def _own(self, setting: Mapping[str, Hashable]) -> tuple[tuple[str, Hashable], ...]:
+    def _terms(self, setting: Mapping[str, Hashable]) -> list[Combination]:
+        """The columns that are 1 for a setting, besides the first."""
+        own = self.combination(setting)
+        if self.additive and own not in self.apart:
+            return [(pair,) for pair in own]
+        return [own] * bool(own)
+
+    def combination(self, setting: Mapping[str, Hashable]) -> Combination:
+        """The levels of a setting that are not those of the reference."""
         return tuple((f, setting[f]) for f in self.reference if setting[f] != self.reference[f])
 
     def row(self, setting: Mapping[str, Hashable]) -> Floats:
         """Row of the design matrix for some settings, (1 + columns,)."""
-        own = self._own(setting)
-        terms = {(pair,) for pair in own} if self.additive else {own}
+        terms = self._terms(setting)
         return np.array([1.0, *(float(column in terms) for column in self.columns)])
 
     def tells(self, setting: Mapping[str, Hashable]) -> bool:
         """Whether the runs had what a row for these settings stands for."""
-        own = self._own(setting)
-        terms = [(pair,) for pair in own] if self.additive else [own] * bool(own)
-        return all(term in self.columns for term in terms)
+        return all(term in self.columns for term in self._terms(setting))
 
     def design(self) -> Floats:
         """The design matrix, (N, 1 + columns)."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from dragchain.effects import Factors, Fit, fit_effects, lack_of_fit
+from dragchain.effects import Combination, Factors, Fit, fit_effects, lack_of_fit
 from dragchain.errors import SeriesError, TableError
 from dragchain.measures import FILE, QUANTITIES, SCHEMA, Quantity
 from dragchain.stats import autocovariance
@@ -167,6 +167,8 @@ class Comparison:
         Probability of so much disagreement with additive effects by chance.
     additive : bool
         Whether effects were added up.
+    apart : list of Setting
+        Those that have effects of their own all the same.
     errors : dict of Setting to Error
     fit : Fit
     factors : Factors
@@ -180,6 +182,7 @@ class Comparison:
     bed_share: float
     additivity: float
     additive: bool
+    apart: list[Setting]
     errors: Mapping[Setting, Error]
     fit: Fit = field(repr=False)
     factors: Factors = field(repr=False)
@@ -393,6 +396,11 @@ def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting
         bed_share=fit.bed_share,
         additivity=additivity,
         additive=factors.additive,
+        apart=[
+            setting
+            for setting in dict.fromkeys(settings)
+            if factors.combination(setting.factors()) in factors.apart
+        ],
         errors={
             setting: _error(fit, factors, setting, reference, quantity.signed)
             for setting in dict.fromkeys(settings)
@@ -405,7 +413,13 @@ def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting
 def _choose(
     settings: Sequence[Setting], values: np.ndarray[Any, Any], beds: list[str], reference: Setting
 ) -> tuple[Factors, Fit, float]:
-    """Additive effects, or one for every combination where the runs contradict additivity."""
+    """Additive effects, as far as the runs do not contradict additivity.
+
+    While they do, the combination that contradicts it most gets an effect of
+    its own: a step that breaks with soft balls alone does not spoil what is
+    known of the others. If most of the combinations would need one, or the
+    runs cannot tell the knobs apart, every combination has its own.
+    """
     levels = [setting.factors() for setting in settings]
     full_factors = Factors(levels, reference.factors(), additive=False)
     factors = Factors(levels, reference.factors(), additive=True)
@@ -417,10 +431,27 @@ def _choose(
         additive = fit_effects(factors.design(), values, beds, full.bed_share)
     except SeriesError:
         return full_factors, full, math.nan
-    probability = lack_of_fit(additive, full)
-    if probability < ADDITIVE_LEVEL:
-        return full_factors, full, probability
-    return factors, fit_effects(factors.design(), values, beds), probability
+    first = probability = lack_of_fit(additive, full)
+    while probability < ADDITIVE_LEVEL:
+        factors = replace(factors, apart=factors.apart | {_misfit(factors, additive, levels)})
+        if 2 * len(factors.apart) > len(full_factors.columns):
+            return full_factors, full, first
+        try:
+            additive = fit_effects(factors.design(), values, beds, full.bed_share)
+        except SeriesError:
+            return full_factors, full, first
+        probability = lack_of_fit(additive, full)
+    return factors, fit_effects(factors.design(), values, beds), first
+
+
+def _misfit(factors: Factors, fit: Fit, levels: Sequence[Mapping[str, Hashable]]) -> Combination:
+    """The combination of levels that fits worst: the largest sum of residuals over its root."""
+    sums: dict[Combination, list[float]] = {}
+    for level, residual in zip(levels, fit.residuals, strict=True):
+        combination = factors.combination(level)
+        if len(combination) > 1 and combination not in factors.apart:
+            sums.setdefault(combination, []).append(float(residual))
+    return max(sums, key=lambda one: abs(sum(sums[one])) / math.sqrt(len(sums[one])))
 
 
 def _error(fit: Fit, factors: Factors, setting: Setting, reference: Setting, signed: bool) -> Error:

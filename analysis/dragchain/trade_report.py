@@ -836,11 +836,19 @@ def _statistic_rows(trade: Trade) -> list[dict[str, str]]:
                 "additivity": DASH
                 if math.isnan(comparison.additivity)
                 else number(comparison.additivity, 2),
-                "model": "added up" if comparison.additive else "separate",
+                "model": _model(comparison),
                 "degrees": str(comparison.fit.degrees),
             }
         )
     return rows
+
+
+def _model(comparison: Comparison) -> str:
+    if not comparison.additive:
+        return "separate"
+    if not comparison.apart:
+        return "added up"
+    return f"added up, without {'; '.join(map(str, comparison.apart))}"
 
 
 def _chance_note(trade: Trade) -> str:

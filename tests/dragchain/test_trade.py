@@ -162,16 +162,23 @@ def test_a_quantity_that_is_missing_or_changes_sign_is_skipped(tmp_path: Path) -
     assert recommend(trade, "chain_length", 1.0) is None
 
 
-def test_an_interaction_gives_every_combination_its_own_error(tmp_path: Path) -> None:
+def test_a_combination_that_breaks_additivity_gets_an_error_of_its_own(tmp_path: Path) -> None:
     found = contents()
     for content in found:
         fidelity = content["fidelity"]
         if (fidelity["youngs_modulus_scale"], fidelity["timestep_fraction"]) == BOTH[:2]:
             content["blocks"]["rod_contacts"] = [2 * n for n in content["blocks"]["rod_contacts"]]
     own = made(tmp_path, found).comparisons["rod_contacts"]
-    assert not own.additive and own.additivity < 0.05
+    assert own.additive and own.additivity < 0.05 and own.apart == [Setting(*BOTH)]
     assert own.errors[Setting(*BOTH)].error == pytest.approx(1.0, abs=2.0 * WITHIN)
     assert abs(own.errors[Setting(*SOFT)].error) < 0.1
+
+
+def test_knobs_that_were_never_turned_alone_are_not_told_apart(tmp_path: Path) -> None:
+    mixed = [one for one in contents() if _point(one) in (REFERENCE, BOTH)]
+    own = made(tmp_path, mixed).comparisons["drag_mean"]
+    assert not own.additive and math.isnan(own.additivity)
+    assert own.errors[Setting(*BOTH)].error == pytest.approx(0.1, abs=WITHIN)
 
 
 def test_softness_alone_and_mixed_with_a_step(tmp_path: Path) -> None:
