@@ -23,7 +23,8 @@ def setting(
     errors = {"drag_mean": None if bound is None else entry(bound / 2, bound)}
     return {
         "youngs_modulus_scale": scale, "timestep_fraction": share, "speed_factor": factor,
-        "seeds": 4, "runs": 4, "failed": 0, "arc_m": 0.4, "relative_cost": cost, "errors": errors,
+        "seeds": 4, "runs": 4, "failed": 0, "breaks": False, "arc_m": 0.4,
+        "relative_cost": cost, "errors": errors,
     } | more  # fmt: skip
 
 

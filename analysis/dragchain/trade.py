@@ -33,6 +33,9 @@ CONFIDENCE = 0.95
 ADDITIVE_LEVEL = 0.05
 """Effects are added up unless chance would disagree as much less often than this."""
 
+BROKEN = 0.1
+"""A step is broken if it changes the mean drag by more than this, beyond doubt."""
+
 TOLERANCES = (0.02, 0.05, 0.1, 0.2)
 
 SILENT = ("seed", "motion.path.revolutions", "motion.path.length_m")
@@ -491,12 +494,34 @@ def relative_error(
     )
 
 
+def breaks(trade: Trade, setting: Setting) -> bool:
+    """Whether a setting's time step is too long: it failed, or the drag is wrong because of it.
+
+    The mean drag differs from that at the best known shorter step, all else
+    alike, by more than `BROKEN`, and the difference is resolved.
+    """
+    if not all(run.complete for run in trade.of(setting)):
+        return True
+    comparison = trade.comparisons.get("drag_mean")
+    shorter = [
+        one
+        for one in trade.settings()
+        if one.timestep_fraction < setting.timestep_fraction
+        and replace(one, timestep_fraction=setting.timestep_fraction) == setting
+    ]
+    if comparison is None or not shorter:
+        return False
+    best = max(shorter, key=lambda one: len(trade.of(one)))
+    change = comparison.between(setting, best)
+    return change is not None and change.resolved and abs(change.error) > BROKEN
+
+
 def candidates(trade: Trade, quantities: Sequence[str]) -> list[Setting]:
     """The settings that could be recommended instead of the reference.
 
     They change nothing but the fidelity, are cheaper, have a step that is known
-    to be safe and more than one run of which every one was complete, and an
-    error in each of the quantities.
+    to be safe and does not break, more than one run, and an error in each of the
+    quantities.
     """
     comparisons = [trade.comparisons.get(name) for name in quantities]
     return [
@@ -507,7 +532,7 @@ def candidates(trade: Trade, quantities: Sequence[str]) -> list[Setting]:
         and trade.cost(setting) < 1.0
         and len(trade.of(setting)) > 1
         and setting.timestep_fraction <= trade.largest_step * (1 + 1e-9)
-        and all(run.complete for run in trade.of(setting))
+        and not breaks(trade, setting)
         and all(own is not None and setting in own.errors for own in comparisons)
     ]
 

@@ -33,6 +33,7 @@ from dragchain.trade import (
     Setting,
     Trade,
     along,
+    breaks,
     compare,
     error_table,
     read_runs,
@@ -262,6 +263,7 @@ def _setting_entry(trade: Trade, setting: Setting) -> dict[str, Any]:
         "runs": len(runs),
         "failed": len(runs) - len(complete),
         "arc_m": trade.arc_m * len(complete),
+        "breaks": breaks(trade, setting),
         "relative_cost": trade.cost(setting),
         "errors": {
             name: vars(own.errors[setting])

@@ -15,6 +15,7 @@ from dragchain.trade import (
     Setting,
     Trade,
     along,
+    breaks,
     compare,
     error_table,
     largest_bound,
@@ -179,6 +180,17 @@ def test_knobs_that_were_never_turned_alone_are_not_told_apart(tmp_path: Path) -
     own = made(tmp_path, mixed).comparisons["drag_mean"]
     assert not own.additive and math.isnan(own.additivity)
     assert own.errors[Setting(*BOTH)].error == pytest.approx(0.1, abs=WITHIN)
+
+
+def test_a_step_that_changes_the_drag_breaks(tmp_path: Path) -> None:
+    found = contents()
+    for content in found:
+        if _point(content) == COARSE:
+            content["blocks"]["drag_mean"] = [0.8 * n for n in content["blocks"]["drag_mean"]]
+    trade = made(tmp_path, found)
+    assert breaks(trade, Setting(*COARSE))
+    assert not breaks(trade, Setting(*SOFT)) and not breaks(trade, Setting(*REFERENCE))
+    assert recommend(trade, "rod_contacts", 0.5) != Setting(*COARSE)
 
 
 def test_softness_alone_and_mixed_with_a_step(tmp_path: Path) -> None:

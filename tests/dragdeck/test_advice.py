@@ -16,7 +16,7 @@ from made_trade import entry, made_trade, setting
 
 from dragdeck import advice as advice_module
 from dragdeck import stability
-from dragdeck.advice import advise, measured_trade, resolve
+from dragdeck.advice import advise, breaking_note, measured_trade, resolve
 from dragdeck.cases import SCENES, Case, load_cases
 from dragdeck.cli import main
 from dragdeck.errors import InputError
@@ -424,3 +424,41 @@ def test_a_wrong_question_is_explained(
     monkeypatch.chdir(project.root)
     assert main(["advise", "small", "--quick", *words]) == 1
     assert "command line: " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("scale", "share", "words"),
+    [
+        (1e-3, 0.6, "60 % is below 80 %"),
+        (1e-3, 0.8, "80 % is NOT BELOW 80 %"),
+        (3e-3, 0.9, "90 % is NOT BELOW 80 %"),  # the next softer level counts
+        (1e-2, 0.9, "90 % is below 150 %"),
+    ],
+)
+def test_the_step_at_which_soft_balls_broke_is_told(
+    case: Case, trade: Trade, scale: float, share: float, words: str
+) -> None:
+    broken = [
+        setting(1e-3, 0.8, 1.0, 0.01, 0.3, breaks=True),
+        setting(1e-3, 1.0, 1.0, 0.01, 0.5, breaks=True),
+        setting(1e-3, 0.4, 5.0, 0.01, 0.5, breaks=True),
+        setting(1e-2, 1.5, 1.0, 0.01, 0.2, breaks=True),
+    ]
+    fidelity = Fidelity(youngs_modulus_scale=scale, timestep_fraction=share)
+    own = replace(case, study=case.study.model_copy(update={"fidelity": fidelity}))
+    ((what, text),) = breaking_note(own, {**trade, "settings": [*trade["settings"], *broken]})
+    assert what == "breaking step" and words in text
+
+
+def test_nothing_is_told_of_balls_softer_than_measured(case: Case, trade: Trade) -> None:
+    fidelity = Fidelity(youngs_modulus_scale=1e-4)
+    own = replace(case, study=case.study.model_copy(update={"fidelity": fidelity}))
+    assert breaking_note(own, trade) == []
+
+
+def test_a_broken_step_is_no_candidate(case: Case, trade: Trade) -> None:
+    cheap = setting(1e-3, 0.6, 1.0, 0.001, 0.001)
+    with_it = {**trade, "settings": [*trade["settings"], cheap]}
+    without = {**trade, "settings": [*trade["settings"], {**cheap, "breaks": True}]}
+    assert advise(case, asked(0.05), with_it).chosen.relative_cost == pytest.approx(0.001)
+    assert advise(case, asked(0.05), without).chosen.relative_cost > 0.001

@@ -335,7 +335,7 @@ def _check_quantity(case: Case, asked: Tolerance, trade: Trade) -> None:
 def process_options(case: Case, trade: Trade, asked: Tolerance) -> Iterator[Option]:
     """Every measured setting that may be used, carried to the case's scene.
 
-    Left out are settings that failed in any run, that too few runs stand
+    Left out are settings whose step breaks, that too few runs stand
     behind, whose error was not measured, whose step is beyond the stability
     limit of the measured scene, or that cost as much as the reference.
     """
@@ -343,12 +343,40 @@ def process_options(case: Case, trade: Trade, asked: Tolerance) -> Iterator[Opti
     limit = largest_share("process", there["lowest_restitution"])
     for row in trade["settings"]:
         entry = row["errors"].get(asked.quantity)
-        stable = row["failed"] == 0 and row["timestep_fraction"] <= limit * (1 + 1e-9)
+        sound = row["failed"] == 0 and not row["breaks"]
+        stable = sound and row["timestep_fraction"] <= limit * (1 + 1e-9)
         if entry is None or not stable or row["runs"] < FEWEST_RUNS:
             continue
         option = _carried(case.study, row, entry, here, there)
         if option.relative_cost < 1 and not _is_reference(option, trade):
             yield option
+
+
+def breaking_note(case: Case, trade: Trade | None = None) -> list[tuple[str, str]]:
+    """What ``check`` and ``explain`` say of the step at which soft balls were seen to break.
+
+    Soft balls break at shorter steps, as shares of the Rayleigh time: the next
+    softer level that was measured counts. Nothing is said where nothing was
+    measured.
+    """
+    try:
+        trade = measured_trade() if trade is None else trade
+    except InputError:
+        return []
+    chosen = case.study.chosen_fidelity()
+    limit = chosen.youngs_modulus_scale * (1 + 1e-9)
+    broken = [row for row in trade["settings"] if row["breaks"] and row["speed_factor"] == 1]
+    softer = [row for row in broken if row["youngs_modulus_scale"] <= limit]
+    if not softer:
+        return []
+    level = max(row["youngs_modulus_scale"] for row in softer)
+    share = min(r["timestep_fraction"] for r in softer if r["youngs_modulus_scale"] == level)
+    verdict = "below" if chosen.timestep_fraction < share else "NOT BELOW"
+    text = (
+        f"{100 * chosen.timestep_fraction:.3g} % is {verdict} {100 * share:.3g} %, where the drag "
+        f"was wrong or a run failed with E x {level:g} ({trade['study']}, {trade['measured']})"
+    )
+    return [("breaking step", text)]
 
 
 def _carried(

@@ -112,6 +112,7 @@ def scene_of(case: Case, scene: SceneName, bed: Bed | None = None) -> Scene:
 
 
 def _check(options: argparse.Namespace) -> None:
+    from dragdeck.advice import breaking_note
     from dragdeck.engine import find_engine
     from dragdeck.render import deck_text, environment
     from dragdeck.stability import notes
@@ -125,7 +126,8 @@ def _check(options: argparse.Namespace) -> None:
             scene = scene_of(case, name)
             deck_text(scene, templates)
             print(f"{name} {run_id}: time step {scene.deck.timestep_s:.3g} s")
-            for what, text in notes(case, name, scene):
+            own = breaking_note(case) if name == "process" else []
+            for what, text in [*notes(case, name, scene), *own]:
                 print(f"  {what}: {text}")
             warnings.update(dict.fromkeys(f"{case.name}: {text}" for text in scene.warnings))
     for warning in warnings:
@@ -134,6 +136,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _explain(options: argparse.Namespace) -> None:
+    from dragdeck.advice import breaking_note
     from dragdeck.explain import expected_cost, explanation, show
     from dragdeck.stability import notes
 
@@ -144,7 +147,11 @@ def _explain(options: argparse.Namespace) -> None:
     results = project.root / "results" / options.study
     scenes = ((case, name, scene_of(case, name)) for case, name in runs)
     show(
-        explanation(scene, expected_cost(scene, results / name), notes(case, name, scene))
+        explanation(
+            scene,
+            expected_cost(scene, results / name),
+            [*notes(case, name, scene), *(breaking_note(case) if name == "process" else [])],
+        )
         for case, name, scene in scenes
     )
 
