@@ -208,7 +208,8 @@ def _processor() -> str:
 def summarise(found: Findings) -> dict[str, Any]:
     """The content of ``trade.json``, which the advisor reads; a null is a number there is none of.
 
-    An ``arc_m`` of a setting is the compared path of all its complete runs together.
+    An ``arc_m`` of a setting is the compared path of all its complete runs together;
+    a ``restitution_error`` is that of the worst impact.
     """
     trade = found.trade
     content = {
@@ -222,7 +223,7 @@ def summarise(found: Findings) -> dict[str, Any]:
         "drop": [
             {
                 "timestep_fraction": drop.timestep_fraction,
-                "restitution_error": drop.error,
+                "restitution_error": drop.bound,
                 "relative_cost": drop.relative_cost,
             }
             for drop in found.drops
