@@ -18,7 +18,7 @@ from dragdeck.cases import Case
 from dragdeck.errors import InputError
 from dragdeck.motion import path_length
 from dragdeck.scenes.numbers import describe
-from dragdeck.similarity import carried_scale, carried_speed, softest_scale
+from dragdeck.similarity import SAME_NUMBER, carried_scale, carried_speed, softest_scale
 from dragdeck.stability import largest_share
 from dragdeck.study import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance
 
@@ -474,11 +474,11 @@ def _outside_numbers(here: Mapping[str, float], trade: Trade) -> Iterator[Outsid
     stiff, inertia = there["stiffness_number"], there["inertial_number"]
     softest = min(scales, default=1.0) ** (2 / 3) * stiff
     fastest = max(factors, default=1.0) * inertia
-    if here["stiffness_number"] < softest:
+    if here["stiffness_number"] < softest * (1 - SAME_NUMBER):
         yield Outside(
             "stiffness number at full modulus", here["stiffness_number"], softest, math.inf
         )
-    if here["inertial_number"] > fastest:
+    if here["inertial_number"] > fastest * (1 + SAME_NUMBER):
         yield Outside("inertial number at the study's speed", here["inertial_number"], 0.0, fastest)
 
 
