@@ -12,7 +12,7 @@ def entry(error: float, bound: float) -> dict[str, Any]:
     """A measured error whose interval is half as wide as its bound to either side."""
     return {
         "error": error, "standard_error": bound / 4, "low": error - bound / 2,
-        "high": error + bound / 2, "bound": bound, "resolved": False,
+        "high": error + bound / 2, "bound": bound, "alone": abs(error), "resolved": False,
     }  # fmt: skip
 
 

@@ -25,6 +25,8 @@ from dragchain.errors import SeriesError, TableError
 from dragchain.measures import FILE, QUANTITIES, SCHEMA, Quantity
 from dragchain.stats import autocovariance
 
+Levels = Mapping[str, Hashable]
+
 KNOBS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
 OTHER = "other"
 """The factor that holds all else a point changes."""
@@ -190,11 +192,26 @@ class Comparison:
     fit: Fit = field(repr=False)
     factors: Factors = field(repr=False)
 
+    def alone(self, setting: Setting, reference: Setting) -> float:
+        """The largest error that one of a setting's knobs makes when it is turned alone.
+
+        A setting may be right because the errors of two knobs cancel. That need
+        not hold in another scene. 0 where the runs do not tell.
+        """
+        own, levels = setting.factors(), reference.factors()
+        errors = [
+            _error(self.fit, self.factors, one, levels, self.quantity.signed)
+            for one in ({**levels, name: own[name]} for name in levels)
+            if self.factors.tells(one)
+        ]
+        return max(abs(error.error) for error in errors)
+
     def between(self, setting: Setting, base: Setting) -> Error | None:
         """Difference of one setting to another; None if the runs cannot tell it."""
         if not all(self.factors.tells(one.factors()) for one in (setting, base)):
             return None
-        return _error(self.fit, self.factors, setting, base, self.quantity.signed)
+        signed = self.quantity.signed
+        return _error(self.fit, self.factors, setting.factors(), base.factors(), signed)
 
 
 @dataclass(frozen=True)
@@ -405,7 +422,7 @@ def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting
             if factors.combination(setting.factors()) in factors.apart
         ],
         errors={
-            setting: _error(fit, factors, setting, reference, quantity.signed)
+            setting: _error(fit, factors, setting.factors(), reference.factors(), quantity.signed)
             for setting in dict.fromkeys(settings)
         },
         fit=fit,
@@ -457,8 +474,8 @@ def _misfit(factors: Factors, fit: Fit, levels: Sequence[Mapping[str, Hashable]]
     return max(sums, key=lambda one: abs(sum(sums[one])) / math.sqrt(len(sums[one])))
 
 
-def _error(fit: Fit, factors: Factors, setting: Setting, reference: Setting, signed: bool) -> Error:
-    weights = factors.row(setting.factors()) - factors.row(reference.factors())
+def _error(fit: Fit, factors: Factors, setting: Levels, reference: Levels, signed: bool) -> Error:
+    weights = factors.row(setting) - factors.row(reference)
     return relative_error(*fit.contrast(weights), fit.degrees, signed)
 
 
@@ -538,8 +555,11 @@ def candidates(trade: Trade, quantities: Sequence[str]) -> list[Setting]:
 
 
 def largest_bound(trade: Trade, quantities: Sequence[str], setting: Setting) -> float:
-    """The largest bound of a setting's errors in some quantities."""
-    return max(trade.comparisons[name].errors[setting].bound for name in quantities)
+    """The largest bound of a setting's errors in some quantities, or error of one of its knobs."""
+    comparisons = [trade.comparisons[name] for name in quantities]
+    return max(
+        max(own.errors[setting].bound, own.alone(setting, trade.reference)) for own in comparisons
+    )
 
 
 def recommend(trade: Trade, quantity: str | Sequence[str], tolerance: float) -> Setting | None:

@@ -267,7 +267,10 @@ def _setting_entry(trade: Trade, setting: Setting) -> dict[str, Any]:
         "breaks": breaks(trade, setting),
         "relative_cost": trade.cost(setting),
         "errors": {
-            name: vars(own.errors[setting])
+            name: {
+                **vars(own.errors[setting]),
+                "alone": own.alone(setting, trade.reference),
+            }
             for name, own in trade.comparisons.items()
             if setting in own.errors
         },

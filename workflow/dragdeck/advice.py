@@ -65,6 +65,8 @@ class Error:
         95 % interval.
     bound : float
         The absolute error is below it with 95 % confidence.
+    alone : float
+        The largest absolute error of one of the knobs, turned alone.
     """
 
     error: float
@@ -72,6 +74,12 @@ class Error:
     low: float
     high: float
     bound: float
+    alone: float
+
+    @property
+    def limit(self) -> float:
+        """What a tolerance is compared with: knobs must not hold it by cancelling each other."""
+        return max(self.bound, self.alone)
 
     def __str__(self) -> str:
         return f"{signed(self.error)} ({signed(self.low)} to {signed(self.high)})"
@@ -299,7 +307,7 @@ def advise(case: Case, asked: Tolerance, trade: Trade | None = None) -> Advice:
     reference = finest_drop(case, trade) if drop else process_reference(case, trade)
     outside = list(outside_of(here, trade, ("lowest_restitution",) if drop else None))
     held_to = asked.tolerance * (OUTSIDE_FACTOR if outside else 1.0)
-    holding = [option for option in options if option.error and option.error.bound <= held_to]
+    holding = [option for option in options if option.error and option.error.limit <= held_to]
     chosen = min(holding, key=_cost_then_bound, default=reference)
     cheaper, dearer = _neighbours(options, chosen, reference)
     return Advice(
@@ -441,7 +449,7 @@ def _drop_limit(case: Case) -> float:
 def _drop_option(case: Case, row: Mapping[str, float], share: float) -> Option:
     """A step of the drop test. The error has no chance in it: it is its own bound."""
     error = float(row["restitution_error"])
-    known = Error(error, 0.0, error, error, abs(error))
+    known = Error(error, 0.0, error, error, abs(error), 0.0)
     process = {**BUILT_IN_FIDELITIES, **case.study.fidelities}[PROCESS_OF_DROP]
     return Option(process, known, row["relative_cost"], share)
 
@@ -483,7 +491,7 @@ def _outside_numbers(here: Mapping[str, float], trade: Trade) -> Iterator[Outsid
 
 
 def _cost_then_bound(option: Option) -> tuple[float, float]:
-    return option.relative_cost, option.error.bound if option.error else 0.0
+    return option.relative_cost, option.error.limit if option.error else 0.0
 
 
 def _neighbours(
@@ -494,13 +502,13 @@ def _neighbours(
     cheaper = max(below, key=_cost_then_bound, default=None)
     if chosen.error is None or chosen == reference:
         return cheaper, None
-    bound = chosen.error.bound
+    limit = chosen.error.limit
     above = [
         option
         for option in options
         if option.relative_cost > chosen.relative_cost
         and option.error is not None
-        and option.error.bound < bound
+        and option.error.limit < limit
     ]
     return cheaper, min(above, key=_cost_then_bound, default=reference)
 
@@ -509,7 +517,7 @@ def _fallback(
     asked: Tolerance, held_to: float, options: Sequence[Option], reference: Option, trade: Trade
 ) -> str:
     """Why the reference: nothing cheaper holds the tolerance; and what is known of it."""
-    best = min((option.error.bound for option in options if option.error), default=None)
+    best = min((option.error.limit for option in options if option.error), default=None)
     smallest = "" if best is None else f"; the smallest bound is {percent(best)}"
     text = (
         f"no measured setting is known to err by less than {percent(held_to)}{smallest}: "

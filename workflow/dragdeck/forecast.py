@@ -240,7 +240,7 @@ def remarks(advice: Advice, study: Study) -> list[tuple[str, str]]:
         found.append(("fallback", advice.fallback))
     cheaper = advice.cheaper
     if cheaper is not None and cheaper.error is not None:
-        bound = cheaper.error.bound
+        bound = cheaper.error.limit
         text = f"may err by up to {percent(bound)}, {percent(bound - advice.held_to)} too much"
         found.append(("cheaper", f"{cheaper}: {text}"))
     if advice.spread is not None:
