@@ -7,7 +7,6 @@ lies within the tolerance, broken if it lies outside, and open otherwise.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -47,6 +46,9 @@ class Check:
         Its dimensionless numbers.
     quantity : str
     tolerance : float
+    held_to : float
+        The error that the settings were chosen for: less than the tolerance
+        where the scene is unlike those that were measured.
     setting : Setting
         What the advisor chose.
     runs, reference_runs : int
@@ -58,11 +60,17 @@ class Check:
     numbers: Mapping[str, float]
     quantity: str
     tolerance: float
+    held_to: float
     setting: Setting
     runs: int
     reference_runs: int
     error: Error
     verdict: Verdict
+
+    @property
+    def met(self) -> bool:
+        """Whether the error is within what the settings were chosen for, not only the tolerance."""
+        return verdict(self.error, self.held_to) == "kept"
 
 
 def verdict(error: Error, tolerance: float) -> Verdict:
@@ -100,8 +108,10 @@ class _Pair:
 def check_promises(files: Sequence[Path]) -> list[Check]:
     """Compare every promise among the runs of a plan with the full stiffness of its scene.
 
-    The scatter of runs is taken to be the same, relatively, in all scenes and
-    settings: it is pooled over them, because few runs are made of each.
+    A scene whose runs at full stiffness all failed has nothing to compare with;
+    `failures` lists them. The scatter of runs is taken to be the same, relatively,
+    in all scenes and settings: it is pooled over them, because few runs are made
+    of each.
 
     Parameters
     ----------
@@ -112,8 +122,8 @@ def check_promises(files: Sequence[Path]) -> list[Check]:
     Raises
     ------
     TableError
-        If a scene has no complete run at full stiffness, a quantity may change
-        its sign, or there are too few runs for an interval.
+        If a scene was not run at full stiffness, a quantity may change its sign,
+        or there are too few runs for an interval.
     """
     pairs = list(_pairs([read_measures(file) for file in files]))
     groups = [group for pair in pairs for group in pair.logarithms()]
@@ -125,24 +135,54 @@ def check_promises(files: Sequence[Path]) -> list[Check]:
 
 
 def _pairs(runs: Sequence[Mapping[str, Any]]) -> Iterator[_Pair]:
-    scenes: dict[Scene, list[Mapping[str, Any]]] = {}
-    for run in runs:
-        if run["complete"]:
-            scenes.setdefault(_scene(run), []).append(run)
-    common = set.intersection(*map(set, scenes)) if scenes else set()
-    for key, own in scenes.items():
-        scene = dict(item for item in key if item not in common)
+    for scene, everyone in _by_scene(runs):
+        own = [run for run in everyone if run["complete"]]
         references = [run for run in own if not run.get("asked")]
+        if not any(not run.get("asked") for run in everyone):
+            raise TableError(f"scene {scene}: no run at full stiffness to compare with")
         if not references:
-            raise TableError(f"scene {scene}: no complete run at full stiffness to compare with")
-        asked = {json.dumps(run["asked"]): run["asked"] for run in own if run.get("asked")}
-        for wanted in asked.values():
-            pair = _Pair(
-                scene, wanted, [run for run in own if run.get("asked") == wanted], references
-            )
+            continue
+        promised: dict[tuple[str, float], list[Mapping[str, Any]]] = {}
+        for run in own:
+            if run.get("asked"):
+                promised.setdefault(_promise(run), []).append(run)
+        for kept in promised.values():
+            pair = _Pair(scene, kept[0]["asked"], kept, references)
             if pair.quantity.signed:
                 raise TableError(f"{pair.quantity.name} may change its sign: it has no promise")
             yield pair
+
+
+def _promise(run: Mapping[str, Any]) -> tuple[str, float]:
+    return str(run["asked"]["quantity"]), float(run["asked"]["tolerance"])
+
+
+def _by_scene(
+    runs: Sequence[Mapping[str, Any]],
+) -> Iterator[tuple[dict[str, str], list[Mapping[str, Any]]]]:
+    """The inputs that tell a scene from the others, and its runs, failed ones included."""
+    scenes: dict[Scene, list[Mapping[str, Any]]] = {}
+    for run in runs:
+        scenes.setdefault(_scene(run), []).append(run)
+    common = set.intersection(*map(set, scenes)) if len(scenes) > 1 else set()
+    for key, own in scenes.items():
+        yield dict(item for item in key if item not in common), own
+
+
+def failures(files: Sequence[Path]) -> list[dict[str, Any]]:
+    """The runs that failed: scene, settings and the first gate that did not hold."""
+    return [
+        {
+            "scene": scene,
+            "asked": bool(run.get("asked")),
+            **{name: run["fidelity"][name] for name in KNOBS},
+            "gate": run["failure"][0]["name"],
+            "seen": run["failure"][0]["seen"],
+        }
+        for scene, runs in _by_scene([read_measures(file) for file in files])
+        for run in runs
+        if not run["complete"]
+    ]
 
 
 def _scene(measures: Mapping[str, Any]) -> Scene:
@@ -161,6 +201,7 @@ def _check(pair: _Pair, scatter: float, degrees: int) -> Check:
         numbers=pair.own[0]["numbers"],
         quantity=pair.quantity.name,
         tolerance=float(pair.asked["tolerance"]),
+        held_to=float(pair.asked.get("held_to", pair.asked["tolerance"])),
         setting=Setting(modulus, step, speed),
         runs=len(own),
         reference_runs=len(references),
@@ -179,14 +220,17 @@ def write_checks(out_dir: Path, files: Sequence[Path]) -> list[Check]:
             "numbers": dict(check.numbers),
             "quantity": check.quantity,
             "tolerance": check.tolerance,
+            "held_to": check.held_to,
             **{name: getattr(check.setting, name) for name in KNOBS},
             "runs": check.runs,
             "reference_runs": check.reference_runs,
             **vars(check.error),
             "verdict": check.verdict,
+            "met": check.met,
         }
         for check in checks
     ]
-    write_json(out_dir / "checks.json", {"schema": 1, "checks": rows})
+    content = {"schema": 1, "checks": rows, "failed": failures(files)}
+    write_json(out_dir / "checks.json", content)
     pd.DataFrame(rows).drop(columns="numbers").to_csv(out_dir / "checks.csv", index=False)
     return checks

@@ -168,8 +168,10 @@ def _read_checks(file: Path | None) -> list[dict[str, Any]]:
     return found
 
 
-def _scene_words(inputs: Mapping[str, str]) -> str:
-    return ", ".join(f"{name} {value}" for name, value in inputs.items()) or "other beds"
+def _check_row(check: Mapping[str, Any]) -> dict[str, Any]:
+    scene = ", ".join(f"{name} {value}" for name, value in check["scene"].items())
+    modulus, step, speed = (float(check[name]) for name in KNOBS)
+    return {**check, "scene": scene or "other beds", "setting": Setting(modulus, step, speed)}
 
 
 # --- trade.json ----------------------------------------------------------------------------------
@@ -231,8 +233,7 @@ def summarise(found: Findings) -> dict[str, Any]:
         ],
         "costs": found.costs.entries,
         "checks": [
-            {**check, "scene": check["numbers"], "met": check["verdict"] == "kept"}
-            for check in found.checks
+            {**check, "scene": check["numbers"], "met": check["met"]} for check in found.checks
         ],
     }
     return {name: _finite(value) for name, value in content.items()}
@@ -423,7 +424,7 @@ def render(found: Findings, pictures: Mapping[str, bytes]) -> str:
         failures=_failure_rows(trade),
         drops=found.drops,
         costs=found.costs.entries,
-        checks=[{**check, "scene": _scene_words(check["scene"])} for check in found.checks],
+        checks=[_check_row(check) for check in found.checks],
         statistics=_statistic_rows(trade),
         points=_point_rows(trade),
         chance=_chance_note(trade),

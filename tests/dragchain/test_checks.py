@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from trade_files import measures, write
 
-from dragchain.checks import check_promises, verdict, write_checks
+from dragchain.checks import check_promises, failures, verdict, write_checks
 from dragchain.errors import TableError
 from dragchain.trade import Error
 
@@ -40,6 +40,14 @@ def test_promises_are_kept_and_broken_by_their_errors(tmp_path: Path) -> None:
     assert (kept.runs, kept.reference_runs) == (6, 6)
 
 
+def test_a_promise_kept_by_the_skin_of_its_teeth_is_not_met(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    asked = {**ASKED, "tolerance": 0.2, "held_to": 0.1}
+    runs = [{**run, "asked": run["asked"] and asked} for run in scene(0.05, 1.12, rng)]
+    (check,) = check_promises(write(tmp_path, runs))
+    assert check.verdict == "kept" and not check.met
+
+
 def test_few_runs_leave_a_promise_open(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     files = write(tmp_path, scene(0.05, 1.08, rng, runs=2))
@@ -63,12 +71,14 @@ def test_a_failed_run_does_not_count(tmp_path: Path) -> None:
     files = write(tmp_path, [*scene(0.05, 1.0, rng), {**failed, "inputs": inputs, "asked": ASKED}])
     (check,) = check_promises(files)
     assert check.runs == 6
+    (lost,) = failures(files)
+    assert lost["asked"] and lost["seen"] == "1 ball"
 
 
 def test_without_full_stiffness_there_is_nothing_to_compare_with(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     files = write(tmp_path, [run for run in scene(0.05, 1.0, rng) if run["asked"]])
-    with pytest.raises(TableError, match="no complete run at full stiffness"):
+    with pytest.raises(TableError, match="no run at full stiffness"):
         check_promises(files)
 
 
