@@ -815,18 +815,27 @@ def _reach_sentence(reach: Reach, tolerance: float) -> str:
 # --- failures, statistics, points
 
 
+TELLING_GATES = ("within its limits", "no engine error")
+"""Gates that say more than others why a run failed, the most telling first."""
+
+
+def _telling(failed: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """The one failed gate that says most."""
+    by_name = {gate["name"]: gate for gate in failed}
+    return next((by_name[name] for name in TELLING_GATES if name in by_name), failed[0])
+
+
 def _failure_rows(trade: Trade) -> list[dict[str, str]]:
+    """A row a failed run."""
+    failed = [run for run in trade.runs if not run.complete]
+    gates = [_telling(run.measures["failure"]) for run in failed]
     return [
         {
             "setting": str(run.setting),
             "seed": str(run.measures["inputs"]["seed"]),
-            "gate": gate["name"],
-            "seen": str(gate["seen"]),
-            "limit": str(gate["limit"]),
+            **{name: str(gate[name]) for name in ("name", "seen", "limit")},
         }
-        for run in trade.runs
-        if not run.complete
-        for gate in run.measures.get("failure", [])
+        for run, gate in zip(failed, gates, strict=True)
     ]
 
 
