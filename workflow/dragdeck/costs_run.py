@@ -386,7 +386,7 @@ def _time_once(engine: Engine, folder: Path, deck: str, ranks: int) -> Timing:
 
 
 def _known_rows(file: Path, inputs: Mapping[str, str], report: Report) -> list[Row]:
-    """Rows of earlier sessions; those of other decks are moved to ``archive/``."""
+    """Rows that were timed before; those of other decks are moved to ``archive/``."""
     if not file.is_file():
         return []
     rows: list[Row] = json.loads(file.read_text(encoding="utf-8"))["rows"]
