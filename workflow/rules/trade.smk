@@ -134,7 +134,8 @@ rule write_checks:
     input:
         lambda wildcards: every_point("measures.json"),
     output:
-        multiext(of_trade("checks"), ".json", ".csv"),
+        checks=of_trade("checks.json"),
+        table=of_trade("checks.csv"),
     log:
         of_trade("logs/checks.log"),
     benchmark:
@@ -144,4 +145,4 @@ rule write_checks:
     params:
         source=source_hash("dragchain.checks"),
     shell:
-        "dragchain checks --out $(dirname {output[0]}) {input} 2>&1 | tee -i {log}"
+        "dragchain checks --out $(dirname {output.checks}) {input} 2>&1 | tee -i {log}"
