@@ -11,6 +11,7 @@ import pytest
 
 from dragdeck.cases import Case
 from dragdeck.errors import EngineError
+from dragdeck.forecast import step_cost
 from dragdeck.project import Project
 from dragdeck.render import environment
 from dragdeck.scenes import fill_scene, process_scene
@@ -74,3 +75,12 @@ def test_the_speed_is_that_of_the_engine(case: Case, project: Project, tmp_path:
     # the drag is the slowest leg: the tool is in contact all the way
     assert 0 < found.drag_steps_per_s < 3 * record["steps_per_s"]
     assert math.isfinite(found.fill_steps_per_s) and found.fill_steps_per_s > 0
+
+
+def test_steps_of_softer_balls_cost_what_was_timed() -> None:
+    costs = [{"name": "modulus_1", "per_step": 0.8}, {"name": "modulus_0.0001", "per_step": 1.6}]
+    trade = {"costs": [*costs, {"name": "plain", "per_step": 9.0}]}
+    assert step_cost(1.0, trade) == pytest.approx(0.8)
+    assert step_cost(1e-6, trade) == pytest.approx(1.6)
+    assert step_cost(0.01, trade) == pytest.approx((0.8 * 1.6) ** 0.5)
+    assert step_cost(0.01, {"costs": []}) == 1.0

@@ -9,14 +9,23 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.table import Table
 
 from dragdeck import __version__
-from dragdeck.advice import Advice, Option, Spread, percent, process_options, with_option
+from dragdeck.advice import (
+    Advice,
+    Option,
+    Spread,
+    measured_trade,
+    percent,
+    process_options,
+    with_option,
+)
 from dragdeck.cases import Case
 from dragdeck.explain import Cost, expected_cost
 from dragdeck.scenes import Scene, drop_scene, fill_scene, process_scene
-from dragdeck.speed import Speed
+from dragdeck.speed import SCALE, Speed
 from dragdeck.study import CirclePath, Study, Tolerance
 
 DEFAULT_TOLERANCE = Tolerance(tolerance=0.05)
@@ -149,9 +158,38 @@ def _cost(scene: Scene, speed: Speed | None, results: Path) -> Cost:
     if speed is None or name == "drop":
         return expected_cost(scene, results / name)
     here = speed.of(scene.case["media"]["count"])
-    rate = here.fill_steps_per_s if name == "fill" else here.drag_steps_per_s
+    rate = here.fill_steps_per_s
+    if name == "process":
+        modulus = scene.case["fidelity"]["youngs_modulus_scale"]
+        rate = here.drag_steps_per_s * step_cost(SCALE) / step_cost(modulus)
     ranks = f"{speed.ranks} rank{'s' if speed.ranks > 1 else ''}"
     return Cost(scene.steps, scene.steps / rate, f"a short run of this study, {ranks}")
+
+
+def step_cost(scale: float, trade: Mapping[str, Any] | None = None) -> float:
+    """Time of a step of the drag at a modulus scale, over that at the others that were timed.
+
+    Soft balls have more contacts, and their steps cost more. Interpolated over
+    logarithms; 1 where nothing was timed.
+
+    Parameters
+    ----------
+    scale : float
+        Factor on every Young's modulus.
+    trade : mapping, optional
+        Instead of `measured_trade`.
+    """
+    costs = (measured_trade() if trade is None else trade)["costs"]
+    timed = {
+        float(cost["name"].removeprefix("modulus_")): float(cost["per_step"])
+        for cost in costs
+        if cost["name"].startswith("modulus_")
+    }
+    if not timed:
+        return 1.0
+    levels = sorted(timed)
+    logs = [math.log(timed[level]) for level in levels]
+    return math.exp(np.interp(math.log(scale), np.log(levels), logs))
 
 
 def advice_json(
