@@ -153,14 +153,13 @@ def measure(run_dir: Path, case: Case, bed: Mapping[str, float]) -> dict[str, An
     """
     force = read_counted(run_dir)
     path = _Path.of(case, force["step"].to_numpy(np.int64))
+    pushing = _pushing_contacts(run_dir)
     found: dict[str, Floats] = {
         **_of_force(force, path),
-        **_of_rod_contacts(run_dir, case, path),
-        **_of_network(run_dir, case, path),
+        **_of_rod_contacts(pushing, _frames(run_dir, path), path),
+        **_of_network(run_dir, path),
     }
-    contacts = read_table(run_dir / "tables" / "rod_contacts.parquet", _CONTACT_COLUMNS)
-    loud = contacts["counted"] & (contacts["normal_force_n"] > 0.0)
-    counts, _ = np.histogram(contacts.loc[loud, "normal_force_n"], FORCE_BINS)
+    counts, _ = np.histogram(pushing["normal_force_n"], FORCE_BINS)
     return {
         "arc_m": path.length_m,
         "block_m": path.length_m / path.blocks,
@@ -285,13 +284,15 @@ def band(series: Floats, spacing_m: float, shortest_m: float, longest_m: float) 
 _CONTACT_COLUMNS = ["step", "normal_force_n", "overlap_m", "counted"]
 
 
-def _of_rod_contacts(run_dir: Path, case: Case, path: _Path) -> dict[str, Floats]:
-    """Contacts that push; a silent one overlaps without a force and does not count."""
+def _pushing_contacts(run_dir: Path) -> pd.DataFrame:
+    """Contacts that push the tool; a silent one overlaps without a force and does not count."""
     table = read_table(run_dir / "tables" / "rod_contacts.parquet", _CONTACT_COLUMNS)
-    table = table[table["counted"] & (table["normal_force_n"] > 0.0)]
+    return table[table["counted"] & (table["normal_force_n"] > 0.0)]
+
+
+def _of_rod_contacts(table: pd.DataFrame, frames: Ints, path: _Path) -> dict[str, Floats]:
     steps = table["step"].to_numpy(np.int64)
     normal = table["normal_force_n"].to_numpy(np.float64)
-    frames = _frames(run_dir, path)
     number = path.block(frames)
     counts = np.bincount(path.block(steps), minlength=path.blocks)
     return {
@@ -317,7 +318,7 @@ def _percentile(share: float) -> Callable[[Floats], float]:
     return lambda values: float(np.percentile(values, share))
 
 
-def _of_network(run_dir: Path, case: Case, path: _Path) -> dict[str, Floats]:
+def _of_network(run_dir: Path, path: _Path) -> dict[str, Floats]:
     tables = run_dir / "tables"
     network = read_table(tables / "network.parquet")
     steps = network["step"].to_numpy(np.int64)

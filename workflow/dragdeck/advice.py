@@ -247,6 +247,14 @@ def measured_trade() -> dict[str, Any]:
     return found
 
 
+def trade_if_measured() -> Trade:
+    """`measured_trade`, or nothing where it cannot be read: for what is only told, not chosen."""
+    try:
+        return measured_trade()
+    except InputError:
+        return {}
+
+
 def resolve(case: Case, asked: Tolerance, trade: Trade | None = None) -> Case:
     """The case with the settings that a tolerance asks for; it remembers the question.
 
@@ -367,13 +375,12 @@ def breaking_note(case: Case, trade: Trade | None = None) -> list[tuple[str, str
     softer level that was measured counts. Nothing is said where nothing was
     measured.
     """
-    try:
-        trade = measured_trade() if trade is None else trade
-    except InputError:
-        return []
+    trade = trade_if_measured() if trade is None else trade
     chosen = case.study.chosen_fidelity()
     limit = chosen.youngs_modulus_scale * (1 + 1e-9)
-    broken = [row for row in trade["settings"] if row["breaks"] and row["speed_factor"] == 1]
+    broken = [
+        row for row in trade.get("settings", ()) if row["breaks"] and row["speed_factor"] == 1
+    ]
     softer = [row for row in broken if row["youngs_modulus_scale"] <= limit]
     if not softer:
         return []

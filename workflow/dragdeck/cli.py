@@ -111,11 +111,17 @@ def scene_of(case: Case, scene: SceneName, bed: Bed | None = None) -> Scene:
     return process_scene(case, bed)
 
 
-def _check(options: argparse.Namespace) -> None:
+def _expectations(case: Case, name: SceneName, scene: Scene) -> list[tuple[str, str]]:
+    """What is known of a scene's time step before it is run."""
     from dragdeck.advice import breaking_note
+    from dragdeck.stability import notes
+
+    return [*notes(case, name, scene), *(breaking_note(case) if name == "process" else [])]
+
+
+def _check(options: argparse.Namespace) -> None:
     from dragdeck.engine import find_engine
     from dragdeck.render import deck_text, environment
-    from dragdeck.stability import notes
 
     project = find_project(Path.cwd())
     cases = project.cases(options.study, options.fidelity)
@@ -126,8 +132,7 @@ def _check(options: argparse.Namespace) -> None:
             scene = scene_of(case, name)
             deck_text(scene, templates)
             print(f"{name} {run_id}: time step {scene.deck.timestep_s:.3g} s")
-            own = breaking_note(case) if name == "process" else []
-            for what, text in [*notes(case, name, scene), *own]:
+            for what, text in _expectations(case, name, scene):
                 print(f"  {what}: {text}")
             warnings.update(dict.fromkeys(f"{case.name}: {text}" for text in scene.warnings))
     for warning in warnings:
@@ -136,9 +141,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _explain(options: argparse.Namespace) -> None:
-    from dragdeck.advice import breaking_note
     from dragdeck.explain import expected_cost, explanation, show
-    from dragdeck.stability import notes
 
     project = find_project(Path.cwd())
     cases = project.cases(options.study, options.fidelity)
@@ -150,7 +153,7 @@ def _explain(options: argparse.Namespace) -> None:
         explanation(
             scene,
             expected_cost(scene, results / name),
-            [*notes(case, name, scene), *(breaking_note(case) if name == "process" else [])],
+            _expectations(case, name, scene),
         )
         for case, name, scene in scenes
     )

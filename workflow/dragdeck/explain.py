@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
+from dragdeck.advice import trade_if_measured
 from dragdeck.scenes import Scene
 
 ASSUMED_BALL_STEPS_PER_S = {"drop": 1.5e6, "fill": 9e6, "process": 7e6}
@@ -51,12 +51,6 @@ def _measured(results: Path) -> Iterable[float]:
         speed = json.loads(file.read_text(encoding="utf-8"))["steps_per_s"]
         if speed:
             yield float(speed)
-
-
-def measured_trade() -> dict[str, Any]:
-    """What was measured of speed and accuracy, ``data/trade.json``; empty if it is not there."""
-    file = resources.files("dragdeck").joinpath("data").joinpath("trade.json")
-    return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
 
 
 def price_of(name: str, trade: Mapping[str, Any]) -> str:
@@ -105,9 +99,9 @@ def explanation(
     notes : iterable of (str, str)
         What its time step means for each pair of bodies.
     trade : mapping, optional
-        Measured costs, if not those of `measured_trade`.
+        Measured costs, if not those of `trade_if_measured`.
     """
-    trade = measured_trade() if trade is None else trade
+    trade = trade_if_measured() if trade is None else trade
     deck = scene.deck
     table = Table(title=f"{deck.study}: {deck.scene} {deck.run}", title_justify="left")
     table.add_column("")
