@@ -135,8 +135,9 @@ def rod_force(period: int, last: int) -> Output:
 
 
 def rod_balls(period: int, first: int, last: int) -> Output:
-    """Balls that the tool pushes, with the force as applied."""
-    columns = (_ID, *_POSITION, _RADIUS, *_vector("force", "n", "f_force_tool_wall"))
+    """Balls that the tool pushes: how they move, and the force as applied."""
+    force = _vector("force", "n", "f_force_tool_wall")
+    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *force)
     return Output("rod_balls", "custom", columns, period, first, last, binary=True)
 
 
