@@ -15,6 +15,7 @@ include: "workflow/rules/report.smk"
 include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/verify.smk"
 include: "workflow/rules/stability.smk"
+include: "workflow/rules/points.smk"
 include: "workflow/rules/trade.smk"
 
 

@@ -26,11 +26,17 @@ PATH_LENGTH = ("motion.path.revolutions", "motion.path.length_m")
 
 
 class Block(Model):
-    """Points that belong together: every combination of the values."""
+    """Points that belong together: every combination of the values that vary."""
 
     vary: dict[str, list[Any]] = Field(description="dotted field: values")
+    one_by_one: dict[str, list[Any]] = Field(
+        default_factory=dict,
+        description="dotted field: values; each of them goes with every combination above, and "
+        "never two at once",
+    )
     seeds: Annotated[Whole, Field(ge=1)] | None = Field(
-        default=None, description="how many, from the study's own on; none: as the plan says"
+        default=None,
+        description="how many, from the study's or scene's own on; none: as the plan says",
     )
     arc: Positive | None = Field(
         default=None, description="share of the study's path; none: as the plan says"
@@ -47,8 +53,8 @@ class Plan(Model):
     points: list[Block] = Field(default_factory=list)
     scenes: dict[str, dict[str, Any]] = Field(
         default={"as it is": {}},
-        description="name: dotted fields and values that change the study; every point is run in "
-        "each of them",
+        description="name: dotted fields and values that change the study, a seed to begin with "
+        "among them; every point is run in each of them",
     )
     cost_rounds: Annotated[Whole, Field(ge=0)] = Field(
         default=3, description="rounds of timing what decks leave out; 0: not at all"
@@ -113,7 +119,7 @@ def plan_points(plan: Plan, plan_file: Path, base: Case) -> Points:
     blocks = [plan.reference, *plan.points]
     found: dict[str, Case] = {}
     for scene, block in itertools.product(plan.scenes.values(), blocks):
-        for settings in _settings(plan, block, base.study):
+        for settings in _settings(plan, block, base.study, scene.get("seed", base.study.seed)):
             shown = {**scene, **_unnamed(settings)}
             case = _case(base, {**plan.base, **scene, **settings}, shown, plan_file)
             found.setdefault(case.run_ids["process"], case)
@@ -125,20 +131,23 @@ def plan_points(plan: Plan, plan_file: Path, base: Case) -> Points:
 
 
 def _size(block: Block) -> int:
-    size = 1
-    for values in block.vary.values():
-        size *= len(values)
-    return size
+    return sum(1 for _ in _combinations(block))
 
 
-def _settings(plan: Plan, block: Block, study: Study) -> Iterator[dict[str, Any]]:
+def _combinations(block: Block) -> Iterator[dict[str, Any]]:
+    single = [{field: value} for field, values in block.one_by_one.items() for value in values]
+    for values in itertools.product(*block.vary.values()):
+        for alone in single or [{}]:
+            yield {**dict(zip(block.vary, values, strict=True)), **alone}
+
+
+def _settings(plan: Plan, block: Block, study: Study, seed: int) -> Iterator[dict[str, Any]]:
     """The fields that each point of a block sets, path and seed included."""
     field, length = _path_length(study)
     arc = {field: length * (block.arc or plan.arc)}
-    for values in itertools.product(*block.vary.values()):
+    for values in _combinations(block):
         for number in range(block.seeds or plan.seeds):
-            seed = {"seed": study.seed + number}
-            yield {**dict(zip(block.vary, values, strict=True)), **arc, **seed}
+            yield {**values, **arc, "seed": seed + number}
 
 
 def _unnamed(settings: Settings) -> dict[str, Any]:

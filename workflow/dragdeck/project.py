@@ -31,7 +31,7 @@ class Project:
 
     @property
     def plans(self) -> Path:
-        """The plans of trades."""
+        """The plans: which points are run."""
         return self.root / "workflow" / "plans"
 
     def cases(self, study: str, fidelity: str | None = None) -> list[Case]:
@@ -64,8 +64,8 @@ class Project:
         return plan_points(read_plan(file), file, self.cases(study)[0])
 
     def point_folder(self, case: Case) -> Path:
-        """The folder of a process run of a trade."""
-        return self.root / "results" / case.study_name / "trade" / case.run_ids["process"]
+        """The folder of a process run of a plan."""
+        return self.root / "results" / case.study_name / "points" / case.run_ids["process"]
 
     def run_folder(self, case: Case, scene: SceneName) -> Path:
         """The folder of one engine run."""

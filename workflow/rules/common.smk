@@ -16,6 +16,7 @@ PROJECT = Project(Path(workflow.basedir))
 STUDY = config.get("study", "uhlmann2015")
 FIDELITY = config.get("fidelity")
 PLAN = config.get("plan", "default")
+VALIDATION = config.get("plan", "paper")
 
 try:
     CASES = PROJECT.cases(STUDY, FIDELITY)
@@ -44,13 +45,18 @@ def of_process(file):
 
 
 def of_point(file):
-    """Path of a file of a process run of a trade, as a pattern."""
-    return f"results/{{study}}/trade/{{run}}/{file}"
+    """Path of a file of a process run of a plan, as a pattern."""
+    return f"results/{{study}}/points/{{run}}/{file}"
 
 
 def of_trade(file):
     """Path of a file of the report on a trade."""
     return f"results/{STUDY}/trade-report/{Path(PLAN).stem}/{file}"
+
+
+def of_validation(file):
+    """Path of a file of the validation."""
+    return f"results/{STUDY}/validation/{file}"
 
 
 def of_experiment(run, file):
@@ -107,23 +113,33 @@ def every(scene, file):
 
 
 @cache
-def points():
-    """The points of the trade's plan."""
+def points(plan=PLAN):
+    """The points of a plan, the trade's if no other."""
     try:
-        return PROJECT.points(STUDY, PLAN)
+        return PROJECT.points(STUDY, plan)
     except DragdeckError as error:
         raise WorkflowError(str(error))
 
 
 @cache
-def points_by_run(scene):
-    """A case of the trade's plan for each run of a scene."""
-    return by_run(points().drops if scene == "drop" else points().processes, scene)
+def points_by_run(scene, plan=PLAN):
+    """A case of a plan for each run of a scene."""
+    return by_run(points(plan).drops if scene == "drop" else points(plan).processes, scene)
 
 
-def every_point(file):
-    """One file of every process run of the trade."""
-    return [f"results/{STUDY}/trade/{run}/{file}" for run in points_by_run("process")]
+def plan_of(scene, run):
+    """The plan that a run belongs to."""
+    return PLAN if run in points_by_run(scene) else VALIDATION
+
+
+def point(run):
+    """The case of a process run of a plan."""
+    return points_by_run("process", plan_of("process", run))[run]
+
+
+def every_point(file, plan=PLAN):
+    """One file of every process run of a plan."""
+    return [f"results/{STUDY}/points/{run}/{file}" for run in points_by_run("process", plan)]
 
 
 def every_drop_point(file):
@@ -138,8 +154,8 @@ def safe_step(case):
 
 
 def case_of(scene, run):
-    """A case that a run belongs to: one of the study's, or else one of the trade's points."""
-    return by_run(CASES, scene).get(run) or points_by_run(scene)[run]
+    """A case that a run belongs to: one of the study's, or else one of a plan's points."""
+    return by_run(CASES, scene).get(run) or points_by_run(scene, plan_of(scene, run))[run]
 
 
 def templates_of(scene):
@@ -177,7 +193,7 @@ def case_option(scene):
     def option(wildcards):
         if wildcards.run in by_run(CASES, scene):
             return fidelity_option(wildcards)
-        return f"--plan {PLAN}"
+        return f"--plan {plan_of(scene, wildcards.run)}"
 
     return option
 
@@ -194,8 +210,8 @@ def fill_of(wildcards, file):
 
 
 def bed_of_point(wildcards, file):
-    """A file of the fill that a point of the trade starts from."""
-    fill = points_by_run("process")[wildcards.run].run_ids["fill"]
+    """A file of the fill that a point of a plan starts from."""
+    fill = point(wildcards.run).run_ids["fill"]
     return f"results/{wildcards.study}/fill/{fill}/{file}"
 
 
