@@ -40,8 +40,14 @@ BROKEN = 0.1
 
 TOLERANCES = (0.02, 0.05, 0.1, 0.2)
 
-SILENT = ("seed", "motion.path.revolutions", "motion.path.length_m")
-"""Inputs that differ between runs without being a setting."""
+SILENT = (
+    "seed",
+    "motion.path.revolutions",
+    "motion.path.length_m",
+    "outputs.tool_contacts_hz",
+    "outputs.network_hz",
+)
+"""Inputs that differ between runs without being a setting: what is written changes nothing."""
 
 
 @dataclass(frozen=True)
@@ -80,12 +86,20 @@ class Run:
         Quantity to the run's value over the common path; empty if it failed.
     measures : mapping
         Content of its ``measures.json``.
+    further : sequence of dict of str to float
+        The same over each further stretch of its path that is as long as the common one.
     """
 
     setting: Setting
     bed: str
     values: Mapping[str, float]
     measures: Mapping[str, Any]
+    further: Sequence[Mapping[str, float]] = ()
+
+    @property
+    def stretches(self) -> list[Mapping[str, float]]:
+        """The values over every stretch of its path."""
+        return [self.values, *self.further]
 
     @property
     def complete(self) -> bool:
@@ -273,7 +287,8 @@ class Trade:
 def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Setting, float]:
     """Read the runs of a trade.
 
-    Of runs that differ in the length of their path alone the longest counts.
+    Of runs that differ in the length of their path alone the longest counts; one that is
+    several times as long as the common path counts as several runs from its bed.
 
     Parameters
     ----------
@@ -307,7 +322,7 @@ def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Se
     if not complete:
         raise TableError("no run of the trade is complete, so there is nothing to compare")
     arc = min(measures["arc_m"] for measures in complete)
-    runs = [Run(*key, values_within(own, arc), own) for key, own in longest.items()]
+    runs = [_run(setting, bed, own, arc) for (setting, bed), own in longest.items()]
     return runs, _setting(content[reference_run / FILE], standard), arc
 
 
@@ -346,14 +361,26 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def values_within(measures: Mapping[str, Any], arc_m: float) -> dict[str, float]:
-    """A run's values over the common path; a block that begins within it counts."""
+def _run(setting: Setting, bed: str, measures: Mapping[str, Any], arc_m: float) -> Run:
+    first, *further = (
+        values_within(measures, arc_m, stretch)
+        for stretch in range(max(1, int(measures.get("arc_m", 0.0) / arc_m + 1e-9)))
+    )
+    return Run(setting, bed, first, measures, further)
+
+
+def values_within(measures: Mapping[str, Any], arc_m: float, stretch: int = 0) -> dict[str, float]:
+    """A run's values over a stretch of its path, the first if no other; blocks stay whole.
+
+    What has one value a bed belongs to the first stretch.
+    """
     if not measures["complete"]:
         return {}
     count = max(1, round(arc_m / measures["block_m"]))
-    found = dict(measures["single"])
+    found = {} if stretch else dict(measures["single"])
+    own = slice(stretch * count, (stretch + 1) * count)
     for quantity in QUANTITIES:
-        blocks = np.array(measures["blocks"].get(quantity.name, []), dtype=np.float64)[:count]
+        blocks = np.array(measures["blocks"].get(quantity.name, []), dtype=np.float64)[own]
         if blocks.size and np.isfinite(blocks).all():
             found[quantity.name] = quantity.of_blocks(blocks)
     return found
@@ -392,13 +419,13 @@ def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting
     SeriesError
         If too few runs have the quantity, or none at the reference does.
     """
-    runs = [run for run in runs if quantity.name in run.values]
-    settings = [run.setting for run in runs]
+    rows = [(run, own) for run in runs for own in run.stretches if quantity.name in own]
+    settings = [run.setting for run, _ in rows]
     if reference not in settings:
         raise SeriesError("no run at the reference has it")
-    values = np.array([run.values[quantity.name] for run in runs])
+    values = np.array([own[quantity.name] for _, own in rows])
     if quantity.signed:
-        drags = [run.values["drag_mean"] for run in runs if run.setting == reference]
+        drags = [own["drag_mean"] for run, own in rows if run.setting == reference]
         scale = abs(float(np.mean(drags)))
         values = values / scale
     elif (values == 0.0).any() or len(set(np.sign(values))) > 1:
@@ -406,7 +433,7 @@ def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting
     else:
         scale = float(np.sign(values[0]))
         values = np.log(np.abs(values))
-    factors, fit, additivity = _choose(settings, values, [run.bed for run in runs], reference)
+    factors, fit, additivity = _choose(settings, values, [run.bed for run, _ in rows], reference)
     level, uncertainty = fit.contrast(factors.row(reference.factors()))
     return Comparison(
         quantity=quantity,
