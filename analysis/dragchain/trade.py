@@ -312,7 +312,7 @@ def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Se
     content = {file: read_measures(file) for file in files}
     if reference_run / FILE not in content:
         raise TableError(f"{reference_run}: the reference is not among the runs of the trade")
-    standard = _inputs(content[reference_run / FILE])
+    standard = content[reference_run / FILE]
     longest: dict[tuple[Setting, str], Mapping[str, Any]] = {}
     for measures in content.values():
         key = (_setting(measures, standard), measures["bed"])
@@ -323,7 +323,7 @@ def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Se
         raise TableError("no run of the trade is complete, so there is nothing to compare")
     arc = min(measures["arc_m"] for measures in complete)
     runs = [_run(setting, bed, own, arc) for (setting, bed), own in longest.items()]
-    return runs, _setting(content[reference_run / FILE], standard), arc
+    return runs, _setting(standard, standard), arc
 
 
 def read_measures(file: Path) -> dict[str, Any]:
@@ -347,12 +347,22 @@ def _inputs(measures: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in inputs.items() if name not in silent}
 
 
+def changed_inputs(measures: Mapping[str, Any], standard: Mapping[str, Any]) -> dict[str, Hashable]:
+    """Inputs of a run, by dotted name, that differ from those of another; no knob is among them.
+
+    Parameters
+    ----------
+    measures, standard : mapping
+        Content of their ``measures.json``.
+    """
+    own, other = _inputs(measures), _inputs(standard)
+    names = sorted({*own, *other})
+    return {name: own.get(name) for name in names if own.get(name) != other.get(name)}
+
+
 def _setting(measures: Mapping[str, Any], standard: Mapping[str, Any]) -> Setting:
-    own = _inputs(measures)
-    names = sorted({*own, *standard})
-    other = [
-        f"{name} {_shown(own.get(name))}" for name in names if own.get(name) != standard.get(name)
-    ]
+    changed = changed_inputs(measures, standard)
+    other = [f"{name} {_shown(value)}" for name, value in changed.items()]
     modulus, step, speed = (float(measures["fidelity"][name]) for name in KNOBS)
     return Setting(modulus, step, speed, ", ".join(other))
 

@@ -1,0 +1,290 @@
+"""The force on the tool over several fills, against measured and published figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import signal, stats
+
+from dragchain.case import Case
+from dragchain.collect import drag_start_s
+from dragchain.effects import Fit, fit_effects
+from dragchain.errors import SeriesError, TableError
+from dragchain.findings import CONFIDENCE, Estimate, finite
+from dragchain.forces import find_drag_peaks, peak_separation_s, read_counted
+from dragchain.frames import Floats
+from dragchain.stats import MeanEstimate, estimate_mean
+from dragchain.validation.fills import Point, Points, over_fills
+
+Found = dict[str, Any]
+
+COMPONENTS = {"drag_n": "drag", "lateral_n": "lateral force", "vertical_n": "vertical force"}
+
+PROMINENCES = (0.5, 1.0, 2.0)
+"""Least prominence of a peak in standard deviations of the drag; the middle one is the rule."""
+
+SEGMENT = 6.0
+"""Length of the spectrum's segments in ball diameters of path (Welch 1967)."""
+
+
+def of_fills(points: Points) -> Found:
+    """The force of every fill, and of all of them together.
+
+    Returns
+    -------
+    dict
+        ``fills`` (a row a fill), ``together`` (component to ``mean`` and ``sd`` with
+        the interval over fills), ``alike`` (whether the fills differ by more than
+        each knows its own mean), ``peaks`` and ``spectrum``.
+    """
+    rows = [_fill_row(point) for point in points.fills]
+    together = {
+        name: {
+            "mean": over_fills([row[name]["mean"] for row in rows]).as_json(),
+            "sd": over_fills([row[name]["sd"] for row in rows], ratio=True).as_json(),
+        }
+        for name in COMPONENTS
+    }
+    return {
+        "fills": rows,
+        "together": together,
+        "alike": _alike(rows),
+        "peaks": _peaks(points.fills),
+        "spectrum": spectrum(points.fills),
+    }
+
+
+def _fill_row(point: Point) -> Found:
+    samples = read_counted(point.folder)
+    cost = point.measures["cost"]
+    return {
+        "run": point.case.run,
+        "seed": point.seed,
+        "fill_height_m": point.measures["single"]["fill_height"],
+        "arc_m": point.measures["arc_m"],
+        "steps": cost["steps"],
+        "cpu_time_s": cost["cpu_time_s"],
+        **{name: _mean(estimate_mean(samples[name].to_numpy())) for name in COMPONENTS},
+    }
+
+
+def _mean(estimate: MeanEstimate) -> Found:
+    known = vars(estimate)
+    return {name: finite(value) if name != "reliable" else value for name, value in known.items()}
+
+
+def _alike(rows: Sequence[Found]) -> Found:
+    """Test by Cochran's Q whether the fills differ by more than their own standard errors.
+
+    Cochran (1954), Biometrics 10, 101-129: the weighted sum of squares about the
+    weighted mean follows chi squared with N - 1 degrees of freedom if they do not.
+    """
+    means = np.array([row["drag_n"]["mean"] for row in rows])
+    weights = np.array([row["drag_n"]["standard_error"] for row in rows]) ** -2.0
+    centre = float(weights @ means / weights.sum())
+    statistic = float(weights @ (means - centre) ** 2)
+    return {
+        "statistic": statistic,
+        "p_value": float(stats.chi2.sf(statistic, len(rows) - 1)),
+        "sd_between_n": float(means.std(ddof=1)),
+        "standard_error_within_n": float(np.sqrt(np.mean(1.0 / weights))),
+    }
+
+
+def _peaks(fills: Sequence[Point]) -> Found:
+    """Peaks by the rule of docs/outputs.md, at three least prominences."""
+    counts: dict[float, list[float]] = {factor: [] for factor in PROMINENCES}
+    times, largest = [], []
+    for point in fills:
+        samples = read_counted(point.folder)
+        time_s, drag = (samples[name].to_numpy(np.float64) for name in ("time_s", "drag_n"))
+        for factor in PROMINENCES:
+            peaks = find_drag_peaks(
+                time_s,
+                drag,
+                min_separation_s=peak_separation_s(point.case),
+                min_prominence_n=factor * float(np.std(drag, ddof=1)),
+            )
+            counts[factor].append(len(peaks.index) / point.measures["arc_m"])
+            if factor == 1.0:
+                times.append((peaks.time_s - drag_start_s(point.case)).tolist())
+                largest.append(float(peaks.drag_n.min(initial=math.inf)))
+    return {
+        "per_metre": {
+            f"{factor:g}": over_fills(found).as_json() for factor, found in counts.items()
+        },
+        "process_time_s": times,
+        "largest_n": [finite(force) for force in largest],
+    }
+
+
+def spectrum(fills: Sequence[Point]) -> Found:
+    """Power spectrum of the drag along the path, by Welch's method, mean over fills.
+
+    Welch (1967), IEEE Trans. Audio Electroacoust. 15, 70-73: Hann windows of
+    `SEGMENT` ball diameters, half overlapping.
+
+    Returns
+    -------
+    dict
+        ``waves_per_diameter`` (F values), ``density`` (N^2 diameters: mean, lowest and
+        highest of the fills) and ``half_wave``: half of the variance lies in waves
+        longer than so many diameters, with its interval over fills.
+    """
+    curves, halves = [], []
+    grid = np.empty(0)
+    for point in fills:
+        drag = read_counted(point.folder)["drag_n"].to_numpy(np.float64)
+        spacing = point.measures["arc_m"] / len(drag) / (2.0 * point.case.media.radius_mean_m)
+        length = min(len(drag), round(SEGMENT / spacing))
+        waves, density = (half[1:] for half in signal.welch(drag, 1.0 / spacing, nperseg=length))
+        grid = grid if grid.size else waves
+        curves.append(np.interp(grid, waves, density))
+        halves.append(_half_wave(waves, density))
+    together = np.array(curves)
+    return {
+        "waves_per_diameter": grid.tolist(),
+        "density": {
+            "mean": together.mean(axis=0).tolist(),
+            "low": together.min(axis=0).tolist(),
+            "high": together.max(axis=0).tolist(),
+        },
+        "half_wave": over_fills(halves, ratio=True).as_json(),
+        "segment": SEGMENT,
+    }
+
+
+def _half_wave(waves: Floats, density: Floats) -> float:
+    total = np.cumsum(density)
+    return float(1.0 / np.interp(0.5 * total[-1], total, waves))
+
+
+def compare(mean: Mapping[str, float], sd: Mapping[str, float], case: Case) -> list[Found]:
+    """Mean and standard deviation of the drag beside every reference figure of the study.
+
+    Returns
+    -------
+    list of dict
+        ``label``, ``mean_n``, ``sd_n``; ``difference`` of our mean over it less one with
+        ``low`` and ``high``, and ``sd_ratio`` the same way, both from the interval over
+        fills alone: no source says how well it knows its own mean.
+    """
+    known = dict(case.reference or {})
+    found = []
+    for key in sorted(name for name in known if name.endswith("_drag_mean_n")):
+        label = key.removesuffix("_drag_mean_n")
+        other, spread = known[key], known.get(f"{label}_drag_sd_n")
+        if not isinstance(other, int | float) or other == 0.0:
+            raise TableError(f"case.json: reference.{key} is {other!r}, not a force to compare")
+        low, high = sorted(mean[edge] / other - 1.0 for edge in ("low", "high"))
+        row: Found = {
+            "label": label,
+            "mean_n": float(other),
+            "sd_n": spread,
+            "difference": {"value": mean["value"] / other - 1.0, "low": low, "high": high},
+        }
+        if isinstance(spread, int | float) and spread > 0.0:
+            row["sd_ratio"] = {name: sd[name] / spread for name in ("value", "low", "high")}
+        found.append(row)
+    return found
+
+
+# --- other settings --------------------------------------------------------------------------
+
+
+def effects(points: Points) -> pd.DataFrame:
+    """What every other setting does to the mean drag and to its standard deviation.
+
+    All runs are fitted together (`dragchain.effects`): one mean a setting, one
+    variance for all, a share of it common to runs from one bed. A setting that
+    changes an input is compared with the same fidelity without that change; one
+    that changes the fidelity alone with the fills.
+
+    Returns
+    -------
+    DataFrame
+        A row a setting: ``knobs``, ``field``, ``value``, ``reference_value`` (of the input
+        that it changes), ``runs``, ``quantity``, ``change low high`` (relative),
+        ``exponent exponent_low exponent_high`` (of the change over that of the input).
+
+    Raises
+    ------
+    SeriesError
+        If there are too few runs.
+    """
+    rows = []
+    for quantity in ("mean", "sd"):
+        fitted = _Fitted(points, quantity)
+        for setting in fitted.settings[1:]:
+            rows.append({"quantity": f"drag_{quantity}", **fitted.row(setting)})
+    return pd.DataFrame(rows)
+
+
+class _Fitted:
+    """One quantity fitted over all runs."""
+
+    def __init__(self, points: Points, quantity: str) -> None:
+        self.points = points.all
+        self.settings = list(dict.fromkeys(point.setting for point in self.points))
+        values = [math.log(abs(_of_run(point, quantity))) for point in self.points]
+        design = np.array([self._indicator(point.setting) for point in self.points])
+        beds = [str(point.measures["bed"]) for point in self.points]
+        self.fit: Fit = fit_effects(design, np.array(values), beds)
+
+    def _indicator(self, setting: tuple[object, ...]) -> Floats:
+        return np.array([float(setting == other) for other in self.settings])
+
+    def row(self, setting: tuple[object, ...]) -> Found:
+        """A setting against what it is to be compared with."""
+        own = [point for point in self.points if point.setting == setting]
+        base = self._base(own[0])
+        weights = self._indicator(setting) - self._indicator(base.setting)
+        value, error = self.fit.contrast(weights)
+        reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, self.fit.degrees)) * error
+        change = Estimate(*(math.expm1(edge) for edge in (value, value - reach, value + reach)))
+        return {
+            "youngs_modulus_scale": own[0].knobs[0],
+            "timestep_fraction": own[0].knobs[1],
+            "speed_factor": own[0].knobs[2],
+            "runs": len(own),
+            "field": next(iter(own[0].changed), ""),
+            "value": next(iter(own[0].changed.values()), None),
+            "reference_value": _input(base, own[0]),
+            "change": change.value,
+            "low": change.low,
+            "high": change.high,
+            **_exponent(value, reach, base, own[0]),
+        }
+
+    def _base(self, point: Point) -> Point:
+        alike = (one for one in self.points if one.knobs == point.knobs and not one.changed)
+        return (next(alike, self.points[0])) if point.changed else self.points[0]
+
+
+def _of_run(point: Point, quantity: str) -> float:
+    drag = read_counted(point.folder)["drag_n"].to_numpy(np.float64)
+    if not drag.size:
+        raise SeriesError(f"{point.case.run}: no sample counts")
+    return float(drag.mean() if quantity == "mean" else drag.std(ddof=1))
+
+
+def _input(base: Point, point: Point) -> object:
+    field = next(iter(point.changed), None)
+    return None if field is None else base.measures["inputs"].get(field)
+
+
+def _exponent(value: float, reach: float, base: Point, point: Point) -> Found:
+    names = ("exponent", "exponent_low", "exponent_high")
+    new, old = next(iter(point.changed.values()), None), _input(base, point)
+    if len(point.changed) != 1 or not all(isinstance(x, int | float) for x in (new, old)):
+        return dict.fromkeys(names)
+    assert isinstance(new, int | float) and isinstance(old, int | float)
+    if new <= 0 or old <= 0:
+        return dict.fromkeys(names)
+    scale = math.log(new / old)
+    edges = sorted((value + sign * reach) / scale for sign in (-1.0, 1.0))
+    return dict(zip(names, (value / scale, *edges), strict=True))

@@ -1,0 +1,250 @@
+"""What the source says of forces around the tool, each statement with a number.
+
+The statements of Uhlmann et al. (2015), section 5 and figure 4, that a number
+can test: forces ahead of the tool are above those behind; the active zone
+reaches far ahead; contact forces grow with depth; contacts are most intense at
+the front; surfaces that point to the bowl's boundary carry marks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from dragchain.case import Case, Circle, Tool
+from dragchain.errors import TableError
+from dragchain.findings import BEARING_BINS, DEPTH_BINS, Estimate
+from dragchain.forces import read_counted
+from dragchain.frames import Floats, Ints, read_table
+from dragchain.validation.fills import Point, over_fills
+
+Found = dict[str, Any]
+
+CORRIDOR = 1.0
+"""Half width of the corridor along the motion beyond the tool's radius, in ball diameters."""
+
+BIN = 0.5
+"""Length of a bin along the corridor, in ball diameters."""
+
+FAR_SIDE = 2.0 * np.pi / 3.0
+"""The bed far from the tool: seen from the bowl's axis, more than 120 degrees away from it."""
+
+FRONT = np.pi / 4.0
+"""The front of the tool: bearings within 45 degrees of the motion."""
+
+
+def of_fills(fills: Sequence[Point]) -> Found:
+    """Every statement with its numbers over the fills."""
+    around = [_around_tool(point) for point in fills]
+    corridors = [_corridor(point) for point in fills]
+    return {
+        "fills": len(fills),
+        "ahead_behind": _together(around, "ratio", ratio=True),
+        "share_ahead": _together(around, "share_ahead"),
+        "depth_slope_n_m": _together(around, "slope"),
+        "deep_over_shallow": _together(around, "deep_over_shallow", ratio=True),
+        "front_share": _together(around, "front_share"),
+        "front_contact_n": _together(around, "front_contact_n"),
+        "flank_contact_n": _together(around, "flank_contact_n"),
+        "front_over_flank": _together(around, "front_over_flank", ratio=True),
+        "outer_over_inner": _together(around, "outer_over_inner", ratio=True),
+        "bearing": _profile(around, "bearing"),
+        "depth": _profile(around, "depth"),
+        "network": _network(corridors),
+    }
+
+
+def _together(rows: Sequence[Found], name: str, *, ratio: bool = False) -> Found | None:
+    values = [row[name] for row in rows]
+    return None if None in values else over_fills(values, ratio=ratio).as_json()
+
+
+def _profile(rows: Sequence[Found], name: str) -> Found:
+    """A curve a fill, averaged bin by bin; the bins are those of the first fill."""
+    curves = np.array([row[name]["value"] for row in rows])
+    found = [over_fills(column.tolist()) for column in curves.T]
+    return {"edges": rows[0][name]["edges"], **_columns(found)}
+
+
+def _columns(estimates: Sequence[Estimate]) -> Found:
+    rows = [estimate.as_json() for estimate in estimates]
+    return {name: [row[name] for row in rows] for name in ("value", "low", "high")}
+
+
+# --- contacts on the tool --------------------------------------------------------------------
+
+
+def _around_tool(point: Point) -> Found:
+    columns = ["bearing_rad", "depth_m", "normal_force_n", "counted"]
+    table = read_table(point.folder / "tables" / "rod_contacts.parquet", columns)
+    table = table[table["counted"] & (table["normal_force_n"] > 0.0)]
+    bearing, depth, force = (
+        table[name].to_numpy(np.float64) for name in ("bearing_rad", "depth_m", "normal_force_n")
+    )
+    ahead = np.abs(bearing) < np.pi / 2
+    around = np.linspace(-np.pi, np.pi, BEARING_BINS + 1)
+    submersion = _tool(point.case).submersion_m
+    levels = np.linspace(0.0, submersion, DEPTH_BINS + 1)
+    counts, _ = np.histogram(depth, levels)
+    sums, _ = np.histogram(depth, levels, weights=force)
+    return {
+        "ratio": float(force[ahead].sum() / force[~ahead].sum()),
+        "share_ahead": float(force[ahead].sum() / force.sum()),
+        "slope": float(np.polyfit(depth, force, 1)[0]),
+        "deep_over_shallow": _mean(force[depth > 2.0 / 3.0 * submersion])
+        / _mean(force[depth < submersion / 3.0]),
+        **_front(bearing, force),
+        "outer_over_inner": _outer_over_inner(point.case, bearing, force),
+        "bearing": {
+            "edges": around.tolist(),
+            "value": (np.histogram(bearing, around, weights=force)[0] / force.sum()).tolist(),
+        },
+        "depth": {"edges": levels.tolist(), "value": (sums / np.maximum(counts, 1)).tolist()},
+    }
+
+
+def _tool(case: Case) -> Tool:
+    if case.tool is None:
+        raise TableError(f"{case.run}: case.json has no tool, which the statements are about")
+    return case.tool
+
+
+def _mean(values: Floats) -> float:
+    return float(values.mean()) if values.size else float("nan")
+
+
+def _front(bearing: Floats, force: Floats) -> Found:
+    """The front quarter of the tool against its two flanks, of a quarter together."""
+    front = np.abs(bearing) <= FRONT
+    flank = (np.abs(bearing) > FRONT) & (np.abs(bearing) <= 2 * FRONT)
+    return {
+        "front_share": float(force[front].sum() / force.sum()),
+        "front_contact_n": _mean(force[front]),
+        "flank_contact_n": _mean(force[flank]),
+        "front_over_flank": float(force[front].sum() / force[flank].sum()),
+    }
+
+
+def _outer_over_inner(case: Case, bearing: Floats, force: Floats) -> float | None:
+    """Normal force on the half that points away from the bowl's axis over that on the other."""
+    if not isinstance(case.motion, Circle):
+        return None
+    outer = np.sign(bearing) == -np.sign(case.motion.sense)
+    return float(force[outer].sum() / force[~outer].sum())
+
+
+# --- the network around the tool -------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Corridor:
+    """Mean normal force of the contacts along the corridor, bin by bin from the tool's surface."""
+
+    edges: Floats
+    ahead: Floats
+    behind: Floats
+    far: float
+    wall: float
+
+
+def _corridor(point: Point) -> _Corridor:
+    """The network's contacts ahead of the tool and behind it, within its depth.
+
+    Bins end where the first of both directions meets the bowl; ``wall`` is the distance from the
+    tool's surface to the bowl along the motion, in ball diameters.
+    """
+    case = point.case
+    if case.bowl is None or case.surface_m is None or not isinstance(case.motion, Circle):
+        raise TableError(f"{case.run}: the corridor needs a tool on a circle about the bowl's axis")
+    diameter = 2.0 * case.media.radius_mean_m
+    radius = _tool(case).radius_m
+    wall = (np.sqrt(case.bowl.radius_m**2 - case.motion.radius_m**2) - radius) / diameter
+    edges = np.arange(0.0, wall + 1e-9, BIN)
+    contacts = _inner_contacts(point)
+    tip = case.surface_m - _tool(case).submersion_m
+    z = contacts["point_z_m"].to_numpy(np.float64)
+    within = (z > tip) & (z < case.surface_m)
+    force = contacts["normal_force_n"].to_numpy(np.float64)
+    along, across, turned = _relative(contacts)
+    corridor = within & (np.abs(across) <= radius + CORRIDOR * diameter)
+    distance = (np.abs(along) - radius) / diameter
+    return _Corridor(
+        edges=edges,
+        ahead=_binned(distance, force, corridor & (along > 0.0), edges),
+        behind=_binned(distance, force, corridor & (along < 0.0), edges),
+        far=_mean(force[within & (np.abs(turned) > FAR_SIDE)]),
+        wall=float(wall),
+    )
+
+
+def _inner_contacts(point: Point) -> pd.DataFrame:
+    """Counted contacts between balls, with place and heading of the tool in their frame."""
+    rod = read_counted(point.folder)[["step", "ref_x_m", "ref_y_m", "heading_rad"]]
+    columns = ["step", "b_id", "point_x_m", "point_y_m", "point_z_m", "normal_force_n"]
+    table = read_table(point.folder / "tables" / "contacts.parquet", columns)
+    table = table[table["b_id"] > 0]
+    return table.merge(rod, on="step")
+
+
+def _relative(contacts: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
+    """Distance along and across the motion, and the angle from the tool about the bowl's axis."""
+    x, y, ref_x, ref_y, heading = (
+        contacts[name].to_numpy(np.float64)
+        for name in ("point_x_m", "point_y_m", "ref_x_m", "ref_y_m", "heading_rad")
+    )
+    cos, sin = np.cos(heading), np.sin(heading)
+    dx, dy = x - ref_x, y - ref_y
+    turned = np.angle(np.exp(1j * (np.arctan2(y, x) - np.arctan2(ref_y, ref_x))))
+    return dx * cos + dy * sin, dy * cos - dx * sin, turned
+
+
+def _binned(distance: Floats, force: Floats, chosen: np.ndarray[Any, Any], edges: Floats) -> Floats:
+    number: Ints = np.digitize(distance[chosen], edges) - 1
+    inside = (number >= 0) & (number < len(edges) - 1)
+    bins = len(edges) - 1
+    sums = np.bincount(number[inside], force[chosen][inside], bins)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(sums / np.bincount(number[inside], minlength=bins))
+
+
+def _network(corridors: Sequence[_Corridor]) -> Found:
+    """Ahead against behind in the network, and how far ahead the tool is felt.
+
+    The reach is the distance at which the force, straight between the middles of the
+    bins, has fallen halfway to that of the bed far from the tool; where it never does
+    before the bowl's wall, the wall is the answer and said to be a lower limit.
+    """
+    edges = corridors[0].edges
+    ahead = np.array([one.ahead for one in corridors])
+    behind = np.array([one.behind for one in corridors])
+    far = [one.far for one in corridors]
+    half = [_half_reach(one) for one in corridors]
+    reached = [reach for reach in half if reach is not None]
+    return {
+        "edges_diameters": edges.tolist(),
+        "wall_diameters": corridors[0].wall,
+        "ahead_n": _columns([over_fills(column.tolist()) for column in ahead.T]),
+        "behind_n": _columns([over_fills(column.tolist()) for column in behind.T]),
+        "far_n": over_fills(far).as_json(),
+        "ratio": over_fills(
+            (ahead.mean(axis=1) / behind.mean(axis=1)).tolist(), ratio=True
+        ).as_json(),
+        "at_wall": over_fills((ahead[:, -1] / np.array(far)).tolist(), ratio=True).as_json(),
+        "half_reach_diameters": over_fills(reached, ratio=True).as_json()
+        if len(reached) == len(half)
+        else None,
+    }
+
+
+def _half_reach(corridor: _Corridor) -> float | None:
+    middle = 0.5 * (corridor.edges[1:] + corridor.edges[:-1])
+    excess = (corridor.ahead - corridor.far) / (corridor.ahead[0] - corridor.far)
+    below = np.flatnonzero(excess < 0.5)
+    if not below.size:
+        return None
+    last = int(below[0])
+    return float(np.interp(0.5, excess[[last, last - 1]], middle[[last, last - 1]]))
