@@ -17,6 +17,7 @@ include: "workflow/rules/verify.smk"
 include: "workflow/rules/stability.smk"
 include: "workflow/rules/points.smk"
 include: "workflow/rules/trade.smk"
+include: "workflow/rules/validate.smk"
 
 
 localrules:
@@ -29,6 +30,7 @@ localrules:
     report,
     stability,
     trade,
+    validate,
     verify,
 
 
@@ -94,3 +96,9 @@ rule trade:
 rule checks:
     input:
         rules.write_checks.output,
+
+
+# The study beside its source: several fills, a control, what is assumed.
+rule validate:
+    input:
+        rules.write_validation.output,

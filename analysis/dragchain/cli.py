@@ -102,6 +102,17 @@ def _parser() -> argparse.ArgumentParser:
         "measures", type=Path, nargs="+", metavar="MEASURES", help="measures.json of the runs"
     )
     trade.set_defaults(action=_trade)
+    validate = commands.add_parser("validate", help="set runs of a study beside its source")
+    validate.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
+    validate.add_argument("--command", default="dragchain validate", help="what made the runs")
+    validate.add_argument(
+        "run_dirs",
+        type=Path,
+        nargs="+",
+        metavar="RUN_DIR",
+        help="measured runs, the reference first",
+    )
+    validate.set_defaults(action=_validate)
     return parser
 
 
@@ -180,6 +191,12 @@ def _trade(options: argparse.Namespace) -> None:
         commands=[options.command] if options.command else [],
         largest_step=options.largest_step,
     )
+
+
+def _validate(options: argparse.Namespace) -> None:
+    from dragchain.validation.page import write_validation
+
+    write_validation(options.out, options.run_dirs, options.command)
 
 
 if __name__ == "__main__":

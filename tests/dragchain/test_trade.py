@@ -295,3 +295,26 @@ def test_files_that_cannot_be_used_are_refused(tmp_path: Path) -> None:
     failed = write(tmp_path / "c", [measures(REFERENCE, 1, rng, failure=FAILURE)])
     with pytest.raises(TableError, match="no run of the trade is complete"):
         read_runs(failed, failed[0].parent)
+
+
+def test_a_run_twice_as_long_counts_as_two_of_its_bed(tmp_path: Path) -> None:
+    rng = np.random.default_rng(11)
+    found = [measures(REFERENCE, seed, rng) for seed in (1, 2, 3)]
+    found += [measures(SOFT, seed, rng, effects=SOFTNESS, blocks=17) for seed in (1, 2, 3)]
+    files = write(tmp_path, found)
+    runs, _, _ = read_runs(files, files[0].parent)
+    long = [run for run in runs if run.setting == Setting(*SOFT)]
+    assert [len(run.stretches) for run in runs if run not in long] == [1, 1, 1]
+    assert [len(run.stretches) for run in long] == [2, 2, 2]
+    second = np.mean(long[0].measures["blocks"]["drag_mean"][8:16])
+    assert long[0].further[0]["drag_mean"] == pytest.approx(second)
+    assert "fill_height" not in long[0].further[0]
+
+
+def test_what_is_written_is_no_setting(tmp_path: Path) -> None:
+    rng = np.random.default_rng(11)
+    found = [measures(REFERENCE, 1, rng, inputs={"outputs.network_hz": 20.0})]
+    found += [measures(REFERENCE, 2, rng, inputs={"outputs.network_hz": 100.0})]
+    files = write(tmp_path, found)
+    runs, reference, _ = read_runs(files, files[0].parent)
+    assert {run.setting for run in runs} == {reference}

@@ -160,7 +160,7 @@ def spectrum(fills: Sequence[Point]) -> Found:
 
 def _half_wave(waves: Floats, density: Floats) -> float:
     total = np.cumsum(density)
-    return float(1.0 / np.interp(0.5 * total[-1], total, waves))
+    return float(1.0 / np.interp(0.5 * total[-1], total - 0.5 * density, waves))
 
 
 def compare(mean: Mapping[str, float], sd: Mapping[str, float], case: Case) -> list[Found]:

@@ -1,0 +1,177 @@
+"""Tables, figures and page of a validation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import matplotlib
+import pandas as pd
+from matplotlib.figure import Figure
+
+from dragchain.figures import STYLE, png
+from dragchain.frames import write_parquet
+from dragchain.parquet import write_json
+from dragchain.report import data_uri, measured, number, percent, share
+from dragchain.validation import figures, force, statements
+from dragchain.validation.claims import claims
+from dragchain.validation.fills import Point, Points, read_points
+
+SCHEMA = 1
+
+
+def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> None:
+    """Write tables, figures and page of the runs of a validation.
+
+    Parameters
+    ----------
+    out_dir : Path
+        Gets ``validation.json``, ``*.parquet``, ``*.csv``, ``figures/*`` and ``report.html``.
+    run_dirs : sequence of Path
+        Folders of measured runs; the first is at the reference's settings.
+    command : str
+        What made them, for the page.
+
+    Raises
+    ------
+    TableError
+        A run has no measures, or fewer than two fills are complete.
+    SeriesError
+        There are too few runs to compare settings.
+    """
+    points = read_points(run_dirs)
+    found = find(points, command)
+    effects = force.effects(points)
+    out_dir.mkdir(parents=True, exist_ok=True)
+    for name, table in tables(found, effects).items():
+        write_parquet(table, out_dir / f"{name}.parquet")
+        table.to_csv(out_dir / f"{name}.csv", index=False, lineterminator="\n")
+    pictures = draw(points, found, effects)
+    folder = out_dir / "figures"
+    folder.mkdir(exist_ok=True)
+    for name, picture in pictures.items():
+        (folder / f"{name}.png").write_bytes(picture)
+    write_json(out_dir / "validation.json", {**found, "effects": effects.to_dict("records")})
+    page = render(points, found, effects, pictures)
+    (out_dir / "report.html").write_text(page, encoding="utf-8")
+
+
+def find(points: Points, command: str) -> dict[str, Any]:
+    """All numbers of the page but those of other settings."""
+    found_force = force.of_fills(points)
+    together = found_force["together"]["drag_n"]
+    case = points.fills[0].case
+    found_statements = statements.of_fills(points.fills)
+    return {
+        "schema": SCHEMA,
+        "study": case.study,
+        "command": command,
+        "measured": max(str(point.measures["started"]) for point in points.all)[:10],
+        "versions": dict(points.fills[0].measures["versions"]),
+        "engine_hours": sum(_cpu_s(point) for point in points.all) / 3600.0,
+        "force": found_force,
+        "comparison": force.compare(together["mean"], together["sd"], case),
+        "statements": found_statements,
+        "claims": [{**vars(claim), "verdict": claim.verdict} for claim in claims(found_statements)],
+    }
+
+
+def _cpu_s(point: Point) -> float:
+    return float(point.measures["cost"]["cpu_time_s"])
+
+
+def tables(found: Mapping[str, Any], effects: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """The numbers of the page as tables, by name."""
+    network = found["statements"]["network"]
+    edges = network["edges_diameters"]
+    profile = {
+        f"{side}_{name}_n": network[f"{side}_n"][name]
+        for side in ("ahead", "behind")
+        for name in ("value", "low", "high")
+    }
+    density = found["force"]["spectrum"]["density"]
+    estimates = [
+        {**{k: v for k, v in claim.items() if k != "estimate"}, **claim["estimate"]}
+        for claim in found["claims"]
+    ]
+    return {
+        "fills": pd.json_normalize(found["force"]["fills"], sep="_"),
+        "effects": effects,
+        "comparison": pd.json_normalize(found["comparison"], sep="_"),
+        "statements": pd.DataFrame(estimates),
+        "corridor": pd.DataFrame(
+            {"from_diameters": edges[:-1], "to_diameters": edges[1:], **profile}
+        ),
+        "around": _profile(found["statements"]["bearing"], "rad"),
+        "depth": _profile(found["statements"]["depth"], "m"),
+        "spectrum": pd.DataFrame(
+            {"waves_per_diameter": found["force"]["spectrum"]["waves_per_diameter"], **density}
+        ),
+    }
+
+
+def _profile(columns: Mapping[str, Any], unit: str) -> pd.DataFrame:
+    edges = columns["edges"]
+    values = {name: columns[name] for name in ("value", "low", "high")}
+    return pd.DataFrame({f"from_{unit}": edges[:-1], f"to_{unit}": edges[1:], **values})
+
+
+def draw(points: Points, found: Mapping[str, Any], effects: pd.DataFrame) -> dict[str, bytes]:
+    """The figures of the page as PNG, by name."""
+    with matplotlib.rc_context(STYLE):
+        drawn: dict[str, Figure] = {
+            "comparison": figures.comparison(found["force"], found["comparison"], effects),
+            "traces": figures.traces(points.fills, found["comparison"]),
+            "spectrum": figures.spectrum(found["force"]["spectrum"]),
+            "around": figures.around(found["statements"]),
+            "corridor": figures.corridor(found["statements"]["network"]),
+        }
+        if (effects["field"] != "").any():
+            drawn["assumed"] = figures.assumed(effects)
+        return {name: png(figure) for name, figure in drawn.items()}
+
+
+def render(
+    points: Points,
+    found: Mapping[str, Any],
+    effects: pd.DataFrame,
+    pictures: Mapping[str, bytes],
+) -> str:
+    """The page: HTML that needs no other file and no network."""
+    folder = resources.files("dragchain").joinpath("validation")
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(
+            lambda name: folder.joinpath(name).read_text(encoding="utf-8")
+        ),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {
+        "number": number,
+        "measured": measured,
+        "percent": percent,
+        "share": share,
+        "interval": interval,
+        "setting": figures.setting_name,
+    }
+    uris = {name: data_uri(picture) for name, picture in pictures.items()}
+    assumptions = points.fills[0].case.assumptions
+    return environment.get_template("validation.html.j2").render(
+        found=found,
+        effects=effects.to_dict("records"),
+        assumptions=assumptions,
+        varied=set(effects["field"]),
+        points=points,
+        picture=uris.get,
+    )
+
+
+def interval(estimate: Mapping[str, float | None], digits: int = 3) -> str:
+    """An estimate with its interval, as text."""
+    value, low, high = (measured(estimate[name], digits) for name in ("value", "low", "high"))
+    return f"{value} ({low} to {high})"

@@ -1,0 +1,29 @@
+# The study beside what its source says: the points of the plan `paper`.
+
+
+rule write_validation:
+    input:
+        measures=lambda wildcards: every_point("measures.json", VALIDATION),
+        template="analysis/dragchain/validation/validation.html.j2",
+    output:
+        page=report(
+            of_validation("report.html"),
+            caption="../report/validation.rst",
+            category="Validation",
+            labels={"run": "all", "figure": "report"},
+        ),
+        found=of_validation("validation.json"),
+        tables=multiext(of_validation(""), "fills.parquet", "effects.parquet", "statements.parquet"),
+    log:
+        of_validation("logs/report.log"),
+    benchmark:
+        of_validation("benchmarks/report.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        command=f"snakemake validate --config study={STUDY} plan={VALIDATION}",
+        runs=lambda wildcards, input: [str(Path(file).parent) for file in input.measures],
+        source=source_hash("dragchain.validation.page"),
+    shell:
+        "dragchain validate --out $(dirname {output.page}) --command '{params.command}'"
+        " {params.runs} > {log} 2>&1"
