@@ -23,7 +23,10 @@ PLAN: dict[str, Any] = {
     "reference": {"vary": {"fidelity.youngs_modulus_scale": [1e-3]}},
     "seeds": 2,
     "cost_rounds": 0,
-    "points": [{"vary": {"fidelity.timestep_fraction": [0.6, 1.9]}}],
+    "points": [
+        {"vary": {"fidelity.timestep_fraction": [0.6, 1.9]}},
+        {"vary": {}, "one_by_one": {"workpiece.shape.radius_m": [0.006]}},
+    ],
     "drop": {"drop.timestep_fraction": [0.1]},
 }
 TRADE = ("trade", "--config", "study=small", "plan=plan.yaml")
@@ -73,3 +76,37 @@ def test_the_record_says_what_made_it(traded: Path) -> None:
 
 def test_nothing_is_left_to_do_in_the_trade(traded: Path) -> None:
     assert jobs(traded, *TRADE) - {"trade"} == set()
+
+
+VALIDATION = ("validate", "--config", "study=small", "plan=plan.yaml")
+
+
+@pytest.fixture(scope="module")
+def validated(traded: Path) -> Path:
+    """The validation of the same points."""
+    done = snakemake(traded, *VALIDATION)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return traded / "results/small/validation"
+
+
+def test_a_validation_shares_the_runs_of_a_trade(validated: Path, traded: Path) -> None:
+    fills = pd.read_parquet(validated / "fills.parquet")
+    assert fills.seed.tolist() == [1, 2]
+    assert (fills.drag_n_mean < 0.0).all()
+    assert jobs(traded, *VALIDATION) - {"validate"} == set()
+    assert jobs(traded, *TRADE) - {"trade"} == set()
+
+
+def test_a_thicker_rod_meets_more_drag(validated: Path) -> None:
+    effects = pd.read_parquet(validated / "effects.parquet")
+    (row,) = effects[(effects.field != "") & (effects.quantity == "drag_mean")].to_dict("records")
+    assert (row["field"], row["value"]) == ("workpiece.shape.radius_m", 0.006)
+    assert row["reference_value"] == 0.004 and row["runs"] == 2
+    assert row["change"] > 0.0
+
+
+def test_the_page_of_a_validation_stands_alone(validated: Path) -> None:
+    page = (validated / "report.html").read_text()
+    assert "data:image/png;base64," in page
+    assert "http" not in page.replace("http-equiv", "")
+    assert "None" not in page and "nan" not in page

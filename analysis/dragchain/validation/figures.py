@@ -115,7 +115,7 @@ def spectrum(found: Found) -> Figure:
     label = f"half of the variance lies to the left: waves over {half:.1f} ball diameters"
     axes.axvline(1.0 / half, color=RED, linestyle="--", label=label)
     axes.set(xlabel="waves in a ball diameter of path", ylabel="power in N² ball diameters")
-    axes.legend(loc="lower left")
+    axes.legend(loc="upper right")
     return figure
 
 
@@ -133,6 +133,7 @@ def around(found: Found) -> Figure:
     left.errorbar(middle, 100 * value, 100 * np.array([value - low, high - value]), fmt="none",
                   ecolor="black", elinewidth=0.8)  # fmt: skip
     left.set_thetagrids(np.arange(0, 360, 45), ["ahead", "", "left", "", "behind", "", "right", ""])
+    left.set_rlabel_position(157.5)
     left.set_title(f"share of the normal force\nin % per {np.degrees(edges[1] - edges[0]):.0f}°")
     depth = found["depth"]
     middle, value, low, high = _bars(depth)
