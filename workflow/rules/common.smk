@@ -54,6 +54,12 @@ def of_trade(file):
     return f"results/{STUDY}/trade-report/{Path(PLAN).stem}/{file}"
 
 
+def checks_option(wildcards):
+    """How to name the checks on other scenes on the command line, if they were made."""
+    file = f"results/{STUDY}/trade-report/checks/checks.json"
+    return f"--checks {file}" if (PROJECT.root / file).is_file() else ""
+
+
 def of_validation(file):
     """Path of a file of the validation."""
     return f"results/{STUDY}/validation/{file}"

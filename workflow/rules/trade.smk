@@ -53,6 +53,7 @@ rule write_trade:
         reference=lambda wildcards: f"results/{STUDY}/points/{next(iter(points_by_run('process')))}",
         drops=lambda wildcards: [f"results/{STUDY}/drop/{run}" for run in points_by_run("drop")],
         costs=lambda wildcards, input: f"--costs {input.costs}" if input.costs else "",
+        checks=checks_option,
         plan=Path(PLAN).stem,
         command=f"snakemake trade --config study={STUDY} plan={PLAN}",
         largest_step=lambda wildcards: safe_step(CASES[0]),
@@ -60,7 +61,7 @@ rule write_trade:
     shell:
         "dragchain trade --out $(dirname {output.page}) --plan {params.plan}"
         " --command '{params.command}' --largest-step {params.largest_step}"
-        " --reference {params.reference} {params.costs} --drops {params.drops}"
+        " --reference {params.reference} {params.costs} {params.checks} --drops {params.drops}"
         " -- {input.measures} > {log} 2>&1"
 
 
