@@ -86,21 +86,27 @@ def major_stress(stress: Floats) -> tuple[Floats, Floats]:
 
 
 def peters_chains(
-    frame: NetworkFrame, alpha_rad: float = ALPHA_RAD, stress_factor: float = STRESS_FACTOR
+    frame: NetworkFrame,
+    alpha_rad: float = ALPHA_RAD,
+    stress_factor: float = STRESS_FACTOR,
+    major: tuple[Floats, Floats] | None = None,
 ) -> list[list[int]]:
     """Return the quasi-linear force chains as ordered rows of the frame's balls.
 
     A ball is highly stressed when its major compressive principal stress is above `stress_factor`
     times the mean of all balls (1 in the paper). Two highly stressed balls in contact are linked when the line of their centres is within
     `alpha_rad` of the principal axis of both; at least `LEAST_BALLS` linked balls are a chain
-    (Peters et al. 2005). Ours is the rule for more than one candidate at the same end of a ball:
+    (Peters et al. 2005). `major` is what `major_stress` returns for the frame, if it is known
+    already. Ours is the rule for more than one candidate at the same end of a ball:
     candidates are taken by falling normal force, each end of an axis holds one link, and no link
     closes a ring, so that every chain is a path and no ball is in two chains. A chain starts at
     its higher end.
     """
     if not frame.normal_force.size:
         return []
-    first, second, end = _candidates(frame, alpha_rad, stress_factor)
+    stress, axis = major_stress(ball_stress(frame)) if major is None else major
+    high = stress > stress_factor * stress.mean()
+    first, second, end = _candidates(frame, alpha_rad, high, axis)
     links: dict[int, dict[int, int]] = {}
     leader = np.arange(frame.ball_id.size)
     for i, j, end_i, end_j in zip(
@@ -116,11 +122,9 @@ def peters_chains(
 
 
 def _candidates(
-    frame: NetworkFrame, alpha_rad: float, stress_factor: float
+    frame: NetworkFrame, alpha_rad: float, high: NDArray[np.bool_], axis: Floats
 ) -> tuple[Ints, Ints, NDArray[np.bool_]]:
     """Return the linkable pairs by falling force, and at which end of either axis they link."""
-    stress, axis = major_stress(ball_stress(frame))
-    high = stress > stress_factor * stress.mean()
     inner = np.flatnonzero(frame.between_balls())
     inner = inner[high[frame.a[inner]] & high[frame.b[inner]]]
     inner = inner[np.argsort(-frame.normal_force[inner], kind="stable")]
@@ -318,10 +322,11 @@ def chain_table(
 def _peters_rows(
     frame: NetworkFrame, alpha_rad: float, stress_factor: float
 ) -> Iterator[dict[str, object]]:
-    chains = peters_chains(frame, alpha_rad, stress_factor)
+    major = major_stress(ball_stress(frame))
+    chains = peters_chains(frame, alpha_rad, stress_factor, major)
     if not chains:
         return
-    stress, _ = major_stress(ball_stress(frame))
+    stress, _ = major
     force_of = _force_between(frame)
     on_bowl = set(frame.a[(frame.other == FLOOR) | (frame.other == SIDE)].tolist())
     for chain in chains:

@@ -309,8 +309,8 @@ def _network(
     axes.grid(False)
     axes.set(xlabel="x in mm", ylabel=f"{view[1]} in mm", xlim=extent[:2], ylim=extent[2:])
     pick = [0, 1] if view == "xy" else [0, 2]
-    _mark_chain(axes, shown, pick)
-    _mark_motion(axes, shown, view)
+    mark_chain(axes, shown, pick)
+    mark_motion(axes, shown, view)
     largest = float(shown.frame.normal_force.max(initial=0.0))
     scale = ScalarMappable(Normalize(0.0, largest), scene.colour_map())
     bar = figure.colorbar(scale, ax=axes, shrink=0.8, pad=0.02)
@@ -333,7 +333,8 @@ def _chain_text(shown: scene.Scene) -> str:
     )
 
 
-def _mark_chain(axes: Axes, shown: scene.Scene, pick: Sequence[int]) -> None:
+def mark_chain(axes: Axes, shown: scene.Scene, pick: Sequence[int]) -> None:
+    """Outline the dominant path on axes in mm; `pick` names the two coordinates."""
     if shown.dominant is None:
         return
     frame, path = shown.frame, shown.dominant
@@ -349,7 +350,7 @@ def _mark_chain(axes: Axes, shown: scene.Scene, pick: Sequence[int]) -> None:
             )
 
 
-def _mark_motion(axes: Axes, shown: scene.Scene, view: scene.View) -> None:
+def mark_motion(axes: Axes, shown: scene.Scene, view: scene.View) -> None:
     """Draw the direction of motion where it hides little: behind the tool, or above the bed."""
     heading = shown.frame.heading_rad
     direction = np.array([np.cos(heading), np.sin(heading)]) * 11.0
