@@ -94,13 +94,13 @@ def peters_chains(
     """Return the quasi-linear force chains as ordered rows of the frame's balls.
 
     A ball is highly stressed when its major compressive principal stress is above `stress_factor`
-    times the mean of all balls (1 in the paper). Two highly stressed balls in contact are linked when the line of their centres is within
-    `alpha_rad` of the principal axis of both; at least `LEAST_BALLS` linked balls are a chain
-    (Peters et al. 2005). `major` is what `major_stress` returns for the frame, if it is known
-    already. Ours is the rule for more than one candidate at the same end of a ball:
-    candidates are taken by falling normal force, each end of an axis holds one link, and no link
-    closes a ring, so that every chain is a path and no ball is in two chains. A chain starts at
-    its higher end.
+    times the mean of all balls (1 in the paper). Two highly stressed balls in contact are linked
+    when the line of their centres is within `alpha_rad` of the principal axis of both; at least
+    `LEAST_BALLS` linked balls are a chain (Peters et al. 2005). Ours is the rule for more than one
+    candidate at the same end of a ball: candidates are taken by falling normal force, each end of
+    an axis holds one link, and no link closes a ring, so that every chain is a path and no ball is
+    in two chains. A chain starts at its higher end. `major` is what `major_stress` returns for the
+    frame, if it is known already.
     """
     if not frame.normal_force.size:
         return []

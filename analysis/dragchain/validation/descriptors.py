@@ -34,9 +34,13 @@ from dragchain.chains import (
 from dragchain.forces import wrap_angle
 from dragchain.frames import FLOOR, ROD, SIDE, Floats, Ints, NetworkFrame, read_frames
 
-FORCE_FACTORS = (0.5, 1.0, 1.5, 2.0)
+FORCE_FACTORS = (0.5, 1.0, 1.5, 2.0, 10.0)
+"""Times the mean normal force. Up to 2 a path is there almost always; at 10 only at times."""
+
 ANGLES_DEG = (30.0, 45.0, 60.0)
-STRESS_FACTORS = (0.5, 1.0, 1.5)
+STRESS_FACTORS = (0.5, 1.0, 1.5, 6.0)
+"""Times the mean stress: 6 for the same reason."""
+
 SAME_CHAIN = 0.5
 """Two chains of frames in a row are one if they share at least this part of their balls."""
 
@@ -169,8 +173,11 @@ def peters_chain(
 
 
 def _from_rod(
-    frame: NetworkFrame, chain: Sequence[int], pushed: set[int], contact_of: dict[tuple[int, int], int]
-) -> Chain:  # fmt: skip
+    frame: NetworkFrame,
+    chain: Sequence[int],
+    pushed: set[int],
+    contact_of: dict[tuple[int, int], int],
+) -> Chain:
     """List a chain from the end that is nearer to one of its balls on the rod."""
     at = [place for place, ball in enumerate(chain) if ball in pushed]
     balls = tuple(chain if at[0] <= len(chain) - 1 - at[-1] else reversed(chain))
@@ -389,8 +396,8 @@ def lives(ball_ids: Sequence[Sequence[int]], time_s: Floats) -> Lives:
 
     return Lives(
         life=life,
-        life_s=spread(frames[life] * interval),
-        age_s=spread((place - first[life]) * interval),
-        left_s=spread((last[life] - place) * interval),
+        life_s=spread(interval * frames[life].astype(np.float64)),
+        age_s=spread(interval * (place - first[life]).astype(np.float64)),
+        left_s=spread(interval * (last[life] - place).astype(np.float64)),
         cut=there & ends[life],
     )

@@ -11,7 +11,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
@@ -21,7 +21,7 @@ from dragchain.case import Case, load_case
 from dragchain.chains import dominant_path, rod_paths
 from dragchain.collect import drag_start_s
 from dragchain.errors import TableError
-from dragchain.figures import BLUE, RED, STYLE, mark_chain, mark_motion, png
+from dragchain.figures import BLUE, CHAIN, RED, STYLE, mark_chain, mark_motion, png
 from dragchain.forces import find_drag_peaks, peak_separation_s, read_counted
 from dragchain.frames import Floats, Ints, NetworkFrame, read_frames, read_table
 from dragchain.scene import Look, Scene, View
@@ -32,13 +32,13 @@ QUIET_S = 0.2
 BEFORE_S, AFTER_S = 1.0, 1.0
 """What the film shows of the time before and after the peak."""
 
-PICTURES = 40
+PICTURES = 34
 """Largest number of pictures of the film."""
 
 PICTURE_MS = 150
 """How long each picture stands."""
 
-COLOURS = 96
+COLOURS = 64
 _PIXELS_PER_MM = 8.0
 _FILM_PIXELS_PER_MM = 5.0
 
@@ -134,15 +134,14 @@ def _side_by_side(
 ) -> Figure:
     largest = max(float(shown.frame.normal_force.max(initial=0.0)) for shown in pair)
     look = Look(_PIXELS_PER_MM, largest)
-    figure = Figure(figsize=(7.6, 6.2), layout="constrained")
-    grid = figure.add_gridspec(2, 2, height_ratios=(3.6, 1.5))
+    figure = Figure(figsize=(7.6, 5.5), layout="constrained")
+    grid = figure.add_gridspec(2, 2, height_ratios=(3.6, 1.3))
     axes = [figure.add_subplot(grid[0, column]) for column in (0, 1)]
     for name, place, shown in zip(("at the peak", "at the quiet moment"), axes, pair, strict=True):
         image, extent = scene.render(run_dir, case, shown, view, look)
         _network(place, shown, view, image, extent)
-        place.set_title(
-            f"{name}, {shown.process_time_s:.2f} s\n{_chain_words(shown)}", fontsize=8.5
-        )
+        words = f"{name}, process time {shown.process_time_s:.2f} s\n{_chain_words(shown)}"
+        place.set_title(words, fontsize=8.5)
     scale = ScalarMappable(Normalize(0.0, largest), scene.colour_map())
     bar = figure.colorbar(scale, ax=axes, shrink=0.75, pad=0.01, aspect=28)
     bar.set_label("normal force of a contact in N;\ncylinder radius in proportion", fontsize=8)
@@ -156,7 +155,7 @@ def _network(
     axes.imshow(image, extent=tuple(extent.tolist()), interpolation="antialiased")
     axes.grid(False)
     axes.set(xlabel="x in mm", ylabel=f"{view[1]} in mm", xlim=extent[:2], ylim=extent[2:])
-    mark_chain(axes, shown, [0, 1] if view == "xy" else [0, 2])
+    mark_chain(axes, shown, [0, 1] if view == "xy" else [0, 2], width=1.0, halo=1.8)
     mark_motion(axes, shown, view)
 
 
@@ -209,8 +208,8 @@ def _scenes(run_dir: Path, case: Case, moments: Moments) -> list[Scene]:
     )
     if not steps.size:
         raise TableError(
-            f"{run_dir}: no network frame within {BEFORE_S:g} s of the peak at {moments.peak_s:.2f} s;"
-            " write the outputs contacts and balls more often"
+            f"{run_dir}: no network frame is near the peak at {moments.peak_s:.2f} s of process "
+            "time; write the outputs contacts and balls more often"
         )
     frames = read_frames(run_dir, (int(steps[0]), int(steps[-1])))
     place = scene.tool_places(run_dir, case)
@@ -231,9 +230,10 @@ def _picture(
         run_dir, case, shown, "xy", Look(_FILM_PIXELS_PER_MM, largest_n, kept)
     )
     figure = Figure(figsize=(4.6, 6.0), dpi=100)
-    axes = figure.add_axes((0.13, 0.335, 0.845, 0.635))
+    axes = figure.add_axes((0.13, 0.315, 0.845, 0.62))
     _network(axes, shown, "xy", image, extent)
-    axes.set_title(f"process time {shown.process_time_s:.2f} s")
+    words = f"process time {shown.process_time_s:.2f} s\n{_chain_words(shown)}"
+    axes.set_title(words, fontsize=8.5)
     below = figure.add_axes((0.13, 0.075, 0.845, 0.17))
     near = np.abs(moments.time_s - moments.peak_s) <= 1.05 * max(BEFORE_S, AFTER_S)
     below.plot(moments.time_s[near], moments.resistance_n[near], color=BLUE, linewidth=0.8)
@@ -247,13 +247,23 @@ def _picture(
         return picture.convert("RGB")
 
 
+def _swatches() -> Image.Image:
+    """Return the colours of forces, bright and dark, and of marks, so that none is lost."""
+    bright = scene.colour_map()(np.linspace(0.0, 1.0, 16))[:, :3]
+    marks = np.array([to_rgb(colour) for colour in (BLUE, RED, CHAIN, "white")])
+    rows = [bright, 0.7 * bright, np.repeat(marks, 4, axis=0)]
+    return Image.fromarray(np.rint(255.0 * np.stack(rows)).astype(np.uint8))
+
+
 def animate(pictures: Sequence[Image.Image]) -> bytes:
     """Return the pictures, all of one size, as a GIF that repeats, with one palette for all."""
     some = pictures[:: max(1, len(pictures) // 6)]
     width, height = some[0].size
-    sheet = Image.new("RGB", (width, height * len(some)))
+    sheet = Image.new("RGB", (width, height * (len(some) + 1)))
     for at, picture in enumerate(some):
         sheet.paste(picture, (0, at * height))
+    swatches = _swatches().resize((width, height), Image.Resampling.NEAREST)
+    sheet.paste(swatches, (0, height * len(some)))
     palette = sheet.quantize(COLOURS)
     flat = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     file = BytesIO()

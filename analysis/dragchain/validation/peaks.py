@@ -18,7 +18,7 @@ import pandas as pd
 from scipy.signal import find_peaks
 from scipy.stats import CensoredData, ecdf
 
-from dragchain.case import load_case
+from dragchain.case import Circle, load_case
 from dragchain.collect import drag_start_s
 from dragchain.errors import TableError
 from dragchain.findings import finite, near_any
@@ -138,15 +138,15 @@ STATEMENTS = {
 }
 
 RULE = (
-    f"A statement is judged by its tests at the default thresholds that hold no force on the rod, "
-    f"for a definition without such a test by those in which it only decides which chain counts. "
-    f"Supported: one of them at least has a p-value below {LEVEL:g} after Holm's adjustment for all "
-    f"the claims' tests, and the sign claimed at most thresholds; a statement about most peaks or "
-    f"most chains must also find a share above one half. Proved: all of them have, at every "
-    f"threshold, and the 95 % intervals over the fills exclude zero effect. Refuted: none has, and "
-    f"each one's interval over the fills lies below {SMALL:g} standard deviations (for a share, "
-    f"below one half, for the orientation below chance). Not supported: anything else. A ratio with the drag below it can support a "
-    f"statement, for it errs against the claim, but not refute it."
+    "A statement is judged by its tests at the default thresholds that hold no force on the rod; "
+    "for a definition without such a test, by those in which it only decides which chain counts. "
+    f"Supported: at least one has a p-value below {LEVEL:g} after Holm's adjustment for all tests "
+    "of claims, and the sign claimed at most thresholds; a statement about most peaks or most "
+    "chains must also find a share above one half. Proved: all of them have, at every threshold, "
+    "and their 95 % intervals over the fills exclude a zero effect. Refuted: none has, and the "
+    f"interval over the fills of each lies below {SMALL:g} standard deviations (of a share, below "
+    "one half; of the orientation, below chance). Not supported: anything else. A ratio with the "
+    "drag below the line can support a statement, for it errs against the claim, but not refute it."
 )
 
 
@@ -169,6 +169,9 @@ class RunSeries:
         ``frame`` (the nearest), ``process_time_s``, ``drag_n``, ``prominence_n``, ``distinct``.
     separation_s : float
         Least time between peaks.
+    sense : int
+        +1 if the rod runs counter-clockwise, so that the bowl's side is on its right, -1 the other
+        way round, 0 on a line.
     columns : sequence of mapping
         For each of `SETTINGS`, the numbers of `frame_table` by name, (N,) each.
     """
@@ -179,6 +182,7 @@ class RunSeries:
     resistance_n: Floats
     peaks: pd.DataFrame
     separation_s: float
+    sense: int
     columns: tuple[Mapping[str, Floats], ...]
 
     @property
@@ -224,7 +228,8 @@ def read_run(run_dir: Path) -> RunSeries:
     )
     label = case.case or case.run
     resistance = -np.interp(time_s, sample_s, drag)
-    return RunSeries(case.run, label, time_s, resistance, peaks, separation, columns)
+    sense = case.motion.sense if isinstance(case.motion, Circle) else 0
+    return RunSeries(case.run, label, time_s, resistance, peaks, separation, sense, columns)
 
 
 def peak_table(
@@ -419,15 +424,39 @@ def _directions(runs: Sequence[RunSeries], at: int, rule: str) -> list[Floats]:
     for run in runs:
         azimuth = run.columns[at]["azimuth_rad"].astype(np.float64)
         window = run.window(-REACH_S, REACH_S)
-        parts = [
-            shifted_means(turn(azimuth), run.events(rule), window) for turn in (np.cos, np.sin)
-        ]
+        events = run.events(rule)
+        parts = [shifted_means(turn(azimuth), events, window) for turn in (np.cos, np.sin)]
         found.append(np.stack(parts, axis=1))
     return found
 
 
 def _resultant(means: Floats) -> Floats:
     return np.asarray(np.hypot(means[..., 0], means[..., 1]))
+
+
+def ranks(runs: Sequence[RunSeries], at: int, rule: str = "all") -> Found:
+    """Tell how the chain of every peak's frame ranks among the chains of all frames of its run.
+
+    Returns
+    -------
+    dict
+        ``rank``: of each peak, the share of the run's frames with a weaker chain (weakest contact
+        over the mean); ``mean``, ``above_half`` and ``far_above``: their mean and the shares of
+        peaks above 1/2 and above `FAR_ABOVE`, by chance 1/2, 1/2 and 1 - `FAR_ABOVE`.
+    """
+    each = [rank for run in runs for rank in chain_ranks(run, at)[run.events(rule)].tolist()]
+    return {
+        "rank": each,
+        "mean": finite(_mean(each)),
+        "above_half": finite(_mean([float(rank > 0.5) for rank in each])),
+        "far_above": finite(_mean([float(rank > FAR_ABOVE) for rank in each])),
+    }
+
+
+def chain_ranks(run: RunSeries, at: int) -> Floats:
+    """Share of a run's frames with a weaker chain than each frame's, none being the weakest."""
+    strength = np.nan_to_num(run.columns[at]["bottleneck_over_mean"].astype(np.float64))
+    return np.asarray(np.searchsorted(np.sort(strength), strength) / len(strength))
 
 
 # --- lags, orientation, lives ----------------------------------------------------------------
@@ -440,20 +469,21 @@ def lag_curves(runs: Sequence[RunSeries], shifts: Ints, rule: str = "all") -> Fo
     -------
     dict
         ``lag_s``; ``drag``; and for every definition at its default thresholds and for
-        ``bottleneck_over_mean``, ``stands_out`` and ``exists``: ``mean``, ``by_run``, ``band`` (95 %
-        of shifted data sets stay within it at all lags), ``peak_lag_s`` (where the mean is
-        largest), ``above_s`` (from when to when around the peak it is above the band, None if it is
-        not at the peak).
+        ``bottleneck_over_mean``, ``stands_out`` and ``exists``: ``mean``, ``by_run``, ``band``
+        (95 % of shifted data sets stay within it at all lags), ``peak_lag_s`` (where the mean is
+        largest), ``above_s`` (from when to when around the peak it is above the band, None if it
+        is not at the peak).
     """
     interval_s = min(run.interval_s for run in runs)
     lags = np.arange(-round(LAG_S / interval_s), round(LAG_S / interval_s) + 1)
+    lag_s = interval_s * lags.astype(np.float64)
     some = shifts[:2000]
     alone = Window(0, 0)
     drag = [
         standardised(run.resistance_n, shifted_means(run.resistance_n, run.events(rule), alone))
         for run in runs
     ]
-    found: Found = {"lag_s": (lags * interval_s).tolist(), "drag": _curve(drag, lags)["mean"]}
+    found: Found = {"lag_s": lag_s.tolist(), "drag": _curve(drag, lags)["mean"]}
     for at, setting in enumerate(SETTINGS):
         if not setting.default:
             continue
@@ -469,7 +499,7 @@ def lag_curves(runs: Sequence[RunSeries], shifts: Ints, rule: str = "all") -> Fo
             width = band(by_shift, some, lags)
             found[setting.definition][name] = curve | {
                 "band": finite(width),
-                **_reach_of(np.array(curve["mean"], dtype=np.float64), lags * interval_s, width),
+                **_reach_of(np.array(curve["mean"], dtype=np.float64), lag_s, width),
             }
     return found
 
@@ -682,7 +712,7 @@ def peak_rows(runs: Sequence[RunSeries]) -> pd.DataFrame:
     for run in runs:
         for at, setting in enumerate(SETTINGS):
             columns = run.columns[at]
-            strength = np.nan_to_num(columns["bottleneck_over_mean"].astype(np.float64))
+            rank = chain_ranks(run, at)
             for number, peak in enumerate(run.peaks.to_dict("records")):
                 frame = int(peak["frame"])
                 rows.append(
@@ -690,7 +720,7 @@ def peak_rows(runs: Sequence[RunSeries]) -> pd.DataFrame:
                     | {str(key): value for key, value in peak.items()}
                     | asdict(setting)
                     | {"thresholds": setting.label, "default": setting.default}
-                    | {"rank": float((strength < strength[frame]).mean())}
+                    | {"rank": float(rank[frame])}
                     | {name: values[frame] for name, values in columns.items()}
                 )
     return pd.DataFrame(rows)
@@ -736,6 +766,10 @@ def study_of(runs: Sequence[RunSeries]) -> Study:
         "statements": judge(tests),
         "tests": _json_rows(tests),
         "lags": lag_curves(runs, shifts),
+        "ranks": {
+            rule: {name: ranks(runs, at, rule) for name, at in defaults.items()}
+            for rule in PEAK_RULES
+        },
         "geometry": {name: geometry(runs, at) for name, at in defaults.items()},
         "lifetimes": {name: lifetimes(runs, at) for name, at in defaults.items()},
     }  # fmt: skip
@@ -758,6 +792,7 @@ def _run_row(run: RunSeries) -> Found:
         "peaks": len(run.peaks),
         "distinct_peaks": int(run.peaks["distinct"].sum()),
         "separation_s": run.separation_s,
+        "sense": run.sense,
     }
 
 
