@@ -359,8 +359,8 @@ def mark_motion(axes: Axes, shown: scene.Scene, view: scene.View) -> None:
     tool = shown.tool_m[:2] * 1e3
     if view == "xy":
         start, end = tool - 1.6 * direction, tool - 0.6 * direction
-        away = 12.0 * np.array([-np.sin(heading), np.cos(heading)])  # left of the motion
-        away *= -1.0 if away[1] > 0.0 else 1.0
+        away = 12.0 * np.array([-np.sin(heading), np.cos(heading)])
+        away *= -1.0 if away @ tool > 0.0 else 1.0  # towards the middle of the bowl
     else:
         away = np.array([0.0, -11.0])
         level = axes.get_ylim()[1] - 3.0
@@ -371,8 +371,9 @@ def mark_motion(axes: Axes, shown: scene.Scene, view: scene.View) -> None:
     axes.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=arrow)
     side = "center" if abs(away[0]) < 6.0 else "left" if away[0] > 0.0 else "right"
     label = axes.annotate(
-        "motion", tuple(start), tuple(away), textcoords="offset points", ha=side, weight="bold"
-    )
+        "motion", tuple(start), tuple(away), textcoords="offset points", ha=side, va="center",
+        weight="bold",
+    )  # fmt: skip
     label.set_path_effects([withStroke(linewidth=3, foreground="white")])
 
 

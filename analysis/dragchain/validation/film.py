@@ -33,12 +33,12 @@ BEFORE_S, AFTER_S = 1.0, 1.0
 """What the film shows of the time before and after the peak."""
 
 PICTURES = 34
-"""Largest number of pictures of the film."""
+"""Number of pictures of the film, at the most."""
 
 PICTURE_MS = 150
 """How long each picture stands."""
 
-COLOURS = 64
+COLOURS = 80
 _PIXELS_PER_MM = 8.0
 _FILM_PIXELS_PER_MM = 5.0
 
@@ -155,7 +155,7 @@ def _network(
     axes.imshow(image, extent=tuple(extent.tolist()), interpolation="antialiased")
     axes.grid(False)
     axes.set(xlabel="x in mm", ylabel=f"{view[1]} in mm", xlim=extent[:2], ylim=extent[2:])
-    mark_chain(axes, shown, [0, 1] if view == "xy" else [0, 2], width=1.0, halo=1.8)
+    mark_chain(axes, shown, [0, 1] if view == "xy" else [0, 2], width=1.2, halo=2.0)
     mark_motion(axes, shown, view)
 
 
@@ -168,12 +168,12 @@ def _chain_words(shown: Scene) -> str:
 
 def _trace(axes: Axes, moments: Moments, marked_s: Sequence[float]) -> None:
     axes.plot(moments.time_s, moments.resistance_n, color=BLUE, linewidth=0.7)
-    for name, at in zip(("peak", "quiet"), marked_s, strict=True):
+    for name, at, lift in zip(("peak", "quiet"), marked_s, (4, -9), strict=True):
         level = float(np.interp(at, moments.time_s, moments.resistance_n))
         axes.axvline(at, color=RED, linewidth=0.8, linestyle=":")
         axes.plot([at], [level], "o", color=RED, markersize=5)
         axes.annotate(
-            name, (at, level), (5, 4), textcoords="offset points", color=RED, weight="bold"
+            name, (at, level), (5, lift), textcoords="offset points", color=RED, weight="bold"
         )
     axes.set(xlabel="process time in s", ylabel="resistance (minus\nthe drag) in N")
     axes.margins(x=0.01, y=0.15)
@@ -191,10 +191,13 @@ def film(run_dir: Path, case: Case, moments: Moments) -> bytes:
 
 
 def film_steps(steps: Ints, process_s: Floats, peak_s: float) -> Ints:
-    """Choose evenly spaced frames around the peak, `PICTURES` at the most, in order."""
+    """Choose evenly spaced frames around the peak, that nearest to it among them."""
     inside = np.flatnonzero((process_s >= peak_s - BEFORE_S) & (process_s <= peak_s + AFTER_S))
+    if not inside.size:
+        return np.array([], dtype=np.int64)
     every = max(1, -(-len(inside) // PICTURES))
-    return np.asarray(steps[inside[::every]])
+    nearest = int(np.abs(process_s[inside] - peak_s).argmin())
+    return np.asarray(steps[inside[nearest % every :: every]])
 
 
 def _scenes(run_dir: Path, case: Case, moments: Moments) -> list[Scene]:
@@ -230,11 +233,11 @@ def _picture(
         run_dir, case, shown, "xy", Look(_FILM_PIXELS_PER_MM, largest_n, kept)
     )
     figure = Figure(figsize=(4.6, 6.0), dpi=100)
-    axes = figure.add_axes((0.13, 0.315, 0.845, 0.62))
+    axes = figure.add_axes((0.13, 0.32, 0.845, 0.615))
     _network(axes, shown, "xy", image, extent)
     words = f"process time {shown.process_time_s:.2f} s\n{_chain_words(shown)}"
     axes.set_title(words, fontsize=8.5)
-    below = figure.add_axes((0.13, 0.075, 0.845, 0.17))
+    below = figure.add_axes((0.13, 0.075, 0.845, 0.155))
     near = np.abs(moments.time_s - moments.peak_s) <= 1.05 * max(BEFORE_S, AFTER_S)
     below.plot(moments.time_s[near], moments.resistance_n[near], color=BLUE, linewidth=0.8)
     level = float(np.interp(shown.process_time_s, moments.time_s, moments.resistance_n))
@@ -251,7 +254,8 @@ def _swatches() -> Image.Image:
     """Return the colours of forces, bright and dark, and of marks, so that none is lost."""
     bright = scene.colour_map()(np.linspace(0.0, 1.0, 16))[:, :3]
     marks = np.array([to_rgb(colour) for colour in (BLUE, RED, CHAIN, "white")])
-    rows = [bright, 0.7 * bright, np.repeat(marks, 4, axis=0)]
+    greys = np.linspace(0.0, 1.0, 16)[:, None].repeat(3, axis=1)
+    rows = [bright, 0.7 * bright, np.repeat(marks, 4, axis=0), greys]
     return Image.fromarray(np.rint(255.0 * np.stack(rows)).astype(np.uint8))
 
 

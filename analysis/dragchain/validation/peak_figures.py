@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from dragchain.figures import BLUE, GREEN, GREY, ORANGE, RED
 from dragchain.frames import Floats
@@ -19,7 +20,7 @@ from dragchain.validation.peaks import DESCRIPTORS, Found, RunSeries, Study
 COLOURS = {"rod_path": BLUE, "free_path": GREEN, "peters": RED, "peters_rod": ORANGE}
 FAMILIES = {"paths": ("free_path", "rod_path"), "Peters' chains": ("peters", "peters_rod")}
 LAGGED = {
-    "bottleneck_over_mean": "weakest contact\nover the mean contact",
+    "bottleneck_over_mean": "weakest contact over\nthe mean contact",
     "stands_out": "weakest behind the rod\nover the shell's rms",
 }
 FOREST = tuple(one for one in DESCRIPTORS if one.statement in ("presence", "dominance"))
@@ -42,8 +43,8 @@ def _around_peaks(lags: Found) -> Figure:
     for row, (name, label) in zip(grid, LAGGED.items(), strict=True):
         for axes, (family, definitions) in zip(row, FAMILIES.items(), strict=True):
             _lag_panel(axes, lag, lags, name, definitions)
-            axes.set_title(f"{family}: {label.replace(chr(10), ' ')}", fontsize=8.5)
-        row[0].set_ylabel("deviation from the run's mean\nin standard deviations")
+            axes.set_title(family)
+        row[0].set_ylabel(f"{label},\nin standard deviations", fontsize=8.5)
     for axes in grid[-1]:
         axes.set_xlabel("time after the peak in s")
     handles = {
@@ -89,7 +90,7 @@ def _effects(tests: pd.DataFrame) -> Figure:
             ].iloc[0]
             _effect(axes, -place - _gap(place), row)
         axes.axvline(0.0, color="black", linewidth=0.8)
-        axes.set_title(fill(descriptor.label, 20), fontsize=7.5)
+        axes.set_title(fill(descriptor.label, 16), fontsize=7.5)
         axes.tick_params(axis="x", labelsize=7.5)
         axes.grid(axis="y", visible=False)
     places = [-place - _gap(place) for place in range(len(SETTINGS))]
@@ -100,11 +101,11 @@ def _effects(tests: pd.DataFrame) -> Figure:
     for definition, colour in COLOURS.items():
         grid[0].plot([], [], "o", color=colour, label=DEFINITIONS[definition])
     grid[0].plot([], [], "o", color=GREY, mfc="white", label="unadjusted p 0.05 or more")
-    figure.supxlabel(
+    figure.suptitle(
         "at peaks less all times, in standard deviations of the run; "
-        "bars: 95 % interval over the fills; *: default",
-        fontsize=8.5,
-    )
+        "bars: 95 % interval over the fills; *: default thresholds",
+        fontsize=8.5, x=0.02, ha="left",
+    )  # fmt: skip
     handles, labels = grid[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower left", ncols=3)
     return figure
@@ -162,6 +163,7 @@ def _rose(axes: Any, runs: tuple[RunSeries, ...], at: int) -> None:
     axes.set_thetagrids(np.arange(0, 360, 90), ["ahead", "left", "behind", "right"], fontsize=7.5)
     axes.set_rlabel_position(157.5)
     axes.tick_params(axis="y", labelsize=7)
+    axes.yaxis.set_major_locator(MaxNLocator(3))
     axes.yaxis.set_major_formatter("{x:.0f} %")
 
 
@@ -183,7 +185,7 @@ def _altitude(axes: Axes, runs: tuple[RunSeries, ...], at: int) -> None:
 def _survival(axes: Axes, lifetime: Found) -> None:
     survival = lifetime["survival"]
     axes.step([0.0, *survival["time_s"]], [1.0, *survival["share"]], where="post", color=BLUE)
-    axes.set(xlabel="age in s", ylabel="share of chains that last longer", yscale="log")
+    axes.set(xlabel="age in s", ylabel="share that lasts longer", yscale="log")
     median = lifetime["median_s"]
     words = "unknown" if median is None else f"{median * 1e3:.0f} ms"
     axes.set_title(

@@ -25,6 +25,7 @@ from dragchain.findings import finite, near_any
 from dragchain.forces import find_drag_peaks, peak_separation_s, read_counted
 from dragchain.frames import Floats, Ints
 from dragchain.validation.descriptors import DEFINITIONS, SETTINGS, Setting, frame_table
+from dragchain.validation.peak_words import answer
 from dragchain.validation.shifts import (
     ShiftTest,
     Window,
@@ -773,6 +774,7 @@ def study_of(runs: Sequence[RunSeries]) -> Study:
         "geometry": {name: geometry(runs, at) for name, at in defaults.items()},
         "lifetimes": {name: lifetimes(runs, at) for name, at in defaults.items()},
     }  # fmt: skip
+    found["answer"] = answer(found)
     return Study(tuple(runs), tests, found)
 
 
