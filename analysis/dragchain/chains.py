@@ -175,10 +175,11 @@ def rod_paths(
     fewest contacts, then the one with the largest sum of forces. The widest path of a graph runs
     along its maximum spanning tree (Hu 1961, Oper. Res. 9, 898-900); the tie rule is ours.
 
-    With `with_rod` false the force of a rod contact plays no part: a path leads from every ball
-    that the rod pushes, and its bottleneck is that of the contacts behind that ball.
+    With `with_rod` false the forces of rod contacts play no part, not even in the mean: a path
+    leads from every ball that the rod pushes, and its bottleneck is that of the contacts behind
+    that ball.
     """
-    strong = np.flatnonzero(frame.normal_force > threshold * frame.mean_force_n())
+    strong = np.flatnonzero(frame.normal_force > threshold * frame.mean_force_n(with_rod=with_rod))
     net = _strong_net(frame, strong)
     width = _widths(net)
     pushed = strong if with_rod else np.flatnonzero(frame.normal_force > 0.0)

@@ -6,7 +6,7 @@ Of every frame one chain counts for each setting: the one with the strongest wea
 - ``rod_path``: as in `dragchain.chains`, from a strong rod contact through strong contacts to the
   bowl; the rod contact counts in the bottleneck.
 - ``free_path``: the same path search in which the forces on the rod play no part, neither for the
-  choice of the path nor for its bottleneck: from any ball that the rod pushes.
+  choice of the path nor for its bottleneck nor in the mean: from any ball that the rod pushes.
 - ``peters``: a chain by Peters et al. (2005) with a ball on the rod and a ball on the bowl.
 - ``peters_rod``: such a chain with a ball on the rod, wherever it ends.
 """
@@ -206,8 +206,8 @@ class Around:
 
     Attributes
     ----------
-    mean_n : float
-        Mean normal force of all contacts.
+    mean_n, free_mean_n : float
+        Mean normal force of all contacts, and of those that are not the rod's.
     resistance_n : float
         Force of the rod on the balls along its motion.
     shell_n : float
@@ -215,6 +215,7 @@ class Around:
     """
 
     mean_n: float
+    free_mean_n: float
     resistance_n: float
     shell_n: float
 
@@ -229,6 +230,7 @@ def around_rod(frame: NetworkFrame) -> Around:
     shell = frame.normal_force[inner & (pushed[frame.a] | pushed[frame.b])]
     return Around(
         frame.mean_force_n(),
+        frame.mean_force_n(with_rod=False),
         float(push.sum()),
         float(np.sqrt(np.mean(shell**2))) if shell.size else np.nan,
     )
@@ -238,12 +240,18 @@ def _heading(frame: NetworkFrame) -> Floats:
     return np.array([np.cos(frame.heading_rad), np.sin(frame.heading_rad), 0.0])
 
 
-def describe(frame: NetworkFrame, around: Around, chain: Chain | None) -> dict[str, object]:
-    """Return the numbers of a frame's dominant chain; NaN, and no balls, if there is none."""
+def describe(
+    frame: NetworkFrame, around: Around, chain: Chain | None, *, with_rod: bool = True
+) -> dict[str, object]:
+    """Return the numbers of a frame's dominant chain; NaN, and no balls, if there is none.
+
+    With `with_rod` false the mean force leaves out the contacts of the rod.
+    """
     if chain is None:
         return dict.fromkeys(_NUMBERS, np.nan) | {"exists": 0.0, "ball_ids": []}
     balls = list(chain.balls)
     forces = frame.normal_force
+    mean = around.mean_n if with_rod else around.free_mean_n
     weakest = float(forces[chain.contacts].min())
     outer = float(forces[chain.outer].min()) if chain.outer.size else np.nan
     push = frame.force[(frame.other == ROD) & np.isin(frame.a, balls)] @ _heading(frame)
@@ -256,8 +264,8 @@ def describe(frame: NetworkFrame, around: Around, chain: Chain | None) -> dict[s
         "exists": 1.0,
         "ball_ids": frame.ball_id[balls].tolist(),
         "bottleneck_n": weakest,
-        "bottleneck_over_mean": weakest / around.mean_n,
-        "outer_over_mean": outer / around.mean_n,
+        "bottleneck_over_mean": weakest / mean,
+        "outer_over_mean": outer / mean,
         "bottleneck_over_drag": weakest / resistance,
         "rod_share": float(push.sum()) / resistance,
         "stands_out": float(forces[chain.behind].min()) / around.shell_n,
@@ -280,30 +288,38 @@ _NUMBERS = (
 def frame_rows(frame: NetworkFrame) -> Iterator[dict[str, object]]:
     """Yield the numbers of a frame's dominant chain for every one of `SETTINGS`, in their order."""
     around = around_rod(frame)
-    paths = {name: path_chain(frame, with_rod=name == "rod_path") for name in
-             ("rod_path", "free_path")}  # fmt: skip
-    described = {name: describe(frame, around, chain) for name, chain in paths.items()}
-    none = describe(frame, around, None)
+    rows = [*_path_rows(frame, around), *_peters_rows(frame, around)]
+    for at, row in enumerate(rows):
+        moment = {"setting": at, "step": frame.step, "time_s": frame.time_s}
+        yield moment | {"resistance_n": around.resistance_n} | row
+
+
+def _path_rows(frame: NetworkFrame, around: Around) -> Iterator[dict[str, object]]:
+    """Search once for each definition: the threshold only decides whether the path counts."""
+    for definition, mean in (("rod_path", around.mean_n), ("free_path", around.free_mean_n)):
+        with_rod = definition == "rod_path"
+        chain = path_chain(frame, with_rod=with_rod)
+        row = describe(frame, around, chain, with_rod=with_rod)
+        weakest = 0.0 if chain is None else float(frame.normal_force[chain.contacts].min())
+        for setting in SETTINGS:
+            if setting.definition == definition:
+                kept = weakest > setting.force_factor * mean
+                yield row if kept else describe(frame, around, None)
+
+
+def _peters_rows(frame: NetworkFrame, around: Around) -> Iterator[dict[str, object]]:
     contact_of = _contact_of(frame)
     major = major_stress(ball_stress(frame))
     found: dict[tuple[float, float], list[list[int]]] = {}
-    for at, setting in enumerate(SETTINGS):
+    for setting in SETTINGS:
         if setting.is_path:
-            row = described[setting.definition]
-            chain = paths[setting.definition]
-            least = setting.force_factor * around.mean_n
-            kept = chain is not None and frame.normal_force[chain.contacts].min() > least
-            row = row if kept else none
-        else:
-            key = (setting.alpha_rad, setting.stress_factor)
-            if key not in found:
-                found[key] = peters_chains(frame, *key, major)
-            on_bowl = setting.definition == "peters"
-            row = describe(
-                frame, around, peters_chain(frame, found[key], contact_of, on_bowl=on_bowl)
-            )
-        moment = {"setting": at, "step": frame.step, "time_s": frame.time_s}
-        yield moment | {"resistance_n": around.resistance_n} | row
+            continue
+        limits = (setting.alpha_rad, setting.stress_factor)
+        if limits not in found:
+            found[limits] = peters_chains(frame, *limits, major)
+        on_bowl = setting.definition == "peters"
+        chain = peters_chain(frame, found[limits], contact_of, on_bowl=on_bowl)
+        yield describe(frame, around, chain)
 
 
 def frame_table(run_dir: Path) -> pd.DataFrame:

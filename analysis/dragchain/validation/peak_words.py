@@ -53,15 +53,20 @@ def _short(found: Found) -> str:
     if most and only:
         return (
             "Do chains explain the peaks? Yes, as far as occurring together can: most peaks come "
-            "with a chain far above usual and most such chains with a peak."
+            "with a strong chain and most strong chains with a peak."
         )
-    limits = [] if most else [_limit(row_of(found, FREE, "coverage"), "peaks", "such a chain")]
-    limits += [] if only else [_limit(row_of(found, FREE, "reverse"), "such chains", "a peak")]
+    coverage, reverse = row_of(found, FREE, "coverage"), row_of(found, FREE, "reverse")
+    parts = [
+        f"{_percent(coverage['effect'])} of the peaks come with a strong chain"
+        if most
+        else _limit(coverage, "peaks", "a strong chain"),
+        f"{_percent(reverse['effect'])} of the strong chains come with a peak"
+        if only
+        else _limit(reverse, "strong chains", "a peak"),
+    ]
     return (
-        "Do chains explain the peaks? In part: at a peak the chain from rod to bowl is stronger "
-        "than at other times, by more than chance. But as to chains far above usual, "
-        + ", and ".join(limits)
-        + "."
+        "Do chains explain the peaks? In part. At a peak the chain from rod to bowl is stronger "
+        "than at other times, by more than chance; " + ", and ".join(parts) + "."
     )
 
 
@@ -109,11 +114,11 @@ def _coverage(found: Found) -> str:
     peaks, chains = row_of(found, FREE, "coverage"), row_of(found, FREE, "reverse")
     limits = found["limits"]
     return (
-        f"Of all peaks, {_percent(peaks['effect'])} have within {limits['near_s']:g} s a chain "
-        f"among the strongest {_percent(1.0 - limits['far_above'])} of the run's moments "
-        f"({_percent(peaks['expected'])} by chance, {_p(peaks['p_claimed'])}). Of such chains, "
-        f"{_percent(chains['effect'])} come with a peak ({_percent(chains['expected'])} by chance, "
-        f"{_p(chains['p_claimed'])})."
+        f"A strong chain (by {limits['strong_sds']:g} standard deviation) is within "
+        f"{limits['near_s']:g} s of {_percent(peaks['effect'])} of the peaks "
+        f"({_percent(peaks['expected'])} by chance, {_claimed(peaks)}). Of the strong chains, each "
+        f"at its strongest, {_percent(chains['effect'])} have a peak as near "
+        f"({_percent(chains['expected'])} by chance, {_claimed(chains)})."
     )
 
 
@@ -143,7 +148,7 @@ def _orientation(found: Found) -> str:
         f"At peaks the chains point {_side(angle, found)} on average "
         f"({_side(here['at_all_times']['azimuth_mean_rad'], found)} at all times). The resultant "
         f"of their azimuths is {_number(turned['effect'])} (1: all point one way), "
-        f"{_number(turned['expected'])} by chance, {_p(turned['p_claimed'])}. Their inclination "
+        f"{_number(turned['expected'])} by chance, {_claimed(turned)}. Their inclination "
         f"varies by {_degrees(here['at_peaks']['inclination_sd_rad']['value'])} (standard "
         f"deviation) about {_degrees(here['at_peaks']['inclination_mean_rad']['value'])}."
     )
@@ -166,8 +171,8 @@ def _altitude(found: Found) -> str:
     peak, usual = here["at_peaks"], here["at_all_times"]
     return (
         f"The altitude of the chains varies: at peaks it is {_height(peak['altitude_mean_m'])} mm "
-        f"with a standard deviation of {_height(peak['altitude_sd_m'])} mm, at all times "
-        f"{_height(usual['altitude_mean_m'])} and {_height(usual['altitude_sd_m'])} mm."
+        f"with a standard deviation of {_spread(peak['altitude_sd_m'])} mm, at all times "
+        f"{_height(usual['altitude_mean_m'])} and {_spread(usual['altitude_sd_m'])} mm."
     )
 
 
@@ -190,8 +195,12 @@ def _effect(row: Found) -> str:
         return "no number, as it never varies"
     known = row["low"] is not None
     span = f" ({row['low']:+.2f} to {row['high']:+.2f} over the fills)" if known else ""
+    return f"{row['effect']:+.2f} standard deviations{span}, {_claimed(row)}"
+
+
+def _claimed(row: Found) -> str:
     holm = "" if row["p_holm"] is None else f", {_p(row['p_holm'])} after Holm"
-    return f"{row['effect']:+.2f} standard deviations{span}, {_p(row['p_claimed'])}{holm}"
+    return _p(row["p_claimed"]) + holm
 
 
 def _p(value: float | None) -> str:
@@ -222,3 +231,7 @@ def _height(row: Found) -> str:
     if row["low"] is None:
         return f"{1e3 * row['value']:.1f}"
     return f"{1e3 * row['value']:.1f} ({1e3 * row['low']:.1f} to {1e3 * row['high']:.1f})"
+
+
+def _spread(row: Found) -> str:
+    return "no" if row["value"] is None else f"{1e3 * row['value']:.1f}"

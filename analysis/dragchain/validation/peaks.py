@@ -49,11 +49,15 @@ ASIDE_S = (0.05, 0.15)
 LAG_S = 0.5
 """Event-triggered averages reach this far before and after a peak."""
 
-NEAR_S = 0.1
+NEAR_S = 0.05
 """A strong chain within this time of a peak counts as together with it."""
 
-FAR_ABOVE = 0.95
-"""Quantile of a run's bottlenecks above which a chain is far above usual."""
+STRONG_SDS = 1.0
+"""A chain is strong if its weakest contact over the frame's mean is this many standard deviations
+above the mean of the run; frames without a chain count as 0."""
+
+TOP = 0.95
+"""Quantile of a run's chains above which one is among the strongest."""
 
 DISTINCT_SDS = 1.0
 """A peak is distinct if its resistance is this many standard deviations above the mean."""
@@ -132,8 +136,8 @@ STATEMENTS = {
     "the rod explains.",
     "order": "The chain builds up before the peak more than it lasts after it.",
     "breaking": "The chain of a peak ends sooner than the chain of any other time.",
-    "coverage": "Most peaks come with a chain that is far above usual.",
-    "reverse": "Most chains that are far above usual come with a peak.",
+    "coverage": "Most peaks come with a strong chain.",
+    "reverse": "Most strong chains come with a peak.",
     "orientation": "The chains of peaks share one orientation in the xy plane more than the chains "
     "of other times.",
 }
@@ -143,8 +147,9 @@ RULE = (
     "for a definition without such a test, by those in which it only decides which chain counts. "
     f"Supported: at least one has a p-value below {LEVEL:g} after Holm's adjustment for all tests "
     "of claims, and the sign claimed at most thresholds; a statement about most peaks or most "
-    "chains must also find a share above one half. Proved: all of them have, at every threshold, "
-    "and their 95 % intervals over the fills exclude a zero effect. Refuted: none has, and the "
+    "chains must also find a share above one half. Proved: all of them hold no "
+    "force on the rod and have it at every threshold, and their 95 % intervals over the fills "
+    "exclude a zero effect. Refuted: none has, and the "
     f"interval over the fills of each lies below {SMALL:g} standard deviations (of a share, below "
     "one half; of the orientation, below chance). Not supported: anything else. A ratio with the "
     "drag below the line can support a statement, for it errs against the claim, but not refute it."
@@ -295,6 +300,9 @@ def _head(setting: Setting, rule: str) -> Found:
 def _row(
     setting: Setting, rule: str, descriptor: Descriptor, test: ShiftTest, **more: float
 ) -> Found:
+    low, high = test.low, test.high
+    if descriptor.name in BOUNDED:
+        low, high = np.clip([low, high], 0.0, 1.0).tolist()
     claimed = {1: test.p_greater, -1: test.p_less, 0: test.p_two_sided}[descriptor.claim]
     return (
         _head(setting, rule)
@@ -305,8 +313,8 @@ def _row(
             "built_in": descriptor.built_in[setting.definition],
             "claim": descriptor.claim,
             "effect": test.value,
-            "low": test.low,
-            "high": test.high,
+            "low": low,
+            "high": high,
             "expected": 0.0,
             "p_claimed": claimed,
             "p_two_sided": test.p_two_sided,
@@ -354,21 +362,20 @@ def _event_rows(
     runs: Sequence[RunSeries], shifts: Ints, at: int, setting: Setting, rule: str
 ) -> list[Found]:
     """Test order, coverage, reverse and orientation."""
-    strong = [strong_chains(run, at) for run in runs]
     peaks = [run.events(rule) for run in runs]
-    coverage = shift_test(_together(runs, peaks, strong), shifts)
-    reverse = shift_test(_together(runs, strong, peaks), shifts)
+    strong = [strong_frames(run, at) for run in runs]
+    with_chain = _together(runs, peaks, strong)
+    with_peak = _together(runs, [strongest(run, at) for run in runs], peaks)
+    coverage, reverse = shift_test(with_chain, shifts), shift_test(with_peak, shifts)
     order = shift_test(_asymmetry(runs, at, rule), shifts)
     turned = shift_test(_directions(runs, at, rule), shifts, _resultant)
-    chance = {
-        "coverage": _mean([_mean(one) for one in _together(runs, peaks, strong)]),
-        "reverse": _mean([_mean(one) for one in _together(runs, strong, peaks)]),
-    }
     expected = float(_resultant(joint(_directions(runs, at, rule), shifts)).mean())
     return [
         _row(setting, rule, _ORDER, order),
-        _row(setting, rule, _COVERAGE, coverage, expected=chance["coverage"]),
-        _row(setting, rule, _REVERSE, reverse, expected=chance["reverse"]),
+        _row(
+            setting, rule, _COVERAGE, coverage, expected=_mean([_mean(one) for one in with_chain])
+        ),
+        _row(setting, rule, _REVERSE, reverse, expected=_mean([_mean(one) for one in with_peak])),
         _row(setting, rule, _ORIENTATION, turned, expected=expected),
     ]
 
@@ -378,20 +385,28 @@ _COVERAGE = Descriptor("coverage", "peaks with a strong chain", "coverage", 1, _
 _REVERSE = Descriptor("reverse", "strong chains with a peak", "reverse", 1, _HELD)
 _ORIENTATION = Descriptor("resultant", "resultant of the azimuth", "orientation", 1, _FREE)
 SHARES = ("coverage", "reverse")
+BOUNDED = (*SHARES, "resultant")
+"""Numbers between 0 and 1, so that an interval beyond is cut there."""
 
 
-def strong_chains(run: RunSeries, at: int) -> Ints:
-    """Frames at which the bottleneck has a maximum far above usual, no two close together.
+def _strength(run: RunSeries, at: int) -> Floats:
+    """Weakest contact of the chain over the frame's mean, 0 in a frame without a chain."""
+    return np.nan_to_num(run.columns[at]["bottleneck_over_mean"].astype(np.float64))
 
-    It is the weakest contact over the frame's mean; 0 in a frame without a chain.
-    """
-    strength = np.nan_to_num(run.columns[at]["bottleneck_over_mean"].astype(np.float64))
-    level = float(np.quantile(strength, FAR_ABOVE))
-    if level <= 0.0:
-        return np.array([], dtype=np.int64)
+
+def strong_frames(run: RunSeries, at: int) -> Ints:
+    """Frames with a strong chain (`STRONG_SDS`)."""
+    strength = _strength(run, at)
+    level = strength.mean() + STRONG_SDS * strength.std(ddof=1)
+    return np.flatnonzero(strength > level)
+
+
+def strongest(run: RunSeries, at: int) -> Ints:
+    """Frames at which a strong chain is strongest, no two closer than peaks may be."""
+    strength = _strength(run, at)
     apart = max(1.0, run.separation_s / run.interval_s)
-    index, _ = find_peaks(strength, height=level, distance=apart)
-    return index.astype(np.int64)
+    index, _ = find_peaks(strength, distance=apart)
+    return np.asarray(index[np.isin(index, strong_frames(run, at))], dtype=np.int64)
 
 
 def _together(
@@ -442,21 +457,21 @@ def ranks(runs: Sequence[RunSeries], at: int, rule: str = "all") -> Found:
     -------
     dict
         ``rank``: of each peak, the share of the run's frames with a weaker chain (weakest contact
-        over the mean); ``mean``, ``above_half`` and ``far_above``: their mean and the shares of
-        peaks above 1/2 and above `FAR_ABOVE`, by chance 1/2, 1/2 and 1 - `FAR_ABOVE`.
+        over the mean); ``mean``, ``above_half`` and ``top``: their mean and the shares of peaks
+        above 1/2 and above `TOP`, by chance 1/2, 1/2 and 1 - `TOP`.
     """
     each = [rank for run in runs for rank in chain_ranks(run, at)[run.events(rule)].tolist()]
     return {
         "rank": each,
         "mean": finite(_mean(each)),
         "above_half": finite(_mean([float(rank > 0.5) for rank in each])),
-        "far_above": finite(_mean([float(rank > FAR_ABOVE) for rank in each])),
+        "top": finite(_mean([float(rank > TOP) for rank in each])),
     }
 
 
 def chain_ranks(run: RunSeries, at: int) -> Floats:
     """Share of a run's frames with a weaker chain than each frame's, none being the weakest."""
-    strength = np.nan_to_num(run.columns[at]["bottleneck_over_mean"].astype(np.float64))
+    strength = _strength(run, at)
     return np.asarray(np.searchsorted(np.sort(strength), strength) / len(strength))
 
 
@@ -674,7 +689,8 @@ def _cell(tests: pd.DataFrame) -> Found:
     outcomes = [_outcome(row, judged) for _, row in main.iterrows()]
     full = [one for one, name in zip(outcomes, main["built_in"], strict=True) if name != "against"]
     if any(one["supports"] for one in outcomes):
-        verdict = "proved" if full and all(one["proves"] for one in full) else "supported"
+        proved = level == "none" and bool(full) and all(one["proves"] for one in full)
+        verdict = "proved" if proved else "supported"
     else:
         refuted = bool(full) and all(one["refutes"] for one in full)
         verdict = "refuted" if refuted else "not supported"
@@ -758,8 +774,13 @@ def study_of(runs: Sequence[RunSeries]) -> Study:
         "schema": SCHEMA,
         "runs": [_run_row(run) for run in runs],
         "limits": {
-            "reach_s": REACH_S, "aside_s": list(ASIDE_S), "near_s": NEAR_S,
-            "far_above": FAR_ABOVE, "distinct_sds": DISTINCT_SDS, "shifts": len(shifts),
+            "reach_s": REACH_S,
+            "aside_s": list(ASIDE_S),
+            "near_s": NEAR_S,
+            "strong_sds": STRONG_SDS,
+            "top": TOP,
+            "distinct_sds": DISTINCT_SDS,
+            "shifts": len(shifts),
             "family": int(tests["p_holm"].notna().sum()),
         },
         "rule": RULE,
