@@ -243,7 +243,8 @@ def _picture(
     level = float(np.interp(shown.process_time_s, moments.time_s, moments.resistance_n))
     below.axvline(shown.process_time_s, color=RED, linewidth=0.8)
     below.plot([shown.process_time_s], [level], "o", color=RED, markersize=6)
-    below.set(xlabel="process time in s", ylabel="resistance in N")
+    below.set(xlabel="process time in s")
+    below.set_ylabel("resistance in N", fontsize=8)
     drawn = BytesIO()
     figure.savefig(drawn, format="png", dpi=100)
     with Image.open(drawn) as picture:

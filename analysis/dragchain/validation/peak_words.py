@@ -47,12 +47,12 @@ def _short(found: Found) -> str:
     only = _verdict(found, "reverse") in HOLDS
     if not stronger:
         return (
-            "Do chains explain the peaks? These runs do not show it: that the chain from rod to "
+            "These runs do not show it: that the chain from rod to "
             "bowl is stronger at a peak than at other times could not be told from chance."
         )
     if most and only:
         return (
-            "Do chains explain the peaks? Yes, as far as occurring together can: most peaks come "
+            "Yes, as far as occurring together can: most peaks come "
             "with a strong chain and most strong chains with a peak."
         )
     coverage, reverse = row_of(found, FREE, "coverage"), row_of(found, FREE, "reverse")
@@ -65,7 +65,7 @@ def _short(found: Found) -> str:
         else _limit(reverse, "strong chains", "a peak"),
     ]
     return (
-        "Do chains explain the peaks? In part. At a peak the chain from rod to bowl is stronger "
+        "In part. At a peak the chain from rod to bowl is stronger "
         "than at other times, by more than chance; " + ", and ".join(parts) + "."
     )
 
@@ -103,8 +103,8 @@ def _dominance(found: Found) -> str:
     share = row_of(found, "rod_path", "rod_share")
     return (
         "Does the chain stand out, or do all forces around the rod rise together? Over the root "
-        f"mean square force of the balls on the rod its weakest contact differs by {_effect(row)}; "
-        f"over the drag itself, which errs against the claim, by {_effect(ratio)}. The chain's own "
+        "mean square force between the balls on the rod and their neighbours, its weakest contact "
+        f"differs by {_effect(row)}; over the drag itself, which errs against the claim, by {_effect(ratio)}. The chain's own "
         f"contact on the rod bears {_percent(share['at_peaks'])} of the drag at peaks and "
         f"{_percent(share['at_all_times'])} at all times; the rest is borne by other contacts."
     )

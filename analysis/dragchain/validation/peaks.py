@@ -121,12 +121,12 @@ DESCRIPTORS = (
         "rod_share", "share of the drag at its rod contact", "dominance", 1,
         dict.fromkeys(DEFINITIONS, "value"),
     ),
-    Descriptor("left_s", "time until it ends", "breaking", -1, _FREE),
-    Descriptor("life_s", "lifetime", "", 0, _FREE),
+    Descriptor("left_s", "time until it ends in s", "breaking", -1, _FREE),
+    Descriptor("life_s", "lifetime in s", "", 0, _FREE),
     Descriptor("balls", "number of balls", "", 0, _FREE),
     Descriptor("straightness", "straightness", "", 0, _FREE),
-    Descriptor("angle_rad", "angle to the motion", "", 0, _FREE),
-    Descriptor("altitude_m", "altitude", "", 0, _FREE),
+    Descriptor("angle_rad", "angle to the motion in rad", "", 0, _FREE),
+    Descriptor("altitude_m", "altitude in m", "", 0, _FREE),
 )  # fmt: skip
 
 STATEMENTS = {
