@@ -104,7 +104,8 @@ def _dominance(found: Found) -> str:
     return (
         "Does the chain stand out, or do all forces around the rod rise together? Over the root "
         "mean square force between the balls on the rod and their neighbours, its weakest contact "
-        f"differs by {_effect(row)}; over the drag itself, which errs against the claim, by {_effect(ratio)}. The chain's own "
+        f"differs by {_effect(row)}; over the drag itself, which errs against the claim, by "
+        f"{_effect(ratio)}. The chain's own "
         f"contact on the rod bears {_percent(share['at_peaks'])} of the drag at peaks and "
         f"{_percent(share['at_all_times'])} at all times; the rest is borne by other contacts."
     )
