@@ -30,6 +30,9 @@ ALPHA_RAD = np.pi / 4
 LEAST_BALLS = 3
 """Fewer balls are no chain (Peters et al. 2005)."""
 
+STRESS_FACTOR = 1.0
+"""Least major principal stress of a chain's balls, as a multiple of the frame's mean."""
+
 THRESHOLD = 1.0
 """Least normal force of a rod path's contacts, as a multiple of the frame's mean."""
 
@@ -82,20 +85,28 @@ def major_stress(stress: Floats) -> tuple[Floats, Floats]:
     return values[:, -1], vectors[:, :, -1]
 
 
-def peters_chains(frame: NetworkFrame, alpha_rad: float = ALPHA_RAD) -> list[list[int]]:
+def peters_chains(
+    frame: NetworkFrame,
+    alpha_rad: float = ALPHA_RAD,
+    stress_factor: float = STRESS_FACTOR,
+    major: tuple[Floats, Floats] | None = None,
+) -> list[list[int]]:
     """Return the quasi-linear force chains as ordered rows of the frame's balls.
 
-    A ball is highly stressed when its major compressive principal stress is above the mean of all
-    balls. Two highly stressed balls in contact are linked when the line of their centres is within
-    `alpha_rad` of the principal axis of both; at least `LEAST_BALLS` linked balls are a chain
-    (Peters et al. 2005). Ours is the rule for more than one candidate at the same end of a ball:
-    candidates are taken by falling normal force, each end of an axis holds one link, and no link
-    closes a ring, so that every chain is a path and no ball is in two chains. A chain starts at
-    its higher end.
+    A ball is highly stressed when its major compressive principal stress is above `stress_factor`
+    times the mean of all balls (1 in the paper). Two highly stressed balls in contact are linked
+    when the line of their centres is within `alpha_rad` of the principal axis of both; at least
+    `LEAST_BALLS` linked balls are a chain (Peters et al. 2005). Ours is the rule for more than one
+    candidate at the same end of a ball: candidates are taken by falling normal force, each end of
+    an axis holds one link, and no link closes a ring, so that every chain is a path and no ball is
+    in two chains. A chain starts at its higher end. `major` is what `major_stress` returns for the
+    frame, if it is known already.
     """
     if not frame.normal_force.size:
         return []
-    first, second, end = _candidates(frame, alpha_rad)
+    stress, axis = major_stress(ball_stress(frame)) if major is None else major
+    high = stress > stress_factor * stress.mean()
+    first, second, end = _candidates(frame, alpha_rad, high, axis)
     links: dict[int, dict[int, int]] = {}
     leader = np.arange(frame.ball_id.size)
     for i, j, end_i, end_j in zip(
@@ -110,10 +121,10 @@ def peters_chains(frame: NetworkFrame, alpha_rad: float = ALPHA_RAD) -> list[lis
     return [chain for chain in _walk(links, frame.centre) if len(chain) >= LEAST_BALLS]
 
 
-def _candidates(frame: NetworkFrame, alpha_rad: float) -> tuple[Ints, Ints, NDArray[np.bool_]]:
+def _candidates(
+    frame: NetworkFrame, alpha_rad: float, high: NDArray[np.bool_], axis: Floats
+) -> tuple[Ints, Ints, NDArray[np.bool_]]:
     """Return the linkable pairs by falling force, and at which end of either axis they link."""
-    stress, axis = major_stress(ball_stress(frame))
-    high = stress > stress.mean()
     inner = np.flatnonzero(frame.between_balls())
     inner = inner[high[frame.a[inner]] & high[frame.b[inner]]]
     inner = inner[np.argsort(-frame.normal_force[inner], kind="stable")]
@@ -152,7 +163,9 @@ def _walk(links: dict[int, dict[int, int]], centre: Floats) -> Iterator[list[int
 # --- paths from the rod to the bowl ----------------------------------------------------------
 
 
-def rod_paths(frame: NetworkFrame, threshold: float = THRESHOLD) -> list[RodPath]:
+def rod_paths(
+    frame: NetworkFrame, threshold: float = THRESHOLD, *, with_rod: bool = True
+) -> list[RodPath]:
     """Return one path for each strong rod contact, by falling force of that contact.
 
     Contacts whose normal force is above `threshold` times the mean of all the frame's contacts are
@@ -161,13 +174,18 @@ def rod_paths(frame: NetworkFrame, threshold: float = THRESHOLD) -> list[RodPath
     (its bottleneck, rod and bowl contacts included) is strongest; among several the one with the
     fewest contacts, then the one with the largest sum of forces. The widest path of a graph runs
     along its maximum spanning tree (Hu 1961, Oper. Res. 9, 898-900); the tie rule is ours.
+
+    With `with_rod` false the forces of rod contacts play no part, not even in the mean: a path
+    leads from every ball that the rod pushes, and its bottleneck is that of the contacts behind
+    that ball.
     """
-    strong = np.flatnonzero(frame.normal_force > threshold * frame.mean_force_n())
+    strong = np.flatnonzero(frame.normal_force > threshold * frame.mean_force_n(with_rod=with_rod))
     net = _strong_net(frame, strong)
     width = _widths(net)
-    rods = strong[frame.other[strong] == ROD]
+    pushed = strong if with_rod else np.flatnonzero(frame.normal_force > 0.0)
+    rods = pushed[frame.other[pushed] == ROD]
     rods = rods[np.argsort(-frame.normal_force[rods], kind="stable")]
-    return [_path_from(frame, net, width, int(rod)) for rod in rods]
+    return [_path_from(frame, net, width, int(rod), with_rod) for rod in rods]
 
 
 _Net = dict[int, list[tuple[float, int, int]]]
@@ -205,11 +223,13 @@ def _widths(net: _Net) -> dict[int, float]:
     return width
 
 
-def _path_from(frame: NetworkFrame, net: _Net, width: dict[int, float], rod: int) -> RodPath:
+def _path_from(
+    frame: NetworkFrame, net: _Net, width: dict[int, float], rod: int, with_rod: bool
+) -> RodPath:
     start = int(frame.a[rod])
     if start not in width:
         return RodPath((start,), (rod,), None)
-    bottleneck = min(float(frame.normal_force[rod]), width[start])
+    bottleneck = min(float(frame.normal_force[rod]), width[start]) if with_rod else width[start]
     balls, contacts = _shortest(net, start, bottleneck)
     return RodPath(balls, (rod, *contacts), int(frame.other[contacts[-1]]))
 
@@ -269,7 +289,11 @@ _COLUMNS: dict[str, str] = {
 
 
 def chain_table(
-    frame: NetworkFrame, *, alpha_rad: float = ALPHA_RAD, threshold: float = THRESHOLD
+    frame: NetworkFrame,
+    *,
+    alpha_rad: float = ALPHA_RAD,
+    stress_factor: float = STRESS_FACTOR,
+    threshold: float = THRESHOLD,
 ) -> pd.DataFrame:
     """Return the chains of a frame by both definitions, a row each.
 
@@ -290,17 +314,20 @@ def chain_table(
         direction: it is listed from its higher end, and reaches the bowl if one of its balls
         touches it; ``end_kind`` is then `none` all the same.
     """
-    rows = [*_peters_rows(frame, alpha_rad), *_path_rows(frame, threshold)]
+    rows = [*_peters_rows(frame, alpha_rad, stress_factor), *_path_rows(frame, threshold)]
     moment = {"step": frame.step, "time_s": frame.time_s}
     table = pd.DataFrame([moment | row for row in rows], columns=list(_COLUMNS))
     return table.astype(_COLUMNS)
 
 
-def _peters_rows(frame: NetworkFrame, alpha_rad: float) -> Iterator[dict[str, object]]:
-    chains = peters_chains(frame, alpha_rad)
+def _peters_rows(
+    frame: NetworkFrame, alpha_rad: float, stress_factor: float
+) -> Iterator[dict[str, object]]:
+    major = major_stress(ball_stress(frame))
+    chains = peters_chains(frame, alpha_rad, stress_factor, major)
     if not chains:
         return
-    stress, _ = major_stress(ball_stress(frame))
+    stress, _ = major
     force_of = _force_between(frame)
     on_bowl = set(frame.a[(frame.other == FLOOR) | (frame.other == SIDE)].tolist())
     for chain in chains:
@@ -342,11 +369,16 @@ def _path_rows(frame: NetworkFrame, threshold: float) -> Iterator[dict[str, obje
         }
 
 
-def dominant_path(frame: NetworkFrame, paths: Iterable[RodPath]) -> RodPath | None:
-    """Return the path to the bowl with the largest bottleneck, or None if no path leads there."""
+def dominant_path(
+    frame: NetworkFrame, paths: Iterable[RodPath], *, with_rod: bool = True
+) -> RodPath | None:
+    """Return the path to the bowl with the largest bottleneck, or None if no path leads there.
+
+    With `with_rod` false the rod contacts' forces do not count.
+    """
 
     def strength(path: RodPath) -> tuple[float, float]:
-        forces = frame.normal_force[list(path.contacts)]
+        forces = frame.normal_force[list(path.contacts[0 if with_rod else 1 :])]
         return float(forces.min()), float(forces.mean())
 
     whole = [path for path in paths if path.end is not None]

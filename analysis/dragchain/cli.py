@@ -72,6 +72,10 @@ def _parser() -> argparse.ArgumentParser:
     stability.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
     stability.add_argument("lists", type=Path, nargs="+", metavar="POINTS", help="lists of points")
     stability.set_defaults(action=_stability)
+    peaks = commands.add_parser("peaks", help="test whether chains explain the peaks of the drag")
+    peaks.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
+    peaks.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
+    peaks.set_defaults(action=_peaks)
     measure = commands.add_parser(
         "measure", parents=[run_dir], help="measure a run of a trade, tables and chains included"
     )
@@ -156,6 +160,13 @@ def _stability(options: argparse.Namespace) -> None:
     from dragchain.stability_report import write_stability
 
     write_stability(options.out, options.lists)
+
+
+def _peaks(options: argparse.Namespace) -> None:
+    from dragchain.validation.peaks_report import write_peaks
+
+    for row in write_peaks(options.out, options.run_dirs)["statements"]:
+        print(f"{row['verdict']}: {row['text']}")
 
 
 def _measure(options: argparse.Namespace) -> None:

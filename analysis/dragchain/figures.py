@@ -309,8 +309,8 @@ def _network(
     axes.grid(False)
     axes.set(xlabel="x in mm", ylabel=f"{view[1]} in mm", xlim=extent[:2], ylim=extent[2:])
     pick = [0, 1] if view == "xy" else [0, 2]
-    _mark_chain(axes, shown, pick)
-    _mark_motion(axes, shown, view)
+    mark_chain(axes, shown, pick)
+    mark_motion(axes, shown, view)
     largest = float(shown.frame.normal_force.max(initial=0.0))
     scale = ScalarMappable(Normalize(0.0, largest), scene.colour_map())
     bar = figure.colorbar(scale, ax=axes, shrink=0.8, pad=0.02)
@@ -333,39 +333,47 @@ def _chain_text(shown: scene.Scene) -> str:
     )
 
 
-def _mark_chain(axes: Axes, shown: scene.Scene, pick: Sequence[int]) -> None:
+def mark_chain(
+    axes: Axes, shown: scene.Scene, pick: Sequence[int], width: float = 1.6, halo: float = 3.0
+) -> None:
+    """Outline the dominant path on axes in mm; `pick` names the two coordinates."""
     if shown.dominant is None:
         return
     frame, path = shown.frame, shown.dominant
     balls = list(path.balls)
     ends = frame.point[[path.contacts[0], path.contacts[-1]]]
     line = np.vstack([ends[:1], frame.centre[balls], ends[1:]])[:, pick] * 1e3
-    axes.plot(*line.T, color="white", linewidth=3.0, alpha=0.9)
-    axes.plot(*line.T, color=CHAIN, linewidth=1.6)
+    axes.plot(*line.T, color="white", linewidth=halo, alpha=0.9)
+    axes.plot(*line.T, color=CHAIN, linewidth=width)
     for centre, radius in zip(frame.centre[balls][:, pick], frame.radius[balls], strict=True):
-        for colour, width in (("white", 3.0), (CHAIN, 1.6)):
+        for colour, thick in (("white", halo), (CHAIN, width)):
             axes.add_patch(
-                Circle(centre * 1e3, radius * 1e3, fill=False, edgecolor=colour, linewidth=width)
+                Circle(centre * 1e3, radius * 1e3, fill=False, edgecolor=colour, linewidth=thick)
             )
 
 
-def _mark_motion(axes: Axes, shown: scene.Scene, view: scene.View) -> None:
+def mark_motion(axes: Axes, shown: scene.Scene, view: scene.View) -> None:
     """Draw the direction of motion where it hides little: behind the tool, or above the bed."""
     heading = shown.frame.heading_rad
     direction = np.array([np.cos(heading), np.sin(heading)]) * 11.0
     tool = shown.tool_m[:2] * 1e3
     if view == "xy":
         start, end = tool - 1.6 * direction, tool - 0.6 * direction
+        away = 12.0 * np.array([-np.sin(heading), np.cos(heading)])
+        away *= -1.0 if away @ tool > 0.0 else 1.0  # towards the middle of the bowl
     else:
+        away = np.array([0.0, -11.0])
         level = axes.get_ylim()[1] - 3.0
         start, end = np.array([tool[0], level]), np.array([tool[0] + direction[0], level])
         if abs(direction[0]) < 1.0:
             return
     arrow = {"arrowstyle": "-|>", "color": "black", "linewidth": 2.0, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=arrow)
+    side = "center" if abs(away[0]) < 6.0 else "left" if away[0] > 0.0 else "right"
     label = axes.annotate(
-        "motion", tuple(start), (0, -11), textcoords="offset points", ha="center", weight="bold"
-    )
+        "motion", tuple(start), tuple(away), textcoords="offset points", ha=side, va="center",
+        weight="bold",
+    )  # fmt: skip
     label.set_path_effects([withStroke(linewidth=3, foreground="white")])
 
 

@@ -66,9 +66,13 @@ class NetworkFrame:
         """Tell which contacts are between two balls, (M,) bool."""
         return np.equal(self.other, BALL)
 
-    def mean_force_n(self) -> float:
-        """Return the mean normal force of all contacts in N, 0 for a frame without contacts."""
-        return float(self.normal_force.mean()) if self.normal_force.size else 0.0
+    def mean_force_n(self, *, with_rod: bool = True) -> float:
+        """Return the mean normal force of all contacts in N, 0 for a frame without contacts.
+
+        With `with_rod` false the contacts of the rod do not count.
+        """
+        forces = self.normal_force if with_rod else self.normal_force[self.other != ROD]
+        return float(forces.mean()) if forces.size else 0.0
 
 
 def frame_of(

@@ -15,6 +15,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -28,9 +29,10 @@ from dragchain.chains import RodPath, dominant_path, rod_paths
 from dragchain.collect import drag_start_s
 from dragchain.errors import DragchainError, TableError
 from dragchain.forces import needed
-from dragchain.frames import Floats, NetworkFrame, read_frames, read_table
+from dragchain.frames import Floats, Ints, NetworkFrame, read_frames, read_table
 
 View = Literal["xy", "xz"]
+ToolPlaces = Callable[[int], tuple[Floats, float]]
 
 PICTURE_TIME_S = 4.5
 """Process time, counted from the start of the drag, at which the paper shows the network."""
@@ -39,6 +41,7 @@ COLOURS = ("#1e8f4e", "#f0c929", "#c8102e")
 _PIXELS_PER_MM = 14
 _SIDES = 18
 _MARGIN_M = 0.004
+_FADED = 0.3
 
 
 class RenderError(DragchainError):
@@ -79,9 +82,14 @@ def segments(frame: NetworkFrame) -> Floats:
     return np.stack([frame.centre[frame.a], end], axis=1)
 
 
-def cylinder_radii(normal_force_n: Floats, radius_mean_m: float) -> Floats:
-    """Return radii proportional to the force, the largest being the mean ball radius, (M,) in m."""
-    largest = normal_force_n.max(initial=0.0)
+def cylinder_radii(
+    normal_force_n: Floats, radius_mean_m: float, largest_n: float | None = None
+) -> Floats:
+    """Return radii proportional to the force, (M,) in m: the mean ball radius at `largest_n`.
+
+    That is the largest of the forces if None; pictures that are to be compared share one.
+    """
+    largest = normal_force_n.max(initial=0.0) if largest_n is None else largest_n
     if largest <= 0.0:
         return np.zeros_like(normal_force_n)
     return np.asarray(np.clip(normal_force_n, 0.0, None) / largest * radius_mean_m)
@@ -103,8 +111,8 @@ def picture_step(steps: Floats, process_time_s: Floats, wanted_s: float = PICTUR
     return int(steps[row])
 
 
-def load_scene(run_dir: Path, case: Case) -> Scene:
-    """Read what the picture of a process run shows.
+def load_scene(run_dir: Path, case: Case, wanted_s: float = PICTURE_TIME_S) -> Scene:
+    """Read what the picture of a process run shows at the frame nearest to `wanted_s`.
 
     Raises
     ------
@@ -115,21 +123,36 @@ def load_scene(run_dir: Path, case: Case) -> Scene:
     network = read_table(tables / "network.parquet", ["step", "time_s"])
     start_s = drag_start_s(case)
     step = picture_step(
-        network["step"].to_numpy(np.float64), network["time_s"].to_numpy(np.float64) - start_s
+        network["step"].to_numpy(np.float64),
+        network["time_s"].to_numpy(np.float64) - start_s,
+        wanted_s,
     )
     frame = next(read_frames(run_dir, (step, step)), None)
     if frame is None:
         raise TableError(f"balls.parquet lacks step {step}, which network.parquet has")
-    rod = read_table(
-        tables / "rod_force.parquet", ["step", "ref_x_m", "ref_y_m", "ref_z_m", "heading_rad"]
-    )
+    tool_m, tool_turn_rad = tool_places(run_dir, case)(step)
     return Scene(
         frame=frame,
-        tool_m=_reference_point(rod, step),
-        tool_turn_rad=_tool_turn(rod, step, case),
+        tool_m=tool_m,
+        tool_turn_rad=tool_turn_rad,
         dominant=dominant_path(frame, rod_paths(frame)),
         process_time_s=frame.time_s - start_s,
     )
+
+
+def tool_places(run_dir: Path, case: Case) -> ToolPlaces:
+    """Return a function of a step: the tool's reference point in m, and its turn in rad.
+
+    Raises
+    ------
+    TableError
+        If ``rod_force.parquet`` is not there.
+    """
+    rod = read_table(
+        run_dir / "tables" / "rod_force.parquet",
+        ["step", "ref_x_m", "ref_y_m", "ref_z_m", "heading_rad"],
+    )
+    return lambda step: (_reference_point(rod, step), _tool_turn(rod, step, case))
 
 
 def _reference_point(rod: pd.DataFrame, step: int) -> Floats:
@@ -174,7 +197,29 @@ def _prefer_egl() -> None:
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 
-def render(run_dir: Path, case: Case, scene: Scene, view: View) -> tuple[NDArray[np.uint8], Floats]:
+@dataclass(frozen=True)
+class Look:
+    """How a picture is rendered.
+
+    Attributes
+    ----------
+    pixels_per_mm : float
+        Resolution.
+    largest_n : float or None
+        Normal force at the red end of the colours and at the mean ball radius; the frame's
+        largest if None.
+    kept : (k,) ndarray of int or None
+        Contacts that stay opaque while the others are seen through; None: all are opaque.
+    """
+
+    pixels_per_mm: float = _PIXELS_PER_MM
+    largest_n: float | None = None
+    kept: Ints | None = None
+
+
+def render(
+    run_dir: Path, case: Case, scene: Scene, view: View, look: Look | None = None
+) -> tuple[NDArray[np.uint8], Floats]:
     """Render one view in parallel projection.
 
     Returns
@@ -187,16 +232,17 @@ def render(run_dir: Path, case: Case, scene: Scene, view: View) -> tuple[NDArray
     _prefer_egl()
     import pyvista as pv
 
+    look = Look() if look is None else look
     low, high = _limits(case, view)
-    size = np.ceil((high - low) * 1e3 * _PIXELS_PER_MM).astype(int)
+    size = np.ceil((high - low) * 1e3 * look.pixels_per_mm).astype(int)
     plotter: Any = pv.Plotter(off_screen=True, window_size=size.tolist(), lighting="light kit")
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
     plotter.enable_depth_peeling(number_of_peels=8)
     _add_bowl(plotter, case, view)
     _add_tool(plotter, run_dir, case, scene)
-    _add_contacts(plotter, scene.frame, case.media.radius_mean_m)
-    _look(plotter, (low + high) / 2, float(high[1] - low[1]), view)
+    _add_contacts(plotter, scene.frame, case.media.radius_mean_m, look)
+    _aim(plotter, (low + high) / 2, float(high[1] - low[1]), view)
     image: NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
     plotter.close()
     return image, np.array([low[0], high[0], low[1], high[1]]) * 1e3
@@ -211,7 +257,7 @@ def _limits(case: Case, view: View) -> tuple[Floats, Floats]:
     )
 
 
-def _look(plotter: Any, middle: Floats, height: float, view: View) -> None:
+def _aim(plotter: Any, middle: Floats, height: float, view: View) -> None:
     x, other = middle
     camera = plotter.camera
     camera.focal_point = (x, other, 0.0) if view == "xy" else (x, 0.0, other)
@@ -254,10 +300,28 @@ def _add_tool(plotter: Any, run_dir: Path, case: Case, scene: Scene) -> None:
     plotter.add_mesh(tool, color="#59636e", opacity=0.45)
 
 
-def _add_contacts(plotter: Any, frame: NetworkFrame, radius_mean_m: float) -> None:
+def _add_contacts(plotter: Any, frame: NetworkFrame, radius_mean_m: float, look: Look) -> None:
+    force = frame.normal_force
+    largest = float(force.max(initial=0.0)) if look.largest_n is None else look.largest_n
+    shown = force > 0.0
+    if look.kept is None:
+        _add_tubes(plotter, frame, np.flatnonzero(shown), radius_mean_m, largest, 1.0)
+        return
+    kept = np.isin(np.arange(force.size), look.kept)
+    _add_tubes(plotter, frame, np.flatnonzero(shown & ~kept), radius_mean_m, largest, _FADED)
+    _add_tubes(plotter, frame, np.flatnonzero(shown & kept), radius_mean_m, largest, 1.0)
+
+
+def _add_tubes(
+    plotter: Any,
+    frame: NetworkFrame,
+    shown: Ints,
+    radius_mean_m: float,
+    largest_n: float,
+    opacity: float,
+) -> None:
     import pyvista as pv
 
-    shown = np.flatnonzero(frame.normal_force > 0.0)
     if not shown.size:
         return
     force = frame.normal_force[shown]
@@ -265,13 +329,14 @@ def _add_contacts(plotter: Any, frame: NetworkFrame, radius_mean_m: float) -> No
     lines = np.arange(2 * shown.size).reshape(-1, 2)
     mesh = pv.PolyData(axis.reshape(-1, 3), lines=np.insert(lines, 0, 2, axis=1).ravel())
     mesh["force"] = np.repeat(force, 2)
-    mesh["radius"] = np.repeat(cylinder_radii(force, radius_mean_m), 2)
+    mesh["radius"] = np.repeat(cylinder_radii(force, radius_mean_m, largest_n), 2)
     tubes = mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES, capping=True)
     plotter.add_mesh(
         tubes,
         scalars="force",
         cmap=colour_map(),
-        clim=(0.0, force.max()),
+        clim=(0.0, largest_n),
+        opacity=opacity,
         ambient=0.35,
         diffuse=0.7,
         show_scalar_bar=False,
