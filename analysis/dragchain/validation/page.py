@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -19,6 +20,7 @@ from dragchain.report import data_uri, measured, number, percent, share
 from dragchain.validation import figures, force, statements
 from dragchain.validation.claims import claims
 from dragchain.validation.fills import Point, Points, read_points
+from dragchain.validation.peaks_report import write_peaks
 
 SCHEMA = 1
 
@@ -49,13 +51,13 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     for name, table in tables(found, effects).items():
         write_parquet(table, out_dir / f"{name}.parquet")
         table.to_csv(out_dir / f"{name}.csv", index=False, lineterminator="\n")
-    pictures = draw(points, found, effects)
     folder = out_dir / "figures"
     folder.mkdir(exist_ok=True)
-    for name, picture in pictures.items():
+    for name, picture in draw(points, found, effects).items():
         (folder / f"{name}.png").write_bytes(picture)
     write_json(out_dir / "validation.json", {**found, "effects": effects.to_dict("records")})
-    page = render(points, found, effects, pictures)
+    peaks = write_peaks(out_dir, [point.folder for point in points.fills])
+    page = render(points, found, effects, peaks, folder)
     (out_dir / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -138,13 +140,14 @@ def render(
     points: Points,
     found: Mapping[str, Any],
     effects: pd.DataFrame,
-    pictures: Mapping[str, bytes],
+    peaks: Mapping[str, Any],
+    folder: Path,
 ) -> str:
-    """The page: HTML that needs no other file and no network."""
-    folder = resources.files("dragchain").joinpath("validation")
+    """The page: HTML that needs no other file and no network; its figures are in `folder`."""
+    templates = resources.files("dragchain").joinpath("validation")
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(
-            lambda name: folder.joinpath(name).read_text(encoding="utf-8")
+            lambda name: templates.joinpath(name).read_text(encoding="utf-8")
         ),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
@@ -159,7 +162,6 @@ def render(
         "interval": interval,
         "setting": figures.setting_name,
     }
-    uris = {name: data_uri(picture) for name, picture in pictures.items()}
     assumptions = points.fills[0].case.assumptions
     return environment.get_template("validation.html.j2").render(
         found=found,
@@ -167,8 +169,18 @@ def render(
         assumptions=assumptions,
         varied=set(effects["field"]),
         points=points,
-        picture=uris.get,
+        peaks=peaks,
+        picture=lambda name: _uri(folder / name),
     )
+
+
+def _uri(file: Path) -> str | None:
+    """A figure as data URI, None if there is no such file."""
+    if not file.is_file():
+        return None
+    if file.suffix == ".gif":
+        return f"data:image/gif;base64,{base64.b64encode(file.read_bytes()).decode('ascii')}"
+    return data_uri(file.read_bytes())
 
 
 def interval(estimate: Mapping[str, float | None], digits: int = 3) -> str:
