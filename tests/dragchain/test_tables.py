@@ -30,7 +30,8 @@ CONTRACT = {
     ),
     "rod_contacts": (
         "step time_s phase ball_id facet_id point_x_m point_y_m point_z_m force_x_n force_y_n"
-        " force_z_n normal_force_n tangential_force_n overlap_m bearing_rad depth_m counted"
+        " force_z_n normal_force_n tangential_force_n overlap_m slip_x_m_s slip_y_m_s"
+        " slip_z_m_s approach_m_s bearing_rad depth_m counted"
     ),
     "balls": (
         "step time_s ball_id x_m y_m z_m vx_m_s vy_m_s vz_m_s wx_rad_s wy_rad_s wz_rad_s radius_m"
