@@ -17,7 +17,7 @@ from dragchain.case import Case
 from dragchain.errors import TableError
 from dragchain.forces import motion_of
 from dragchain.frames import Floats, Ints
-from dragchain.verification.recording import effective_modulus
+from dragchain.hertz import contact_time, effective_modulus
 
 IMPACT, SLIDING, ROLLING, RESTING = TYPES = ("impact", "sliding", "rolling", "resting")
 
@@ -91,8 +91,7 @@ class Surfaces:
 def surfaces(case: Case) -> Surfaces:
     """Return friction and contact time of ball and tool from the inputs of ``case.json``.
 
-    The time is that of an elastic impact on a plane,
-    ``2.87 (m^2 / (R E*^2 v))^(1/5)`` (Johnson 1985, eq. 11.24).
+    The time is that of an elastic impact on a plane; see `contact_time`.
 
     Raises
     ------
@@ -118,8 +117,8 @@ def surfaces(case: Case) -> Surfaces:
     modulus = case.fidelity.youngs_modulus_scale * effective_modulus(*materials)
     radius = case.media.radius_mean_m
     mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * radius**3
-    speed = motion_of(case).speed_m_s
-    return Surfaces(float(friction), float(2.87 * (mass**2 / (radius * modulus**2 * speed)) ** 0.2))
+    time_s = contact_time(mass, radius, modulus, motion_of(case).speed_m_s)
+    return Surfaces(float(friction), float(time_s))
 
 
 def _input(case: Case, name: str) -> object:

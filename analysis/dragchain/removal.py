@@ -58,9 +58,6 @@ GAPS = (1, 2, 5)
 MOBILISED = (0.9, 0.95, 0.99, 0.999)
 """Limits of a sliding contact, to see what they do to the sums."""
 
-TINY_N = 1e-12
-"""Stands for a normal force of zero in ratios."""
-
 DEPTH_BINS, BEARING_BINS = 20, 24
 
 UNCERTAIN = ("normal_impulse_ns", "force_slide_nm", "friction_work_j")
@@ -263,7 +260,8 @@ def _with_amounts(
     heading = rod["heading_rad"].to_numpy()
     turn = tool_turn(heading, case)
     speed = np.linalg.norm(slip, axis=1)
-    mobilisation = tangential / (surfaces(case).friction * np.maximum(normal, TINY_N))
+    most = surfaces(case).friction * normal
+    mobilisation = np.divide(tangential, most, out=np.full_like(most, np.inf), where=most > 0.0)
     mobilised = mobilisation >= limits.mobilised
     velocity = tool_velocity(rows["step"].to_numpy(), point, reference[:, :2], case)
     drag = workpiece_frame(force, heading) * interval_s
