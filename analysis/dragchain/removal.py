@@ -443,7 +443,7 @@ def findings(
 ) -> dict[str, Any]:
     """Return the content of ``removal.json``; `event` is the event of each row of `sampled`."""
     known = surfaces(case)
-    return {
+    found = {
         "schema": SCHEMA,
         "run": case.run,
         "confidence": CONFIDENCE,
@@ -453,6 +453,7 @@ def findings(
         "path_m": sampled.path_m,
         "friction_coefficient": known.friction,
         "contact_time_s": known.contact_time_s,
+        "impact_seen_share": min(1.0, known.contact_time_s / sampled.interval_s),
         "limits": limits.as_json(),
         **_totals(sampled, events),
         "types": _types(sampled, events, event),
@@ -460,9 +461,59 @@ def findings(
         "mobilised": _mobilised(sampled),
         "gaps": [{"samples": gap, "events": _stays(sampled.rows, 1 + gap)} for gap in (0, *GAPS)],
         "profiles": _profiles(sampled),
-        "sampling": _sampling(sampled),
+        "sampling": _sampling(sampled, case, limits),
         "closure": _closure(sampled, facets, events),
     }
+    return {**found, "words": words(found)}
+
+
+def words(found: Mapping[str, Any]) -> list[str]:
+    """Say in sentences what the findings are, each number with its 95 % interval."""
+    metre, front = found["per_metre"], found["front_share"]
+    types = found["types"]
+    by_type = "; ".join(
+        f"{name} {types[name]['events']} stays with {_percent(share['normal_impulse_ns'])} of the"
+        f" normal impulse and {_percent(share['friction_work_j'])} of the friction work"
+        for name in TYPES
+        for share in (types[name]["share_of"],)
+    )
+    return [
+        f"{_span(found['mean_contacts'])} balls' contacts press on the tool at once.",
+        f"A metre of way brings a normal impulse of {_span(metre['normal_impulse_ns'])} N s,"
+        f" {_percent(front['normal_impulse_ns'])} of it on the front half.",
+        f"The contacts together slide {_span(metre['sliding_m'])} m a metre of way. Normal force"
+        f" times sliding distance is {_span(metre['force_slide_nm'])} N m a metre,"
+        f" {_percent(front['force_slide_nm'])} of it on the front half.",
+        f"Friction on the tool takes {_span(metre['friction_work_j'])} J a metre, which is"
+        f" {_percent(found['friction_share_of_work'])} of the work that the tool does on the bed.",
+        f"{_percent(found['load_while_sliding_share'])} of the normal impulse is carried while a"
+        " contact slides, the rest while it sticks.",
+        f"By type of stay: {by_type}.",
+        f"A lone impact at the tool's speed lasts {1e3 * found['contact_time_s']:.2g} ms, a sample"
+        f" comes every {1e3 * found['sample_interval_s']:.2g} ms: one in"
+        f" {1.0 / found['impact_seen_share']:.3g} is seen. Sums are fair all the same, for each"
+        " seen one stands for those unseen; the number of stays is not.",
+    ]
+
+
+def _span(estimate: Mapping[str, float | None]) -> str:
+    value, low, high = (_digits(estimate[key]) for key in ("value", "low", "high"))
+    return f"{value} ({low} to {high})"
+
+
+def _percent(estimate: Mapping[str, float | None]) -> str:
+    value, low, high = (
+        _digits(None if estimate[key] is None else 100.0 * (estimate[key] or 0.0))
+        for key in ("value", "low", "high")
+    )
+    return f"{value} % ({low} to {high})"
+
+
+def _digits(value: float | None) -> str:
+    """Return a number with three digits and without an exponent, "unknown" for none."""
+    if value is None:
+        return "unknown"
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
 def _totals(sampled: Sampled, events: pd.DataFrame) -> dict[str, Any]:
@@ -551,16 +602,21 @@ def _sensitivity(
     sampled: Sampled, events: pd.DataFrame, case: Case, limits: Thresholds
 ) -> list[dict[str, Any]]:
     """Return the shares by type with each limit halved and doubled."""
-    table = []
-    for name, moved in {"as stated": limits, **limits.varied()}.items():
-        kind = event_types(events, case, sampled.interval_s, moved)
-        of = {
-            key: {t: _share(events[key].to_numpy(), kind == t) for t in TYPES}
-            for key in ("normal_impulse_ns", "force_slide_nm", "friction_work_j")
-        }
-        counts = {t: float((kind == t).mean()) for t in TYPES}
-        table.append({"limits": name, "share_of": {"events": counts, **of}})
-    return table
+    interval_s = sampled.interval_s
+    cases = {"as stated": limits, **limits.varied()}
+    return [
+        {"limits": name, "share_of": _shares(events, event_types(events, case, interval_s, moved))}
+        for name, moved in cases.items()
+    ]
+
+
+def _shares(events: pd.DataFrame, kind: Any) -> dict[str, dict[str, float | None]]:
+    """Return each type's share of the stays and of what they bring."""
+    names = ("normal_impulse_ns", "force_slide_nm", "friction_work_j")
+    shares = {
+        name: {t: _share(events[name].to_numpy(), kind == t) for t in TYPES} for name in names
+    }
+    return {"events": {t: float((kind == t).mean()) for t in TYPES}, **shares}
 
 
 def _share(values: Floats, chosen: Any) -> float | None:
@@ -615,31 +671,46 @@ def _columns(found: list[Estimate]) -> dict[str, list[float | None]]:
     return {key: [finite(getattr(estimate, key)) for estimate in found] for key in keys}
 
 
-def _sampling(sampled: Sampled) -> list[dict[str, Any]]:
-    """Return how far every n-th sample alone is off all of them, the worst of its n beginnings."""
-    table = []
-    frame = sampled.rows["frame"].to_numpy()
-    totals = {name: float(sampled.rows[name].sum()) for name in AMOUNTS}
-    for every in THINNING:
-        off: dict[str, float] = dict.fromkeys(AMOUNTS, 0.0)
-        events = []
-        for start in range(every):
-            some = sampled.rows[frame % every == start]
-            for name, total in totals.items():
-                if total:
-                    error = abs(every * float(some[name].sum()) / total - 1.0)
-                    off[name] = max(off[name], error)
-            thinned = some.assign(frame=some["frame"] // every)
-            events.append(_stays(thinned))
-        table.append(
-            {
-                "every": every,
-                "samples_hz": 1.0 / (every * sampled.interval_s),
-                "largest_relative_error": off,
-                "events": float(np.mean(events)),
-            }
-        )
-    return table
+def _sampling(sampled: Sampled, case: Case, limits: Thresholds) -> list[dict[str, Any]]:
+    """Return what every n-th sample alone would give.
+
+    The sums' errors are the worst of its n beginnings, the number of stays is their mean; the
+    shares by type are those of the first.
+    """
+    return [
+        {
+            "every": every,
+            "samples_hz": 1.0 / (every * sampled.interval_s),
+            "largest_relative_error": {
+                name: _thinned_error(sampled.rows, name, every) for name in AMOUNTS
+            },
+            "events": float(np.mean([_stays(_thinned(sampled, every, i)) for i in range(every)])),
+            "share_of": _thinned_types(sampled, every, case, limits),
+        }
+        for every in THINNING
+    ]
+
+
+def _thinned(sampled: Sampled, every: int, start: int) -> pd.DataFrame:
+    """Return the contacts of every n-th frame, each standing for n; frames are numbered anew."""
+    rows = sampled.rows[sampled.rows["frame"] % every == start]
+    amounts = {name: every * rows[name] for name in AMOUNTS}
+    return rows.assign(frame=rows["frame"] // every, **amounts).reset_index(drop=True)
+
+
+def _thinned_error(rows: pd.DataFrame, name: str, every: int) -> float | None:
+    """Return the largest relative error of a sum over every n-th frame."""
+    parts = np.bincount(rows["frame"] % every, rows[name], every)
+    return finite(float(np.abs(every * parts / parts.sum() - 1.0).max())) if parts.sum() else None
+
+
+def _thinned_types(
+    sampled: Sampled, every: int, case: Case, limits: Thresholds
+) -> dict[str, dict[str, float | None]]:
+    interval_s = every * sampled.interval_s
+    rows = _thinned(sampled, every, 0)
+    events, _ = find_events(rows, -(-sampled.frames // every), interval_s)
+    return _shares(events, event_types(events, case, interval_s, limits))
 
 
 def _stays(rows: pd.DataFrame, step: int = 1) -> int:

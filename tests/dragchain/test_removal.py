@@ -303,6 +303,7 @@ def test_fewer_samples_change_the_number_of_stays(run: Path) -> None:
     assert table[10]["largest_relative_error"]["sliding_m"] == pytest.approx(0.0, abs=1e-12)
     assert table[10]["events"] == pytest.approx(3 + 1 / 10)
     assert table[2]["events"] == pytest.approx(3 + 1)
+    assert table[2]["share_of"]["force_slide_nm"]["sliding"] == 1.0
 
 
 def test_the_vtp_file_holds_the_table(run: Path, facets: pd.DataFrame) -> None:
@@ -425,4 +426,6 @@ def test_a_cylinder_is_turned_back_into_its_own_frame(tmp_path: Path) -> None:
     np.testing.assert_allclose(as_mesh.normals, [[1, 0, 0]] * 2)
     case = replace(case, tool=replace(case.tool, kind="cylinder"))
     np.testing.assert_allclose(read_surface(tmp_path, case).normals, [[0, -1, 0]] * 2, atol=1e-12)
-    np.testing.assert_allclose(turned(np.array([0.0, 2.0, 1.0]), -np.pi / 2), [2, 0, 1])
+    np.testing.assert_allclose(turned(np.array([0.0, 2.0, 1.0]), 0.0), [0, 2, 1])
+    quarter = turned(np.array([[0.0, 2.0, 1.0]]), np.array([-np.pi / 2]))
+    np.testing.assert_allclose(quarter, [[2, 0, 1]], atol=1e-12)
