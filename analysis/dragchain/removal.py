@@ -43,7 +43,7 @@ SCHEMA = 1
 FILE = Path("tables") / "removal.json"
 WRITTEN = ("facets.parquet", "contact_events.parquet", "removal.json", "rod.vtp")
 
-OFF_FACET = 1e-6
+OFF_FACET = 1e-5
 """Largest distance of a contact point from its facet over the tool's length: rounding."""
 
 BLOCK_ROWS = 100_000
@@ -478,7 +478,7 @@ def words(found: Mapping[str, Any]) -> list[str]:
         for share in (types[name]["share_of"],)
     )
     return [
-        f"{_span(found['mean_contacts'])} balls' contacts press on the tool at once.",
+        f"{_span(found['mean_contacts'])} contacts press on the tool at once, in the mean.",
         f"A metre of way brings a normal impulse of {_span(metre['normal_impulse_ns'])} N s,"
         f" {_percent(front['normal_impulse_ns'])} of it on the front half.",
         f"The contacts together slide {_span(metre['sliding_m'])} m a metre of way. Normal force"
@@ -489,10 +489,10 @@ def words(found: Mapping[str, Any]) -> list[str]:
         f"{_percent(found['load_while_sliding_share'])} of the normal impulse is carried while a"
         " contact slides, the rest while it sticks.",
         f"By type of stay: {by_type}.",
-        f"A lone impact at the tool's speed lasts {1e3 * found['contact_time_s']:.2g} ms, a sample"
-        f" comes every {1e3 * found['sample_interval_s']:.2g} ms: one in"
-        f" {1.0 / found['impact_seen_share']:.3g} is seen. Sums are fair all the same, for each"
-        " seen one stands for those unseen; the number of stays is not.",
+        f"A lone impact at the tool's speed lasts {1e3 * found['contact_time_s']:.2g} ms and a"
+        f" sample comes every {1e3 * found['sample_interval_s']:.2g} ms, so the chance to see one"
+        f" is {100 * found['impact_seen_share']:.2g} %. The sums are fair all the same; the number"
+        " of stays depends on the rate of samples.",
     ]
 
 
