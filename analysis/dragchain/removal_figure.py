@@ -45,6 +45,8 @@ VIEWS = {
 }
 
 _PIXELS = 900
+_BESIDE_IN, _AROUND_IN, _TALLEST_IN = 1.3, 2.3, 3.5
+"""What labels take of the width and height of the figure, and how high its panels are at most."""
 
 
 def draw_rod(
@@ -70,8 +72,9 @@ def draw_rod(
     names = ("front", "rear") if cylinder else tuple(VIEWS)
     scale = Normalize(0.0, _largest(facets))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH_IN, 5.6), layout="constrained")
-        widths = [1.0, 1.0, 2.8, 2.4] if cylinder else [1.0] * 4 + [1.8]
+        widths = [1.0, 1.0, 2.8, 2.4] if cylinder else [1.0] * 4 + [1.4]
+        height = _height_in(case, widths[0] / sum(widths))
+        figure = Figure(figsize=(WIDTH_IN, height), layout="constrained")
         panels = figure.subplots(1, len(widths), sharey=True, width_ratios=widths)
         mesh = _coloured(surface, facets)
         for axes, name in zip(panels, names, strict=False):
@@ -79,7 +82,7 @@ def draw_rod(
         if cylinder:
             _unrolled(panels[2], sampled, scale, case)
         _profile(panels[-1], found)
-        panels[0].set_ylabel("depth below the surface in mm")
+        panels[0].set_ylabel("depth in mm")
         panels[0].set_ylim(_depths(case)[::-1])
         bar = figure.colorbar(
             ScalarMappable(scale, COLOURS),
@@ -92,6 +95,19 @@ def draw_rod(
         bar.set_label(LABEL)
         figure.suptitle(_title(found, case), fontsize=9.5, x=0.02, ha="left")
         return _save(run_dir / "figures" / "rod.png", png(figure))
+
+
+def _height_in(case: Case, share: float) -> float:
+    """Return the figure's height, that a view of this share of the width has a tool fill it."""
+    high, low = _depths(case)
+    view_in = share * (WIDTH_IN - _BESIDE_IN)
+    fits = view_in * (low - high) / (2e3 * _half_width(case))
+    return _AROUND_IN + min(_TALLEST_IN, fits)
+
+
+def _half_width(case: Case) -> float:
+    """Return half of the width that is shown, m."""
+    return 1.15 * needed(case.tool, "tool").radius_m
 
 
 def _save(file: Path, picture: bytes) -> Path:
@@ -126,12 +142,13 @@ def _depths(case: Case) -> tuple[float, float]:
 
 def _view(axes: Axes, mesh: Any, name: str, scale: Normalize, case: Case) -> None:
     """Set a rendered side of the tool on axes of width and depth in mm."""
-    image, half = _render(mesh, name, scale, case)
+    image, half = _render(mesh, name, scale, case), 1e3 * _half_width(case)
     high, low = _depths(case)
-    axes.imshow(image, extent=(-half, half, low, high), aspect="equal", interpolation="antialiased")
+    axes.imshow(image, extent=(-half, half, low, high), interpolation="antialiased")
+    axes.set_aspect("equal", adjustable="datalim")
     axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle="--")
     axes.grid(False)
-    axes.set(xlabel="width in mm", xlim=(-half, half))
+    axes.set(xlabel="width in mm")
     eye = VIEWS[name]
     axes.set_title(f"{eye.label}\n{eye.motion if _keeps_heading(case) else ''}", fontsize=8.5)
 
@@ -142,14 +159,14 @@ def _keeps_heading(case: Case) -> bool:
     return not isinstance(motion, Circle) or motion.turns_with_path
 
 
-def _render(mesh: Any, name: str, scale: Normalize, case: Case) -> tuple[NDArray[np.uint8], float]:
-    """Return a side of the tool in parallel projection, and half its width in mm."""
+def _render(mesh: Any, name: str, scale: Normalize, case: Case) -> NDArray[np.uint8]:
+    """Return a side of the tool in parallel projection."""
     import pyvista as pv
 
     high, low = _depths(case)
     height = (low - high) * 1e-3
     tip = needed(case.tool, "tool").submersion_m
-    half = 1.15 * needed(case.tool, "tool").radius_m
+    half = _half_width(case)
     size = (max(8, round(_PIXELS * 2 * half / height)), _PIXELS)
     plotter: Any = pv.Plotter(off_screen=True, window_size=list(size))
     plotter.set_background("white")
@@ -176,7 +193,7 @@ def _render(mesh: Any, name: str, scale: Normalize, case: Case) -> tuple[NDArray
     plotter.renderer.reset_camera_clipping_range()
     image: NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
     plotter.close()
-    return image, half * 1e3
+    return image
 
 
 def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> None:
@@ -212,17 +229,25 @@ def _profile(axes: Axes, found: dict[str, Any]) -> None:
     axes.barh(middle, value, height=0.9 * np.diff(edges), color=BLUE, alpha=0.75)
     error = np.abs([value - np.minimum(low, value), np.maximum(high, value) - value])
     axes.errorbar(value, middle, xerr=error, fmt="none", ecolor="black", elinewidth=0.9)
-    axes.set(xlabel="force times sliding in N m\nper m of way and mm of depth", xlim=(0.0, None))
+    axes.set(xlabel="force times sliding\nin N m per m of way\nand mm of depth", xlim=(0.0, None))
     axes.set_title("by depth, end included\n(bars: 95 % interval)", fontsize=8.5)
 
 
 def _title(found: dict[str, Any], case: Case) -> str:
-    work, share = found["per_metre"]["friction_work_j"], found["friction_share_of_work"]
-    front = found["front_share"]["force_slide_nm"]
+    """Say what the picture is of; shares are unknown where nothing slides."""
+    work, share, front = (
+        {key: np.nan if number is None else number for key, number in estimate.items()}
+        for estimate in (
+            found["per_metre"]["friction_work_j"],
+            found["friction_share_of_work"],
+            found["front_share"]["force_slide_nm"],
+        )
+    )
     return (
-        f"{case.case or case.run}: sliding of balls on the tool over {found['path_m'] * 1e3:.0f} mm"
-        f" of its way ({found['time_s']:.1f} s)\n"
-        f"friction work {work['value']:.3g} J/m ({work['low']:.3g} to {work['high']:.3g}),"
-        f" {100 * share['value']:.1f} % of the work of the drag;"
-        f" {100 * front['value']:.0f} % of force times sliding on the front half"
+        f"{case.case or case.run}: sliding of balls on the tool, {found['path_m'] * 1e3:.0f} mm of"
+        f" its way in {found['time_s']:.1f} s\n"
+        f"friction work {work['value']:.3g} J a metre ({work['low']:.3g} to {work['high']:.3g}),"
+        f" {100 * share['value']:.1f} % of all work of the tool\n"
+        f"front half: {100 * front['value']:.0f} % of force times sliding"
+        f" ({100 * front['low']:.0f} to {100 * front['high']:.0f})"
     )
