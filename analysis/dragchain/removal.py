@@ -156,7 +156,8 @@ def write_removal(run_dir: Path, limits: Thresholds | None = None) -> list[Path]
     Raises
     ------
     TableError
-        If a table is missing, holds no velocities or does not fit the mesh.
+        If it is no process run, or a table is missing, holds no velocities or does
+        not fit the mesh.
     SeriesError
         If the run is too short for its statistics.
     """
@@ -164,6 +165,8 @@ def write_removal(run_dir: Path, limits: Thresholds | None = None) -> list[Path]
 
     limits = limits or Thresholds()
     case = load_case(run_dir)
+    if case.scene != "process":
+        raise TableError(f"{run_dir}: its scene is {case.scene}; only a process run has a tool")
     sampled = sample(run_dir, case, limits)
     surface = read_surface(run_dir, case)
     off = _check_facets(sampled, surface, case)

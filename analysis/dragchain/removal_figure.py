@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from dragchain import scene
@@ -150,7 +151,9 @@ def _view(axes: Axes, mesh: Any, name: str, scale: Normalize, case: Case) -> Non
     axes.grid(False)
     axes.set(xlabel="width in mm")
     eye = VIEWS[name]
-    axes.set_title(f"{eye.label}\n{eye.motion if _keeps_heading(case) else ''}", fontsize=8.5)
+    axes.xaxis.set_major_locator(MaxNLocator(2, integer=True))
+    when = eye.motion if _keeps_heading(case) else "(at the start)"
+    axes.set_title(f"{eye.label}\n{when}", fontsize=8.5)
 
 
 def _keeps_heading(case: Case) -> bool:

@@ -222,6 +222,12 @@ def test_a_mesh_of_another_run_is_refused(tmp_path: Path) -> None:
         write_removal(folder)
 
 
+def test_a_run_without_a_tool_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "case.json").write_text(json.dumps(case_json() | {"scene": "fill"}))
+    with pytest.raises(TableError, match="only a process run has a tool"):
+        write_removal(tmp_path)
+
+
 def test_missing_friction_is_named(run: Path) -> None:
     case = load_case(run)
     inputs = {k: v for k, v in case.inputs.items() if "friction" not in k}
