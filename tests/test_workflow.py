@@ -94,6 +94,20 @@ def test_the_tool_goes_where_it_should(finished: Path) -> None:
     assert abs(radius - 0.010).max() < 1e-6
 
 
+def test_balls_that_stick_to_the_tool_move_with_it(finished: Path) -> None:
+    """Below the limit of friction a ball's surface follows the tool's, however that moves."""
+    for run in (finished / "results/small/process").iterdir():
+        contacts = pd.read_parquet(run / "tables/rod_contacts.parquet")
+        pressed = contacts[contacts["counted"] & (contacts["normal_force_n"] > 5e-3)]
+        slip = (pressed[["slip_x_m_s", "slip_y_m_s", "slip_z_m_s"]] ** 2).sum(axis=1) ** 0.5
+        most = 0.28 * pressed["normal_force_n"]
+        sticks = pressed["tangential_force_n"] < 0.8 * most
+        slides = pressed["tangential_force_n"] > 0.99 * most
+        assert sticks.sum() > 30
+        assert slip[sticks].median() < 0.1 * slip[slides].median()
+        assert (run / "tables/rod.vtp").is_file()
+
+
 def test_the_readmes_pandas_lines_run(finished: Path) -> None:
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
     assert len([line for line in code.splitlines() if line]) == 5

@@ -55,6 +55,10 @@ def _parser() -> argparse.ArgumentParser:
         "figures", parents=[run_dir], help="draw the figures of a run from its tables"
     )
     figures.set_defaults(action=_figures)
+    removal = commands.add_parser(
+        "removal", parents=[run_dir], help="load, sliding and friction work on a tool's facets"
+    )
+    removal.set_defaults(action=_removal)
     report = commands.add_parser("report", help="write the report on several runs")
     report.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
     report.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
@@ -136,6 +140,12 @@ def _figures(options: argparse.Namespace) -> None:
     from dragchain.figures import write_figures
 
     write_figures(options.run_dir)
+
+
+def _removal(options: argparse.Namespace) -> None:
+    from dragchain.removal import write_removal
+
+    write_removal(options.run_dir)
 
 
 def _report(options: argparse.Namespace) -> None:

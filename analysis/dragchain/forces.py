@@ -92,7 +92,8 @@ def needed(value: T | None, name: str) -> T:
     return value
 
 
-def _motion(case: Case) -> Circle | Line:
+def motion_of(case: Case) -> Circle | Line:
+    """Return the motion of the tool in the drag."""
     if case.motion is None:
         raise TableError("case.json has no motion, which these tables need")
     return case.motion
@@ -119,13 +120,52 @@ def headings(steps: NDArray[np.int64], ref_xy_m: Floats, case: Case) -> Floats:
     (N,) ndarray
         Angles from x towards y, rad, in (-pi, pi].
     """
-    motion = _motion(case)
+    motion = motion_of(case)
     if not isinstance(motion, Circle):
         return np.full(len(steps), wrap_angle(motion.heading_rad))
     radial = np.arctan2(ref_xy_m[:, 1], ref_xy_m[:, 0])
     tangential = wrap_angle(radial + motion.sense * np.pi / 2.0)
     start = wrap_angle(motion.start_heading_rad)
     return np.where(steps > drag_phase(case).start_step, tangential, start)
+
+
+def tool_velocity(
+    steps: NDArray[np.int64], point_m: Floats, ref_xy_m: Floats, case: Case
+) -> Floats:
+    """Velocity of points that are fixed to the tool, in the drag.
+
+    A tool that turns with its circle rotates about the bowl's axis, w x r with
+    w = sense speed / radius; every other tool is moved without turning, along
+    its heading.
+
+    Parameters
+    ----------
+    steps : (N,) ndarray of int
+        Steps.
+    point_m : (N, 3) ndarray
+        The points at these steps, m.
+    ref_xy_m : (N, 2) ndarray
+        Reference point of the tool at these steps, m.
+    case : Case
+        The case, of a process.
+
+    Returns
+    -------
+    (N, 3) ndarray
+        Velocities, m/s; NaN outside of the drag, of which alone ``case.json``
+        gives the motion.
+    """
+    motion = motion_of(case)
+    drag = drag_phase(case)
+    if isinstance(motion, Circle) and motion.turns_with_path:
+        turning = motion.sense * motion.speed_m_s / motion.radius_m
+        along = turning * np.column_stack([-point_m[:, 1], point_m[:, 0]])
+    else:
+        heading = headings(steps, ref_xy_m, case)
+        along = motion.speed_m_s * np.column_stack([np.cos(heading), np.sin(heading)])
+    velocity = np.column_stack([along, np.zeros(len(steps))])
+    dragged = (steps > drag.start_step) & (steps <= drag.end_step)
+    return np.where(dragged[:, None], velocity, np.nan)
 
 
 def wrap_angle(angle_rad: ArrayLike) -> Floats:
@@ -225,7 +265,7 @@ def find_drag_peaks(
 
 def peak_separation_s(case: Case) -> float:
     """Return the time in which the tool travels one mean ball radius, s."""
-    return case.media.radius_mean_m / _motion(case).speed_m_s
+    return case.media.radius_mean_m / motion_of(case).speed_m_s
 
 
 def read_counted(run_dir: Path | str) -> pd.DataFrame:

@@ -27,6 +27,8 @@ from dragchain.prediction import (
     prediction_for,
     read_advice,
 )
+from dragchain.removal import FILE as REMOVAL
+from dragchain.removal import read_removal
 from dragchain.stats import RELIABLE_TIMES
 
 RUN_SCHEMA = 1
@@ -46,11 +48,17 @@ FIGURES: dict[Scene, dict[str, str]] = {
         "force_depth": "Normal force on the tool by depth below the settled surface.",
         "chains_peaks": "Resistance and its peaks above the weakest contact of the dominant path "
         "from tool to bowl.",
+        "rod": "Where balls press and slide on the tool: normal force times sliding distance, per "
+        "area of the tool and metre of its way. It is what Archard's law of wear starts from, and "
+        "no removed volume.",
     },
     "fill": {"fill": "Settling of the fill."},
     "drop": {"drop": "Impacts of the drop."},
 }
 """Figures of the page by scene, with their captions."""
+
+OPTIONAL = frozenset({"rod"})
+"""Figures without which a report is still made: they need more than the usual tables."""
 
 
 @dataclass(frozen=True)
@@ -315,6 +323,7 @@ def _section(study: Study, options: list[Entry]) -> dict[str, object]:
         "pictures": [picture for run in study.runs for picture in pictures(run)],
         "fill": study.fill.findings["bed"] if study.fill else None,
         "drop": study.drop.findings if study.drop else None,
+        "removal": read_removal(process.folder) if (process.folder / REMOVAL).is_file() else None,
         "asked": asked,
         "interval": actual_interval(asked, process.findings["forces"]) if asked else None,
         "costs": list(cost_rows(expected, records)) if expected else [],
@@ -328,14 +337,15 @@ def pictures(run: Run) -> list[dict[str, str]]:
     Raises
     ------
     TableError
-        If a figure of a process or a drop is missing; a fill without thermo table has none.
+        If a figure of a process or a drop is missing; a fill without thermo table has none, and
+        a process may lack those of `OPTIONAL`.
     """
     found = []
     for name, caption in FIGURES[run.case.scene].items():
         file = run.folder / "figures" / f"{name}.png"
         if file.is_file():
             found.append({"name": name, "caption": caption, "uri": data_uri(file.read_bytes())})
-        elif run.case.scene != "fill":
+        elif run.case.scene != "fill" and name not in OPTIONAL:
             raise TableError(f"{file}: there is no such file; run `dragchain figures` first")
     return found
 

@@ -29,6 +29,8 @@ BOWL_MESH = 1
 _POINT = ("point_x_m", "point_y_m", "point_z_m")
 _CENTRE = ("x_m", "y_m", "z_m")
 _FORCE = ("force_x_n", "force_y_n", "force_z_n")
+_VELOCITY = ("vx_m_s", "vy_m_s", "vz_m_s")
+_SPIN = ("wx_rad_s", "wy_rad_s", "wz_rad_s")
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,10 @@ class WallContacts:
     normal : (N, 3) ndarray
         Unit vector from the contact point to the ball's centre; zero where the
         ball received no force, because no centre is written then.
+    surface_m_s : (N, 3) ndarray
+        Velocity of the ball's surface at the contact point, v + w x r with r
+        from the ball's centre; NaN where the ball received no force, and
+        everywhere if ``rod_balls`` holds no velocities.
     overlap_m : (N,) ndarray
         Overlap.
     silent : (N,) ndarray of bool
@@ -59,6 +65,7 @@ class WallContacts:
     force_n: Floats
     evaluated_n: Floats
     normal: Floats
+    surface_m_s: Floats
     overlap_m: Floats
     silent: NDArray[np.bool_]
 
@@ -174,7 +181,8 @@ def join_rod_frame(balls: Frame, contacts: Frame) -> RodFrame:
         raise TableError(f"step {balls.step}: rod_balls holds a ball more than once")
     applied = balls.vectors(*_FORCE)[order]
     centres = balls.vectors(*_CENTRE)[order]
-    all_contacts = _place(_sorted(contacts), known, applied, centres)
+    motion = _motion(balls, order)
+    all_contacts = _place(_sorted(contacts), known, applied, centres, motion)
     unplaced = ~np.isin(known, all_contacts.ball_id)
     on_bowl = _sorted(contacts).columns.get("mesh_id", np.zeros(contacts.rows)) == BOWL_MESH
     return RodFrame(
@@ -191,8 +199,22 @@ def _sorted(contacts: Frame) -> Frame:
     return Frame(contacts.step, {name: col[order] for name, col in contacts.columns.items()})
 
 
-def _place(contacts: Frame, known: Ints, applied: Floats, centres: Floats) -> WallContacts:
-    """Join contacts with the balls `known`, whose forces and centres are given in that order."""
+def _motion(balls: Frame, order: Ints) -> tuple[Floats, Floats]:
+    """Velocity and spin of the balls in `order`, (K, 3) each; NaN if the run did not write them."""
+    if not {*_VELOCITY, *_SPIN} <= balls.columns.keys():
+        unknown = np.full((len(order), 3), np.nan)
+        return unknown, unknown
+    return balls.vectors(*_VELOCITY)[order], balls.vectors(*_SPIN)[order]
+
+
+def _place(
+    contacts: Frame,
+    known: Ints,
+    applied: Floats,
+    centres: Floats,
+    motion: tuple[Floats, Floats],
+) -> WallContacts:
+    """Join contacts with the balls `known`, of which all else is given in that order."""
     ids = np.asarray(contacts.columns["ball_id"], dtype=np.int64)
     at = np.searchsorted(known, ids)
     silent = ~np.isin(ids, known)
@@ -200,10 +222,13 @@ def _place(contacts: Frame, known: Ints, applied: Floats, centres: Floats) -> Wa
     evaluated = contacts.vectors(*_FORCE)
     force = np.zeros_like(evaluated)
     normal = np.zeros_like(evaluated)
+    surface = np.full_like(evaluated, np.nan)
     points = contacts.vectors(*_POINT)
     loud = ~silent
     force[loud] = _share(evaluated[loud], at[loud], applied)
     normal[loud] = _unit(centres[at[loud]] - points[loud])
+    velocity, spin = (values[at[loud]] for values in motion)
+    surface[loud] = velocity + np.cross(spin, points[loud] - centres[at[loud]])
     return WallContacts(
         ball_id=ids,
         facet_id=np.asarray(contacts.columns["facet_id"], dtype=np.int64),
@@ -211,6 +236,7 @@ def _place(contacts: Frame, known: Ints, applied: Floats, centres: Floats) -> Wa
         force_n=force,
         evaluated_n=evaluated,
         normal=normal,
+        surface_m_s=surface,
         overlap_m=np.asarray(contacts.columns["overlap_m"], dtype=np.float64),
         silent=silent,
     )

@@ -23,6 +23,7 @@ from dragchain.forces import (
     headings,
     needed,
     phase_codes,
+    tool_velocity,
     workpiece_frame,
     wrap_angle,
 )
@@ -33,6 +34,7 @@ from dragchain.rod import RodFrame, WallContacts, iter_rod_frames
 FORCES = ("force_x_n", "force_y_n", "force_z_n")
 POINT = ("point_x_m", "point_y_m", "point_z_m")
 TORQUES = ("torque_x_nm", "torque_y_nm", "torque_z_nm")
+SLIP = ("slip_x_m_s", "slip_y_m_s", "slip_z_m_s")
 REFERENCE = ("ref_x_m", "ref_y_m", "ref_z_m")
 KINEMATICS = (
     *("ball_id", "x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s"),
@@ -44,7 +46,8 @@ ROD_FORCE = (
 )
 ROD_CONTACTS = (
     *("step", "time_s", "phase", "ball_id", "facet_id", *POINT, *FORCES),
-    *("normal_force_n", "tangential_force_n", "overlap_m", "bearing_rad", "depth_m", "counted"),
+    *("normal_force_n", "tangential_force_n", "overlap_m", *SLIP, "approach_m_s"),
+    *("bearing_rad", "depth_m", "counted"),
 )
 CONTACTS = (
     *("step", "time_s", "kind", "a_id", "b_id", *POINT, *FORCES),
@@ -242,10 +245,14 @@ def rod_contact_rows(
     Returns
     -------
     dict of str to (N,) array
-        The columns; forces are on the tool.
+        The columns; forces are on the tool, velocities those of the ball's
+        surface against the tool's.
     """
     steps = np.full(len(contacts), step)
-    heading = headings(steps, np.tile(ref_xy_m, (len(steps), 1)), case)
+    references = np.tile(ref_xy_m, (len(steps), 1))
+    heading = headings(steps, references, case)
+    relative = contacts.surface_m_s - tool_velocity(steps, contacts.point_m, references, case)
+    apart = np.einsum("ij,ij->i", relative, contacts.normal)
     x, y = (contacts.point_m[:, :2] - ref_xy_m).T
     return {
         "step": steps,
@@ -258,6 +265,8 @@ def rod_contact_rows(
         "normal_force_n": contacts.normal_force_n(),
         "tangential_force_n": contacts.tangential_force_n(),
         "overlap_m": contacts.overlap_m,
+        **_named(SLIP, relative - apart[:, None] * contacts.normal),
+        "approach_m_s": -apart,
         "bearing_rad": wrap_angle(np.arctan2(y, x) - heading),
         "depth_m": needed(case.surface_m, "surface_m") - contacts.point_m[:, 2],
         "counted": counted_mask(steps, case),

@@ -19,6 +19,7 @@ def contacts(forces, evaluated=None, silent=None):
         force_n=force,
         evaluated_n=force if evaluated is None else np.array(evaluated, dtype=float),
         normal=np.zeros((count, 3)),
+        surface_m_s=np.zeros((count, 3)),
         overlap_m=np.zeros(count),
         silent=np.zeros(count, dtype=bool) if silent is None else np.array(silent),
     )

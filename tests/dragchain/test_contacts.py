@@ -30,6 +30,7 @@ def wall(points=(), forces=(), normals=(), silent=()):
         force_n=np.array(forces, dtype=float).reshape(-1, 3),
         evaluated_n=np.zeros((count, 3)),
         normal=np.array(normals, dtype=float).reshape(-1, 3),
+        surface_m_s=np.zeros((count, 3)),
         overlap_m=np.full(count, 1e-6),
         silent=np.array(silent, dtype=bool),
     )

@@ -12,8 +12,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from PIL import Image
+from removal_files import made_contacts, write_run
 
 from dragchain.errors import GateError, TableError
+from dragchain.removal import write_removal
 from dragchain.report import (
     LARGE_PICTURE,
     data_uri,
@@ -228,6 +230,27 @@ def test_page_is_whole_and_needs_nothing_else(process: Path, tmp_path: Path) -> 
     assert outside == []
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert not re.search(r"https?://|@import|url\(", text)
+
+
+def test_page_shows_the_contacts_on_the_tool_if_they_are_known(
+    process: Path, tmp_path: Path
+) -> None:
+    write_report(tmp_path / "without", [process])
+    assert "force \N{MULTIPLICATION SIGN} sliding" not in page_of(tmp_path / "without").words
+    made = write_run(tmp_path / "made", made_contacts())
+    write_removal(made)
+    for file in ("tables/removal.json", "figures/rod.png"):
+        (process / file).write_bytes((made / file).read_bytes())
+    write_report(tmp_path / "with", [process])
+    page = page_of(tmp_path / "with")
+    assert page.open == []
+    assert len(page.images) == len(PICTURES) + 2
+    html = (tmp_path / "with" / "report.html").read_text(encoding="utf-8")
+    words = " ".join(re.sub("<[^>]+>", " ", html).split())
+    assert "impact 2 0.33 % (" in words
+    assert "resting 1 17 % (" in words
+    assert "normal impulse in N s 0.856" in words
+    assert "friction work in J 0.00200" in words
 
 
 def test_page_says_what_counts(process: Path, tmp_path: Path) -> None:

@@ -11,9 +11,12 @@ from tiny_run_files import (
     COLUMNS,
     LAST,
     RADIUS_M,
+    SPEED_M_S,
+    SPIN_RAD_S,
     SURFACE_M,
     WEIGHT_N,
     chain_n,
+    overlap_m,
     rod_balls,
     tool_x_m,
 )
@@ -21,6 +24,7 @@ from tiny_run_files import (
 from dragchain import DumpError, GateError, TableError, load_case, load_outputs, write_tables
 from dragchain.dumps import iter_prints
 from dragchain.forces import read_counted, summarise_forces
+from dragchain.removal import write_removal
 from dragchain.tables import ToolSamples
 
 CONTRACT = {
@@ -30,7 +34,8 @@ CONTRACT = {
     ),
     "rod_contacts": (
         "step time_s phase ball_id facet_id point_x_m point_y_m point_z_m force_x_n force_y_n"
-        " force_z_n normal_force_n tangential_force_n overlap_m bearing_rad depth_m counted"
+        " force_z_n normal_force_n tangential_force_n overlap_m slip_x_m_s slip_y_m_s"
+        " slip_z_m_s approach_m_s bearing_rad depth_m counted"
     ),
     "balls": (
         "step time_s ball_id x_m y_m z_m vx_m_s vy_m_s vz_m_s wx_rad_s wy_rad_s wz_rad_s radius_m"
@@ -93,6 +98,37 @@ def test_rod_contacts_hold_the_applied_force_on_the_tool(tables) -> None:
     assert (contacts["bearing_rad"] == 0).all()
     assert (contacts["facet_id"] == 7).all()
     assert contacts["counted"].tolist() == [step >= 40 for step in steps]
+
+
+def test_the_slip_is_that_of_the_balls_surface_against_the_tool(tables) -> None:
+    """Ball 1 spins about y and falls behind the tool by a third of its speed."""
+    contacts = tables["rod_contacts"]
+    before, drag = contacts[contacts["phase"] == "plunge"], contacts[contacts["phase"] == "drag"]
+    slip = ["slip_x_m_s", "slip_y_m_s", "slip_z_m_s"]
+    reach = RADIUS_M - np.array([overlap_m(step) for step in drag["step"]])
+    exact = np.column_stack([0 * reach, 0 * reach, SPIN_RAD_S * reach])
+    np.testing.assert_allclose(drag[slip], exact, rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(drag["approach_m_s"], SPEED_M_S / 3, rtol=1e-6)
+    assert before[[*slip, "approach_m_s"]].isna().all(axis=None)
+
+
+def test_a_run_without_velocities_has_tables_but_no_slip(tiny_run: Path, edit_json, raw) -> None:
+    old = ["ball_id", "x_m", "y_m", "z_m", "radius_m", *(f"force_{axis}_n" for axis in "xyz")]
+    keep = [COLUMNS["rod_balls"].index(name) for name in old]
+    frames = [
+        raw.binary(step, [[row[i] for i in keep] for row in rod_balls(step)], len(old))
+        for step in range(0, LAST + 1, 10)
+    ]
+    (tiny_run / "rod_balls.1.bin").write_bytes(b"".join(frames))
+    edit_json(tiny_run / "columns.json", lambda c: c["outputs"]["rod_balls"].update(columns=old))
+    write_tables(tiny_run)
+    contacts = pd.read_parquet(tiny_run / "tables" / "rod_contacts.parquet")
+    assert (
+        contacts[["slip_x_m_s", "slip_y_m_s", "slip_z_m_s", "approach_m_s"]].isna().all(axis=None)
+    )
+    assert (contacts["normal_force_n"] > 0).all()
+    with pytest.raises(TableError, match="rod_balls holds no velocities"):
+        write_removal(tiny_run)
 
 
 def test_the_bearing_is_measured_from_the_direction_of_motion(tiny_run: Path, edit_json) -> None:
@@ -174,9 +210,10 @@ def test_a_force_that_does_not_add_up_closes_the_gate(tiny_run: Path, raw) -> No
 def resume(run: Path, raw, step: int, factor: float) -> None:
     """Add a second part to rod_balls whose first frame, at `step`, has other forces."""
     (balls,) = rod_balls(step)
-    balls[5] *= factor
-    rest = [raw.binary(later, rod_balls(later), 8) for later in range(step + 10, LAST + 1, 10)]
-    (run / "rod_balls.2.bin").write_bytes(raw.binary(step, [balls], 8) + b"".join(rest))
+    width = len(COLUMNS["rod_balls"])
+    balls[COLUMNS["rod_balls"].index("force_x_n")] *= factor
+    rest = [raw.binary(later, rod_balls(later), width) for later in range(step + 10, LAST + 1, 10)]
+    (run / "rod_balls.2.bin").write_bytes(raw.binary(step, [balls], width) + b"".join(rest))
 
 
 def test_a_frame_evaluated_anew_after_a_resume_does_not_count(tiny_run: Path, raw) -> None:

@@ -52,6 +52,7 @@ BOWL_RADIUS_M = 40e-3
 CHAIN_Z_M = 0.03
 SURFACE_M = 0.05
 SPEED_M_S = 1e-4
+SPIN_RAD_S = 0.02
 DRAG_START = 20
 LAST = 100
 
@@ -64,7 +65,11 @@ COLUMNS: dict[str, list[str]] = {
         *(f"torque_{axis}_nm" for axis in VECTOR),
         *(f"ref_{axis}_m" for axis in VECTOR),
     ],
-    "rod_balls": ["ball_id", "x_m", "y_m", "z_m", "radius_m", *FORCE],
+    "rod_balls": [
+        *("ball_id", "x_m", "y_m", "z_m", *(f"v{axis}_m_s" for axis in VECTOR)),
+        *(f"w{axis}_rad_s" for axis in VECTOR),
+        *("radius_m", *FORCE),
+    ],
     "rod_contacts": [
         *(f"point_{axis}_m" for axis in VECTOR),
         *("facet_id", "ball_id", *FORCE, "overlap_m"),
@@ -116,7 +121,9 @@ def rod_balls(step: int) -> list[list[float]]:
     """Rows of rod_balls: ball 1, once the tool is there."""
     if step < 10:
         return []
-    return [[1, _centre_1(step), 0, CHAIN_Z_M, RADIUS_M, chain_n(step), 0, WEIGHT_N]]
+    speed = 2 / 3 * SPEED_M_S if step > DRAG_START else 0.0
+    motion = [speed, 0, 0, 0, SPIN_RAD_S, 0]
+    return [[1, _centre_1(step), 0, CHAIN_Z_M, *motion, RADIUS_M, chain_n(step), 0, WEIGHT_N]]
 
 
 def _rod_contacts(step: int) -> list[list[float]]:
@@ -232,7 +239,9 @@ def raw_files() -> Mapping[str, bytes]:
     return {
         "thermo.1.txt": Raw.prints(thermo, COLUMNS["thermo"]),
         "rod_force.1.txt": Raw.prints(rod_force, COLUMNS["rod_force"]),
-        "rod_balls.1.bin": b"".join(Raw.binary(s, rod_balls(s), 8) for s in steps["rod_balls"]),
+        "rod_balls.1.bin": b"".join(
+            Raw.binary(s, rod_balls(s), len(COLUMNS["rod_balls"])) for s in steps["rod_balls"]
+        ),
         "balls.1.bin": b"".join(Raw.binary(s, _balls(s), 17) for s in steps["balls"]),
         "rod_contacts.1.dump": b"".join(
             Raw.text(s, _rod_contacts(s), engine["rod_contacts"], "local")

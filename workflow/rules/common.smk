@@ -227,6 +227,7 @@ def of_every_run(wildcards):
         *every("process", "run.json"),
         *every("process", "tables/figures.json"),
         *every("process", "tables/closure.json"),
+        *every("process", "tables/removal.json"),
         *every("fill", "run.json"),
         *every("fill", "tables/fill.json"),
         *every("fill", "tables/figures.json"),

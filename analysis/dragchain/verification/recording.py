@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from dragchain.case import load_outputs
 from dragchain.dumps import iter_frames
 from dragchain.errors import CaseError, GateError, TableError
+from dragchain.hertz import effective_modulus
 from dragchain.report import refusal
 from dragchain.verification.law import Ball, Contact, Motion
 
@@ -135,15 +136,6 @@ class Recording:
     def _crossing(self, overlap: Floats, at: int) -> float:
         share = overlap[at] / (overlap[at] - overlap[at + 1])
         return float(self.time_s[at] + share * (self.time_s[at + 1] - self.time_s[at]))
-
-
-def effective_modulus(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
-    """Effective Young's modulus, Pa (Johnson 1985, eq. 4.21 ff.)."""
-    compliance: float = sum(
-        (1 - material["poissons_ratio"] ** 2) / material["youngs_modulus_pa"]
-        for material in (first, second)
-    )
-    return 1 / compliance
 
 
 def effective_shear(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
