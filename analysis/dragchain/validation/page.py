@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import shutil
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -17,7 +18,7 @@ from dragchain.figures import STYLE, png
 from dragchain.frames import write_parquet
 from dragchain.parquet import write_json
 from dragchain.report import data_uri, measured, number, percent, share
-from dragchain.validation import figures, force, statements
+from dragchain.validation import figures, force, load, statements
 from dragchain.validation.claims import claims
 from dragchain.validation.fills import Point, Points, read_points
 from dragchain.validation.peaks_report import write_peaks
@@ -48,13 +49,14 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     found = find(points, command)
     effects = force.effects(points)
     out_dir.mkdir(parents=True, exist_ok=True)
-    for name, table in tables(found, effects).items():
+    for name, table in tables(points, found, effects).items():
         write_parquet(table, out_dir / f"{name}.parquet")
         table.to_csv(out_dir / f"{name}.csv", index=False, lineterminator="\n")
     folder = out_dir / "figures"
     folder.mkdir(exist_ok=True)
     for name, picture in draw(points, found, effects).items():
         (folder / f"{name}.png").write_bytes(picture)
+    shutil.copyfile(points.fills[0].folder / "figures" / "rod.png", folder / "rod.png")
     write_json(out_dir / "validation.json", {**found, "effects": effects.to_dict("records")})
     peaks = write_peaks(out_dir, [point.folder for point in points.fills])
     page = render(points, found, effects, peaks, folder)
@@ -76,6 +78,7 @@ def find(points: Points, command: str) -> dict[str, Any]:
         "engine_hours": sum(_cpu_s(point) for point in points.all) / 3600.0,
         "force": found_force,
         "comparison": force.compare(together["mean"], together["sd"], case),
+        "load": load.of_fills(points.fills),
         "statements": found_statements,
         "claims": [{**vars(claim), "verdict": claim.verdict} for claim in claims(found_statements)],
     }
@@ -85,7 +88,9 @@ def _cpu_s(point: Point) -> float:
     return float(point.measures["cost"]["cpu_time_s"])
 
 
-def tables(found: Mapping[str, Any], effects: pd.DataFrame) -> dict[str, pd.DataFrame]:
+def tables(
+    points: Points, found: Mapping[str, Any], effects: pd.DataFrame
+) -> dict[str, pd.DataFrame]:
     """The numbers of the page as tables, by name."""
     network = found["statements"]["network"]
     edges = network["edges_diameters"]
@@ -102,6 +107,8 @@ def tables(found: Mapping[str, Any], effects: pd.DataFrame) -> dict[str, pd.Data
     return {
         "fills": pd.json_normalize(found["force"]["fills"], sep="_"),
         "effects": effects,
+        "load": pd.DataFrame(found["load"]["rows"]),
+        "facets": load.facets(points.fills),
         "comparison": pd.json_normalize(found["comparison"], sep="_"),
         "statements": pd.DataFrame(estimates),
         "corridor": pd.DataFrame(
