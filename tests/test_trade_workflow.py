@@ -67,7 +67,7 @@ def test_the_record_says_what_made_it(traded: Path) -> None:
     folder = traded / "results/small/trade-report/plan"
     trade = json.loads((folder / "trade.json").read_text())
     assert trade["commands"] == ["snakemake trade --config study=small plan=plan.yaml"]
-    assert trade["runs"] == 6 and trade["reference"]["youngs_modulus_scale"] == 1e-3
+    assert trade["runs"] == 8 and trade["reference"]["youngs_modulus_scale"] == 1e-3
     assert trade["scene"]["tool_to_ball"] == pytest.approx(0.008 / 0.00654, rel=0.01)
     assert len(trade["drop"]) == 2
     page = (folder / "report.html").read_text()

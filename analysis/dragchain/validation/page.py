@@ -57,7 +57,7 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     for name, picture in draw(points, found, effects).items():
         (folder / f"{name}.png").write_bytes(picture)
     shutil.copyfile(points.fills[0].folder / "figures" / "rod.png", folder / "rod.png")
-    write_json(out_dir / "validation.json", {**found, "effects": effects.to_dict("records")})
+    write_json(out_dir / "validation.json", {**found, "effects": _records(effects)})
     peaks = write_peaks(out_dir, [point.folder for point in points.fills])
     page = render(points, found, effects, peaks, folder)
     (out_dir / "report.html").write_text(page, encoding="utf-8")
@@ -172,13 +172,19 @@ def render(
     assumptions = points.fills[0].case.assumptions
     return environment.get_template("validation.html.j2").render(
         found=found,
-        effects=effects.to_dict("records"),
+        effects=_records(effects),
         assumptions=assumptions,
         varied=set(effects["field"]),
         points=points,
         peaks=peaks,
         picture=lambda name: _uri(folder / name),
     )
+
+
+def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """The rows of a table, None where there is no number."""
+    known = table.astype(object).where(table.notna(), None)
+    return [{str(name): value for name, value in row.items()} for row in known.to_dict("records")]
 
 
 def _uri(file: Path) -> str | None:
