@@ -151,9 +151,16 @@ def _settings(plan: Plan, block: Block, study: Study, seed: int) -> Iterator[dic
 
 
 def _unnamed(settings: Settings) -> dict[str, Any]:
-    """The fields that the name of a fidelity without a name does not say already."""
+    """The fields to name a point by.
+
+    Not those that the name of a fidelity without a name says already, nor what is written.
+    """
     said = {"fidelity", *(f"fidelity.{name}" for name in SAID_BY_NAME)}
-    return {field: value for field, value in settings.items() if field not in said}
+    return {
+        field: value
+        for field, value in settings.items()
+        if field not in said and not field.startswith("outputs.")
+    }
 
 
 def _path_length(study: Study) -> tuple[str, float]:
