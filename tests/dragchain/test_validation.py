@@ -167,6 +167,17 @@ def test_effects_are_found_against_what_they_change(points: Points) -> None:
     assert (spread.low < spread.change).all() and (spread.change < spread.high).all()
 
 
+def test_a_shorter_run_counts_less(points: Points) -> None:
+    def half_width(arc_m: float) -> float:
+        control, *others = points.others
+        shorter = dataclasses.replace(control, measures={**control.measures, "arc_m": arc_m})
+        row = force.effects(Points(points.fills, [shorter, *others])).iloc[0]
+        return float(row.high - row.low)
+
+    whole = points.fills[0].measures["arc_m"]
+    assert half_width(whole / 4.0) > 1.4 * half_width(whole)
+
+
 @pytest.mark.parametrize(
     ("low", "high", "verdict"), [(1.1, 1.5, HOLDS), (0.5, 0.9, FAILS), (0.9, 1.5, OPEN)]
 )

@@ -200,7 +200,9 @@ def effects(points: Points) -> pd.DataFrame:
     """What every other setting does to the mean drag and to its standard deviation.
 
     All runs are fitted together (`dragchain.effects`): one mean a setting, one
-    variance for all, a share of it common to runs from one bed. A setting that
+    variance for all, in inverse proportion to the path. What runs from one bed have in common
+    is not made use of: it was measured to be little (docs/trade.md), and these are too few runs
+    to tell. A setting that
     changes an input is compared with the same fidelity without that change; one
     that changes the fidelity alone with the fills.
 
@@ -230,10 +232,12 @@ class _Fitted:
     def __init__(self, points: Points, quantity: str) -> None:
         self.points = points.all
         self.settings = list(dict.fromkeys(point.setting for point in self.points))
-        values = [math.log(abs(_of_run(point, quantity))) for point in self.points]
+        values = np.array([math.log(abs(_of_run(point, quantity))) for point in self.points])
         design = np.array([self._indicator(point.setting) for point in self.points])
-        beds = [str(point.measures["bed"]) for point in self.points]
-        self.fit: Fit = fit_effects(design, np.array(values), beds)
+        weights = np.sqrt([float(point.measures["arc_m"]) for point in self.points])
+        weights /= weights.max()
+        runs = range(len(self.points))
+        self.fit: Fit = fit_effects(weights[:, None] * design, weights * values, runs)
 
     def _indicator(self, setting: tuple[object, ...]) -> Floats:
         return np.array([float(setting == other) for other in self.settings])
