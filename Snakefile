@@ -16,6 +16,7 @@ include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/verify.smk"
 include: "workflow/rules/stability.smk"
 include: "workflow/rules/trade.smk"
+include: "workflow/rules/scaling.smk"
 
 
 localrules:
@@ -26,6 +27,7 @@ localrules:
     fill,
     process,
     report,
+    scaling,
     stability,
     trade,
     verify,
@@ -93,3 +95,9 @@ rule trade:
 rule checks:
     input:
         rules.write_checks.output,
+
+
+# How the mean drag depends on the field that the study's block scaling names.
+rule scaling:
+    input:
+        rules.write_scaling.output,

@@ -193,15 +193,15 @@ def estimate_scatter(runs: Runs, design: Floats) -> Scatter:
     single values it is the random-effects model of meta-analysis.
     """
 
-    def loss(parameters: ArrayLike) -> float:
-        spread, share = np.asarray(parameters)
-        covariance = runs.covariance(Scatter(float(np.exp(spread)), float(share)))
-        return _minus_likelihood(design, runs.logarithms, covariance)
+    def loss(parameters: Floats) -> float:
+        scatter = Scatter(float(np.exp(parameters[0])), float(parameters[1]))
+        return _minus_likelihood(design, runs.logarithms, runs.covariance(scatter))
 
-    spreads, shares = np.log(SPREADS), (0.0, LARGEST_SHARE if runs.shares_beds else 0.0)
-    trials = itertools.product(np.linspace(*spreads, 12)[1:-2], {0.0, 0.5 * shares[1]})
-    start = np.array(min(trials, key=loss))
-    found = minimize(loss, start, bounds=[spreads, shares], method="L-BFGS-B")
+    least, most = (float(limit) for limit in np.log(SPREADS))
+    share = LARGEST_SHARE if runs.shares_beds else 0.0
+    trials = itertools.product(np.linspace(least, most, 12)[1:-2], {0.0, 0.5 * share})
+    start = min((np.array(trial) for trial in trials), key=loss)
+    found = minimize(loss, start, bounds=[(least, most), (0.0, share)], method="L-BFGS-B")
     return Scatter(float(np.exp(found.x[0])), float(found.x[1]))
 
 
@@ -276,11 +276,11 @@ class PowerLaw:
             for (below, above), step in zip(pairwise(units), steps, strict=True)
         ]
 
-    def deviation(self, number: int) -> Estimate:
-        """Relative difference of one level from the law that the other levels follow."""
+    def deviation(self, number: int) -> Estimate | None:
+        """Relative difference of one level from the law of the others; None if too few runs."""
         runs, degrees = self.runs, self.runs.degrees(3)
         if degrees < 1:
-            return Estimate(float("nan"), float("nan"), float("nan"))
+            return None
         design = np.column_stack([runs.line(), runs.each_level()[:, number]])
         covariance = runs.covariance(estimate_scatter(runs, design))
         found = solve(design, runs.logarithms, covariance, degrees)
@@ -330,7 +330,7 @@ def _lack_of_fit(straight: Linear, means: Linear, runs: Runs) -> float:
 
 @dataclass(frozen=True)
 class TwoTerms:
-    """``value = a x^n + b x^(n-1) = a x^(n-1) (x + offset)`` with a given n.
+    """``value = a x^n + b x^(n-1)`` with a given n.
 
     Attributes
     ----------
@@ -338,8 +338,6 @@ class TwoTerms:
         n.
     leading, lower : Estimate
         a and b.
-    offset : Estimate or None
-        b / a by Fieller's theorem; None if its interval is not bounded.
     lower_share : Estimate
         Part of the value at the highest level that the lower term makes.
     lack_of_fit : float or None
@@ -349,8 +347,26 @@ class TwoTerms:
     power: float
     leading: Estimate
     lower: Estimate
-    offset: Estimate | None
     lower_share: Estimate
+    lack_of_fit: float | None
+
+
+@dataclass(frozen=True)
+class Shifted:
+    """``value = a (x + offset)^n`` with a given n.
+
+    Attributes
+    ----------
+    power : float
+        n.
+    offset : Estimate or None
+        By Fieller's theorem, in the unit of x; None if its interval is not bounded.
+    lack_of_fit : float or None
+        As for a power law.
+    """
+
+    power: float
+    offset: Estimate | None
     lack_of_fit: float | None
 
 
@@ -368,30 +384,47 @@ def fit_two_terms(law: PowerLaw, power: float) -> TwoTerms:
         The higher power.
     """
     runs = law.runs
-    size = np.exp(runs.each_level() @ law.means.effects)
-    high, low = runs.x**power, runs.x ** (power - 1.0)
-    terms, relative = np.column_stack([high / size, low / size]), runs.values / size
-    fit = solve(terms, relative, runs.covariance(law.scatter), runs.degrees(2))
+    terms = np.column_stack([runs.x**power, runs.x ** (power - 1.0)])
+    fit, lack = _fit_terms(law, terms, 1.0)
     top = runs.levels[-1]
     return TwoTerms(
         power=power,
         leading=fit.estimate([1.0, 0.0]),
         lower=fit.estimate([0.0, 1.0]),
-        offset=_ratio(fit),
         lower_share=_share(fit, np.array([top**power, top ** (power - 1.0)])),
-        lack_of_fit=_terms_lack(terms, relative, law),
+        lack_of_fit=lack,
     )
 
 
-def _terms_lack(terms: Floats, relative: Floats, law: PowerLaw) -> float | None:
-    runs = law.runs
+def fit_shifted(law: PowerLaw, power: float) -> Shifted:
+    """Fit a given power of a shifted x: the root of the value is a straight line.
+
+    Parameters
+    ----------
+    law : PowerLaw
+        The power law fitted to the same runs.
+    power : float
+        n, not zero.
+    """
+    x = law.runs.x
+    fit, lack = _fit_terms(law, np.column_stack([x, np.ones(len(x))]), 1.0 / power)
+    return Shifted(power, _ratio(fit), lack)
+
+
+def _fit_terms(law: PowerLaw, terms: Floats, root: float) -> tuple[Linear, float | None]:
+    """Fit terms (N, 2) to a root of the values, relative to the levels, and test their lack."""
+    runs, scatter = law.runs, law.scatter
+    single = runs.each_level()
+    size = np.exp(root * (single @ law.means.effects))
+    design, relative = terms / size[:, None], runs.values**root / size
+    fit = solve(design, relative, root**2 * runs.covariance(scatter), runs.degrees(2))
     free = runs.degrees(len(runs.levels))
     if free < 1:
-        return None
-    single = runs.each_level()
-    covariance = runs.covariance(estimate_scatter(runs, single))
+        return fit, None
+    covariance = root**2 * runs.covariance(estimate_scatter(runs, single))
     means = solve(single, relative, covariance, free)
-    return _lack_of_fit(solve(terms, relative, covariance, runs.degrees(2)), means, runs)
+    straight = solve(design, relative, covariance, runs.degrees(2))
+    return fit, _lack_of_fit(straight, means, runs)
 
 
 def _ratio(fit: Linear) -> Estimate | None:
