@@ -359,6 +359,8 @@ class Shifted:
     ----------
     power : float
         n.
+    root_slope, root_constant : float
+        The root of the value is ``root_slope x + root_constant``.
     offset : Estimate or None
         By Fieller's theorem, in the unit of x; None if its interval is not bounded.
     lack_of_fit : float or None
@@ -366,8 +368,14 @@ class Shifted:
     """
 
     power: float
+    root_slope: float
+    root_constant: float
     offset: Estimate | None
     lack_of_fit: float | None
+
+    def at(self, x: float) -> float:
+        """The value at a level; zero where the line is below."""
+        return float(max(self.root_slope * x + self.root_constant, 0.0) ** self.power)
 
 
 def fit_two_terms(law: PowerLaw, power: float) -> TwoTerms:
@@ -408,7 +416,8 @@ def fit_shifted(law: PowerLaw, power: float) -> Shifted:
     """
     x = law.runs.x
     fit, lack = _fit_terms(law, np.column_stack([x, np.ones(len(x))]), 1.0 / power)
-    return Shifted(power, _ratio(fit), lack)
+    slope, constant = (float(effect) for effect in fit.effects)
+    return Shifted(power, slope, constant, _ratio(fit), lack)
 
 
 def _fit_terms(law: PowerLaw, terms: Floats, root: float) -> tuple[Linear, float | None]:

@@ -234,7 +234,6 @@ def statement(exponent: Estimate, expected: Expectation) -> str:
 
 def _plain(law: PowerLaw) -> dict[str, Any]:
     levels = law.runs.levels
-    curve = np.geomspace(levels[0], levels[-1], CURVE_POINTS)
     return {
         "exponent": asdict(law.exponent),
         "change_per_decade": asdict(law.exponent.exp(factor=math.log(10.0), less=1.0)),
@@ -247,17 +246,25 @@ def _plain(law: PowerLaw) -> dict[str, Any]:
         "spread": law.scatter.spread,
         "bed_share": law.scatter.bed_share,
         "lack_of_fit": law.lack_of_fit,
-        "curve": [{"x": float(x), **asdict(law.at(float(x)))} for x in curve],
+        "curve": [{"x": x, **asdict(law.at(x))} for x in _curve(law)],
     }
+
+
+def _curve(law: PowerLaw) -> list[float]:
+    """Levels at which a curve is drawn."""
+    levels = law.runs.levels
+    return [float(x) for x in np.geomspace(levels[0], levels[-1], CURVE_POINTS)]
 
 
 def _other_forms(law: PowerLaw, power: float | None) -> dict[str, Any]:
     """The expected power with a lower one beside it, and of a shifted level, if there is one."""
     if power is None or power < 1.0:
         return {"two_terms": None, "shifted": None}
+    shifted = fit_shifted(law, power)
+    curve = [{"x": x, "value": shifted.at(x)} for x in _curve(law)]
     return {
         "two_terms": asdict(fit_two_terms(law, power)),
-        "shifted": asdict(fit_shifted(law, power)),
+        "shifted": {**asdict(shifted), "curve": curve},
     }
 
 

@@ -12,13 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
-from dragchain.figures import BLUE, GREY, ORANGE, STYLE, WIDTH_IN
+from dragchain.figures import BLUE, GREEN, ORANGE, STYLE, WIDTH_IN
 
 INK = "#1d2733"
 LEAST_SPAN = 2.5
 """An axis of drag spans at least this factor, so that chance does not look like a trend."""
 
 PAD = 1.12
+SIDEWAYS = 0.015
+"""Runs of a level stand side by side, this part of the level apart."""
+
 TICKS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 
 NAMES: Mapping[str, tuple[str, str, float]] = {
@@ -123,6 +126,15 @@ def _law(axes: Axes, found: Mapping[str, Any], factor: float) -> None:
         slope = middle * (every / centre) ** expected
         axes.plot(factor * every, slope, "--", color=ORANGE, lw=1.4, label="expected slope")
 
+    if found["shifted"]:
+        _shifted(axes, found["shifted"]["curve"], factor)
+
+
+def _shifted(axes: Axes, curve: Sequence[Mapping[str, float]], factor: float) -> None:
+    x = factor * np.array([point["x"] for point in curve])
+    values = [point["value"] for point in curve]
+    axes.plot(x, values, "-.", color=GREEN, lw=1.2, label="expected power of level + offset")
+
 
 def _whole(axes: Axes, curve: Sequence[Mapping[str, float]], factor: float) -> None:
     x = factor * np.array([point["x"] for point in curve])
@@ -131,28 +143,36 @@ def _whole(axes: Axes, curve: Sequence[Mapping[str, float]], factor: float) -> N
 
 
 def _points(axes: Axes, found: Mapping[str, Any], factor: float) -> None:
+    levels = [level for level in found["levels"] if level["runs"] > 1]
+    axes.plot(
+        [factor * level["x"] for level in levels],
+        [level["drag_n"]["value"] for level in levels],
+        "_",
+        ms=17,
+        mew=2.0,
+        color=INK,
+        label="mean of a level",
+    )
     runs = found["runs"]
     axes.errorbar(
-        [factor * run["level"] for run in runs],
+        [factor * run["level"] * beside for run, beside in zip(runs, _beside(runs), strict=True)],
         [run["drag_n"] for run in runs],
         yerr=[run["standard_error_n"] for run in runs],
         fmt="o",
-        ms=3.5,
+        ms=4.0,
         mfc="white",
-        color=GREY,
-        elinewidth=0.8,
+        color=INK,
+        elinewidth=0.9,
+        zorder=3,
         label="a run and its standard error",
     )
-    drags = [level["drag_n"] for level in found["levels"]]
-    axes.plot(
-        [factor * level["x"] for level in found["levels"]],
-        [drag["value"] for drag in drags],
-        "D",
-        ms=5.5,
-        color=INK,
-        label="mean of a level",
-        zorder=3,
-    )
+
+
+def _beside(runs: Sequence[Mapping[str, Any]]) -> list[float]:
+    """Factors on the levels of runs that put beds side by side."""
+    beds = sorted({run["bed"] for run in runs})
+    middle = 0.5 * (len(beds) - 1)
+    return [1.0 + SIDEWAYS * (beds.index(run["bed"]) - middle) for run in runs]
 
 
 def _ticks(axes: Axes, found: Mapping[str, Any], factor: float) -> None:
