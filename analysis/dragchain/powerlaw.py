@@ -152,8 +152,8 @@ class Runs:
 
     @property
     def shares_beds(self) -> bool:
-        """Whether any two runs start from the same bed."""
-        return len(set(self.beds)) < len(self.beds)
+        """Whether there are several beds, and some have several runs."""
+        return 1 < len(set(self.beds)) < len(self.beds)
 
     def degrees(self, effects: int) -> int:
         """Degrees of freedom that some effects leave; beds that are shared take theirs."""
@@ -219,13 +219,15 @@ def solve(design: Floats, values: Floats, covariance: Floats, degrees: int) -> L
     """Generalised least squares, its covariance scaled by the residuals.
 
     The scale is that of Knapp and Hartung 2003, Statistics in Medicine 22, 2693:
-    with it Student's t holds though the scatter was estimated from few runs.
+    with it Student's t holds though the scatter was estimated from few runs. It is
+    never below 1 (Roever, Knapp and Friede 2015, BMC Med. Res. Methodol. 15, 99):
+    a few runs that happen to agree do not make their own errors smaller.
     """
     root = np.linalg.cholesky(covariance)
     left, right = np.linalg.solve(root, design), np.linalg.solve(root, values)
     effects = np.asarray(np.linalg.lstsq(left, right, rcond=None)[0], dtype=np.float64)
     square = float(np.sum((right - left @ effects) ** 2))
-    scale = square / (len(values) - design.shape[1])
+    scale = max(1.0, square / (len(values) - design.shape[1]))
     return Linear(effects, np.asarray(scale * np.linalg.inv(left.T @ left)), degrees, square)
 
 
@@ -315,7 +317,7 @@ def _level_means(runs: Runs, scatter: Scatter, line: Linear) -> Linear:
     left = np.linalg.solve(root, runs.each_level())
     right = np.linalg.solve(root, runs.logarithms)
     effects = np.asarray(np.linalg.lstsq(left, right, rcond=None)[0], dtype=np.float64)
-    scale = line.square / (len(runs.x) - 2)
+    scale = max(1.0, line.square / (len(runs.x) - 2))
     return Linear(effects, np.asarray(scale * np.linalg.inv(left.T @ left)), line.degrees, 0.0)
 
 

@@ -32,6 +32,7 @@ from dragchain.powerlaw import (
     solve,
 )
 from dragchain.scaling_figures import draw_scaling, draw_scalings
+from dragchain.scaling_words import remarks
 
 __all__ = ["Expectation", "Run", "draw_scalings", "find", "read_runs", "read_scalings"]
 
@@ -184,7 +185,7 @@ def find(runs: Sequence[Run], field: str, expected: Expectation) -> dict[str, An
     if expected.within is not None:
         inner = fit_power_law(law.runs.within(*expected.within))
     judged = inner or law
-    return {
+    found = {
         "schema": SCHEMA,
         "study": runs[0].case.study,
         "field": field,
@@ -207,6 +208,7 @@ def find(runs: Sequence[Run], field: str, expected: Expectation) -> dict[str, An
         "fidelity": vars(runs[0].case.fidelity),
         "versions": dict(runs[0].case.versions),
     }
+    return {**found, "remarks": remarks(found)}
 
 
 def _sample(runs: Sequence[Run]) -> Runs:
