@@ -84,13 +84,13 @@ def _change(found: Found) -> str:
 def _forms(found: Found) -> Iterator[str]:
     if not found["shifted"]:
         return
-    _, unit, factor = axis_name(found["field"])
+    label, unit, factor = axis_name(found["field"])
     offset, power = found["shifted"]["offset"], found["shifted"]["power"]
     if offset and unit == "mm":
         balls = interval(offset, 1.0 / found["scene"]["ball_diameter_m"], 1)
         yield (
-            f"With the expected exponent {power:g} the drag follows the level plus an offset of "
-            f"{interval(offset, factor, 1)} {unit}, {balls} ball diameters"
+            f"With the expected exponent {power:g} the drag follows the {label} plus an offset "
+            f"of {interval(offset, factor, 1)} {unit}, {balls} ball diameters"
             f"{_probability(found['shifted'])}."
         )
     terms = found["two_terms"]
