@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import html
 import json
 from collections.abc import Callable
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import jinja2
 import numpy as np
 import pandas as pd
 import pytest
@@ -152,6 +155,37 @@ def test_the_scalings_of_the_package_are_whole() -> None:
         again = _refit(found)
         assert again == pytest.approx(found["fit"]["exponent"]["value"], abs=0.01)
         assert list(table(found)[found["field"]]) == [level["x"] for level in found["levels"]]
+
+
+def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
+    scalings = read_scalings()
+    folder = resources.files("dragchain") / "validation"
+    template = (folder / "scaling.html.j2").read_text(encoding="utf-8")
+    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, autoescape=True)
+    page = environment.from_string(template).render(
+        found=scalings, picture=lambda name: f"data:image/png;base64,{name}"
+    )
+    assert 'src="data:image/png;base64,scaling"' in page
+    for found in scalings:
+        assert found["statement"] in page
+        assert all(html.escape(remark, quote=True) in page for remark in found["remarks"])
+
+
+def test_the_remarks_name_a_lack_of_fit(write_run: Writer) -> None:
+    field = "motion.speed_m_s"
+    bent = {0.005: 1.0, 0.01: 1.0, 0.02: 1.0, 0.04: 1.8, 0.08: 1.0}
+    folders = [
+        write_run(drag, seed, **{field: speed}) for speed, drag in bent.items() for seed in (1, 2)
+    ]
+    words = " ".join(find(read_runs(folders, field), field, Expectation(0.0))["remarks"])
+    assert "does not hold" in words and "40 mm/s by +" in words
+    assert "Ten times the level changes the drag by" in words
+
+
+def test_one_bed_is_told(write_run: Writer) -> None:
+    folders = [write_run(depth, **{DEPTH: depth}) for depth in (*LEVELS, 0.05)]
+    words = " ".join(find(read_runs(folders, DEPTH), DEPTH, Expectation(1.0))["remarks"])
+    assert "too few runs of one level" in words and "start from one bed" in words
 
 
 def _refit(found: dict[str, Any]) -> float:
