@@ -32,7 +32,7 @@ from dragchain.powerlaw import (
     solve,
 )
 from dragchain.scaling_figures import draw_scaling, draw_scalings
-from dragchain.scaling_words import remarks
+from dragchain.scaling_words import interval, remarks
 
 __all__ = ["Expectation", "Run", "draw_scalings", "find", "read_runs", "read_scalings"]
 
@@ -225,7 +225,7 @@ def _verdict(exponent: Estimate, expected: float | None) -> str:
 
 def statement(exponent: Estimate, expected: Expectation) -> str:
     """The exponent and whether its interval holds what is expected, in one sentence."""
-    found = f"exponent {exponent.value:.2f} ({exponent.low:.2f} to {exponent.high:.2f})"
+    found = f"exponent {interval(asdict(exponent))}"
     if expected.exponent is None:
         return found
     source = f" of {expected.source}" if expected.source else ""

@@ -104,7 +104,7 @@ def _title(found: Mapping[str, Any]) -> str:
 
 
 def _signed(value: float) -> str:
-    return f"{value:.2f}".replace("-", "\N{MINUS SIGN}")
+    return f"{round(value, 2) + 0.0:.2f}".replace("-", "\N{MINUS SIGN}")
 
 
 def _law(axes: Axes, found: Mapping[str, Any], factor: float) -> None:

@@ -32,7 +32,9 @@ def remarks(found: Found) -> list[str]:
 
 def interval(estimate: Mapping[str, float], factor: float = 1.0, digits: int = 2) -> str:
     """Format a value with its interval, ``1.53 (1.32 to 1.74)``."""
-    value, low, high = (factor * estimate[name] for name in ("value", "low", "high"))
+    value, low, high = (
+        round(factor * estimate[name], digits) + 0.0 for name in ("value", "low", "high")
+    )
     return f"{value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
 
 
