@@ -19,6 +19,7 @@ include: "workflow/rules/stability.smk"
 include: "workflow/rules/points.smk"
 include: "workflow/rules/trade.smk"
 include: "workflow/rules/validate.smk"
+include: "workflow/rules/scaling.smk"
 
 
 localrules:
@@ -29,6 +30,7 @@ localrules:
     fill,
     process,
     report,
+    scaling,
     stability,
     trade,
     validate,
@@ -103,3 +105,9 @@ rule checks:
 rule validate:
     input:
         rules.write_validation.output,
+
+
+# How the mean drag depends on the field that the study's block scaling names.
+rule scaling:
+    input:
+        rules.write_scaling.output,

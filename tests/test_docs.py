@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import pytest
 from paths import ROOT
 
+from dragchain.scaling import read_scalings
+from dragchain.scaling_words import interval
 from dragdeck.fields import page
+from dragdeck.project import Project
 from dragdeck.scenes.drop import DropDeck
 from dragdeck.scenes.fill import FillDeck
 from dragdeck.scenes.process import ProcessDeck
@@ -39,6 +43,19 @@ def test_every_link_leads_somewhere(file) -> None:
     links = re.findall(r"\]\(([^)#:]+)\)", file.read_text())
     missing = [link for link in links if not (file.parent / link).exists()]
     assert not missing
+
+
+@pytest.mark.parametrize("found", read_scalings(), ids=lambda found: found["study"])
+def test_the_scalings_are_those_of_the_studies_and_on_the_page(found: dict[str, Any]) -> None:
+    text = (ROOT / "docs/scaling.md").read_text()
+    assert interval(found["fit"]["exponent"]) in text and found["statement"] in text
+    cases = Project(ROOT).cases(found["study"])
+    scaling = cases[0].study.scaling
+    assert scaling is not None and scaling.within is None
+    assert (scaling.field, scaling.expected_exponent, scaling.source) == (
+        *(found["field"], found["expected"]["exponent"], found["expected"]["source"]),
+    )
+    assert {run["run"] for run in found["runs"]} == {case.run_ids["process"] for case in cases}
 
 
 def test_every_block_is_on_the_page() -> None:

@@ -91,6 +91,17 @@ def _parser() -> argparse.ArgumentParser:
     )
     checks.add_argument("measures", type=Path, nargs="+", metavar="MEASURES", help="measures.json")
     checks.set_defaults(action=_checks)
+    scaling = commands.add_parser("scaling", help="fit a power law to the drag over one field")
+    scaling.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
+    scaling.add_argument("--field", required=True, help="dotted name of the field")
+    scaling.add_argument("--expected", type=float, metavar="N", help="exponent to compare with")
+    scaling.add_argument("--source", help="where that exponent comes from")
+    scaling.add_argument(
+        "--within", type=float, nargs=2, metavar=("LOW", "HIGH"), help="levels it is meant for"
+    )
+    scaling.add_argument("--command", help="what made it, for the record")
+    scaling.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
+    scaling.set_defaults(action=_scaling)
     trade = commands.add_parser("trade", help="write the report on a trade of speed and accuracy")
     trade.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
     trade.add_argument(
@@ -196,6 +207,20 @@ def _checks(options: argparse.Namespace) -> None:
             f" {check.setting}: {error.error:+.3f} ({error.low:+.3f} to {error.high:+.3f}),"
             f" {check.verdict}"
         )
+
+
+def _scaling(options: argparse.Namespace) -> None:
+    from dragchain.scaling import Expectation, write_scaling
+
+    within = tuple(options.within) if options.within else None
+    found = write_scaling(
+        options.out,
+        options.run_dirs,
+        options.field,
+        Expectation(options.expected, options.source, within),
+        [options.command] if options.command else [],
+    )
+    print(f"{options.field}: {found['statement']}")
 
 
 def _trade(options: argparse.Namespace) -> None:

@@ -127,3 +127,62 @@ def test_an_edited_mesh_names_another_run(
     (after,) = load_cases(file)
     assert first != after.run_ids["process"]
     assert before.run_ids["fill"] == after.run_ids["fill"]
+
+
+SCALING = {"field": "motion.submersion_m", "expected_exponent": 2, "source": "somebody"}
+DEPTHS = [0.010, "1.5e-2", 0.020]
+
+
+def test_a_scaling_is_part_of_no_run(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    data = {**small, "matrix": {"motion.submersion_m": DEPTHS, "seed": [1, 2]}}
+    before = load_cases(write_study(data))
+    after = load_cases(write_study({**data, "scaling": SCALING}))
+    assert len(after) == 6
+    for one, other in zip(before, after, strict=True):
+        assert one.run_ids == other.run_ids
+        assert all(one.digest(scene) == other.digest(scene) for scene in SCENES)
+    assert after[0].study.scaling is not None and before[0].study.scaling is None
+
+
+@pytest.mark.parametrize(
+    ("scaling", "matrix", "field", "words"),
+    [
+        ({"field": "motion.depth_m"}, {}, "scaling.field", "not a field of matrix"),
+        ({}, {"motion.speed_m_s": [0.01, 0.02]}, "matrix", "another field varies"),
+        (
+            {},
+            {"motion.submersion_m": [0.01, 0.02]},
+            "matrix.motion.submersion_m",
+            "too few levels",
+        ),
+        ({"within": [0.01, 0.015]}, {}, "matrix.motion.submersion_m", "too few levels"),
+        ({"within": [0.02, 0.01]}, {}, "scaling", "not up"),
+        ({"field": "seed"}, {}, "scaling", "seed"),
+        ({"slope": 2}, {}, "scaling.slope", "unknown key"),
+        (
+            {"field": "workpiece.shape.kind"},
+            {"motion.submersion_m": None, "workpiece.shape.kind": ["cylinder"] * 1},
+            "matrix.workpiece.shape.kind",
+            "numbers above 0",
+        ),
+    ],
+)
+def test_a_scaling_that_the_matrix_cannot_tell_is_refused(
+    small: dict[str, Any],
+    write_study: Callable[..., Path],
+    scaling: dict[str, Any],
+    matrix: dict[str, Any],
+    field: str,
+    words: str,
+) -> None:
+    varied = {"motion.submersion_m": DEPTHS, "seed": [1, 2], **matrix}
+    data = {
+        **small,
+        "matrix": {name: values for name, values in varied.items() if values},
+        "scaling": {**SCALING, **scaling},
+    }
+    with pytest.raises(InputError, match=words) as caught:
+        load_cases(write_study(data))
+    assert caught.value.field == field

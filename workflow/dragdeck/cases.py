@@ -11,6 +11,7 @@ import copy
 import hashlib
 import itertools
 import json
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -19,7 +20,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 from dragdeck.errors import InputError
-from dragdeck.study import STUDY_FILE, MeshShape, Study, Tolerance, read_yaml, validate
+from dragdeck.study import (
+    STUDY_FILE,
+    MeshShape,
+    Scaling,
+    Study,
+    Tolerance,
+    read_yaml,
+    validate,
+)
 
 SceneName = Literal["drop", "fill", "process"]
 SCENES: tuple[SceneName, ...] = ("drop", "fill", "process")
@@ -142,9 +151,75 @@ def load_cases(file: Path, fidelity: str | None = None) -> list[Case]:
     if fidelity is not None:
         data["fidelity"] = fidelity
     validate({**data, "matrix": {}}, file)
-    matrix = validate(data, file).matrix
+    study = validate(data, file)
+    matrix = study.matrix
+    if study.scaling is not None:
+        _check_scaling(study.scaling, matrix, file)
     plain = {**data, "matrix": {}}
     return [settle_case(file, plain, settings) for settings in _combinations(matrix, file)]
+
+
+LEAST_LEVELS = 3
+"""Levels that a power law is fitted to: two would fit any."""
+
+
+def _check_scaling(scaling: Scaling, matrix: Mapping[str, list[Any]], file: Path) -> None:
+    """Refuse a scaling that the matrix cannot tell.
+
+    Raises
+    ------
+    InputError
+        Its field is not in the matrix, is not alone there but for the seed, or has
+        a level that is no number above zero; or too few levels are within its range.
+    """
+    field = scaling.field
+    if field not in matrix:
+        raise InputError(
+            "not a field of matrix",
+            file=file,
+            field="scaling.field",
+            value=field,
+            limit=f"one of: {', '.join(name for name in matrix if name != 'seed') or 'none here'}",
+            remedy="add its levels to matrix, or name a field that is there",
+        )
+    others = [name for name in matrix if name not in (field, "seed")]
+    if others:
+        raise InputError(
+            "another field varies too, so that the drag is no function of one",
+            file=file,
+            field="matrix",
+            value=", ".join(others),
+            limit=f"{field} and seed",
+            remedy="give each field a study of its own, or leave out scaling",
+        )
+    levels = [_level(value, field, file) for value in matrix[field]]
+    low, high = scaling.within or (min(levels), max(levels))
+    if sum(low <= level <= high for level in levels) < LEAST_LEVELS:
+        raise InputError(
+            f"too few levels from {low:g} to {high:g} for a power law",
+            file=file,
+            field=f"matrix.{field}",
+            value=matrix[field],
+            limit=f"{LEAST_LEVELS} levels or more",
+            remedy="add levels" + (", or widen scaling.within" if scaling.within else ""),
+        )
+
+
+def _level(value: Any, field: str, file: Path) -> float:
+    """A level of a scaling as a number."""
+    try:
+        level = math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError):
+        level = math.nan
+    if not (math.isfinite(level) and level > 0):
+        raise InputError(
+            "a power law needs numbers above 0",
+            file=file,
+            field=f"matrix.{field}",
+            value=value,
+            remedy="remove this level, or leave out scaling",
+        )
+    return level
 
 
 def settle_case(

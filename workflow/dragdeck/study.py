@@ -323,6 +323,28 @@ class Reference(Model):
     )
 
 
+class Scaling(Model):
+    """A power law to look for in the mean drag over the levels of one matrix field."""
+
+    field: str = Field(description="dotted name of a field of matrix, its levels numbers above 0")
+    expected_exponent: Number | None = Field(
+        default=None, description="exponent to compare the fitted one with"
+    )
+    source: str | None = Field(default=None, description="where that exponent comes from")
+    within: tuple[Positive, Positive] | None = Field(
+        default=None,
+        description="levels from ... to, where the exponent is expected; none: everywhere",
+    )
+
+    @model_validator(mode="after")
+    def _order(self) -> Scaling:
+        if self.field == "seed":
+            raise ValueError("the seed is no field to fit a power law over")
+        if self.within is not None and self.within[0] >= self.within[1]:
+            raise ValueError(f"within goes from {self.within[0]:g} to {self.within[1]:g}: not up")
+        return self
+
+
 BUILT_IN_FIDELITIES: Mapping[str, Fidelity] = {
     "draft": Fidelity(youngs_modulus_scale=1e-3, timestep_fraction=0.6),
     "standard": Fidelity(youngs_modulus_scale=1e-2, timestep_fraction=0.5),
@@ -359,6 +381,7 @@ class Study(Model):
     matrix: dict[str, list[Any]] = Field(
         default_factory=dict, description="dotted field: values; every combination is a case"
     )
+    scaling: Scaling | None = None
     assumptions: list[Assumption] = Field(default_factory=list)
     reference: Reference | None = None
 

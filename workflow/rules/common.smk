@@ -1,6 +1,7 @@
 # What the rules share: the study, its cases, the paths of its runs.
 from functools import cache
 from pathlib import Path
+from shlex import quote
 
 from snakemake.exceptions import WorkflowError
 
@@ -63,6 +64,29 @@ def checks_option(wildcards):
 def of_validation(file):
     """Path of a file of the validation."""
     return f"results/{STUDY}/validation/{file}"
+
+
+def of_scaling(file):
+    """Path of a file of the study's scaling."""
+    return f"results/{STUDY}/scaling/{file}"
+
+
+def scaling_options(wildcards):
+    """What the study's block scaling asks for, as options of the command line."""
+    scaling = CASES[0].study.scaling
+    if scaling is None:
+        raise WorkflowError(
+            f"{relative(CASES[0].file)}: scaling: a required key is missing\n"
+            "  remedy: name the field to fit a power law over, see docs/scaling.md"
+        )
+    options = ["--field", scaling.field]
+    if scaling.expected_exponent is not None:
+        options += ["--expected", scaling.expected_exponent]
+    if scaling.source is not None:
+        options += ["--source", scaling.source]
+    if scaling.within is not None:
+        options += ["--within", *scaling.within]
+    return " ".join(quote(str(option)) for option in options)
 
 
 def of_experiment(run, file):

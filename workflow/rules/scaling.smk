@@ -1,0 +1,28 @@
+# The mean drag over one field of the study's matrix, and the power law in it.
+
+
+rule write_scaling:
+    input:
+        every("process", "tables/rod_force.parquet"),
+    output:
+        multiext(of_scaling("scaling."), "csv", "json"),
+        figure=report(
+            of_scaling("scaling.png"),
+            caption="../report/scaling.rst",
+            category="Scaling",
+            labels={"run": "all", "figure": "scaling"},
+        ),
+    log:
+        of_scaling("logs/scaling.log"),
+    benchmark:
+        of_scaling("benchmarks/scaling.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        runs=every_folder("process"),
+        options=scaling_options,
+        command=f"snakemake scaling --config study={STUDY}",
+        source=source_hash("dragchain.scaling"),
+    shell:
+        "dragchain scaling --out $(dirname {output.figure}) {params.options}"
+        " --command '{params.command}' -- {params.runs} 2>&1 | tee -i {log}"
