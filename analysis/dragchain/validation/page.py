@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 import shutil
 from collections.abc import Mapping, Sequence
 from importlib import resources
@@ -18,6 +19,7 @@ from dragchain.figures import STYLE, png
 from dragchain.frames import write_parquet
 from dragchain.parquet import write_json
 from dragchain.report import data_uri, measured, number, percent, share
+from dragchain.scaling import draw_scalings, read_scalings
 from dragchain.validation import figures, force, load, statements
 from dragchain.validation.claims import claims
 from dragchain.validation.fills import Point, Points, read_points
@@ -80,8 +82,22 @@ def find(points: Points, command: str) -> dict[str, Any]:
         "comparison": force.compare(together["mean"], together["sd"], case),
         "load": load.of_fills(points.fills),
         "statements": found_statements,
+        "scalings": scalings_of(points.fills[0].measures["numbers"]),
         "claims": [{**vars(claim), "verdict": claim.verdict} for claim in claims(found_statements)],
     }
+
+
+SAME_SCENE = ("bowl_to_ball", "ball_friction", "lowest_restitution", "balls")
+"""Numbers that a scene shares with the sweeps that are shown beside it."""
+
+
+def scalings_of(numbers: Mapping[str, float]) -> list[dict[str, Any]]:
+    """The packaged sweeps that were made in a scene with these numbers."""
+    return [
+        found
+        for found in read_scalings()
+        if all(math.isclose(found["scene"][k], numbers[k], rel_tol=0.01) for k in SAME_SCENE)
+    ]
 
 
 def _cpu_s(point: Point) -> float:
@@ -140,6 +156,8 @@ def draw(points: Points, found: Mapping[str, Any], effects: pd.DataFrame) -> dic
         }
         if (effects["field"] != "").any():
             drawn["assumed"] = figures.assumed(effects)
+        if found["scalings"]:
+            drawn["scaling"] = draw_scalings(found["scalings"])
         return {name: png(figure) for name, figure in drawn.items()}
 
 
