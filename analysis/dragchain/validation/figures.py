@@ -130,10 +130,11 @@ def around(found: Found) -> Figure:
     colours = np.where(np.abs(middle) < np.pi / 2, BLUE, ORANGE)
     left.set_theta_zero_location("N")
     left.bar(middle, 100 * value, width=np.diff(edges), color=colours, edgecolor="white")
-    left.errorbar(middle, 100 * value, 100 * np.array([value - low, high - value]), fmt="none",
-                  ecolor="black", elinewidth=0.8)  # fmt: skip
+    reach = np.array([value - np.maximum(low, 0.0), high - value])
+    left.errorbar(middle, 100 * value, 100 * reach, fmt="none", ecolor="black", elinewidth=0.8)
     left.set_thetagrids(np.arange(0, 360, 45), ["ahead", "", "left", "", "behind", "", "right", ""])
     left.set_rlabel_position(157.5)
+    left.set_rmin(0.0)
     left.set_title(f"share of the normal force\nin % per {np.degrees(edges[1] - edges[0]):.0f}°")
     depth = found["depth"]
     middle, value, low, high = _bars(depth)
