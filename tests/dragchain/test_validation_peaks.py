@@ -159,7 +159,9 @@ def made_run(rng: np.random.Generator, pull: float, name: str = "made") -> RunSe
         **vars(lives(balls, time_s)),
     }  # fmt: skip
     table = peak_table(time_s, -resistance, time_s, 0.1)
-    return RunSeries(name, name, time_s, resistance, table, 0.1, 1, (columns,) * len(SETTINGS))
+    return RunSeries(
+        name, name, time_s, resistance, table, table, 0.1, 1, (columns,) * len(SETTINGS)
+    )
 
 
 def verdicts(found: dict[str, Any]) -> dict[str, str]:
@@ -226,6 +228,16 @@ def test_a_chain_that_follows_the_peak_does_not_lead_it() -> None:
     assert order["effect"] < 0.0 and order["p_claimed"] > 0.95
     lag = made.found["lags"]["free_path"]["bottleneck_over_mean"]["peak_lag_s"]
     assert lag == pytest.approx(0.1, abs=0.03)
+
+
+def test_slow_peaks_are_not_those_of_a_vibration() -> None:
+    time_s = np.arange(0.0, 10.0, 1e-3)
+    slow = np.sin(2 * np.pi * time_s / 2.0)
+    shaken = slow + 0.8 * np.sin(2 * np.pi * time_s / 3.3e-3)
+    found = peak_table(time_s, -peaks.averaged(time_s, shaken), time_s[::10], 0.3)
+    # what is left of the vibration, 2 %, moves the top of so slow a wave by less than 0.1 s
+    assert found["process_time_s"].to_numpy() == pytest.approx([0.5, 2.5, 4.5, 6.5, 8.5], abs=0.1)
+    assert peaks.averaged(time_s, slow) == pytest.approx(slow, abs=0.02)
 
 
 def test_holm_counts_only_the_claims_at_the_default_thresholds() -> None:

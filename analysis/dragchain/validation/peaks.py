@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import find_peaks
 from scipy.stats import CensoredData, ecdf
 
@@ -66,7 +67,11 @@ LEVEL = 0.05
 SMALL = 0.2
 """An effect below this many standard deviations is small (Cohen 1988)."""
 
-PEAK_RULES = ("all", "distinct")
+AVERAGED_S = 0.05
+"""Slow peaks are those of the drag averaged over this time: many times the period at which stiff
+balls vibrate, and a tenth of a ball diameter of path in the study of the paper."""
+
+PEAK_RULES = ("all", "distinct", "slow")
 
 Found = dict[str, Any]
 
@@ -173,6 +178,8 @@ class RunSeries:
         Minus the drag there.
     peaks : DataFrame
         ``frame`` (the nearest), ``process_time_s``, ``drag_n``, ``prominence_n``, ``distinct``.
+    slow : DataFrame
+        The same of the peaks of the drag averaged over `AVERAGED_S`.
     separation_s : float
         Least time between peaks.
     sense : int
@@ -187,6 +194,7 @@ class RunSeries:
     time_s: Floats
     resistance_n: Floats
     peaks: pd.DataFrame
+    slow: pd.DataFrame
     separation_s: float
     sense: int
     columns: tuple[Mapping[str, Floats], ...]
@@ -198,7 +206,11 @@ class RunSeries:
 
     def events(self, rule: str) -> Ints:
         """Frames of the peaks by one of `PEAK_RULES`."""
-        kept = self.peaks if rule == "all" else self.peaks[self.peaks["distinct"]]
+        kept = {
+            "all": self.peaks,
+            "distinct": self.peaks[self.peaks["distinct"]],
+            "slow": self.slow,
+        }[rule]
         return kept["frame"].to_numpy(np.int64)
 
     def window(self, first_s: float, last_s: float) -> Window:
@@ -224,6 +236,7 @@ def read_run(run_dir: Path) -> RunSeries:
     drag = samples["drag_n"].to_numpy(np.float64)
     separation = peak_separation_s(case)
     peaks = peak_table(sample_s, drag, time_s, separation)
+    slow = peak_table(sample_s, averaged(sample_s, drag), time_s, separation)
     if peaks.empty:
         raise TableError(
             f"{run_dir}: the drag has no peak, so there is nothing to explain; drag for longer"
@@ -235,7 +248,13 @@ def read_run(run_dir: Path) -> RunSeries:
     label = case.case or case.run
     resistance = -np.interp(time_s, sample_s, drag)
     sense = case.motion.sense if isinstance(case.motion, Circle) else 0
-    return RunSeries(case.run, label, time_s, resistance, peaks, separation, sense, columns)
+    return RunSeries(case.run, label, time_s, resistance, peaks, slow, separation, sense, columns)
+
+
+def averaged(time_s: Floats, series: Floats) -> Floats:
+    """A series at equal intervals, (N,), averaged over `AVERAGED_S` about every sample."""
+    width = max(1, round(AVERAGED_S / float(np.median(np.diff(time_s)))))
+    return np.asarray(uniform_filter1d(series, width, mode="nearest"), dtype=np.float64)
 
 
 def peak_table(
@@ -253,6 +272,11 @@ def peak_table(
             "distinct": -peaks.drag_n > level,
         }
     )
+
+
+def rules_of(runs: Sequence[RunSeries]) -> list[str]:
+    """Those of `PEAK_RULES` by which every run has a peak."""
+    return [rule for rule in PEAK_RULES if all(run.events(rule).size for run in runs)]
 
 
 # --- tests -----------------------------------------------------------------------------------
@@ -274,11 +298,11 @@ def tests_of(runs: Sequence[RunSeries], shifts: Ints) -> pd.DataFrame:
     """
     rows = [
         _descriptor_row(runs, shifts, at, descriptor, rule)
-        for rule in PEAK_RULES
+        for rule in rules_of(runs)
         for at in range(len(SETTINGS))
         for descriptor in DESCRIPTORS
     ]
-    for rule in PEAK_RULES:
+    for rule in rules_of(runs):
         for at, setting in enumerate(SETTINGS):
             rows += _event_rows(runs, shifts, at, setting, rule)
     table = pd.DataFrame(rows)
@@ -780,6 +804,7 @@ def study_of(runs: Sequence[RunSeries]) -> Study:
             "strong_sds": STRONG_SDS,
             "top": TOP,
             "distinct_sds": DISTINCT_SDS,
+            "averaged_s": AVERAGED_S,
             "shifts": len(shifts),
             "family": int(tests["p_holm"].notna().sum()),
         },
@@ -790,7 +815,7 @@ def study_of(runs: Sequence[RunSeries]) -> Study:
         "lags": lag_curves(runs, shifts),
         "ranks": {
             rule: {name: ranks(runs, at, rule) for name, at in defaults.items()}
-            for rule in PEAK_RULES
+            for rule in rules_of(runs)
         },
         "geometry": {name: geometry(runs, at) for name, at in defaults.items()},
         "lifetimes": {name: lifetimes(runs, at) for name, at in defaults.items()},
@@ -814,6 +839,7 @@ def _run_row(run: RunSeries) -> Found:
         "to_s": float(run.time_s[-1]),
         "peaks": len(run.peaks),
         "distinct_peaks": int(run.peaks["distinct"].sum()),
+        "slow_peaks": len(run.slow),
         "separation_s": run.separation_s,
         "sense": run.sense,
     }
