@@ -237,7 +237,8 @@ def test_slow_peaks_are_not_those_of_a_vibration() -> None:
     found = peak_table(time_s, -peaks.averaged(time_s, shaken), time_s[::10], 0.3)
     # what is left of the vibration, 2 %, moves the top of so slow a wave by less than 0.1 s
     assert found["process_time_s"].to_numpy() == pytest.approx([0.5, 2.5, 4.5, 6.5, 8.5], abs=0.1)
-    assert peaks.averaged(time_s, slow) == pytest.approx(slow, abs=0.02)
+    inside = slice(25, -25)
+    assert peaks.averaged(time_s, slow)[inside] == pytest.approx(slow[inside], abs=0.002)
 
 
 def test_holm_counts_only_the_claims_at_the_default_thresholds() -> None:
