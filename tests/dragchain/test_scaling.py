@@ -166,7 +166,7 @@ def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
     page = environment.from_string(template).render(
         found=scalings, picture=lambda name: f"data:image/png;base64,{name}"
     )
-    assert 'src="data:image/png;base64,scaling"' in page
+    assert 'src="data:image/png;base64,scaling.png"' in page
     for found in scalings:
         assert found["statement"] in page
         assert all(html.escape(remark, quote=True) in page for remark in found["remarks"])
