@@ -382,15 +382,19 @@ def coverage(trade: Trade, name: str, trials: int = TRIALS) -> float | None:
     if own is None or set(own.errors) == {trade.reference}:
         return None
     runs = [run for run in trade.runs if name in run.values]
+    stretches = [sum(name in one for one in run.stretches) for run in runs]
     beds = list(dict.fromkeys(run.bed for run in runs))
-    number = np.array([beds.index(run.bed) for run in runs])
+    number = np.repeat([beds.index(run.bed) for run in runs], stretches)
     rng = np.random.default_rng(0)
     held: list[bool] = []
     for _ in range(trials):
         scatter = math.sqrt(own.bed_share) * rng.standard_normal(len(beds))[number]
-        scatter += math.sqrt(1.0 - own.bed_share) * rng.standard_normal(len(runs))
-        values = np.exp(own.run_sd * scatter)
-        again = [replace(run, values={name: float(v)}) for run, v in zip(runs, values, strict=True)]
+        scatter += math.sqrt(1.0 - own.bed_share) * rng.standard_normal(len(number))
+        values = iter(np.exp(own.run_sd * scatter).tolist())
+        again = []
+        for run, count in zip(runs, stretches, strict=True):
+            first, *further = ({name: next(values)} for _ in range(count))
+            again.append(replace(run, values=first, further=further))
         errors = compare_quantity(
             replace(own.quantity, signed=False), again, trade.reference
         ).errors

@@ -311,6 +311,14 @@ def test_a_run_twice_as_long_counts_as_two_of_its_bed(tmp_path: Path) -> None:
     assert "fill_height" not in long[0].further[0]
 
 
+def test_long_runs_do_not_change_how_often_an_interval_holds_the_truth(tmp_path: Path) -> None:
+    rng = np.random.default_rng(13)
+    found = [measures(REFERENCE, seed, rng) for seed in (1, 2, 3, 4)]
+    found += [measures(SOFT, seed, rng, blocks=17) for seed in (1, 2, 3, 4)]
+    held = coverage(made(tmp_path, found), "drag_mean", trials=60)
+    assert held is not None and 0.85 <= held <= 1.0
+
+
 def test_what_is_written_is_no_setting(tmp_path: Path) -> None:
     rng = np.random.default_rng(11)
     found = [measures(REFERENCE, 1, rng, inputs={"outputs.network_hz": 20.0})]
