@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +108,7 @@ def test_a_thicker_rod_meets_more_drag(validated: Path) -> None:
 
 def test_the_page_of_a_validation_stands_alone(validated: Path) -> None:
     page = (validated / "report.html").read_text()
-    assert "data:image/png;base64," in page
-    assert "http" not in page.replace("http-equiv", "")
-    assert "None" not in page and "nan" not in page
+    text = re.sub(r"data:image/[^\"]+", "", page)
+    assert len(text) < len(page) - 100_000
+    assert "http" not in text
+    assert "None" not in text and "nan" not in text
