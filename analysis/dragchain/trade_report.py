@@ -196,7 +196,7 @@ def provenance(trade: Trade, plan: str, commands: Sequence[str]) -> dict[str, An
         },
         "machine": {"cores": os.cpu_count(), "processor": _processor()},
         "runs": len(measures),
-        "engine_hours": sum(one["cost"]["wall_time_s"] for one in measures) / 3600.0,
+        "engine_hours": sum(one["cost"]["cpu_time_s"] for one in measures) / 3600.0,
     }
 
 
