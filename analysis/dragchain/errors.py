@@ -56,6 +56,8 @@ class DumpError(DragchainError):
         Byte offset into the file at which the frame or the row starts.
     expected : str, optional
         What should have stood there.
+    kept : str, optional
+        What came before it and is good.
     remedy : str, optional
         What the user can do.
     """
@@ -68,6 +70,7 @@ class DumpError(DragchainError):
         frame: int | None = None,
         offset: int | None = None,
         expected: str | None = None,
+        kept: str | None = None,
         remedy: str | None = None,
     ) -> None:
         self.file = file
@@ -75,6 +78,7 @@ class DumpError(DragchainError):
         self.frame = frame
         self.offset = offset
         self.expected = expected
+        self.kept = kept
         self.remedy = remedy
         place = [f"{file}"]
         if frame is not None:
@@ -84,6 +88,8 @@ class DumpError(DragchainError):
         lines = [f"{', '.join(place)}: {problem}"]
         if expected is not None:
             lines.append(f"expected: {expected}")
+        if kept is not None:
+            lines.append(f"kept: {kept}")
         super().__init__(_joined(lines, remedy))
 
 
