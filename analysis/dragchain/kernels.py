@@ -24,15 +24,14 @@ _MOST_DIGITS = 19
 def _fives() -> NDArray[np.uint64]:
     """First 128 bits of 5**q for all powers of ten q of a double, (Q, 2): high, low.
 
-    Those of negative powers are rounded up, all others down.
+    Those of -27 to -1, whose exact values have no end, are rounded up; all others down.
     """
     rows = []
     for power in range(_LOWEST_POWER, _HIGHEST_POWER + 1):
         five = 5 ** abs(power)
         bits = five.bit_length()
         if power < 0:
-            scaled = (1 << (2 * bits + 128)) // five + 1
-            scaled >>= scaled.bit_length() - 128
+            scaled = (1 << (bits + 127)) // five + (power >= -27)
         else:
             scaled = five << (128 - bits) if bits <= 128 else five >> (bits - 128)
         rows.append((scaled >> 64, scaled & (2**64 - 1)))
@@ -241,8 +240,8 @@ def _double(digits, power):
         value = np.float64(digits)
         value = value / _TENS[-power] if power < 0 else value * _TENS[power]
         return _bits_of(value), True
-    found = _bits(digits, power)
-    return found, found != _U0
+    found = _bits(digits, power) if digits != _U0 else _U0
+    return found, found != _U0 or digits == _U0
 
 
 @njit(nogil=True, cache=True, inline="always")
