@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import bz2
+import gzip
 import io
+import zlib
 from pathlib import Path
 from typing import Any
 
-CODECS = {".gz": "gzip", ".zst": "zstd", ".bz2": "bz2", ".lz4": "lz4"}
-"""Codec by the last suffix of a file's name."""
+CODECS = (".gz", ".bz2", ".zst", ".lz4")
+"""Last suffixes of the names of compressed files."""
 
-_CHUNK_BYTES = 4096
-"""What is read at once of a compressed file: at most this much before damage is lost."""
+_CHUNK_BYTES = 1 << 16
 
 
 class Content(io.RawIOBase):
@@ -32,16 +34,10 @@ class Content(io.RawIOBase):
     """
 
     def __init__(self, file: Path) -> None:
-        codec = CODECS.get(file.suffix)
-        self.size = file.stat().st_size if codec is None else None
+        self.size = None if file.suffix in CODECS else file.stat().st_size
         self.damage: str | None = None
         self._position = 0
-        self._chunk = None if codec is None else _CHUNK_BYTES
-        self._stream: Any = open(file, "rb", buffering=0)  # noqa: SIM115
-        if codec is not None:
-            import pyarrow as pa
-
-            self._stream = pa.CompressedInputStream(pa.PythonFile(self._stream, "r"), codec)
+        self._stream = _open(file)
 
     def readable(self) -> bool:
         """Tell that it can be read."""
@@ -53,14 +49,19 @@ class Content(io.RawIOBase):
 
     def readinto(self, buffer: Any) -> int:
         """Fill a buffer, or as much of it as one read gives; 0 at the end."""
-        try:
-            count = int(self._stream.readinto(memoryview(buffer)[: self._chunk]))
-        except OSError as error:
-            if self._chunk is None:
-                raise
-            self.damage, count = str(error), 0
+        count = self._stream.readinto(buffer) if self.size is not None else self._unpack(buffer)
         self._position += count
-        return count
+        return int(count)
+
+    def _unpack(self, buffer: Any) -> int:
+        """Read from a compressed file; a damaged one ends after what is good of it."""
+        try:
+            data = self._stream.read1(min(len(buffer), _CHUNK_BYTES))
+        except (OSError, EOFError, zlib.error) as error:
+            self.damage = str(error)
+            return 0
+        buffer[: len(data)] = data
+        return len(data)
 
     def fill(self, buffer: memoryview) -> int:
         """Fill a buffer; less only where the content ends."""
@@ -71,10 +72,9 @@ class Content(io.RawIOBase):
 
     def skip(self, count: int) -> None:
         """Leave out the next `count` bytes."""
-        if self._chunk is None:
-            self._position = self._stream.seek(self._position + count)
-            return
         end, rest = self._position + count, memoryview(bytearray(_CHUNK_BYTES))
+        if self.size is not None:
+            self._position = self._stream.seek(end)
         while self._position < end and self.readinto(rest[: end - self._position]):
             pass
 
@@ -82,3 +82,16 @@ class Content(io.RawIOBase):
         """Close the file."""
         self._stream.close()
         super().close()
+
+
+def _open(file: Path) -> Any:
+    """Open a file; of a compressed one ``read1`` gives the content."""
+    if file.suffix == ".gz":
+        return gzip.open(file)
+    if file.suffix == ".bz2":
+        return bz2.open(file)
+    if file.suffix in CODECS:
+        import pyarrow as pa
+
+        return pa.input_stream(str(file), compression="detect")
+    return file.open("rb", buffering=0)

@@ -80,17 +80,21 @@ class DumpError(DragchainError):
         self.expected = expected
         self.kept = kept
         self.remedy = remedy
-        place = [f"{file}"]
-        if frame is not None:
-            place.append(f"frame {frame}")
-        if offset is not None:
-            place.append(f"byte {offset}")
-        lines = [f"{', '.join(place)}: {problem}"]
-        if expected is not None:
-            lines.append(f"expected: {expected}")
-        if kept is not None:
-            lines.append(f"kept: {kept}")
-        super().__init__(_joined(lines, remedy))
+        super().__init__()
+
+    def __str__(self) -> str:
+        """Return what was found where, what should have stood there, what is kept."""
+        place = [f"{self.file}"]
+        if self.frame is not None:
+            place.append(f"frame {self.frame}")
+        if self.offset is not None:
+            place.append(f"byte {self.offset}")
+        lines = [f"{', '.join(place)}: {self.problem}"]
+        if self.expected is not None:
+            lines.append(f"expected: {self.expected}")
+        if self.kept is not None:
+            lines.append(f"kept: {self.kept}")
+        return _joined(lines, self.remedy)
 
 
 class TruncatedDumpError(DumpError):

@@ -68,7 +68,7 @@ class Frame:
 
 def is_integer_column(name: str) -> bool:
     """Whether a column counts or names things, which makes it int64 in tables."""
-    return name in ("step", "balls") or name.endswith("_id")
+    return name in ("step", "balls", "id", "type") or name.endswith("_id")
 
 
 def read_dump_file(file: Path, output: Output) -> Iterator[Frame]:
@@ -143,7 +143,7 @@ class _Cursor:
             offset=self.offset,
             expected=expected,
             kept=self.kept(),
-            remedy="the file is not what this run's deck writes; run the engine again",
+            remedy="read what the run's deck writes, all of it; else run the engine again",
         )
 
     def kept(self) -> str | None:
@@ -259,7 +259,7 @@ def _column_order(at: _Cursor, line: str) -> list[int]:
     if sorted(found) != sorted(at.output.header):
         at.fail(
             f"the header names the columns {' '.join(found)}",
-            f"{' '.join(at.output.header)} in any order, as columns.json says",
+            f"{' '.join(at.output.header)} in any order",
         )
     return [found.index(name) for name in at.output.header]
 
