@@ -24,7 +24,7 @@ from dragchain.case import Output
 from dragchain.content import Content
 from dragchain.formats import Columns, Frame, is_integer_column, read_carefully
 
-BLOCK_BYTES = 1 << 20
+BLOCK_BYTES = 1 << 19
 """What is read at once; a block grows until it holds a whole frame."""
 
 HELD_BYTES = 1 << 26
@@ -38,6 +38,7 @@ _WIDEST_NUMBER = 32
 _SMALLEST_FRAME = 64
 _MOST_ROW_BYTES = 1 << 30
 
+Bytes = NDArray[np.uint8]
 Cells = NDArray[np.uint64]
 
 
@@ -131,8 +132,9 @@ class _Parsed:
         rows = int(counts.sum())
         columns: Columns = {}
         for name, place in zip(output.columns, block.form.order, strict=True):
-            kind = np.int64 if is_integer_column(name) else np.float64
-            columns[name] = self.cells[place, :rows].view(kind)
+            cells = self.cells[place, :rows]
+            integers = is_integer_column(name)
+            columns[name] = cells.view(np.int64) if integers else cells.view(np.float64)
         return Batch(block.file, first, steps, counts, columns)
 
 
@@ -141,13 +143,13 @@ class _Form(Protocol):
 
     order: list[int]
 
-    def most_rows(self, buffer: bytearray, size: int) -> int:
-        """What the number of rows in the bytes does not exceed."""
+    def most_rows(self, size: int) -> int:
+        """What the number of rows in so many bytes does not exceed."""
 
-    def whole_frames(self, buffer: bytearray, size: int) -> int:
+    def whole_frames(self, buffer: Bytes, size: int) -> int:
         """How many of the bytes read are whole frames for sure."""
 
-    def possible(self, buffer: bytearray, size: int, rest: int | None) -> bool:
+    def possible(self, buffer: Bytes, size: int, rest: int | None) -> bool:
         """Whether the frame that begins here may become whole as `rest` more bytes come."""
 
     def parse(
@@ -170,9 +172,9 @@ class _Text:
         )
 
     @classmethod
-    def of(cls, output: Output, buffer: bytearray) -> _Text | None:
+    def of(cls, output: Output, buffer: Bytes) -> _Text | None:
         """Form of a file that begins like this; None if it is not this output."""
-        lines = bytes(buffer[:_HEAD_BYTES]).split(b"\n", 9)
+        lines = buffer[:_HEAD_BYTES].tobytes().split(b"\n", 9)
         noun = b"ENTRIES" if output.kind == "local" else b"ATOMS"
         if len(lines) < 10 or not lines[8].startswith(b"ITEM: " + noun + b" "):
             return None
@@ -180,14 +182,16 @@ class _Text:
             return None
         return cls(output, lines[2] + b"\n", lines[8] + b"\n")
 
-    def most_rows(self, buffer: bytearray, size: int) -> int:
-        return int(np.count_nonzero(np.frombuffer(buffer, dtype=np.uint8, count=size) == 10))
+    def most_rows(self, size: int) -> int:
+        return size // (2 * len(self.order))
 
-    def whole_frames(self, buffer: bytearray, size: int) -> int:
-        return buffer.rfind(b"\n" + _FIRST_LINE, 0, size) + 1
+    def whole_frames(self, buffer: Bytes, size: int) -> int:
+        from dragchain import kernels
 
-    def possible(self, buffer: bytearray, size: int, rest: int | None) -> bool:
-        rows = bytes(buffer[:_HEAD_BYTES]).split(b"\n", 4)[3]
+        return int(kernels.last_frame(np.uint64(buffer.ctypes.data), size, self._lines[0]))
+
+    def possible(self, buffer: Bytes, size: int, rest: int | None) -> bool:
+        rows = buffer[:_HEAD_BYTES].tobytes().split(b"\n", 4)[3]
         if not rows.isdigit():
             return False
         return size <= _HEAD_BYTES + int(rows) * len(self.order) * _WIDEST_NUMBER
@@ -210,18 +214,18 @@ class _Binary:
         self.order = list(range(len(output.columns)))
         self._whole = np.array([is_integer_column(name) for name in output.columns])
 
-    def most_rows(self, buffer: bytearray, size: int) -> int:
+    def most_rows(self, size: int) -> int:
         return size // (8 * len(self.order))
 
-    def whole_frames(self, buffer: bytearray, size: int) -> int:
+    def whole_frames(self, buffer: Bytes, size: int) -> int:
         from dragchain import kernels
 
-        address = np.frombuffer(buffer, dtype=np.uint8).ctypes.data
-        return int(kernels.whole_binary_frames(np.uint64(address), size, len(self.order)))
+        address = np.uint64(buffer.ctypes.data)
+        return int(kernels.whole_binary_frames(address, size, len(self.order)))
 
-    def possible(self, buffer: bytearray, size: int, rest: int | None) -> bool:
-        step, rows, tilted = struct.unpack_from("<qqi", buffer)
-        (width,) = struct.unpack_from("<i", buffer, 92 + 24 * (tilted == 1))
+    def possible(self, buffer: Bytes, size: int, rest: int | None) -> bool:
+        step, rows, tilted = struct.unpack_from("<qqi", buffer.data)
+        (width,) = struct.unpack_from("<i", buffer.data, 92 + 24 * (tilted == 1))
         plain = step >= 0 and rows >= 0 and tilted in (0, 1) and width == len(self.order)
         missing = 8 * rows * width - size
         return plain and missing <= (_MOST_ROW_BYTES if rest is None else rest)
@@ -245,7 +249,7 @@ class _Block:
         The file.
     offset : int
         Where in its content the block begins.
-    buffer : bytearray
+    buffer : (L,) ndarray of uint8
         The bytes, with some of the next block and `_PADDING` zeros after them.
     size : int
         How many of them are the block's.
@@ -257,7 +261,7 @@ class _Block:
 
     file: Path
     offset: int
-    buffer: bytearray
+    buffer: Bytes
     size: int
     form: _Form | None
     stuck: bool
@@ -266,7 +270,7 @@ class _Block:
         """Make room for the block's cells and frames."""
         if self.form is None:
             return np.empty((0, 0), dtype=np.uint64), np.empty((0, 2), dtype=np.int64)
-        rows = self.form.most_rows(self.buffer, self.size)
+        rows = self.form.most_rows(self.size)
         cells = np.empty((len(self.form.order), rows), dtype=np.uint64)
         return cells, np.empty((self.size // _SMALLEST_FRAME + 1, 2), dtype=np.int64)
 
@@ -274,22 +278,21 @@ class _Block:
         """Read the block's frames."""
         if self.form is None:
             return _Parsed(frames, cells, 0)
-        address = np.frombuffer(self.buffer, dtype=np.uint8).ctypes.data
-        done, size = self.form.parse(address, self.size, cells, frames)
+        done, size = self.form.parse(self.buffer.ctypes.data, self.size, cells, frames)
         return _Parsed(frames[:done], cells, size)
 
 
 def _blocks(file: Path, output: Output) -> Iterator[_Block]:
     """The blocks of a file; each but the last is cut before a frame."""
-    held, offset, more = b"", 0, BLOCK_BYTES
+    held, offset, more = np.empty(0, dtype=np.uint8), 0, BLOCK_BYTES
     form: _Form | None = _Binary(output) if output.binary else None
     with Content(file) as content:
         while True:
             room = len(held) + more
-            buffer = bytearray(room + _PADDING)
+            buffer = np.empty(room + _PADDING, dtype=np.uint8)
             buffer[: len(held)] = held
-            with memoryview(buffer) as view:
-                size = len(held) + content.fill(view[len(held) : room])
+            size = len(held) + content.fill(buffer.data[len(held) : room])
+            buffer[size : size + _PADDING] = 0
             form = form or _Text.of(output, buffer)
             if form is None:
                 yield _Block(file, offset, buffer, 0, form, stuck=size > 0)
@@ -304,7 +307,7 @@ def _blocks(file: Path, output: Output) -> Iterator[_Block]:
                 yield _Block(file, offset, buffer, cut, form, stuck)
             if stuck:
                 return
-            held, offset = bytes(memoryview(buffer)[cut:size]), offset + cut
+            held, offset = buffer[cut:size], offset + cut
             more = BLOCK_BYTES if cut else size
 
 

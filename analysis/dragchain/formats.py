@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice, takewhile
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,7 +129,7 @@ class _Cursor:
     """An open file, and the frame or row in it that is being read."""
 
     file: Path
-    stream: io.BufferedReader
+    stream: io.BufferedReader[Any]
     content: Content
     output: Output
     frame: int
@@ -249,7 +249,9 @@ def _read_text_frame(at: _Cursor) -> Frame:
     values = _parse(lines, at)
     after = at.stream.peek(1)
     if after[:1] in _ROW_BEGINS:
-        at.fail(f"{rows} rows are not all: {after[:40]!r} follows", f"{rows} rows, as its header says")
+        at.fail(
+            f"{rows} rows are not all: {after[:40]!r} follows", f"{rows} rows, as its header says"
+        )
     return Frame(step, _split(values[:, order], at), at.frame == 0)
 
 

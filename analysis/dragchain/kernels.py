@@ -49,10 +49,10 @@ _HIDDEN = np.uint64(2**52)
 
 
 @intrinsic
-def _word(_context, at):  # type: ignore[no-untyped-def]
+def _word(_context, at):
     """Load the eight bytes at an address, which need not be aligned, as a uint64."""
 
-    def load(_context, builder, _signature, arguments):  # type: ignore[no-untyped-def]
+    def load(_context, builder, _signature, arguments):
         place = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
         word = builder.load(place)
         word.align = 1
@@ -62,57 +62,57 @@ def _word(_context, at):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def _byte(_context, at):  # type: ignore[no-untyped-def]
+def _byte(_context, at):
     """Load the byte at an address."""
 
-    def load(_context, builder, _signature, arguments):  # type: ignore[no-untyped-def]
+    def load(_context, builder, _signature, arguments):
         return builder.load(builder.inttoptr(arguments[0], ir.IntType(8).as_pointer()))
 
     return types.uint8(types.uint64), load
 
 
 @intrinsic
-def _bits_of(_context, value):  # type: ignore[no-untyped-def]
+def _bits_of(_context, value):
     """Take the bits of a double as a uint64."""
 
-    def cast(_context, builder, _signature, arguments):  # type: ignore[no-untyped-def]
+    def cast(_context, builder, _signature, arguments):
         return builder.bitcast(arguments[0], ir.IntType(64))
 
     return types.uint64(types.float64), cast
 
 
 @intrinsic
-def _double_of(_context, bits):  # type: ignore[no-untyped-def]
+def _double_of(_context, bits):
     """Take a uint64 for the bits of a double."""
 
-    def cast(_context, builder, _signature, arguments):  # type: ignore[no-untyped-def]
+    def cast(_context, builder, _signature, arguments):
         return builder.bitcast(arguments[0], ir.DoubleType())
 
     return types.float64(types.uint64), cast
 
 
 @intrinsic
-def _trailing_zeros(_context, word):  # type: ignore[no-untyped-def]
+def _trailing_zeros(_context, word):
     """Count the zero bits below the lowest one of a uint64, 64 if there is none."""
 
-    def count(_context, builder, _signature, arguments):  # type: ignore[no-untyped-def]
+    def count(_context, builder, _signature, arguments):
         return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 0))
 
     return types.uint64(types.uint64), count
 
 
 @intrinsic
-def _leading_zeros(_context, word):  # type: ignore[no-untyped-def]
+def _leading_zeros(_context, word):
     """Count the zero bits above the highest one of a uint64, 64 if there is none."""
 
-    def count(_context, builder, _signature, arguments):  # type: ignore[no-untyped-def]
+    def count(_context, builder, _signature, arguments):
         return builder.ctlz(arguments[0], ir.Constant(ir.IntType(1), 0))
 
     return types.uint64(types.uint64), count
 
 
 @njit(nogil=True, cache=True, inline="always")
-def _product(a, b):  # type: ignore[no-untyped-def]
+def _product(a, b):
     """The 128 bits of a product of two uint64: high, low."""
     a1, a0, b1, b0 = a >> _U32, a & _LOW_HALF, b >> _U32, b & _LOW_HALF
     low, cross1, cross2 = a0 * b0, a1 * b0, a0 * b1
@@ -122,7 +122,7 @@ def _product(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def _bits(digits, power):  # type: ignore[no-untyped-def]
+def _bits(digits, power):
     """Bits of the double nearest to ``digits * 10**power``; 0 if this cannot tell.
 
     `digits` is a uint64 above zero. Subnormal and infinite results are among those
@@ -154,6 +154,7 @@ def _bits(digits, power):  # type: ignore[no-untyped-def]
     return (mantissa & ~_HIDDEN) | (np.uint64(exponent) << np.uint64(52))
 
 
+_ZERO = np.uint64(0x30)
 _ZEROS = np.uint64(0x3030303030303030)
 _CARRY = np.uint64(0x7676767676767676)
 _HIGHS = np.uint64(0x8080808080808080)
@@ -165,7 +166,7 @@ _SCALES = np.array([10**count for count in range(9)], dtype=np.uint64)
 
 
 @njit(nogil=True, cache=True, inline="always")
-def _read_digits(at, digits):  # type: ignore[no-untyped-def]
+def _read_digits(at, digits):
     """Append the digits that begin at `at` to a uint64, which wraps: the digits, their end.
 
     Eight at a time: Lemire 2021, section 4.
@@ -186,7 +187,7 @@ def _read_digits(at, digits):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True, inline="always")
-def read_number(at):  # type: ignore[no-untyped-def]
+def read_number(at):
     """Read one decimal number.
 
     Parameters
@@ -207,10 +208,13 @@ def read_number(at):  # type: ignore[no-untyped-def]
     """
     start = at
     negative = _byte(at) == 45
-    if negative or _byte(at) == 43:
-        at += _U1
+    at += np.uint64(negative)
     begin = at
-    digits, at = _read_digits(at, _U0)
+    if _byte(at + _U1) == 46:
+        digits = np.uint64(_byte(at)) ^ _ZERO
+        at += np.uint64(digits < _U10)
+    else:
+        digits, at = _read_digits(at, _U0)
     count = np.int64(at - begin)
     power = np.int64(0)
     if _byte(at) == 46:
@@ -245,7 +249,7 @@ def _double(digits, power):
 
 
 @njit(nogil=True, cache=True, inline="always")
-def _skip(at, literal):  # type: ignore[no-untyped-def]
+def _skip(at, literal):
     """Where a literal that should stand here ends; 0 if it does not stand here."""
     for byte in literal:
         if _byte(at) != byte:
@@ -255,7 +259,7 @@ def _skip(at, literal):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def _skip_lines(at, end, count):  # type: ignore[no-untyped-def]
+def _skip_lines(at, end, count):
     """Where the next lines end; 0 if the text ends before they do."""
     while count > 0 and at < end:
         if _byte(at) == 10:
@@ -265,7 +269,7 @@ def _skip_lines(at, end, count):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True, inline="always")
-def _read_count(at):  # type: ignore[no-untyped-def]
+def _read_count(at):
     """Read a whole number that is a line: the number, the end of the line or 0."""
     number, after = _read_digits(at, _U0)
     plain = after > at and after - at <= _U18 and _byte(after) == 10
@@ -293,7 +297,7 @@ def _text_head(at, end, step_line, count_line, box_line, names_line):
 
 
 @njit(nogil=True, cache=True)
-def _text_rows(at, rows, first, whole, cells):  # type: ignore[no-untyped-def]
+def _text_rows(at, rows, first, whole, cells):
     """Read the rows of a frame into `cells` from row `first` on: where they end, or 0."""
     width = len(whole)
     for row in range(first, first + rows):
@@ -323,7 +327,7 @@ def _text_rows(at, rows, first, whole, cells):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def text_frames(at, size, lines, whole, cells, frames):  # type: ignore[no-untyped-def]
+def text_frames(at, size, lines, whole, cells, frames):
     """Read whole frames of a text dump, up to the first that is not of the plain form.
 
     Parameters
@@ -363,18 +367,32 @@ def text_frames(at, size, lines, whole, cells, frames):  # type: ignore[no-untyp
     return done, np.int64(at - start)
 
 
+_STEP_WORD = np.frombuffer(b"ITEM: TI", dtype="<u8")[0]
+
+
+@njit(nogil=True, cache=True)
+def last_frame(at, size, step_line):
+    """Offset of the last line, but the first, that is the one above a step; 0 if there is none."""
+    for place in range(size - len(step_line), 0, -1):
+        here = at + np.uint64(place)
+        found = _word(here) == _STEP_WORD and _byte(here - _U1) == 10
+        if found and _skip(here, step_line) != _U0:
+            return place
+    return 0
+
+
 _HEAD_BYTES = 100
 _INFINITE = np.uint64(0x7FF0000000000000)
 _TILE = 8
 
 
 @njit(nogil=True, cache=True, inline="always")
-def _int32(at):  # type: ignore[no-untyped-def]
+def _int32(at):
     return np.int64(np.int32(np.uint32(_word(at) & _LOW_HALF)))
 
 
 @njit(nogil=True, cache=True)
-def _binary_head(at, end, width):  # type: ignore[no-untyped-def]
+def _binary_head(at, end, width):
     """Read the header of a frame: step, rows, ranks, where the ranks begin or 0."""
     bad = np.int64(0), np.int64(0), np.int64(0), _U0
     if end - at < np.uint64(_HEAD_BYTES):
@@ -393,7 +411,7 @@ def _binary_head(at, end, width):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def _rank_rows(at, end, width):  # type: ignore[no-untyped-def]
+def _rank_rows(at, end, width):
     """Number of rows that a rank wrote; -1 if they are not all there."""
     if end - at < np.uint64(4):
         return np.int64(-1)
@@ -404,7 +422,7 @@ def _rank_rows(at, end, width):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def _turn(at, rows, first, whole, cells):  # type: ignore[no-untyped-def]
+def _turn(at, rows, first, whole, cells):
     """Copy rows of doubles into columns; tell whether all are finite and whole if need be."""
     width = len(whole)
     line = np.uint64(8 * width)
@@ -431,7 +449,7 @@ def _turn(at, rows, first, whole, cells):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def _binary_end(at, end, width):  # type: ignore[no-untyped-def]
+def _binary_end(at, end, width):
     """Where a whole frame ends; 0 if it is not whole or not of the plain form."""
     _, rows, ranks, at = _binary_head(at, end, width)
     if at == _U0:
@@ -446,7 +464,7 @@ def _binary_end(at, end, width):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def whole_binary_frames(at, size, width):  # type: ignore[no-untyped-def]
+def whole_binary_frames(at, size, width):
     """How many bytes the whole frames take that bytes of a binary dump begin with."""
     start, end = at, at + np.uint64(size)
     while at < end:
@@ -458,7 +476,7 @@ def whole_binary_frames(at, size, width):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def binary_frames(at, size, whole, cells, frames):  # type: ignore[no-untyped-def]
+def binary_frames(at, size, whole, cells, frames):
     """Read whole frames of a binary dump, up to the first that is not of the plain form.
 
     Parameters and what it returns are those of `text_frames`.

@@ -49,7 +49,14 @@ def binary(raw, steps=ROWS) -> bytes:
     return b"".join(raw.binary(step, ROWS[step], len(NAMES)) for step in steps)
 
 
-def as_lists(frames, printed=True):
+def head(step, rows, names) -> str:
+    return (
+        f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{rows}\n"
+        f"ITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\nITEM: ATOMS {names} \n"
+    )
+
+
+def as_lists(frames):
     """Step and rows of frames, in the order in which they come."""
     return [
         (frame.step, [list(row) for row in zip(*frame.columns.values(), strict=True)])
@@ -90,8 +97,9 @@ def test_reads_text_by_its_header(tmp_path: Path, raw, suffix, kind) -> None:
 @pytest.mark.parametrize("suffix", [".gz", ".zst", ""])
 def test_reads_binary_by_the_names_given(tmp_path: Path, raw, suffix) -> None:
     file = tmp_path / f"a.bin{suffix}"
-    frames = [raw.binary(step, rows, 3, ranks) for ranks, (step, rows) in enumerate(ROWS.items(), 1)]
-    file.write_bytes(COMPRESS[suffix](b"".join(frames)))
+    steps = enumerate(ROWS.items(), 1)
+    content = b"".join(raw.binary(step, rows, 3, ranks) for ranks, (step, rows) in steps)
+    file.write_bytes(COMPRESS[suffix](content))
     found = as_lists(read_dump(file, NAMES))
     assert [(step, sorted(rows)) for step, rows in found] == [
         (step, sorted(rows)) for step, rows in expected(False)
@@ -170,7 +178,7 @@ def spoilt(raw) -> dict[str, tuple[str, bytes, str]]:
         "a word": ("a.dump", good.replace(b" 4 ", b" 4x "), "row 0"),
         "a number less": ("a.dump", good.replace(b" 4 ", b" "), "row 0"),
         "a number more": ("a.dump", good.replace(b" 4 ", b" 4 4 "), "row 0"),
-        "an id that is not whole": ("a.dump", good.replace(b"\n1 0.125", b"\n1.5 0.125"), "id is 1.5"),
+        "an id that is not whole": ("a.dump", good.replace(b"\n1 0.1", b"\n1.5 0.1"), "id is 1.5"),
         "another program": ("a.dump", b"# VTK DataFile\n1 2 3\n", "found '# VTK"),
         "bytes": ("a.dump", b"\xff\xfe\xfd\n", "not text"),
         "binary: cut in rows": ("a.bin", whole[:-1], "the file ends after"),
@@ -179,7 +187,7 @@ def spoilt(raw) -> dict[str, tuple[str, bytes, str]]:
         "binary: inf": ("a.bin", whole[:-8] + struct.pack("<d", -math.inf), "is -inf"),
         "binary: wrong count": ("a.bin", whole[:8] + b"\2" + whole[9:], "ends|wrote 1 rows"),
         "binary: other width": ("a.bin", raw.binary(14, [[1, 2]], 2, 1), "2 columns"),
-        "binary: another program": ("a.bin", b"\x89HDF\r\n\x1a\n" + b"\xff" * 200, "not the header"),
+        "binary: another program": ("a.bin", b"\x89HDF\r\n" + b"\xff" * 200, "not the header"),
     }
 
 
@@ -193,15 +201,15 @@ SPOILT = [
 
 
 @pytest.mark.usefixtures("_block_bytes")
-@pytest.mark.parametrize("goes_on", [False, True], ids=["at the end", "with more after it"])
 @pytest.mark.parametrize("suffix", ["", ".gz"])
-@pytest.mark.parametrize("what", SPOILT)
+@pytest.mark.parametrize(
+    ("what", "goes_on"),
+    [*((what, False) for what in SPOILT), *((what, True) for what in SPOILT if "cut" not in what)],
+)
 def test_what_is_spoilt_is_named_and_what_came_before_kept(
     tmp_path: Path, raw, what, suffix, goes_on
 ) -> None:
     name, content, message = spoilt(raw)[what]
-    if goes_on and "cut" in what:
-        pytest.skip("a cut is at the end")
     write = binary if name.endswith(".bin") else text
     before, after = write(raw, [0, 7]), write(raw, [21]) if goes_on else b""
     file, table = tmp_path / f"{name}{suffix}", tmp_path / "a.parquet"
@@ -267,8 +275,7 @@ def test_the_fast_way_gives_what_the_careful_way_gives(tmp_path: Path, frames, s
     file = tmp_path / "a.dump"
     file.write_bytes(
         b"".join(
-            f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{len(rows)}\nITEM: BOX BOUNDS ff ff ff\n"
-            f"0 1\n0 1\n0 1\nITEM: ATOMS id x y \n{''.join(row + chr(10) for row in rows)}".encode()
+            head(step, len(rows), "id x y").encode() + "".join(f"{row}\n" for row in rows).encode()
             for step, rows in enumerate([["1 2 3"], *frames])
         )
     )
@@ -286,11 +293,8 @@ def test_a_large_text_is_read_bit_for_bit(tmp_path: Path) -> None:
     random.seed(3)
     values = np.frombuffer(random.randbytes(8 * 300_000), dtype=np.float64)
     values = values[np.isfinite(values) & (np.abs(values) > 2.3e-308)][:240_000].reshape(-1, 3)
-    lines = ["%r %.17g %.9g \n" % tuple(row) for row in values.tolist()]
-    (tmp_path / "a.dump").write_text(
-        f"ITEM: TIMESTEP\n1\nITEM: NUMBER OF ATOMS\n{len(lines)}\nITEM: BOX BOUNDS ff ff ff\n"
-        f"0 1\n0 1\n0 1\nITEM: ATOMS x y z \n{''.join(lines)}"
-    )
+    lines = [f"{one!r} {two:.17g} {three:.9g} \n" for one, two, three in values.tolist()]
+    (tmp_path / "a.dump").write_text(head(1, len(lines), "x y z") + "".join(lines))
     (frame,) = read_dump(tmp_path / "a.dump")
     words = [line.split() for line in lines]
     for place, name in enumerate("xyz"):
