@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from dragchain.case import Output
 from dragchain.content import Content
-from dragchain.formats import Columns, Frame, is_integer_column, read_carefully
+from dragchain.formats import MAX_RANKS, Columns, Frame, is_integer_column, read_carefully
 
 BLOCK_BYTES = 1 << 19
 """What is read at once; a block grows until it holds a whole frame."""
@@ -225,10 +225,13 @@ class _Binary:
 
     def possible(self, buffer: Bytes, size: int, rest: int | None) -> bool:
         step, rows, tilted = struct.unpack_from("<qqi", buffer.data)
-        (width,) = struct.unpack_from("<i", buffer.data, 92 + 24 * (tilted == 1))
-        plain = step >= 0 and rows >= 0 and tilted in (0, 1) and width == len(self.order)
+        width, ranks = struct.unpack_from("<ii", buffer.data, 92 + 24 * (tilted == 1))
+        plain = step >= 0 and rows >= 0 and tilted in (0, 1) and 1 <= ranks <= MAX_RANKS
+        if not plain or width != len(self.order):
+            return False
         missing = 8 * rows * width - size
-        return plain and missing <= (_MOST_ROW_BYTES if rest is None else rest)
+        most = _MOST_ROW_BYTES if rest is None else rest
+        return bool(-_HEAD_BYTES - 4 * ranks < missing <= most)
 
     def parse(
         self, address: int, size: int, cells: Cells, frames: NDArray[np.int64]
@@ -293,9 +296,10 @@ def _blocks(file: Path, output: Output) -> Iterator[_Block]:
             buffer[: len(held)] = held
             size = len(held) + content.fill(buffer.data[len(held) : room])
             buffer[size : size + _PADDING] = 0
-            form = form or _Text.of(output, buffer)
+            form = form or _Text.of(output, buffer[:size])
             if form is None:
-                yield _Block(file, offset, buffer, 0, form, stuck=size > 0)
+                broken = size > 0 or content.damage is not None
+                yield _Block(file, offset, buffer, 0, form, stuck=broken)
                 return
             if size < room:
                 yield _Block(file, offset, buffer, size, form, stuck=content.damage is not None)

@@ -26,12 +26,14 @@ Columns = dict[str, NDArray[np.float64] | NDArray[np.int64]]
 BLOCK_ROWS = 20_000
 """Rows of a ``fix print`` file that are read at once."""
 
+MAX_RANKS = 1_000_000
+"""A binary frame that claims to come from more ranks is none."""
+
 _HEAD = struct.Struct("<qqi6i")
 _TILT_BYTES = 24
 _BOX_BYTES = 48
 _TAIL = struct.Struct("<ii")
 _COUNT = struct.Struct("<i")
-_MAX_RANKS = 1_000_000
 _ROW_BEGINS = [bytes([byte]) for byte in b"0123456789+-. "]
 
 
@@ -215,7 +217,7 @@ def _read_binary_frame(at: _Cursor) -> Frame:
     found_width, ranks = _TAIL.unpack(at.take(_TAIL.size, "a binary frame's header"))
     if found_width != width:
         at.fail(f"the rows have {found_width} columns", foreign)
-    if not 1 <= ranks <= _MAX_RANKS:
+    if not 1 <= ranks <= MAX_RANKS:
         at.fail(f"the frame claims to come from {ranks} ranks", foreign)
     size = at.content.size
     if size is not None and rows * width * 8 > size - at.stream.tell():

@@ -258,6 +258,32 @@ def test_a_compressed_file_that_only_lacks_its_end_is_an_error(tmp_path: Path, r
         list(read_dump(tmp_path / "a.dump.gz"))
 
 
+def test_a_compressed_file_without_content_is_an_error_if_it_is_cut(tmp_path: Path, raw) -> None:
+    (tmp_path / "a.bin.gz").write_bytes(gzip.compress(binary(raw))[:10])
+    with pytest.raises(TruncatedDumpError, match="frame 0, byte 0: the file ends after 0 bytes"):
+        list(read_dump(tmp_path / "a.bin.gz", NAMES))
+
+
+@pytest.mark.parametrize("name", ["a.bin", "a.bin.gz", "a.dump", "a.dump.gz"])
+def test_a_spoilt_frame_does_not_make_a_block_grow(tmp_path: Path, raw, name, monkeypatch) -> None:
+    """Ranks that do not add up, or a count too small, before very many frames."""
+    monkeypatch.setattr(blocks, "BLOCK_BYTES", 8192)
+    if "bin" in name:
+        spoilt = bytearray(raw.binary(0, ROWS[0], 3, 1))
+        spoilt[8] = 2
+        content = bytes(spoilt) + raw.binary(7, ROWS[0], 3) * 9000
+    else:
+        content = text(raw, [0]) + b"1 2 3 \n" * 99_000
+    file = tmp_path / name
+    file.write_bytes(COMPRESS[file.suffix if file.suffix == ".gz" else ""](content))
+    output = _output(file, NAMES if "bin" in name else None)
+    found = list(blocks._blocks(file, output))
+    assert found[-1].stuck
+    assert max(len(block.buffer) for block in found) < 40_000
+    with pytest.raises(DumpError, match="frame 0"):
+        list(read_dump(file, NAMES if "bin" in name else None))
+
+
 ODD = ["1 2.5 3", "1  2.5 3 ", "\t1 2.5\t3", "1 +2.5 3", "1.0 2.5 3 ", "1 2.5E0 3 ", "1 .5 3. "]
 words = st.one_of(
     st.sampled_from(ODD),
