@@ -36,6 +36,7 @@ BALLS = (
     *("wx_rad_s", "wy_rad_s", "wz_rad_s", "radius_m"),
     *(f"{wall}_force_{axis}_n" for wall in ("floor", "side") for axis in "xyz"),
 )
+BOX = (-0.05, 0.05, -0.05, 0.05, 0.0, 0.32)
 Rows = int
 
 
@@ -169,7 +170,7 @@ def made_frames(folder: Path) -> tuple[Path, Path]:
             )
             balls = rng.normal(size=(1422, len(BALLS)))
             balls[:, 0] = np.arange(1, 1423)
-            head = (step, 1422, 0, *[1] * 6, *[0.0] * 6, len(BALLS), 1, balls.size)
+            head = (step, 1422, 0, *[1] * 6, *BOX, len(BALLS), 1, balls.size)
             data.write(struct.pack("<qqi6i6diii", *head) + balls.tobytes())
     return text, binary
 
