@@ -2,7 +2,8 @@
 
 `load_case` and `load_outputs` say what a run models and wrote; `iter_frames`
 and `iter_prints` stream its raw outputs; `write_tables` makes the Parquet
-tables that everything else starts from.
+tables that everything else starts from. `read_dump` and `dump_to_parquet` read
+any other dump of the engine.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from dragchain.errors import (
     TruncatedDumpError,
 )
 from dragchain.formats import Frame
+from dragchain.reading import dump_to_parquet, read_dump
 from dragchain.stats import MeanEstimate, estimate_mean
 from dragchain.tables import write_tables
 
@@ -34,10 +36,12 @@ __all__ = [
     "SeriesError",
     "TableError",
     "TruncatedDumpError",
+    "dump_to_parquet",
     "estimate_mean",
     "iter_frames",
     "iter_prints",
     "load_case",
     "load_outputs",
+    "read_dump",
     "write_tables",
 ]

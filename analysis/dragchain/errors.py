@@ -56,6 +56,8 @@ class DumpError(DragchainError):
         Byte offset into the file at which the frame or the row starts.
     expected : str, optional
         What should have stood there.
+    kept : str, optional
+        What came before it and is good.
     remedy : str, optional
         What the user can do.
     """
@@ -68,6 +70,7 @@ class DumpError(DragchainError):
         frame: int | None = None,
         offset: int | None = None,
         expected: str | None = None,
+        kept: str | None = None,
         remedy: str | None = None,
     ) -> None:
         self.file = file
@@ -75,16 +78,23 @@ class DumpError(DragchainError):
         self.frame = frame
         self.offset = offset
         self.expected = expected
+        self.kept = kept
         self.remedy = remedy
-        place = [f"{file}"]
-        if frame is not None:
-            place.append(f"frame {frame}")
-        if offset is not None:
-            place.append(f"byte {offset}")
-        lines = [f"{', '.join(place)}: {problem}"]
-        if expected is not None:
-            lines.append(f"expected: {expected}")
-        super().__init__(_joined(lines, remedy))
+        super().__init__()
+
+    def __str__(self) -> str:
+        """Return what was found where, what should have stood there, what is kept."""
+        place = [f"{self.file}"]
+        if self.frame is not None:
+            place.append(f"frame {self.frame}")
+        if self.offset is not None:
+            place.append(f"byte {self.offset}")
+        lines = [f"{', '.join(place)}: {self.problem}"]
+        if self.expected is not None:
+            lines.append(f"expected: {self.expected}")
+        if self.kept is not None:
+            lines.append(f"kept: {self.kept}")
+        return _joined(lines, self.remedy)
 
 
 class TruncatedDumpError(DumpError):

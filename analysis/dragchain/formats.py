@@ -5,18 +5,20 @@
 
 from __future__ import annotations
 
+import io
 import struct
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice, takewhile
 from pathlib import Path
-from typing import BinaryIO, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dragchain.case import Output
+from dragchain.content import Content
 from dragchain.errors import DumpError, TruncatedDumpError
 
 Columns = dict[str, NDArray[np.float64] | NDArray[np.int64]]
@@ -24,12 +26,15 @@ Columns = dict[str, NDArray[np.float64] | NDArray[np.int64]]
 BLOCK_ROWS = 20_000
 """Rows of a ``fix print`` file that are read at once."""
 
+MAX_RANKS = 1_000_000
+"""A binary frame that claims to come from more ranks is none."""
+
 _HEAD = struct.Struct("<qqi6i")
 _TILT_BYTES = 24
 _BOX_BYTES = 48
 _TAIL = struct.Struct("<ii")
 _COUNT = struct.Struct("<i")
-_MAX_RANKS = 1_000_000
+_ROW_BEGINS = [bytes([byte]) for byte in b"0123456789+-. "]
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,7 @@ class Frame:
 
 def is_integer_column(name: str) -> bool:
     """Whether a column counts or names things, which makes it int64 in tables."""
-    return name in ("step", "balls") or name.endswith("_id")
+    return name in ("step", "balls", "id", "type") or name.endswith("_id")
 
 
 def read_dump_file(file: Path, output: Output) -> Iterator[Frame]:
@@ -74,9 +79,10 @@ def read_dump_file(file: Path, output: Output) -> Iterator[Frame]:
     Parameters
     ----------
     file : Path
-        The file.
+        The file, compressed if its name ends in one of `dragchain.content.CODECS`.
     output : Output
-        What ``columns.json`` says about it.
+        What ``columns.json`` says about it. A text dump may have its columns in any
+        order, as its header says.
 
     Yields
     ------
@@ -89,15 +95,35 @@ def read_dump_file(file: Path, output: Output) -> Iterator[Frame]:
         If the file ends inside a frame.
     DumpError
         If the file is not such a dump, has other columns, or holds something
-        that is not a finite number.
+        that is not a finite number. The frames before have come by then.
+    """
+    from dragchain.blocks import read_batches
+
+    for batch in read_batches([file], output):
+        yield from batch.frames()
+
+
+def read_carefully(
+    file: Path, output: Output, *, frame: int = 0, offset: int = 0
+) -> Iterator[Frame]:
+    """Do as `read_dump_file` does, but line by line: slow, and exact about what is wrong.
+
+    Parameters
+    ----------
+    file, output
+        As in `read_dump_file`.
+    frame, offset : int
+        The frame to begin with, and the byte of the content at which it starts.
     """
     read_one = _read_binary_frame if output.binary else _read_text_frame
-    size = file.stat().st_size
-    with file.open("rb") as stream:
-        frame = 0
-        while stream.tell() < size:
-            yield read_one(_Cursor(file, stream, size, output, frame, stream.tell()))
+    with Content(file) as content:
+        content.skip(offset)
+        stream = io.BufferedReader(content)
+        while stream.peek(1):
+            yield read_one(_Cursor(file, stream, content, output, frame, stream.tell()))
             frame += 1
+        if content.damage is not None:
+            _Cursor(file, stream, content, output, frame, stream.tell()).cut_short("more frames")
 
 
 @dataclass
@@ -105,8 +131,8 @@ class _Cursor:
     """An open file, and the frame or row in it that is being read."""
 
     file: Path
-    stream: BinaryIO
-    size: int
+    stream: io.BufferedReader[Any]
+    content: Content
     output: Output
     frame: int
     offset: int
@@ -118,27 +144,38 @@ class _Cursor:
             frame=self.frame,
             offset=self.offset,
             expected=expected,
-            remedy="the file is not what this run's deck writes; run the engine again",
+            kept=self.kept(),
+            remedy="read what the run's deck writes, all of it; else run the engine again",
         )
+
+    def kept(self) -> str | None:
+        """Say which frames have been read; the rows of a ``fix print`` file come in blocks."""
+        if self.output.kind == "print":
+            return None
+        return f"the {self.frame} frames before it" if self.frame else "no frame stands before it"
 
     def fail_row(self, row: int, problem: str, expected: str) -> NoReturn:
         """Fail at a row; in a ``fix print`` file the rows are what is counted."""
         if self.output.kind != "print":
             self.fail(f"row {row}: {problem}", expected)
-        self.stream.seek(self.offset)
-        self.offset += sum(len(line) for line in islice(self.stream, row))
+        with Content(self.file) as content:
+            content.skip(self.offset)
+            self.offset += sum(len(line) for line in islice(io.BufferedReader(content), row))
         self.frame += row
         self.fail(problem, expected)
 
     def cut_short(self, expected: str) -> NoReturn:
         thing = "row" if self.output.kind == "print" else "frame"
+        size = self.stream.tell() if self.content.size is None else self.content.size
+        damage = "" if self.content.damage is None else f" ({self.content.damage})"
         raise TruncatedDumpError(
             self.file,
-            f"the file ends after {self.size} bytes, inside this {thing};"
+            f"the file ends after {size} bytes{damage}, inside this {thing};"
             f" the {thing}s before it are intact",
             frame=self.frame,
             offset=self.offset,
             expected=expected,
+            kept=self.kept(),
             remedy="let the run go on from its last checkpoint, or run it again",
         )
 
@@ -180,9 +217,10 @@ def _read_binary_frame(at: _Cursor) -> Frame:
     found_width, ranks = _TAIL.unpack(at.take(_TAIL.size, "a binary frame's header"))
     if found_width != width:
         at.fail(f"the rows have {found_width} columns", foreign)
-    if not 1 <= ranks <= _MAX_RANKS:
+    if not 1 <= ranks <= MAX_RANKS:
         at.fail(f"the frame claims to come from {ranks} ranks", foreign)
-    if rows * width * 8 > at.size - at.stream.tell():
+    size = at.content.size
+    if size is not None and rows * width * 8 > size - at.stream.tell():
         at.cut_short(f"{rows} rows of {width} numbers")
     values = np.concatenate([_read_rank(at, width) for _ in range(ranks)])
     if len(values) != rows:
@@ -206,20 +244,28 @@ def _read_text_frame(at: _Cursor) -> Frame:
     at.item("BOX BOUNDS")
     for _ in range(3):
         at.line("the bounds of the box")
-    _check_header(at, at.item("ENTRIES" if at.output.kind == "local" else "ATOMS"))
+    order = _column_order(at, at.item("ENTRIES" if at.output.kind == "local" else "ATOMS"))
     lines = list(islice(at.stream, rows))
     if len(lines) < rows or (lines and not lines[-1].endswith(b"\n")):
         at.cut_short(f"{rows} whole rows of {len(at.output.columns)} numbers")
-    return Frame(step, _split(_parse(lines, at), at), at.frame == 0)
+    values = _parse(lines, at)
+    after = at.stream.peek(1)
+    if after[:1] in _ROW_BEGINS:
+        at.fail(
+            f"{rows} rows are not all: {after[:40]!r} follows", f"{rows} rows, as its header says"
+        )
+    return Frame(step, _split(values[:, order], at), at.frame == 0)
 
 
-def _check_header(at: _Cursor, line: str) -> None:
+def _column_order(at: _Cursor, line: str) -> list[int]:
+    """Where in a row the columns stand, in the order of the output's."""
     found = line.split()[2:]
-    if found != list(at.output.header):
+    if sorted(found) != sorted(at.output.header):
         at.fail(
             f"the header names the columns {' '.join(found)}",
-            f"{' '.join(at.output.header)}, as columns.json says",
+            f"{' '.join(at.output.header)} in any order",
         )
+    return [found.index(name) for name in at.output.header]
 
 
 def _parse(lines: list[bytes], at: _Cursor) -> NDArray[np.float64]:
@@ -301,14 +347,14 @@ def read_print_file(
         If the header is another one, a row is not finite numbers, or the steps
         do not increase.
     """
-    size = file.stat().st_size
-    with file.open("rb") as stream:
-        at = _Cursor(file, stream, size, output, 0, 0)
-        if size == 0:
+    with Content(file) as content:
+        stream = io.BufferedReader(content)
+        at = _Cursor(file, stream, content, output, 0, 0)
+        if not stream.peek(1):
             return
         _check_print_header(at)
         last_step = -1
-        while stream.tell() < size:
+        while stream.peek(1):
             lines, cut = _print_lines(at, block_rows)
             if lines:
                 columns = _split(_parse(lines, at), at)

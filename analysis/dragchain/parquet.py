@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -19,6 +21,8 @@ GROUP_ROWS = 131_072
 
 CATEGORY = pa.dictionary(pa.int8(), pa.string())
 """Type of a column that holds one of a few texts."""
+
+_FEW = ("radius_m",)
 
 
 def table_schema(columns: Mapping[str, pa.DataType]) -> pa.Schema:
@@ -37,12 +41,32 @@ def column_type(name: str) -> pa.DataType:
     return pa.float64()
 
 
+def encodings(schema: pa.Schema) -> dict[str, Any]:
+    """How the columns are stored: options of a Parquet writer that change no value.
+
+    Whole numbers rise slowly or stay: differences. Bytes of like weight of neighbouring
+    floats are alike, while their values rarely come twice: byte stream split. Labels and
+    radii are few: dictionaries.
+    """
+    few = [field.name for field in schema if field.type == CATEGORY or field.name in _FEW]
+    split = {pa.int64(): "DELTA_BINARY_PACKED", pa.float64(): "BYTE_STREAM_SPLIT"}
+    return {
+        "compression": "zstd",
+        "use_dictionary": few,
+        "column_encoding": {
+            field.name: split[field.type]
+            for field in schema
+            if field.type in split and field.name not in few
+        },
+    }
+
+
 class TableWriter:
     """A Parquet file that appears under its name only once it is whole.
 
-    Use it as a context manager. Rows are collected into row groups, so memory
-    does not grow with the table. If the block ends in an exception, nothing is
-    left behind, and an older table of that name stays as it was.
+    Use it as a context manager. Rows are collected into row groups, which a thread of
+    its own writes, so memory does not grow with the table. If the block ends in an
+    exception, nothing is left behind, and an older table of that name stays as it was.
 
     Parameters
     ----------
@@ -57,35 +81,47 @@ class TableWriter:
         self.schema = table_schema({name: column_type(name) for name in columns})
         self.rows = 0
         self._temporary = file.with_name(f".{file.name}.{os.getpid()}.tmp")
-        self._batches: list[pa.RecordBatch] = []
+        self._parts: dict[str, list[Any]] = {name: [] for name in columns}
         self._held = 0
+        self._thread = ThreadPoolExecutor(1)
+        self._writing: Future[None] | None = None
 
     def __enter__(self) -> Self:
         """Open the temporary file."""
         self.file.parent.mkdir(parents=True, exist_ok=True)
-        self._writer = pq.ParquetWriter(self._temporary, self.schema, compression="zstd")
+        self._writer = pq.ParquetWriter(self._temporary, self.schema, **encodings(self.schema))
         return self
 
     def write(self, columns: Mapping[str, Any]) -> None:
         """Append rows; `columns` maps every column's name to an array of one length."""
-        arrays = [
-            value if isinstance(value, pa.Array) else pa.array(value, type=kind)
-            for value, kind in ((columns[field.name], field.type) for field in self.schema)
-        ]
-        batch = pa.RecordBatch.from_arrays(arrays, schema=self.schema)
-        if batch.num_rows == 0:
+        parts = {name: columns[name] for name in self._parts}
+        lengths = {len(part) for part in parts.values()}
+        if len(lengths) != 1:
+            raise ValueError(f"{self.file}: columns of unequal lengths {sorted(lengths)}")
+        rows = lengths.pop()
+        if rows == 0:
             return
-        self._batches.append(batch)
-        self._held += batch.num_rows
+        for name, part in parts.items():
+            self._parts[name].append(part)
+        self._held += rows
         if self._held >= GROUP_ROWS:
             self._flush()
 
     def _flush(self) -> None:
-        if self._batches:
-            table = pa.Table.from_batches(self._batches, schema=self.schema)
-            self._writer.write_table(table, row_group_size=max(self._held, 1))
+        self._wait()
+        if self._held:
+            arrays = [_joined(self._parts[field.name], field.type) for field in self.schema]
+            table = pa.Table.from_arrays(arrays, schema=self.schema)
+            self._writing = self._thread.submit(
+                self._writer.write_table, table, row_group_size=self._held
+            )
         self.rows += self._held
-        self._batches, self._held = [], 0
+        self._parts, self._held = {name: [] for name in self._parts}, 0
+
+    def _wait(self) -> None:
+        if self._writing is not None:
+            self._writing.result()
+        self._writing = None
 
     def __exit__(
         self,
@@ -97,11 +133,20 @@ class TableWriter:
         try:
             if kind is None:
                 self._flush()
+            self._thread.shutdown()
             self._writer.close()
             if kind is None:
+                self._wait()
                 os.replace(self._temporary, self.file)
         finally:
             self._temporary.unlink(missing_ok=True)
+
+
+def _joined(parts: list[Any], kind: pa.DataType) -> pa.Array:
+    """One column of parts that are arrays of either library."""
+    if kind == CATEGORY:
+        return pa.concat_arrays(parts)
+    return pa.array(np.concatenate(parts), type=kind)
 
 
 def category(codes: Any, labels: tuple[str, ...]) -> pa.Array:

@@ -115,6 +115,33 @@ def tangential_force(force_n: Floats, normal: Floats) -> Floats:
     return np.asarray(np.linalg.norm(force_n - along, axis=1))
 
 
+@dataclass(frozen=True)
+class RodPair:
+    """``rod_balls`` and ``rod_contacts`` of one step, not joined yet."""
+
+    balls: Frame
+    contacts: Frame
+
+    @property
+    def step(self) -> int:
+        """The step."""
+        return self.balls.step
+
+    def join(self) -> RodFrame:
+        """Give every contact the force that its ball received; see `join_rod_frame`."""
+        return join_rod_frame(self.balls, self.contacts)
+
+
+def iter_rod_pairs(run_dir: Path, outputs: Mapping[str, Output]) -> Iterator[RodPair]:
+    """What `iter_rod_frames` joins, for those who need some steps only."""
+    balls = iter_frames(run_dir, outputs["rod_balls"])
+    contacts = iter_frames(run_dir, outputs["rod_contacts"])
+    for ball_frame, contact_frame in zip_longest(balls, contacts):
+        if ball_frame is None or contact_frame is None:
+            raise TableError("one of rod_balls and rod_contacts ends before the other")
+        yield RodPair(ball_frame, contact_frame)
+
+
 def iter_rod_frames(run_dir: Path, outputs: Mapping[str, Output]) -> Iterator[RodFrame]:
     """Contacts on the tool, step by step.
 
@@ -137,12 +164,7 @@ def iter_rod_frames(run_dir: Path, outputs: Mapping[str, Output]) -> Iterator[Ro
     DumpError
         If one of them cannot be read.
     """
-    balls = iter_frames(run_dir, outputs["rod_balls"])
-    contacts = iter_frames(run_dir, outputs["rod_contacts"])
-    for ball_frame, contact_frame in zip_longest(balls, contacts):
-        if ball_frame is None or contact_frame is None:
-            raise TableError("one of rod_balls and rod_contacts ends before the other")
-        yield join_rod_frame(ball_frame, contact_frame)
+    return (pair.join() for pair in iter_rod_pairs(run_dir, outputs))
 
 
 def join_rod_frame(balls: Frame, contacts: Frame) -> RodFrame:
@@ -182,9 +204,11 @@ def join_rod_frame(balls: Frame, contacts: Frame) -> RodFrame:
     applied = balls.vectors(*_FORCE)[order]
     centres = balls.vectors(*_CENTRE)[order]
     motion = _motion(balls, order)
-    all_contacts = _place(_sorted(contacts), known, applied, centres, motion)
-    unplaced = ~np.isin(known, all_contacts.ball_id)
-    on_bowl = _sorted(contacts).columns.get("mesh_id", np.zeros(contacts.rows)) == BOWL_MESH
+    contacts = _sorted(contacts)
+    all_contacts = _place(contacts, known, applied, centres, motion)
+    unplaced = np.ones(len(known), dtype=np.bool_)
+    unplaced[np.searchsorted(known, all_contacts.ball_id[~all_contacts.silent])] = False
+    on_bowl = contacts.columns.get("mesh_id", np.zeros(contacts.rows)) == BOWL_MESH
     return RodFrame(
         balls.step,
         all_contacts.select(~on_bowl),
@@ -217,7 +241,7 @@ def _place(
     """Join contacts with the balls `known`, of which all else is given in that order."""
     ids = np.asarray(contacts.columns["ball_id"], dtype=np.int64)
     at = np.searchsorted(known, ids)
-    silent = ~np.isin(ids, known)
+    silent = np.append(known, 0)[at] != ids
     at[silent] = 0
     evaluated = contacts.vectors(*_FORCE)
     force = np.zeros_like(evaluated)

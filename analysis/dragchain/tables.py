@@ -29,7 +29,7 @@ from dragchain.forces import (
 )
 from dragchain.formats import Columns, Frame
 from dragchain.parquet import TableWriter, category, write_json
-from dragchain.rod import RodFrame, WallContacts, iter_rod_frames
+from dragchain.rod import RodFrame, WallContacts, iter_rod_frames, iter_rod_pairs
 
 FORCES = ("force_x_n", "force_y_n", "force_z_n")
 POINT = ("point_x_m", "point_y_m", "point_z_m")
@@ -289,10 +289,10 @@ def _write_balls(run: Run, file: Path) -> None:
 def _write_contacts(run: Run, file: Path) -> None:
     bowl_radius = needed(run.case.bowl, "bowl").radius_m
     balls = _Follower("balls", run.frames("balls"))
-    rods = _Follower("rod_contacts", iter_rod_frames(run.folder, run.outputs))
+    rods = _Follower("rod_contacts", iter_rod_pairs(run.folder, run.outputs))
     with TableWriter(file, CONTACTS) as table:
         for frame in run.frames("contacts"):
-            rod = rods.at(frame.step)
+            rod = rods.at(frame.step).join()
             ball_frame = balls.at(frame.step)
             rows = contact_rows(ball_frame, frame, rod.rod, rod.bowl, bowl_radius)
             table.write(_contact_columns(frame.step, rows, run.case))
