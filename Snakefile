@@ -21,13 +21,20 @@ include: "workflow/rules/trade.smk"
 include: "workflow/rules/validate.smk"
 
 
+# With a queue, these stay where snakemake runs: they take a second or two.
 localrules:
     all,
     calibrate,
     checks,
     drop,
     fill,
+    pass_verdict,
     process,
+    render_drop,
+    render_fill,
+    render_point,
+    render_process,
+    render_verification,
     report,
     stability,
     trade,
