@@ -328,6 +328,15 @@ def test_only_the_queue_needs_its_plugin(machine: Machine):
     assert names(machine.done()) == ["snakemake"]
 
 
+def test_a_queue_that_would_cut_ranks_is_refused(machine: Machine):
+    machine.run("setup")
+    machine.done()
+    refused = machine.run("all", "--profile", "profiles/slurm")
+    assert refused.returncode == 1
+    assert "remedy: --workflow-profile profiles/slurm" in refused.stderr
+    assert machine.done() == []
+
+
 def test_the_test_of_the_queue_installs_a_slurm(machine: Machine):
     machine.run("setup")
     machine.done()
