@@ -22,13 +22,20 @@ include: "workflow/rules/validate.smk"
 include: "workflow/rules/scaling.smk"
 
 
+# With a queue, these stay where snakemake runs: they take a second or two.
 localrules:
     all,
     calibrate,
     checks,
     drop,
     fill,
+    pass_verdict,
     process,
+    render_drop,
+    render_fill,
+    render_point,
+    render_process,
+    render_verification,
     report,
     scaling,
     stability,

@@ -37,6 +37,7 @@ FAKE_PYTHON = """\
 #!/bin/sh
 case "$*" in
     *version_info*) exit "${FAKE_OLD:-0}" ;;
+    *executor_plugin*) exit "${FAKE_NO_PLUGIN:-0}" ;;
     *ensurepip*) exit "${FAKE_NO_VENV:-0}" ;;
     --version) echo Python 3.12.1 ;;
     "-m venv --clear "*)
@@ -311,6 +312,44 @@ def test_missing_mpirun_is_only_a_warning(machine: Machine):
     assert "openmpi-bin" in warned.stderr
 
 
+# --- a queue ---------------------------------------------------------------------------
+
+
+def test_only_the_queue_needs_its_plugin(machine: Machine):
+    machine.run("setup")
+    machine.done()
+    machine.run("all", FAKE_NO_PLUGIN="1")
+    assert names(machine.done()) == ["snakemake"]
+    machine.run("all", "--workflow-profile", "profiles/slurm", FAKE_NO_PLUGIN="1")
+    installed, ran = machine.done()
+    assert ".[slurm]" in installed and "--constraint constraints.txt" in installed
+    assert ran.startswith("snakemake [all] [--workflow-profile] [profiles/slurm] ")
+    machine.run("all", "--workflow-profile", "profiles/slurm")
+    assert names(machine.done()) == ["snakemake"]
+
+
+def test_a_queue_that_would_cut_ranks_is_refused(machine: Machine):
+    machine.run("setup")
+    machine.done()
+    refused = machine.run("all", "--profile", "profiles/slurm")
+    assert refused.returncode == 1
+    assert "remedy: --workflow-profile profiles/slurm" in refused.stderr
+    assert machine.done() == []
+
+
+def test_the_test_of_the_queue_installs_a_slurm(machine: Machine):
+    machine.run("setup")
+    machine.done()
+    if not shutil.which("slurmctld", path="/usr/sbin"):
+        refused = machine.run("test", "--slurm")
+        assert refused.returncode == 1
+        assert "slurm-wlm munge" in refused.stderr
+    for name in ("slurmctld", "munged"):
+        machine.add(name, FAKE_TOOL)
+    assert machine.run("test", "--slurm", "-x").returncode == 0
+    assert machine.done()[-1].startswith("pytest [-m] [slurm] [-x] ")
+
+
 # --- the tests -------------------------------------------------------------------------
 
 
@@ -367,6 +406,7 @@ def test_every_dependency_is_pinned_at_or_above_its_minimum():
     wanted = [
         *project["project"]["dependencies"],
         *project["project"]["optional-dependencies"]["test"],
+        *project["project"]["optional-dependencies"]["slurm"],
         *project["build-system"]["requires"],
     ]
     for requirement in map(Requirement, wanted):

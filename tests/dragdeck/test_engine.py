@@ -6,7 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from dragdeck.engine import ENGINE_VARIABLE, Engine, command, engine_errors, find_engine
+from dragdeck.engine import (
+    ENGINE_VARIABLE,
+    LAUNCHER_VARIABLE,
+    Engine,
+    command,
+    engine_errors,
+    execute,
+    find_engine,
+)
 from dragdeck.errors import EngineError
 
 
@@ -42,6 +50,30 @@ def test_one_rank_needs_no_mpirun(monkeypatch: pytest.MonkeyPatch) -> None:
     assert command(engine, "deck", 1, 1, None)[0] == "/opt/liggghts"
     with pytest.raises(EngineError, match="no mpirun"):
         command(engine, "deck", 2, 1, None)
+
+
+def test_a_launcher_of_ones_own_starts_the_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = Engine("/opt/liggghts", "3.8.0")
+    monkeypatch.setenv(LAUNCHER_VARIABLE, "env --mpi=pmix")
+    assert command(engine, "deck", 4, 1, None)[:5] == ["env", "--mpi=pmix", "-n", "4", engine.path]
+    assert command(engine, "deck", 1, 1, None)[0] == engine.path
+    monkeypatch.setenv(LAUNCHER_VARIABLE, "no-such-launcher -v")
+    with pytest.raises(EngineError, match=f"no-such-launcher.*\n.*{LAUNCHER_VARIABLE}"):
+        command(engine, "deck", 4, 1, None)
+
+
+@pytest.mark.parametrize("launcher", ["", "sh"])
+def test_only_a_launcher_of_ones_own_sees_the_queue(
+    launcher: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(LAUNCHER_VARIABLE, launcher)
+    for name in ("SLURM_JOB_ID", "PMIX_RANK", "OTHER"):
+        monkeypatch.setenv(name, "7")
+    screen = tmp_path / "screen.txt"
+    shown = "echo $SLURM_JOB_ID,$PMIX_RANK,$OTHER"
+    ending = execute(["sh", "-c", shown], tmp_path, screen, watch=lambda seconds: None)
+    assert ending.exit_status == 0
+    assert screen.read_text() == ("7,7,7\n" if launcher else ",,7\n")
 
 
 def test_a_resumed_run_names_its_checkpoint() -> None:

@@ -145,6 +145,28 @@ def test_a_killed_engine_is_never_a_result(
     assert json.loads(run(folder, silent).read_text())["state"] == "complete"
 
 
+def test_a_queue_that_signals_the_engine_too_stops_the_run(
+    small: dict[str, Any], write_study: Callable[..., Path], project: Project
+) -> None:
+    small["fidelities"]["quick"].update(fill_timestep_fraction=0.05)
+    (case,) = load_cases(write_study(small))
+    folder = project.run_folder(case, "fill")
+    write_run(fill_scene(case), folder, environment(project.templates))
+    process = start(folder)
+    wait_for(has_checkpoint(folder))
+    (engine,) = psutil.Process(process.pid).children()
+    engine.send_signal(signal.SIGTERM)
+    _, said = process.communicate(timeout=60)
+    assert b"stopped as asked" in said
+    assert state(folder)["parts"][0]["exit_status"] == 0
+    assert not list(folder.glob("restart_forced_*"))
+
+    (folder / "restart_forced_liggghts_7.data").touch()  # the runner was killed before it looked
+    result = json.loads(run(folder, silent).read_text())
+    assert result["parts"][1]["from_step"] > 0
+    assert not (folder / "archive").exists()
+
+
 def test_the_engines_error_reaches_the_user_and_is_not_retried(fill: Path) -> None:
     deck = fill / "in.liggghts"
     good = deck.read_text()

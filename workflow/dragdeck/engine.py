@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -20,6 +21,12 @@ from dragdeck.errors import EngineError
 
 ENGINE_VARIABLE = "DRAGDECK_ENGINE"
 """Environment variable with the path of an engine of one's own."""
+
+LAUNCHER_VARIABLE = "DRAGDECK_LAUNCHER"
+"""Environment variable with a launcher of one's own, for example ``srun --mpi=pmix``."""
+
+QUEUE_VARIABLES = ("SLURM_", "PMI")
+"""Beginnings of the names of a queue's variables."""
 
 OLDEST_VERSION = (3, 8, 0)
 """Oldest engine that the decks were run on."""
@@ -85,7 +92,10 @@ def find_engine() -> Engine:
 
 @cache
 def _version(path: str) -> str:
-    shown = subprocess.run([path, "-h"], capture_output=True, text=True, check=False, timeout=60)
+    words = [path, "-h"]
+    shown = subprocess.run(
+        words, capture_output=True, text=True, check=False, timeout=60, env=_environment(words)
+    )
     found = re.search(r"LIGGGHTS[^\n]*?(\d+)\.(\d+)\.(\d+)", shown.stdout)
     oldest = ".".join(map(str, OLDEST_VERSION))
     if found is None:
@@ -121,6 +131,8 @@ def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | Non
         words += ["-var", "resume", "1", "-var", "from", source.name]
     if ranks == 1:
         return words
+    if own := _own_launcher():
+        return [*own, "-n", str(ranks), *words]
     launcher = shutil.which("mpirun")
     if launcher is None:
         raise EngineError(
@@ -129,6 +141,17 @@ def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | Non
         )
     idle = ["--mca", "mpi_yield_when_idle", "1"]  # free, and kind to whoever shares the cores
     return [launcher, "-np", str(ranks), "--bind-to", "none", "--oversubscribe", *idle, *words]
+
+
+def _own_launcher() -> list[str]:
+    """The launcher that the user named, if any."""
+    words = shlex.split(os.environ.get(LAUNCHER_VARIABLE, ""))
+    if words and shutil.which(words[0]) is None:
+        raise EngineError(
+            f"no launcher: {words[0]!r} is not an executable file\n"
+            f"  remedy: correct {LAUNCHER_VARIABLE}, or unset it to use mpirun"
+        )
+    return words
 
 
 def execute(words: Sequence[str], folder: Path, screen: Path, watch: Watch) -> Ending:
@@ -158,7 +181,7 @@ def execute(words: Sequence[str], folder: Path, screen: Path, watch: Watch) -> E
             stdin=subprocess.DEVNULL,
             stdout=sink,
             stderr=subprocess.STDOUT,
-            env=_environment(),
+            env=_environment(list(words)),
             start_new_session=True,  # a Ctrl-C reaches us, not the engine
         )
         with _heeding_signals() as asked:
@@ -183,9 +206,18 @@ def _ended(process: subprocess.Popen[bytes], options: int = os.WNOHANG) -> float
     return usage.ru_utime + usage.ru_stime
 
 
-def _environment() -> dict[str, str]:
+def _environment(words: list[str]) -> dict[str, str]:
+    """What a command sees of our environment.
+
+    Only a launcher of the user's own sees the queue that we may be in. Open MPI would
+    hold a lone engine in a Slurm step for a rank that ``srun`` started, and look for the
+    others; ``mpirun`` would ask Slurm for nodes, and our ranks stay on this one.
+    """
+    own = words[:1] == _own_launcher()[:1]
+    hidden = () if own else QUEUE_VARIABLES
+    seen = {name: value for name, value in os.environ.items() if not name.startswith(hidden)}
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    return {**os.environ, "OMP_NUM_THREADS": "1", **(allowed if os.geteuid() == 0 else {})}
+    return {**seen, "OMP_NUM_THREADS": "1", **(allowed if os.geteuid() == 0 else {})}
 
 
 @contextlib.contextmanager

@@ -84,6 +84,7 @@ def run(folder: Path, report: Report, *, again: bool = False, every_s: float = 1
         The run ended but a gate did not hold.
     """
     case, columns = _read(folder, CASE_FILE), _read(folder, COLUMNS_FILE)
+    _take_forced_restarts(folder)
     inputs = fingerprint(folder)
     state = _state(folder)
     if state and (state["inputs"] != inputs or (again and state["state"] != "complete")):
@@ -273,6 +274,7 @@ def _conclude(
     part = state["parts"][-1]
     screen = (folder / f"screen.{part['part']}.txt").read_text(errors="replace")
     killed = part["exit_status"] < 0 or part["exit_status"] >= 128
+    asked = _take_forced_restarts(folder) or asked
     if "DRAGDECK END" not in screen and (asked or (killed and not engine_errors(screen))):
         state["state"] = "stopped"
         _save(folder, state)
@@ -371,6 +373,18 @@ def _newest_checkpoint(folder: Path) -> Path | None:
     latest = max((file.stat().st_mtime_ns for file in texts), default=0)
     whole = [file for file in _checkpoints(folder) if file.stat().st_mtime_ns < latest]
     return whole[-1] if whole else None
+
+
+def _take_forced_restarts(folder: Path) -> bool:
+    """Delete what the engine wrote because it was itself told to end; whether it was.
+
+    A queue signals every process of a job. The engine then ends as if all were well, with
+    a restart file that looks like a part of the deck; two ranks need not agree on its step.
+    """
+    forced = list(folder.glob("restart_forced_*"))
+    for file in forced:
+        file.unlink()
+    return bool(forced)
 
 
 def _last_step(screen: Path) -> int | None:
