@@ -19,12 +19,12 @@ from dragchain.drop import effective_restitution
 from dragchain.errors import TableError
 from dragchain.findings import (
     CONFIDENCE,
-    Estimate,
     ahead_behind,
     association,
     bearing_profile,
     depth_profile,
     depth_slope,
+    estimate_columns,
     finite,
     near_any,
 )
@@ -93,7 +93,7 @@ def _process(run_dir: Path, case: Case) -> Findings:
     peaks_s, peaks = _peaks(samples, case)
     return {
         "process_time_zero_s": drag_start_s(case),
-        "forces": {name: _mean(estimate) for name, estimate in forces.items()},
+        "forces": {name: mean_numbers(estimate) for name, estimate in forces.items()},
         "comparison": compare(forces["drag_n"], case.reference),
         "peaks": peaks,
         "network": _network(network),
@@ -103,7 +103,8 @@ def _process(run_dir: Path, case: Case) -> Findings:
     }
 
 
-def _mean(estimate: MeanEstimate) -> Findings:
+def mean_numbers(estimate: MeanEstimate) -> Findings:
+    """Return all that is known of a mean by name, None where a number is not finite."""
     known = asdict(estimate)
     return {name: finite(value) if name != "reliable" else value for name, value in known.items()}
 
@@ -228,19 +229,14 @@ def _around_tool(run_dir: Path, samples: pd.DataFrame) -> Findings:
         "confidence": CONFIDENCE,
         "rod_frames": frames,
         "ahead_behind": {name: estimate.as_json() for name, estimate in ratio.items()},
-        "bearing": {"edges_rad": edges.tolist(), "force_n": _columns(around)},
+        "bearing": {"edges_rad": edges.tolist(), "force_n": estimate_columns(around)},
         "depth": {
             "edges_m": levels.tolist(),
-            "contact_n": _columns(contact),
-            "line_n_m": _columns(line),
+            "contact_n": estimate_columns(contact),
+            "line_n_m": estimate_columns(line),
             "slope_n_m": slope.as_json(),
         },
     }
-
-
-def _columns(estimates: list[Estimate]) -> dict[str, list[float | None]]:
-    rows = [estimate.as_json() for estimate in estimates]
-    return {name: [row[name] for row in rows] for name in ("value", "low", "high")}
 
 
 def _frame_numbers(run_dir: Path, samples: pd.DataFrame, steps: Ints) -> tuple[Ints, int]:

@@ -7,7 +7,7 @@ circular shifts; neither takes neighbouring frames for independent.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +41,12 @@ class Estimate:
 def finite(number: float) -> float | None:
     """Return the number, or None where JSON has no way to write it."""
     return float(number) if np.isfinite(number) else None
+
+
+def estimate_columns(estimates: Sequence[Estimate]) -> dict[str, list[float | None]]:
+    """Return estimates as columns ``value``, ``low`` and ``high``."""
+    rows = [estimate.as_json() for estimate in estimates]
+    return {name: [row[name] for row in rows] for name in ("value", "low", "high")}
 
 
 # --- block bootstrap -------------------------------------------------------------------------

@@ -216,8 +216,7 @@ def sample(run_dir: Path, case: Case, limits: Thresholds) -> Sampled:
             f"{tables}: rod_force.parquet lacks steps of rod_contacts.parquet;"
             " make both again with `dragchain tables`"
         )
-    loaded = contacts["counted"] & (contacts[_FORCE] != 0.0).any(axis=1)
-    rows = contacts[loaded].reset_index(drop=True)
+    rows = contacts[_loaded(contacts)].reset_index(drop=True)
     if rows.empty:
         raise TableError(f"{run_dir}: no ball touches the tool in the counted drag")
     rows["frame"] = np.searchsorted(steps, rows["step"])
@@ -233,14 +232,18 @@ def _read_contacts(file: Path, run_dir: Path) -> pd.DataFrame:
     if missing := sorted(set(_CONTACT) - set(whole.columns)):
         raise TableError(f"{file}: has no column {missing[0]}: it is older than this; {remedy}")
     contacts = whole[_CONTACT]
-    loaded = contacts["counted"] & (contacts[_FORCE] != 0.0).any(axis=1)
-    if contacts.loc[loaded, _VELOCITY].isna().any(axis=None):
+    if contacts.loc[_loaded(contacts), _VELOCITY].isna().any(axis=None):
         raise TableError(
             f"{file}: slip_x_m_s is not known: the run's rod_balls holds no velocities,"
             " as runs did before it was asked for them; run the case again, then "
             f"dragchain tables {run_dir}"
         )
     return contacts
+
+
+def _loaded(contacts: pd.DataFrame) -> pd.Series:
+    """Tell which contacts count and carry force."""
+    return contacts["counted"] & (contacts[_FORCE] != 0.0).any(axis=1)
 
 
 def _counted_steps(run_dir: Path, case: Case, contacts: pd.DataFrame) -> tuple[Ints, float]:

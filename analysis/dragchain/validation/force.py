@@ -11,13 +11,13 @@ import pandas as pd
 from scipy import signal, stats
 
 from dragchain.case import Case
-from dragchain.collect import drag_start_s
+from dragchain.collect import drag_start_s, mean_numbers
 from dragchain.effects import Fit, fit_effects
-from dragchain.errors import SeriesError, TableError
+from dragchain.errors import TableError
 from dragchain.findings import CONFIDENCE, Estimate, finite
 from dragchain.forces import find_drag_peaks, peak_separation_s, read_counted
 from dragchain.frames import Floats
-from dragchain.stats import MeanEstimate, estimate_mean
+from dragchain.stats import estimate_mean
 from dragchain.validation.fills import Point, Points, over_fills
 
 Found = dict[str, Any]
@@ -68,13 +68,8 @@ def _fill_row(point: Point) -> Found:
         "arc_m": point.measures["arc_m"],
         "steps": cost["steps"],
         "cpu_time_s": cost["cpu_time_s"],
-        **{name: _mean(estimate_mean(samples[name].to_numpy())) for name in COMPONENTS},
+        **{name: mean_numbers(estimate_mean(samples[name].to_numpy())) for name in COMPONENTS},
     }
-
-
-def _mean(estimate: MeanEstimate) -> Found:
-    known = vars(estimate)
-    return {name: finite(value) if name != "reliable" else value for name, value in known.items()}
 
 
 def _alike(rows: Sequence[Found]) -> Found:
@@ -219,8 +214,13 @@ def effects(points: Points) -> pd.DataFrame:
         If there are too few runs.
     """
     rows = []
-    for quantity in ("mean", "sd"):
-        fitted = _Fitted(points, quantity)
+    drags = [read_counted(point.folder)["drag_n"].to_numpy(np.float64) for point in points.all]
+    sizes = {
+        "mean": [abs(float(drag.mean())) for drag in drags],
+        "sd": [float(drag.std(ddof=1)) for drag in drags],
+    }
+    for quantity, values in sizes.items():
+        fitted = _Fitted(points, values)
         for setting in fitted.settings[1:]:
             rows.append({"quantity": f"drag_{quantity}", **fitted.row(setting)})
     return pd.DataFrame(rows)
@@ -229,10 +229,10 @@ def effects(points: Points) -> pd.DataFrame:
 class _Fitted:
     """One quantity fitted over all runs."""
 
-    def __init__(self, points: Points, quantity: str) -> None:
+    def __init__(self, points: Points, sizes: Sequence[float]) -> None:
         self.points = points.all
         self.settings = list(dict.fromkeys(point.setting for point in self.points))
-        values = np.array([math.log(abs(_of_run(point, quantity))) for point in self.points])
+        values = np.log(sizes)
         design = np.array([self._indicator(point.setting) for point in self.points])
         weights = np.sqrt([float(point.measures["arc_m"]) for point in self.points])
         weights /= weights.max()
@@ -267,13 +267,6 @@ class _Fitted:
     def _base(self, point: Point) -> Point:
         alike = (one for one in self.points if one.knobs == point.knobs and not one.changed)
         return (next(alike, self.points[0])) if point.changed else self.points[0]
-
-
-def _of_run(point: Point, quantity: str) -> float:
-    drag = read_counted(point.folder)["drag_n"].to_numpy(np.float64)
-    if not drag.size:
-        raise SeriesError(f"{point.case.run}: no sample counts")
-    return float(drag.mean() if quantity == "mean" else drag.std(ddof=1))
 
 
 def _input(base: Point, point: Point) -> object:

@@ -824,11 +824,6 @@ def study_of(runs: Sequence[RunSeries]) -> Study:
     return Study(tuple(runs), tests, found)
 
 
-def find_peaks_and_chains(run_dirs: Sequence[Path]) -> Found:
-    """Return what the runs say of peaks and chains, for JSON; see `study`."""
-    return study(run_dirs).found
-
-
 def _run_row(run: RunSeries) -> Found:
     return {
         "run": run.run,

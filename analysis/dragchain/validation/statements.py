@@ -17,7 +17,7 @@ import pandas as pd
 
 from dragchain.case import Case, Circle, Tool
 from dragchain.errors import TableError
-from dragchain.findings import BEARING_BINS, DEPTH_BINS, Estimate
+from dragchain.findings import BEARING_BINS, DEPTH_BINS, estimate_columns
 from dragchain.forces import read_counted
 from dragchain.frames import Floats, Ints, read_table
 from dragchain.validation.fills import Point, over_fills
@@ -67,12 +67,7 @@ def _profile(rows: Sequence[Found], name: str) -> Found:
     """A curve a fill, averaged bin by bin; the bins are those of the first fill."""
     curves = np.array([row[name]["value"] for row in rows])
     found = [over_fills(column.tolist()) for column in curves.T]
-    return {"edges": rows[0][name]["edges"], **_columns(found)}
-
-
-def _columns(estimates: Sequence[Estimate]) -> Found:
-    rows = [estimate.as_json() for estimate in estimates]
-    return {name: [row[name] for row in rows] for name in ("value", "low", "high")}
+    return {"edges": rows[0][name]["edges"], **estimate_columns(found)}
 
 
 # --- contacts on the tool --------------------------------------------------------------------
@@ -227,8 +222,8 @@ def _network(corridors: Sequence[_Corridor]) -> Found:
     return {
         "edges_diameters": edges.tolist(),
         "wall_diameters": corridors[0].wall,
-        "ahead_n": _columns([over_fills(column.tolist()) for column in ahead.T]),
-        "behind_n": _columns([over_fills(column.tolist()) for column in behind.T]),
+        "ahead_n": estimate_columns([over_fills(column.tolist()) for column in ahead.T]),
+        "behind_n": estimate_columns([over_fills(column.tolist()) for column in behind.T]),
         "far_n": over_fills(far).as_json(),
         "ratio": over_fills(
             (ahead.mean(axis=1) / behind.mean(axis=1)).tolist(), ratio=True
