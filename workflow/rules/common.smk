@@ -172,6 +172,18 @@ def every_point(file, plan=PLAN):
     return [f"results/{STUDY}/points/{run}/{file}" for run in points_by_run("process", plan)]
 
 
+def every_fill(file):
+    """One file of every run of the validation that differs from its first by the seed alone."""
+    runs = points_by_run("process", VALIDATION)
+    first = next(iter(runs.values())).study
+    alike = [
+        run
+        for run, case in runs.items()
+        if case.study.model_copy(update={"seed": first.seed}) == first
+    ]
+    return [f"results/{STUDY}/points/{run}/{file}" for run in alike]
+
+
 def every_drop_point(file):
     """One file of every drop test of the trade."""
     return [f"results/{STUDY}/drop/{run}/{file}" for run in points_by_run("drop")]

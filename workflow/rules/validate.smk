@@ -4,6 +4,7 @@
 rule write_validation:
     input:
         measures=lambda wildcards: every_point("measures.json", VALIDATION),
+        loads=lambda wildcards: every_fill("tables/removal.json"),
         template="analysis/dragchain/validation/validation.html.j2",
     output:
         page=report(
