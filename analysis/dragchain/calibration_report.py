@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import matplotlib
 import numpy as np
 import pandas as pd
@@ -20,8 +18,8 @@ from dragchain.calibrate import CONFIDENCE, Calibration, DropRun, Drops, read_dr
 from dragchain.calibration import calibrate_file, confirmed, full_drop
 from dragchain.errors import TableError
 from dragchain.figures import BLUE, GREEN, GREY, ORANGE, RED, STYLE, png
+from dragchain.page import data_uri, render_page
 from dragchain.record import Floats, read_record
-from dragchain.report import data_uri, number
 
 WIDTH_IN = 7.6
 
@@ -80,7 +78,7 @@ def write_report(record: Path, folder: Path) -> Path:
         (folder / "figures" / f"{name}.png").write_bytes(picture)
     page = folder / "report.html"
     draft = page.with_name(page.name + ".part")
-    text = render_page(
+    text = render(
         result,
         {name: table.to_dict("records") for name, table in tables.items()},
         confirmed(confirm),
@@ -105,7 +103,7 @@ def _csv(file: Path) -> pd.DataFrame:
     return pd.read_csv(file)
 
 
-def render_page(
+def render(
     result: Mapping[str, Any],
     tables: Mapping[str, Any],
     confirm: Mapping[str, Any],
@@ -113,12 +111,8 @@ def render_page(
     pictures: Mapping[str, str],
 ) -> str:
     """Return the page: HTML that needs no other file and no network."""
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters["number"] = number
-    source = resources.files("dragchain").joinpath("calibration.html.j2").read_text("utf-8")
-    return environment.from_string(source).render(
+    return render_page(
+        "calibration.html.j2",
         result=result,
         tables=tables,
         bias=_bias_table(tables["bias"]),

@@ -8,19 +8,18 @@ import os
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import matplotlib
 import numpy as np
 
 from dragchain.figures import STYLE, png
 from dragchain.frames import write_parquet
 from dragchain.measures import LONG_WAVE, SHORT_WAVE, Quantity
+from dragchain.notation import DASH, MINUS, number
+from dragchain.page import data_uri, render_page
 from dragchain.parquet import write_json
-from dragchain.report import DASH, MINUS, data_uri, number
 from dragchain.trade import (
     ADDITIVE_LEVEL,
     CONFIDENCE,
@@ -339,7 +338,7 @@ def cell(error: Error | None) -> dict[str, str]:
     if not error.resolved:
         return {"text": NOT_RESOLVED, "detail": interval(error), "kind": "open"}
     size = abs(error.error)
-    kind = "large" if size > RUINED else "middle" if size > RUINED / 2.0 else "small"
+    kind = "bad" if size > RUINED else "middling" if size > RUINED / 2.0 else "good"
     large = error.error >= FOLD
     text = f"{number(1.0 + error.error, 2)}-fold" if large else f"{percent(error.error)} %"
     return {"text": text, "detail": interval(error), "kind": kind}
@@ -396,19 +395,17 @@ CAPTIONS = {
 
 def render(found: Findings, pictures: Mapping[str, bytes]) -> str:
     """The page: HTML that needs no other file and no network."""
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters |= {"number": number, "percent": percent, "share": plainly}
-    source = resources.files("dragchain").joinpath("trade.html.j2").read_text(encoding="utf-8")
     trade = found.trade
-    page = environment.from_string(source).render(
+    return render_page(
+        "trade.html.j2",
+        {"in_percent": percent, "plainly": plainly},
         found=found,
         trade=trade,
         what=what_was_run(found),
         references=_reference_rows(trade),
         tolerances=TOLERANCES,
         choices=choice_rows(found),
+        best=_best(found),
         advice=advice(found),
         plain=_plain_note(found),
         soft=softness_rows(trade),
@@ -440,7 +437,6 @@ def render(found: Findings, pictures: Mapping[str, bytes]) -> str:
         waves=(SHORT_WAVE, LONG_WAVE),
         dash=DASH,
     )
-    return page.replace(" %", "\N{NO-BREAK SPACE}%")
 
 
 def what_was_run(found: Findings) -> list[tuple[str, str]]:
@@ -554,7 +550,7 @@ def _choice_cell(found: Findings, choice: Choice) -> dict[str, str]:
         return {
             "text": str(choice.setting),
             "detail": f"{cheaper(ratio)}{more}; bound {percent(choice.bound, sign=False)} %",
-            "kind": "found",
+            "kind": "good",
         }
     if choice.nearest is None:
         return {"text": "none", "detail": "no setting has two complete runs", "kind": "none"}
@@ -580,7 +576,7 @@ def _drop_cell(drops: Sequence[Drop], drop: Drop | None) -> dict[str, str]:
         "text": f"step {plainly(drop.timestep_fraction)} % of Rayleigh",
         "detail": f"{cheaper(1.0 / drop.relative_cost)} than the finest; worst impact "
         f"{percent(drop.bound, sign=False)} %",
-        "kind": "found",
+        "kind": "good",
     }
 
 
@@ -594,6 +590,14 @@ def advice(found: Findings) -> list[str]:
         parts = [(one, _drop_words(choose_drop(found.drops, one))) for one in TOLERANCES]
         sentences.append(_advice("restitution (drop test)", parts))
     return sentences
+
+
+def _best(found: Findings) -> dict[str, Any] | None:
+    """What to choose for the first quantity, with what the head of the page says of it."""
+    names = next(iter(_compared(found.trade)), None)
+    if names is None:
+        return None
+    return {"label": _chosen_label(found.trade, names), "choices": choices_of(found, names)}
 
 
 def _drop_words(drop: Drop | None) -> str | None:

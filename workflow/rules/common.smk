@@ -94,6 +94,12 @@ def of_experiment(run, file):
     return f"results/verification/collide/{run}/{file}"
 
 
+def page_templates(*names):
+    """The templates of a page, with those that all pages are made of."""
+    folder = PROJECT.root / "analysis/dragchain"
+    return [str(folder / name) for name in (*names, "page.html.j2", "macros.html.j2")]
+
+
 def of_report(file):
     """Path of a file of the study's report."""
     return f"results/{STUDY}/report/{file}"

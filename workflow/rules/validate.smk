@@ -5,7 +5,9 @@ rule write_validation:
     input:
         measures=lambda wildcards: every_point("measures.json", VALIDATION),
         loads=lambda wildcards: every_fill("tables/removal.json"),
-        template="analysis/dragchain/validation/validation.html.j2",
+        templates=page_templates(
+            *(f"validation/{name}.html.j2" for name in ("validation", "peaks", "scaling", "load"))
+        ),
     output:
         page=report(
             of_validation("report.html"),
