@@ -19,7 +19,8 @@ from dragchain.cli import main as dragchain
 from dragchain.errors import TableError
 from dragchain.trade import compare, read_runs
 from dragchain.trade_findings import choose_drop, read_costs, read_drops
-from dragchain.trade_report import percent, plainly, times, verdicts
+from dragchain.trade_rows import verdicts
+from dragchain.trade_words import percent, plainly, times
 
 COSTS = [
     {"name": "plain", "scene": "process", "what": "the <plain> deck", "ratio": 2.0,
