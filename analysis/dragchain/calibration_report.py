@@ -14,8 +14,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import chi2
 
-from dragchain.calibrate import CONFIDENCE, Calibration, DropRun, Drops, read_drops
+from dragchain.calibrate import CONFIDENCE, Calibration
 from dragchain.calibration import calibrate_file, confirmed, full_drop
+from dragchain.drop_runs import DropRun, Drops, read_drops
 from dragchain.errors import TableError
 from dragchain.figures import BLUE, GREEN, GREY, ORANGE, RED, STYLE, png
 from dragchain.page import data_uri, render_page
