@@ -11,19 +11,8 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from dragchain.calibrate import (
-    IMPACTS,
-    Calibration,
-    DropRun,
-    Drops,
-    Emulator,
-    Fit,
-    bias_rows,
-    calibrate,
-    emulate,
-    prepare,
-    read_drops,
-)
+from dragchain.calibrate import Calibration, Emulator, Fit, bias_rows, calibrate, emulate, prepare
+from dragchain.drop_runs import IMPACTS, DropRun, Drops, read_drops
 from dragchain.errors import TableError
 from dragchain.record import Record, as_json, measure, read_record
 from dragchain.synthetic import Sensor, coverage, record_of, run_trials

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import matplotlib
 import numpy as np
 import pandas as pd
@@ -16,12 +14,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import chi2
 
-from dragchain.calibrate import CONFIDENCE, Calibration, DropRun, Drops, read_drops
+from dragchain.calibrate import CONFIDENCE, Calibration
 from dragchain.calibration import calibrate_file, confirmed, full_drop
+from dragchain.drop_runs import DropRun, Drops, read_drops
 from dragchain.errors import TableError
 from dragchain.figures import BLUE, GREEN, GREY, ORANGE, RED, STYLE, png
+from dragchain.page import data_uri, render_page
 from dragchain.record import Floats, read_record
-from dragchain.report import data_uri, number
 
 WIDTH_IN = 7.6
 
@@ -80,7 +79,7 @@ def write_report(record: Path, folder: Path) -> Path:
         (folder / "figures" / f"{name}.png").write_bytes(picture)
     page = folder / "report.html"
     draft = page.with_name(page.name + ".part")
-    text = render_page(
+    text = render(
         result,
         {name: table.to_dict("records") for name, table in tables.items()},
         confirmed(confirm),
@@ -105,7 +104,7 @@ def _csv(file: Path) -> pd.DataFrame:
     return pd.read_csv(file)
 
 
-def render_page(
+def render(
     result: Mapping[str, Any],
     tables: Mapping[str, Any],
     confirm: Mapping[str, Any],
@@ -113,12 +112,8 @@ def render_page(
     pictures: Mapping[str, str],
 ) -> str:
     """Return the page: HTML that needs no other file and no network."""
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters["number"] = number
-    source = resources.files("dragchain").joinpath("calibration.html.j2").read_text("utf-8")
-    return environment.from_string(source).render(
+    return render_page(
+        "calibration.html.j2",
         result=result,
         tables=tables,
         bias=_bias_table(tables["bias"]),

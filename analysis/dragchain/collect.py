@@ -19,6 +19,7 @@ from dragchain.drop import effective_restitution
 from dragchain.errors import TableError
 from dragchain.findings import (
     CONFIDENCE,
+    Estimate,
     ahead_behind,
     association,
     bearing_profile,
@@ -37,6 +38,7 @@ from dragchain.forces import (
 )
 from dragchain.frames import Floats, Ints, read_table
 from dragchain.parquet import write_json
+from dragchain.reference import Reference, read_references
 from dragchain.stats import MeanEstimate
 
 SCHEMA = 1
@@ -119,26 +121,21 @@ def compare(ours: MeanEstimate, reference: Mapping[str, object] | None) -> list[
         reference, less one) with ``low`` and ``high`` from the interval of our mean alone, and
         ``source``.
     """
-    found = []
-    known = {} if reference is None else dict(reference)
-    for key in sorted(name for name in known if name.endswith("_drag_mean_n")):
-        label = key.removesuffix("_drag_mean_n")
-        mean, sd = known[key], known.get(f"{label}_drag_sd_n")
-        if not isinstance(mean, int | float) or mean == 0.0:
-            raise TableError(f"case.json: reference.{key} is {mean!r}, not a force to compare with")
-        low, high = sorted(100.0 * (edge / mean - 1.0) for edge in (ours.ci_low, ours.ci_high))
-        found.append(
-            {
-                "label": label,
-                "mean_n": float(mean),
-                "sd_n": float(sd) if isinstance(sd, int | float) else None,
-                "difference_percent": 100.0 * (ours.mean / mean - 1.0),
-                "low": low,
-                "high": high,
-                "source": str(known.get("source", "")),
-            }
-        )
-    return found
+    mean = Estimate(ours.mean, ours.ci_low, ours.ci_high)
+    return [_against(mean, one) for one in read_references(reference)]
+
+
+def _against(mean: Estimate, reference: Reference) -> Findings:
+    difference = reference.difference(mean)
+    return {
+        "label": reference.label,
+        "mean_n": reference.mean_n,
+        "sd_n": reference.sd_n,
+        "difference_percent": 100.0 * difference.value,
+        "low": 100.0 * difference.low,
+        "high": 100.0 * difference.high,
+        "source": reference.source,
+    }
 
 
 def _peaks(samples: pd.DataFrame, case: Case) -> tuple[Floats, Findings]:

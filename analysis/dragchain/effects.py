@@ -7,18 +7,18 @@ estimated too, so that pairing counts exactly as much as it helps.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 from scipy.optimize import minimize_scalar
 
 from dragchain.errors import SeriesError
+from dragchain.mixed import Floats, Whitened, alike, same
 
-Floats = NDArray[np.float64]
 Combination = tuple[tuple[str, Hashable], ...]
 """Factors and their levels, those of the reference left out."""
 
@@ -85,56 +85,26 @@ def fit_effects(
         raise SeriesError(f"{runs} runs cannot tell {number} effects: run more seeds")
     if np.linalg.matrix_rank(design) < number:
         raise SeriesError("the effects cannot be told apart: vary one setting at a time as well")
-    problem = _Problem(design, values, _same(beds))
+    same_bed = same(beds)
     if bed_share is None:
-        bed_share = problem.best_share() if len(set(beds)) < runs else 0.0
-    return problem.solve(bed_share)
+        shared = len(set(beds)) < runs
+        bed_share = _best_share(design, values, same_bed) if shared else 0.0
+    model = Whitened.of(design, values, alike(same_bed, bed_share))
+    variance = float(model.residuals @ model.residuals) / model.degrees
+    covariance = np.asarray(variance * model.covariance)
+    sd = float(np.sqrt(variance))
+    return Fit(model.effects, covariance, sd, bed_share, model.degrees, model.residuals)
 
 
-def _same(labels: Sequence[Hashable]) -> Floats:
-    """1 where two runs have the same label, else 0, (N, N)."""
-    numbers = {label: number for number, label in enumerate(dict.fromkeys(labels))}
-    codes = np.array([numbers[label] for label in labels])
-    return np.asarray(codes[:, None] == codes[None, :], dtype=np.float64)
+def _best_share(design: Floats, values: Floats, same_bed: Floats) -> float:
+    """The share of the beds that maximises the restricted likelihood at the best variance."""
 
+    def loss(share: float) -> float:
+        model = Whitened.of(design, values, alike(same_bed, share))
+        return model.log_determinants + 0.5 * model.degrees * math.log(max(model.square, 1e-300))
 
-@dataclass(frozen=True)
-class _Problem:
-    design: Floats
-    values: Floats
-    same_bed: Floats
-
-    def best_share(self) -> float:
-        found = minimize_scalar(
-            self.minus_likelihood, bounds=(0.0, LARGEST_SHARE), method="bounded"
-        )
-        return float(found.x) if found.fun < self.minus_likelihood(0.0) else 0.0
-
-    def minus_likelihood(self, share: float) -> float:
-        """Restricted log likelihood, negative, without constants."""
-        root, design, values = self._whitened(share)
-        _, triangle = np.linalg.qr(design)
-        effects = np.linalg.lstsq(design, values, rcond=None)[0]
-        square = float(np.sum((values - design @ effects) ** 2))
-        degrees = len(values) - design.shape[1]
-        determinants = np.log(np.diag(root)).sum() + np.log(np.abs(np.diag(triangle))).sum()
-        return float(determinants + 0.5 * degrees * np.log(max(square, 1e-300)))
-
-    def solve(self, share: float) -> Fit:
-        _, design, values = self._whitened(share)
-        effects = np.asarray(np.linalg.lstsq(design, values, rcond=None)[0], dtype=np.float64)
-        residuals = values - design @ effects
-        degrees = len(values) - design.shape[1]
-        variance = float(residuals @ residuals) / degrees
-        covariance = np.asarray(variance * np.linalg.inv(design.T @ design))
-        return Fit(effects, covariance, float(np.sqrt(variance)), share, degrees, residuals)
-
-    def _whitened(self, share: float) -> tuple[Floats, Floats, Floats]:
-        size = len(self.values)
-        alike = (1.0 - share) * np.eye(size) + share * self.same_bed
-        root = np.asarray(np.linalg.cholesky(alike), dtype=np.float64)
-        design = np.asarray(np.linalg.solve(root, self.design), dtype=np.float64)
-        return root, design, np.asarray(np.linalg.solve(root, self.values), dtype=np.float64)
+    found = minimize_scalar(loss, bounds=(0.0, LARGEST_SHARE), method="bounded")
+    return float(found.x) if found.fun < loss(0.0) else 0.0
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,12 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.optimize import minimize
 
 from dragchain.errors import SeriesError
-
-Floats = NDArray[np.float64]
+from dragchain.mixed import Floats, Whitened, alike, same
 
 CONFIDENCE = 0.95
 LEAST_LEVELS = 3
@@ -147,8 +146,7 @@ class Runs:
     @cached_property
     def same_bed(self) -> Floats:
         """1 where two runs start from the same bed, else 0, (N, N)."""
-        rows = [[float(one == other) for other in self.beds] for one in self.beds]
-        return np.array(rows)
+        return same(self.beds)
 
     @property
     def shares_beds(self) -> bool:
@@ -175,8 +173,7 @@ class Runs:
 
     def covariance(self, scatter: Scatter) -> Floats:
         """Covariance of the logarithms, (N, N)."""
-        own = (1.0 - scatter.bed_share) * np.eye(len(self.x))
-        between = own + scatter.bed_share * self.same_bed
+        between = alike(self.same_bed, scatter.bed_share)
         return np.asarray(scatter.spread**2 * between + np.diag(self.errors**2))
 
     def within(self, low: float, high: float) -> Runs:
@@ -223,12 +220,9 @@ def solve(design: Floats, values: Floats, covariance: Floats, degrees: int) -> L
     never below 1 (Roever, Knapp and Friede 2015, BMC Med. Res. Methodol. 15, 99):
     a few runs that happen to agree do not make their own errors smaller.
     """
-    root = np.linalg.cholesky(covariance)
-    left, right = np.linalg.solve(root, design), np.linalg.solve(root, values)
-    effects = np.asarray(np.linalg.lstsq(left, right, rcond=None)[0], dtype=np.float64)
-    square = float(np.sum((right - left @ effects) ** 2))
-    scale = max(1.0, square / (len(values) - design.shape[1]))
-    return Linear(effects, np.asarray(scale * np.linalg.inv(left.T @ left)), degrees, square)
+    model = Whitened.of(design, values, covariance)
+    scale = max(1.0, model.square / model.degrees)
+    return Linear(model.effects, np.asarray(scale * model.covariance), degrees, model.square)
 
 
 @dataclass(frozen=True)
@@ -313,12 +307,9 @@ def fit_power_law(runs: Runs) -> PowerLaw:
 
 def _level_means(runs: Runs, scatter: Scatter, line: Linear) -> Linear:
     """Means of levels without repetition, with the scatter about the line."""
-    root = np.linalg.cholesky(runs.covariance(scatter))
-    left = np.linalg.solve(root, runs.each_level())
-    right = np.linalg.solve(root, runs.logarithms)
-    effects = np.asarray(np.linalg.lstsq(left, right, rcond=None)[0], dtype=np.float64)
+    model = Whitened.of(runs.each_level(), runs.logarithms, runs.covariance(scatter))
     scale = max(1.0, line.square / (len(runs.x) - 2))
-    return Linear(effects, np.asarray(scale * np.linalg.inv(left.T @ left)), line.degrees, 0.0)
+    return Linear(model.effects, np.asarray(scale * model.covariance), line.degrees, 0.0)
 
 
 def _lack_of_fit(straight: Linear, means: Linear, runs: Runs) -> float:

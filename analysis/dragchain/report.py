@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import pandas as pd
-from PIL import Image
 
 from dragchain.case import Assumption, Case, Scene, load_case
 from dragchain.collect import Findings, read_findings
 from dragchain.errors import GateError, TableError
 from dragchain.frames import write_parquet
+from dragchain.page import data_uri, file_uri, render_page
 from dragchain.prediction import (
     Entry,
     actual_interval,
@@ -32,10 +27,8 @@ from dragchain.removal import read_removal
 from dragchain.stats import RELIABLE_TIMES
 
 RUN_SCHEMA = 1
-LARGE_PICTURE = 200_000
-"""Bytes above which the page holds a picture as WebP; ``figures/`` keeps the PNG."""
-
-DASH, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
+SHOWN = 6
+"""Cases that the head of the page names; more are in its first table alone."""
 
 FIGURES: dict[Scene, dict[str, str]] = {
     "process": {
@@ -109,7 +102,7 @@ def write_report(out_dir: Path, run_dirs: Sequence[Path], advice: Path | None = 
     if not studies:
         raise TableError("no folder of a process run is given, so there is nothing to report")
     summary = pd.DataFrame([summary_row(study) for study in studies])
-    page = render_page(studies, summary, read_advice(advice) if advice is not None else [])
+    page = render(studies, summary, read_advice(advice) if advice is not None else [])
     out_dir.mkdir(parents=True, exist_ok=True)
     write_parquet(summary, out_dir / "summary.parquet")
     _write_text(out_dir / "summary.csv", summary.to_csv(index=False, lineterminator="\n"))
@@ -282,26 +275,18 @@ def _upstream_columns(study: Study) -> dict[str, object]:
 # --- the page --------------------------------------------------------------------------------
 
 
-def render_page(
+def render(
     studies: Sequence[Study], summary: pd.DataFrame, options: list[Entry] | None = None
 ) -> str:
     """Return the page: HTML that needs no other file and no network."""
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters |= {
-        "number": number,
-        "measured": measured,
-        "percent": percent,
-        "share": share,
-    }
-    source = resources.files("dragchain").joinpath("report.html.j2").read_text(encoding="utf-8")
     columns = {str(name): summary[name].tolist() for name in summary}
-    return environment.from_string(source).render(
+    return render_page(
+        "report.html.j2",
         title=", ".join(dict.fromkeys(study.process.case.study for study in studies)),
         studies=[_section(study, options or []) for study in studies],
         overview=_overview(studies) if len(studies) > 1 else None,
         columns=columns,
+        shown=SHOWN,
         reliable_times=RELIABLE_TIMES,
     )
 
@@ -343,22 +328,12 @@ def pictures(run: Run) -> list[dict[str, str]]:
     found = []
     for name, caption in FIGURES[run.case.scene].items():
         file = run.folder / "figures" / f"{name}.png"
-        if file.is_file():
-            found.append({"name": name, "caption": caption, "uri": data_uri(file.read_bytes())})
+        uri = file_uri(file)
+        if uri is not None:
+            found.append({"name": name, "caption": caption, "uri": uri})
         elif run.case.scene != "fill" and name not in OPTIONAL:
             raise TableError(f"{file}: there is no such file; run `dragchain figures` first")
     return found
-
-
-def data_uri(png: bytes) -> str:
-    """Return a PNG picture as a data URI, a large one as the smaller WebP."""
-    kind = "png"
-    if len(png) > LARGE_PICTURE:
-        small = io.BytesIO()
-        with Image.open(io.BytesIO(png)) as picture:
-            picture.save(small, format="webp", quality=90)
-        kind, png = "webp", small.getvalue()
-    return f"data:image/{kind};base64,{base64.b64encode(png).decode('ascii')}"
 
 
 def _overview(studies: Sequence[Study]) -> str:
@@ -369,36 +344,3 @@ def _overview(studies: Sequence[Study]) -> str:
     names = [study.process.case.case or study.process.case.run for study in studies]
     forces = [study.process.findings["forces"]["drag_n"] for study in studies]
     return data_uri(png(drag_of_cases(names, forces, references)))
-
-
-def measured(value: object, digits: int = 3) -> str:
-    """Return a number as `number` does, with its zeros at the end."""
-    if not isinstance(value, float) or value == 0.0 or not 1e-4 <= abs(value) < 10**digits:
-        return number(value, digits)
-    return f"{value:#.{digits}g}".rstrip(".").replace("-", MINUS)
-
-
-def number(value: object, digits: int = 3) -> str:
-    """Return a number with that many significant digits, a dash for none, text as it is."""
-    if value is None:
-        return DASH
-    if isinstance(value, bool | str) or not isinstance(value, int | float):
-        return str(value)
-    if not math.isfinite(value):
-        return DASH
-    if isinstance(value, int):
-        return f"{value:,}".replace(",", " ") if abs(value) >= 10_000 else str(value)
-    text = f"{value:.{digits}g}"
-    if "e" in text and 1e-4 <= abs(value) < 1e7:
-        text = f"{value:.0f}"
-    return text.replace("-", MINUS) if "e" not in text else text
-
-
-def percent(value: float | None) -> str:
-    """Return a signed percentage with one decimal, a dash for none."""
-    return DASH if value is None else f"{value:+.1f} %".replace("-", MINUS)
-
-
-def share(value: float | None) -> str:
-    """Return a share of 1 as a signed percentage, a dash for none."""
-    return percent(None if value is None else 100 * value)

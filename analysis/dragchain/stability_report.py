@@ -7,11 +7,9 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import matplotlib
 import numpy as np
 import pandas as pd
@@ -23,8 +21,8 @@ from matplotlib.patches import Patch, Rectangle
 from dragchain import stability
 from dragchain.figures import STYLE, WIDTH_IN, png
 from dragchain.frames import write_parquet
+from dragchain.page import data_uri, render_page
 from dragchain.parquet import write_json
-from dragchain.report import data_uri
 from dragchain.stability import (
     CLASSES,
     ENERGY,
@@ -298,13 +296,9 @@ def render(
     pictures: Mapping[str, bytes],
 ) -> str:
     """The page: HTML that needs no other file and no network."""
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters["short"] = "{:.3g}".format
-    source = resources.files("dragchain").joinpath("stability.html.j2").read_text(encoding="utf-8")
     table = summary["restitution_error"]
-    return environment.from_string(source).render(
+    return render_page(
+        "stability.html.j2",
         summary=summary,
         titles=TITLES,
         classes=_class_counts(points),

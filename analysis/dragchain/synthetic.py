@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
 
-from dragchain.calibrate import IMPACTS, DropRun, Sweep, calibrate
+from dragchain.calibrate import Sweep, calibrate
+from dragchain.drop_runs import IMPACTS, DropRun
 from dragchain.errors import RecordError
 from dragchain.record import Record, check_samples, measure
 

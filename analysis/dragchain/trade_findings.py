@@ -1,6 +1,6 @@
 """What a trade says: choices, the effect of softness, gains, path lengths, drops and costs.
 
-Numbers only; `trade_report` puts them into words.
+Numbers only; `trade_words`, `trade_choices` and `trade_rows` put them into words.
 """
 
 from __future__ import annotations

@@ -12,20 +12,16 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from dragchain.calibrate import (
-    DropRun,
-    Drops,
-    Purpose,
     Sweep,
-    Waveform,
     bias_rows,
     calibrate,
     emulate,
     observe,
     prepare,
     sample_impact,
-    waveform,
 )
 from dragchain.calibration import put_for, result
+from dragchain.drop_runs import DropRun, Drops, Purpose, Waveform, waveform
 from dragchain.errors import RecordError, TableError
 from dragchain.record import Measured, measure
 from dragchain.synthetic import Sensor, coverage, record_of, run_trials

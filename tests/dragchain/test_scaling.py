@@ -6,11 +6,9 @@ import html
 import json
 from collections.abc import Callable
 from dataclasses import asdict
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 import pandas as pd
 import pytest
@@ -18,6 +16,7 @@ from tiny_run_files import DENSITY_KG_M3, GRAVITY_M_S2, RADIUS_M, TOOL_RADIUS_M,
 
 from dragchain.cli import main
 from dragchain.errors import TableError
+from dragchain.page import page_environment
 from dragchain.powerlaw import Estimate, Runs, fit_power_law
 from dragchain.scaling import (
     Expectation,
@@ -160,12 +159,8 @@ def test_the_scalings_of_the_package_are_whole() -> None:
 
 def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
     scalings = read_scalings()
-    folder = resources.files("dragchain") / "validation"
-    template = (folder / "scaling.html.j2").read_text(encoding="utf-8")
-    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, autoescape=True)
-    page = environment.from_string(template).render(
-        found=scalings, picture=lambda name: f"data:image/png;base64,{name}"
-    )
+    template = page_environment().get_template("validation/scaling.html.j2")
+    page = template.render(found=scalings, picture=lambda name: f"data:image/png;base64,{name}")
     assert 'src="data:image/png;base64,scaling.png"' in page
     for found in scalings:
         assert found["statement"] in page

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from pages import stands_alone
 from paths import ROOT
 
 from dragchain.cli import main as dragchain
@@ -235,8 +236,7 @@ def test_fewer_steps_in_a_contact_make_a_larger_error(coarse: Path) -> None:
 @pytest.mark.engine
 @pytest.mark.slow
 def test_the_report_stands_alone(coarse: Path) -> None:
-    page = (coarse / "report.html").read_text()
-    assert "data:image/" in page and 'src="http' not in page and "<link" not in page
+    assert stands_alone((coarse / "report.html").read_text()).images
     known = json.loads((coarse / "stability.json").read_text())
     assert known["engine_versions"] and known["regimes"]["settle"]["safe_fraction"] >= 0.8
 

@@ -11,9 +11,10 @@ from typing import Any
 import pytest
 from scipy.integrate import solve_ivp
 
-from dragchain.calibrate import calibrate, prepare, read_drops
+from dragchain.calibrate import calibrate, prepare
 from dragchain.calibration import confirmed, write_calibration, write_synthetic, write_trials
 from dragchain.calibration_report import write_report
+from dragchain.drop_runs import read_drops
 from dragchain.record import measure, read_record
 from dragchain.synthetic import Sensor
 from dragdeck.calibration import (

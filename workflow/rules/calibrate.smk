@@ -131,7 +131,7 @@ rule write_calibration_report:
         of_calibration("sweep/drops.json"),
         of_calibration("confirm/drops.json"),
         record=drop_record,
-        template=str(PROJECT.root / "analysis/dragchain/calibration.html.j2"),
+        templates=page_templates("calibration.html.j2"),
     output:
         page=report(
             of_calibration("report.html"),

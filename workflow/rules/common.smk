@@ -94,6 +94,12 @@ def of_experiment(run, file):
     return f"results/verification/collide/{run}/{file}"
 
 
+def page_templates(*names):
+    """The templates of a page, with those that all pages are made of."""
+    folder = PROJECT.root / "analysis/dragchain"
+    return [str(folder / name) for name in (*names, "page.html.j2", "macros.html.j2")]
+
+
 def of_report(file):
     """Path of a file of the study's report."""
     return f"results/{STUDY}/report/{file}"
@@ -170,6 +176,18 @@ def point(run):
 def every_point(file, plan=PLAN):
     """One file of every process run of a plan."""
     return [f"results/{STUDY}/points/{run}/{file}" for run in points_by_run("process", plan)]
+
+
+def every_fill(file):
+    """One file of every run of the validation that differs from its first by the seed alone."""
+    runs = points_by_run("process", VALIDATION)
+    first = next(iter(runs.values())).study
+    alike = [
+        run
+        for run, case in runs.items()
+        if case.study.model_copy(update={"seed": first.seed}) == first
+    ]
+    return [f"results/{STUDY}/points/{run}/{file}" for run in alike]
 
 
 def every_drop_point(file):

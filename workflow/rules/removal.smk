@@ -33,3 +33,28 @@ rule map_removal:
         source=source_hash("dragchain.removal", "dragchain.removal_figure"),
     shell:
         "dragchain removal $(dirname {input.run}) > {log} 2>&1"
+
+
+# The same of a point of a plan; `measure_point` makes its tables.
+rule map_removal_of_point:
+    input:
+        of_point("measures.json"),
+    output:
+        multiext(
+            of_point("tables/"),
+            "facets.parquet",
+            "contact_events.parquet",
+            "removal.json",
+            "rod.vtp",
+        ),
+        of_point("figures/rod.png"),
+    log:
+        of_point("logs/removal.log"),
+    benchmark:
+        of_point("benchmarks/removal.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        source=source_hash("dragchain.removal", "dragchain.removal_figure"),
+    shell:
+        "dragchain removal $(dirname {input}) > {log} 2>&1"

@@ -99,7 +99,7 @@ rule write_report:
     input:
         of_every_run,
         advice=asked_advice,
-        template="analysis/dragchain/report.html.j2",
+        templates=page_templates("report.html.j2"),
     output:
         csv=of_report("summary.csv"),
         parquet=of_report("summary.parquet"),

@@ -52,7 +52,7 @@ rule write_stability:
             "results/stability/points/{regime}.json",
             regime=["impact", "settle", "column", "drag"],
         ),
-        template=str(PROJECT.root / "analysis/dragchain/stability.html.j2"),
+        templates=page_templates("stability.html.j2"),
     output:
         page=report(
             "results/stability/report.html",

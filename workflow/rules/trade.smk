@@ -32,7 +32,7 @@ rule write_trade:
         measures=lambda wildcards: every_point("measures.json"),
         drops=lambda wildcards: every_drop_point("tables/impacts.parquet"),
         costs=lambda wildcards: [of_trade("costs.json")] if points().cost_rounds else [],
-        template=str(PROJECT.root / "analysis/dragchain/trade.html.j2"),
+        templates=page_templates("trade.html.j2"),
     output:
         page=report(
             of_trade("report.html"),

@@ -4,7 +4,10 @@
 rule write_validation:
     input:
         measures=lambda wildcards: every_point("measures.json", VALIDATION),
-        template="analysis/dragchain/validation/validation.html.j2",
+        loads=lambda wildcards: every_fill("tables/removal.json"),
+        templates=page_templates(
+            *(f"validation/{name}.html.j2" for name in ("validation", "peaks", "scaling", "load"))
+        ),
     output:
         page=report(
             of_validation("report.html"),

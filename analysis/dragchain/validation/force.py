@@ -13,10 +13,10 @@ from scipy import signal, stats
 from dragchain.case import Case
 from dragchain.collect import drag_start_s, mean_numbers
 from dragchain.effects import Fit, fit_effects
-from dragchain.errors import TableError
 from dragchain.findings import CONFIDENCE, Estimate, finite
 from dragchain.forces import find_drag_peaks, peak_separation_s, read_counted
 from dragchain.frames import Floats
+from dragchain.reference import Reference, read_references
 from dragchain.stats import estimate_mean
 from dragchain.validation.fills import Point, Points, over_fills
 
@@ -168,24 +168,20 @@ def compare(mean: Mapping[str, float], sd: Mapping[str, float], case: Case) -> l
         ``low`` and ``high``, and ``sd_ratio`` the same way, both from the interval over
         fills alone: no source says how well it knows its own mean.
     """
-    known = dict(case.reference or {})
-    found = []
-    for key in sorted(name for name in known if name.endswith("_drag_mean_n")):
-        label = key.removesuffix("_drag_mean_n")
-        other, spread = known[key], known.get(f"{label}_drag_sd_n")
-        if not isinstance(other, int | float) or other == 0.0:
-            raise TableError(f"case.json: reference.{key} is {other!r}, not a force to compare")
-        low, high = sorted(mean[edge] / other - 1.0 for edge in ("low", "high"))
-        row: Found = {
-            "label": label,
-            "mean_n": float(other),
-            "sd_n": spread,
-            "difference": {"value": mean["value"] / other - 1.0, "low": low, "high": high},
-        }
-        if isinstance(spread, int | float) and spread > 0.0:
-            row["sd_ratio"] = {name: sd[name] / spread for name in ("value", "low", "high")}
-        found.append(row)
-    return found
+    ours = Estimate(mean["value"], mean["low"], mean["high"])
+    return [_against(ours, sd, reference) for reference in read_references(case.reference)]
+
+
+def _against(mean: Estimate, sd: Mapping[str, float], reference: Reference) -> Found:
+    row: Found = {
+        "label": reference.label,
+        "mean_n": reference.mean_n,
+        "sd_n": reference.sd_n,
+        "difference": vars(reference.difference(mean)),
+    }
+    if reference.sd_n is not None and reference.sd_n > 0.0:
+        row["sd_ratio"] = {name: sd[name] / reference.sd_n for name in ("value", "low", "high")}
+    return row
 
 
 # --- other settings --------------------------------------------------------------------------

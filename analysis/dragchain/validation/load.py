@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from dragchain.frames import read_table
-from dragchain.removal import read_removal, write_removal
+from dragchain.removal import read_removal
 from dragchain.validation.fills import Point, over_fills
 
 Found = dict[str, Any]
@@ -17,7 +17,10 @@ Found = dict[str, Any]
 def of_fills(fills: Sequence[Point]) -> Found:
     """What `dragchain.removal` says of every fill, and of all of them together.
 
-    Writes the files of `dragchain.removal.write_removal` into every run folder.
+    Parameters
+    ----------
+    fills : sequence of Point
+        Each with the files of `dragchain.removal.write_removal` in its folder.
 
     Returns
     -------
@@ -25,11 +28,13 @@ def of_fills(fills: Sequence[Point]) -> Found:
         ``rows`` (``label``, ``unit``, ``value``, ``low``, ``high`` over fills), ``types``
         (type of stay to its shares in %), ``closure`` (largest relative error of the sums over
         facets against the force on the tool), ``first`` (``removal.json`` of the first fill).
+
+    Raises
+    ------
+    TableError
+        If a fill has no such files.
     """
-    found = []
-    for point in fills:
-        write_removal(point.folder)
-        found.append(read_removal(point.folder))
+    found = [read_removal(point.folder) for point in fills]
     rows = [
         {"label": label, "unit": unit, **over_fills([of(one) for one in found]).as_json()}
         for label, unit, of in _ROWS

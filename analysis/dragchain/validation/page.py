@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import base64
 import math
 import shutil
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import matplotlib
 import pandas as pd
 from matplotlib.figure import Figure
 
 from dragchain.figures import STYLE, png
 from dragchain.frames import write_parquet
+from dragchain.page import file_uri, render_page
 from dragchain.parquet import write_json
-from dragchain.report import data_uri, measured, number, percent, share
 from dragchain.scaling import draw_scalings, read_scalings
 from dragchain.validation import figures, force, load, statements
 from dragchain.validation.claims import claims
@@ -169,33 +166,17 @@ def render(
     folder: Path,
 ) -> str:
     """The page: HTML that needs no other file and no network; its figures are in `folder`."""
-    templates = resources.files("dragchain").joinpath("validation")
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(
-            lambda name: templates.joinpath(name).read_text(encoding="utf-8")
-        ),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {
-        "number": number,
-        "measured": measured,
-        "percent": percent,
-        "share": share,
-        "interval": interval,
-        "setting": figures.setting_name,
-    }
     assumptions = points.fills[0].case.assumptions
-    return environment.get_template("validation.html.j2").render(
+    return render_page(
+        "validation/validation.html.j2",
+        {"setting": figures.setting_name},
         found=found,
         effects=_records(effects),
         assumptions=assumptions,
         varied=set(effects["field"]),
         points=points,
         peaks=peaks,
-        picture=lambda name: _uri(folder / name),
+        picture=lambda name: file_uri(folder / name),
     )
 
 
@@ -203,18 +184,3 @@ def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
     """The rows of a table, None where there is no number."""
     known = table.astype(object).where(table.notna(), None)
     return [{str(name): value for name, value in row.items()} for row in known.to_dict("records")]
-
-
-def _uri(file: Path) -> str | None:
-    """A figure as data URI, None if there is no such file."""
-    if not file.is_file():
-        return None
-    if file.suffix == ".gif":
-        return f"data:image/gif;base64,{base64.b64encode(file.read_bytes()).decode('ascii')}"
-    return data_uri(file.read_bytes())
-
-
-def interval(estimate: Mapping[str, float | None], digits: int = 3) -> str:
-    """An estimate with its interval, as text."""
-    value, low, high = (measured(estimate[name], digits) for name in ("value", "low", "high"))
-    return f"{value} ({low} to {high})"

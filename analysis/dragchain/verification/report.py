@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from itertools import groupby
 from pathlib import Path
 
-import jinja2
 import matplotlib
 import pandas as pd
 
 from dragchain.errors import GateError, TableError
 from dragchain.figures import STYLE, png
 from dragchain.frames import read_table, write_parquet
-from dragchain.report import data_uri, number
+from dragchain.page import data_uri, render_page
 from dragchain.verification.checks import JUDGED, Check, judge
 from dragchain.verification.figures import draw
 from dragchain.verification.recording import Recording, read_recording
@@ -113,17 +111,14 @@ def verdict(report_dir: Path) -> str:
 def render(runs: Sequence[Recording], summary: pd.DataFrame) -> str:
     """The page: HTML that needs no other file and no network."""
     ordered = sorted(runs, key=lambda run: (run.case["number"], _place(str(run.case["test"]))))
-    sections = [
-        _section(test, list(group), summary)
+    parts = [
+        _part(test, list(group), summary)
         for test, group in groupby(ordered, key=lambda run: str(run.case["test"]))
     ]
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters |= {"number": number, "quantity": quantity}
-    source = resources.files("dragchain.verification").joinpath("verification.html.j2")
-    return environment.from_string(source.read_text(encoding="utf-8")).render(
-        sections=sections,
+    return render_page(
+        "verification/verification.html.j2",
+        {"quantity": quantity},
+        parts=parts,
         counts=counts(summary),
         failures=_rows(summary[summary["verdict"] == "fail"]),
         runs=len(runs),
@@ -134,7 +129,7 @@ def _place(test: str) -> int:
     return list(WORDS).index(test)
 
 
-def _section(test: str, runs: Sequence[Recording], summary: pd.DataFrame) -> Mapping[str, object]:
+def _part(test: str, runs: Sequence[Recording], summary: pd.DataFrame) -> Mapping[str, object]:
     rows = summary[summary["test"] == test]
     with matplotlib.rc_context(STYLE):
         picture = data_uri(png(draw(test, runs)))
