@@ -157,6 +157,9 @@ class Moments:
                 membership = chain_membership(network, chains.at(step))
             tool = None if track is None else track.at(step)
             yield Moment(step, time_s, of_balls, of_contacts, network, membership, tool)
+        for rows in (balls, contacts, chains):
+            if rows is not None:
+                rows.finish()
 
 
 def _table(run: Run, name: str) -> Path:
@@ -229,6 +232,11 @@ class _Rows:
             return self._none
         rows: pd.DataFrame = pa.Table.from_batches(self._next[1]).to_pandas()
         return rows
+
+    def finish(self) -> None:
+        """Read what is left, so that a step out of order is found."""
+        for _ in self._frames:
+            pass
 
 
 _Frame = tuple[int, list[pa.RecordBatch]]

@@ -54,14 +54,15 @@ class ParaviewWriter:
             parts["contacts"] = contacts_mesh(moment, with_chains=self._with_chains)
         if self._tool is not None and moment.tool is not None:
             parts["tool"] = placed(self._tool, *moment.tool)
-        for part in parts.values():
-            part.field_data["step"] = [moment.step]
-            part.field_data["TimeValue"] = [moment.time_s]
         name = f"{moment.step:0{self._width}d}"
-        self._blocks(parts).save(self._folder / _FRAMES / f"{name}.vtm", compression=None)
+        frames = self._folder / _FRAMES
+        self._blocks(parts).save(frames / f"{name}.vtm", compression=None)
         self._list("run", moment.time_s, f"{name}.vtm")
-        for number, part_name in enumerate(parts):  # as VTK's writer of VTM files names them
-            self._list(part_name, moment.time_s, f"{name}/{name}_{number}.vtp")
+        for number, (part_name, part) in enumerate(parts.items()):
+            file = f"{name}/{name}_{number}.vtp"  # as VTK's writer of VTM files names it
+            if not (frames / file).exists():  # it leaves out a part that is empty
+                part.save(frames / file, compression=None)
+            self._list(part_name, moment.time_s, file)
 
     def _list(self, series: str, time_s: float, file: str) -> None:
         self._series.setdefault(series, []).append((time_s, f"{_FRAMES}/{file}"))
@@ -122,6 +123,8 @@ def contacts_mesh(moment: Moment, *, with_chains: bool) -> Any:
 
     contacts, frame = moment.contacts, moment.network
     assert contacts is not None and frame is not None
+    if contacts.empty:
+        return pv.PolyData()
     points = segments(frame).reshape(-1, 3)
     ends = np.arange(len(points)).reshape(-1, 2)
     mesh = pv.PolyData(points, lines=np.insert(ends, 0, 2, axis=1).ravel())
