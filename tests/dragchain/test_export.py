@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import shutil
 import subprocess
@@ -14,6 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import pyvista as pv
+from paths import ROOT
 from tiny_run_files import CHAIN_Z_M, LAST, RADIUS_M, TIMESTEP_S, tool_x_m
 
 from dragchain.chains import RodPath, chain_table, dominant_path, peters_chains, rod_paths
@@ -482,6 +484,15 @@ def test_the_command_tells_size_and_file(run: Path, tmp_path: Path, capsys) -> N
     assert main(["export", str(run), *arguments]) == 1
     assert "holds an export already" in capsys.readouterr().err
     assert main(["export", str(run), *arguments, "--replace"]) == 0
+
+
+def test_the_pages_lines_run(run: Path, monkeypatch) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/export.md").read_text(), re.DOTALL)
+    monkeypatch.chdir(write_export(run, "paraview").file.parent)
+    names: dict[str, Any] = {}
+    exec(code, names)
+    assert names["spheres"].n_cells > 4 * 100
+    assert names["pushed"].n_cells == 3
 
 
 PEAK = """
