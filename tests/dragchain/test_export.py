@@ -442,6 +442,23 @@ def test_a_file_of_the_user_is_never_written_over(run: Path) -> None:
     assert len(series(folder / "run.pvd")) == 1
 
 
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{}", "does not list an export"),
+        ("run.xyz", "does not list an export"),
+        ('{"files": ["../mine.txt"]}', "names files of other folders"),
+    ],
+)
+def test_a_list_that_is_none_removes_nothing(run: Path, text: str, message: str) -> None:
+    folder = write_export(run, "xyz").file.parent
+    (folder.parent / "mine.txt").write_text("notes")
+    (folder / "export.json").write_text(text)
+    with pytest.raises(ExportError, match=message):
+        write_export(run, "xyz", replace=True)
+    assert (folder.parent / "mine.txt").exists() and (folder / "run.xyz").exists()
+
+
 @pytest.mark.parametrize("replace", [False, True])
 def test_a_folder_with_other_files_is_left_alone(run: Path, tmp_path: Path, replace: bool) -> None:
     mine = tmp_path / "mine"

@@ -70,7 +70,19 @@ def _old_files(target: Path, replace: bool) -> set[str]:
             f"{target} holds an export already\n  remedy: {_ELSEWHERE}, or replace it with"
             " --replace"
         )
-    return {LIST, *json.loads(listed.read_text(encoding="utf-8"))["files"]}
+    return {LIST, *_listed(listed)}
+
+
+def _listed(file: Path) -> set[str]:
+    """Read the names of an earlier export's files, all of them below its folder."""
+    try:
+        names = set(json.loads(file.read_text(encoding="utf-8"))["files"])
+        paths = [Path(name) for name in names]
+    except (ValueError, KeyError, TypeError) as error:
+        raise ExportError(f"{file} does not list an export\n  remedy: {_ELSEWHERE}") from error
+    if any(path.is_absolute() or ".." in path.parts for path in paths):
+        raise ExportError(f"{file} names files of other folders\n  remedy: {_ELSEWHERE}")
+    return names
 
 
 def _move(draft: Path, target: Path, old: set[str]) -> None:
