@@ -22,6 +22,7 @@ MAIN = "run.pvd"
 """The file to open: all there is."""
 
 _FRAMES = "frames"
+_CHAIN_ARRAYS = {"peters_chain": "peters", "rod_paths": "paths", "dominant": "dominant"}
 
 
 class ParaviewWriter:
@@ -36,19 +37,18 @@ class ParaviewWriter:
     """
 
     def __init__(self, folder: Path, moments: Moments) -> None:
-        import pyvista as pv
-
         self._folder = folder
         self._with_chains = moments.has_chains
         self._width = len(str(moments.steps[-1]))
         case = moments.run.case
         self._tool = None if case.tool is None else tool_mesh(moments.run.folder, case)
         self._series: dict[str, list[tuple[float, str]]] = {}
-        self._blocks: type[Any] = pv.MultiBlock
         (folder / _FRAMES).mkdir()
 
     def add(self, moment: Moment) -> None:
         """Write the files of one frame."""
+        import pyvista as pv
+
         parts = {"balls": balls_mesh(moment, with_chains=self._with_chains)}
         if moment.network is not None:
             parts["contacts"] = contacts_mesh(moment, with_chains=self._with_chains)
@@ -56,7 +56,7 @@ class ParaviewWriter:
             parts["tool"] = placed(self._tool, *moment.tool)
         name = f"{moment.step:0{self._width}d}"
         frames = self._folder / _FRAMES
-        self._blocks(parts).save(frames / f"{name}.vtm", compression=None)
+        pv.MultiBlock(parts).save(frames / f"{name}.vtm", compression=None)
         self._list("run", moment.time_s, f"{name}.vtm")
         for number, (part_name, part) in enumerate(parts.items()):
             file = f"{name}/{name}_{number}.vtp"  # as VTK's writer of VTM files names it
@@ -143,10 +143,6 @@ def contacts_mesh(moment: Moment, *, with_chains: bool) -> Any:
 def _chains(data: Any, moment: Moment, what: str, size: int) -> None:
     """Add number of the chain, number of rod paths, and dominance: 0 none, -1 not searched."""
     found = moment.membership
-    for name, field in {
-        "peters_chain": "peters",
-        "rod_paths": "paths",
-        "dominant": "dominant",
-    }.items():
+    for name, field in _CHAIN_ARRAYS.items():
         values = np.full(size, -1) if found is None else getattr(found, f"{what}_{field}")
         data[name] = values.astype(np.int32)
