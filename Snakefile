@@ -13,6 +13,7 @@ include: "workflow/rules/tables.smk"
 include: "workflow/rules/network.smk"
 include: "workflow/rules/removal.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/export.smk"
 include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/verify.smk"
 include: "workflow/rules/stability.smk"
@@ -28,6 +29,7 @@ localrules:
     calibrate,
     checks,
     drop,
+    export,
     fill,
     pass_verdict,
     process,
@@ -75,6 +77,12 @@ rule process:
 rule report:
     input:
         rules.write_report.output,
+
+
+# The process runs as time series for ParaView and OVITO.
+rule export:
+    input:
+        every("process", "export/paraview/run.pvd"),
 
 
 # The restitution that a measured drop test asks for.

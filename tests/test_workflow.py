@@ -11,6 +11,7 @@ from typing import Any
 
 import pandas as pd
 import pytest
+import pyvista as pv
 import yaml
 from pages import stands_alone
 from paths import ROOT, SMALL_STUDY
@@ -121,6 +122,19 @@ def test_the_readmes_pandas_lines_run(finished: Path) -> None:
 
 def test_nothing_is_left_to_do(finished: Path) -> None:
     assert jobs(finished, *STUDY) == set()
+
+
+def test_frames_are_exported_when_asked_for(finished: Path) -> None:
+    export = ("export", "--config", "study=small")
+    assert jobs(finished, *export) == {"export", "export_paraview"}
+    done = snakemake(finished, *export)
+    assert done.returncode == 0, done.stderr
+    for run in (finished / "results/small/process").iterdir():
+        times = set(pd.read_parquet(run / "tables/balls.parquet", columns=["time_s"])["time_s"])
+        assert pv.PVDReader(run / "export/paraview/run.pvd").time_values == sorted(times)
+    assert jobs(finished, *export) == set()
+    again = snakemake(finished, *export, "--forcerun", "export_paraview")
+    assert again.returncode == 0, again.stderr
 
 
 def test_an_edited_template_runs_what_depends_on_it(finished: Path) -> None:

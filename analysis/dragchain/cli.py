@@ -59,6 +59,20 @@ def _parser() -> argparse.ArgumentParser:
         "removal", parents=[run_dir], help="load, sliding and friction work on a tool's facets"
     )
     removal.set_defaults(action=_removal)
+    export = commands.add_parser(
+        "export", parents=[run_dir], help="write the frames of a run for ParaView or OVITO"
+    )
+    export.add_argument(
+        "--to", required=True, choices=("paraview", "xyz"), help="VTP files with a PVD, or text"
+    )
+    export.add_argument(
+        "--out", type=Path, metavar="DIR", help="its folder (default: export/TO in the run's)"
+    )
+    export.add_argument("--from-time", type=float, metavar="S", help="first simulated time, s")
+    export.add_argument("--to-time", type=float, metavar="S", help="last simulated time, s")
+    export.add_argument("--every", type=int, default=1, metavar="N", help="every N-th frame only")
+    export.add_argument("--replace", action="store_true", help="write over an earlier export")
+    export.set_defaults(action=_export)
     report = commands.add_parser("report", help="write the report on several runs")
     report.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
     report.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
@@ -157,6 +171,21 @@ def _removal(options: argparse.Namespace) -> None:
     from dragchain.removal import write_removal
 
     write_removal(options.run_dir)
+
+
+def _export(options: argparse.Namespace) -> None:
+    from dragchain.export.moments import Selection
+    from dragchain.export.writing import write_export
+
+    done = write_export(
+        options.run_dir,
+        options.to,
+        options.out,
+        Selection(options.from_time, options.to_time, options.every),
+        replace=options.replace,
+        report=print,
+    )
+    print(f"{done.frames} frames, {done.size / 1e6:.1f} MB: {done.file}")
 
 
 def _report(options: argparse.Namespace) -> None:

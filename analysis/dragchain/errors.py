@@ -105,6 +105,10 @@ class TableError(DragchainError):
     """Raw outputs that are whole one by one but contradict each other."""
 
 
+class ExportError(DragchainError):
+    """A run that cannot be written for another program, or not there."""
+
+
 class SeriesError(DragchainError):
     """A series of samples that carries no statistics."""
 

@@ -181,9 +181,20 @@ def read_table(path: Path, columns: list[str] | None = None) -> pd.DataFrame:
     TableError
         If the file is not there.
     """
+    return pd.read_parquet(needed_table(path), columns=columns)
+
+
+def needed_table(path: Path) -> Path:
+    """Return the path of a table that is there, or say which command makes it.
+
+    Raises
+    ------
+    TableError
+        If the file is not there.
+    """
     if not path.is_file():
         raise TableError(f"{path} is not there: run `dragchain tables {path.parent.parent}`")
-    return pd.read_parquet(path, columns=columns)
+    return path
 
 
 def _stretch(path: Path, columns: list[str], first: int, last: int) -> pd.DataFrame:

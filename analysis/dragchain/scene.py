@@ -37,6 +37,9 @@ ToolPlaces = Callable[[int], tuple[Floats, float]]
 PICTURE_TIME_S = 4.5
 """Process time, counted from the start of the drag, at which the paper shows the network."""
 
+TOOL_COLUMNS = ("step", "ref_x_m", "ref_y_m", "ref_z_m", "heading_rad")
+"""Columns of ``rod_force.parquet`` that say where the tool is."""
+
 COLOURS = ("#1e8f4e", "#f0c929", "#c8102e")
 _PIXELS_PER_MM = 14
 _SIDES = 18
@@ -148,11 +151,23 @@ def tool_places(run_dir: Path, case: Case) -> ToolPlaces:
     TableError
         If ``rod_force.parquet`` is not there.
     """
-    rod = read_table(
-        run_dir / "tables" / "rod_force.parquet",
-        ["step", "ref_x_m", "ref_y_m", "ref_z_m", "heading_rad"],
-    )
-    return lambda step: (_reference_point(rod, step), _tool_turn(rod, step, case))
+    rod = read_table(run_dir / "tables" / "rod_force.parquet", list(TOOL_COLUMNS))
+    return lambda step: tool_place(rod, step, case)
+
+
+def tool_place(rod: pd.DataFrame, step: int, case: Case) -> tuple[Floats, float]:
+    """Return the tool's reference point at a step in m, (3,), and its turn in rad.
+
+    Parameters
+    ----------
+    rod : DataFrame
+        `TOOL_COLUMNS` of ``rod_force.parquet``, of the samples around that step at least.
+    step : int
+        The step.
+    case : Case
+        The case, of a process.
+    """
+    return _reference_point(rod, step), _tool_turn(rod, step, case)
 
 
 def _reference_point(rod: pd.DataFrame, step: int) -> Floats:
@@ -289,15 +304,30 @@ def _add_bowl(plotter: Any, case: Case, view: View) -> None:
 
 
 def _add_tool(plotter: Any, run_dir: Path, case: Case, scene: Scene) -> None:
+    tool = placed(tool_mesh(run_dir, case), scene.tool_m, scene.tool_turn_rad)
+    plotter.add_mesh(tool, color="#59636e", opacity=0.45)
+
+
+def tool_mesh(run_dir: Path, case: Case) -> Any:
+    """Read the tool's mesh, as it lies in its file.
+
+    Raises
+    ------
+    TableError
+        If the file is not there.
+    """
     import pyvista as pv
 
     path = run_dir / needed(case.tool, "tool").mesh
     if not path.is_file():
         raise TableError(f"{path} is not there, though case.json names it as the tool's mesh")
-    tool: Any = pv.read(path)
-    tool = tool.rotate_z(np.degrees(scene.tool_turn_rad), inplace=False)
-    tool = tool.translate(scene.tool_m, inplace=False)
-    plotter.add_mesh(tool, color="#59636e", opacity=0.45)
+    return pv.read(path)
+
+
+def placed(tool: Any, tool_m: Floats, turn_rad: float) -> Any:
+    """Return the tool's mesh turned about the vertical and put to its reference point."""
+    turned = tool.rotate_z(np.degrees(turn_rad), inplace=False)
+    return turned.translate(tool_m, inplace=False)
 
 
 def _add_contacts(plotter: Any, frame: NetworkFrame, radius_mean_m: float, look: Look) -> None:

@@ -1,0 +1,309 @@
+"""What a run's tables say of one network frame after another.
+
+Nothing is held but the frame at hand, so memory does not grow with the length of a run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import groupby, pairwise
+from operator import itemgetter
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from dragchain.case import Case
+from dragchain.errors import ExportError, TableError
+from dragchain.export.membership import Membership, chain_membership
+from dragchain.frames import Floats, Ints, NetworkFrame, frame_of, needed_table
+from dragchain.scene import TOOL_COLUMNS, tool_place
+from dragchain.tables import CONTACTS, KINEMATICS, Run
+
+_BATCH_ROWS = 65_536
+_CHAINS = ("step", "definition", "ball_ids", "reaches_bowl", "end_kind", "dominant")
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which frames are wanted.
+
+    Attributes
+    ----------
+    first_s, last_s : float or None
+        First and last simulated time, ``time_s`` of the tables; None: no limit.
+    every : int
+        Every how many frames of that stretch one is taken, beginning with its first.
+    """
+
+    first_s: float | None = None
+    last_s: float | None = None
+    every: int = 1
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One frame: what there is of balls, contacts, chains and the tool.
+
+    Attributes
+    ----------
+    step, time_s
+        When it was written.
+    balls : DataFrame
+        Rows of ``balls.parquet``, by rising ``ball_id``.
+    contacts : DataFrame or None
+        Rows of ``contacts.parquet``; None if the run wrote no contacts.
+    network : NetworkFrame or None
+        The same balls and contacts as arrays, in the same order.
+    membership : Membership or None
+        What is in a chain; None if there are no chain tables, or if they do not
+        reach this frame.
+    tool : (3,) float and float, or None
+        The tool's reference point in m and its turn in rad; None if there is no tool.
+    """
+
+    step: int
+    time_s: float
+    balls: pd.DataFrame
+    contacts: pd.DataFrame | None
+    network: NetworkFrame | None
+    membership: Membership | None
+    tool: tuple[Floats, float] | None
+
+
+@dataclass(frozen=True)
+class Moments:
+    """The wanted frames of a run.
+
+    Attributes
+    ----------
+    run : Run
+        The run.
+    steps, times_s : (N,) arrays
+        When the frames were written; N is at least 1.
+    """
+
+    run: Run
+    steps: Ints
+    times_s: Floats
+
+    @classmethod
+    def of(cls, run: Run, selection: Selection) -> Moments:
+        """Find the frames of a selection.
+
+        Raises
+        ------
+        ExportError
+            If the run wrote no balls, or none in the interval.
+        TableError
+            If ``balls.parquet`` is not there.
+        """
+        if selection.every < 1:
+            raise ExportError(f"--every is {selection.every}, not at least 1")
+        if not run.wrote("balls"):
+            raise ExportError(
+                f"{run.folder}: this {run.case.scene} run wrote no output balls, so there is"
+                " nothing to export\n  remedy: export a fill or a process that lists balls in"
+                " its outputs"
+            )
+        steps, times_s = _frame_times(_table(run, "balls.parquet"))
+        wanted = _inside(times_s, selection, run.case)
+        if not wanted.any():
+            raise ExportError(_nothing(run, times_s, selection))
+        every = selection.every
+        return cls(run, steps[wanted][::every], times_s[wanted][::every])
+
+    def __len__(self) -> int:
+        """Return the number of frames N."""
+        return self.steps.size
+
+    @property
+    def has_contacts(self) -> bool:
+        """Whether the run wrote its contacts."""
+        return self.run.wrote("contacts", "rod_balls", "rod_contacts")
+
+    @property
+    def has_chains(self) -> bool:
+        """Whether chains were looked for."""
+        tables = ("network.parquet", "chains.parquet")
+        return self.has_contacts and all(self.run.table(name).is_file() for name in tables)
+
+    def __iter__(self) -> Iterator[Moment]:
+        """Yield the frames in the order of their steps.
+
+        Raises
+        ------
+        TableError
+            If a table is missing or the tables contradict each other.
+        """
+        run, steps = self.run, self.steps
+        balls = _Rows(_table(run, "balls.parquet"), steps, KINEMATICS)
+        contacts = (
+            _Rows(_table(run, "contacts.parquet"), steps, CONTACTS) if self.has_contacts else None
+        )
+        chains = _Rows(run.table("chains.parquet"), steps, _CHAINS) if self.has_chains else None
+        searched = _steps(run.table("network.parquet")) if chains is not None else frozenset()
+        track = _Track(run) if run.case.tool is not None else None
+        for step, time_s in zip(steps.tolist(), self.times_s.tolist(), strict=True):
+            of_balls = balls.at(step).sort_values("ball_id", ignore_index=True)
+            of_contacts = None if contacts is None else contacts.at(step)
+            network = membership = None
+            if of_contacts is not None:
+                network = frame_of(of_contacts, of_balls, step, time_s, np.nan)
+            if chains is not None and network is not None and step in searched:
+                membership = chain_membership(network, chains.at(step))
+            tool = None if track is None else track.at(step)
+            yield Moment(step, time_s, of_balls, of_contacts, network, membership, tool)
+        for rows in (balls, contacts, chains):
+            if rows is not None:
+                rows.finish()
+
+
+def _table(run: Run, name: str) -> Path:
+    return needed_table(run.table(name))
+
+
+def _inside(times_s: Floats, selection: Selection, case: Case) -> np.ndarray:
+    """Tell which times are in the interval; half a step is no difference."""
+    low = -np.inf if selection.first_s is None else selection.first_s
+    high = np.inf if selection.last_s is None else selection.last_s
+    half = 0.5 * case.timestep_s
+    return (times_s >= low - half) & (times_s <= high + half)
+
+
+def _nothing(run: Run, times_s: Floats, selection: Selection) -> str:
+    if not times_s.size:
+        return f"{run.table('balls.parquet')} holds no frames, so there is nothing to export"
+    wanted = [
+        f"{word} {value:g} s"
+        for word, value in (("from", selection.first_s), ("to", selection.last_s))
+        if value is not None
+    ]
+    return (
+        f"{run.folder}: there is no frame {' '.join(wanted)}\n"
+        f"  limit:  the {times_s.size} frames are of {times_s[0]:g} to {times_s[-1]:g} s\n"
+        "  remedy: give --from-time and --to-time as simulated time, time_s of the tables"
+    )
+
+
+# --- tables, step by step --------------------------------------------------------------------
+
+
+def _frame_times(file: Path) -> tuple[Ints, Floats]:
+    """Return the rising steps of a table's frames and their times in s."""
+    steps: list[int] = []
+    times_s: list[float] = []
+    for step, rows in _frames(file, ["step", "time_s"]):
+        steps.append(step)
+        times_s.append(rows[0]["time_s"][0].as_py())
+    return np.array(steps, dtype=np.int64), np.array(times_s, dtype=np.float64)
+
+
+def _steps(file: Path) -> frozenset[int]:
+    return frozenset(_frame_times(file)[0].tolist())
+
+
+class _Rows:
+    """The rows of a table at steps that rise.
+
+    Parameters
+    ----------
+    file : Path
+        The table.
+    wanted : (N,) array of int
+        The steps that will be asked for; row groups without any are not read.
+    columns : sequence of str
+        Its columns.
+    """
+
+    def __init__(self, file: Path, wanted: Ints, columns: tuple[str, ...]) -> None:
+        self._frames = _frames(file, list(columns), wanted)
+        self._none: pd.DataFrame = pq.read_schema(file).empty_table().select(columns).to_pandas()
+        self._next = next(self._frames, None)
+
+    def at(self, step: int) -> pd.DataFrame:
+        """Rows of a step above the last one asked for; maybe none."""
+        while self._next is not None and self._next[0] < step:
+            self._next = next(self._frames, None)
+        if self._next is None or self._next[0] > step:
+            return self._none
+        rows: pd.DataFrame = pa.Table.from_batches(self._next[1]).to_pandas()
+        return rows
+
+    def finish(self) -> None:
+        """Read what is left, so that a step out of order is found."""
+        for _ in self._frames:
+            pass
+
+
+_Frame = tuple[int, list[pa.RecordBatch]]
+
+
+def _frames(file: Path, columns: list[str], wanted: Ints | None = None) -> Iterator[_Frame]:
+    """Yield each step with its rows, from a table in the order of its steps."""
+    if "step" not in columns:
+        columns = ["step", *columns]
+    before = -1
+    for step, pieces in groupby(_pieces(file, columns, wanted), key=itemgetter(0)):
+        if step < before:
+            raise TableError(
+                f"{file}: step {step} comes after step {before}\n"
+                "  remedy: make the tables again with `dragchain tables`"
+            )
+        before = step
+        yield step, [rows for _, rows in pieces]
+
+
+def _pieces(
+    file: Path, columns: list[str], wanted: Ints | None
+) -> Iterator[tuple[int, pa.RecordBatch]]:
+    """Yield the stretches of one step within each batch of rows."""
+    with pq.ParquetFile(file) as table:
+        groups = _groups(table, wanted)
+        for batch in table.iter_batches(_BATCH_ROWS, row_groups=groups, columns=columns):
+            steps = batch["step"].to_numpy()
+            starts = np.flatnonzero(np.diff(steps, prepend=steps[0] - 1))
+            for start, end in pairwise([*starts.tolist(), steps.size]):
+                yield int(steps[start]), batch.slice(start, end - start)
+
+
+def _groups(table: pq.ParquetFile, wanted: Ints | None) -> list[int]:
+    """Return the row groups that may hold a wanted step."""
+    groups = list(range(table.num_row_groups))
+    column = table.schema_arrow.get_field_index("step")
+    if wanted is None:
+        return groups
+    return [group for group in groups if _may_hold(table, group, column, wanted)]
+
+
+def _may_hold(table: pq.ParquetFile, group: int, column: int, wanted: Ints) -> bool:
+    known = table.metadata.row_group(group).column(column).statistics
+    if known is None or not known.has_min_max:
+        return True
+    return bool(np.searchsorted(wanted, known.min) < np.searchsorted(wanted, known.max, "right"))
+
+
+class _Track:
+    """Where the tool is at steps that rise; a stretch of ``rod_force.parquet`` is held."""
+
+    def __init__(self, run: Run) -> None:
+        self._case = run.case
+        file = pq.ParquetFile(_table(run, "rod_force.parquet"))
+        batches = file.iter_batches(_BATCH_ROWS, columns=list(TOOL_COLUMNS))
+        self._blocks = (batch.to_pandas() for batch in batches)
+        first = next(self._blocks, None)
+        if first is None:
+            raise TableError(f"{run.table('rod_force.parquet')} holds no samples")
+        self._rows = first
+
+    def at(self, step: int) -> tuple[Floats, float]:
+        """Return reference point in m and turn in rad."""
+        while self._rows["step"].iloc[-1] < step:
+            following = next(self._blocks, None)
+            if following is None:
+                break
+            self._rows = pd.concat([self._rows.iloc[-1:], following])
+        return tool_place(self._rows, step, self._case)

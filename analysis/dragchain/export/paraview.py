@@ -1,0 +1,148 @@
+"""A run as a time series of ParaView: VTP files, joined by a VTM file a frame and a PVD file.
+
+The files are not compressed and name what a ball has as LIGGGHTS does in its own VTK
+files (``id``, ``radius``, ``v``, ``omega``), so that OVITO opens the same series.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from dragchain.chains import ball_stress, major_stress
+from dragchain.export.moments import Moment, Moments
+from dragchain.frames import BALL
+from dragchain.network import contact_counts
+from dragchain.scene import placed, segments, tool_mesh
+
+MAIN = "run.pvd"
+"""The file to open: all there is."""
+
+_FRAMES = "frames"
+_CHAIN_ARRAYS = {"peters_chain": "peters", "rod_paths": "paths", "dominant": "dominant"}
+
+
+class ParaviewWriter:
+    """Writes one frame after another, and the lists of them at the end.
+
+    Parameters
+    ----------
+    folder : Path
+        An empty folder.
+    moments : Moments
+        The frames that will be written.
+    """
+
+    def __init__(self, folder: Path, moments: Moments) -> None:
+        self._folder = folder
+        self._with_chains = moments.has_chains
+        self._width = len(str(moments.steps[-1]))
+        case = moments.run.case
+        self._tool = None if case.tool is None else tool_mesh(moments.run.folder, case)
+        self._series: dict[str, list[tuple[float, str]]] = {}
+        (folder / _FRAMES).mkdir()
+
+    def add(self, moment: Moment) -> None:
+        """Write the files of one frame."""
+        import pyvista as pv
+
+        parts = {"balls": balls_mesh(moment, with_chains=self._with_chains)}
+        if moment.network is not None:
+            parts["contacts"] = contacts_mesh(moment, with_chains=self._with_chains)
+        if self._tool is not None and moment.tool is not None:
+            parts["tool"] = placed(self._tool, *moment.tool)
+        name = f"{moment.step:0{self._width}d}"
+        frames = self._folder / _FRAMES
+        pv.MultiBlock(parts).save(frames / f"{name}.vtm", compression=None)
+        self._list("run", moment.time_s, f"{name}.vtm")
+        for number, (part_name, part) in enumerate(parts.items()):
+            file = f"{name}/{name}_{number}.vtp"  # as VTK's writer of VTM files names it
+            if not (frames / file).exists():  # it leaves out a part that is empty
+                part.save(frames / file, compression=None)
+            self._list(part_name, moment.time_s, file)
+
+    def _list(self, series: str, time_s: float, file: str) -> None:
+        self._series.setdefault(series, []).append((time_s, f"{_FRAMES}/{file}"))
+
+    def close(self) -> None:
+        """Write the PVD files."""
+        for name, files in self._series.items():
+            (self._folder / f"{name}.pvd").write_text(pvd(files), encoding="utf-8")
+
+
+def pvd(files: list[tuple[float, str]]) -> str:
+    """Return a PVD file, which lists times in s and the file of each."""
+    rows = [
+        f'    <DataSet timestep="{time_s!r}" part="0" file={quoteattr(file)}/>\n'
+        for time_s, file in files
+    ]
+    return (
+        '<?xml version="1.0"?>\n'
+        '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
+        f"  <Collection>\n{''.join(rows)}  </Collection>\n</VTKFile>\n"
+    )
+
+
+def balls_mesh(moment: Moment, *, with_chains: bool) -> Any:
+    """Return the balls as points with what is known of each.
+
+    ``id``, ``radius`` (m), ``v`` (m/s) and ``omega`` (rad/s); with contacts
+    ``coordination_number`` and ``major_stress_pa`` (major compressive principal stress);
+    with chains ``peters_chain``, ``rod_paths`` and ``dominant``, see `_chains`.
+    """
+    import pyvista as pv
+
+    balls = moment.balls
+    mesh = pv.PolyData(balls[["x_m", "y_m", "z_m"]].to_numpy(np.float64))
+    data = mesh.point_data
+    data["id"] = balls["ball_id"].to_numpy(np.int64)
+    data["radius"] = balls["radius_m"].to_numpy(np.float64)
+    data["v"] = balls[["vx_m_s", "vy_m_s", "vz_m_s"]].to_numpy(np.float64)
+    data["omega"] = balls[["wx_rad_s", "wy_rad_s", "wz_rad_s"]].to_numpy(np.float64)
+    if moment.network is not None:
+        data["coordination_number"] = contact_counts(moment.network).astype(np.int32)
+        data["major_stress_pa"] = major_stress(ball_stress(moment.network))[0]
+    if with_chains:
+        _chains(data, moment, "ball", len(balls))
+    return mesh
+
+
+def contacts_mesh(moment: Moment, *, with_chains: bool) -> Any:
+    """Return the contacts as lines from centre to centre, or from centre to contact point.
+
+    Each has ``kind`` (0 between balls, 1 with the tool, 2 the floor, 3 the side), ``id1``
+    and ``id2`` (as ``a_id`` and ``b_id``), ``force_n`` (on the first), and the columns
+    ``normal_force_n``, ``tangential_force_n`` and ``overlap_m``; with chains those of
+    `balls_mesh`. No two lines share a point, so that data of the lines can be moved to
+    their points without a mean.
+    """
+    import pyvista as pv
+
+    contacts, frame = moment.contacts, moment.network
+    assert contacts is not None and frame is not None
+    if contacts.empty:
+        return pv.PolyData()
+    points = segments(frame).reshape(-1, 3)
+    ends = np.arange(len(points)).reshape(-1, 2)
+    mesh = pv.PolyData(points, lines=np.insert(ends, 0, 2, axis=1).ravel())
+    data = mesh.cell_data
+    data["kind"] = np.asarray(BALL - frame.other, dtype=np.int32)
+    data["id1"] = contacts["a_id"].to_numpy(np.int64)
+    data["id2"] = contacts["b_id"].to_numpy(np.int64)
+    data["force_n"] = frame.force
+    for name in ("normal_force_n", "tangential_force_n", "overlap_m"):
+        data[name] = contacts[name].to_numpy(np.float64)
+    if with_chains:
+        _chains(data, moment, "contact", len(contacts))
+    return mesh
+
+
+def _chains(data: Any, moment: Moment, what: str, size: int) -> None:
+    """Add number of the chain, number of rod paths, and dominance: 0 none, -1 not searched."""
+    found = moment.membership
+    for name, field in _CHAIN_ARRAYS.items():
+        values = np.full(size, -1) if found is None else getattr(found, f"{what}_{field}")
+        data[name] = values.astype(np.int32)

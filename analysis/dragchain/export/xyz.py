@@ -1,0 +1,80 @@
+"""The balls of a run as one text file in the extended XYZ format.
+
+Of the text formats that OVITO reads, this one says in each frame's header what every
+column is and of which type, holds the time in s beside the step, and is read by other
+programs too; a LAMMPS dump has neither types nor, in most readers, the time.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+
+from dragchain.export.moments import Moment, Moments
+from dragchain.network import contact_counts
+
+MAIN = "run.xyz"
+"""The file to open."""
+
+COLUMNS = {
+    "id": ("ball_id",),
+    "pos": ("x_m", "y_m", "z_m"),
+    "velo": ("vx_m_s", "vy_m_s", "vz_m_s"),
+    "omega": ("wx_rad_s", "wy_rad_s", "wz_rad_s"),
+    "radius": ("radius_m",),
+}
+"""Columns of ``balls.parquet`` under the names by which OVITO knows them."""
+
+SPECIES = "X"
+"""What each line begins with, as in any XYZ file: no chemical element."""
+
+_PLAIN = pyarrow.csv.WriteOptions(include_header=False, delimiter=" ", quoting_style="none")
+
+
+class XyzWriter:
+    """Writes one frame after another.
+
+    Parameters
+    ----------
+    folder : Path
+        An empty folder.
+    moments : Moments
+        The frames that will be written.
+    """
+
+    def __init__(self, folder: Path, moments: Moments) -> None:
+        self._file = (folder / MAIN).open("wb")
+
+    def add(self, moment: Moment) -> None:
+        """Append one frame; numbers are written so that they read back to the last bit."""
+        columns: dict[str, pa.Array] = {"species": pa.repeat(SPECIES, len(moment.balls))}
+        for name in (name for names in COLUMNS.values() for name in names):
+            columns[name] = pa.array(moment.balls[name].to_numpy())
+        if moment.network is not None:
+            columns["coordination"] = pa.array(contact_counts(moment.network))
+        self._file.write(header(moment).encode())
+        pyarrow.csv.write_csv(pa.table(columns), self._file, _PLAIN)
+        self._file.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def header(moment: Moment) -> str:
+    """Return the two lines before the balls of a frame."""
+    kinds = [f"{name}:{'I' if name == 'id' else 'R'}:{len(of)}" for name, of in COLUMNS.items()]
+    if moment.network is not None:
+        kinds.append("Coordination:I:1")
+    words = [
+        f"Properties=species:S:1:{':'.join(kinds)}",
+        f"Time={moment.time_s!r}",
+        f"Timestep={moment.step}",
+        'pbc="F F F"',
+    ]
+    if moment.tool is not None:
+        words.append(f'tool_m="{" ".join(map(repr, np.asarray(moment.tool[0]).tolist()))}"')
+    return f"{len(moment.balls)}\n{' '.join(words)}\n"

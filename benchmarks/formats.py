@@ -1,0 +1,207 @@
+"""What OVITO, VTK's readers and a plain parser find in exports, and how fast that goes.
+
+A run is exported for ParaView and as extended XYZ. OVITO opens ``run.pvd`` and ``run.xyz``,
+VTK's readers (those of ParaView) open ``run.pvd``; of every frame, time, ids, places,
+velocities, spins and radii of the balls, the contacts' forces and the tool's facets are
+set beside the tables. Any difference ends it with an error; numbers that OVITO reads from
+text may be off by two machine epsilons of their type, for its parser rounds more than once.
+A radius it holds in 32 bits.
+
+    python benchmarks/formats.py RUN_DIR [--every N] [--rounds 3]
+
+OVITO is in the extra ``benchmarks``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from importlib.metadata import version
+from itertools import zip_longest
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+import pandas as pd
+
+from dragchain.export.moments import Moment, Moments, Selection
+from dragchain.export.writing import folder_size, write_export
+from dragchain.tables import Run
+
+VECTORS = {
+    "Position": ["x_m", "y_m", "z_m"],
+    "Velocity": ["vx_m_s", "vy_m_s", "vz_m_s"],
+    "Angular Velocity": ["wx_rad_s", "wy_rad_s", "wz_rad_s"],
+}
+FORCE = ["force_x_n", "force_y_n", "force_z_n"]
+
+
+# --- the readers: each checks every frame against the tables ------------------------------
+
+
+def ovito_paraview(folder: Path, expected: Iterator[Moment]) -> None:
+    """Open ``run.pvd`` with OVITO: particles, lines and a mesh."""
+    for moment, data in _both(expected, _ovito(folder / "run.pvd")):
+        same("time", data.attributes["Time"], moment.time_s)
+        _ovito_balls(data.particles, moment.balls)
+        if moment.network is not None:
+            same("coordination", data.particles["coordination_number"][...], _contacts_of(moment))
+        if moment.contacts is not None:
+            _ovito_contacts(next(iter(data.lines.values())), moment.contacts)
+        if moment.tool is not None and not data.surfaces:
+            sys.exit("OVITO finds no tool")
+
+
+def ovito_xyz(folder: Path, expected: Iterator[Moment]) -> None:
+    """Open ``run.xyz`` with OVITO."""
+    for moment, data in _both(expected, _ovito(folder / "run.xyz")):
+        same("time", data.attributes["Time"], moment.time_s, parsed=True)
+        same("step", data.attributes["Timestep"], moment.step)
+        _ovito_balls(data.particles, moment.balls, parsed=True)
+        if moment.network is not None:
+            same("coordination", data.particles["Coordination"][...], _contacts_of(moment))
+
+
+def vtk_paraview(folder: Path, expected: Iterator[Moment]) -> None:
+    """Open ``run.pvd`` with VTK's readers."""
+    import pyvista as pv
+
+    reader = pv.PVDReader(folder / "run.pvd")
+
+    def frames() -> Iterator[tuple[float, pv.MultiBlock]]:
+        for time_s in reader.time_values:
+            reader.set_active_time_value(time_s)
+            yield time_s, reader.read()[0]
+
+    for moment, (time_s, blocks) in _both(expected, frames()):
+        same("time", time_s, moment.time_s)
+        balls = blocks["balls"]
+        same("id", balls["id"], moment.balls["ball_id"])
+        same("radius", balls["radius"], moment.balls["radius_m"])
+        for name, values in zip(VECTORS, (balls.points, balls["v"], balls["omega"]), strict=True):
+            same(name, values, moment.balls[VECTORS[name]])
+        if moment.contacts is not None:
+            same("force", blocks["contacts"]["force_n"], moment.contacts[FORCE])
+
+
+def _ovito(file: Path) -> Iterator[object]:
+    from ovito.io import import_file
+
+    source = import_file(str(file)).source
+    return (source.compute(number) for number in range(source.num_frames))
+
+
+def _ovito_balls(particles: object, balls: pd.DataFrame, *, parsed: bool = False) -> None:
+    same("id", particles["Particle Identifier"][...], balls["ball_id"])
+    for name, columns in VECTORS.items():
+        same(name, particles[name][...], balls[columns], parsed=parsed)
+    radii = balls["radius_m"].to_numpy(np.float32)
+    same("Radius", particles["Radius"][...], radii, parsed=parsed)
+
+
+def _ovito_contacts(lines: object, contacts: pd.DataFrame) -> None:
+    """OVITO puts a line's data on both of its points."""
+    same("force", lines["force_n"][::2], contacts[FORCE])
+    same("normal force", lines["normal_force_n"][1::2], contacts["normal_force_n"])
+    same("id 1", lines["Particle Identifier 1"][::2], contacts["a_id"])
+
+
+def _contacts_of(moment: Moment) -> np.ndarray:
+    from dragchain.network import contact_counts
+
+    return contact_counts(moment.network)
+
+
+def _both(expected: Iterator[Moment], found: Iterator) -> Iterator:
+    for one, other in zip_longest(expected, found):
+        if one is None or other is None:
+            sys.exit("the reader finds another number of frames than were written")
+        yield one, other
+
+
+def same(what: str, found: object, expected: object, *, parsed: bool = False) -> None:
+    """End with an error where a number is not the table's; `parsed` grants it two epsilons."""
+    found, expected = np.asarray(found), np.asarray(expected)
+    relative = 2.0 * np.finfo(expected.dtype).eps if parsed else 0.0
+    equal = found.shape == expected.shape
+    if not equal or not (np.abs(found - expected) <= relative * np.abs(expected)).all():
+        sys.exit(f"{what} is not what the table holds:\n{found}\n{expected}")
+
+
+READERS: dict[str, tuple[str, Callable[[Path, Iterator[Moment]], None]]] = {
+    "OVITO, run.pvd": ("paraview", ovito_paraview),
+    "VTK (ParaView's readers), run.pvd": ("paraview", vtk_paraview),
+    "OVITO, run.xyz": ("xyz", ovito_xyz),
+}
+
+
+# --- the run ------------------------------------------------------------------------------
+
+
+def timed(action: Callable[[], object]) -> tuple[float, float]:
+    """Return wall and processor seconds."""
+    wall, processor = time.perf_counter(), time.process_time()
+    action()
+    return time.perf_counter() - wall, time.process_time() - processor
+
+
+def row(name: str, times: list[tuple[float, float]], frames: int, size: int) -> str:
+    """Return a line of the table: medians over the rounds."""
+    wall, processor = (median(column) for column in zip(*times, strict=True))
+    rates = f"{frames / processor:.0f} | {size / 1e6 / processor:.0f} | {size / 1e6 / wall:.0f}"
+    return f"| {name} | {rates} |"
+
+
+def main() -> None:
+    """Export, read, check and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("run_dir", type=Path, metavar="RUN_DIR", help="a run with its tables")
+    parser.add_argument("--every", type=int, default=1, metavar="N", help="every N-th frame only")
+    parser.add_argument("--rounds", type=int, default=3)
+    options = parser.parse_args()
+    selection = Selection(every=options.every)
+    moments = Moments.of(Run.open(options.run_dir), selection)
+    lines = ["| | frames/s a core | MB/s a core | MB/s |", "| --- | ---: | ---: | ---: |"]
+    with tempfile.TemporaryDirectory() as name:
+        sizes = {}
+        for to in ("paraview", "xyz"):
+            folder = Path(name) / to
+            times = [
+                timed(lambda f=folder, t=to: _export(options.run_dir, t, f, selection))
+                for _ in range(options.rounds)
+            ]
+            sizes[to] = folder_size(folder)
+            lines.append(row(f"write {to}", times, len(moments), sizes[to]))
+        known = list(moments)
+        for reader, (to, check) in READERS.items():
+            times = [
+                timed(lambda c=check, t=to: c(Path(name) / t, iter(known)))
+                for _ in range(options.rounds)
+            ]
+            lines.append(row(f"read and check {reader}", times, len(moments), sizes[to]))
+    shown = ", ".join(f"{name} {version(name)}" for name in ("ovito", "vtk", "pyvista", "pyarrow"))
+    load = " ".join(f"{value:.1f}" for value in os.getloadavg())
+    balls = len(known[0].balls)
+    held = ", ".join(f"{size / 1e6:.1f} MB {to}" for to, size in sizes.items())
+    print(
+        f"{len(os.sched_getaffinity(0))} cores, load {load}; Python {platform.python_version()},"
+        f" {shown}.\n{len(moments)} frames of {balls} balls, {options.rounds} rounds; {held}."
+        " Every number read is the table's (OVITO's from text: to two epsilons).\n"
+    )
+    print("\n".join(lines))
+
+
+def _export(run_dir: Path, to: str, folder: Path, selection: Selection) -> None:
+    write_export(run_dir, to, folder, selection, replace=True)
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    main()
