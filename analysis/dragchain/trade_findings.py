@@ -22,6 +22,7 @@ from dragchain.frames import Floats
 from dragchain.measures import FORCE_BINS, QUANTITIES, Quantity
 from dragchain.trade import (
     CONFIDENCE,
+    OTHER,
     Comparison,
     Error,
     Run,
@@ -57,8 +58,8 @@ def differing(setting: Setting, base: Setting) -> list[str]:
 
 
 def hub(trade: Trade) -> Setting:
-    """The setting that most others differ from in one factor only: the base of the plan."""
-    settings = trade.settings()
+    """The setting that most others differ from in one knob only: the base of the plan."""
+    settings = [one for one in trade.settings() if not one.other]
 
     def neighbours(setting: Setting) -> tuple[int, int]:
         near = sum(len(differing(other, setting)) == 1 for other in settings)
@@ -224,7 +225,8 @@ class Gain:
 def gains(trade: Trade) -> list[Gain]:
     """Every change of the reference and of the hub whose single changes were all run.
 
-    The hub against the reference is among them in any case.
+    The hub against the reference is among them in any case, and whatever is no knob
+    against the same setting without it.
     """
     centre = hub(trade)
     found: list[Gain] = []
@@ -235,6 +237,10 @@ def gains(trade: Trade) -> list[Gain]:
             told = setting == centre or all(map(trade.of, singles))
             if factors and setting != trade.reference and told:
                 found.append(_gain(trade, setting, base, factors, singles))
+    for setting in trade.settings():
+        base = replace(setting, other="")
+        if setting.other and base not in (trade.reference, centre) and trade.of(base):
+            found.append(_gain(trade, setting, base, [OTHER], [setting]))
     names = list(trade.reference.factors())
     return sorted(found, key=lambda gain: [names.index(name) for name in gain.factors])
 

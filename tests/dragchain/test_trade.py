@@ -222,6 +222,20 @@ def test_gains_alone_and_together(trade: Trade) -> None:
     assert math.isnan(found[reference, Setting(*COARSE)].product)
 
 
+def test_what_is_no_knob_is_held_against_the_same_without_it(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    inputs = {"bowl.facet_size_m": 0.005}
+    faceted = [
+        measures(COARSE, seed, rng, effects=SOFTNESS, cpu_time_s=60.0, inputs=inputs)
+        for seed in (1, 2, 3)
+    ]
+    trade = made(tmp_path, contents() + faceted)
+    (gain,) = (one for one in gains(trade) if one.factors == ["other"])
+    assert gain.base == Setting(*COARSE) and gain.setting.other == "bowl.facet_size_m 0.005"
+    assert gain.errors["contact_force_mean"].error == pytest.approx(-0.3, abs=WITHIN)
+    assert gain.speed_up.ratio == pytest.approx(40.0 / 60.0)
+
+
 def test_the_hub_is_the_setting_most_others_are_near_to(tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
     near = [(0.1, 0.5, 1.0), (0.01, 0.8, 1.0), (0.01, 0.5, 5.0), BOTH, BOTH]
