@@ -262,9 +262,8 @@ def main() -> None:
     head = f"{machine()}. {case['media']['count']} balls; {rates(options.run, drag)}."
     output = f"{head}\n\n{table(found, drag)}"
     print(output)
-    if options.commands == list(COMMANDS):
-        before, mark, _ = PAGE.read_text().partition("<!-- output -->\n")
-        PAGE.write_text(f"{before}{mark}\n{output}\n")
+    before, mark, _ = PAGE.read_text().partition("<!-- output -->\n")
+    PAGE.write_text(f"{before}{mark}\n{output}\n")
 
 
 if __name__ == "__main__":
