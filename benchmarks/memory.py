@@ -197,6 +197,15 @@ def run_command(command: str, run: Path, bed: Path) -> dict[str, float]:
     return found
 
 
+def kept(command: str, run: Path, bed: Path) -> dict[str, float]:
+    """Measure one command on one run, or say what was measured in this folder before."""
+    file = run.parent / f"{run.name}-{command}.json"
+    if not file.is_file():
+        file.write_text(json.dumps(run_command(command, run, bed)))
+    found: dict[str, float] = json.loads(file.read_text())
+    return found
+
+
 def table(found: dict[str, list[dict[str, float]]], drag: Drag) -> str:
     """What was measured, as a Markdown table."""
     lines = [
@@ -241,7 +250,7 @@ def main() -> None:
     parser.add_argument("run", type=Path, metavar="RUN_DIR", help="a complete process run")
     parser.add_argument("--times", type=int, default=4, help="length of the long run")
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
-    parser.add_argument("--folder", type=Path, help="where the runs are made and kept")
+    parser.add_argument("--folder", type=Path, help="where runs and measurements are made and kept")
     options = parser.parse_args()
     case = json.loads((options.run / "case.json").read_text())
     phase = case["phases"][-1]
@@ -255,10 +264,9 @@ def main() -> None:
             if not run.is_dir():
                 lengthen(options.run, run, Drag(drag.start, drag.end, drag.timestep_s, times))
         bed = fill_table(options.run)
-        found = {
-            command: [run_command(command, run, bed) for run in runs.values()]
-            for command in options.commands
-        }
+        found = {}
+        for command in options.commands:
+            found[command] = [kept(command, run, bed) for run in runs.values()]
     head = f"{machine()}. {case['media']['count']} balls; {rates(options.run, drag)}."
     output = f"{head}\n\n{table(found, drag)}"
     print(output)
