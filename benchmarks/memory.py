@@ -71,17 +71,17 @@ def lengthen(run: Path, target: Path, drag: Drag) -> None:
     outputs = json.loads((run / "columns.json").read_text())
     last = drag.end + (drag.times - 1) * drag.steps
     case["phases"][-1]["end_step"] = last
-    for name, output in outputs["outputs"].items():
+    for output in outputs["outputs"].values():
         output["last_step"] = last
         file = output["pattern"].replace("{part}", "1")
         write = lengthen_prints if output["kind"] == "print" else lengthen_frames
         with (run / file).open("rb") as source, (target / file).open("wb") as out:
-            write(source, out, drag, name)
+            write(source, out, drag)
     (target / "case.json").write_text(json.dumps(case, indent=1))
     (target / "columns.json").write_text(json.dumps(outputs, indent=1))
 
 
-def lengthen_prints(source: BinaryIO, out: BinaryIO, drag: Drag, _: str) -> None:
+def lengthen_prints(source: BinaryIO, out: BinaryIO, drag: Drag) -> None:
     """Repeat the rows of a ``fix print`` whose steps are in the drag."""
     out.write(source.readline())
     dragged = []
@@ -97,34 +97,34 @@ def lengthen_prints(source: BinaryIO, out: BinaryIO, drag: Drag, _: str) -> None
             out.write(b"%d %.15g " % (later, later * drag.timestep_s) + rest)
 
 
-def lengthen_frames(source: BinaryIO, out: BinaryIO, drag: Drag, name: str) -> None:
+def lengthen_frames(source: BinaryIO, out: BinaryIO, drag: Drag) -> None:
     """Repeat the frames of a dump whose steps are in the drag."""
-    frames = text_frames if source.read(5) == b"ITEM:" else binary_frames
+    text = source.read(5) == b"ITEM:"
     for turn in range(drag.times):
         source.seek(0)
-        for step, rest in frames(source):
+        for step, rest in text_frames(source) if text else binary_frames(source):
             if turn == 0 or step > drag.start:
                 later = step + turn * drag.steps
-                head = f"ITEM: TIMESTEP\n{later}\n".encode()
-                out.write((head if frames is text_frames else struct.pack("<q", later)) + rest)
+                first = b"ITEM: TIMESTEP\n%d\n" % later if text else struct.pack("<q", later)
+                out.write(first + rest)
 
 
 def text_frames(source: BinaryIO) -> Iterator[Frame]:
     """Steps of a text dump, and what follows each."""
     while source.readline():
         step = int(source.readline())
-        head = list(islice(source, 7))
-        yield step, b"".join([*head, *islice(source, int(head[1]))])
+        lines = list(islice(source, 7))
+        yield step, b"".join([*lines, *islice(source, int(lines[1]))])
 
 
 def binary_frames(source: BinaryIO) -> Iterator[Frame]:
     """Steps of a binary dump, and what follows each."""
-    while step := source.read(8):
+    while first := source.read(8):
         parts = [source.read(92)]
         for _ in range(struct.unpack_from("<i", parts[0], 88)[0]):
             parts.append(source.read(4))
             parts.append(source.read(8 * struct.unpack("<i", parts[-1])[0]))
-        yield struct.unpack("<q", step)[0], b"".join(parts)
+        yield struct.unpack("<q", first)[0], b"".join(parts)
 
 
 # --- the commands -------------------------------------------------------------------------
@@ -145,7 +145,7 @@ def copy_upstream(run: Path, folder: Path) -> None:
 def fill_table(run: Path) -> Path:
     """The table of the bed from which a run started."""
     name = json.loads((run / "case.json").read_text())["upstream"]["fill"]
-    return run.parent.parent / "fill" / name / "tables" / "fill.json"
+    return run.parent.parent / "fill" / str(name) / "tables" / "fill.json"
 
 
 def other_fill(run: Path) -> Path:

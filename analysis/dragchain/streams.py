@@ -7,9 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from dragchain.errors import TableError
+
+PIECE_ROWS = 32_768
+"""Rows that come at once: what is computed of them is a multiple of their size."""
 
 Steps = tuple[int, int]
 """The first and the last step to read."""
@@ -18,7 +22,7 @@ Steps = tuple[int, int]
 def read_groups(
     path: Path, columns: Sequence[str], steps: Steps | None = None
 ) -> Iterator[pd.DataFrame]:
-    """Yield the rows of a table that has a column ``step``, a row group at a time.
+    """Yield the rows of a table that has a column ``step``, a row group or a part of it at a time.
 
     Parameters
     ----------
@@ -50,11 +54,15 @@ def read_groups(
         for group in range(file.num_row_groups):
             if steps is not None and _outside(file, group, steps):
                 continue
-            rows = file.read_row_group(group, columns=list(columns)).to_pandas()
-            if steps is not None:
-                rows = rows[(rows["step"] >= steps[0]) & (rows["step"] <= steps[1])]
-            if len(rows):
-                yield rows
+            table = file.read_row_group(group, columns=list(columns))
+            for start in range(0, table.num_rows, PIECE_ROWS):
+                rows = table.slice(start, PIECE_ROWS).to_pandas()
+                if steps is not None:
+                    rows = rows[(rows["step"] >= steps[0]) & (rows["step"] <= steps[1])]
+                if len(rows):
+                    yield rows
+            del table
+            pa.default_memory_pool().release_unused()
 
 
 def _outside(file: pq.ParquetFile, group: int, steps: Steps) -> bool:

@@ -59,7 +59,7 @@ def of_fills(points: Points) -> Found:
 
 
 def _fill_row(point: Point) -> Found:
-    samples = read_counted(point.folder, COMPONENTS)
+    samples = read_counted(point.folder, tuple(COMPONENTS))
     cost = point.measures["cost"]
     return {
         "run": point.case.run,
