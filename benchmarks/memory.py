@@ -86,11 +86,11 @@ def lengthen_prints(source: BinaryIO, out: BinaryIO, drag: Drag) -> None:
     out.write(source.readline())
     dragged = []
     for line in source:
-        step, _, rest = line.split(b" ", 2)
-        if int(step) <= drag.start:
+        first, _, rest = line.split(b" ", 2)
+        if int(first) <= drag.start:
             out.write(line)
         else:
-            dragged.append((int(step), rest))
+            dragged.append((int(first), rest))
     for turn in range(drag.times):
         for step, rest in dragged:
             later = step + turn * drag.steps

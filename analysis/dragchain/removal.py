@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -79,6 +79,9 @@ _KEPT = [
     *("mobilisation", "mobilised", "normal_work_j", "tool_work_j"),
 ]
 """What is held of every contact."""
+
+DRAWN = ["tool_z_m", "depth_m", "bearing_rad", "force_slide_nm"]
+"""What is left of it for the picture, which needs memory itself."""
 
 
 @dataclass(frozen=True)
@@ -187,6 +190,8 @@ def write_removal(run_dir: Path, limits: Thresholds | None = None) -> list[Path]
     write_parquet(events.drop(columns="frame"), files[1])
     write_json(files[2], found)
     write_vtp(surface, facets, files[3])
+    sampled = replace(sampled, rows=sampled.rows[DRAWN].copy())
+    del event
     return [*files, draw_rod(run_dir, case, sampled, surface, facets, found)]
 
 
