@@ -172,7 +172,8 @@ def find_events(rows: pd.DataFrame, frames: int, interval_s: float) -> tuple[pd.
     touch = np.empty(len(rows), dtype=np.int64)
     touch[order] = np.cumsum(chosen) - 1
     events = _sums(rows, event, strongest, touch, frames, interval_s)
-    for name, path in _paths(rows.iloc[strongest], event[strongest], interval_s).items():
+    moves = rows[[*POINT, *SLIP]].iloc[strongest]
+    for name, path in _paths(moves, event[strongest], interval_s).items():
         events[name] = np.bincount(path[0], path[1], len(events))
     rolled = events["rolling_m"] / (events["samples"] - 1).where(events["samples"] > 1)
     events["rolling_m_s"] = rolled / interval_s
