@@ -13,8 +13,12 @@ import pandas as pd
 import pytest
 import pyvista as pv
 import yaml
+from fat_files import fatten
 from pages import stands_alone
 from paths import ROOT, SMALL_STUDY
+
+from dragchain import write_tables
+from dragchain.network import write_chains
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -108,6 +112,20 @@ def test_balls_that_stick_to_the_tool_move_with_it(finished: Path) -> None:
         assert sticks.sum() > 30
         assert slip[sticks].median() < 0.1 * slip[slides].median()
         assert (run / "tables/rod.vtp").is_file()
+
+
+def test_all_contact_columns_would_give_the_same_tables(finished: Path, tmp_path: Path) -> None:
+    """Real frames with columns that nobody reads; what the engine wrote stays digit by digit."""
+    (run,) = (finished / "results/small/process").glob("*0.016*")
+    fatten(run, tmp_path / "fat")
+    write_tables(tmp_path / "fat")
+    write_chains(tmp_path / "fat")
+    for name in ("contacts", "rod_contacts", "network", "chains"):
+        lean, fat = (
+            pd.read_parquet(folder / f"tables/{name}.parquet") for folder in (run, tmp_path / "fat")
+        )
+        assert len(lean) > 0
+        pd.testing.assert_frame_equal(lean, fat, check_exact=True)
 
 
 def test_the_readmes_pandas_lines_run(finished: Path) -> None:

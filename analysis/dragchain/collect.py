@@ -87,11 +87,17 @@ def read_findings(run_dir: Path) -> Findings:
 # --- process ---------------------------------------------------------------------------------
 
 
+_CHAIN_COLUMNS = [
+    *("step", "definition", "n_balls", "bottleneck_n", "azimuth_rad", "altitude_m"),
+    *("reaches_bowl", "end_kind", "dominant"),
+]
+
+
 def _process(run_dir: Path, case: Case) -> Findings:
-    samples = read_counted(run_dir)
+    samples = read_counted(run_dir, ("step", "time_s", "drag_n"))
     forces = summarise_forces(run_dir)
     network = read_table(run_dir / "tables" / "network.parquet")
-    chains = read_table(run_dir / "tables" / "chains.parquet")
+    chains = read_table(run_dir / "tables" / "chains.parquet", _CHAIN_COLUMNS)
     peaks_s, peaks = _peaks(samples, case)
     return {
         "process_time_zero_s": drag_start_s(case),

@@ -169,8 +169,11 @@ def find_events(rows: pd.DataFrame, frames: int, interval_s: float) -> tuple[pd.
     event = np.empty(len(rows), dtype=np.int64)
     event[order] = place[found]
     strongest = order[chosen]
-    events = _sums(rows, event, strongest, frames, interval_s)
-    for name, path in _paths(rows.iloc[strongest], event[strongest], interval_s).items():
+    touch = np.empty(len(rows), dtype=np.int64)
+    touch[order] = np.cumsum(chosen) - 1
+    events = _sums(rows, event, strongest, touch, frames, interval_s)
+    moves = rows[[*POINT, *SLIP]].iloc[strongest]
+    for name, path in _paths(moves, event[strongest], interval_s).items():
         events[name] = np.bincount(path[0], path[1], len(events))
     rolled = events["rolling_m"] / (events["samples"] - 1).where(events["samples"] > 1)
     events["rolling_m_s"] = rolled / interval_s
@@ -179,11 +182,18 @@ def find_events(rows: pd.DataFrame, frames: int, interval_s: float) -> tuple[pd.
 
 
 def _sums(
-    rows: pd.DataFrame, event: Ints, strongest: Ints, frames: int, interval_s: float
+    rows: pd.DataFrame,
+    event: Ints,
+    strongest: Ints,
+    touch: Ints,
+    frames: int,
+    interval_s: float,
 ) -> pd.DataFrame:
-    """Return the columns of the events that need no paths."""
+    """Return the columns of the events that need no paths.
+
+    `touch` is the ball-and-frame of each row, as an index into `strongest`.
+    """
     count = int(event.max(initial=-1)) + 1
-    touch = _touch(rows, strongest)
     force = np.bincount(touch, rows["normal_force_n"], len(strongest))
     of_touch = event[strongest]
     samples = np.bincount(of_touch, minlength=count)
@@ -219,13 +229,6 @@ def _sums(
             "mobilised_share": share,
         }
     )
-
-
-def _touch(rows: pd.DataFrame, strongest: Ints) -> Ints:
-    """Return the ball-and-frame of each row, as an index into `strongest`."""
-    keys = pd.MultiIndex.from_frame(rows[["ball_id", "frame"]])
-    known = pd.MultiIndex.from_frame(rows[["ball_id", "frame"]].iloc[strongest])
-    return np.asarray(known.get_indexer(keys), dtype=np.int64)
 
 
 def _heads(event: Ints, rows: pd.DataFrame) -> Ints:

@@ -268,13 +268,15 @@ def peak_separation_s(case: Case) -> float:
     return case.media.radius_mean_m / motion_of(case).speed_m_s
 
 
-def read_counted(run_dir: Path | str) -> pd.DataFrame:
+def read_counted(run_dir: Path | str, columns: Sequence[str] | None = None) -> pd.DataFrame:
     """Read the samples of the force on the tool that statistics use.
 
     Parameters
     ----------
     run_dir : Path or str
         The run folder, with its tables made.
+    columns : sequence of str, optional
+        Columns to read; all if None.
 
     Returns
     -------
@@ -289,7 +291,8 @@ def read_counted(run_dir: Path | str) -> pd.DataFrame:
     file = Path(run_dir) / "tables" / "rod_force.parquet"
     if not file.is_file():
         raise TableError(f"{file}: there is no such table; run `dragchain tables` first")
-    return pd.read_parquet(file, filters=[("counted", "==", True)])
+    wanted = None if columns is None else list(columns)
+    return pd.read_parquet(file, columns=wanted, filters=[("counted", "==", True)])
 
 
 def summarise_forces(run_dir: Path | str) -> dict[str, MeanEstimate]:
@@ -312,6 +315,6 @@ def summarise_forces(run_dir: Path | str) -> dict[str, MeanEstimate]:
     SeriesError
         If too few samples are counted.
     """
-    samples = read_counted(run_dir)
     names = ("drag_n", "lateral_n", "vertical_n")
+    samples = read_counted(run_dir, names)
     return {name: estimate_mean(samples[name].to_numpy()) for name in names}

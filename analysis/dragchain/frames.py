@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.errors import TableError
+from dragchain.streams import read_steps
 
 BALL, ROD, FLOOR, SIDE = 1, 0, -1, -2
 """The other body of a contact; the last three are the ``b_id`` of the contacts table."""
@@ -156,21 +157,33 @@ def read_frames(run_dir: Path, steps: tuple[int, int] | None = None) -> Iterator
     tables = run_dir / "tables"
     rod_force = read_table(tables / "rod_force.parquet", ["step", "heading_rad", "counted"])
     first, last = counted_range(rod_force) if steps is None else steps
-    contacts = _stretch(tables / "contacts.parquet", _CONTACTS, first, last)
-    balls = _stretch(tables / "balls.parquet", [*_BALLS, "time_s"], first, last)
-    contact_rows = contacts.groupby("step").indices
-    ball_rows = balls.groupby("step").indices
+    contacts = _Rows(read_steps(tables / "contacts.parquet", _CONTACTS, (first, last)))
     heading_step = rod_force["step"].to_numpy(np.int64)
     heading = np.unwrap(rod_force["heading_rad"].to_numpy(np.float64))
-    for step in np.unique(balls["step"].to_numpy(np.int64)).tolist():
-        of_step = balls.iloc[ball_rows[step]]
+    balls = read_steps(tables / "balls.parquet", [*_BALLS, "time_s"], (first, last))
+    for step, of_step in balls:
         yield frame_of(
-            contacts.iloc[contact_rows.get(step, [])],
+            contacts.of(step),
             of_step,
             step,
             float(of_step["time_s"].iloc[0]),
             float(np.interp(step, heading_step, heading)),
         )
+
+
+class _Rows:
+    """The rows of a table at rising steps, none where it does not have the step."""
+
+    def __init__(self, steps: Iterator[tuple[int, pd.DataFrame]]) -> None:
+        self._steps = steps
+        self._next = next(steps, None)
+        self._none = pd.DataFrame(columns=_CONTACTS)
+
+    def of(self, step: int) -> pd.DataFrame:
+        """Rows of a step above the last one asked for."""
+        while self._next is not None and self._next[0] < step:
+            self._next = next(self._steps, None)
+        return self._none if self._next is None or self._next[0] > step else self._next[1]
 
 
 def read_table(path: Path, columns: list[str] | None = None) -> pd.DataFrame:
@@ -195,13 +208,6 @@ def needed_table(path: Path) -> Path:
     if not path.is_file():
         raise TableError(f"{path} is not there: run `dragchain tables {path.parent.parent}`")
     return path
-
-
-def _stretch(path: Path, columns: list[str], first: int, last: int) -> pd.DataFrame:
-    if not path.is_file():
-        return read_table(path)
-    limits = [("step", ">=", first), ("step", "<=", last)]
-    return pd.read_parquet(path, columns=columns, filters=limits)
 
 
 def write_parquet(table: pd.DataFrame, path: Path) -> None:

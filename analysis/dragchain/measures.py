@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from dragchain.forces import drag_phase, read_counted
 from dragchain.frames import Floats, Ints, read_table
 from dragchain.network import write_chains
 from dragchain.parquet import write_json
+from dragchain.streams import read_groups
 from dragchain.tables import write_tables
 
 SCHEMA = 1
@@ -151,15 +152,14 @@ def measure(run_dir: Path, case: Case, bed: Mapping[str, float]) -> dict[str, An
         B values, None where a block has none), ``single`` (those of the bed), and
         ``force_histogram`` (counts of contacts on the tool between `FORCE_BINS`).
     """
-    force = read_counted(run_dir)
+    force = read_counted(run_dir, ("step", "drag_n", "lateral_n", "vertical_n"))
     path = _Path.of(case, force["step"].to_numpy(np.int64))
-    pushing = _pushing_contacts(run_dir)
+    on_rod, counts = _of_rod_contacts(run_dir, path)
     found: dict[str, Floats] = {
         **_of_force(force, path),
-        **_of_rod_contacts(pushing, _frames(run_dir, path), path),
+        **on_rod,
         **_of_network(run_dir, path),
     }
-    counts, _ = np.histogram(pushing["normal_force_n"], FORCE_BINS)
     return {
         "arc_m": path.length_m,
         "block_m": path.length_m / path.blocks,
@@ -187,6 +187,10 @@ def _cost(case: Case, outcome: Mapping[str, Any]) -> dict[str, Any]:
         "speed_m_s": motion.speed_m_s,
         "steps_per_m": 1.0 / (motion.speed_m_s * case.timestep_s),
     }
+
+
+Rows = tuple[Ints, Floats]
+"""Steps, (N,), and values, (N, ...), of N rows of a table."""
 
 
 @dataclass(frozen=True)
@@ -223,11 +227,27 @@ class _Path:
         with np.errstate(invalid="ignore"):
             return np.asarray(total / count)
 
-    def each(self, steps: Ints, values: Floats, statistic: Callable[[Floats], float]) -> Floats:
-        """A statistic of the values in every block, (B,); NaN in a block without any."""
-        block = self.block(steps)
-        inside = (values[block == number] for number in range(self.blocks))
-        return np.array([statistic(part) if part.size else math.nan for part in inside])
+    def parts(self, rows: Iterable[Rows]) -> Iterator[tuple[int, Floats]]:
+        """Values of rising steps block by block: number of the block, and what is in it.
+
+        Parameters
+        ----------
+        rows : iterable of ((N,) ndarray of int, (N, ...) ndarray)
+            Steps and values, a piece of the table each. One piece and one block are held.
+        """
+        held: list[Floats] = []
+        last = 0
+        for steps, values in rows:
+            block = self.block(steps)
+            cuts = np.flatnonzero(np.diff(block)) + 1
+            for first, end in zip([0, *cuts], [*cuts, len(block)], strict=True):
+                if held and block[first] != last:
+                    yield last, np.concatenate(held)
+                    held = []
+                held.append(values[first:end])
+                last = int(block[first])
+        if held:
+            yield last, np.concatenate(held)
 
 
 def _of_force(force: pd.DataFrame, path: _Path) -> dict[str, Floats]:
@@ -281,28 +301,44 @@ def band(series: Floats, spacing_m: float, shortest_m: float, longest_m: float) 
     return np.fft.irfft(amplitude, n=len(series))
 
 
-_CONTACT_COLUMNS = ["step", "normal_force_n", "overlap_m", "counted"]
+def _pushing_contacts(run_dir: Path) -> Iterator[Rows]:
+    """Normal force and overlap of contacts that push the tool, (N, 2).
+
+    A silent contact overlaps without a force and does not count.
+    """
+    file = run_dir / "tables" / "rod_contacts.parquet"
+    for rows in read_groups(file, ["step", "normal_force_n", "overlap_m", "counted"]):
+        pushing = rows[rows["counted"] & (rows["normal_force_n"] > 0.0)]
+        if len(pushing):
+            yield (
+                pushing["step"].to_numpy(np.int64),
+                pushing[["normal_force_n", "overlap_m"]].to_numpy(np.float64),
+            )
 
 
-def _pushing_contacts(run_dir: Path) -> pd.DataFrame:
-    """Contacts that push the tool; a silent one overlaps without a force and does not count."""
-    table = read_table(run_dir / "tables" / "rod_contacts.parquet", _CONTACT_COLUMNS)
-    return table[table["counted"] & (table["normal_force_n"] > 0.0)]
+def _of_rod_contacts(run_dir: Path, path: _Path) -> tuple[dict[str, Floats], Ints]:
+    """Quantities of the contacts on the tool, and their number between `FORCE_BINS`."""
+    frames = np.bincount(path.block(_frames(run_dir, path)), minlength=path.blocks)
+    contacts = np.zeros(path.blocks)
+    histogram = np.zeros(len(FORCE_BINS) - 1, dtype=np.int64)
+    names = ("mean", "p50", "p90", "p99")
+    found = {f"contact_force_{name}": np.full(path.blocks, math.nan) for name in names}
+    overlap = np.full(path.blocks, math.nan)
+    for number, (normal, depth) in (
+        (number, values.T) for number, values in path.parts(_pushing_contacts(run_dir))
+    ):
+        contacts[number] = len(normal)
+        overlap[number] = _mean(depth / path.diameter_m)
+        found["contact_force_mean"][number] = _mean(normal)
+        for share in (50, 90, 99):
+            found[f"contact_force_p{share}"][number] = np.percentile(normal, share)
+        histogram += np.histogram(normal, FORCE_BINS)[0]
+    return {"rod_contacts": contacts / frames, **found, "rod_overlap": overlap}, histogram
 
 
-def _of_rod_contacts(table: pd.DataFrame, frames: Ints, path: _Path) -> dict[str, Floats]:
-    steps = table["step"].to_numpy(np.int64)
-    normal = table["normal_force_n"].to_numpy(np.float64)
-    number = path.block(frames)
-    counts = np.bincount(path.block(steps), minlength=path.blocks)
-    return {
-        "rod_contacts": counts / np.bincount(number, minlength=path.blocks),
-        "contact_force_mean": path.mean(steps, normal),
-        "contact_force_p50": path.each(steps, normal, _percentile(50)),
-        "contact_force_p90": path.each(steps, normal, _percentile(90)),
-        "contact_force_p99": path.each(steps, normal, _percentile(99)),
-        "rod_overlap": path.mean(steps, table["overlap_m"].to_numpy() / path.diameter_m),
-    }
+def _mean(values: Floats) -> float:
+    """Mean of values that are added one after the other."""
+    return float(np.bincount(np.zeros(len(values), dtype=np.int64), values)[0] / len(values))
 
 
 def _frames(run_dir: Path, path: _Path) -> Ints:
@@ -314,17 +350,13 @@ def _frames(run_dir: Path, path: _Path) -> Ints:
     return steps[steps > path.first_step]
 
 
-def _percentile(share: float) -> Callable[[Floats], float]:
-    return lambda values: float(np.percentile(values, share))
-
-
 def _of_network(run_dir: Path, path: _Path) -> dict[str, Floats]:
     tables = run_dir / "tables"
     network = read_table(tables / "network.parquet")
     steps = network["step"].to_numpy(np.int64)
-    contacts = read_table(tables / "contacts.parquet", ["step", "kind", "overlap_m"])
-    inner = contacts[(contacts["kind"] == "ball-ball") & (contacts["step"] > path.first_step)]
-    overlap = inner["overlap_m"].to_numpy(np.float64) / path.diameter_m
+    overlap = np.full(path.blocks, math.nan)
+    for number, values in path.parts(_overlaps(tables / "contacts.parquet", path)):
+        overlap[number] = np.percentile(values, 99)
     columns = {
         "coordination_number": "coordination_number",
         "mechanical_coordination_number": "mechanical_coordination_number",
@@ -332,9 +364,26 @@ def _of_network(run_dir: Path, path: _Path) -> dict[str, Floats]:
     }
     return {
         **{name: path.mean(steps, network[col].to_numpy()) for name, col in columns.items()},
-        "overlap_p99": path.each(inner["step"].to_numpy(np.int64), overlap, _percentile(99)),
-        **_of_chains(read_table(tables / "chains.parquet"), steps, path),
+        "overlap_p99": overlap,
+        **_of_chains(read_table(tables / "chains.parquet", _CHAIN_COLUMNS), steps, path),
     }
+
+
+def _overlaps(file: Path, path: _Path) -> Iterator[Rows]:
+    """Overlaps of balls over the mean diameter, from the path's beginning on."""
+    for rows in read_groups(file, ["step", "kind", "overlap_m"]):
+        inner = rows[(rows["kind"] == "ball-ball") & (rows["step"] > path.first_step)]
+        if len(inner):
+            yield (
+                inner["step"].to_numpy(np.int64),
+                inner["overlap_m"].to_numpy(np.float64) / path.diameter_m,
+            )
+
+
+_CHAIN_COLUMNS = [
+    *("step", "definition", "n_balls", "inclination_rad", "azimuth_rad"),
+    *("dominant", "bottleneck_n"),
+]
 
 
 def _of_chains(chains: pd.DataFrame, frames: Ints, path: _Path) -> dict[str, Floats]:

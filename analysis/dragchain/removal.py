@@ -7,8 +7,8 @@ so none of them is a removed volume. See docs/removal.md.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,11 +33,11 @@ from dragchain.findings import (
     block_length,
     estimates,
     finite,
-    frame_sums,
 )
 from dragchain.forces import counted_mask, motion_of, needed, tool_velocity, workpiece_frame
-from dragchain.frames import Floats, Ints, read_table, write_parquet
+from dragchain.frames import Floats, Ints, write_parquet
 from dragchain.parquet import write_json
+from dragchain.streams import read_groups
 
 SCHEMA = 1
 FILE = Path("tables") / "removal.json"
@@ -72,6 +72,16 @@ _CONTACT = [
     *("step", "time_s", "ball_id", "facet_id", *_PLACE, *_FORCE, "normal_force_n"),
     *("tangential_force_n", *_VELOCITY, "approach_m_s", "bearing_rad", "depth_m", "counted"),
 ]
+
+_KEPT = [
+    *("frame", "time_s", "ball_id", "facet_id", "normal_force_n", "bearing_rad", "depth_m"),
+    *(*POINT, *SLIP, *WORKPIECE, *AMOUNTS),
+    *("mobilisation", "mobilised", "normal_work_j", "tool_work_j"),
+]
+"""What is held of every contact."""
+
+DRAWN = ["tool_z_m", "depth_m", "bearing_rad", "force_slide_nm"]
+"""What is left of it for the picture, which needs memory itself."""
 
 
 @dataclass(frozen=True)
@@ -180,6 +190,8 @@ def write_removal(run_dir: Path, limits: Thresholds | None = None) -> list[Path]
     write_parquet(events.drop(columns="frame"), files[1])
     write_json(files[2], found)
     write_vtp(surface, facets, files[3])
+    sampled = replace(sampled, rows=sampled.rows[DRAWN].copy())
+    del event
     return [*files, draw_rod(run_dir, case, sampled, surface, facets, found)]
 
 
@@ -202,43 +214,47 @@ def read_removal(run_dir: Path) -> dict[str, Any]:
 
 
 def sample(run_dir: Path, case: Case, limits: Thresholds) -> Sampled:
-    """Read the counted contacts of a run; see `Sampled`."""
+    """Read the counted contacts of a run, a row group at a time; see `Sampled`."""
     tables = run_dir / "tables"
-    contacts = _read_contacts(tables / "rod_contacts.parquet", run_dir)
-    steps, interval_s = _counted_steps(run_dir, case, contacts)
-    rod = read_table(
-        tables / "rod_force.parquet",
-        ["step", "heading_rad", *_REFERENCE, "drag_n", "lateral_n", "vertical_n"],
-    ).set_index("step")
-    at_steps = rod.reindex(steps)
-    if at_steps.isna().any(axis=None):
+    steps, interval_s = _counted_steps(run_dir, case)
+    rod = _rod_at(tables / "rod_force.parquet", steps)
+    parts = []
+    for contacts in _read_contacts(tables / "rod_contacts.parquet", run_dir):
+        contacts["frame"] = np.searchsorted(steps, contacts["step"])
+        at = rod.reindex(contacts["step"])
+        parts.append(_with_amounts(contacts, at, case, interval_s, limits)[_KEPT])
+    if not parts:
+        raise TableError(f"{run_dir}: no ball touches the tool in the counted drag")
+    impulse = rod[["drag_n", "lateral_n", "vertical_n"]].to_numpy().sum(axis=0) * interval_s
+    path = motion_of(case).speed_m_s * interval_s * len(steps)
+    return Sampled(pd.concat(parts, ignore_index=True), len(steps), interval_s, path, impulse)
+
+
+def _rod_at(file: Path, steps: Ints) -> pd.DataFrame:
+    """Place, heading and force of the tool at rising steps, by step."""
+    names = ["step", "heading_rad", *_REFERENCE, "drag_n", "lateral_n", "vertical_n"]
+    parts = (rows[np.isin(rows["step"], steps)] for rows in read_groups(file, names))
+    rod = pd.concat(parts, ignore_index=True).set_index("step").reindex(steps)
+    if rod.isna().any(axis=None):
         raise TableError(
-            f"{tables}: rod_force.parquet lacks steps of rod_contacts.parquet;"
+            f"{file.parent}: rod_force.parquet lacks steps of rod_contacts.parquet;"
             " make both again with `dragchain tables`"
         )
-    rows = contacts[_loaded(contacts)].reset_index(drop=True)
-    if rows.empty:
-        raise TableError(f"{run_dir}: no ball touches the tool in the counted drag")
-    rows["frame"] = np.searchsorted(steps, rows["step"])
-    rows = _with_amounts(rows, rod.reindex(rows["step"]), case, interval_s, limits)
-    impulse = at_steps[["drag_n", "lateral_n", "vertical_n"]].to_numpy().sum(axis=0) * interval_s
-    path = motion_of(case).speed_m_s * interval_s * len(steps)
-    return Sampled(rows, len(steps), interval_s, path, impulse)
+    return rod
 
 
-def _read_contacts(file: Path, run_dir: Path) -> pd.DataFrame:
-    remedy = f"make the tables again: dragchain tables {run_dir}"
-    whole = read_table(file)
-    if missing := sorted(set(_CONTACT) - set(whole.columns)):
-        raise TableError(f"{file}: has no column {missing[0]}: it is older than this; {remedy}")
-    contacts = whole[_CONTACT]
-    if contacts.loc[_loaded(contacts), _VELOCITY].isna().any(axis=None):
-        raise TableError(
-            f"{file}: slip_x_m_s is not known: the run's rod_balls holds no velocities,"
-            " as runs did before it was asked for them; run the case again, then "
-            f"dragchain tables {run_dir}"
-        )
-    return contacts
+def _read_contacts(file: Path, run_dir: Path) -> Iterator[pd.DataFrame]:
+    """Counted contacts with force, a row group at a time."""
+    for contacts in read_groups(file, _CONTACT):
+        loaded = contacts[_loaded(contacts)].reset_index(drop=True)
+        if loaded[_VELOCITY].isna().any(axis=None):
+            raise TableError(
+                f"{file}: slip_x_m_s is not known: the run's rod_balls holds no velocities,"
+                " as runs did before it was asked for them; run the case again, then "
+                f"dragchain tables {run_dir}"
+            )
+        if len(loaded):
+            yield loaded
 
 
 def _loaded(contacts: pd.DataFrame) -> pd.Series:
@@ -246,13 +262,15 @@ def _loaded(contacts: pd.DataFrame) -> pd.Series:
     return contacts["counted"] & (contacts[_FORCE] != 0.0).any(axis=1)
 
 
-def _counted_steps(run_dir: Path, case: Case, contacts: pd.DataFrame) -> tuple[Ints, float]:
+def _counted_steps(run_dir: Path, case: Case) -> tuple[Ints, float]:
     """Return the counted steps of ``rod_contacts`` and the time between two, s."""
     output = load_outputs(run_dir)["rod_contacts"]
     last = needed(output.last_step, "last_step of rod_contacts")
     steps = np.arange(output.first_step, last + 1, output.period_steps, dtype=np.int64)
-    left_out = contacts.loc[~contacts["counted"], "step"].unique()
-    counted = counted_mask(steps, case) & ~np.isin(steps, left_out)
+    counted = counted_mask(steps, case)
+    file = run_dir / "tables" / "rod_contacts.parquet"
+    for rows in read_groups(file, ["step", "counted"]):
+        counted &= ~np.isin(steps, rows.loc[~rows["counted"], "step"].unique())
     return steps[counted], output.period_steps * case.timestep_s
 
 
@@ -526,12 +544,17 @@ def _totals(sampled: Sampled, events: pd.DataFrame) -> dict[str, Any]:
     """Return totals, what they are a metre of path, the front's share, and shares of work."""
     rows, known = sampled.rows, [*AMOUNTS, "normal_work_j", "tool_work_j"]
     ahead = (rows["bearing_rad"].abs() < np.pi / 2).to_numpy()
-    amounts = rows[known].to_numpy()
-    one, slides = np.ones(len(rows)), rows["mobilised"].to_numpy()
-    load = amounts[:, known.index("normal_impulse_ns")]
-    weights = np.column_stack([amounts, amounts * ahead[:, None], one, load * slides])
-    begun = np.bincount(events["frame"], minlength=sampled.frames)
-    sums = np.column_stack([frame_sums(rows["frame"].to_numpy(), sampled.frames, weights), begun])
+    frame, frames = rows["frame"].to_numpy(), sampled.frames
+    loads = rows["normal_impulse_ns"] * rows["mobilised"]
+    sums = np.column_stack(
+        [
+            *(np.bincount(frame, rows[name], frames) for name in known),
+            *(np.bincount(frame, rows[name] * ahead, frames) for name in known),
+            np.bincount(frame, minlength=frames),
+            np.bincount(frame, loads, frames),
+            np.bincount(events["frame"], minlength=frames),
+        ]
+    )
     count = len(known)
     at = {name: number for number, name in enumerate(known)}
     metre = sampled.path_m / sampled.frames
@@ -567,8 +590,11 @@ def _types(sampled: Sampled, events: pd.DataFrame, event: Ints) -> dict[str, Any
     kind = events["type"].to_numpy()
     of_rows = kind[event]
     frame = rows["frame"].to_numpy()
-    amounts = rows[list(_SHARED)].to_numpy()
-    parts = [frame_sums(frame, sampled.frames, amounts * (of_rows == t)[:, None]) for t in TYPES]
+    parts = [
+        np.bincount(frame, rows[name] * (of_rows == t), sampled.frames)
+        for t in TYPES
+        for name in _SHARED
+    ]
     begun = [np.bincount(events["frame"][kind == t], minlength=sampled.frames) for t in TYPES]
     sums = np.column_stack([*parts, *begun])
     width = len(_SHARED)
@@ -690,18 +716,24 @@ def _sampling(sampled: Sampled, case: Case, limits: Thresholds) -> list[dict[str
             "largest_relative_error": {
                 name: _thinned_error(sampled.rows, name, every) for name in AMOUNTS
             },
-            "events": float(np.mean([_stays(_thinned(sampled, every, i)) for i in range(every)])),
+            "events": float(np.mean([_thinned_stays(sampled, every, i) for i in range(every)])),
             "share_of": _thinned_types(sampled, every, case, limits),
         }
         for every in THINNING
     ]
 
 
-def _thinned(sampled: Sampled, every: int, start: int) -> pd.DataFrame:
+def _thinned(sampled: Sampled, every: int) -> pd.DataFrame:
     """Return the contacts of every n-th frame, each standing for n; frames are numbered anew."""
-    rows = sampled.rows[sampled.rows["frame"] % every == start]
+    rows = sampled.rows[sampled.rows["frame"] % every == 0]
     amounts = {name: every * rows[name] for name in AMOUNTS}
     return rows.assign(frame=rows["frame"] // every, **amounts).reset_index(drop=True)
+
+
+def _thinned_stays(sampled: Sampled, every: int, start: int) -> int:
+    """Return the number of stays that every n-th frame shows."""
+    rows = sampled.rows.loc[sampled.rows["frame"] % every == start, ["ball_id", "frame"]]
+    return _stays(rows.assign(frame=rows["frame"] // every))
 
 
 def _thinned_error(rows: pd.DataFrame, name: str, every: int) -> float | None:
@@ -714,7 +746,7 @@ def _thinned_types(
     sampled: Sampled, every: int, case: Case, limits: Thresholds
 ) -> dict[str, dict[str, float | None]]:
     interval_s = every * sampled.interval_s
-    rows = _thinned(sampled, every, 0)
+    rows = _thinned(sampled, every)
     events, _ = find_events(rows, -(-sampled.frames // every), interval_s)
     return _shares(events, event_types(events, case, interval_s, limits))
 

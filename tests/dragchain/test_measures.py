@@ -12,7 +12,7 @@ import pytest
 
 from dragchain.case import load_case
 from dragchain.errors import TableError
-from dragchain.measures import QUANTITIES, _Path, _percentile, band, measure, write_measures
+from dragchain.measures import QUANTITIES, _Path, band, measure, write_measures
 from dragchain.network import write_chains
 from dragchain.parquet import write_json
 from dragchain.tables import write_tables
@@ -66,13 +66,18 @@ def test_a_step_belongs_to_the_block_that_it_ends_in() -> None:
     assert PATH.block(steps).tolist() == [0, 0, 0, 0, 1, 1, 2, 3, 3]
 
 
-def test_means_and_percentiles_of_blocks() -> None:
-    steps = np.array([110, 150, 200, 210, 500])
-    values = np.array([1.0, 2.0, 6.0, 5.0, 7.0])
-    assert PATH.mean(steps, values) == pytest.approx([3.0, 5.0, np.nan, 7.0], nan_ok=True)
-    medians = PATH.each(steps, values, _percentile(50))
-    assert medians == pytest.approx([2.0, 5.0, np.nan, 7.0], nan_ok=True)
-    assert _percentile(90)(np.arange(11.0)) == pytest.approx(9.0)
+STEPS, VALUES = np.array([110, 150, 200, 210, 500]), np.array([1.0, 2.0, 6.0, 5.0, 7.0])
+
+
+def test_means_of_blocks() -> None:
+    assert PATH.mean(STEPS, VALUES) == pytest.approx([3.0, 5.0, np.nan, 7.0], nan_ok=True)
+
+
+@pytest.mark.parametrize("cuts", [[], [1], [3], [1, 2, 3, 4]])
+def test_a_block_is_whole_wherever_the_table_is_cut(cuts: list[int]) -> None:
+    pieces = zip(np.split(STEPS, cuts), np.split(VALUES, cuts), strict=True)
+    found = {number: values.tolist() for number, values in PATH.parts(pieces)}
+    assert found == {0: [1.0, 2.0, 6.0], 1: [5.0], 3: [7.0]}
 
 
 def test_squares_are_rooted_after_their_mean() -> None:

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from dragchain.errors import TableError
@@ -150,6 +152,25 @@ def test_frames_follow_the_count_of_balls_and_may_be_empty(run_dir: Path) -> Non
     assert [frame.step for frame in frames] == [10, 20]
     assert [frame.ball_id.size for frame in frames] == [6, 2]
     assert [frame.normal_force.size for frame in frames] == [7, 0]
+
+
+def test_frames_are_read_as_they_are_needed(run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("contacts", "balls"):
+        file = run_dir / "tables" / f"{name}.parquet"
+        pd.read_parquet(file).to_parquet(file, row_group_size=2)
+    read: list[int] = []
+    real = pq.ParquetFile.read_row_group
+
+    def noted(self: pq.ParquetFile, group: int, **options: object) -> pa.Table:
+        read.append(group)
+        return real(self, group, **options)
+
+    monkeypatch.setattr(pq.ParquetFile, "read_row_group", noted)
+    frames = read_frames(run_dir, (0, 30))
+    next(frames)
+    first = len(read)
+    assert sum(1 for _ in frames) == 3
+    assert len(read) > 2 * first
 
 
 def test_a_frame_has_the_heading_of_its_step(run_dir: Path) -> None:

@@ -25,7 +25,7 @@ def traces(fills: Sequence[Point], comparison: Sequence[Found]) -> Figure:
     figure = Figure(figsize=(WIDTH_IN, 0.7 + 1.35 * len(fills)), layout="constrained")
     panels = np.atleast_1d(figure.subplots(len(fills), 1, sharex=True, sharey=True))
     for axes, point in zip(panels, fills, strict=True):
-        samples = read_counted(point.folder)
+        samples = read_counted(point.folder, ("time_s", "drag_n"))
         time_s = samples["time_s"].to_numpy(np.float64)
         drag = samples["drag_n"].to_numpy(np.float64)
         peaks = find_drag_peaks(time_s, drag, min_separation_s=peak_separation_s(point.case))

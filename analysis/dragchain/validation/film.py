@@ -69,7 +69,7 @@ def choose_moments(run_dir: Path, case: Case) -> Moments:
     TableError
         If the drag has no peak.
     """
-    samples = read_counted(run_dir)
+    samples = read_counted(run_dir, ("time_s", "drag_n"))
     time_s = samples["time_s"].to_numpy(np.float64) - drag_start_s(case)
     drag = samples["drag_n"].to_numpy(np.float64)
     peaks = find_drag_peaks(time_s, drag, min_separation_s=peak_separation_s(case))

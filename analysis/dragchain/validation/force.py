@@ -59,7 +59,7 @@ def of_fills(points: Points) -> Found:
 
 
 def _fill_row(point: Point) -> Found:
-    samples = read_counted(point.folder)
+    samples = read_counted(point.folder, tuple(COMPONENTS))
     cost = point.measures["cost"]
     return {
         "run": point.case.run,
@@ -95,7 +95,7 @@ def _peaks(fills: Sequence[Point]) -> Found:
     counts: dict[float, list[float]] = {factor: [] for factor in PROMINENCES}
     times, largest = [], []
     for point in fills:
-        samples = read_counted(point.folder)
+        samples = read_counted(point.folder, ("time_s", "drag_n"))
         time_s, drag = (samples[name].to_numpy(np.float64) for name in ("time_s", "drag_n"))
         for factor in PROMINENCES:
             peaks = find_drag_peaks(
@@ -133,7 +133,7 @@ def spectrum(fills: Sequence[Point]) -> Found:
     curves, halves = [], []
     grid = np.empty(0)
     for point in fills:
-        drag = read_counted(point.folder)["drag_n"].to_numpy(np.float64)
+        drag = read_counted(point.folder, ("drag_n",))["drag_n"].to_numpy(np.float64)
         spacing = point.measures["arc_m"] / len(drag) / (2.0 * point.case.media.radius_mean_m)
         length = min(len(drag), round(SEGMENT / spacing))
         waves, density = (half[1:] for half in signal.welch(drag, 1.0 / spacing, nperseg=length))
@@ -210,7 +210,10 @@ def effects(points: Points) -> pd.DataFrame:
         If there are too few runs.
     """
     rows = []
-    drags = [read_counted(point.folder)["drag_n"].to_numpy(np.float64) for point in points.all]
+    drags = [
+        read_counted(point.folder, ("drag_n",))["drag_n"].to_numpy(np.float64)
+        for point in points.all
+    ]
     sizes = {
         "mean": [abs(float(drag.mean())) for drag in drags],
         "sd": [float(drag.std(ddof=1)) for drag in drags],

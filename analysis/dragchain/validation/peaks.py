@@ -227,7 +227,7 @@ def read_run(run_dir: Path) -> RunSeries:
         If a table is missing, or the drag has no peak.
     """
     case = load_case(run_dir)
-    samples = read_counted(run_dir)
+    samples = read_counted(run_dir, ("time_s", "drag_n"))
     table = frame_table(run_dir)
     parts = [part for _, part in table.groupby("setting", sort=True)]
     start_s = drag_start_s(case)

@@ -8,7 +8,7 @@ the front; surfaces that point to the bowl's boundary carry marks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ from dragchain.errors import TableError
 from dragchain.findings import BEARING_BINS, DEPTH_BINS, estimate_columns
 from dragchain.forces import read_counted
 from dragchain.frames import Floats, Ints, read_table
+from dragchain.streams import read_groups
 from dragchain.validation.fills import Point, over_fills
 
 Found = dict[str, Any]
@@ -159,30 +160,37 @@ def _corridor(point: Point) -> _Corridor:
     radius = _tool(case).radius_m
     wall = (np.sqrt(case.bowl.radius_m**2 - case.motion.radius_m**2) - radius) / diameter
     edges = np.arange(0.0, wall + 1e-9, BIN)
-    contacts = _inner_contacts(point)
     tip = case.surface_m - _tool(case).submersion_m
-    z = contacts["point_z_m"].to_numpy(np.float64)
-    within = (z > tip) & (z < case.surface_m)
-    force = contacts["normal_force_n"].to_numpy(np.float64)
-    along, across, turned = _relative(contacts)
-    corridor = within & (np.abs(across) <= radius + CORRIDOR * diameter)
-    distance = (np.abs(along) - radius) / diameter
+    ahead, behind = _Bins.of(edges), _Bins.of(edges)
+    far: list[Floats] = []
+    for contacts in _inner_contacts(point):
+        z = contacts["point_z_m"].to_numpy(np.float64)
+        within = (z > tip) & (z < case.surface_m)
+        force = contacts["normal_force_n"].to_numpy(np.float64)
+        along, across, turned = _relative(contacts)
+        corridor = within & (np.abs(across) <= radius + CORRIDOR * diameter)
+        distance = (np.abs(along) - radius) / diameter
+        ahead.add(distance, force, corridor & (along > 0.0))
+        behind.add(distance, force, corridor & (along < 0.0))
+        far.append(force[within & (np.abs(turned) > FAR_SIDE)])
     return _Corridor(
         edges=edges,
-        ahead=_binned(distance, force, corridor & (along > 0.0), edges),
-        behind=_binned(distance, force, corridor & (along < 0.0), edges),
-        far=_mean(force[within & (np.abs(turned) > FAR_SIDE)]),
+        ahead=ahead.means(),
+        behind=behind.means(),
+        far=_mean(np.concatenate(far)),
         wall=float(wall),
     )
 
 
-def _inner_contacts(point: Point) -> pd.DataFrame:
-    """Counted contacts between balls, with place and heading of the tool in their frame."""
-    rod = read_counted(point.folder)[["step", "ref_x_m", "ref_y_m", "heading_rad"]]
+def _inner_contacts(point: Point) -> Iterator[pd.DataFrame]:
+    """Counted contacts between balls, with place and heading of the tool in their frame.
+
+    They come a row group of the table at a time.
+    """
+    rod = read_counted(point.folder, ("step", "ref_x_m", "ref_y_m", "heading_rad"))
     columns = ["step", "b_id", "point_x_m", "point_y_m", "point_z_m", "normal_force_n"]
-    table = read_table(point.folder / "tables" / "contacts.parquet", columns)
-    table = table[table["b_id"] > 0]
-    return table.merge(rod, on="step")
+    for rows in read_groups(point.folder / "tables" / "contacts.parquet", columns):
+        yield rows[rows["b_id"] > 0].merge(rod, on="step")
 
 
 def _relative(contacts: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
@@ -197,13 +205,29 @@ def _relative(contacts: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
     return dx * cos + dy * sin, dy * cos - dx * sin, turned
 
 
-def _binned(distance: Floats, force: Floats, chosen: np.ndarray[Any, Any], edges: Floats) -> Floats:
-    number: Ints = np.digitize(distance[chosen], edges) - 1
-    inside = (number >= 0) & (number < len(edges) - 1)
-    bins = len(edges) - 1
-    sums = np.bincount(number[inside], force[chosen][inside], bins)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(sums / np.bincount(number[inside], minlength=bins))
+@dataclass(frozen=True)
+class _Bins:
+    """Sums and numbers of forces between edges, gathered piece by piece."""
+
+    edges: Floats
+    sums: Floats
+    counts: Ints
+
+    @classmethod
+    def of(cls, edges: Floats) -> _Bins:
+        return cls(edges, np.zeros(len(edges) - 1), np.zeros(len(edges) - 1, dtype=np.int64))
+
+    def add(self, distance: Floats, force: Floats, chosen: np.ndarray[Any, Any]) -> None:
+        """Add the chosen forces, one after the other."""
+        number: Ints = np.digitize(distance[chosen], self.edges) - 1
+        inside = (number >= 0) & (number < len(self.sums))
+        np.add.at(self.sums, number[inside], force[chosen][inside])
+        np.add.at(self.counts, number[inside], 1)
+
+    def means(self) -> Floats:
+        """Mean force between the edges, NaN where there is none."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.sums / self.counts)
 
 
 def _network(corridors: Sequence[_Corridor]) -> Found:
