@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
+from dragchain.bearing import circumference, parts, within
 from dragchain.errors import SeriesError
 from dragchain.frames import Floats, Ints
 from dragchain.stats import MIN_SAMPLES, autocorrelation_time
@@ -149,9 +150,10 @@ def ahead_behind(
     dict
         ``ahead_n`` and ``behind_n``: sum of the normal forces within 90 degrees of the direction
         of motion and beyond, mean over the frames; ``ratio`` of the two; ``share_ahead`` of all.
+        A contact abeam counts half on either side.
     """
-    ahead = np.abs(bearing_rad) < np.pi / 2
-    weights = np.stack([normal_force_n * ahead, normal_force_n * ~ahead], axis=1)
+    ahead = within(bearing_rad, np.pi / 2)
+    weights = np.stack([normal_force_n * ahead, normal_force_n * (1.0 - ahead)], axis=1)
 
     def statistic(sums: Floats) -> Floats:
         front, back = sums[..., 0], sums[..., 1]
@@ -168,12 +170,14 @@ def bearing_profile(
     normal_force_n: Floats,
     bins: int = BEARING_BINS,
 ) -> tuple[Floats, list[Estimate]]:
-    """Return the edges of equal bins over (-pi, pi] and the mean force a frame in each, in N."""
-    edges = np.linspace(-np.pi, np.pi, bins + 1)
-    row = np.clip(np.searchsorted(edges, bearing_rad, side="left") - 1, 0, bins - 1)
+    """Return the edges of equal bins over the circumference and the mean force a frame in each, N.
+
+    A contact on an edge counts half on either side.
+    """
     sums = np.zeros((frames, bins))
-    np.add.at(sums, (frame, row), normal_force_n)
-    return edges, estimates(sums, lambda means: means)
+    for row in parts(bearing_rad, bins):
+        np.add.at(sums, (frame, row), 0.5 * normal_force_n)
+    return circumference(bins), estimates(sums, lambda means: means)
 
 
 # --- the force against depth -----------------------------------------------------------------

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dragchain.bearing import circumference, parts, within
 from dragchain.case import Case, Circle, load_case, load_outputs
 from dragchain.contact_events import (
     AMOUNTS,
@@ -543,7 +544,7 @@ def _digits(value: float | None) -> str:
 def _totals(sampled: Sampled, events: pd.DataFrame) -> dict[str, Any]:
     """Return totals, what they are a metre of path, the front's share, and shares of work."""
     rows, known = sampled.rows, [*AMOUNTS, "normal_work_j", "tool_work_j"]
-    ahead = (rows["bearing_rad"].abs() < np.pi / 2).to_numpy()
+    ahead = within(rows["bearing_rad"].to_numpy(np.float64), np.pi / 2)
     frame, frames = rows["frame"].to_numpy(), sampled.frames
     loads = rows["normal_impulse_ns"] * rows["mobilised"]
     sums = np.column_stack(
@@ -681,14 +682,20 @@ def _profiles(sampled: Sampled) -> dict[str, Any]:
     rows, metre = sampled.rows, sampled.path_m / sampled.frames
     frame, weight = rows["frame"].to_numpy(), rows["force_slide_nm"].to_numpy()
     depth = rows["depth_m"].to_numpy()
-    ranges = {"depth": (depth.min(), depth.max(), DEPTH_BINS), "bearing": (-np.pi, np.pi, None)}
+    levels = np.linspace(depth.min(), depth.max(), DEPTH_BINS + 1)
+    level = np.clip(np.searchsorted(levels, depth, side="right") - 1, 0, DEPTH_BINS - 1)
+    bins = {
+        "depth": (levels, (level, level)),
+        "bearing": (
+            circumference(BEARING_BINS),
+            parts(rows["bearing_rad"].to_numpy(np.float64), BEARING_BINS),
+        ),
+    }
     profiles = {}
-    for name, (low, high, bins) in ranges.items():
-        edges = np.linspace(low, high, (bins or BEARING_BINS) + 1)
-        value = depth if name == "depth" else rows["bearing_rad"].to_numpy()
-        bin_ = np.clip(np.searchsorted(edges, value, side="right") - 1, 0, len(edges) - 2)
+    for name, (edges, halves) in bins.items():
         sums = np.zeros((sampled.frames, len(edges) - 1))
-        np.add.at(sums, (frame, bin_), weight)
+        for half in halves:
+            np.add.at(sums, (frame, half), 0.5 * weight)
         found = estimates(sums, _per(metre * (edges[1] - edges[0])))
         profiles[name] = {"edges": edges.tolist(), "force_slide": _columns(found)}
     return profiles

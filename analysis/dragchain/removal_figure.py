@@ -17,6 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from dragchain import scene
+from dragchain.bearing import circumference, parts
 from dragchain.case import Case, Circle
 from dragchain.figures import BLUE, GREY, STYLE, WIDTH_IN, png
 from dragchain.findings import BEARING_BINS
@@ -203,12 +204,16 @@ def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> Non
     """Draw the mantle of a cylinder unrolled: bearing against depth."""
     tool = needed(case.tool, "tool")
     rows = sampled.rows[sampled.rows["tool_z_m"] > 1e-3 * tool.length_m]
-    bearings = np.linspace(-np.pi, np.pi, BEARING_BINS + 1)
+    bearings = circumference(BEARING_BINS)
     shallowest = 1e-3 * _depths(case)[0]
     depths = np.linspace(shallowest, tool.submersion_m, DEPTH_BINS + 1)
-    sums, _, _ = np.histogram2d(
-        rows["depth_m"], rows["bearing_rad"], [depths, bearings], weights=rows["force_slide_nm"]
-    )
+    middles = 0.5 * (bearings[:-1] + bearings[1:])
+    sums = np.zeros((DEPTH_BINS, BEARING_BINS))
+    for part in parts(rows["bearing_rad"].to_numpy(np.float64), BEARING_BINS):
+        weights = 0.5 * rows["force_slide_nm"]
+        sums += np.histogram2d(rows["depth_m"], middles[part], [depths, bearings], weights=weights)[
+            0
+        ]
     area = tool.radius_m * (bearings[1] - bearings[0]) * (depths[1] - depths[0])
     shown = sums / (area * sampled.path_m)
     axes.pcolormesh(np.degrees(bearings), depths * 1e3, shown, cmap=COLOURS, norm=scale)

@@ -117,7 +117,7 @@ def steady_arguments(
 def test_bearing_bins_hold_all_force_and_close_at_pi() -> None:
     edges, found = bearing_profile(*steady_arguments([math.pi, 0.1, -3.1], [4.0, 2.0, 1.0]), bins=4)
     assert edges == pytest.approx(np.array([-1, -0.5, 0, 0.5, 1]) * math.pi)
-    assert [estimate.value for estimate in found] == pytest.approx([1.0, 0.0, 2.0, 4.0])
+    assert [estimate.value for estimate in found] == pytest.approx([3.0, 0.0, 2.0, 2.0])
 
 
 def test_depth_bins_give_force_per_contact_and_per_depth() -> None:

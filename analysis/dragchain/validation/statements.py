@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from dragchain.bearing import circumference, parts, to_the_left, within
 from dragchain.case import Case, Circle, Tool
 from dragchain.errors import TableError
 from dragchain.findings import BEARING_BINS, DEPTH_BINS, estimate_columns
@@ -81,23 +82,22 @@ def _around_tool(point: Point) -> Found:
     bearing, depth, force = (
         table[name].to_numpy(np.float64) for name in ("bearing_rad", "depth_m", "normal_force_n")
     )
-    ahead = np.abs(bearing) < np.pi / 2
-    around = np.linspace(-np.pi, np.pi, BEARING_BINS + 1)
+    ahead = float((force * within(bearing, np.pi / 2)).sum() / force.sum())
     submersion = _tool(point.case).submersion_m
     levels = np.linspace(0.0, submersion, DEPTH_BINS + 1)
     counts, _ = np.histogram(depth, levels)
     sums, _ = np.histogram(depth, levels, weights=force)
     return {
-        "ratio": float(force[ahead].sum() / force[~ahead].sum()),
-        "share_ahead": float(force[ahead].sum() / force.sum()),
+        "ratio": _over(ahead, 1.0 - ahead),
+        "share_ahead": ahead,
         "slope": float(np.polyfit(depth, force, 1)[0]),
         "deep_over_shallow": _mean(force[depth > 2.0 / 3.0 * submersion])
         / _mean(force[depth < submersion / 3.0]),
         **_front(bearing, force),
         "outer_over_inner": _outer_over_inner(point.case, bearing, force),
         "bearing": {
-            "edges": around.tolist(),
-            "value": (np.histogram(bearing, around, weights=force)[0] / force.sum()).tolist(),
+            "edges": circumference(BEARING_BINS).tolist(),
+            "value": _around(bearing, force).tolist(),
         },
         "depth": {"edges": levels.tolist(), "value": (sums / np.maximum(counts, 1)).tolist()},
     }
@@ -113,24 +113,36 @@ def _mean(values: Floats) -> float:
     return float(values.mean()) if values.size else float("nan")
 
 
+def _around(bearing: Floats, force: Floats) -> Floats:
+    """Share of the force in each part of the circumference."""
+    halves = [np.bincount(part, force, BEARING_BINS) for part in parts(bearing, BEARING_BINS)]
+    return np.asarray(sum(halves) / (2.0 * force.sum()))
+
+
 def _front(bearing: Floats, force: Floats) -> Found:
     """The front quarter of the tool against its two flanks, of a quarter together."""
-    front = np.abs(bearing) <= FRONT
-    flank = (np.abs(bearing) > FRONT) & (np.abs(bearing) <= 2 * FRONT)
+    front = within(bearing, FRONT)
+    flank = within(bearing, 2 * FRONT) - front
+    in_front, at_flanks = float((force * front).sum()), float((force * flank).sum())
     return {
-        "front_share": float(force[front].sum() / force.sum()),
-        "front_contact_n": _mean(force[front]),
-        "flank_contact_n": _mean(force[flank]),
-        "front_over_flank": float(force[front].sum() / force[flank].sum()),
+        "front_share": in_front / float(force.sum()),
+        "front_contact_n": _over(in_front, float(front.sum())),
+        "flank_contact_n": _over(at_flanks, float(flank.sum())),
+        "front_over_flank": _over(in_front, at_flanks),
     }
+
+
+def _over(one: float, other: float) -> float:
+    return one / other if other else float("nan")
 
 
 def _outer_over_inner(case: Case, bearing: Floats, force: Floats) -> float | None:
     """Normal force on the half that points away from the bowl's axis over that on the other."""
     if not isinstance(case.motion, Circle):
         return None
-    outer = np.sign(bearing) == -np.sign(case.motion.sense)
-    return float(force[outer].sum() / force[~outer].sum())
+    left = float((force * to_the_left(bearing)).sum() / force.sum())
+    outer = left if case.motion.sense < 0 else 1.0 - left
+    return _over(outer, 1.0 - outer)
 
 
 # --- the network around the tool -------------------------------------------------------------
