@@ -207,13 +207,11 @@ def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> Non
     bearings = circumference(BEARING_BINS)
     shallowest = 1e-3 * _depths(case)[0]
     depths = np.linspace(shallowest, tool.submersion_m, DEPTH_BINS + 1)
-    middles = 0.5 * (bearings[:-1] + bearings[1:])
+    middles, half = 0.5 * (bearings[:-1] + bearings[1:]), 0.5 * rows["force_slide_nm"]
     sums = np.zeros((DEPTH_BINS, BEARING_BINS))
     for part in parts(rows["bearing_rad"].to_numpy(np.float64), BEARING_BINS):
-        weights = 0.5 * rows["force_slide_nm"]
-        sums += np.histogram2d(rows["depth_m"], middles[part], [depths, bearings], weights=weights)[
-            0
-        ]
+        grid = [depths, bearings]
+        sums += np.histogram2d(rows["depth_m"], middles[part], grid, weights=half)[0]
     area = tool.radius_m * (bearings[1] - bearings[0]) * (depths[1] - depths[0])
     shown = sums / (area * sampled.path_m)
     axes.pcolormesh(np.degrees(bearings), depths * 1e3, shown, cmap=COLOURS, norm=scale)
