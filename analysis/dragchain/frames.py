@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from dragchain.errors import TableError
@@ -19,11 +24,17 @@ KINDS = {BALL: "ball", ROD: "rod", FLOOR: "floor", SIDE: "side"}
 
 _POINT = ["point_x_m", "point_y_m", "point_z_m"]
 _FORCE = ["force_x_n", "force_y_n", "force_z_n"]
-_CONTACTS = ["step", "time_s", "a_id", "b_id", *_POINT, *_FORCE, "normal_force_n"]
-_BALLS = ["step", "ball_id", "x_m", "y_m", "z_m", "radius_m"]
+_CENTRE = ["x_m", "y_m", "z_m"]
+_CONTACTS = ["step", "a_id", "b_id", *_POINT, *_FORCE, "normal_force_n"]
+_BALLS = ["step", "time_s", "ball_id", *_CENTRE, "radius_m"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Columns = Mapping[str, NDArray[Any]]
+"""Columns of a table by their names, (n,) each."""
+
+GROUP_ROWS = 131_072
+"""Rows of a row group that `TableParts` writes: what it holds of a table."""
 
 
 @dataclass(frozen=True)
@@ -76,18 +87,28 @@ class NetworkFrame:
 
 
 def frame_of(
-    contacts: pd.DataFrame, balls: pd.DataFrame, step: int, time_s: float, heading_rad: float
+    contacts: pd.DataFrame | Columns,
+    balls: pd.DataFrame | Columns,
+    step: int,
+    time_s: float,
+    heading_rad: float,
 ) -> NetworkFrame:
     """Return the frame that rows of the contacts and balls tables of one step describe.
 
     Raises
     ------
     TableError
-        If a contact names a ball that the frame does not have.
+        If a contact names a ball that the frame does not have, or a ball has two rows.
     """
-    balls = balls.sort_values("ball_id")
-    ball_id = balls["ball_id"].to_numpy(np.int64)
-    b_id = contacts["b_id"].to_numpy(np.int64)
+    ball_id = np.array(balls["ball_id"], dtype=np.int64)
+    centre, radius = _vectors(balls, _CENTRE), np.array(balls["radius_m"], dtype=np.float64)
+    if (np.diff(ball_id) <= 0).any():
+        order = np.argsort(ball_id)
+        ball_id, centre, radius = ball_id[order], centre.T[:, order].T, radius[order]
+    twice = np.flatnonzero(np.diff(ball_id) == 0)
+    if twice.size:
+        raise TableError(f"balls.parquet has ball {ball_id[twice[0]]} twice in step {step}")
+    b_id = np.asarray(contacts["b_id"], dtype=np.int64)
     b = np.full(b_id.shape, -1, dtype=np.int64)
     b[b_id > 0] = _rows_of(b_id[b_id > 0], ball_id, step)
     return NetworkFrame(
@@ -95,26 +116,40 @@ def frame_of(
         time_s=time_s,
         heading_rad=heading_rad,
         ball_id=ball_id,
-        centre=balls[["x_m", "y_m", "z_m"]].to_numpy(np.float64),
-        radius=balls["radius_m"].to_numpy(np.float64),
-        a=_rows_of(contacts["a_id"].to_numpy(np.int64), ball_id, step),
+        centre=centre,
+        radius=radius,
+        a=_rows_of(np.asarray(contacts["a_id"], dtype=np.int64), ball_id, step),
         b=b,
         other=np.where(b_id > 0, BALL, b_id),
-        point=contacts[_POINT].to_numpy(np.float64),
-        force=contacts[_FORCE].to_numpy(np.float64),
-        normal_force=contacts["normal_force_n"].to_numpy(np.float64),
+        point=_vectors(contacts, _POINT),
+        force=_vectors(contacts, _FORCE),
+        normal_force=np.array(contacts["normal_force_n"], dtype=np.float64),
     )
+
+
+def _vectors(table: pd.DataFrame | Columns, names: Iterable[str]) -> Floats:
+    """Return three columns as vectors, (n, 3), each column in one piece."""
+    return np.array([table[name] for name in names], dtype=np.float64).T
 
 
 def _rows_of(ids: Ints, ball_id: Ints, step: int) -> Ints:
     """Return the row of each id in the sorted `ball_id`."""
-    unknown = ids[~np.isin(ids, ball_id)]
+    rows = places(ids, ball_id)
+    unknown = ids[rows < 0]
     if unknown.size:
         raise TableError(
             f"contacts of step {step} name ball {unknown[0]}, which balls.parquet does not have "
             "in that step: make the tables again from whole dumps"
         )
-    return np.searchsorted(ball_id, ids)
+    return rows
+
+
+def places(ids: Ints, known: Ints) -> Ints:
+    """Return the place of each id in `known`, whose ids are unlike; -1 where it is not there.
+
+    By hashing: in a time linear in both.
+    """
+    return np.asarray(pd.Index(known).get_indexer(pd.Index(ids)), dtype=np.int64)
 
 
 def counted_range(rod_force: pd.DataFrame) -> tuple[int, int]:
@@ -141,6 +176,9 @@ def counted_range(rod_force: pd.DataFrame) -> tuple[int, int]:
 def read_frames(run_dir: Path, steps: tuple[int, int] | None = None) -> Iterator[NetworkFrame]:
     """Yield the network frames of a process run in the order of their steps.
 
+    The tables are read row group by row group: of each no more is held than a row group and a
+    frame, however long the run is.
+
     Parameters
     ----------
     run_dir
@@ -156,21 +194,81 @@ def read_frames(run_dir: Path, steps: tuple[int, int] | None = None) -> Iterator
     tables = run_dir / "tables"
     rod_force = read_table(tables / "rod_force.parquet", ["step", "heading_rad", "counted"])
     first, last = counted_range(rod_force) if steps is None else steps
-    contacts = _stretch(tables / "contacts.parquet", _CONTACTS, first, last)
-    balls = _stretch(tables / "balls.parquet", [*_BALLS, "time_s"], first, last)
-    contact_rows = contacts.groupby("step").indices
-    ball_rows = balls.groupby("step").indices
     heading_step = rod_force["step"].to_numpy(np.int64)
     heading = np.unwrap(rod_force["heading_rad"].to_numpy(np.float64))
-    for step in np.unique(balls["step"].to_numpy(np.int64)).tolist():
-        of_step = balls.iloc[ball_rows[step]]
+    contacts = _Follower(_by_step(tables / "contacts.parquet", _CONTACTS, first, last))
+    for step, balls in _by_step(tables / "balls.parquet", _BALLS, first, last):
         yield frame_of(
-            contacts.iloc[contact_rows.get(step, [])],
-            of_step,
+            contacts.at(step),
+            balls,
             step,
-            float(of_step["time_s"].iloc[0]),
+            float(balls["time_s"][0]),
             float(np.interp(step, heading_step, heading)),
         )
+
+
+class _Follower:
+    """Finds the contacts of rising steps; a step without any has none."""
+
+    def __init__(self, by_step: Iterator[tuple[int, Columns]]) -> None:
+        self._by_step = by_step
+        self._next = next(by_step, None)
+
+    def at(self, step: int) -> Columns:
+        """Contacts of a step above the last one asked for."""
+        while self._next is not None and self._next[0] < step:
+            self._next = next(self._by_step, None)
+        if self._next is None or self._next[0] != step:
+            return {name: np.empty(0) for name in _CONTACTS}
+        return self._next[1]
+
+
+def _by_step(path: Path, names: list[str], first: int, last: int) -> Iterator[tuple[int, Columns]]:
+    """Yield the rows of every step from `first` to `last`, in the order of the table."""
+    held: list[Columns] = []
+    step = -1
+    for group in _row_groups(path, names, first, last):
+        cuts = np.flatnonzero(np.diff(group["step"])) + 1
+        for begin, end in pairwise([0, *cuts.tolist(), len(group["step"])]):
+            part = {name: values[begin:end] for name, values in group.items()}
+            if held and part["step"][0] != step:
+                yield step, _joined(held)
+                held = []
+            if part["step"][0] < step:
+                raise TableError(
+                    f"{path}: step {part['step'][0]} comes after step {step}: make the tables "
+                    f"again with `dragchain tables {path.parent.parent}`"
+                )
+            step = int(part["step"][0])
+            held.append(part)
+    if held:
+        yield step, _joined(held)
+
+
+def _joined(parts: list[Columns]) -> Columns:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _row_groups(path: Path, names: list[str], first: int, last: int) -> Iterator[Columns]:
+    """Yield the rows of a stretch of steps, row group by row group, those of others unread."""
+    _there(path)
+    with pq.ParquetFile(path) as file:
+        missing = sorted(set(names) - set(file.schema_arrow.names))
+        if missing:
+            raise TableError(
+                f"{path} has no column {missing[0]}: make the tables again with "
+                f"`dragchain tables {path.parent.parent}`"
+            )
+        column = file.schema_arrow.names.index("step")
+        for number in range(file.num_row_groups):
+            known = file.metadata.row_group(number).column(column).statistics
+            if known is not None and known.has_min_max and (known.max < first or known.min > last):
+                continue
+            group = file.read_row_group(number, columns=names)
+            columns = {name: group[name].to_numpy() for name in names}
+            inside = (columns["step"] >= first) & (columns["step"] <= last)
+            if inside.any():
+                yield {name: values[inside] for name, values in columns.items()}
 
 
 def read_table(path: Path, columns: list[str] | None = None) -> pd.DataFrame:
@@ -181,16 +279,13 @@ def read_table(path: Path, columns: list[str] | None = None) -> pd.DataFrame:
     TableError
         If the file is not there.
     """
-    if not path.is_file():
-        raise TableError(f"{path} is not there: run `dragchain tables {path.parent.parent}`")
+    _there(path)
     return pd.read_parquet(path, columns=columns)
 
 
-def _stretch(path: Path, columns: list[str], first: int, last: int) -> pd.DataFrame:
+def _there(path: Path) -> None:
     if not path.is_file():
-        return read_table(path)
-    limits = [("step", ">=", first), ("step", "<=", last)]
-    return pd.read_parquet(path, columns=columns, filters=limits)
+        raise TableError(f"{path} is not there: run `dragchain tables {path.parent.parent}`")
 
 
 def write_parquet(table: pd.DataFrame, path: Path) -> None:
@@ -198,3 +293,60 @@ def write_parquet(table: pd.DataFrame, path: Path) -> None:
     draft = path.with_name(path.name + ".part")
     table.to_parquet(draft, index=False)
     draft.replace(path)
+
+
+class TableParts:
+    """A table that is written part by part and appears under its name only once it is whole.
+
+    Use it as a context manager. It holds no more than `GROUP_ROWS` rows and the last part. If the
+    block ends in an exception, nothing is left behind.
+
+    Parameters
+    ----------
+    path : Path
+        The table's final name.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._draft = path.with_name(path.name + ".part")
+        self._parts: list[pd.DataFrame] = []
+        self._writer: Any = None
+
+    def __enter__(self) -> Self:
+        """Begin; the file is there with the first rows."""
+        return self
+
+    def write(self, part: pd.DataFrame) -> None:
+        """Append the rows of a part."""
+        self._parts.append(part)
+        if sum(map(len, self._parts)) >= GROUP_ROWS:
+            self._flush()
+
+    def _flush(self) -> None:
+        if not self._parts:
+            return
+        rows = pd.concat(self._parts, ignore_index=True)
+        schema = None if self._writer is None else self._writer.schema
+        table = pa.Table.from_pandas(rows, schema, preserve_index=False)
+        if self._writer is None:
+            self._writer = pq.ParquetWriter(self._draft, table.schema)
+        self._writer.write_table(table)
+        self._parts = []
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Put the draft in the table's place, or remove it after an exception."""
+        try:
+            if kind is None:
+                self._flush()
+            if self._writer is not None:
+                self._writer.close()
+            if kind is None:
+                self._draft.replace(self._path)
+        finally:
+            self._draft.unlink(missing_ok=True)
