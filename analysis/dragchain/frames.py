@@ -231,14 +231,14 @@ def _by_step(path: Path, names: list[str], first: int, last: int) -> Iterator[tu
         cuts = np.flatnonzero(np.diff(group["step"])) + 1
         for begin, end in pairwise([0, *cuts.tolist(), len(group["step"])]):
             part = {name: values[begin:end] for name, values in group.items()}
-            if held and part["step"][0] != step:
-                yield step, _joined(held)
-                held = []
             if part["step"][0] < step:
                 raise TableError(
                     f"{path}: step {part['step'][0]} comes after step {step}: make the tables "
                     f"again with `dragchain tables {path.parent.parent}`"
                 )
+            if held and part["step"][0] != step:
+                yield step, _joined(held)
+                held = []
             step = int(part["step"][0])
             held.append(part)
     if held:

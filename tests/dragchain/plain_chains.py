@@ -16,10 +16,39 @@ import pandas as pd
 
 from dragchain.chains import ALPHA_RAD, LEAST_BALLS, RodPath, dominant_path, major_stress
 from dragchain.forces import wrap_angle
-from dragchain.frames import FLOOR, KINDS, ROD, SIDE, Floats, Ints, NetworkFrame
+from dragchain.frames import BALL, FLOOR, KINDS, ROD, SIDE, Floats, Ints, NetworkFrame
 
 BOWL = -1
+POINT_AND_FORCE = (("point", "m"), ("force", "n"))
 Net = dict[int, list[tuple[float, int, int]]]
+
+
+def plain_frame(contacts: pd.DataFrame, balls: pd.DataFrame) -> NetworkFrame:
+    balls = balls.sort_values("ball_id")
+    ball_id = balls["ball_id"].to_numpy(np.int64)
+    a_id, b_id = contacts["a_id"].to_numpy(np.int64), contacts["b_id"].to_numpy(np.int64)
+    b = np.full(b_id.shape, -1, dtype=np.int64)
+    b[b_id > 0] = _rows_of(b_id[b_id > 0], ball_id)
+    vectors = [[f"{name}_{axis}_{unit}" for axis in "xyz"] for name, unit in POINT_AND_FORCE]
+    return NetworkFrame(
+        step=int(balls["step"].iloc[0]),
+        time_s=float(balls["time_s"].iloc[0]),
+        heading_rad=0.0,
+        ball_id=ball_id,
+        centre=balls[["x_m", "y_m", "z_m"]].to_numpy(np.float64),
+        radius=balls["radius_m"].to_numpy(np.float64),
+        a=_rows_of(a_id, ball_id),
+        b=b,
+        other=np.where(b_id > 0, BALL, b_id),
+        point=contacts[vectors[0]].to_numpy(np.float64),
+        force=contacts[vectors[1]].to_numpy(np.float64),
+        normal_force=contacts["normal_force_n"].to_numpy(np.float64),
+    )
+
+
+def _rows_of(ids: Ints, ball_id: Ints) -> Ints:
+    assert np.isin(ids, ball_id).all()
+    return np.searchsorted(ball_id, ids)
 
 
 def plain_stress(frame: NetworkFrame) -> Floats:
