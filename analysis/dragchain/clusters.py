@@ -105,10 +105,10 @@ def find_clusters(frame: NetworkFrame, force_n: Floats) -> Clusters:
     by_stop = np.argsort(stops, kind="stable")
     pairs = [pair for ways in SPANS.values() for pair in ways]
     counts, joined = kernels.grow_clusters(
-        frame.a[order],
-        np.where(frame.between_balls(), frame.b, -1)[order],
+        frame.a.astype(np.int32)[order],
+        np.where(frame.between_balls(), frame.b, -1).astype(np.int32)[order],
         _touched(frame)[order],
-        np.array(pairs),
+        np.array(pairs, dtype=np.uint8),
         stops[by_stop],
         frame.ball_id.size,
     )
@@ -121,12 +121,14 @@ def find_clusters(frame: NetworkFrame, force_n: Floats) -> Clusters:
     return Clusters(thresholds, stops, clusters, members, largest, squares, size, percolation)
 
 
-def _touched(frame: NetworkFrame) -> Ints:
+def _touched(frame: NetworkFrame) -> NDArray[np.uint8]:
     """Return a bit for what each contact's ball touches with it, (M,), 0 for another ball."""
-    quarter = np.round(np.arctan2(frame.point[:, 1], frame.point[:, 0]) / (0.5 * np.pi))
-    side = _QUARTERS[quarter.astype(np.int64) % 4]
-    kinds = [frame.other == ROD, frame.other == FLOOR, frame.other == SIDE]
-    return np.select(kinds, [np.full_like(side, _ROD), np.full_like(side, _FLOOR), side], 0)
+    bits = np.zeros(frame.other.shape, dtype=np.uint8)
+    bits[frame.other == ROD], bits[frame.other == FLOOR] = _ROD, _FLOOR
+    side = np.flatnonzero(frame.other == SIDE)
+    bearing = np.arctan2(frame.point[side, 1], frame.point[side, 0])
+    bits[side] = _QUARTERS[np.round(bearing / (0.5 * np.pi)).astype(np.int64) % 4]
+    return bits
 
 
 def frame_clusters(frame: NetworkFrame) -> Clusters:

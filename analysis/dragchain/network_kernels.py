@@ -1,8 +1,11 @@
 """Compiled loops over the contacts of a network frame.
 
-They hold what has no form in arrays: forests of balls (a ball's `leader` leads to the root of its
-tree; Tarjan 1975, J. ACM 22, 215-225) and searches. All take time and memory linear in balls and
-contacts, but `shortest_path`, whose time is linear in the contacts that it meets.
+They hold what has no form in arrays: forests of balls (Tarjan 1975, J. ACM 22, 215-225) and
+searches. All take steps that are linear in balls and contacts, but `shortest_path`, whose steps
+are linear in the contacts that it meets. What is noted of a ball takes as few bytes as it can: in a
+large network the time goes into memory that is not near.
+
+`leader` is a forest: of a ball the one above it, of a root minus the number of balls of its tree.
 """
 
 from __future__ import annotations
@@ -47,10 +50,24 @@ def ball_moments(a, b, centre, point, force):
 
 @njit(nogil=True, cache=True)
 def _root(leader, ball):
-    while leader[ball] != ball:
-        leader[ball] = leader[leader[ball]]
-        ball = leader[ball]
+    """Find the root of a ball's tree, and shorten the way there."""
+    above = leader[ball]
+    while above >= 0:
+        higher = leader[above]
+        if higher >= 0:
+            leader[ball] = higher
+        ball, above = above, higher
     return ball
+
+
+@njit(nogil=True, cache=True)
+def _join(leader, one, other):
+    """Hang the smaller of two trees below the root of the larger: the root, and the one below."""
+    if leader[one] > leader[other]:
+        one, other = other, one
+    leader[one] += leader[other]
+    leader[other] = one
+    return one, other
 
 
 @njit(nogil=True, cache=True)
@@ -73,7 +90,7 @@ def link_balls(balls, first, second, end_first, end_second):
     """
     near = np.full((balls, 2), -1)
     by = np.full((balls, 2), -1)
-    leader = np.arange(balls)
+    leader = np.full(balls, -1, dtype=np.int32)
     for pair in range(len(first)):
         i, j = first[pair], second[pair]
         end_i, end_j = int(end_first[pair]), int(end_second[pair])
@@ -81,7 +98,7 @@ def link_balls(balls, first, second, end_first, end_second):
             continue
         root_i, root_j = _root(leader, i), _root(leader, j)
         if root_i != root_j:
-            leader[root_i] = root_j
+            _join(leader, root_i, root_j)
             near[i, end_i], near[j, end_j] = j, i
             by[i, end_i] = by[j, end_j] = pair
     return near, by
@@ -161,15 +178,12 @@ def widths(a, b, force, order, nodes, target):
     """
     width = np.full(nodes, -np.inf)
     width[target] = np.inf
-    leader = np.arange(nodes)
-    following = np.arange(nodes)  # the nodes of a tree as a ring
-    size = np.ones(nodes, dtype=np.int64)
+    leader = np.full(nodes, -1, dtype=np.int32)
+    following = np.arange(nodes).astype(np.int32)  # the nodes of a tree as a ring
     for edge in order:
         root_a, root_b = _root(leader, a[edge]), _root(leader, b[edge])
         if root_a == root_b:
             continue
-        if size[root_a] < size[root_b]:
-            root_a, root_b = root_b, root_a
         if (width[root_a] == -np.inf) != (width[root_b] == -np.inf):
             lost = root_a if width[root_a] == -np.inf else root_b
             node = lost
@@ -178,8 +192,7 @@ def widths(a, b, force, order, nodes, target):
                 node = following[node]
                 if node == lost:
                     break
-        leader[root_b] = root_a
-        size[root_a] += size[root_b]
+        _join(leader, root_a, root_b)
         following[root_a], following[root_b] = following[root_b], following[root_a]
     return width
 
@@ -192,7 +205,7 @@ def adjacency(a, b, nodes):
     -------
     starts : (nodes + 1,) ndarray of int64
         Where each node's edges begin in the other two, and where the last one's end.
-    near, edge : (2 M,) ndarray of int64
+    near, edge : (2 M,) ndarray of int32
         The node on the other side, and the edge.
     """
     starts = np.zeros(nodes + 1, dtype=np.int64)
@@ -202,8 +215,8 @@ def adjacency(a, b, nodes):
     for node in range(nodes):
         starts[node + 1] += starts[node]
     place = starts[:-1].copy()
-    near = np.empty(2 * len(a), dtype=np.int64)
-    edge = np.empty(2 * len(a), dtype=np.int64)
+    near = np.empty(2 * len(a), dtype=np.int32)
+    edge = np.empty(2 * len(a), dtype=np.int32)
     for k in range(len(a)):
         i, j = a[k], b[k]
         near[place[i]], edge[place[i]] = j, k
@@ -216,9 +229,9 @@ def adjacency(a, b, nodes):
 @njit(nogil=True, cache=True)
 def search_space(nodes):
     """Return what `shortest_path` notes of every node, to be used for many searches."""
-    mark = np.full(nodes, -1)
-    depth, queue = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
-    come, by = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
+    mark = np.full(nodes, -1, dtype=np.int32)
+    depth, queue = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
+    come, by = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
     return mark, depth, queue, come, by, np.empty(nodes)
 
 
@@ -288,9 +301,9 @@ def grow_clusters(a, b, touch, spans, stops, balls):
     a, b : (M,) ndarray of int64
         The balls of each contact, in the order in which contacts join; ``b`` is negative where
         the other body is no ball.
-    touch : (M,) ndarray of int64
+    touch : (M,) ndarray of uint8
         Bits of the places that ball ``a`` touches with the contact.
-    spans : (S, 2) ndarray of int64
+    spans : (S, 2) ndarray of uint8
         A cluster spans if it touches one of the places of either column.
     stops : (K,) ndarray of int64
         Rising numbers of contacts after which the clusters are counted.
@@ -305,12 +318,12 @@ def grow_clusters(a, b, touch, spans, stops, balls):
     joined : (S,) ndarray of int64
         The contact with which a cluster spans for the first time, or -1.
     """
-    leader = np.arange(balls)
-    size = np.ones(balls, dtype=np.int64)
-    places = np.zeros(balls, dtype=np.int64)
+    leader = np.full(balls, -1, dtype=np.int32)
+    places = np.zeros(balls, dtype=np.uint8)
     counts = np.zeros((len(stops), 4), dtype=np.int64)
     joined = np.full(len(spans), -1)
-    clusters = members = largest = squares = stop = 0
+    clusters = members = largest = squares = np.int64(0)
+    stop = 0
     for contact in range(len(a) + 1):
         while stop < len(stops) and stops[stop] == contact:
             counts[stop] = clusters, members, largest, squares
@@ -318,26 +331,26 @@ def grow_clusters(a, b, touch, spans, stops, balls):
         if contact == len(a):
             break
         root = _root(leader, a[contact])
-        places[root] |= touch[contact]
         if b[contact] >= 0:
             other = _root(leader, b[contact])
             if other == root:
                 continue
-            if size[root] < size[other]:
-                root, other = other, root
             for tree in (root, other):
-                if size[tree] == 1:
-                    members += 1
-                else:
-                    clusters -= 1
-                    squares -= size[tree] ** 2
-            leader[other] = root
-            size[root] += size[other]
-            places[root] |= places[other]
+                size = -np.int64(leader[tree])
+                members += size == 1
+                clusters -= size > 1
+                squares -= size**2 * (size > 1)
+            root, below = _join(leader, root, other)
+            places[root] |= places[below]
+            size = -np.int64(leader[root])
             clusters += 1
-            squares += size[root] ** 2
-            largest = max(largest, size[root])
-        for span in range(len(spans)):
-            if joined[span] < 0 and places[root] & spans[span, 0] and places[root] & spans[span, 1]:
-                joined[span] = contact
+            squares += size**2
+            largest = max(largest, size)
+        else:
+            places[root] |= touch[contact]
+        if places[root]:
+            for span in range(len(spans)):
+                spanned = places[root] & spans[span, 0] and places[root] & spans[span, 1]
+                if spanned and joined[span] < 0:
+                    joined[span] = contact
     return counts, joined
