@@ -7,20 +7,23 @@
     For each strong rod contact the path through strong contacts to the bowl whose weakest contact
     is strongest, see `rod_paths`.
 
-No result depends on the numbering of the balls or on the order of the contacts.
+As long as no two contacts bear the same force, no result depends on the numbering of the balls or
+on the order of the contacts. Where equal forces leave a choice, the contact counts that comes first
+in the frame, which in ``contacts.parquet`` is the one with the lower ids.
 """
 
 from __future__ import annotations
 
-import heapq
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from dragchain import network_kernels as kernels
 from dragchain.forces import wrap_angle
 from dragchain.frames import FLOOR, KINDS, ROD, SIDE, Floats, Ints, NetworkFrame
 
@@ -35,8 +38,6 @@ STRESS_FACTOR = 1.0
 
 THRESHOLD = 1.0
 """Least normal force of a rod path's contacts, as a multiple of the frame's mean."""
-
-_BOWL = -1
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,36 @@ class RodPath:
     end: int | None
 
 
+@dataclass(frozen=True)
+class ChainRows:
+    """C chains, one after another, as rows of a frame.
+
+    Attributes
+    ----------
+    balls, contacts : (K,) and (L,) ndarray of int64
+        Rows of the balls and of the contacts, in the order of each chain.
+    ball_starts, contact_starts : (C + 1,) ndarray of int64
+        Where each chain begins in `balls` and in `contacts`, and where the last one ends.
+    """
+
+    balls: Ints
+    contacts: Ints
+    ball_starts: Ints
+    contact_starts: Ints
+
+    def __len__(self) -> int:
+        return len(self.ball_starts) - 1
+
+    def ball_lists(self) -> list[list[int]]:
+        """Return the rows of each chain's balls."""
+        return _split(self.balls, self.ball_starts)
+
+
+def _split(values: Ints, starts: Ints) -> list[list[int]]:
+    flat, at = values.tolist(), starts.tolist()
+    return [flat[begin:end] for begin, end in pairwise(at)]
+
+
 # --- stress and Peters' chains ---------------------------------------------------------------
 
 
@@ -68,13 +99,8 @@ def ball_stress(frame: NetworkFrame) -> Floats:
     ball, over the ball's volume, made symmetric (Weber 1966; Peters et al. 2005, eq. 1). Contacts
     with rod and bowl count too.
     """
-    inner = frame.between_balls()
-    ball = np.concatenate([frame.a, frame.b[inner]])
-    point = np.concatenate([frame.point, frame.point[inner]])
-    force = np.concatenate([frame.force, -frame.force[inner]])
-    moment = -np.einsum("ci,cj->cij", point - frame.centre[ball], force)
-    total = np.zeros((frame.ball_id.size, 3, 3))
-    np.add.at(total, ball, moment)
+    other = np.where(frame.between_balls(), frame.b, -1)
+    total: Floats = kernels.ball_moments(frame.a, other, frame.centre, frame.point, frame.force)
     volume = 4.0 / 3.0 * np.pi * frame.radius**3
     return (total + total.transpose(0, 2, 1)) / (2.0 * volume[:, None, None])
 
@@ -97,67 +123,49 @@ def peters_chains(
     times the mean of all balls (1 in the paper). Two highly stressed balls in contact are linked
     when the line of their centres is within `alpha_rad` of the principal axis of both; at least
     `LEAST_BALLS` linked balls are a chain (Peters et al. 2005). Ours is the rule for more than one
-    candidate at the same end of a ball: candidates are taken by falling normal force, each end of
-    an axis holds one link, and no link closes a ring, so that every chain is a path and no ball is
-    in two chains. A chain starts at its higher end. `major` is what `major_stress` returns for the
+    candidate at the same end of a ball: candidates are taken by falling normal force (of equal
+    ones the first of the frame), each end of an axis holds one link, and no link closes a ring, so
+    that every chain is a path and no ball is in two chains. A chain starts at its higher end, and
+    the chains come by the height of their starts. `major` is what `major_stress` returns for the
     frame, if it is known already.
     """
-    if not frame.normal_force.size:
-        return []
+    return peters_rows(frame, alpha_rad, stress_factor, major).ball_lists()
+
+
+def peters_rows(
+    frame: NetworkFrame,
+    alpha_rad: float = ALPHA_RAD,
+    stress_factor: float = STRESS_FACTOR,
+    major: tuple[Floats, Floats] | None = None,
+) -> ChainRows:
+    """Return the chains of `peters_chains` with the contacts between their balls."""
     stress, axis = major_stress(ball_stress(frame)) if major is None else major
-    high = stress > stress_factor * stress.mean()
-    first, second, end = _candidates(frame, alpha_rad, high, axis)
-    links: dict[int, dict[int, int]] = {}
-    leader = np.arange(frame.ball_id.size)
-    for i, j, end_i, end_j in zip(
-        first.tolist(), second.tolist(), end[0].tolist(), end[1].tolist(), strict=True
-    ):
-        free = end_i not in links.get(i, {}) and end_j not in links.get(j, {})
-        root_i, root_j = _root(leader, i), _root(leader, j)
-        if free and root_i != root_j:
-            leader[root_i] = root_j
-            links.setdefault(i, {})[end_i] = j
-            links.setdefault(j, {})[end_j] = i
-    return [chain for chain in _walk(links, frame.centre) if len(chain) >= LEAST_BALLS]
+    high = stress > stress_factor * stress.mean() if stress.size else stress > 0.0
+    candidates, end = _candidates(frame, alpha_rad, high, axis)
+    near, by = kernels.link_balls(
+        frame.ball_id.size, frame.a[candidates], frame.b[candidates], end[0], end[1]
+    )
+    ends = np.flatnonzero((near >= 0).sum(axis=1) == 1)
+    ends = ends[np.lexsort(-frame.centre[ends].T)]
+    balls, pairs, starts = kernels.walk_links(near, by, ends, LEAST_BALLS)
+    return ChainRows(balls, candidates[pairs], starts, starts - np.arange(len(starts)))
 
 
 def _candidates(
     frame: NetworkFrame, alpha_rad: float, high: NDArray[np.bool_], axis: Floats
-) -> tuple[Ints, Ints, NDArray[np.bool_]]:
-    """Return the linkable pairs by falling force, and at which end of either axis they link."""
+) -> tuple[Ints, NDArray[np.bool_]]:
+    """Return the linkable contacts by falling force, and at which end of either axis they link."""
     inner = np.flatnonzero(frame.between_balls())
     inner = inner[high[frame.a[inner]] & high[frame.b[inner]]]
-    inner = inner[np.argsort(-frame.normal_force[inner], kind="stable")]
     first, second = frame.a[inner], frame.b[inner]
     line = frame.centre[second] - frame.centre[first]
     line /= np.linalg.norm(line, axis=1, keepdims=True)
     cosine = np.stack(
         [np.einsum("ci,ci->c", axis[first], line), -np.einsum("ci,ci->c", axis[second], line)]
     )
-    aligned = (np.abs(cosine) >= np.cos(alpha_rad)).all(axis=0)
-    return first[aligned], second[aligned], cosine[:, aligned] > 0
-
-
-def _root(leader: Ints, ball: int) -> int:
-    while leader[ball] != ball:
-        leader[ball] = leader[leader[ball]]
-        ball = int(leader[ball])
-    return ball
-
-
-def _walk(links: dict[int, dict[int, int]], centre: Floats) -> Iterator[list[int]]:
-    """Yield every path of the links once, from its higher end."""
-    seen: set[int] = set()
-    ends = [ball for ball, of_ball in links.items() if len(of_ball) == 1]
-    for start in sorted(ends, key=lambda ball: tuple(-centre[ball, ::-1])):
-        if start in seen:
-            continue
-        chain, ball, before = [start], start, None
-        while following := [other for other in links[ball].values() if other != before]:
-            before, ball = ball, following[0]
-            chain.append(ball)
-        seen.add(ball)
-        yield chain
+    aligned = np.flatnonzero((np.abs(cosine) >= np.cos(alpha_rad)).all(axis=0))
+    aligned = aligned[np.argsort(-frame.normal_force[inner[aligned]], kind="stable")]
+    return inner[aligned], cosine[:, aligned] > 0
 
 
 # --- paths from the rod to the bowl ----------------------------------------------------------
@@ -172,103 +180,61 @@ def rod_paths(
     strong. A path leads from the rod contact through strong contacts between balls to a strong
     contact with floor or side. Of all such paths the widest counts: the one whose weakest contact
     (its bottleneck, rod and bowl contacts included) is strongest; among several the one with the
-    fewest contacts, then the one with the largest sum of forces. The widest path of a graph runs
-    along its maximum spanning tree (Hu 1961, Oper. Res. 9, 898-900); the tie rule is ours.
+    fewest contacts, then the one with the largest sum of forces, then the one that is found first
+    from the rod on, level by level, where contacts are taken in the order of the frame. The widest
+    path of a graph runs along its maximum spanning tree (Hu 1961, Oper. Res. 9, 898-900); the tie
+    rule is ours.
 
     With `with_rod` false the forces of rod contacts play no part, not even in the mean: a path
     leads from every ball that the rod pushes, and its bottleneck is that of the contacts behind
     that ball.
     """
-    strong = np.flatnonzero(frame.normal_force > threshold * frame.mean_force_n(with_rod=with_rod))
-    net = _strong_net(frame, strong)
-    width = _widths(net)
-    pushed = strong if with_rod else np.flatnonzero(frame.normal_force > 0.0)
+    rows = path_rows(frame, threshold, with_rod=with_rod)
+    pairs = zip(rows.ball_lists(), _split(rows.contacts, rows.contact_starts), strict=True)
+    return [RodPath(tuple(balls), tuple(links), _end(frame, links)) for balls, links in pairs]
+
+
+def _end(frame: NetworkFrame, contacts: list[int]) -> int | None:
+    return int(frame.other[contacts[-1]]) if len(contacts) > 1 else None
+
+
+def path_rows(
+    frame: NetworkFrame, threshold: float = THRESHOLD, *, with_rod: bool = True
+) -> ChainRows:
+    """Return the paths of `rod_paths`; one that leads nowhere has the rod contact alone."""
+    force = frame.normal_force
+    strong = np.flatnonzero(force > threshold * frame.mean_force_n(with_rod=with_rod))
+    pushed = strong if with_rod else np.flatnonzero(force > 0.0)
     rods = pushed[frame.other[pushed] == ROD]
-    rods = rods[np.argsort(-frame.normal_force[rods], kind="stable")]
-    return [_path_from(frame, net, width, int(rod), with_rod) for rod in rods]
+    rods = rods[np.argsort(-force[rods], kind="stable")]
+    links = strong[frame.other[strong] != ROD]
+    bowl = frame.ball_id.size
+    ends = frame.a[links], np.where(frame.between_balls()[links], frame.b[links], bowl)
+    strength, start = force[links], frame.a[rods]
+    width = kernels.widths(*ends, strength, np.argsort(-strength), bowl + 1, bowl)[start]
+    least = np.minimum(width, force[rods]) if with_rod else width
+    net, space = kernels.adjacency(*ends, bowl + 1), kernels.search_space(bowl + 1)
+    balls, contacts = [], []
+    for number in range(len(rods)):
+        ball, link = start[number : number + 1], links[:0]
+        if width[number] > -np.inf:
+            ball, link = kernels.shortest_path(
+                net, strength, start[number], bowl, least[number], number, space
+            )
+        balls.append(ball)
+        contacts.append(np.append(rods[number], links[link]))
+    return ChainRows(_joined(balls), _joined(contacts), _starts(balls), _starts(contacts))
 
 
-_Net = dict[int, list[tuple[float, int, int]]]
+def _joined(parts: list[Ints]) -> Ints:
+    return np.concatenate([np.empty(0, dtype=np.int64), *parts])
 
 
-def _strong_net(frame: NetworkFrame, strong: Ints) -> _Net:
-    """Return (normal force, contact, other node) of each node; the bowl is one node."""
-    kept = strong[frame.other[strong] != ROD]
-    ends = np.where(frame.between_balls()[kept], frame.b[kept], _BOWL)
-    net: _Net = {_BOWL: []}
-    for a, b, contact, force in zip(
-        frame.a[kept].tolist(),
-        ends.tolist(),
-        kept.tolist(),
-        frame.normal_force[kept].tolist(),
-        strict=True,
-    ):
-        net.setdefault(a, []).append((force, contact, b))
-        net.setdefault(b, []).append((force, contact, a))
-    return net
-
-
-def _widths(net: _Net) -> dict[int, float]:
-    """Return the bottleneck of the widest path from the bowl to every node that has a path."""
-    width: dict[int, float] = {}
-    heap = [(-np.inf, _BOWL)]
-    while heap:
-        negative, node = heapq.heappop(heap)
-        if node in width:
-            continue
-        width[node] = -negative
-        for force, _, other in net[node]:
-            if other not in width:
-                heapq.heappush(heap, (max(negative, -force), other))
-    return width
-
-
-def _path_from(
-    frame: NetworkFrame, net: _Net, width: dict[int, float], rod: int, with_rod: bool
-) -> RodPath:
-    start = int(frame.a[rod])
-    if start not in width:
-        return RodPath((start,), (rod,), None)
-    bottleneck = min(float(frame.normal_force[rod]), width[start]) if with_rod else width[start]
-    balls, contacts = _shortest(net, start, bottleneck)
-    return RodPath(balls, (rod, *contacts), int(frame.other[contacts[-1]]))
-
-
-def _shortest(net: _Net, start: int, least: float) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return balls and contacts of the path to the bowl with the fewest contacts of `least` force.
-
-    Level by level; within a level the largest sum of forces wins.
-    """
-    best: dict[int, tuple[float, int, int]] = {start: (0.0, -1, start)}
-    level = {start: 0.0}
-    while _BOWL not in best:
-        found: dict[int, tuple[float, int, int]] = {}
-        for node, total in level.items():
-            for force, contact, other in net[node]:
-                if force < least or other in best:
-                    continue
-                if other not in found or total + force > found[other][0]:
-                    found[other] = (total + force, contact, node)
-        best |= found
-        level = {node: entry[0] for node, entry in found.items()}
-    return _trace(best, start)
-
-
-def _trace(
-    best: dict[int, tuple[float, int, int]], start: int
-) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    balls: list[int] = []
-    contacts: list[int] = []
-    node = _BOWL
-    while node != start:
-        _, contact, node = best[node]
-        contacts.append(contact)
-        balls.append(node)
-    return tuple(reversed(balls)), tuple(reversed(contacts))
+def _starts(parts: list[Ints]) -> Ints:
+    return np.cumsum([0, *map(len, parts)])
 
 
 # --- measures --------------------------------------------------------------------------------
-
 _COLUMNS: dict[str, str] = {
     "step": "int64",
     "time_s": "float64",
@@ -314,59 +280,23 @@ def chain_table(
         direction: it is listed from its higher end, and reaches the bowl if one of its balls
         touches it; ``end_kind`` is then `none` all the same.
     """
-    rows = [*_peters_rows(frame, alpha_rad, stress_factor), *_path_rows(frame, threshold)]
-    moment = {"step": frame.step, "time_s": frame.time_s}
-    table = pd.DataFrame([moment | row for row in rows], columns=list(_COLUMNS))
-    return table.astype(_COLUMNS)
-
-
-def _peters_rows(
-    frame: NetworkFrame, alpha_rad: float, stress_factor: float
-) -> Iterator[dict[str, object]]:
-    major = major_stress(ball_stress(frame))
-    chains = peters_chains(frame, alpha_rad, stress_factor, major)
-    if not chains:
-        return
-    stress, _ = major
-    force_of = _force_between(frame)
-    on_bowl = set(frame.a[(frame.other == FLOOR) | (frame.other == SIDE)].tolist())
-    for chain in chains:
-        forces = [force_of[i, j] for i, j in pairwise(chain)]
-        yield {
-            **_measures(frame, chain, forces, frame.centre[chain]),
-            "definition": "peters",
-            "major_stress_mean_pa": float(stress[chain].mean()),
-            "reaches_bowl": not on_bowl.isdisjoint(chain),
-            "end_kind": "none",
-            "dominant": False,
+    tables = [_peters_table(frame, alpha_rad, stress_factor), _path_table(frame, threshold)]
+    count = sum(len(table["ball_ids"]) for table in tables)
+    moment = {"step": np.full(count, frame.step), "time_s": np.full(count, frame.time_s)}
+    return pd.DataFrame(
+        {
+            name: _column(kind, [moment[name]] if name in moment else [t[name] for t in tables])
+            for name, kind in _COLUMNS.items()
         }
+    )
 
 
-def _force_between(frame: NetworkFrame) -> dict[tuple[int, int], float]:
-    inner = frame.between_balls()
-    pairs = zip(frame.a[inner].tolist(), frame.b[inner].tolist(), strict=True)
-    forces = dict(zip(pairs, frame.normal_force[inner].tolist(), strict=True))
-    return forces | {(j, i): force for (i, j), force in forces.items()}
-
-
-def _path_rows(frame: NetworkFrame, threshold: float) -> Iterator[dict[str, object]]:
-    paths = rod_paths(frame, threshold)
-    dominant = dominant_path(frame, paths)
-    for path in paths:
-        forces: Sequence[float] = []
-        points = np.empty((0, 3))
-        if path.end is not None:
-            forces = frame.normal_force[list(path.contacts)].tolist()
-            rod, bowl = frame.point[[path.contacts[0], path.contacts[-1]]]
-            points = np.vstack([rod, frame.centre[list(path.balls)], bowl])
-        yield {
-            **_measures(frame, path.balls, forces, points),
-            "definition": "rod_path",
-            "major_stress_mean_pa": np.nan,
-            "reaches_bowl": path.end is not None,
-            "end_kind": "none" if path.end is None else KINDS[path.end],
-            "dominant": path is dominant,
-        }
+def _column(kind: str, parts: Sequence[Any]) -> Any:
+    """Return a column of a table made of its parts."""
+    if kind in ("str", "object"):
+        values = [value for part in parts for value in part]
+        return pd.array(values, dtype="str") if kind == "str" else values
+    return np.concatenate(parts).astype(kind)
 
 
 def dominant_path(
@@ -385,23 +315,96 @@ def dominant_path(
     return max(whole, key=strength) if whole else None
 
 
-def _measures(
-    frame: NetworkFrame, balls: Sequence[int], forces: Sequence[float], points: Floats
-) -> dict[str, object]:
-    rows = list(balls)
-    line = points[-1] - points[0] if len(points) else np.full(3, np.nan)
-    turn = np.arctan2(line[1], line[0]) - frame.heading_rad
+def _peters_table(frame: NetworkFrame, alpha_rad: float, stress_factor: float) -> dict[str, Any]:
+    major = major_stress(ball_stress(frame))
+    rows = peters_rows(frame, alpha_rad, stress_factor, major)
+    on_bowl = np.zeros(frame.ball_id.size, dtype=bool)
+    on_bowl[frame.a[(frame.other == FLOOR) | (frame.other == SIDE)]] = True
     return {
-        "n_balls": len(rows),
-        "ball_ids": frame.ball_id[rows].tolist(),
-        "bottleneck_n": min(forces, default=np.nan),
-        "mean_force_n": float(np.mean(forces)) if len(forces) else np.nan,
-        "length_m": _length(points) if len(points) else np.nan,
-        "azimuth_rad": float(wrap_angle(turn)),
-        "inclination_rad": float(np.arctan2(line[2], np.hypot(line[0], line[1]))),
-        "altitude_m": float(frame.centre[rows, 2].mean()),
+        **_measures(frame, rows),
+        **_shape(frame, frame.centre[rows.balls], rows.ball_starts),
+        "ball_ids": _ids(frame, rows),
+        "definition": ["peters"] * len(rows),
+        "major_stress_mean_pa": _of_each(rows.ball_starts, major[0][rows.balls], _mean),
+        "reaches_bowl": _of_each(rows.ball_starts, on_bowl[rows.balls], _any),
+        "end_kind": ["none"] * len(rows),
+        "dominant": np.zeros(len(rows), dtype=bool),
     }
 
 
-def _length(points: Floats) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+def _path_table(frame: NetworkFrame, threshold: float) -> dict[str, Any]:
+    rows = path_rows(frame, threshold)
+    whole = np.diff(rows.contact_starts) > 1
+    first = rows.contacts[rows.contact_starts[:-1]]
+    last = rows.contacts[rows.contact_starts[1:] - 1]
+    starts = rows.ball_starts + 2 * np.arange(len(rows) + 1)
+    points = np.empty((starts[-1], 3))
+    inner = np.ones(len(points), dtype=bool)
+    inner[starts[:-1]] = inner[starts[1:] - 1] = False
+    points[inner] = frame.centre[rows.balls]
+    points[starts[:-1]], points[starts[1:] - 1] = frame.point[first], frame.point[last]
+    found = _measures(frame, rows) | _shape(frame, points, starts)
+    for name in ("bottleneck_n", "mean_force_n", "length_m", "azimuth_rad", "inclination_rad"):
+        found[name] = np.where(whole, found[name], np.nan)
+    order = np.lexsort((-found["mean_force_n"], -found["bottleneck_n"]))
+    dominant = np.zeros(len(rows), dtype=bool)
+    dominant[order[:1]] = whole[order[:1]]
+    kinds = frame.other[last].tolist()
+    return {
+        **found,
+        "ball_ids": _ids(frame, rows),
+        "definition": ["rod_path"] * len(rows),
+        "major_stress_mean_pa": np.full(len(rows), np.nan),
+        "reaches_bowl": whole,
+        "end_kind": [
+            KINDS[kind] if there else "none" for kind, there in zip(kinds, whole, strict=True)
+        ],
+        "dominant": dominant,
+    }
+
+
+def _ids(frame: NetworkFrame, rows: ChainRows) -> list[list[int]]:
+    return _split(frame.ball_id[rows.balls], rows.ball_starts)
+
+
+def _measures(frame: NetworkFrame, rows: ChainRows) -> dict[str, NDArray[Any]]:
+    forces = frame.normal_force[rows.contacts]
+    return {
+        "n_balls": np.diff(rows.ball_starts),
+        "bottleneck_n": _of_each(rows.contact_starts, forces, lambda x: x.min(axis=1)),
+        "mean_force_n": _of_each(rows.contact_starts, forces, _mean),
+        "altitude_m": _of_each(rows.ball_starts, frame.centre[rows.balls, 2], _mean),
+    }
+
+
+def _shape(frame: NetworkFrame, points: Floats, starts: Ints) -> dict[str, Floats]:
+    """Return length and direction of polylines, one after another."""
+    line = points[starts[1:] - 1] - points[starts[:-1]]
+    x, y, z = np.ascontiguousarray(line.T)
+    return {
+        "length_m": _of_each(starts, points, _length),
+        "azimuth_rad": wrap_angle(np.arctan2(y, x) - frame.heading_rad),
+        "inclination_rad": np.arctan2(z, np.hypot(x, y)),
+    }
+
+
+def _of_each(starts: Ints, values: NDArray[Any], measure: Callable[[Any], NDArray[Any]]) -> Floats:
+    """Measure each chain's values: all chains of one length at once, (n, length, ...)."""
+    found = np.empty(len(starts) - 1)
+    lengths = np.diff(starts)
+    for length in np.unique(lengths):
+        which = np.flatnonzero(lengths == length)
+        found[which] = measure(values[starts[which][:, None] + np.arange(length)])
+    return found
+
+
+def _mean(values: NDArray[Any]) -> Floats:
+    return np.asarray(values.mean(axis=1))
+
+
+def _any(values: NDArray[Any]) -> NDArray[np.bool_]:
+    return np.asarray(values.any(axis=1))
+
+
+def _length(points: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dragchain.errors import TableError
 from dragchain.formats import Frame
+from dragchain.frames import places
 from dragchain.rod import WallContacts, tangential_force
 
 Floats = NDArray[np.float64]
@@ -64,8 +65,8 @@ class _Balls:
 
     def rows_of(self, ids: Ints) -> Ints:
         """Row of each ball; an error names the first that is not there."""
-        rows = np.minimum(np.searchsorted(self.ids, ids), max(len(self.ids) - 1, 0))
-        lost = np.flatnonzero(self.ids[rows] != ids) if len(self.ids) else np.arange(len(ids))
+        rows = places(ids, self.ids)
+        lost = np.flatnonzero(rows < 0)
         if lost.size:
             raise TableError(
                 f"step {self.step}: ball {int(ids[lost[0]])} is in a contact but not in balls"
@@ -102,7 +103,8 @@ def contact_rows(
     Raises
     ------
     TableError
-        If the frames are of different steps or a contact names an unknown ball.
+        If the frames are of different steps, a ball is there twice, or a contact names an
+        unknown one.
     """
     if balls.step != contacts.step:
         raise TableError(f"contacts has step {contacts.step} where balls has step {balls.step}")
@@ -113,6 +115,9 @@ def contact_rows(
         balls.vectors(*_CENTRE)[order],
         np.asarray(balls.columns["radius_m"][order], dtype=np.float64),
     )
+    twice = np.flatnonzero(np.diff(known.ids) == 0)
+    if twice.size:
+        raise TableError(f"step {balls.step}: balls has ball {int(known.ids[twice[0]])} twice")
     smallest = float(known.radii.min(initial=np.inf))
     groups = [
         _ball_ball(known, contacts),

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from dragchain.errors import TableError
@@ -20,11 +24,17 @@ KINDS = {BALL: "ball", ROD: "rod", FLOOR: "floor", SIDE: "side"}
 
 _POINT = ["point_x_m", "point_y_m", "point_z_m"]
 _FORCE = ["force_x_n", "force_y_n", "force_z_n"]
-_CONTACTS = ["step", "time_s", "a_id", "b_id", *_POINT, *_FORCE, "normal_force_n"]
-_BALLS = ["step", "ball_id", "x_m", "y_m", "z_m", "radius_m"]
+_CENTRE = ["x_m", "y_m", "z_m"]
+_CONTACTS = ["step", "a_id", "b_id", *_POINT, *_FORCE, "normal_force_n"]
+_BALLS = ["step", "time_s", "ball_id", *_CENTRE, "radius_m"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Columns = Mapping[str, NDArray[Any]]
+"""Columns of a table by their names, (n,) each."""
+
+GROUP_ROWS = 131_072
+"""Rows of a row group that `TableParts` writes: what it holds of a table."""
 
 
 @dataclass(frozen=True)
@@ -77,18 +87,28 @@ class NetworkFrame:
 
 
 def frame_of(
-    contacts: pd.DataFrame, balls: pd.DataFrame, step: int, time_s: float, heading_rad: float
+    contacts: pd.DataFrame | Columns,
+    balls: pd.DataFrame | Columns,
+    step: int,
+    time_s: float,
+    heading_rad: float,
 ) -> NetworkFrame:
     """Return the frame that rows of the contacts and balls tables of one step describe.
 
     Raises
     ------
     TableError
-        If a contact names a ball that the frame does not have.
+        If a contact names a ball that the frame does not have, or a ball has two rows.
     """
-    balls = balls.sort_values("ball_id")
-    ball_id = balls["ball_id"].to_numpy(np.int64)
-    b_id = contacts["b_id"].to_numpy(np.int64)
+    ball_id = np.array(balls["ball_id"], dtype=np.int64)
+    centre, radius = _vectors(balls, _CENTRE), np.array(balls["radius_m"], dtype=np.float64)
+    if (np.diff(ball_id) <= 0).any():
+        order = np.argsort(ball_id)
+        ball_id, centre, radius = ball_id[order], centre.T[:, order].T, radius[order]
+    twice = np.flatnonzero(np.diff(ball_id) == 0)
+    if twice.size:
+        raise TableError(f"balls.parquet has ball {ball_id[twice[0]]} twice in step {step}")
+    b_id = np.asarray(contacts["b_id"], dtype=np.int64)
     b = np.full(b_id.shape, -1, dtype=np.int64)
     b[b_id > 0] = _rows_of(b_id[b_id > 0], ball_id, step)
     return NetworkFrame(
@@ -96,26 +116,40 @@ def frame_of(
         time_s=time_s,
         heading_rad=heading_rad,
         ball_id=ball_id,
-        centre=balls[["x_m", "y_m", "z_m"]].to_numpy(np.float64),
-        radius=balls["radius_m"].to_numpy(np.float64),
-        a=_rows_of(contacts["a_id"].to_numpy(np.int64), ball_id, step),
+        centre=centre,
+        radius=radius,
+        a=_rows_of(np.asarray(contacts["a_id"], dtype=np.int64), ball_id, step),
         b=b,
         other=np.where(b_id > 0, BALL, b_id),
-        point=contacts[_POINT].to_numpy(np.float64),
-        force=contacts[_FORCE].to_numpy(np.float64),
-        normal_force=contacts["normal_force_n"].to_numpy(np.float64),
+        point=_vectors(contacts, _POINT),
+        force=_vectors(contacts, _FORCE),
+        normal_force=np.array(contacts["normal_force_n"], dtype=np.float64),
     )
+
+
+def _vectors(table: pd.DataFrame | Columns, names: Iterable[str]) -> Floats:
+    """Return three columns as vectors, (n, 3), each column in one piece."""
+    return np.array([table[name] for name in names], dtype=np.float64).T
 
 
 def _rows_of(ids: Ints, ball_id: Ints, step: int) -> Ints:
     """Return the row of each id in the sorted `ball_id`."""
-    unknown = ids[~np.isin(ids, ball_id)]
+    rows = places(ids, ball_id)
+    unknown = ids[rows < 0]
     if unknown.size:
         raise TableError(
             f"contacts of step {step} name ball {unknown[0]}, which balls.parquet does not have "
             "in that step: make the tables again from whole dumps"
         )
-    return np.searchsorted(ball_id, ids)
+    return rows
+
+
+def places(ids: Ints, known: Ints) -> Ints:
+    """Return the place of each id in `known`, whose ids are unlike; -1 where it is not there.
+
+    By hashing: in a time linear in both.
+    """
+    return np.asarray(pd.Index(known).get_indexer(pd.Index(ids)), dtype=np.int64)
 
 
 def counted_range(rod_force: pd.DataFrame) -> tuple[int, int]:
@@ -142,6 +176,9 @@ def counted_range(rod_force: pd.DataFrame) -> tuple[int, int]:
 def read_frames(run_dir: Path, steps: tuple[int, int] | None = None) -> Iterator[NetworkFrame]:
     """Yield the network frames of a process run in the order of their steps.
 
+    The tables are read row group by row group: of each no more is held than a row group and a
+    frame, however long the run is.
+
     Parameters
     ----------
     run_dir
@@ -160,7 +197,7 @@ def read_frames(run_dir: Path, steps: tuple[int, int] | None = None) -> Iterator
     contacts = _Rows(read_steps(tables / "contacts.parquet", _CONTACTS, (first, last)))
     heading_step = rod_force["step"].to_numpy(np.int64)
     heading = np.unwrap(rod_force["heading_rad"].to_numpy(np.float64))
-    balls = read_steps(tables / "balls.parquet", [*_BALLS, "time_s"], (first, last))
+    balls = read_steps(tables / "balls.parquet", _BALLS, (first, last))
     for step, of_step in balls:
         yield frame_of(
             contacts.of(step),
@@ -215,3 +252,60 @@ def write_parquet(table: pd.DataFrame, path: Path) -> None:
     draft = path.with_name(path.name + ".part")
     table.to_parquet(draft, index=False)
     draft.replace(path)
+
+
+class TableParts:
+    """A table that is written part by part and appears under its name only once it is whole.
+
+    Use it as a context manager. It holds no more than `GROUP_ROWS` rows and the last part. If the
+    block ends in an exception, nothing is left behind.
+
+    Parameters
+    ----------
+    path : Path
+        The table's final name.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._draft = path.with_name(path.name + ".part")
+        self._parts: list[pd.DataFrame] = []
+        self._writer: Any = None
+
+    def __enter__(self) -> Self:
+        """Begin; the file is there with the first rows."""
+        return self
+
+    def write(self, part: pd.DataFrame) -> None:
+        """Append the rows of a part."""
+        self._parts.append(part)
+        if sum(map(len, self._parts)) >= GROUP_ROWS:
+            self._flush()
+
+    def _flush(self) -> None:
+        if not self._parts:
+            return
+        rows = pd.concat(self._parts, ignore_index=True)
+        schema = None if self._writer is None else self._writer.schema
+        table = pa.Table.from_pandas(rows, schema, preserve_index=False)
+        if self._writer is None:
+            self._writer = pq.ParquetWriter(self._draft, table.schema)
+        self._writer.write_table(table)
+        self._parts = []
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Put the draft in the table's place, or remove it after an exception."""
+        try:
+            if kind is None:
+                self._flush()
+            if self._writer is not None:
+                self._writer.close()
+            if kind is None:
+                self._draft.replace(self._path)
+        finally:
+            self._draft.unlink(missing_ok=True)

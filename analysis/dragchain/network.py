@@ -13,9 +13,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from dragchain import chains
+from dragchain.chains import chain_table
+from dragchain.clusters import Clusters, cluster_rows, frame_clusters
 from dragchain.errors import TableError
-from dragchain.frames import KINDS, Ints, NetworkFrame, read_frames, write_parquet
+from dragchain.frames import KINDS, Ints, NetworkFrame, TableParts, read_frames, write_parquet
 
 LEAST_CONTACTS = 4
 """A ball with fewer contacts is a rattler. Four is the mean number with which frictional spheres
@@ -51,8 +52,12 @@ def mechanical_coordination_number(
     return coordination_number(counts[counts >= least])
 
 
-def frame_statistics(frame: NetworkFrame) -> dict[str, float]:
-    """Return one row of ``network.parquet``; forces in N, NaN where a frame has no contact."""
+def frame_statistics(frame: NetworkFrame, clusters: Clusters | None = None) -> dict[str, float]:
+    """Return one row of ``network.parquet``; forces in N, NaN where a frame has no contact.
+
+    `clusters` is what `frame_clusters` returns for the frame, if it is known already.
+    """
+    clusters = clusters or frame_clusters(frame)
     counts = contact_counts(frame)
     normal = frame.normal_force
     mean = float(normal.mean()) if normal.size else float("nan")
@@ -71,13 +76,15 @@ def frame_statistics(frame: NetworkFrame) -> dict[str, float]:
         "normal_force_mean_n": mean,
         "normal_force_max_n": float(normal.max()) if normal.size else float("nan"),
         "above_mean_share": float((normal > mean).mean()) if normal.size else float("nan"),
+        **{f"{name}_n": force for name, force in clusters.percolation_n.items()},
     }
 
 
 def write_chains(run_dir: Path) -> None:
-    """Write ``tables/network.parquet`` and ``tables/chains.parquet`` of a process run.
+    """Write the tables ``network``, ``clusters`` and ``chains`` of a process run.
 
-    Both hold the frames of the counted stretch of the drag and no others.
+    They hold the frames of the counted stretch of the drag and no others. One frame is in memory
+    at a time.
 
     Raises
     ------
@@ -85,15 +92,19 @@ def write_chains(run_dir: Path) -> None:
         If a table is missing, or if the counted stretch holds no network frame.
     """
     network: list[dict[str, float]] = []
-    found: list[pd.DataFrame] = []
-    for frame in read_frames(run_dir):
-        network.append(frame_statistics(frame))
-        found.append(chains.chain_table(frame))
-    if not network:
-        raise TableError(
-            f"{run_dir}: the counted stretch of the drag holds no network frame; "
-            "write the outputs contacts and balls more often or run longer"
-        )
+    grown: list[dict[str, NDArray[Any]]] = []
     tables = run_dir / "tables"
+    with TableParts(tables / "chains.parquet") as found:
+        for frame in read_frames(run_dir):
+            clusters = frame_clusters(frame)
+            network.append(frame_statistics(frame, clusters))
+            grown.append(cluster_rows(frame, clusters))
+            found.write(chain_table(frame))
+        if not network:
+            raise TableError(
+                f"{run_dir}: the counted stretch of the drag holds no network frame; "
+                "write the outputs contacts and balls more often or run longer"
+            )
     write_parquet(pd.DataFrame(network), tables / "network.parquet")
-    write_parquet(pd.concat(found, ignore_index=True), tables / "chains.parquet")
+    columns = {name: np.concatenate([part[name] for part in grown]) for name in grown[0]}
+    write_parquet(pd.DataFrame(columns), tables / "clusters.parquet")

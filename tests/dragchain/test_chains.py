@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dragchain.chains import (
@@ -261,6 +261,7 @@ def packing(
 
 
 @given(seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None)
 def test_numbering_and_order_change_nothing(seed: int) -> None:
     centres, contacts = packing(seed)
     random = np.random.default_rng(seed + 1)
@@ -282,6 +283,7 @@ def test_numbering_and_order_change_nothing(seed: int) -> None:
 
 
 @given(seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None)
 def test_no_path_is_wider_than_the_one_found(seed: int) -> None:
     centres, contacts = packing(seed)
     frame = make_frame(centres, contacts)

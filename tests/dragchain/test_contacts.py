@@ -129,3 +129,9 @@ def test_a_contact_of_an_unknown_ball_is_an_error(balls) -> None:
 def test_frames_of_different_steps_are_an_error() -> None:
     with pytest.raises(TableError, match="contacts has step 9 where balls has step 100"):
         contact_rows(frame(BALLS, []), frame(CONTACTS, [], step=9), wall(), wall(), 10.0)
+
+
+def test_a_ball_that_is_there_twice_is_refused() -> None:
+    balls = [[1, 0, 0, 5, 2, *CALM], [2, 2.9, 0, 5, 1, *CALM], [1, 9, 0, 5, 2, *CALM]]
+    with pytest.raises(TableError, match="step 100: balls has ball 1 twice"):
+        rows_of(balls)

@@ -9,8 +9,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from dragchain.clusters import FORCE_FACTORS
 from dragchain.errors import TableError
-from dragchain.frames import NetworkFrame, counted_range, frame_of, read_frames
+from dragchain.frames import NetworkFrame, TableParts, counted_range, frame_of, read_frames
 from dragchain.network import (
     contact_counts,
     coordination_number,
@@ -180,6 +181,93 @@ def test_a_frame_has_the_heading_of_its_step(run_dir: Path) -> None:
         assert math.cos(frame.heading_rad - expected) == pytest.approx(1.0)
 
 
+def grouped(run_dir: Path, rows: int) -> None:
+    """Write contacts and balls again in row groups of few rows."""
+    for name in ("contacts", "balls"):
+        file = run_dir / "tables" / f"{name}.parquet"
+        pd.read_parquet(file).to_parquet(file, row_group_size=rows)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 5, 100])
+def test_frames_may_spread_over_row_groups(run_dir: Path, rows: int) -> None:
+    whole = list(read_frames(run_dir, (0, 30)))
+    grouped(run_dir, rows)
+    parts = list(read_frames(run_dir, (0, 30)))
+    assert [frame.step for frame in parts] == [0, 10, 20, 30]
+    for one, other in zip(whole, parts, strict=True):
+        for name, values in vars(one).items():
+            np.testing.assert_array_equal(values, vars(other)[name])
+
+
+def test_row_groups_are_read_when_their_frames_are_due(run_dir: Path, monkeypatch) -> None:
+    read: list[int] = []
+    plain = pq.ParquetFile.read_row_group
+
+    def noted(file, number, **options):
+        read.append(number)
+        return plain(file, number, **options)
+
+    monkeypatch.setattr(pq.ParquetFile, "read_row_group", noted)
+    grouped(run_dir, 2)
+    frames = read_frames(run_dir, (10, 30))
+    next(frames)
+    # rows 7 to 13 of contacts and 6 to 11 of balls are step 10, and a row beyond shows their ends
+    assert sorted(set(read)) == [3, 4, 5, 6, 7]
+    list(frames)
+    assert len(read) == 8 + 7
+    assert sorted(set(read)) == [3, 4, 5, 6, 7, 8, 9, 10]
+
+
+def test_a_table_whose_steps_fall_is_refused(run_dir: Path) -> None:
+    file = run_dir / "tables" / "contacts.parquet"
+    pd.read_parquet(file).iloc[::-1].to_parquet(file)
+    with pytest.raises(TableError, match=r"contacts.parquet is not in the order of its steps"):
+        list(read_frames(run_dir, (10, 30)))
+
+
+def test_a_table_without_a_column_is_refused(run_dir: Path) -> None:
+    file = run_dir / "tables" / "balls.parquet"
+    pd.read_parquet(file).drop(columns="radius_m").to_parquet(file)
+    with pytest.raises(TableError, match=r"balls.parquet: has no column radius_m"):
+        list(read_frames(run_dir))
+
+
+def test_a_ball_with_two_rows_is_refused() -> None:
+    with pytest.raises(TableError, match="ball 2 twice in step 1"):
+        a_frame([(1, 2, 1.0)], [2, 1, 3, 2])
+
+
+def test_a_table_in_parts_is_the_whole_table(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("dragchain.frames.GROUP_ROWS", 3)
+    parts = [contact_rows(step, STAR[:step]) for step in (1, 2, 4, 1)]
+    parts.insert(2, parts[0].iloc[:0])
+    with TableParts(tmp_path / "t.parquet") as table:
+        for part in parts:
+            table.write(part)
+            assert not (tmp_path / "t.parquet").exists()
+    whole = pd.concat(parts, ignore_index=True)
+    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "t.parquet"), whole)
+    assert pq.ParquetFile(tmp_path / "t.parquet").num_row_groups == 3
+    whole.to_parquet(tmp_path / "w.parquet", index=False)
+    schemas = [pq.read_schema(tmp_path / f"{name}.parquet") for name in "tw"]
+    assert schemas[0].equals(schemas[1], check_metadata=True)
+
+
+def test_a_table_in_parts_that_breaks_off_leaves_the_old_one(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("dragchain.frames.GROUP_ROWS", 1)
+    (tmp_path / "t.parquet").write_bytes(b"old")
+
+    def break_off() -> None:
+        with TableParts(tmp_path / "t.parquet") as table:
+            table.write(contact_rows(1, STAR))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        break_off()
+    assert [file.name for file in tmp_path.iterdir()] == ["t.parquet"]
+    assert (tmp_path / "t.parquet").read_bytes() == b"old"
+
+
 def test_write_chains_writes_counted_frames_only(run_dir: Path) -> None:
     write_chains(run_dir)
     network = pd.read_parquet(run_dir / "tables" / "network.parquet")
@@ -189,6 +277,14 @@ def test_write_chains_writes_counted_frames_only(run_dir: Path) -> None:
     assert set(chains["step"]) == {10}
     path = chains[chains["definition"] == "rod_path"].iloc[0]
     assert list(path["ball_ids"]) == [7, 1] or not path["reaches_bowl"]
+    clusters = pd.read_parquet(run_dir / "tables" / "clusters.parquet")
+    assert clusters["step"].tolist() == [10] * len(FORCE_FACTORS) + [20] * len(FORCE_FACTORS)
+    # above the mean of 3 N: ball 7 with ball 1 and on the rod, and ball 4 on the side
+    at_mean = clusters[(clusters["step"] == 10) & (clusters["force_factor"] == 1.0)].iloc[0]
+    assert at_mean["strong_contacts"] == 3
+    assert at_mean["largest_cluster"] == 2
+    assert not at_mean["rod_to_bowl"]
+    assert network["rod_to_bowl_n"].tolist() == [2.0, 0.0]
     assert not list((run_dir / "tables").glob("*.part"))
 
 

@@ -14,6 +14,7 @@ rule find_chains:
     output:
         of_process("tables/network.parquet"),
         of_process("tables/chains.parquet"),
+        of_process("tables/clusters.parquet"),
     log:
         of_process("logs/chains.log"),
     benchmark:

@@ -25,10 +25,11 @@ from dragchain.chains import (
     ALPHA_RAD,
     STRESS_FACTOR,
     THRESHOLD,
+    ChainRows,
     ball_stress,
     dominant_path,
     major_stress,
-    peters_chains,
+    peters_rows,
     rod_paths,
 )
 from dragchain.forces import wrap_angle
@@ -190,11 +191,11 @@ def _strength(frame: NetworkFrame, chain: Chain) -> tuple[float, float]:
     return float(forces.min()), float(forces.mean())
 
 
-def _contact_of(frame: NetworkFrame) -> dict[tuple[int, int], int]:
-    inner = np.flatnonzero(frame.between_balls())
-    low = np.minimum(frame.a[inner], frame.b[inner]).tolist()
-    high = np.maximum(frame.a[inner], frame.b[inner]).tolist()
-    return dict(zip(zip(low, high, strict=True), inner.tolist(), strict=True))
+def _contact_of(frame: NetworkFrame, links: Ints) -> dict[tuple[int, int], int]:
+    """Return the contact of each linked pair of balls, the lower row first."""
+    low = np.minimum(frame.a[links], frame.b[links]).tolist()
+    high = np.maximum(frame.a[links], frame.b[links]).tolist()
+    return dict(zip(zip(low, high, strict=True), links.tolist(), strict=True))
 
 
 # --- its numbers -----------------------------------------------------------------------------
@@ -308,17 +309,17 @@ def _path_rows(frame: NetworkFrame, around: Around) -> Iterator[dict[str, object
 
 
 def _peters_rows(frame: NetworkFrame, around: Around) -> Iterator[dict[str, object]]:
-    contact_of = _contact_of(frame)
     major = major_stress(ball_stress(frame))
-    found: dict[tuple[float, float], list[list[int]]] = {}
+    found: dict[tuple[float, float], ChainRows] = {}
     for setting in SETTINGS:
         if setting.is_path:
             continue
         limits = (setting.alpha_rad, setting.stress_factor)
         if limits not in found:
-            found[limits] = peters_chains(frame, *limits, major)
-        on_bowl = setting.definition == "peters"
-        chain = peters_chain(frame, found[limits], contact_of, on_bowl=on_bowl)
+            found[limits] = peters_rows(frame, *limits, major)
+        rows, on_bowl = found[limits], setting.definition == "peters"
+        contact_of = _contact_of(frame, rows.contacts)
+        chain = peters_chain(frame, rows.ball_lists(), contact_of, on_bowl=on_bowl)
         yield describe(frame, around, chain)
 
 
