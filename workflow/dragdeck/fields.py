@@ -94,7 +94,7 @@ def _limits_of_part(part: Any) -> str:
     annotation, *metadata = get_args(part)
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return ""
-    return _limits(FieldInfo.from_annotation(Annotated[annotation, *metadata]))
+    return _limits(FieldInfo.from_annotation(Annotated[annotation, *metadata]))  # type: ignore[arg-type]
 
 
 def _default(field: FieldInfo) -> str:

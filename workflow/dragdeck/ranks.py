@@ -14,6 +14,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dragdeck.errors import InputError
 
@@ -33,6 +34,7 @@ _POINTS = 129
 """Points across a cell at which the width of the bowl is taken."""
 
 Counts = tuple[int, int, int]
+Shares = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -129,27 +131,32 @@ def _grids(ranks: int) -> Iterator[Counts]:
 
 def _split(grid: Counts, filling: Filling) -> Split:
     """What a grid gives each rank."""
-    plan = _floor_shares(grid, filling, 0.0), _floor_shares(grid, filling, filling.reach_m)
-    tall = _height_shares(grid[2], filling, 0.0), _height_shares(grid[2], filling, filling.reach_m)
-    own, known = (filling.balls * np.outer(floor, up).ravel() for floor, up in zip(plan, tall))
-    return Split(grid, float(known.max()), own.tolist())
+    own, known = (
+        filling.balls
+        * np.outer(_floor_shares(grid, filling, reach), _height_shares(grid[2], filling, reach))
+        for reach in (0.0, filling.reach_m)
+    )
+    return Split(grid, float(known.max()), own.ravel().tolist())
 
 
-def _floor_shares(grid: Counts, filling: Filling, reach_m: float) -> np.ndarray[Any, Any]:
+def _floor_shares(grid: Counts, filling: Filling, reach_m: float) -> Shares:
     """Share of the bowl's floor in each cell of x and y, widened by a reach."""
-    x_edges, y_edges = (_edges(n, -filling.half_width_m, filling.half_width_m) for n in grid[:2])
+    radius, half_width = filling.radius_m, filling.half_width_m
+    x_edges, y_edges = (_edges(n, -half_width, half_width) for n in grid[:2])
     shares = np.empty(grid[:2])
     for i, j in product(range(grid[0]), range(grid[1])):
-        low, high = np.clip(x_edges[i : i + 2] + [-reach_m, reach_m], -filling.radius_m, filling.radius_m)
-        angle = np.linspace(np.arcsin(low / filling.radius_m), np.arcsin(high / filling.radius_m), _POINTS)
-        half = filling.radius_m * np.cos(angle)  # of the chord at x = radius sin(angle)
-        width = np.clip(y_edges[j + 1] + reach_m, -half, half)
-        width -= np.clip(y_edges[j] - reach_m, -half, half)
-        shares[i, j] = np.trapezoid(width * half, angle) / (np.pi * filling.radius_m**2)
+        x_ends = np.array([x_edges[i] - reach_m, x_edges[i + 1] + reach_m])
+        first, last = np.arcsin(np.clip(x_ends / radius, -1, 1))
+        angles = np.linspace(first, last, _POINTS)
+        chord = radius * np.cos(angles)  # half of it, at x = radius sin(angle)
+        low, high = (
+            np.clip(y, -chord, chord) for y in (y_edges[j] - reach_m, y_edges[j + 1] + reach_m)
+        )
+        shares[i, j] = np.trapezoid((high - low) * chord, angles) / (np.pi * radius**2)
     return shares
 
 
-def _height_shares(count: int, filling: Filling, reach_m: float) -> np.ndarray[Any, Any]:
+def _height_shares(count: int, filling: Filling, reach_m: float) -> Shares:
     """Share of the bed's height in each layer of cells, widened by a reach."""
     edges = _edges(count, filling.bottom_m, filling.top_m)
     low = np.clip(edges[:-1] - reach_m, 0, filling.height_m)
@@ -157,7 +164,7 @@ def _height_shares(count: int, filling: Filling, reach_m: float) -> np.ndarray[A
     return np.asarray((high - low) / filling.height_m)
 
 
-def _edges(count: int, low: float, high: float) -> np.ndarray[Any, Any]:
+def _edges(count: int, low: float, high: float) -> Shares:
     return np.linspace(low, high, count + 1)
 
 

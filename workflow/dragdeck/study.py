@@ -53,8 +53,7 @@ Positive = Annotated[Number, Field(gt=0)]
 NonNegative = Annotated[Number, Field(ge=0)]
 Whole = Annotated[int, BeforeValidator(_whole)]
 Ranks = Annotated[
-    Annotated[Literal["auto"], Tag("a-word")]
-    | Annotated[Whole, Field(ge=1), Tag("a-number")],
+    Annotated[Literal["auto"], Tag("a-word")] | Annotated[Whole, Field(ge=1), Tag("a-number")],
     Discriminator(lambda value: "a-word" if value == "auto" else "a-number"),
 ]
 
