@@ -2,9 +2,10 @@
 
 The scene of ``studies/pilot`` with 1,422, 10,000 and 100,000 balls, about equally deep:
 the bed is filled, the rod dragged along the same arc, and every step of the analysis run
-in a process of its own. Runs that are complete are not run again. Then the first steps of
-the drag's deck are timed on one rank and on two, in turns, less the same deck without a
-step: what is left is the steps alone. All cost is processor time, of all ranks together.
+in a process of its own. Runs that are complete are not run again, nor commands and rounds
+that were measured: they are kept in ``benchmarks/results/pilot``. The first steps of the
+drag's deck are timed on one rank and on two, in turns, less the same deck without a step:
+what is left is the steps alone. All cost is processor time, of all ranks together.
 
     python benchmarks/pilot.py [--balls 1422 10000 100000] [--rounds 3] [--ball-steps 2e7]
 """
@@ -20,7 +21,7 @@ import re
 import statistics
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,7 @@ from dragdeck.cases import Case, SceneName, settle_case
 from dragdeck.engine import Ending, command, execute, find_engine
 from dragdeck.project import Project, find_project, study_templates
 from dragdeck.ranks import decomposition
-from dragdeck.render import environment, write_run
+from dragdeck.render import environment, replace_text, write_run
 from dragdeck.runner import run
 from dragdeck.scenes import Bed, Scene, fill_scene, process_scene
 from dragdeck.study import CirclePath, read_yaml
@@ -82,7 +83,6 @@ def case_of(project: Project, balls: int) -> Case:
         "motion.path.radius_m": round(ratio * path.radius_m, 4),
         "motion.path.revolutions": round(path.revolutions / ratio, 4),
         "motion.plunge_at_m": [round(ratio * path.radius_m, 4), 0.0],
-        f"fidelities.{study.fidelity}.ranks": 1,
     }
     return settle_case(pilot.file, read_yaml(pilot.file), values, shown={})
 
@@ -110,6 +110,23 @@ def dragchain(*words: object) -> Command:
     return found
 
 
+def kept(name: str, folder: Path) -> Command:
+    """What a command took on a run, measured now if it was not before."""
+    file = TIMED / "commands.json"
+    known = json.loads(file.read_text()) if file.is_file() else {}
+    key = f"{name} {folder.name}"
+    if key not in known:
+        known[key] = vars(dragchain(name, folder))
+        write(file, known)
+    return Command(**known[key])
+
+
+def write(file: Path, content: object) -> None:
+    """Write a JSON file."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    replace_text(file, json.dumps(content, indent=1) + "\n")
+
+
 def bed_of(fill: Path) -> Bed:
     """The settled bed of a fill whose tables are made."""
     found = json.loads((fill / "tables" / "fill.json").read_text())
@@ -120,9 +137,9 @@ def measure(project: Project, balls: int) -> tuple[Size, Case, Path]:
     """Fill, drag, analyse."""
     case = case_of(project, balls)
     fill = made(project, case, "fill", fill_scene(case))
-    commands = {"tables of the fill": dragchain("tables", fill)}
+    commands = {"tables of the fill": kept("tables", fill)}
     drag = made(project, case, "process", process_scene(case, bed_of(fill)))
-    commands |= {name: dragchain(name, drag) for name in ANALYSIS}
+    commands |= {name: kept(name, drag) for name in ANALYSIS}
     return size_of(balls, fill, drag, commands), case, fill
 
 
@@ -208,15 +225,20 @@ def time_steps(folder: Path, steps: int, ranks: int) -> Timing:
     )
 
 
-def rounds(folder: Path, steps: int, count: int) -> Iterator[dict[int, Timing]]:
-    """Time one rank and two in turns, each first every other round."""
-    for number in range(count):
+def rounds(folder: Path, steps: int, count: int) -> list[dict[int, Timing]]:
+    """Time one rank and two in turns, each first every other round; known rounds count."""
+    file = folder.parent / f"rounds-{steps}.json"
+    known = json.loads(file.read_text()) if file.is_file() else []
+    for number in range(len(known), count):
         order = (1, 2) if number % 2 == 0 else (2, 1)
         found = {ranks: time_steps(folder, steps, ranks) for ranks in order}
         say(f"{steps} steps, " + ", ".join(
             f"{ranks} rank(s): {t.cpu_time_s:.2f} s, {t.wall_time_s:.2f} s by the clock"
             for ranks, t in sorted(found.items())))  # fmt: skip
-        yield found
+        known.append({ranks: vars(timing) for ranks, timing in found.items()})
+        write(file, known)
+    known = json.loads(file.read_text())
+    return [{int(ranks): Timing(**timing) for ranks, timing in one.items()} for one in known]
 
 
 # --- the page -----------------------------------------------------------------------------
@@ -225,15 +247,15 @@ def rounds(folder: Path, steps: int, count: int) -> Iterator[dict[int, Timing]]:
 def engine_table(sizes: Sequence[Size]) -> str:
     """Cost of a ball and step, and bytes."""
     lines = [
-        "| balls | steps of the fill | ns a ball and step | steps of the drag | ns a ball and step "
-        "| contacts a ball | raw bytes a ball and frame |",
-        "| ---: " * 7 + "|",
+        "| balls | steps of the fill | ranks | ns a ball and step | steps of the drag | ranks "
+        "| ns a ball and step | contacts a ball | raw bytes a ball and frame |",
+        "| ---: " * 9 + "|",
     ]
     for size in sizes:
         cost = [1e9 * r["cpu_time_s"] / r["steps"] / size.balls for r in (size.fill, size.drag)]
         lines.append(
-            f"| {size.balls:,} | {size.fill['steps']:,} | {cost[0]:.0f} "
-            f"| {size.drag['steps']:,} | {cost[1]:.0f} "
+            f"| {size.balls:,} | {size.fill['steps']:,} | {size.fill['ranks']} | {cost[0]:.0f} "
+            f"| {size.drag['steps']:,} | {size.drag['ranks']} | {cost[1]:.0f} "
             f"| {size.contacts / size.frames / size.balls:.2f} "
             f"| {size.bytes_ / size.frames / size.balls:.0f} |"
         )
@@ -320,11 +342,11 @@ def main() -> None:
         if options.rounds:
             steps = max(1, round(options.ball_steps / balls))
             folder = timed_folder(case, fill, project)
-            timed[balls] = steps, list(rounds(folder, steps, options.rounds))
+            timed[balls] = steps, rounds(folder, steps, options.rounds)
     parts = [
         f"{machine()}. {options.rounds} rounds of one rank against two, {options.ball_steps:.0e} "
         "balls times steps each.",
-        "### Engine, one rank: whole runs",
+        "### Engine: whole runs",
         engine_table(sizes),
         "### Analysis",
         analysis_table(sizes),
