@@ -49,8 +49,8 @@ WINDOW_DIAMETERS = 12.0
 DEPTH_DIAMETERS = 6.0
 """Mean ball diameters before and behind the tool whose contacts are then seen from the side."""
 
-_MOST_PIXELS = 2400
-"""Pixels along the longer edge of a picture: a tenth more than the widest whole bowl needs."""
+_MOST_PIXELS = 1400
+"""Most pixels along an edge of a picture: a bowl of 100 mm at full resolution."""
 
 
 class RenderError(DragchainError):

@@ -344,7 +344,7 @@ def test_a_picture_of_a_wide_bowl_has_no_more_pixels_than_vtk_takes(process: Pat
     frame = network_frame([2.0, 0.5])
     shown = scene.Scene(frame, np.array([0.015, 0.012, 0.01]), 0.0, None, 0.2)
     image, extent = scene.render(process, case, shown, "xy", scene.Look(pixels_per_mm=40.0))
-    assert max(image.shape[:2]) <= 2401
+    assert max(image.shape[:2]) <= 1401
     assert is_red(pixel(image, extent, 0.0, 0.0))
 
 

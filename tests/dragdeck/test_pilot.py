@@ -86,12 +86,11 @@ def test_the_benchmark_keeps_arc_and_depth(pilot: Case, benchmark: ModuleType, b
     assert list(process_scene(case).warnings) == []
 
 
-def test_the_timed_deck_is_the_process_as_far_as_its_first_leg(
+def test_the_timed_deck_is_the_process_without_its_motion(
     pilot: Case, benchmark: ModuleType
 ) -> None:
     whole = deck_text(process_scene(pilot), environment(Project(ROOT).templates))
-    cut = benchmark.first_steps(whole, 7)
+    cut = benchmark.at_rest(whole, 7)
     head = cut.removesuffix('\nrun 7\nprint "DRAGDECK END"\n')
     assert head != cut and whole.startswith(head)
-    assert "fix move_plunge" in head and "dump" not in head.replace("dump_", "")
-    assert "upto" not in cut
+    assert "fix tool_wall" in head and "fix move" not in cut and "upto" not in cut
