@@ -130,7 +130,7 @@ def test_auto_depends_on_the_study_and_the_machine_but_run_ids_do_not(
     small: dict[str, Any], write_study: WriteStudy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small["media"]["count"] = 4 * FEWEST_BALLS_A_RANK
-    small["bowl"] |= {"radius_m": 0.1}
+    small["bowl"] |= {"radius_m": 0.3}
     small["fidelity"] = {"youngs_modulus_scale": 1e-3, "ranks": "auto"}
     file = write_study(small)
     ids = set()

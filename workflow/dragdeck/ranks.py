@@ -21,8 +21,10 @@ from dragdeck.errors import InputError
 CORES_VARIABLE = "DRAGDECK_CORES"
 """Environment variable: cores that ``ranks: auto`` may count on, if not those seen here."""
 
-FEWEST_BALLS_A_RANK = 700
-"""``ranks: auto`` gives no rank fewer balls: two ranks were measured to pay on 1422."""
+FEWEST_BALLS_A_RANK = 5000
+"""``ranks: auto`` gives no rank fewer balls. Two ranks of 5,000 balls were measured to take
+1.28 times the processor time of one with all (docs/big.md); smaller runs are soon done
+anyway, and on a machine that others use too their ranks wait for each other."""
 
 MOST_OVER_MEAN = 1.5
 """A warning is given where the fullest rank has more than this times the mean."""
