@@ -88,7 +88,9 @@ def _draw_process(run_dir: Path, case: Case, findings: Findings) -> list[Path]:
     views: tuple[scene.View, ...] = ("xy", "xz")
     for view in views:
         image, extent = scene.render(run_dir, case, shown, view)
-        written.append(_save(run_dir, f"network_{view}", _network(shown, view, image, extent)))
+        written.append(
+            _save(run_dir, f"network_{view}", _network(case, shown, view, image, extent))
+        )
     return written
 
 
@@ -299,7 +301,7 @@ def _link(found: Findings) -> str:
 
 
 def _network(
-    shown: scene.Scene, view: scene.View, image: NDArray[np.uint8], extent: Floats
+    case: Case, shown: scene.Scene, view: scene.View, image: NDArray[np.uint8], extent: Floats
 ) -> Figure:
     """Set a rendered view on axes in mm, with what it shows named."""
     height = 5.6 * (extent[3] - extent[2]) / (extent[1] - extent[0]) + 0.9
@@ -318,7 +320,8 @@ def _network(
     side = "from above" if view == "xy" else "from the side"
     axes.set_title(
         f"contact network {side}, process time {shown.process_time_s:.2f} s; "
-        f"largest normal force {largest:.2f} N\n" + _chain_text(shown)
+        f"largest normal force {largest:.2f} N\n"
+        + "\n".join(filter(None, (_chain_text(shown), scene.cut_words(case, view))))
     )
     return figure
 

@@ -46,6 +46,15 @@ _SIDES = 18
 _MARGIN_M = 0.004
 _FADED = 0.3
 
+WINDOW_DIAMETERS = 12.0
+"""Mean ball diameters to either side of the tool that a picture of a wider bowl shows."""
+
+DEPTH_DIAMETERS = 6.0
+"""Mean ball diameters before and behind the tool whose contacts are then seen from the side."""
+
+_MOST_PIXELS = 1400
+"""Most pixels along an edge of a picture: a bowl of 100 mm at full resolution."""
+
 
 class RenderError(DragchainError):
     """Off-screen rendering does not work on this machine."""
@@ -213,13 +222,72 @@ def _prefer_egl() -> None:
 
 
 @dataclass(frozen=True)
+class Window:
+    """The part of the bowl that a picture shows.
+
+    Attributes
+    ----------
+    low, high : (2,) float
+        Corners in m along the axes of the view.
+    contacts : (M,) bool or None
+        The contacts of the frame that are drawn; None: all.
+    """
+
+    low: Floats
+    high: Floats
+    contacts: NDArray[np.bool_] | None = None
+
+
+def window(case: Case, scene: Scene, view: View) -> Window:
+    """Return the whole bowl, or the tool's surroundings if the bowl is much wider than they are.
+
+    Only contacts whose point lies in the surroundings are then drawn: `WINDOW_DIAMETERS` to
+    either side of the tool and, seen from the side, `DEPTH_DIAMETERS` before and behind it.
+    """
+    bowl_m = needed(case.bowl, "bowl").radius_m + _MARGIN_M
+    floor = (-_MARGIN_M, 1.25 * needed(case.surface_m, "surface_m"))
+    diameter = 2.0 * case.media.radius_mean_m
+    half = WINDOW_DIAMETERS * diameter
+    whole = shows_all(case)
+    middle = np.zeros(2) if whole else scene.tool_m[:2]
+    low = np.full(2, -bowl_m) if whole else np.maximum(middle - half, -bowl_m)
+    high = np.full(2, bowl_m) if whole else np.minimum(middle + half, bowl_m)
+    corners = (low, high)
+    if view == "xz":
+        corners = (np.array([low[0], floor[0]]), np.array([high[0], floor[1]]))
+    if whole:
+        return Window(*corners)
+    point = scene.frame.point[:, :2]
+    near = np.logical_and(point >= low, point <= high).all(axis=1)
+    if view == "xz":
+        near &= np.abs(point[:, 1] - middle[1]) <= DEPTH_DIAMETERS * diameter
+    return Window(*corners, np.asarray(near))
+
+
+def shows_all(case: Case) -> bool:
+    """Tell whether pictures of a case show its whole bowl."""
+    reach = needed(case.bowl, "bowl").radius_m + _MARGIN_M
+    return reach <= WINDOW_DIAMETERS * 2.0 * case.media.radius_mean_m
+
+
+def cut_words(case: Case, view: View) -> str:
+    """Return what a picture leaves out, in words; empty if it shows the whole bowl."""
+    if shows_all(case):
+        return ""
+    words = f"shown: up to {WINDOW_DIAMETERS:g} ball diameters beside the tool"
+    if view == "xy":
+        return words
+    return words + f", {DEPTH_DIAMETERS:g} before and behind it"
+
+
+@dataclass(frozen=True)
 class Look:
     """How a picture is rendered.
 
     Attributes
     ----------
     pixels_per_mm : float
-        Resolution.
+        Resolution; less where a picture would be larger than VTK renders well.
     largest_n : float or None
         Normal force at the red end of the colours and at the mean ball radius; the frame's
         largest if None.
@@ -248,35 +316,29 @@ def render(
     import pyvista as pv
 
     look = Look() if look is None else look
-    low, high = _limits(case, view)
-    size = np.ceil((high - low) * 1e3 * look.pixels_per_mm).astype(int)
+    part = window(case, scene, view)
+    low, high = part.low, part.high
+    pixels_per_mm = min(look.pixels_per_mm, _MOST_PIXELS / float((high - low).max() * 1e3))
+    size = np.ceil((high - low) * 1e3 * pixels_per_mm).astype(int)
     plotter: Any = pv.Plotter(off_screen=True, window_size=size.tolist(), lighting="light kit")
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
     plotter.enable_depth_peeling(number_of_peels=8)
     _add_bowl(plotter, case, view)
     _add_tool(plotter, run_dir, case, scene)
-    _add_contacts(plotter, scene.frame, case.media.radius_mean_m, look)
-    _aim(plotter, (low + high) / 2, float(high[1] - low[1]), view)
+    _add_contacts(plotter, scene.frame, case.media.radius_mean_m, look, part.contacts)
+    away = max(1.0, 2.0 * needed(case.bowl, "bowl").radius_m)
+    _aim(plotter, (low + high) / 2, float(high[1] - low[1]), view, away)
     image: NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
     plotter.close()
     return image, np.array([low[0], high[0], low[1], high[1]]) * 1e3
 
 
-def _limits(case: Case, view: View) -> tuple[Floats, Floats]:
-    reach = needed(case.bowl, "bowl").radius_m + _MARGIN_M
-    if view == "xy":
-        return np.array([-reach, -reach]), np.array([reach, reach])
-    return np.array([-reach, -_MARGIN_M]), np.array(
-        [reach, 1.25 * needed(case.surface_m, "surface_m")]
-    )
-
-
-def _aim(plotter: Any, middle: Floats, height: float, view: View) -> None:
+def _aim(plotter: Any, middle: Floats, height: float, view: View, away_m: float) -> None:
     x, other = middle
     camera = plotter.camera
     camera.focal_point = (x, other, 0.0) if view == "xy" else (x, 0.0, other)
-    camera.position = (x, other, 1.0) if view == "xy" else (x, -1.0, other)
+    camera.position = (x, other, away_m) if view == "xy" else (x, -away_m, other)
     camera.up = (0.0, 1.0, 0.0) if view == "xy" else (0.0, 0.0, 1.0)
     camera.parallel_projection = True
     camera.parallel_scale = height / 2
@@ -330,10 +392,16 @@ def placed(tool: Any, tool_m: Floats, turn_rad: float) -> Any:
     return turned.translate(tool_m, inplace=False)
 
 
-def _add_contacts(plotter: Any, frame: NetworkFrame, radius_mean_m: float, look: Look) -> None:
+def _add_contacts(
+    plotter: Any,
+    frame: NetworkFrame,
+    radius_mean_m: float,
+    look: Look,
+    within: NDArray[np.bool_] | None,
+) -> None:
     force = frame.normal_force
     largest = float(force.max(initial=0.0)) if look.largest_n is None else look.largest_n
-    shown = force > 0.0
+    shown = force > 0.0 if within is None else (force > 0.0) & within
     if look.kept is None:
         _add_tubes(plotter, frame, np.flatnonzero(shown), radius_mean_m, largest, 1.0)
         return

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -307,6 +308,44 @@ def test_a_rendered_contact_is_where_its_axes_say(
     weak = pixel(image, extent, 5.0, level_mm)
     assert weak[1] > weak[2] + 40 and not is_red(weak)
     assert min(pixel(image, extent, 5.0, level_mm + 1.5)) > 200
+
+
+def widened(case: Case, radius_m: float) -> Case:
+    assert case.bowl is not None
+    return replace(case, bowl=replace(case.bowl, radius_m=radius_m))
+
+
+def test_a_bowl_not_much_wider_than_the_window_is_shown_whole(process: Path) -> None:
+    case = load_case(process)
+    shown = scene.Scene(network_frame([1.0, 1.0]), np.array([0.01, 0.0, 0.01]), 0.0, None, 0.2)
+    part = scene.window(case, shown, "xy")
+    assert part.contacts is None and part.low.tolist() == [-0.024, -0.024]
+    assert scene.cut_words(case, "xz") == ""
+
+
+def test_a_wide_bowl_is_cut_to_the_surroundings_of_the_tool(process: Path) -> None:
+    case = widened(load_case(process), 0.5)
+    reach = 2 * R * scene.WINDOW_DIAMETERS
+    depth = 2 * R * scene.DEPTH_DIAMETERS
+    tool = np.array([0.5 + 0.004 - reach / 2, 0.1, 0.01])
+    frame = network_frame([1.0, 1.0])
+    places = np.array([[0.0, 1.1 * depth, 0.0], [-1.1 * reach, 0.0, 0.0]]) + tool
+    shown = scene.Scene(replace(frame, point=places), tool, 0.0, None, 0.2)
+    above, side = (scene.window(case, shown, view) for view in ("xy", "xz"))
+    assert above.low.tolist() == pytest.approx((tool[:2] - reach).tolist())
+    assert above.high.tolist() == pytest.approx([0.504, 0.1 + reach])  # no farther than the bowl
+    assert above.contacts is not None and above.contacts.tolist() == [True, False]
+    assert side.contacts is not None and side.contacts.tolist() == [False, False]
+    assert f"{scene.WINDOW_DIAMETERS:g} ball diameters" in scene.cut_words(case, "xy")
+
+
+def test_a_picture_of_a_wide_bowl_has_no_more_pixels_than_vtk_takes(process: Path) -> None:
+    case = widened(load_case(process), 2.0)
+    frame = network_frame([2.0, 0.5])
+    shown = scene.Scene(frame, np.array([0.015, 0.012, 0.01]), 0.0, None, 0.2)
+    image, extent = scene.render(process, case, shown, "xy", scene.Look(pixels_per_mm=40.0))
+    assert max(image.shape[:2]) <= 1401
+    assert is_red(pixel(image, extent, 0.0, 0.0))
 
 
 def test_a_missing_tool_mesh_is_named(process: Path, tmp_path: Path) -> None:

@@ -101,3 +101,14 @@ def test_a_bed_that_did_not_settle_fails(tmp_path: Path) -> None:
     (tmp_path / "screen.1.txt").write_text("DRAGDECK NOT SETTLED: energy ratio 0.1\n")
     gates = check_run(tmp_path, {**CASE, "scene": "fill"}, {"outputs": {}}, 0, 1)
     assert {gate.name for gate in gates if not gate.passed} == {"ended by itself", "bed at rest"}
+
+
+@pytest.mark.parametrize("cut", [0, 1, 30])
+def test_a_frame_longer_than_the_first_look_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cut: int
+) -> None:
+    monkeypatch.setattr("dragdeck.gates.TAIL_BYTES", 16)
+    content = (text_frame(5, ["1 2"]) + text_frame(9, ["3 4"] * 50)).encode()
+    file = tmp_path / "output"
+    file.write_bytes(content[: len(content) - cut])
+    assert last_frame(file, LOCAL) == (None if cut else 9)

@@ -13,13 +13,14 @@ import itertools
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
 from dragdeck.errors import InputError
+from dragdeck.ranks import auto_ranks, cores_here
 from dragdeck.study import (
     STUDY_FILE,
     MeshShape,
@@ -53,6 +54,8 @@ class Case:
         What the settings in `study` were found for, if they were.
     advised : mapping or None
         What is expected of them then; ``asked`` of the process's ``case.json``.
+    beside : int
+        Cases that can run beside each other, this one among them.
     """
 
     file: Path
@@ -60,6 +63,19 @@ class Case:
     study: Study
     asked: Tolerance | None = None
     advised: Mapping[str, Any] | None = None
+    beside: int = 1
+
+    @property
+    def ranks(self) -> int:
+        """Engine processes of a run of the fill or the process.
+
+        What ``ranks: auto`` comes to is no part of a run's name: a study has the same runs
+        on every machine.
+        """
+        asked = self.study.chosen_fidelity().ranks
+        if asked == "auto":
+            return auto_ranks(self.study.media.count, self.beside, cores_here())
+        return asked
 
     @property
     def study_name(self) -> str:
@@ -156,7 +172,15 @@ def load_cases(file: Path, fidelity: str | None = None) -> list[Case]:
     if study.scaling is not None:
         _check_scaling(study.scaling, matrix, file)
     plain = {**data, "matrix": {}}
-    return [settle_case(file, plain, settings) for settings in _combinations(matrix, file)]
+    return beside_each_other(
+        [settle_case(file, plain, settings) for settings in _combinations(matrix, file)]
+    )
+
+
+def beside_each_other(cases: Iterable[Case]) -> list[Case]:
+    """The same cases, each knowing how many there are."""
+    known = list(cases)
+    return [replace(case, beside=len(known)) for case in known]
 
 
 LEAST_LEVELS = 3

@@ -112,11 +112,13 @@ def scene_of(case: Case, scene: SceneName, bed: Bed | None = None) -> Scene:
 
 
 def _expectations(case: Case, name: SceneName, scene: Scene) -> list[tuple[str, str]]:
-    """What is known of a scene's time step before it is run."""
+    """What is known of a scene's time step and bed before it is run."""
     from dragdeck.advice import breaking_note
+    from dragdeck.outlook import notes as bed_notes
     from dragdeck.stability import notes
 
-    return [*notes(case, name, scene), *(breaking_note(case) if name == "process" else [])]
+    found = [*notes(case, name, scene), *(breaking_note(case) if name == "process" else [])]
+    return found if name == "drop" else [*found, *bed_notes(case)]
 
 
 def _check(options: argparse.Namespace) -> None:

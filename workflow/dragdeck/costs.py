@@ -485,7 +485,7 @@ def timed_deck(
     scene, whole, start = _TIMED[variant.scene](case, templates, steps, bed, source)
     for edit in variant.edits:
         whole, start = edit.apply(whole), edit.apply(start)
-    ranks = case.study.chosen_fidelity().ranks if variant.scene == "process" else 1
+    ranks = case.ranks if variant.scene == "process" else 1
     files = scene.files if variant.scene == "drop" else {}
     return TimedDeck(whole, start, scene.meshes, files, ranks, scene.deck.timestep_s)
 

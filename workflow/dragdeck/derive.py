@@ -13,6 +13,9 @@ SOLID_FRACTION_ESTIMATE = 0.59
 """Solid fraction of a poured bed about twelve balls wide, an estimate used only
 for expectations before the bed exists (measured beds replace it)."""
 
+COORDINATION_ESTIMATE = 5.0
+"""Contacts of a ball in a poured bed with friction, an estimate used only for expectations."""
+
 DENSEST_RANDOM_PACKING = 0.64
 """Random close packing of equal balls (Scott and Kilgour 1969, 0.6366)."""
 
@@ -84,6 +87,23 @@ def bed_pressure(density_kg_m3: float, gravity_m_s2: float, depth_m: float) -> f
     pressure is lower.
     """
     return SOLID_FRACTION_ESTIMATE * density_kg_m3 * gravity_m_s2 * depth_m
+
+
+def bed_overlap(modulus_pa: float, pressure_pa: float) -> float:
+    """Overlap of two balls of a bed under a pressure, over their diameter d: an estimate.
+
+    The mean normal force of a contact is F = pi d^2 p / (z phi) (Agnolin and Roux 2007,
+    Physical Review E 76, 061302), here with z = `COORDINATION_ESTIMATE` contacts a ball and
+    the solid fraction phi = `SOLID_FRACTION_ESTIMATE`; its overlap is that of `hertz_overlap`.
+
+    Parameters
+    ----------
+    modulus_pa : float
+        Effective modulus of two balls.
+    pressure_pa : float
+    """
+    force = math.pi * pressure_pa / (COORDINATION_ESTIMATE * SOLID_FRACTION_ESTIMATE)
+    return hertz_overlap(force, 0.25, modulus_pa)  # of balls with a diameter of 1
 
 
 def stiffness_number(material: Material, pressure_pa: float) -> float:

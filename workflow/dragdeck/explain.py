@@ -35,22 +35,28 @@ def expected_cost(scene: Scene, results: Path) -> Cost:
     ----------
     scene : Scene
     results : Path
-        The folder of the study's runs of this scene: measured ones are used.
+        The folder of the study's runs of this scene: measured ones are used, those with
+        as many balls if there are any, the others as if a step took a time a ball.
     """
-    count = 1 if scene.deck.scene == "drop" else scene.case["media"]["count"]
-    measured = list(_measured(results))
+    drop = scene.deck.scene == "drop"
+    count = 1 if drop else scene.case["media"]["count"]
+    measured = [(1 if drop else balls, rate) for balls, rate in _measured(results)]
+    measured = [(balls, rate) for balls, rate in measured if balls == count] or measured
     if measured:
-        rate = sum(measured) / len(measured)
+        rate = sum(balls / count * rate for balls, rate in measured) / len(measured)
         return Cost(scene.steps, scene.steps / rate, f"{len(measured)} run(s) of this study here")
     rate = ASSUMED_BALL_STEPS_PER_S[scene.deck.scene] / count
     return Cost(scene.steps, scene.steps / rate, "assumed: no run of this study measured here")
 
 
-def _measured(results: Path) -> Iterable[float]:
+def _measured(results: Path) -> Iterable[tuple[int, float]]:
+    """Balls and steps a second of each run."""
     for file in results.glob("*/run.json"):
         speed = json.loads(file.read_text(encoding="utf-8"))["steps_per_s"]
-        if speed:
-            yield float(speed)
+        case = file.with_name("case.json")
+        if speed and case.is_file():
+            media = json.loads(case.read_text(encoding="utf-8"))["media"]
+            yield int(media["count"]), float(speed)
 
 
 def price_of(name: str, trade: Mapping[str, Any]) -> str:

@@ -78,8 +78,23 @@ _SIGNS = {Gt: ("above", "gt"), Ge: ("at least", "ge"), Lt: ("below", "lt"), Le: 
 def _limits(field: FieldInfo) -> str:
     if get_origin(field.annotation) is Literal:
         return " or ".join(repr(value) for value in get_args(field.annotation))
+    parts = get_args(field.annotation) if _is_union(field.annotation) else ()
+    if parts and all(get_origin(part) is Annotated for part in parts):
+        return " or ".join(filter(None, map(_limits_of_part, parts)))
     bounds = [(_SIGNS[type(item)], item) for item in field.metadata if type(item) in _SIGNS]
     return ", ".join(f"{words} {getattr(item, name):g}" for (words, name), item in bounds)
+
+
+def _is_union(annotation: Any) -> bool:
+    return get_origin(annotation) in (Union, types.UnionType)
+
+
+def _limits_of_part(part: Any) -> str:
+    """Limits of one of several plain forms of a value; of a model they stand with its fields."""
+    annotation, *metadata = get_args(part)
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return ""
+    return _limits(FieldInfo.from_annotation(Annotated[annotation, *metadata]))  # type: ignore[arg-type]
 
 
 def _default(field: FieldInfo) -> str:

@@ -66,7 +66,10 @@ class Forecast:
         error = self.option.error
         return {
             "role": self.role,
-            "settings": self.case.study.chosen_fidelity().model_dump(mode="json"),
+            "settings": {
+                **self.case.study.chosen_fidelity().model_dump(mode="json"),
+                "ranks": self.case.ranks,
+            },
             "drop_timestep_fraction": self.option.drop_timestep_fraction,
             "error": vars(error) if error else None,
             "relative_cost": self.option.relative_cost,

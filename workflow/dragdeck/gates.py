@@ -13,7 +13,7 @@ from typing import Any
 from dragdeck.engine import engine_errors
 
 TAIL_BYTES = 4_000_000
-"""How much of a text dump's end is looked at; more than any one frame has."""
+"""How much of a text output's end is looked at first; a dump's frame can be longer."""
 
 _HEADER = struct.Struct("<qqi6i6d2i")
 _CHUNK = struct.Struct("<i")
@@ -116,6 +116,21 @@ def _frames(folder: Path, name: str, output: Mapping[str, Any], parts: int) -> G
     return Gate(gate, reached, f"to step {step}", limit)
 
 
+def split_gate(found: Mapping[str, Any] | None, ranks: int) -> Gate:
+    """Whether the engine ran on the ranks that were asked for.
+
+    An engine that was built for another MPI than its launcher's runs once a rank, each
+    with all balls, and all write the same files.
+    """
+    limit = f"{ranks} rank{'s' if ranks > 1 else ''}"
+    if found is None:
+        return Gate("split as asked", False, "the engine names no processor grid", limit)
+    seen = " by ".join(map(str, found["grid"]))
+    if found["balls"]:
+        seen += f", {found['balls']['least']:,} to {found['balls']['most']:,} balls a rank"
+    return Gate("split as asked", math.prod(found["grid"]) == ranks, seen, limit)
+
+
 def last_frame(file: Path, output: Mapping[str, Any]) -> int | None:
     """Step of a file's last frame, or None where that frame is not whole.
 
@@ -129,7 +144,21 @@ def last_frame(file: Path, output: Mapping[str, Any]) -> int | None:
         return _last_row(_tail(file), len(output["columns"]))
     if output["binary"]:
         return _last_binary(file)
-    return _last_text(_tail(file), len(output["columns"]))
+    return _last_text(_from_last(file, b"ITEM: TIMESTEP\n"), len(output["columns"]))
+
+
+def _from_last(file: Path, mark: bytes) -> bytes | None:
+    """What follows the last mark in a file; None where there is none."""
+    size, length = file.stat().st_size, TAIL_BYTES
+    with file.open("rb") as stream:
+        while True:
+            stream.seek(max(0, size - length))
+            _, found, rest = stream.read().rpartition(mark)
+            if found:
+                return rest
+            if length >= size:
+                return None
+            length *= 4
 
 
 def _tail(file: Path) -> str:
@@ -145,15 +174,15 @@ def _last_row(text: str, width: int) -> int | None:
     return int(words[0]) if len(words) == width and words[0].isdigit() else None
 
 
-def _last_text(text: str, width: int) -> int | None:
-    _, mark, frame = text.rpartition("ITEM: TIMESTEP\n")
-    if not mark or not frame.endswith("\n"):
+def _last_text(frame: bytes | None, width: int) -> int | None:
+    if frame is None or not frame.endswith(b"\n"):
         return None
-    lines = frame.splitlines()
-    if len(lines) < 8 or len(lines) != 8 + int(lines[2]):
+    lines = frame.count(b"\n")
+    head = frame.split(b"\n", 3)
+    if lines < 8 or lines != 8 + int(head[2]):
         return None
-    rows = lines[8:]
-    return int(lines[0]) if not rows or len(rows[-1].split()) == width else None
+    last_row = frame[:-1].rpartition(b"\n")[2]
+    return int(head[0]) if lines == 8 or len(last_row.split()) == width else None
 
 
 def _last_binary(file: Path) -> int | None:

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, ValidationError
 
-from dragdeck.cases import SAID_BY_NAME, Case, settle_case
+from dragdeck.cases import SAID_BY_NAME, Case, beside_each_other, settle_case
 from dragdeck.errors import InputError
 from dragdeck.study import Model, Positive, Study, Whole, explained, read_yaml
 
@@ -127,7 +127,7 @@ def plan_points(plan: Plan, plan_file: Path, base: Case) -> Points:
     for settings in [{}, *({field: value} for field, all_ in plan.drop.items() for value in all_)]:
         case = _case(base, {**plan.base, **settings}, settings, plan_file)
         drops.setdefault(case.run_ids["drop"], case)
-    return Points(list(found.values()), list(drops.values()), plan.cost_rounds)
+    return Points(beside_each_other(found.values()), list(drops.values()), plan.cost_rounds)
 
 
 def _size(block: Block) -> int:

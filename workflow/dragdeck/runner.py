@@ -20,8 +20,9 @@ from typing import Any
 
 from dragdeck.engine import Engine, command, engine_errors, execute, find_engine
 from dragdeck.errors import EngineError, GateError, InputError
-from dragdeck.gates import Gate, check_run
+from dragdeck.gates import Gate, check_run, split_gate
 from dragdeck.limits import breach, held, read_samples
+from dragdeck.ranks import decomposition
 from dragdeck.render import CASE_FILE, COLUMNS_FILE, DECK_FILE, replace_text
 
 STATE_FILE = "state.json"
@@ -279,7 +280,9 @@ def _conclude(
         state["state"] = "stopped"
         _save(folder, state)
         raise EngineError(_stopped(folder, asked, part["exit_status"]))
+    state["decomposition"] = decomposition(screen)
     gates = check_run(folder, case, columns, part["exit_status"], part["part"])
+    gates.append(split_gate(state["decomposition"], state["ranks"]))
     gates += _limit_gates(folder, case, columns, part["part"])
     state["gates"] = [gate.as_json() for gate in gates]
     state.update(_totals(state["parts"]))

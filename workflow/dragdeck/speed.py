@@ -140,7 +140,7 @@ def short_case(case: Case) -> Case:
         timestep_fraction=min(TIMESTEP_FRACTION, asked.timestep_fraction),
         fill_timestep_fraction=asked.fill_timestep_fraction,
         skin_m=asked.skin_m,
-        ranks=asked.ranks,
+        ranks=case.ranks,
     )
     changed = study.model_copy(update={"fidelity": soft})
     dt = _timestep(changed)

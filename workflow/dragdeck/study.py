@@ -52,6 +52,10 @@ Number = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0)]
 NonNegative = Annotated[Number, Field(ge=0)]
 Whole = Annotated[int, BeforeValidator(_whole)]
+Ranks = Annotated[
+    Annotated[Literal["auto"], Tag("a-word")] | Annotated[Whole, Field(ge=1), Tag("a-number")],
+    Discriminator(lambda value: "a-word" if value == "auto" else "a-number"),
+]
 
 
 class Model(BaseModel):
@@ -256,7 +260,9 @@ class Fidelity(Model):
     skin_m: Positive | None = Field(
         default=None, description="neighbour skin, m; none: 0.1 of the mean radius"
     )
-    ranks: Annotated[Whole, Field(ge=1)] = Field(default=2, description="engine processes")
+    ranks: Ranks = Field(
+        default=2, description="engine processes; auto: by balls, cases and cores (docs/big.md)"
+    )
 
 
 Quantity = Literal[
@@ -503,7 +509,7 @@ def validate(data: Mapping[str, Any], file: Path | str) -> Study:
         raise explained(error, file) from None
 
 
-_FORMS = ("cylinder", "circle", "line", "a-name", "settings", "a-tolerance")
+_FORMS = ("cylinder", "circle", "line", "a-name", "a-number", "a-word", "settings", "a-tolerance")
 """Names of alternatives, which are no part of a field's dotted name."""
 
 _LIMITS = {

@@ -248,7 +248,7 @@ def case_option(scene):
 
 def ranks(scene):
     """Number of engine processes of a run, as a function of its wildcards."""
-    return lambda wildcards: case_of(scene, wildcards.run).study.chosen_fidelity().ranks
+    return lambda wildcards: case_of(scene, wildcards.run).ranks
 
 
 def fill_of(wildcards, file):

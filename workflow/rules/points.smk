@@ -41,7 +41,7 @@ rule run_point:
         of_point("benchmarks/run.tsv")
     conda:
         "../envs/python.yaml"
-    threads: lambda wildcards: point(wildcards.run).study.chosen_fidelity().ranks
+    threads: lambda wildcards: point(wildcards.run).ranks
     params:
         source=source_hash("dragdeck.runner"),
     shell:

@@ -14,6 +14,7 @@ from dragdeck.errors import InputError
 from dragdeck.mesh import Mesh
 from dragdeck.outputs import Output
 from dragdeck.packing import Array, radii
+from dragdeck.ranks import ENGINE_CHOOSES
 from dragdeck.study import Material, Study
 
 ENGINE_SOFTEST_PA = 5e6
@@ -56,6 +57,8 @@ class Deck:
         Unit vector of gravity.
     checkpoint_steps : int
         Steps between restart points; 0 for none.
+    processors : str
+        How the ranks are laid out along x, y and z.
     """
 
     title: str
@@ -72,6 +75,7 @@ class Deck:
     gravity_direction: tuple[float, float, float] = (0, 0, -1)
     thermo_steps: int = 0
     checkpoint_steps: int = 0
+    processors: str = ENGINE_CHOOSES
     version: str = __version__
     templates: str = ""
 
@@ -222,7 +226,12 @@ def base_case(case: Case, scene: SceneName, timestep_s: float, rayleigh_s: float
         "timestep_s": timestep_s,
         "rayleigh_time_s": rayleigh_s,
         "gravity_m_s2": study.gravity_m_s2,
-        "fidelity": {"name": case.fidelity_name, **fidelity, "skin_m": skin(study)},
+        "fidelity": {
+            "name": case.fidelity_name,
+            **fidelity,
+            "skin_m": skin(study),
+            "ranks": case.ranks,
+        },
         **case.asked_of(scene),
         "inputs": flat(case.content(scene)),
         "media": {

@@ -15,11 +15,16 @@ from dragdeck.derive import (
     SOLID_FRACTION_ESTIMATE,
     ball_mass,
     bed_height,
+    bed_overlap,
+    bed_pressure,
+    effective_modulus,
     fall_speed,
 )
 from dragdeck.errors import InputError
 from dragdeck.limits import run_limits
-from dragdeck.packing import Balls, pour
+from dragdeck.packing import FIRST_SPEED_M_S, Balls, pour
+from dragdeck.ranks import Filling, Split, split
+from dragdeck.ranks import warnings as rank_warnings
 from dragdeck.scenes.common import (
     Deck,
     LeftOut,
@@ -32,10 +37,15 @@ from dragdeck.scenes.common import (
     skin,
     timestep,
 )
+from dragdeck.similarity import rounded
 from dragdeck.study import Study
 
 CHECK_INTERVAL_S = 0.02
 """Time between two looks at the kinetic energy, about the fall over one ball."""
+
+MOST_OVERLAP = 0.01
+"""Overlap over the diameter, by the weight of the bed, above which a warning is given: an
+assumption; forces on the tool are several times those of the weight."""
 
 SETTLING_ESTIMATE_S = 0.5
 """Time from the last ball's arrival to rest, an estimate used for expectations only."""
@@ -73,6 +83,7 @@ def fill_scene(case: Case) -> Scene:
     top = box_top(study, balls)
     longest = study.fill.longest_s
     types = _fill_types(study)
+    parts = rank_split(case, top)
     deck = FillDeck(
         title=f"Fill: {study.title}",
         study=case.study_name,
@@ -87,6 +98,7 @@ def fill_scene(case: Case) -> Scene:
         outputs=(outputs.thermo(check_steps, None), outputs.settled_balls()),
         thermo_steps=check_steps,
         checkpoint_steps=5 * check_steps,
+        processors=parts.line,
         bowl_type=types.index(study.bowl.material) + 1,
         bowl_radius_m=study.bowl.radius_m,
         energy_ratio=study.fill.energy_ratio,
@@ -117,6 +129,11 @@ def fill_scene(case: Case) -> Scene:
             "contact output": LeftOut("nobody reads contacts before the drag", "fill_contacts"),
             "facets of the bowl": LeftOut("balls fall the same onto an exact plane and cylinder"),
         },
+        warnings=[
+            *rank_warnings(parts),
+            *overlap_warnings(study),
+            *_skin_warnings(study, balls, dt),
+        ],
     )
 
 
@@ -178,6 +195,62 @@ def box_top(study: Study, balls: Balls) -> float:
     return math.ceil(100 * max(balls.top_m, above_bed, 2 * study.bowl.height_m) + 5) / 100
 
 
+def rank_split(case: Case, top_m: float) -> Split:
+    """How the box of a case is split among its ranks.
+
+    Parameters
+    ----------
+    case : Case
+    top_m : float
+        Top of the box.
+    """
+    study = case.study
+    filling = Filling(
+        balls=study.media.count,
+        radius_m=study.bowl.radius_m,
+        height_m=expected_surface(study),
+        half_width_m=_half_width(study),
+        bottom_m=-study.media.radius_mean_m,
+        top_m=top_m,
+        reach_m=2 * float(bed_radii(study).max()) + skin(study),
+    )
+    return split(case.ranks, filling)
+
+
+def floor_overlap(study: Study) -> float:
+    """Overlap of two balls at the floor under the bed's weight, over the diameter: an estimate."""
+    ball, scale = ball_material(study), study.chosen_fidelity().youngs_modulus_scale
+    pressure = bed_pressure(ball.density_kg_m3, study.gravity_m_s2, expected_surface(study))
+    return bed_overlap(effective_modulus(ball, ball, scale), pressure)
+
+
+def overlap_warnings(study: Study) -> list[str]:
+    """A warning where balls are too soft for the bed above them."""
+    overlap = floor_overlap(study)
+    if overlap <= MOST_OVERLAP:
+        return []
+    scale = study.chosen_fidelity().youngs_modulus_scale
+    stiffer = rounded(scale * (overlap / MOST_OVERLAP) ** 1.5, up=True)
+    return [
+        f"the weight of the bed presses balls at the floor {100 * overlap:.2g} % of a diameter "
+        f"into each other, more than {100 * MOST_OVERLAP:g} %: the bed is denser than a real one; "
+        f"take a fidelity.youngs_modulus_scale of at least {stiffer:g}"
+    ]
+
+
+def _skin_warnings(study: Study, balls: Balls, timestep_s: float) -> list[str]:
+    """A warning where a falling ball outruns the neighbour lists, which fails the run."""
+    speed = FIRST_SPEED_M_S + fall_speed(_free_fall(study, balls), study.gravity_m_s2)
+    least = rounded(2 * speed * timestep_s, up=True)
+    if skin(study) >= least:
+        return []
+    return [
+        f"balls fall at up to {speed:.2g} m/s, more than half the neighbour skin of "
+        f"{skin(study):.2g} m in a step: the run would fail for dangerous neighbour builds; take "
+        f"a fidelity.skin_m of at least {least:g}, or a smaller fidelity.fill_timestep_fraction"
+    ]
+
+
 def bed_limits(study: Study, top_m: float, speed_m_s: float) -> dict[str, Any]:
     """Limits of a run with the whole bed in a box of that height."""
     mass = ball_mass(ball_material(study), study.media.radius_mean_m)
@@ -192,13 +265,23 @@ def _energy_unit(study: Study) -> float:
 
 
 def _expected_time(study: Study, balls: Balls) -> float:
-    drop = balls.top_m - expected_surface(study)
-    return fall_speed(max(drop, 0.0), study.gravity_m_s2) / study.gravity_m_s2 + SETTLING_ESTIMATE_S
+    fall = fall_speed(_free_fall(study, balls), study.gravity_m_s2) / study.gravity_m_s2
+    return fall + SETTLING_ESTIMATE_S
+
+
+def _free_fall(study: Study, balls: Balls) -> float:
+    """Height that the highest ball falls to the bed, m."""
+    return max(balls.top_m - expected_surface(study), 0.0)
+
+
+def _half_width(study: Study) -> float:
+    """Half of the box's width, m."""
+    return study.bowl.radius_m + 2 * study.media.radius_mean_m
 
 
 def _balls_data(balls: Balls, study: Study, top_m: float, types: int) -> str:
     """The engine's data file: one line a ball, numbers that read back exactly."""
-    side = study.bowl.radius_m + 2 * study.media.radius_mean_m
+    side = _half_width(study)
     density = ball_material(study).density_kg_m3
     count = len(balls.radii_m)
     atoms = (

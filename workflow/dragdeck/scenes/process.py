@@ -14,6 +14,7 @@ from dragdeck.errors import InputError
 from dragdeck.mesh import Mesh, bowl
 from dragdeck.motion import Leg, farthest_reach, legs, plunge_point, start_heading
 from dragdeck.outputs import Output
+from dragdeck.ranks import warnings as rank_warnings
 from dragdeck.scenes.common import (
     Deck,
     LeftOut,
@@ -28,7 +29,13 @@ from dragdeck.scenes.common import (
     skin,
     timestep,
 )
-from dragdeck.scenes.fill import bed_limits, box_top, expected_surface, first_balls
+from dragdeck.scenes.fill import (
+    bed_limits,
+    box_top,
+    expected_surface,
+    first_balls,
+    rank_split,
+)
 from dragdeck.scenes.numbers import describe
 from dragdeck.scenes.tool import tool_length, tool_mesh, tool_radius
 from dragdeck.study import CirclePath, CylinderShape, MeshShape, Study
@@ -142,6 +149,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene:
     types = study.type_names()
     top = box_top(study, first_balls(study))
     check_headroom(case, clear, top)
+    parts = rank_split(case, top)
     deck = ProcessDeck(
         title=study.title,
         study=case.study_name,
@@ -156,6 +164,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene:
         outputs=_outputs(periods, drag.start_step, last, study.bowl.facet_size_m is not None),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, last),
+        processors=parts.line,
         bowl_type=types.index(study.bowl.material) + 1,
         bowl_radius_m=study.bowl.radius_m,
         bowl_facets=study.bowl.facet_size_m is not None,
@@ -175,7 +184,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene:
         meshes={"tool.stl": tool_mesh(case), **bowl_meshes(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
-        warnings=_warnings(case, dt),
+        warnings=[*_warnings(case, dt), *rank_warnings(parts)],
     )
 
 
