@@ -176,8 +176,8 @@ def counted_range(rod_force: pd.DataFrame) -> tuple[int, int]:
 def read_frames(run_dir: Path, steps: tuple[int, int] | None = None) -> Iterator[NetworkFrame]:
     """Yield the network frames of a process run in the order of their steps.
 
-    The tables are read row group by row group: of each no more is held than a row group and a
-    frame, however long the run is.
+    The tables are read row group by row group: of each no more is held than a frame and the row
+    groups that it lies in, however long the run is.
 
     Parameters
     ----------

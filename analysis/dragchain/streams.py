@@ -39,7 +39,7 @@ def needed_table(path: Path) -> Path:
 
 def _command(path: Path) -> str:
     """Return the command that makes a table."""
-    made_by = "chains" if path.stem in ("network", "chains") else "tables"
+    made_by = "chains" if path.stem in ("network", "chains", "clusters") else "tables"
     return f"dragchain {made_by} {path.parent.parent}"
 
 
