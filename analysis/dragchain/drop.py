@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.errors import TableError
 from dragchain.formats import Columns
+from dragchain.frames import read_table
 
 Floats = NDArray[np.float64]
 
@@ -135,7 +135,5 @@ def effective_restitution(run_dir: Path | str) -> Restitution:
         If ``impacts.parquet`` is not there.
     """
     file = Path(run_dir) / "tables" / "impacts.parquet"
-    if not file.is_file():
-        raise TableError(f"{file}: there is no such table; run `dragchain tables` first")
-    ratio = pd.read_parquet(file, columns=["restitution"])["restitution"].to_numpy()
+    ratio = read_table(file, ["restitution"])["restitution"].to_numpy()
     return Restitution(float(ratio.mean()), float(ratio.min()), float(ratio.max()), len(ratio))

@@ -15,6 +15,7 @@ from scipy.signal import find_peaks
 from dragchain.case import Case, Circle, Line, Phase
 from dragchain.errors import SeriesError, TableError
 from dragchain.stats import MeanEstimate, estimate_mean
+from dragchain.streams import needed_table
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
@@ -289,10 +290,8 @@ def read_counted(run_dir: Path | str, columns: Sequence[str] | None = None) -> p
         If the table is not there.
     """
     file = Path(run_dir) / "tables" / "rod_force.parquet"
-    if not file.is_file():
-        raise TableError(f"{file}: there is no such table; run `dragchain tables` first")
     wanted = None if columns is None else list(columns)
-    return pd.read_parquet(file, columns=wanted, filters=[("counted", "==", True)])
+    return pd.read_parquet(needed_table(file), columns=wanted, filters=[("counted", "==", True)])
 
 
 def summarise_forces(run_dir: Path | str) -> dict[str, MeanEstimate]:

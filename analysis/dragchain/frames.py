@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from dragchain.errors import TableError
-from dragchain.streams import read_steps
+from dragchain.streams import RisingSteps, needed_table, read_steps
 
 BALL, ROD, FLOOR, SIDE = 1, 0, -1, -2
 """The other body of a contact; the last three are the ``b_id`` of the contacts table."""
@@ -176,8 +176,8 @@ def counted_range(rod_force: pd.DataFrame) -> tuple[int, int]:
 def read_frames(run_dir: Path, steps: tuple[int, int] | None = None) -> Iterator[NetworkFrame]:
     """Yield the network frames of a process run in the order of their steps.
 
-    The tables are read row group by row group: of each no more is held than a row group and a
-    frame, however long the run is.
+    The tables are read row group by row group: of each no more is held than a frame and the row
+    groups that it lies in, however long the run is.
 
     Parameters
     ----------
@@ -194,33 +194,18 @@ def read_frames(run_dir: Path, steps: tuple[int, int] | None = None) -> Iterator
     tables = run_dir / "tables"
     rod_force = read_table(tables / "rod_force.parquet", ["step", "heading_rad", "counted"])
     first, last = counted_range(rod_force) if steps is None else steps
-    contacts = _Rows(read_steps(tables / "contacts.parquet", _CONTACTS, (first, last)))
+    contacts = RisingSteps(tables / "contacts.parquet", _CONTACTS, (first, last))
     heading_step = rod_force["step"].to_numpy(np.int64)
     heading = np.unwrap(rod_force["heading_rad"].to_numpy(np.float64))
     balls = read_steps(tables / "balls.parquet", _BALLS, (first, last))
     for step, of_step in balls:
         yield frame_of(
-            contacts.of(step),
+            contacts.at(step),
             of_step,
             step,
             float(of_step["time_s"].iloc[0]),
             float(np.interp(step, heading_step, heading)),
         )
-
-
-class _Rows:
-    """The rows of a table at rising steps, none where it does not have the step."""
-
-    def __init__(self, steps: Iterator[tuple[int, pd.DataFrame]]) -> None:
-        self._steps = steps
-        self._next = next(steps, None)
-        self._none = pd.DataFrame(columns=_CONTACTS)
-
-    def of(self, step: int) -> pd.DataFrame:
-        """Rows of a step above the last one asked for."""
-        while self._next is not None and self._next[0] < step:
-            self._next = next(self._steps, None)
-        return self._none if self._next is None or self._next[0] > step else self._next[1]
 
 
 def read_table(path: Path, columns: list[str] | None = None) -> pd.DataFrame:
@@ -232,19 +217,6 @@ def read_table(path: Path, columns: list[str] | None = None) -> pd.DataFrame:
         If the file is not there.
     """
     return pd.read_parquet(needed_table(path), columns=columns)
-
-
-def needed_table(path: Path) -> Path:
-    """Return the path of a table that is there, or say which command makes it.
-
-    Raises
-    ------
-    TableError
-        If the file is not there.
-    """
-    if not path.is_file():
-        raise TableError(f"{path} is not there: run `dragchain tables {path.parent.parent}`")
-    return path
 
 
 def write_parquet(table: pd.DataFrame, path: Path) -> None:

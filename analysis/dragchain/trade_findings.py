@@ -13,12 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from scipy import stats
 
 from dragchain.case import load_case
 from dragchain.errors import TableError
-from dragchain.frames import Floats
+from dragchain.frames import Floats, read_table
 from dragchain.measures import FORCE_BINS, QUANTITIES, Quantity
 from dragchain.trade import (
     CONFIDENCE,
@@ -472,9 +471,7 @@ def _read_drop(folder: Path) -> dict[str, Any]:
     case = load_case(folder)
     if case.scene != "drop":
         raise TableError(f"{folder}: this is a {case.scene}, not a drop")
-    table = folder / "tables" / "impacts.parquet"
-    if not table.is_file():
-        raise TableError(f"{table}: there is no such table; run `dragchain tables` first")
+    impacts = read_table(folder / "tables" / "impacts.parquet", ["restitution"])
     record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     if record["state"] != "complete":
         raise TableError(f"{folder}: its state is {record['state']!r}, not 'complete'")
@@ -486,7 +483,7 @@ def _read_drop(folder: Path) -> dict[str, Any]:
             for name, value in case.inputs.items()
             if name not in ("seed", "drop.timestep_fraction")
         },
-        "ratios": pd.read_parquet(table, columns=["restitution"])["restitution"].to_numpy(),
+        "ratios": impacts["restitution"].to_numpy(),
         "cost": record.get("cpu_time_s") or record["wall_time_s"] * record["ranks"],
     }
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 import pyvista as pv
 from paths import ROOT
@@ -333,21 +334,30 @@ def test_row_groups_and_batches_may_cut_a_frame(run: Path, monkeypatch) -> None:
     whole = write_export(run, "paraview", run / "whole").file.parent
     for name in ("balls", "contacts", "rod_force", "chains"):
         table(run, name).to_parquet(run / f"tables/{name}.parquet", row_group_size=3)
-    monkeypatch.setattr("dragchain.export.moments._BATCH_ROWS", 2)
+    monkeypatch.setattr("dragchain.streams.PIECE_ROWS", 2)
     cut = write_export(run, "paraview", run / "cut").file.parent
     files = sorted(file.relative_to(whole) for file in whole.rglob("*.vt*"))
     assert len(files) == 6 * 4
     assert all((whole / file).read_bytes() == (cut / file).read_bytes() for file in files)
 
 
-def test_row_groups_without_a_wanted_frame_are_not_read(run: Path) -> None:
-    balls = table(run, "balls")
-    balls.to_parquet(run / "tables/balls.parquet", row_group_size=4)
-    from dragchain.export.moments import _groups, pq
+def test_row_groups_without_a_wanted_frame_are_not_read(run: Path, monkeypatch) -> None:
+    table(run, "balls").to_parquet(run / "tables/balls.parquet", row_group_size=4)
+    for name in ("contacts", "rod_force"):
+        table(run, name).to_parquet(run / f"tables/{name}.parquet")
+    moments = Moments.of(Run.open(run), Selection(first_s=0.02, every=4))
+    assert moments.steps.tolist() == [20, 100]
+    read: list[int] = []
+    plain = pq.ParquetFile.read_row_group
 
-    with pq.ParquetFile(run / "tables/balls.parquet") as file:
-        assert _groups(file, np.array([20, 100])) == [1, 5]
-        assert _groups(file, None) == [0, 1, 2, 3, 4, 5]
+    def noted(file, number, **options):
+        if file.num_row_groups > 1:
+            read.append(number)
+        return plain(file, number, **options)
+
+    monkeypatch.setattr(pq.ParquetFile, "read_row_group", noted)
+    assert [moment.step for moment in moments] == [20, 100]
+    assert read == [1, 5]
 
 
 # --- errors ----------------------------------------------------------------------------------
@@ -370,7 +380,14 @@ def test_a_missing_mesh_of_the_tool_is_an_error(run: Path) -> None:
 def test_steps_that_fall_are_an_error(run: Path) -> None:
     table(run, "contacts")[::-1].to_parquet(run / "tables/contacts.parquet")
     (run / "tables/chains.parquet").unlink()
-    with pytest.raises(TableError, match="step 80 comes after step 100"):
+    with pytest.raises(TableError, match=r"contacts.parquet .*: step 80 comes after step 100: .*"):
+        write_export(run, "xyz")
+
+
+def test_chains_without_a_column_name_the_command_that_makes_them(run: Path) -> None:
+    file = run / "tables/chains.parquet"
+    table(run, "chains").drop(columns="dominant").to_parquet(file)
+    with pytest.raises(TableError, match=r"no column dominant: .* again: dragchain chains"):
         write_export(run, "xyz")
 
 

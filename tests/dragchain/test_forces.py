@@ -154,5 +154,5 @@ def test_peaks_are_one_ball_radius_of_travel_apart(case: Case) -> None:
 
 
 def test_missing_tables_are_named(tmp_path: Path) -> None:
-    with pytest.raises(TableError, match=r"rod_force\.parquet: there is no such table"):
+    with pytest.raises(TableError, match=r"rod_force\.parquet is not there: run `dragchain tables"):
         read_counted(tmp_path)

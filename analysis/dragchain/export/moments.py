@@ -7,23 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import groupby, pairwise
-from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from dragchain.case import Case
 from dragchain.errors import ExportError, TableError
 from dragchain.export.membership import Membership, chain_membership
-from dragchain.frames import Floats, Ints, NetworkFrame, frame_of, needed_table
+from dragchain.frames import Floats, Ints, NetworkFrame, frame_of
 from dragchain.scene import TOOL_COLUMNS, tool_place
+from dragchain.streams import RisingSteps, read_groups, read_steps
 from dragchain.tables import CONTACTS, KINEMATICS, Run
 
-_BATCH_ROWS = 65_536
+_BALLS = ("step", *KINEMATICS)
 _CHAINS = ("step", "definition", "ball_ids", "reaches_bowl", "end_kind", "dominant")
 
 
@@ -109,7 +106,7 @@ class Moments:
                 " nothing to export\n  remedy: export a fill or a process that lists balls in"
                 " its outputs"
             )
-        steps, times_s = _frame_times(_table(run, "balls.parquet"))
+        steps, times_s = _frame_times(run.table("balls.parquet"))
         wanted = _inside(times_s, selection, run.case)
         if not wanted.any():
             raise ExportError(_nothing(run, times_s, selection))
@@ -140,11 +137,12 @@ class Moments:
             If a table is missing or the tables contradict each other.
         """
         run, steps = self.run, self.steps
-        balls = _Rows(_table(run, "balls.parquet"), steps, KINEMATICS)
-        contacts = (
-            _Rows(_table(run, "contacts.parquet"), steps, CONTACTS) if self.has_contacts else None
-        )
-        chains = _Rows(run.table("chains.parquet"), steps, _CHAINS) if self.has_chains else None
+        balls = RisingSteps(run.table("balls.parquet"), _BALLS, steps)
+        contacts = chains = None
+        if self.has_contacts:
+            contacts = RisingSteps(run.table("contacts.parquet"), CONTACTS, steps)
+        if self.has_chains:
+            chains = RisingSteps(run.table("chains.parquet"), _CHAINS, steps)
         searched = _steps(run.table("network.parquet")) if chains is not None else frozenset()
         track = _Track(run) if run.case.tool is not None else None
         for step, time_s in zip(steps.tolist(), self.times_s.tolist(), strict=True):
@@ -160,10 +158,6 @@ class Moments:
         for rows in (balls, contacts, chains):
             if rows is not None:
                 rows.finish()
-
-
-def _table(run: Run, name: str) -> Path:
-    return needed_table(run.table(name))
 
 
 def _inside(times_s: Floats, selection: Selection, case: Case) -> np.ndarray:
@@ -196,9 +190,9 @@ def _frame_times(file: Path) -> tuple[Ints, Floats]:
     """Return the rising steps of a table's frames and their times in s."""
     steps: list[int] = []
     times_s: list[float] = []
-    for step, rows in _frames(file, ["step", "time_s"]):
+    for step, rows in read_steps(file, ["step", "time_s"]):
         steps.append(step)
-        times_s.append(rows[0]["time_s"][0].as_py())
+        times_s.append(rows["time_s"].iloc[0])
     return np.array(steps, dtype=np.int64), np.array(times_s, dtype=np.float64)
 
 
@@ -206,94 +200,12 @@ def _steps(file: Path) -> frozenset[int]:
     return frozenset(_frame_times(file)[0].tolist())
 
 
-class _Rows:
-    """The rows of a table at steps that rise.
-
-    Parameters
-    ----------
-    file : Path
-        The table.
-    wanted : (N,) array of int
-        The steps that will be asked for; row groups without any are not read.
-    columns : sequence of str
-        Its columns.
-    """
-
-    def __init__(self, file: Path, wanted: Ints, columns: tuple[str, ...]) -> None:
-        self._frames = _frames(file, list(columns), wanted)
-        self._none: pd.DataFrame = pq.read_schema(file).empty_table().select(columns).to_pandas()
-        self._next = next(self._frames, None)
-
-    def at(self, step: int) -> pd.DataFrame:
-        """Rows of a step above the last one asked for; maybe none."""
-        while self._next is not None and self._next[0] < step:
-            self._next = next(self._frames, None)
-        if self._next is None or self._next[0] > step:
-            return self._none
-        rows: pd.DataFrame = pa.Table.from_batches(self._next[1]).to_pandas()
-        return rows
-
-    def finish(self) -> None:
-        """Read what is left, so that a step out of order is found."""
-        for _ in self._frames:
-            pass
-
-
-_Frame = tuple[int, list[pa.RecordBatch]]
-
-
-def _frames(file: Path, columns: list[str], wanted: Ints | None = None) -> Iterator[_Frame]:
-    """Yield each step with its rows, from a table in the order of its steps."""
-    if "step" not in columns:
-        columns = ["step", *columns]
-    before = -1
-    for step, pieces in groupby(_pieces(file, columns, wanted), key=itemgetter(0)):
-        if step < before:
-            raise TableError(
-                f"{file}: step {step} comes after step {before}\n"
-                "  remedy: make the tables again with `dragchain tables`"
-            )
-        before = step
-        yield step, [rows for _, rows in pieces]
-
-
-def _pieces(
-    file: Path, columns: list[str], wanted: Ints | None
-) -> Iterator[tuple[int, pa.RecordBatch]]:
-    """Yield the stretches of one step within each batch of rows."""
-    with pq.ParquetFile(file) as table:
-        groups = _groups(table, wanted)
-        for batch in table.iter_batches(_BATCH_ROWS, row_groups=groups, columns=columns):
-            steps = batch["step"].to_numpy()
-            starts = np.flatnonzero(np.diff(steps, prepend=steps[0] - 1))
-            for start, end in pairwise([*starts.tolist(), steps.size]):
-                yield int(steps[start]), batch.slice(start, end - start)
-
-
-def _groups(table: pq.ParquetFile, wanted: Ints | None) -> list[int]:
-    """Return the row groups that may hold a wanted step."""
-    groups = list(range(table.num_row_groups))
-    column = table.schema_arrow.get_field_index("step")
-    if wanted is None:
-        return groups
-    return [group for group in groups if _may_hold(table, group, column, wanted)]
-
-
-def _may_hold(table: pq.ParquetFile, group: int, column: int, wanted: Ints) -> bool:
-    known = table.metadata.row_group(group).column(column).statistics
-    if known is None or not known.has_min_max:
-        return True
-    return bool(np.searchsorted(wanted, known.min) < np.searchsorted(wanted, known.max, "right"))
-
-
 class _Track:
     """Where the tool is at steps that rise; a stretch of ``rod_force.parquet`` is held."""
 
     def __init__(self, run: Run) -> None:
         self._case = run.case
-        file = pq.ParquetFile(_table(run, "rod_force.parquet"))
-        batches = file.iter_batches(_BATCH_ROWS, columns=list(TOOL_COLUMNS))
-        self._blocks = (batch.to_pandas() for batch in batches)
+        self._blocks = read_groups(run.table("rod_force.parquet"), TOOL_COLUMNS)
         first = next(self._blocks, None)
         if first is None:
             raise TableError(f"{run.table('rod_force.parquet')} holds no samples")
