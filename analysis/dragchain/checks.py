@@ -51,7 +51,7 @@ class Check:
         where the scene is unlike those that were measured.
     setting : Setting
         What the advisor chose.
-    runs, reference_runs : int
+    runs, failed, reference_runs : int
     error : Error
     verdict : str
     """
@@ -63,14 +63,15 @@ class Check:
     held_to: float
     setting: Setting
     runs: int
+    failed: int
     reference_runs: int
     error: Error
     verdict: Verdict
 
     @property
     def met(self) -> bool:
-        """Whether the error is within what the settings were chosen for, not only the tolerance."""
-        return verdict(self.error, self.held_to) == "kept"
+        """Whether no run failed and the error is within what the settings were chosen for."""
+        return not self.failed and verdict(self.error, self.held_to) == "kept"
 
 
 def verdict(error: Error, tolerance: float) -> Verdict:
@@ -90,6 +91,7 @@ class _Pair:
     asked: Mapping[str, Any]
     own: Sequence[Mapping[str, Any]]
     references: Sequence[Mapping[str, Any]]
+    failed: int
 
     @property
     def quantity(self) -> Quantity:
@@ -147,10 +149,15 @@ def _pairs(runs: Sequence[Mapping[str, Any]]) -> Iterator[_Pair]:
             if run.get("asked"):
                 promised.setdefault(_promise(run), []).append(run)
         for kept in promised.values():
-            pair = _Pair(scene, kept[0]["asked"], kept, references)
+            failed = sum(_failed(run, kept[0]) for run in everyone)
+            pair = _Pair(scene, kept[0]["asked"], kept, references, failed)
             if pair.quantity.signed:
                 raise TableError(f"{pair.quantity.name} may change its sign: it has no promise")
             yield pair
+
+
+def _failed(run: Mapping[str, Any], kept: Mapping[str, Any]) -> bool:
+    return not run["complete"] and bool(run.get("asked")) and _promise(run) == _promise(kept)
 
 
 def _promise(run: Mapping[str, Any]) -> tuple[str, float]:
@@ -204,6 +211,7 @@ def _check(pair: _Pair, scatter: float, degrees: int) -> Check:
         held_to=float(pair.asked.get("held_to", pair.asked["tolerance"])),
         setting=Setting(modulus, step, speed),
         runs=len(own),
+        failed=pair.failed,
         reference_runs=len(references),
         error=error,
         verdict=verdict(error, float(pair.asked["tolerance"])),
@@ -223,6 +231,7 @@ def write_checks(out_dir: Path, files: Sequence[Path]) -> list[Check]:
             "held_to": check.held_to,
             **{name: getattr(check.setting, name) for name in KNOBS},
             "runs": check.runs,
+            "failed": check.failed,
             "reference_runs": check.reference_runs,
             **vars(check.error),
             "verdict": check.verdict,

@@ -37,7 +37,7 @@ def test_promises_are_kept_and_broken_by_their_errors(tmp_path: Path) -> None:
     assert kept.error.low < 0.02 < kept.error.high
     assert broken.error.low < 0.3 < broken.error.high
     assert dict(broken.scene) == {"motion.submersion_m": "0.03"}
-    assert (kept.runs, kept.reference_runs) == (6, 6)
+    assert (kept.runs, kept.failed, kept.reference_runs) == (6, 0, 6) and kept.met
 
 
 def test_a_promise_kept_by_the_skin_of_its_teeth_is_not_met(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_a_failed_run_does_not_count(tmp_path: Path) -> None:
     inputs = {**failed["inputs"], "motion.submersion_m": 0.05}
     files = write(tmp_path, [*scene(0.05, 1.0, rng), {**failed, "inputs": inputs, "asked": ASKED}])
     (check,) = check_promises(files)
-    assert check.runs == 6
+    assert (check.runs, check.failed, check.verdict) == (6, 1, "kept") and not check.met
     (lost,) = failures(files)
     assert lost["asked"] and lost["seen"] == "1 ball"
 
