@@ -22,7 +22,7 @@ FLOOR = 1e-3
 """Errors below this are drawn here."""
 
 INK = "#1d2733"
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", "p", ">", "d")
 COLUMNS = 3
 TITLES = {
     "drag_sd": "standard deviation of drag",
