@@ -17,20 +17,21 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import platform
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
+from machine import machine
+
 if TYPE_CHECKING:
     import pandas as pd
 
+PACKAGES = ("numpy", "numba", "scipy", "pandas")
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "benchmarks" / "chains.md"
 FRAME = ROOT / "tests" / "dragchain" / "data" / "real_frame"
@@ -302,21 +303,6 @@ def stream_table(found: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def machine() -> str:
-    """What it ran on."""
-    names = [
-        line.split(":", 1)[1].strip()
-        for line in Path("/proc/cpuinfo").read_text().splitlines()
-        if line.startswith("model name")
-    ]
-    load = " ".join(f"{value:.1f}" for value in os.getloadavg())
-    packages = [f"{name} {version(name)}" for name in ("numpy", "numba", "scipy", "pandas")]
-    return (
-        f"{len(os.sched_getaffinity(0))} cores ({names[0] if names else platform.machine()}), load"
-        f" {load} at the end; Python {platform.python_version()}, {', '.join(packages)}"
-    )
-
-
 # --- the run ------------------------------------------------------------------------------
 
 
@@ -344,7 +330,7 @@ def report(run: Path | None, rounds: int, largest: int) -> None:
             tables.append(page_tables(kind, found))
         tables.append(stream_table([stream(frame, *sizes) for sizes in STREAMS]))
     source = "the frame of the tests" if run is None else "a frame of a run"
-    output = "\n\n".join([f"{machine()}. {rounds} rounds, {source}.", *tables])
+    output = "\n\n".join([f"{machine(*PACKAGES)}. {rounds} rounds, {source}.", *tables])
     print(output)
     before, mark, _ = PAGE.read_text().partition("<!-- output -->\n")
     PAGE.write_text(f"{before}{mark}\n{output}\n")

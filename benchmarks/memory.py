@@ -28,7 +28,8 @@ from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
-from reading import machine, peak_bytes
+from machine import machine
+from reading import PACKAGES, peak_bytes
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "benchmarks" / "memory.md"
@@ -267,7 +268,7 @@ def main() -> None:
         found = {}
         for command in options.commands:
             found[command] = [kept(command, run, bed) for run in runs.values()]
-    head = f"{machine()}. {case['media']['count']} balls; {rates(options.run, drag)}."
+    head = f"{machine(*PACKAGES)}. {case['media']['count']} balls; {rates(options.run, drag)}."
     output = f"{head}\n\n{table(found, drag)}"
     print(output)
     before, mark, _ = PAGE.read_text().partition("<!-- output -->\n")

@@ -16,8 +16,6 @@ import argparse
 import contextlib
 import json
 import os
-import platform
-import re
 import statistics
 import sys
 import time
@@ -27,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+from machine import machine
 
 from dragdeck.cases import Case, SceneName, settle_case
 from dragdeck.engine import Ending, command, execute, find_engine
@@ -309,17 +308,6 @@ def spread(values: Sequence[float], form: str = ".2f") -> str:
     return f"{middle:{form}} ({low:{form}} to {high:{form}})"
 
 
-def machine() -> str:
-    """What it ran on."""
-    names = re.findall(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
-    load = " ".join(f"{value:.1f}" for value in os.getloadavg())
-    return (
-        f"{len(os.sched_getaffinity(0))} cores ({names[0] if names else platform.machine()}), "
-        f"load {load} at the end; LIGGGHTS {find_engine().version}, "
-        f"Python {platform.python_version()}"
-    )
-
-
 def say(line: str) -> None:
     """Report progress."""
     print(line, file=sys.stderr, flush=True)
@@ -345,7 +333,7 @@ def main() -> None:
             folder = timed_folder(case, fill, project)
             timed[balls] = steps, rounds(folder, steps, options.rounds)
     parts = [
-        f"{machine()}. {options.rounds} rounds of one rank against two.",
+        f"{machine()}, LIGGGHTS {find_engine().version}. {options.rounds} rounds of one rank against two.",
         "### Engine: whole runs",
         engine_table(sizes),
         "### Analysis",

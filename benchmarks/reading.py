@@ -17,17 +17,18 @@ import argparse
 import io
 import json
 import os
-import platform
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from importlib.metadata import PackageNotFoundError, version
 from itertools import islice
 from pathlib import Path
 from statistics import median
 
+from machine import machine
+
+PACKAGES = ("numpy", "numba", "pyarrow", "pandas", "ovito")
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "benchmarks" / "reading.md"
 CONTACTS = [f"c_ball_contacts[{i}]" for i in (1, 2, 4, 5, 6, 7)]
@@ -247,30 +248,6 @@ def table(kind: str, file: Path, found: dict[str, list[dict[str, float]]]) -> st
     return "\n".join(lines)
 
 
-def machine() -> str:
-    """What it ran on."""
-    names = [
-        line.split(":", 1)[1].strip()
-        for line in Path("/proc/cpuinfo").read_text().splitlines()
-        if line.startswith("model name")
-    ]
-    load = " ".join(f"{value:.1f}" for value in os.getloadavg())
-    packages = [
-        f"{name} {_version(name)}" for name in ("numpy", "numba", "pyarrow", "pandas", "ovito")
-    ]
-    return (
-        f"{len(os.sched_getaffinity(0))} cores ({names[0] if names else platform.machine()}), load"
-        f" {load} at the end; Python {platform.python_version()}, {', '.join(packages)}"
-    )
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "missing"
-
-
 def main() -> None:
     """Measure, print, and write the page."""
     parser = argparse.ArgumentParser(
@@ -301,7 +278,7 @@ def main() -> None:
             tables.append(table(kind, file, found))
             file.unlink()
     frames = "made frames" if options.run is None else "real frames, repeated"
-    output = "\n\n".join([f"{machine()}. {options.rounds} rounds, {frames}.", *tables])
+    output = "\n\n".join([f"{machine(*PACKAGES)}. {options.rounds} rounds, {frames}.", *tables])
     print(output)
     before, mark, _ = PAGE.read_text().partition("<!-- output -->\n")
     PAGE.write_text(f"{before}{mark}\n{output}\n")
