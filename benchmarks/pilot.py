@@ -16,6 +16,7 @@ import argparse
 import contextlib
 import json
 import os
+import re
 import statistics
 import sys
 import time
@@ -333,7 +334,8 @@ def main() -> None:
             folder = timed_folder(case, fill, project)
             timed[balls] = steps, rounds(folder, steps, options.rounds)
     parts = [
-        f"{machine()}, LIGGGHTS {find_engine().version}. {options.rounds} rounds of one rank against two.",
+        f"{machine()}, LIGGGHTS {find_engine().version}."
+        f" {options.rounds} rounds of one rank against two.",
         "### Engine: whole runs",
         engine_table(sizes),
         "### Analysis",
