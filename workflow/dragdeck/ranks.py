@@ -23,7 +23,7 @@ CORES_VARIABLE = "DRAGDECK_CORES"
 
 FEWEST_BALLS_A_RANK = 5000
 """``ranks: auto`` gives no rank fewer balls. Two ranks of 5,000 balls were measured to take
-1.28 times the processor time of one with all (docs/big.md); smaller runs are soon done
+1.08 times the processor time of one with all (docs/big.md); smaller runs are soon done
 anyway, and on a machine that others use too their ranks wait for each other."""
 
 MOST_OVER_MEAN = 1.5
