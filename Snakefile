@@ -6,19 +6,14 @@ min_version("9.0")
 
 
 include: "workflow/rules/common.smk"
-include: "workflow/rules/decks.smk"
+include: "workflow/rules/runs.smk"
 include: "workflow/rules/advise.smk"
-include: "workflow/rules/simulate.smk"
-include: "workflow/rules/tables.smk"
-include: "workflow/rules/network.smk"
-include: "workflow/rules/removal.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/export.smk"
 include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/verify.smk"
 include: "workflow/rules/stability.smk"
-include: "workflow/rules/points.smk"
-include: "workflow/rules/trade.smk"
+include: "workflow/rules/tradeoff.smk"
 include: "workflow/rules/validate.smk"
 include: "workflow/rules/scaling.smk"
 
@@ -27,21 +22,17 @@ include: "workflow/rules/scaling.smk"
 localrules:
     all,
     calibrate,
-    checks,
-    drop,
+    promises,
+    drop_test,
     export,
-    fill,
+    filling,
     pass_verdict,
     process,
-    render_drop,
-    render_fill,
-    render_point,
-    render_process,
     render_verification,
     report,
     scaling,
     stability,
-    trade,
+    tradeoff,
     validate,
     verify,
 
@@ -51,26 +42,28 @@ rule all:
     default_target: True
     input:
         rules.write_report.output,
-        every("drop", "figures/drop.png"),
-        every("fill", "figures/fill.png"),
+        [
+            every(name, *(f"figures/{figure}.png" for figure in scene.figures))
+            for name, scene in SCENES.items()
+        ],
 
 
 # The drop tests.
-rule drop:
+rule drop_test:
     input:
-        every("drop", "tables/impacts.parquet"),
+        every("drop_test", "tables/impacts.parquet"),
 
 
 # The settled beds.
-rule fill:
+rule filling:
     input:
-        every("fill", "tables/fill.json"),
+        every("filling", "tables/packing.json"),
 
 
 # The process runs with their tables.
 rule process:
     input:
-        every("process", "tables/rod_force.parquet"),
+        every("process", "tables/workpiece_force.parquet"),
 
 
 # summary.csv, summary.parquet and report.html.
@@ -105,15 +98,15 @@ rule stability:
 
 
 # What speed costs in accuracy: the points of a plan against the reference.
-rule trade:
+rule tradeoff:
     input:
-        rules.write_trade.output,
+        rules.write_tradeoff.output,
 
 
-# Whether the advisor's promises hold on other scenes: --config plan=checks
-rule checks:
+# Whether the advisor's promises hold on other scenes: --config plan=promises
+rule promises:
     input:
-        rules.write_checks.output,
+        rules.write_promises.output,
 
 
 # The study beside its source: several fills, a control, what is assumed.

@@ -1,10 +1,11 @@
 """Rates of finding chains, paths and clusters in networks of 3e3 to 1e6 contacts.
 
-Two kinds of networks: `tiled`, a real frame side by side with itself, each tile with a rod of its
-own; `bed`, one connected lattice of balls out of place with random forces around one rod. Rates
-are contacts over the processor time of one thread, the arrays' and compiled loops' beside the plain
-oracle's of the tests, which is how it was done before; both must find the same. Then whole runs of
-tiled frames are read and their chains written, each in a process of its own, for the memory.
+Two kinds of networks: `tiled`, a real frame side by side with itself, each tile with a workpiece
+of its own; `bed`, one connected lattice of particles out of place with random forces around one
+workpiece. Rates are contacts over the processor time of one thread, the arrays' and compiled
+loops' beside the plain oracle's of the tests, which is how it was done before; both must find the
+same. Then whole runs of tiled frames are read and their chains written, each in a process of its
+own, for the memory.
 
     python benchmarks/chains.py [--run RUN_DIR] [--rounds 3] [--plain 300000]
 
@@ -51,14 +52,14 @@ STREAMS = ((87, 2), (87, 6), (291, 2))
 
 
 def tiled(frame: Path, tiles: int) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Contacts and balls of a frame repeated on a square grid, a bowl's width and a half apart."""
+    """A frame repeated on a square grid, a bowl's width and a half apart."""
     import numpy as np
     import pandas as pd
 
     contacts = pd.read_parquet(frame / "contacts.parquet")
-    balls = pd.read_parquet(frame / "balls.parquet")
-    pitch = 1.5 * float(np.ptp(balls["x_m"]))
-    shift = int(balls["ball_id"].max())
+    particles = pd.read_parquet(frame / "particles.parquet")
+    pitch = 1.5 * float(np.ptp(particles["x_m"]))
+    shift = int(particles["particle_id"].max())
     across = int(np.ceil(np.sqrt(tiles)))
 
     def moved(table: pd.DataFrame, names: tuple[str, str, list[str]], tile: int) -> pd.DataFrame:
@@ -69,19 +70,19 @@ def tiled(frame: Path, tiles: int) -> tuple[pd.DataFrame, pd.DataFrame]:
             table[name] = table[name].where(table[name] <= 0, table[name] + shift * tile)
         return table
 
-    ball_names = ("x_m", "y_m", ["ball_id"])
+    particle_names = ("x_m", "y_m", ["particle_id"])
     contact_names = ("point_x_m", "point_y_m", ["a_id", "b_id"])
     return (
         pd.concat([moved(contacts, contact_names, tile) for tile in range(tiles)]),
-        pd.concat([moved(balls, ball_names, tile) for tile in range(tiles)]),
+        pd.concat([moved(particles, particle_names, tile) for tile in range(tiles)]),
     )
 
 
 def bed(edge: int) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Contacts and balls of a jittered cubic lattice, six contacts a ball, around one rod.
+    """Particles on a jittered cubic lattice, six contacts each, around one workpiece.
 
     A pair of next neighbours, or next but one, touches with a chance of one third; forces are
-    exponentially distributed. The 40 upper balls nearest to the axis touch the rod.
+    exponentially distributed. The 40 upper particles nearest to the axis touch the workpiece.
     """
     import numpy as np
     import pandas as pd
@@ -99,23 +100,23 @@ def bed(edge: int) -> tuple[pd.DataFrame, pd.DataFrame]:
         pairs.append(np.stack([there, there + way @ np.array([edge**2, edge, 1])]))
     a, b = np.concatenate(pairs, axis=1)
     upper = np.flatnonzero(place[:, 2] >= edge // 2)
-    rod = upper[np.argsort(np.hypot(*centre[upper, :2].T))[:40]]
+    workpiece = upper[np.argsort(np.hypot(*centre[upper, :2].T))[:40]]
     side = np.flatnonzero(((place[:, :2] == 0) | (place[:, :2] == edge - 1)).any(axis=1))
     floor = np.flatnonzero(place[:, 2] == 0)
-    ball = np.concatenate([a, rod, floor, side])
-    bodies = [np.full(len(on), body) for body, on in ((0, rod), (-1, floor), (-2, side))]
-    normal = random.exponential(size=len(ball))
-    away = random.normal(size=(len(ball), 3))
+    particle = np.concatenate([a, workpiece, floor, side])
+    bodies = [np.full(len(on), body) for body, on in ((0, workpiece), (-1, floor), (-2, side))]
+    normal = random.exponential(size=len(particle))
+    away = random.normal(size=(len(particle), 3))
     away[: len(a)] = centre[b] - centre[a]
     away /= np.linalg.norm(away, axis=1, keepdims=True)
-    point = centre[ball] + radius * away
-    contacts = pd.DataFrame({"a_id": 1 + ball, "b_id": np.concatenate([1 + b, *bodies])})
+    point = centre[particle] + radius * away
+    contacts = pd.DataFrame({"a_id": 1 + particle, "b_id": np.concatenate([1 + b, *bodies])})
     contacts[[f"point_{axis}_m" for axis in "xyz"]] = point
     contacts[[f"force_{axis}_n" for axis in "xyz"]] = -normal[:, None] * away
     contacts["normal_force_n"] = normal
-    balls = pd.DataFrame({"ball_id": 1 + np.arange(count), "radius_m": radius})
-    balls[["x_m", "y_m", "z_m"]] = centre
-    return contacts, balls.assign(step=1, time_s=0.5)
+    particles = pd.DataFrame({"particle_id": 1 + np.arange(count), "radius_m": radius})
+    particles[["x_m", "y_m", "z_m"]] = centre
+    return contacts, particles.assign(step=1, time_s=0.5)
 
 
 # --- measurements -------------------------------------------------------------------------
@@ -131,16 +132,16 @@ def measure(kind: str, frame: Path, size: int, rounds: int, largest: int) -> dic
     sys.path.insert(0, str(ROOT / "tests" / "dragchain"))
     import plain_chains as plain
 
-    from dragchain import chains, clusters
-    from dragchain.frames import frame_of
+    from dragchain.network import chains, clusters
+    from dragchain.network.frame import frame_of
 
-    contacts, balls = tiled(frame, size) if kind == "tiled" else bed(size)
-    columns = [{name: table[name].to_numpy() for name in table} for table in (contacts, balls)]
+    contacts, particles = tiled(frame, size) if kind == "tiled" else bed(size)
+    columns = [{name: table[name].to_numpy() for name in table} for table in (contacts, particles)]
     net = frame_of(*columns, 1, 0.5, 0.0)
     jobs: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
         "build": (
             lambda: frame_of(*columns, 1, 0.5, 0.0),
-            lambda: plain.plain_frame(contacts, balls),
+            lambda: plain.plain_frame(contacts, particles),
         ),
         "clusters": (
             lambda: clusters.frame_clusters(net),
@@ -150,12 +151,12 @@ def measure(kind: str, frame: Path, size: int, rounds: int, largest: int) -> dic
             ],
         ),
         "Peters chains": (lambda: chains.peters_rows(net), lambda: plain.plain_peters(net)),
-        "rod paths": (lambda: chains.path_rows(net), lambda: plain.plain_paths(net)),
+        "workpiece paths": (lambda: chains.path_rows(net), lambda: plain.plain_paths(net)),
         "chain table": (lambda: chains.chain_table(net), lambda: plain.plain_table(net)),
     }
     count = len(contacts)
-    found: dict[str, Any] = {"contacts": count, "balls": len(balls)}
-    found["rods"] = int((net.other == 0).sum())
+    found: dict[str, Any] = {"contacts": count, "particles": len(particles)}
+    found["workpieces"] = int((net.other == 0).sum())
     for name, (ours, theirs) in jobs.items():
         ours()
         found[name] = {"ours": [], "plain": []}
@@ -165,8 +166,8 @@ def measure(kind: str, frame: Path, size: int, rounds: int, largest: int) -> dic
                 found[name]["plain"].append(seconds(theirs))
     if count <= largest:
         assert chains.peters_chains(net) == plain.plain_peters(net)
-        assert chains.rod_paths(net) == plain.plain_paths(net)
-        assert np.array_equal(chains.ball_stress(net), plain.plain_stress(net))
+        assert chains.widest_paths(net) == plain.plain_paths(net)
+        assert np.array_equal(chains.particle_stress(net), plain.plain_stress(net))
     print(kind, found, flush=True)
     return found
 
@@ -191,11 +192,11 @@ def stream(frame: Path, tiles: int, frames: int) -> dict[str, Any]:
         tables = Path(name) / "tables"
         tables.mkdir()
         steps = 100 * np.arange(1, frames + 1)
-        rows = {"step": steps, "heading_rad": 0.0 * steps, "counted": steps > 0}
-        pd.DataFrame(rows).to_parquet(tables / "rod_force.parquet")
+        rows = {"step": steps, "direction_rad": 0.0 * steps, "in_statistics": steps > 0}
+        pd.DataFrame(rows).to_parquet(tables / "workpiece_force.parquet")
         held = tiled(frame, tiles)
         contacts = len(held[0])
-        for table, file in zip(held, ("contacts", "balls"), strict=True):
+        for table, file in zip(held, ("contacts", "particles"), strict=True):
             schema = pa.Schema.from_pandas(table, preserve_index=False)
             with pq.ParquetWriter(tables / f"{file}.parquet", schema) as writer:
                 for step in steps:
@@ -210,7 +211,7 @@ def stream(frame: Path, tiles: int, frames: int) -> dict[str, Any]:
 
 def write(run: Path) -> dict[str, float]:
     """Write the chains of a run."""
-    from dragchain.network import write_chains
+    from dragchain.network.write import write_chains
 
     before = memory("VmRSS")
     start = time.process_time()
@@ -232,7 +233,7 @@ def memory(name: str) -> int:
 
 # --- the page -----------------------------------------------------------------------------
 
-JOBS = ("build", "clusters", "Peters chains", "rod paths", "chain table")
+JOBS = ("build", "clusters", "Peters chains", "workpiece paths", "chain table")
 
 
 def exponent(contacts: list[int], cost: list[float]) -> str:
@@ -251,13 +252,13 @@ def page_tables(kind: str, found: list[dict[str, Any]]) -> str:
     lines = [
         f"### {kind}: million contacts a second, by processor time",
         "",
-        f"| contacts | balls | on rods | {' | '.join(JOBS)} |",
+        f"| contacts | particles | on workpieces | {' | '.join(JOBS)} |",
         f"| ---: | ---: | ---: |{' ---: |' * len(JOBS)}",
     ]
     cost = {job: [median(one[job]["ours"]) for one in found] for job in JOBS}
     for at, one in enumerate(found):
         rates = [f"{contacts[at] / cost[job][at] / 1e6:.2f}" for job in JOBS]
-        counts = f"{contacts[at]:,} | {one['balls']:,} | {one['rods']:,}"
+        counts = f"{contacts[at]:,} | {one['particles']:,} | {one['workpieces']:,}"
         lines.append(f"| {counts} | {' | '.join(rates)} |")
     lines += [
         "",
@@ -312,7 +313,7 @@ def one_frame(run: Path, folder: Path) -> None:
 
     steps = pd.read_parquet(run / "tables" / "network.parquet", columns=["step"])["step"]
     where = [("step", "==", int(steps.iloc[len(steps) // 2]))]
-    for name in ("contacts", "balls"):
+    for name in ("contacts", "particles"):
         names = pd.read_parquet(FRAME / f"{name}.parquet").columns.to_list()
         table = pd.read_parquet(run / "tables" / f"{name}.parquet", columns=names, filters=where)
         table.to_parquet(folder / f"{name}.parquet", index=False)

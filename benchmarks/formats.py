@@ -2,7 +2,7 @@
 
 A run is exported for ParaView and as extended XYZ. OVITO opens ``run.pvd`` and ``run.xyz``,
 VTK's readers (those of ParaView) open ``run.pvd``; of every frame, time, ids, places,
-velocities, spins and radii of the balls, the contacts' forces and the tool's facets are
+velocities, spins and radii of the particles, the contacts' forces and the workpiece's facets are
 set beside the tables. Any difference ends it with an error; numbers that OVITO reads from
 text may be off by two machine epsilons of their type, for its parser rounds more than once.
 A radius it holds in 32 bits.
@@ -29,9 +29,9 @@ from statistics import median
 import numpy as np
 import pandas as pd
 
-from dragchain.export.moments import Moment, Moments, Selection
-from dragchain.export.writing import folder_size, write_export
-from dragchain.tables import Run
+from dragchain.export.frames import Moment, Moments, Selection
+from dragchain.export.write import folder_size, write_export
+from dragchain.tables.run_folder import Run
 
 VECTORS = {
     "Position": ["x_m", "y_m", "z_m"],
@@ -48,13 +48,13 @@ def ovito_paraview(folder: Path, expected: Iterator[Moment]) -> None:
     """Open ``run.pvd`` with OVITO: particles, lines and a mesh."""
     for moment, data in _both(expected, _ovito(folder / "run.pvd")):
         same("time", data.attributes["Time"], moment.time_s)
-        _ovito_balls(data.particles, moment.balls)
+        _ovito_particles(data.particles, moment.particles)
         if moment.network is not None:
             same("coordination", data.particles["coordination_number"][...], _contacts_of(moment))
         if moment.contacts is not None:
             _ovito_contacts(next(iter(data.lines.values())), moment.contacts)
-        if moment.tool is not None and not data.surfaces:
-            sys.exit("OVITO finds no tool")
+        if moment.workpiece is not None and not data.surfaces:
+            sys.exit("OVITO finds no workpiece")
 
 
 def ovito_xyz(folder: Path, expected: Iterator[Moment]) -> None:
@@ -62,7 +62,7 @@ def ovito_xyz(folder: Path, expected: Iterator[Moment]) -> None:
     for moment, data in _both(expected, _ovito(folder / "run.xyz")):
         same("time", data.attributes["Time"], moment.time_s, parsed=True)
         same("step", data.attributes["Timestep"], moment.step)
-        _ovito_balls(data.particles, moment.balls, parsed=True)
+        _ovito_particles(data.particles, moment.particles, parsed=True)
         if moment.network is not None:
             same("coordination", data.particles["Coordination"][...], _contacts_of(moment))
 
@@ -80,11 +80,13 @@ def vtk_paraview(folder: Path, expected: Iterator[Moment]) -> None:
 
     for moment, (time_s, blocks) in _both(expected, frames()):
         same("time", time_s, moment.time_s)
-        balls = blocks["balls"]
-        same("id", balls["id"], moment.balls["ball_id"])
-        same("radius", balls["radius"], moment.balls["radius_m"])
-        for name, values in zip(VECTORS, (balls.points, balls["v"], balls["omega"]), strict=True):
-            same(name, values, moment.balls[VECTORS[name]])
+        particles = blocks["particles"]
+        same("id", particles["id"], moment.particles["particle_id"])
+        same("radius", particles["radius"], moment.particles["radius_m"])
+        for name, values in zip(
+            VECTORS, (particles.points, particles["v"], particles["omega"]), strict=True
+        ):
+            same(name, values, moment.particles[VECTORS[name]])
         if moment.contacts is not None:
             same("force", blocks["contacts"]["force_n"], moment.contacts[FORCE])
 
@@ -96,12 +98,12 @@ def _ovito(file: Path) -> Iterator[object]:
     return (source.compute(number) for number in range(source.num_frames))
 
 
-def _ovito_balls(particles: object, balls: pd.DataFrame, *, parsed: bool = False) -> None:
-    same("id", particles["Particle Identifier"][...], balls["ball_id"])
+def _ovito_particles(dots: object, particles: pd.DataFrame, *, parsed: bool = False) -> None:
+    same("id", dots["Particle Identifier"][...], particles["particle_id"])
     for name, columns in VECTORS.items():
-        same(name, particles[name][...], balls[columns], parsed=parsed)
-    radii = balls["radius_m"].to_numpy(np.float32)
-    same("Radius", particles["Radius"][...], radii, parsed=parsed)
+        same(name, dots[name][...], particles[columns], parsed=parsed)
+    radii = particles["radius_m"].to_numpy(np.float32)
+    same("Radius", dots["Radius"][...], radii, parsed=parsed)
 
 
 def _ovito_contacts(lines: object, contacts: pd.DataFrame) -> None:
@@ -112,7 +114,7 @@ def _ovito_contacts(lines: object, contacts: pd.DataFrame) -> None:
 
 
 def _contacts_of(moment: Moment) -> np.ndarray:
-    from dragchain.network import contact_counts
+    from dragchain.network.statistics import contact_counts
 
     return contact_counts(moment.network)
 
@@ -188,11 +190,12 @@ def main() -> None:
             lines.append(row(f"read and check {reader}", times, len(moments), sizes[to]))
     shown = ", ".join(f"{name} {version(name)}" for name in ("ovito", "vtk", "pyvista", "pyarrow"))
     load = " ".join(f"{value:.1f}" for value in os.getloadavg())
-    balls = len(known[0].balls)
+    particles = len(known[0].particles)
     held = ", ".join(f"{size / 1e6:.1f} MB {to}" for to, size in sizes.items())
     print(
         f"{len(os.sched_getaffinity(0))} cores, load {load}; Python {platform.python_version()},"
-        f" {shown}.\n{len(moments)} frames of {balls} balls, {options.rounds} rounds; {held}."
+        f" {shown}.\n{len(moments)} frames of {particles} particles, {options.rounds} "
+        f"rounds; {held}."
         " Every number read is the table's (OVITO's from text: to two epsilons).\n"
     )
     print("\n".join(lines))

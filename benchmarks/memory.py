@@ -1,7 +1,7 @@
 """Memory and processor time of the analysis on a run and on one several times as long.
 
 The drag of a real run is repeated with its steps going on, best a whole number of
-revolutions, so that the tool goes on where it was. Every command goes through the short
+revolutions, so that the workpiece goes on where it was. Every command goes through the short
 run and through the long one, each in a process of its own. Memory is the most that this
 process held; processor time is that of all its threads.
 
@@ -65,7 +65,7 @@ class Drag:
 def lengthen(run: Path, target: Path, drag: Drag) -> None:
     """Copy a run with its drag repeated."""
     target.mkdir(parents=True)
-    for name in ("tool.stl", "run.json", "outcome.json", "state.json"):
+    for name in ("workpiece.stl", "run.json", "outcome.json", "state.json"):
         if (run / name).is_file():
             shutil.copyfile(run / name, target / name)
     case = json.loads((run / "case.json").read_text())
@@ -143,13 +143,13 @@ def copy_upstream(run: Path, folder: Path) -> None:
                 subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
 
 
-def fill_table(run: Path) -> Path:
+def packing_table(run: Path) -> Path:
     """The table of the bed from which a run started."""
-    name = json.loads((run / "case.json").read_text())["upstream"]["fill"]
-    return run.parent.parent / "fill" / str(name) / "tables" / "fill.json"
+    name = json.loads((run / "case.json").read_text())["upstream"]["filling"]
+    return run.parent.parent / "filling" / str(name) / "tables" / "packing.json"
 
 
-def other_fill(run: Path) -> Path:
+def other_filling(run: Path) -> Path:
     """A run of the same frames that says it had another bed, which `validate` needs."""
     other = run.with_name(run.name + "-other")
     if not other.is_dir():
@@ -166,12 +166,12 @@ Arguments = Callable[[Path, Path], list[Path | str]]
 COMMANDS: dict[str, Arguments] = {
     "tables": lambda run, _: [run],
     "chains": lambda run, _: [run],
-    "measure": lambda run, bed: [run, "--fill-table", bed],
+    "measure": lambda run, bed: [run, "--filling-table", bed],
     "removal": lambda run, _: [run],
     "figures": lambda run, _: [run],
     "report": lambda run, _: ["--out", run / "report", run],
     "peaks": lambda run, _: ["--out", run / "peaks", run],
-    "validate": lambda run, _: ["--out", run / "validation", run, other_fill(run)],
+    "validate": lambda run, _: ["--out", run / "validation", run, other_filling(run)],
 }
 """Commands in the order in which each finds what it needs, and their arguments."""
 
@@ -230,8 +230,8 @@ def rates(run: Path, drag: Drag) -> str:
     """How often the run wrote what is read."""
     outputs = json.loads((run / "columns.json").read_text())["outputs"]
     names = {
-        "rod_force": "force on the tool",
-        "rod_contacts": "its contacts",
+        "workpiece_force": "force on the workpiece",
+        "workpiece_contacts": "its contacts",
         "contacts": "network",
     }
     return ", ".join(
@@ -264,11 +264,11 @@ def main() -> None:
         for times, run in runs.items():
             if not run.is_dir():
                 lengthen(options.run, run, Drag(drag.start, drag.end, drag.timestep_s, times))
-        bed = fill_table(options.run)
+        bed = packing_table(options.run)
         found = {}
         for command in options.commands:
             found[command] = [kept(command, run, bed) for run in runs.values()]
-    head = f"{machine(*PACKAGES)}. {case['media']['count']} balls; {rates(options.run, drag)}."
+    head = f"{machine(*PACKAGES)}. {case['media']['count']} particles; {rates(options.run, drag)}."
     output = f"{head}\n\n{table(found, drag)}"
     print(output)
     before, mark, _ = PAGE.read_text().partition("<!-- output -->\n")

@@ -1,13 +1,13 @@
-"""What a ball costs in small and big bowls: engine and analysis, one rank and two.
+"""What a particle costs in small and big bowls: engine and analysis, one rank and two.
 
-The scene of ``studies/pilot`` with 1,422, 10,000 and 100,000 balls, about equally deep:
-the bed is filled, the rod dragged along the same arc, and every step of the analysis run
+The scene of ``studies/pilot`` with 1,422, 10,000 and 100,000 particles, about equally deep:
+the bed is filled, the workpiece dragged along the same arc, and every step of the analysis run
 in a process of its own. Runs that are complete are not run again, nor commands and rounds
 that were measured: they are kept in ``benchmarks/results/pilot``. The drag's deck with its
-rod left above the bed is timed on one rank and on two, in turns, less the same deck without
+workpiece left above the bed is timed on one rank and on two, in turns, less the same deck without
 a step: what is left is the steps alone. All cost is processor time, of all ranks together.
 
-    python benchmarks/pilot.py [--balls 1422 10000 100000] [--rounds 3] [--ball-steps 2e7]
+    python benchmarks/pilot.py [--particles 1422 10000 100000] [--rounds 3] [--particle-steps 2e7]
 """
 
 from __future__ import annotations
@@ -23,19 +23,25 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import psutil
 from machine import machine
 
-from dragdeck.cases import Case, SceneName, settle_case
-from dragdeck.engine import Ending, command, execute, find_engine
+from dragdeck.cases.case import Case
+from dragdeck.decks.render import environment, write_run
+from dragdeck.documents import Part
+from dragdeck.engine.log import ParticlesPerRank, decomposition
+from dragdeck.engine.process import Ending, command, execute, find_engine
+from dragdeck.engine.record import RunRecord
+from dragdeck.engine.run_folder import run
+from dragdeck.files import replace_text
 from dragdeck.project import Project, find_project, study_templates
-from dragdeck.ranks import decomposition
-from dragdeck.render import environment, replace_text, write_run
-from dragdeck.runner import run
-from dragdeck.scenes import Bed, Scene, fill_scene, process_scene
-from dragdeck.study import CirclePath, read_yaml
+from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.process import PROCESS, process_scene
+from dragdeck.scenes.scene import Bed, SceneType, read_bed
+from dragdeck.study.model import CirclePath
+from dragdeck.study.yaml import read_yaml
+from dragdeck.sweep.cases import settle_case
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "benchmarks" / "pilot.md"
@@ -43,7 +49,7 @@ TIMED = ROOT / "benchmarks" / "results" / "pilot"
 STUDY = "pilot"
 SMALL_BOWL_M = 0.040
 LEAST_STEPS = 50
-ANALYSIS = ("tables", "chains", "removal", "figures")
+ANALYSIS = ("tables", "chains", "loading", "figures")
 
 
 @dataclass(frozen=True)
@@ -56,11 +62,11 @@ class Command:
 
 @dataclass(frozen=True)
 class Size:
-    """All that was measured with one number of balls."""
+    """All that was measured with one number of particles."""
 
-    balls: int
-    fill: Mapping[str, Any]
-    drag: Mapping[str, Any]
+    particles: int
+    filling: RunRecord
+    drag: RunRecord
     frames: int
     contacts: int
     bytes_: int
@@ -70,16 +76,16 @@ class Size:
 # --- the runs -----------------------------------------------------------------------------
 
 
-def case_of(project: Project, balls: int) -> Case:
-    """The pilot's scene with another number of balls at the same depth, on the same arc."""
+def case_of(project: Project, particles: int) -> Case:
+    """The pilot's scene with another number of particles at the same depth, on the same arc."""
     (pilot,) = project.cases(STUDY)
     study = pilot.study
     path = study.motion.path
     assert isinstance(path, CirclePath)
-    bowl = max(SMALL_BOWL_M, study.bowl.radius_m * (balls / study.media.count) ** 0.5)
+    bowl = max(SMALL_BOWL_M, study.bowl.radius_m * (particles / study.media.count) ** 0.5)
     ratio = bowl / study.bowl.radius_m
     values = {
-        "media.count": balls,
+        "media.count": particles,
         "bowl.radius_m": round(bowl, 4),
         "motion.path.radius_m": round(ratio * path.radius_m, 4),
         "motion.path.revolutions": round(path.revolutions / ratio, 4),
@@ -88,11 +94,13 @@ def case_of(project: Project, balls: int) -> Case:
     return settle_case(pilot.file, read_yaml(pilot.file), values, shown={})
 
 
-def made(project: Project, case: Case, name: SceneName, scene: Scene) -> Path:
+def made(project: Project, case: Case, kind: SceneType, bed: Bed | None) -> Path:
     """The folder of a complete run."""
-    folder = project.run_folder(case, name)
+    folder = project.run_folder(case, kind)
     if not (folder / "run.json").is_file():
-        write_run(scene, folder, environment(project.templates, study_templates(case)))
+        write_run(
+            kind.build(case, bed), folder, environment(project.templates, study_templates(case))
+        )
         run(folder, say, every_s=60.0)
     return folder
 
@@ -128,33 +136,32 @@ def write(file: Path, content: object) -> None:
     replace_text(file, json.dumps(content, indent=1) + "\n")
 
 
-def bed_of(fill: Path) -> Bed:
+def bed_of(filling: Path) -> Bed:
     """The settled bed of a fill whose tables are made."""
-    found = json.loads((fill / "tables" / "fill.json").read_text())
-    return Bed(found["fill_height_m"], found["top_m"])
+    return read_bed(filling / "tables" / "packing.json")
 
 
-def measure(project: Project, balls: int) -> tuple[Size, Case, Path]:
+def measure(project: Project, particles: int) -> tuple[Size, Case, Path]:
     """Fill, drag, analyse."""
-    case = case_of(project, balls)
-    fill = made(project, case, "fill", fill_scene(case))
-    commands = {"tables of the fill": kept("tables", fill)}
-    drag = made(project, case, "process", process_scene(case, bed_of(fill)))
+    case = case_of(project, particles)
+    filling = made(project, case, FILLING, None)
+    commands = {"tables of the fill": kept("tables", filling)}
+    drag = made(project, case, PROCESS, bed_of(filling))
     commands |= {name: kept(name, drag) for name in ANALYSIS}
-    return size_of(balls, fill, drag, commands), case, fill
+    return size_of(particles, filling, drag, commands), case, filling
 
 
-def size_of(balls: int, fill: Path, drag: Path, commands: Mapping[str, Command]) -> Size:
+def size_of(particles: int, filling: Path, drag: Path, commands: Mapping[str, Command]) -> Size:
     """Gather what the run folders say."""
     import pyarrow.compute as pc
     import pyarrow.parquet as pq
 
     steps = pq.read_table(drag / "tables" / "contacts.parquet", columns=["step"])["step"]
     raw = [file for file in drag.iterdir() if re.search(r"\.\d+\.(dump|bin|txt)$", file.name)]
-    records = [json.loads((folder / "run.json").read_text()) for folder in (fill, drag)]
+    records = [RunRecord.read(folder / "run.json") for folder in (filling, drag)]
     return Size(
-        balls=balls,
-        fill=records[0],
+        particles=particles,
+        filling=records[0],
         drag=records[1],
         frames=len(pc.unique(steps)),
         contacts=len(steps),
@@ -166,32 +173,31 @@ def size_of(balls: int, fill: Path, drag: Path, commands: Mapping[str, Command])
 # --- one rank and two ---------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Timing:
-    """A timed deck: time of the steps alone, s; memory of a rank, MB; the ranks' balls."""
+class Timing(Part):
+    """A timed deck: time of the steps alone, s; memory of a rank, MB; the ranks' particles."""
 
     cpu_time_s: float
     wall_time_s: float
     peak_mb: float
-    split: Mapping[str, Any]
+    split: ParticlesPerRank
 
 
 def at_rest(deck: str, steps: int) -> str:
-    """The deck up to its first leg: steps of the settled bed with the rod above it."""
+    """The deck up to its first leg: steps of the settled bed with the workpiece above it."""
     head, found, _ = deck.partition("\nfix move_plunge ")
     if not found:
         raise SystemExit("the deck has no plunge")
     return f'{head}\nrun {steps}\nprint "DRAGDECK END"\n'
 
 
-def timed_folder(case: Case, fill: Path, project: Project) -> Path:
+def timed_folder(case: Case, filling: Path, project: Project) -> Path:
     """A folder with the drag's deck and the bed that it starts from."""
     folder = TIMED / str(case.study.media.count) / "process" / "deck"
-    write_run(process_scene(case, bed_of(fill)), folder, environment(project.templates))
-    bed = folder.parent.parent / "fill" / fill.name
+    write_run(process_scene(case, bed_of(filling)), folder, environment(project.templates))
+    bed = folder.parent.parent / "filling" / filling.name
     bed.mkdir(parents=True, exist_ok=True)
-    (bed / "fill.restart").unlink(missing_ok=True)
-    os.link(fill / "fill.restart", bed / "fill.restart")
+    (bed / "packing.restart").unlink(missing_ok=True)
+    os.link(filling / "packing.restart", bed / "packing.restart")
     return folder
 
 
@@ -218,11 +224,14 @@ def time_steps(folder: Path, steps: int, ranks: int) -> Timing:
     """Time the steps of the deck at rest, less what it takes to start."""
     start, _, _ = time_once(folder, 0, ranks)
     whole, text, peak_mb = time_once(folder, steps, ranks)
+    split = decomposition(text)
+    if split is None or split.particles is None:
+        raise SystemExit("LIGGGHTS does not say how it split the box")
     return Timing(
-        whole.cpu_time_s - start.cpu_time_s,
-        whole.wall_time_s - start.wall_time_s,
-        peak_mb,
-        decomposition(text) or {},
+        cpu_time_s=whole.cpu_time_s - start.cpu_time_s,
+        wall_time_s=whole.wall_time_s - start.wall_time_s,
+        peak_mb=peak_mb,
+        split=split.particles,
     )
 
 
@@ -236,7 +245,7 @@ def rounds(folder: Path, steps: int, count: int) -> list[dict[int, Timing]]:
         say(f"{steps} steps, " + ", ".join(
             f"{ranks} rank(s): {t.cpu_time_s:.2f} s, {t.wall_time_s:.2f} s by the clock"
             for ranks, t in sorted(found.items())))  # fmt: skip
-        known.append({ranks: vars(timing) for ranks, timing in found.items()})
+        known.append({ranks: timing.model_dump() for ranks, timing in found.items()})
         write(file, known)
     known = json.loads(file.read_text())
     return [{int(ranks): Timing(**timing) for ranks, timing in one.items()} for one in known]
@@ -246,35 +255,38 @@ def rounds(folder: Path, steps: int, count: int) -> list[dict[int, Timing]]:
 
 
 def engine_table(sizes: Sequence[Size]) -> str:
-    """Cost of a ball and step, and bytes."""
+    """Cost of a particle and step, and bytes."""
     lines = [
-        "| balls | steps of the fill | ranks | ns a ball and step | steps of the drag | ranks "
-        "| ns a ball and step | contacts a ball | raw bytes a ball and frame |",
+        "| particles | steps of the fill | ranks | ns a particle and step | steps of the "
+        "drag | ranks "
+        "| ns a particle and step | contacts a particle | raw bytes a particle and frame |",
         "| ---: " * 9 + "|",
     ]
     for size in sizes:
-        cost = [1e9 * r["cpu_time_s"] / r["steps"] / size.balls for r in (size.fill, size.drag)]
+        cost = [1e9 * r.cpu_time_s / r.steps / size.particles for r in (size.filling, size.drag)]
         lines.append(
-            f"| {size.balls:,} | {size.fill['steps']:,} | {size.fill['ranks']} | {cost[0]:.0f} "
-            f"| {size.drag['steps']:,} | {size.drag['ranks']} | {cost[1]:.0f} "
-            f"| {size.contacts / size.frames / size.balls:.2f} "
-            f"| {size.bytes_ / size.frames / size.balls:.0f} |"
+            f"| {size.particles:,} | {size.filling.steps:,} | {size.filling.ranks} | "
+            f"{cost[0]:.0f} "
+            f"| {size.drag.steps:,} | {size.drag.ranks} | {cost[1]:.0f} "
+            f"| {size.contacts / size.frames / size.particles:.2f} "
+            f"| {size.bytes_ / size.frames / size.particles:.0f} |"
         )
     return "\n".join(lines)
 
 
 def analysis_table(sizes: Sequence[Size]) -> str:
-    """Cost of each command, of a ball and frame, and memory."""
+    """Cost of each command, of a particle and frame, and memory."""
     lines = [
-        "| command | balls | frames | processor time in s | µs a ball and frame | peak MB |",
+        "| command | particles | frames | processor time in s | µs a particle and frame "
+        "| peak MB |",
         "| --- | ---: | ---: | ---: | ---: | ---: |",
     ]
     for name in sizes[0].commands:
         for size in sizes:
-            found, frames = size.commands[name], 1 if "fill" in name else size.frames
-            each = 1e6 * found.cpu_time_s / frames / size.balls
+            found, frames = size.commands[name], 1 if "filling" in name else size.frames
+            each = 1e6 * found.cpu_time_s / frames / size.particles
             lines.append(
-                f"| {name} | {size.balls:,} | {frames} | {found.cpu_time_s:.1f} | {each:.1f} "
+                f"| {name} | {size.particles:,} | {frames} | {found.cpu_time_s:.1f} | {each:.1f} "
                 f"| {found.peak_mb:.0f} |"
             )
     return "\n".join(lines)
@@ -283,21 +295,23 @@ def analysis_table(sizes: Sequence[Size]) -> str:
 def ranks_table(timed: Mapping[int, tuple[int, list[dict[int, Timing]]]]) -> str:
     """Two ranks against one."""
     lines = [
-        "| balls | steps | ns a ball and step, one rank | two ranks | processor time, two over one "
-        "| by the clock, two over one | balls of the two ranks | MB of one rank, of each of two |",
+        "| particles | steps | ns a particle and step, one rank | two ranks | processor "
+        "time, two over one "
+        "| by the clock, two over one | particles of the two ranks | MB of one rank, of "
+        "each of two |",
         "| ---: | ---: | ---: | ---: | ---: | ---: | --- | --- |",
     ]
-    for balls, (steps, found) in timed.items():
+    for particles, (steps, found) in timed.items():
         each = [
-            spread([1e9 * one[ranks].cpu_time_s / steps / balls for one in found], ".0f")
+            spread([1e9 * one[ranks].cpu_time_s / steps / particles for one in found], ".0f")
             for ranks in (1, 2)
         ]
         cpu = spread([one[2].cpu_time_s / one[1].cpu_time_s for one in found])
         wall = spread([one[2].wall_time_s / one[1].wall_time_s for one in found])
-        split = found[-1][2].split["balls"]
+        split = found[-1][2].split
         lines.append(
-            f"| {balls:,} | {steps:,} | {each[0]} | {each[1]} | {cpu} | {wall} "
-            f"| {split['least']:,} and {split['most']:,} "
+            f"| {particles:,} | {steps:,} | {each[0]} | {each[1]} | {cpu} | {wall} "
+            f"| {split.least:,} and {split.most:,} "
             f"| {found[-1][1].peak_mb:.0f}, {found[-1][2].peak_mb:.0f} |"
         )
     return "\n".join(lines)
@@ -319,20 +333,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("--balls", type=int, nargs="+", default=[1422, 10_000, 100_000])
+    parser.add_argument("--particles", type=int, nargs="+", default=[1422, 10_000, 100_000])
     parser.add_argument("--rounds", type=int, default=3, help="of one rank against two; 0: none")
-    parser.add_argument("--ball-steps", type=float, default=2e7, help="timed in each, or more")
+    parser.add_argument("--particle-steps", type=float, default=2e7, help="timed in each, or more")
     options = parser.parse_args()
     project = find_project(ROOT)
     sizes, timed = [], {}
-    for balls in options.balls:
-        say(f"{balls:,} balls")
-        size, case, fill = measure(project, balls)
+    for particles in options.particles:
+        say(f"{particles:,} particles")
+        size, case, filling = measure(project, particles)
         sizes.append(size)
         if options.rounds:
-            steps = max(LEAST_STEPS, round(options.ball_steps / balls))
-            folder = timed_folder(case, fill, project)
-            timed[balls] = steps, rounds(folder, steps, options.rounds)
+            steps = max(LEAST_STEPS, round(options.particle_steps / particles))
+            folder = timed_folder(case, filling, project)
+            timed[particles] = steps, rounds(folder, steps, options.rounds)
     parts = [
         f"{machine()}, LIGGGHTS {find_engine().version}."
         f" {options.rounds} rounds of one rank against two.",
@@ -343,7 +357,7 @@ def main() -> None:
     ]
     if timed:
         parts += [
-            "### Two ranks against one: the bed at rest, the rod above it",
+            "### Two ranks against one: the bed at rest, the workpiece above it",
             ranks_table(timed),
         ]
     output = "\n\n".join(parts)

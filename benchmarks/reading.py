@@ -8,7 +8,7 @@ counts; starting Python, importing and compiling do not, the first file being a 
 
     python benchmarks/reading.py [--run RUN_DIR] [--rounds 3] [--megabytes 500]
 
-Without ``--run`` the frames are made: as many balls and contacts as a small bowl has.
+Without ``--run`` the frames are made: as many particles and contacts as a small bowl has.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from machine import machine
 PACKAGES = ("numpy", "numba", "pyarrow", "pandas", "ovito")
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "benchmarks" / "reading.md"
-CONTACTS = [f"c_ball_contacts[{i}]" for i in (1, 2, 4, 5, 6, 7)]
-BALLS = (
-    *("ball_id", "x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s"),
+CONTACTS = [f"c_particle_contacts[{i}]" for i in (1, 2, 4, 5, 6, 7)]
+PARTICLES = (
+    *("particle_id", "x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s"),
     *("wx_rad_s", "wy_rad_s", "wz_rad_s", "radius_m"),
     *(f"{wall}_force_{axis}_n" for wall in ("floor", "side") for axis in "xyz"),
 )
@@ -46,9 +46,9 @@ Rows = int
 
 def ours_to_frames(file: Path) -> Rows:
     """Every frame as arrays."""
-    from dragchain.reading import read_dump
+    from dragchain.dumps.any_dump import read_dump
 
-    columns = BALLS if file.suffix == ".bin" else None
+    columns = PARTICLES if file.suffix == ".bin" else None
     return sum(frame.rows for frame in read_dump(file, columns))
 
 
@@ -56,10 +56,10 @@ def ours_to_parquet(file: Path) -> Rows:
     """Every frame into a Parquet table."""
     import pyarrow.parquet as pq
 
-    from dragchain.reading import dump_to_parquet
+    from dragchain.tables.convert import dump_to_parquet
 
     table = file.with_suffix(".parquet")
-    dump_to_parquet(file, table, BALLS if file.suffix == ".bin" else None)
+    dump_to_parquet(file, table, PARTICLES if file.suffix == ".bin" else None)
     rows = pq.ParquetFile(table).metadata.num_rows
     table.unlink()
     return int(rows)
@@ -97,7 +97,7 @@ def _pandas_binary(file: Path) -> Iterator[Rows]:
                 np.fromfile(stream, "<f8", int.from_bytes(stream.read(4), "little"))
                 for _ in range(ranks)
             ]
-            frame = pd.DataFrame(np.concatenate(parts).reshape(rows, -1), columns=BALLS)
+            frame = pd.DataFrame(np.concatenate(parts).reshape(rows, -1), columns=PARTICLES)
             yield len(frame.copy())
 
 
@@ -106,7 +106,7 @@ def ovito_by_frame(file: Path) -> Rows:
     from ovito.io import import_file
 
     if file.suffix == ".bin":
-        names = ["Particle Identifier", *(f"Position.{axis}" for axis in "XYZ"), *BALLS[4:]]
+        names = ["Particle Identifier", *(f"Position.{axis}" for axis in "XYZ"), *PARTICLES[4:]]
     else:
         names = ["Particle Identifiers.1", "Particle Identifiers.2"]
         names += ["Force.1", "Force.2", "Force.3", "Overlap"]
@@ -150,7 +150,7 @@ def peak_bytes() -> int:
 
 
 def made_frames(folder: Path) -> tuple[Path, Path]:
-    """A text and a binary dump of frames of random balls and contacts."""
+    """A text and a binary dump of frames of random particles and contacts."""
     import struct
 
     import numpy as np
@@ -169,10 +169,10 @@ def made_frames(folder: Path) -> tuple[Path, Path]:
             lines.writelines(
                 f"{a} {b} {x:.9g} {y:.9g} {z:.9g} {depth:.9g} \n" for a, b, x, y, z, depth in rows
             )
-            balls = rng.normal(size=(1422, len(BALLS)))
-            balls[:, 0] = np.arange(1, 1423)
-            head = (step, 1422, 0, *[1] * 6, *BOX, len(BALLS), 1, balls.size)
-            data.write(struct.pack("<qqi6i6diii", *head) + balls.tobytes())
+            particles = rng.normal(size=(1422, len(PARTICLES)))
+            particles[:, 0] = np.arange(1, 1423)
+            head = (step, 1422, 0, *[1] * 6, *BOX, len(PARTICLES), 1, particles.size)
+            data.write(struct.pack("<qqi6i6diii", *head) + particles.tobytes())
     return text, binary
 
 
@@ -194,12 +194,13 @@ def short_text(source: Path, target: Path) -> None:
 
 def short_binary(source: Path, target: Path) -> None:
     """Keep the first frames of a binary dump."""
-    from dragchain.case import Output
-    from dragchain.formats import read_carefully
+    from dragchain.dumps.careful_reader import read_carefully
+    from dragchain.run.case import Output
 
-    output = Output("balls", "custom", True, "", BALLS, None, 1, 0, None)
+    output = Output("particles", "custom", True, "", PARTICLES, None, 1, 0, None)
     sizes = [
-        104 + 8 * len(BALLS) * frame.rows for frame in islice(read_carefully(source, output), 20)
+        104 + 8 * len(PARTICLES) * frame.rows
+        for frame in islice(read_carefully(source, output), 20)
     ]
     with source.open("rb") as stream:
         target.write_bytes(stream.read(sum(sizes)))
@@ -268,7 +269,7 @@ def main() -> None:
         if options.run is None:
             text, binary = made_frames(folder)
         else:
-            text, binary = options.run / "contacts.1.dump", options.run / "balls.1.bin"
+            text, binary = options.run / "contacts.1.dump", options.run / "particles.1.bin"
         short_text(text, folder / "short.dump")
         short_binary(binary, folder / "short.bin")
         for kind, source in (("Text", text), ("Binary", binary)):

@@ -13,9 +13,10 @@ import yaml
 from hypothesis import settings
 from paths import ROOT, SMALL_STUDY
 
-from dragdeck.cases import Case, load_cases
+from dragdeck.cases.case import Case
 from dragdeck.project import Project
-from dragdeck.study import read_yaml
+from dragdeck.study.yaml import read_yaml
+from dragdeck.sweep.cases import load_cases
 
 # A build that nobody watches tries the same examples every time.
 settings.register_profile("ci", derandomize=True)

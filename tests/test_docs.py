@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 from paths import ROOT
 
-from dragchain.scaling import read_scalings
-from dragchain.scaling_words import interval
-from dragdeck.fields import page
+from dragchain.scaling.fit import read_scalings
+from dragchain.scaling.words import interval
 from dragdeck.project import Project
-from dragdeck.scenes.drop import DropDeck
-from dragdeck.scenes.fill import FillDeck
-from dragdeck.scenes.process import ProcessDeck
+from dragdeck.scenes.drop_test import DropDeck
+from dragdeck.scenes.filling import FillingDeck
+from dragdeck.scenes.process import PROCESS, ProcessDeck
+from dragdeck.study.field_page import page
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 
@@ -31,7 +31,7 @@ def test_every_field_has_a_meaning() -> None:
     assert not missing or missing == ["`draft`"]
 
 
-@pytest.mark.parametrize("deck", [DropDeck, FillDeck, ProcessDeck])
+@pytest.mark.parametrize("deck", [DropDeck, FillingDeck, ProcessDeck])
 def test_every_value_of_a_deck_is_on_the_page(deck: type) -> None:
     text = (ROOT / "docs/templates.md").read_text()
     names = set(re.findall(r"[`.](\w+)`", text))
@@ -51,11 +51,11 @@ def test_the_scalings_are_those_of_the_studies_and_on_the_page(found: dict[str, 
     assert interval(found["fit"]["exponent"]) in text and found["statement"] in text
     cases = Project(ROOT).cases(found["study"])
     scaling = cases[0].study.scaling
-    assert scaling is not None and scaling.within is None
+    assert scaling is not None and scaling.fit_range is None
     assert (scaling.field, scaling.expected_exponent, scaling.source) == (
         *(found["field"], found["expected"]["exponent"], found["expected"]["source"]),
     )
-    assert {run["run"] for run in found["runs"]} == {case.run_ids["process"] for case in cases}
+    assert {run["run"] for run in found["runs"]} == {PROCESS.run_id(case) for case in cases}
 
 
 def test_every_block_is_on_the_page() -> None:

@@ -19,7 +19,7 @@ import pandas as pd
 import pytest
 import yaml
 from paths import ROOT, SMALL_STUDY
-from test_workflow import snakemake
+from snakemake_calls import snakemake
 
 pytestmark = pytest.mark.slurm
 
@@ -109,7 +109,7 @@ def names(folder: Path, pattern: str) -> list[Path]:
 def test_every_run_and_table_went_through_the_queue(queued: Path, cluster: Cluster) -> None:
     jobs = cluster.jobs()
     assert set(jobs.JobState) == {"COMPLETED"}
-    # run_fill, run_process, write_report, and a group each for drop, fill and process
+    # run_filling, run_process, write_report, and a group each for drop, fill and process
     assert len(jobs) == 6
     ran = (jobs.EndTime - jobs.StartTime).dt.total_seconds()
     waited = (jobs.StartTime - jobs.SubmitTime).dt.total_seconds()
@@ -155,8 +155,8 @@ def test_a_job_has_a_processor_for_each_rank(
     folder = copy_of_project(tmp_path)
     edit(folder, fidelities__quick__ranks=2)
     before = set(cluster.jobs().index)
-    succeed(folder, "fill", "--until", "run_fill", *STUDY, *QUEUE)
-    (run,) = (folder / "results/small/fill").iterdir()
+    succeed(folder, "filling", "--until", "run_filling", *STUDY, *QUEUE)
+    (run,) = (folder / "results/small/filling").iterdir()
     assert json.loads((run / "run.json").read_text())["ranks"] == 2
     assert re.search(r"[12] by [12] by [12] MPI processor grid", (run / "screen.1.txt").read_text())
     jobs = cluster.jobs()
@@ -197,7 +197,7 @@ def test_a_run_that_its_time_limit_ends_goes_on(
         print(f"part {part['part']}: steps {part['from_step']:,} to {part.get('to_step')}")
 
     succeed(queued, "process", *STUDY)  # the tables, without the queue
-    (output,) = [json.loads((run / "columns.json").read_text())["outputs"]["rod_force"]]
-    steps = pd.read_parquet(run / "tables/rod_force.parquet").step
+    (output,) = [json.loads((run / "columns.json").read_text())["outputs"]["workpiece_force"]]
+    steps = pd.read_parquet(run / "tables/workpiece_force.parquet").step
     wanted = range(output["first_step"], output["last_step"] + 1, output["period_steps"])
     assert steps.tolist() == list(wanted)

@@ -1,38 +1,42 @@
-"""Tables, networks and figures from what a DEM engine wrote about a dragged tool.
+"""Read what LIGGGHTS wrote and make tables, chains, figures and reports of it.
 
-`load_case` and `load_outputs` say what a run models and wrote; `iter_frames`
-and `iter_prints` stream its raw outputs; `write_tables` makes the Parquet
-tables that everything else starts from. `read_dump` and `dump_to_parquet` read
-any other dump of the engine.
+The names below are loaded when they are first used, so that the command starts at once.
 """
 
 from __future__ import annotations
 
-from dragchain.case import Case, Output, load_case, load_outputs
-from dragchain.dumps import iter_frames, iter_prints
-from dragchain.errors import (
-    CaseError,
-    DragchainError,
-    DumpError,
-    GateError,
-    SeriesError,
-    TableError,
-    TruncatedDumpError,
-)
-from dragchain.formats import Frame
-from dragchain.reading import dump_to_parquet, read_dump
-from dragchain.stats import MeanEstimate, estimate_mean
-from dragchain.tables import write_tables
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dragchain.dumps.any_dump import read_dump
+    from dragchain.dumps.frame import Frame
+    from dragchain.dumps.run_parts import iter_frames, iter_prints
+    from dragchain.errors import (
+        DocumentError,
+        DragchainError,
+        DumpError,
+        RecordError,
+        RejectedRunError,
+        SeriesError,
+        TableError,
+        TruncatedDumpError,
+    )
+    from dragchain.run.case import Case, Output, load_case, load_outputs
+    from dragchain.statistics.correlated import MeanEstimate, estimate_mean
+    from dragchain.tables.convert import dump_to_parquet
+    from dragchain.tables.write import write_tables
 
 __all__ = [
     "Case",
-    "CaseError",
+    "DocumentError",
     "DragchainError",
     "DumpError",
     "Frame",
-    "GateError",
     "MeanEstimate",
     "Output",
+    "RecordError",
+    "RejectedRunError",
     "SeriesError",
     "TableError",
     "TruncatedDumpError",
@@ -45,3 +49,20 @@ __all__ = [
     "read_dump",
     "write_tables",
 ]
+
+_MODULES = {
+    "dumps.any_dump": ("read_dump",),
+    "dumps.frame": ("Frame",),
+    "dumps.run_parts": ("iter_frames", "iter_prints"),
+    "run.case": ("Case", "Output", "load_case", "load_outputs"),
+    "statistics.correlated": ("MeanEstimate", "estimate_mean"),
+    "tables.convert": ("dump_to_parquet",),
+    "tables.write": ("write_tables",),
+}
+_HOMES = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES.get(name, 'errors')}"), name)

@@ -1,4 +1,4 @@
-"""The command ``dragchain``."""
+"""The command ``dragchain``: a table of commands, each with the function that it calls."""
 
 from __future__ import annotations
 
@@ -6,10 +6,132 @@ import argparse
 import math
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
-from dragchain.calibration_cli import add_calibration
 from dragchain.errors import DragchainError
+
+
+def _argument(*names: str, **options: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """An argument as argparse takes it; its name is that of the function's parameter."""
+    return names, options
+
+
+RUN_DIR = _argument("run_dir", type=Path, metavar="RUN_DIR", help="folder of one run")
+RUN_DIRS = _argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
+OUT_DIR = _argument(
+    "--out", type=Path, required=True, metavar="DIR", dest="out_dir", help="folder of the results"
+)
+MADE_BY = _argument("--command", help="what made the runs, for the record")
+DROPS = _argument("--drops", type=Path, required=True, dest="drops_file", help="drops.json")
+RECORD = _argument("record", type=Path, metavar="RECORD", help="the CSV of force over time")
+MEASURES = _argument(
+    "measures", type=Path, nargs="+", metavar="MEASURES", help="measures.json of the runs"
+)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command: the function that it calls, and that function's parameters.
+
+    What the function returns is printed if it is text.
+    """
+
+    name: str
+    help: str
+    function: str
+    arguments: tuple[tuple[tuple[str, ...], dict[str, Any]], ...]
+
+    def run(self, options: dict[str, Any]) -> None:
+        """Import the function and call it."""
+        module, _, name = self.function.partition(":")
+        said = getattr(import_module(f"dragchain.{module}"), name)(**options)
+        if isinstance(said, str):
+            print(said)
+
+
+COMMANDS = (
+    Command("tables", "tables of a run from its raw outputs", "tables.write:write_tables",
+            (RUN_DIR,)),
+    Command("chains", "contact network and force chains of a run, from its tables",
+            "network.write:write_chains", (RUN_DIR,)),
+    Command("loading", "load, sliding and friction work on the workpiece's facets",
+            "loading.write:write_loading", (RUN_DIR,)),
+    Command("figures", "figures of a run, from its tables", "report.run_figures:write_figures",
+            (RUN_DIR,)),
+    Command("export", "frames of a run for ParaView or OVITO", "export.write:export_command", (
+        RUN_DIR,
+        _argument("--to", required=True, choices=("paraview", "xyz"),
+                  help="VTP files with a PVD, or extended XYZ"),
+        _argument("--out", type=Path, metavar="DIR", help="default: export/TO in the run's folder"),
+        _argument("--from-time", type=float, metavar="S", help="first simulated time, s"),
+        _argument("--to-time", type=float, metavar="S", help="last simulated time, s"),
+        _argument("--every", type=int, default=1, metavar="N", help="every N-th frame only"),
+        _argument("--replace", action="store_true", help="write over an earlier export"))),
+    Command("report", "report on the process runs of a study", "report.study_report:write_report", (
+        OUT_DIR, RUN_DIRS,
+        _argument("--advice", type=Path, metavar="FILE", help="advice.json of the study"))),
+)  # fmt: skip
+"""What a user calls."""
+
+STEPS = (
+    Command("measure", "tables, chains and measures of a run of a plan",
+            "tradeoff.measures:write_measures", (
+                RUN_DIR,
+                _argument("--packing", type=Path, required=True, dest="packing_table",
+                          help="packing.json of its bed"))),
+    Command("tradeoff", "report on speed against accuracy", "tradeoff.report:write_tradeoff", (
+        OUT_DIR, MEASURES, MADE_BY,
+        _argument("--reference", type=Path, required=True, metavar="RUN_DIR",
+                  dest="reference_run", help="a run at the reference settings"),
+        _argument("--drops", type=Path, nargs="*", default=[], metavar="RUN_DIR",
+                  help="drop tests"),
+        _argument("--costs", type=Path, metavar="FILE", help="costs of what decks leave out"),
+        _argument("--promises", type=Path, metavar="FILE", help="promises on other scenes"),
+        _argument("--plan", default="", metavar="NAME", help="name of the plan"),
+        _argument("--largest-step", type=float, default=math.inf,
+                  help="largest fraction of the Rayleigh time to recommend"))),
+    Command("promises", "the advisor's promises against runs of other scenes",
+            "tradeoff.promises:promises_command", (OUT_DIR, MEASURES)),
+    Command("scaling", "power law of the mean drag over one field", "scaling.fit:scaling_command", (
+        OUT_DIR, RUN_DIRS, MADE_BY,
+        _argument("--field", required=True, help="dotted name of the field"),
+        _argument("--expected", type=float, metavar="N", help="exponent to compare with"),
+        _argument("--source", help="where that exponent comes from"),
+        _argument("--fit-range", type=float, nargs=2, metavar=("LOW", "HIGH"),
+                  help="levels for which the exponent is expected"))),
+    Command("validate", "runs of a study beside its source", "validation.report:write_validation",
+            (OUT_DIR, RUN_DIRS, _argument("--command", required=True, help="for the record"))),
+    Command("stability", "report on a stability map", "stability.report:write_stability", (
+        OUT_DIR,
+        _argument("lists", type=Path, nargs="+", metavar="POINTS", help="lists of points"))),
+    Command("verify", "checks of the verification suite", "verification.report:write_verification",
+            (OUT_DIR, RUN_DIRS)),
+    Command("verdict", "fail if a quantity of the suite failed", "verification.report:verdict", (
+        _argument("report_dir", type=Path, metavar="DIR", help="what `verify` wrote"),)),
+    Command("record", "impacts of a measured drop test", "calibration.results:write_record", (
+        RECORD,
+        _argument("--fall-time", type=float, required=True, metavar="S", dest="fall_time_s",
+                  help="free fall before the first impact, s"),
+        _argument("--out", type=Path, required=True, metavar="FILE", help="record.json"))),
+    Command("calibrate", "restitution from a measured drop test",
+            "calibration.results:calibrate_command", (RECORD, DROPS, OUT_DIR)),
+    Command("trials", "known restitutions recovered from synthetic records",
+            "calibration.results:write_trials", (
+                DROPS,
+                _argument("--trials", type=Path, required=True, dest="trials_file",
+                          help="drops.json of the trials"),
+                _argument("--seed", type=int, default=1, help="seed of sensors and noise"),
+                _argument("--records", type=int, default=1, help="records of each drop"),
+                _argument("--out", type=Path, required=True, metavar="FILE", help="trials.json"))),
+    Command("calibration-report", "figures and page of a calibration",
+            "calibration.report:write_report", (
+                RECORD,
+                _argument("folder", type=Path, metavar="DIR", help="folder of the calibration"))),
+)  # fmt: skip
+"""What the rules call: ``dragchain step NAME``."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -26,9 +148,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit status: 0, or 1 after an error that is printed to stderr. A
         wrong use of the command exits with 2.
     """
-    options = _parser().parse_args(arguments)
+    options = vars(_parser().parse_args(arguments))
+    command = options.pop("_command")
     try:
-        options.action(options)
+        command.run(options)
     except (DragchainError, OSError) as error:
         print(f"dragchain: {error}", file=sys.stderr)
         return 1
@@ -37,241 +160,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="dragchain", description="Make tables, figures and reports of what the engine wrote."
+        prog="dragchain", description="Tables, figures and reports of what LIGGGHTS wrote."
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    run_dir = argparse.ArgumentParser(add_help=False)
-    run_dir.add_argument("run_dir", type=Path, metavar="RUN_DIR", help="folder of one run")
-
-    tables = commands.add_parser(
-        "tables", parents=[run_dir], help="make the tables of a run from its raw outputs"
-    )
-    tables.set_defaults(action=_tables)
-    chains = commands.add_parser(
-        "chains", parents=[run_dir], help="make the network and chain tables from the tables"
-    )
-    chains.set_defaults(action=_chains)
-    figures = commands.add_parser(
-        "figures", parents=[run_dir], help="draw the figures of a run from its tables"
-    )
-    figures.set_defaults(action=_figures)
-    removal = commands.add_parser(
-        "removal", parents=[run_dir], help="load, sliding and friction work on a tool's facets"
-    )
-    removal.set_defaults(action=_removal)
-    export = commands.add_parser(
-        "export", parents=[run_dir], help="write the frames of a run for ParaView or OVITO"
-    )
-    export.add_argument(
-        "--to", required=True, choices=("paraview", "xyz"), help="VTP files with a PVD, or text"
-    )
-    export.add_argument(
-        "--out", type=Path, metavar="DIR", help="its folder (default: export/TO in the run's)"
-    )
-    export.add_argument("--from-time", type=float, metavar="S", help="first simulated time, s")
-    export.add_argument("--to-time", type=float, metavar="S", help="last simulated time, s")
-    export.add_argument("--every", type=int, default=1, metavar="N", help="every N-th frame only")
-    export.add_argument("--replace", action="store_true", help="write over an earlier export")
-    export.set_defaults(action=_export)
-    report = commands.add_parser("report", help="write the report on several runs")
-    report.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
-    report.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
-    report.add_argument("--advice", type=Path, metavar="FILE", help="advice.json of the study")
-    report.set_defaults(action=_report)
-    add_calibration(commands)
-    verify = commands.add_parser("verify", help="judge the runs of the verification suite")
-    verify.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
-    verify.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
-    verify.set_defaults(action=_verify)
-    verdict = commands.add_parser("verdict", help="fail if a quantity of the suite failed")
-    verdict.add_argument("report_dir", type=Path, metavar="DIR", help="what `verify` wrote")
-    verdict.set_defaults(action=_verdict)
-    stability = commands.add_parser("stability", help="write the report on a stability map")
-    stability.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
-    stability.add_argument("lists", type=Path, nargs="+", metavar="POINTS", help="lists of points")
-    stability.set_defaults(action=_stability)
-    peaks = commands.add_parser("peaks", help="test whether chains explain the peaks of the drag")
-    peaks.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
-    peaks.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
-    peaks.set_defaults(action=_peaks)
-    measure = commands.add_parser(
-        "measure", parents=[run_dir], help="measure a run of a trade, tables and chains included"
-    )
-    measure.add_argument("--fill-table", type=Path, required=True, help="fill.json of its bed")
-    measure.set_defaults(action=_measure)
-    checks = commands.add_parser("checks", help="check the advisor's promises on other scenes")
-    checks.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="the results' folder"
-    )
-    checks.add_argument("measures", type=Path, nargs="+", metavar="MEASURES", help="measures.json")
-    checks.set_defaults(action=_checks)
-    scaling = commands.add_parser("scaling", help="fit a power law to the drag over one field")
-    scaling.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
-    scaling.add_argument("--field", required=True, help="dotted name of the field")
-    scaling.add_argument("--expected", type=float, metavar="N", help="exponent to compare with")
-    scaling.add_argument("--source", help="where that exponent comes from")
-    scaling.add_argument(
-        "--within", type=float, nargs=2, metavar=("LOW", "HIGH"), help="levels it is meant for"
-    )
-    scaling.add_argument("--command", help="what made it, for the record")
-    scaling.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
-    scaling.set_defaults(action=_scaling)
-    trade = commands.add_parser("trade", help="write the report on a trade of speed and accuracy")
-    trade.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
-    trade.add_argument(
-        "--reference", type=Path, required=True, metavar="RUN_DIR", help="a run at the reference"
-    )
-    trade.add_argument(
-        "--drops", type=Path, nargs="*", default=[], metavar="RUN_DIR", help="drop tests"
-    )
-    trade.add_argument("--costs", type=Path, metavar="FILE", help="costs of what decks leave out")
-    trade.add_argument("--checks", type=Path, metavar="FILE", help="checks on other scenes")
-    trade.add_argument("--plan", default="", metavar="NAME", help="name of the plan")
-    trade.add_argument("--command", help="what made it, for the record")
-    trade.add_argument(
-        "--largest-step", type=float, default=math.inf, help="over the Rayleigh time, to recommend"
-    )
-    trade.add_argument(
-        "measures", type=Path, nargs="+", metavar="MEASURES", help="measures.json of the runs"
-    )
-    trade.set_defaults(action=_trade)
-    validate = commands.add_parser("validate", help="set runs of a study beside its source")
-    validate.add_argument("--out", type=Path, required=True, metavar="DIR", help="its folder")
-    validate.add_argument("--command", default="dragchain validate", help="what made the runs")
-    validate.add_argument(
-        "run_dirs",
-        type=Path,
-        nargs="+",
-        metavar="RUN_DIR",
-        help="measured runs, the reference first",
-    )
-    validate.set_defaults(action=_validate)
+    _add(commands, COMMANDS)
+    step = commands.add_parser("step", help="a step of the workflow: dragchain step --help")
+    _add(step.add_subparsers(required=True, metavar="STEP"), STEPS)
     return parser
 
 
-def _tables(options: argparse.Namespace) -> None:
-    from dragchain.tables import write_tables
-
-    write_tables(options.run_dir)
-
-
-def _chains(options: argparse.Namespace) -> None:
-    from dragchain.network import write_chains
-
-    write_chains(options.run_dir)
-
-
-def _figures(options: argparse.Namespace) -> None:
-    from dragchain.figures import write_figures
-
-    write_figures(options.run_dir)
-
-
-def _removal(options: argparse.Namespace) -> None:
-    from dragchain.removal import write_removal
-
-    write_removal(options.run_dir)
-
-
-def _export(options: argparse.Namespace) -> None:
-    from dragchain.export.moments import Selection
-    from dragchain.export.writing import write_export
-
-    done = write_export(
-        options.run_dir,
-        options.to,
-        options.out,
-        Selection(options.from_time, options.to_time, options.every),
-        replace=options.replace,
-        report=print,
-    )
-    print(f"{done.frames} frames, {done.size / 1e6:.1f} MB: {done.file}")
-
-
-def _report(options: argparse.Namespace) -> None:
-    from dragchain.report import write_report
-
-    write_report(options.out, options.run_dirs, options.advice)
-
-
-def _verify(options: argparse.Namespace) -> None:
-    from dragchain.verification.report import write_verification
-
-    write_verification(options.out, options.run_dirs)
-
-
-def _verdict(options: argparse.Namespace) -> None:
-    from dragchain.verification.report import verdict
-
-    print(verdict(options.report_dir))
-
-
-def _stability(options: argparse.Namespace) -> None:
-    from dragchain.stability_report import write_stability
-
-    write_stability(options.out, options.lists)
-
-
-def _peaks(options: argparse.Namespace) -> None:
-    from dragchain.validation.peaks_report import write_peaks
-
-    for row in write_peaks(options.out, options.run_dirs)["statements"]:
-        print(f"{row['verdict']}: {row['text']}")
-
-
-def _measure(options: argparse.Namespace) -> None:
-    from dragchain.measures import write_measures
-
-    write_measures(options.run_dir, options.fill_table)
-
-
-def _checks(options: argparse.Namespace) -> None:
-    from dragchain.checks import write_checks
-
-    for check in write_checks(options.out, options.measures):
-        scene = ", ".join(f"{name} {value}" for name, value in check.scene.items())
-        error = check.error
-        print(
-            f"{scene or 'other beds'}: {check.quantity} within {check.tolerance:g} by"
-            f" {check.setting}: {error.error:+.3f} ({error.low:+.3f} to {error.high:+.3f}),"
-            f" {check.verdict}"
-        )
-
-
-def _scaling(options: argparse.Namespace) -> None:
-    from dragchain.scaling import Expectation, write_scaling
-
-    within = tuple(options.within) if options.within else None
-    found = write_scaling(
-        options.out,
-        options.run_dirs,
-        options.field,
-        Expectation(options.expected, options.source, within),
-        [options.command] if options.command else [],
-    )
-    print(f"{options.field}: {found['statement']}")
-
-
-def _trade(options: argparse.Namespace) -> None:
-    from dragchain.trade_report import write_trade
-
-    write_trade(
-        options.out,
-        options.measures,
-        options.reference,
-        drops=options.drops,
-        costs=options.costs,
-        checks=options.checks,
-        plan=options.plan,
-        commands=[options.command] if options.command else [],
-        largest_step=options.largest_step,
-    )
-
-
-def _validate(options: argparse.Namespace) -> None:
-    from dragchain.validation.page import write_validation
-
-    write_validation(options.out, options.run_dirs, options.command)
+def _add(parsers: Any, commands: Sequence[Command]) -> None:
+    for command in commands:
+        parser = parsers.add_parser(command.name, help=command.help, description=command.help)
+        for names, options in command.arguments:
+            parser.add_argument(*names, **options)
+        parser.set_defaults(_command=command)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ def _joined(lines: list[str], remedy: str | None) -> str:
     return "\n  ".join(lines)
 
 
-class CaseError(DragchainError):
+class DocumentError(DragchainError):
     """A ``case.json`` or ``columns.json`` that cannot be used.
 
     Parameters
@@ -83,7 +83,7 @@ class DumpError(DragchainError):
         super().__init__()
 
     def __str__(self) -> str:
-        """Return what was found where, what should have stood there, what is kept."""
+        """What was found where, what should have stood there, what is kept."""
         place = [f"{self.file}"]
         if self.frame is not None:
             place.append(f"frame {self.frame}")
@@ -113,7 +113,7 @@ class SeriesError(DragchainError):
     """A series of samples that carries no statistics."""
 
 
-class GateError(DragchainError):
+class RejectedRunError(DragchainError):
     """A run whose outputs are whole but cannot be trusted."""
 
 

@@ -19,15 +19,15 @@ def raw() -> type[Raw]:
 
 @pytest.fixture
 def tiny_run(tmp_path: Path) -> Path:
-    """Folder of a process run with four balls, without its tables.
+    """Folder of a process run with four particles, without its tables.
 
-    The tool, a cylinder of 5 mm, moves along +x from the bowl's axis at 0.1 mm/s
-    from step 20 to 100, a step being 1 ms. Ball 1 touches it, ball 2 touches
-    ball 1 and the bowl's side: a straight chain at z = 30 mm whose three
-    contacts share the overlap ``40 um + tool_x`` equally and carry 100 N/mm of
-    it: (4 N + 1e5 N/m tool_x) / 3. The tool holds ball 1 up, the side ball 2.
-    Ball 4 lies on ball 3 and that on the floor. Nothing touches the tool at
-    step 0; the forces in ``rod_contacts`` are 5 % above the applied ones.
+    The workpiece, a cylinder of 5 mm, moves along +x from the bowl's axis at 0.1 mm/s
+    from step 20 to 100, a step being 1 ms. Particle 1 touches it, particle 2 touches
+    particle 1 and the bowl's side: a straight chain at z = 30 mm whose three
+    contacts share the overlap ``40 um + workpiece_x`` equally and carry 100 N/mm of
+    it: (4 N + 1e5 N/m workpiece_x) / 3. The workpiece holds particle 1 up, the side particle 2.
+    Particle 4 lies on particle 3 and that on the floor. Nothing touches the workpiece at
+    step 0; the forces in ``workpiece_contacts`` are 5 % above the applied ones.
     Samples count from step 40 on.
     """
     folder = tmp_path / "tiny"

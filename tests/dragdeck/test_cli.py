@@ -8,9 +8,11 @@ from typing import Any
 
 import pytest
 
-from dragdeck.cases import Case
+from dragdeck.cases.case import Case
 from dragdeck.cli import main
 from dragdeck.project import Project
+from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.process import PROCESS
 
 
 @pytest.fixture(autouse=True)
@@ -33,7 +35,7 @@ def test_bad_input_writes_nothing(
 ) -> None:
     small["media"]["count"] = -5
     write_study(small)
-    assert main(["render", "small", "drop", "any"]) == 1
+    assert main(["step", "render", "small", "drop_test", "any"]) == 1
     assert not (project.root / "results").exists()
 
 
@@ -55,20 +57,20 @@ def test_explain_shows_what_is_left_out_and_the_cost(
 def test_a_process_is_never_rendered_on_a_guess(
     case: Case, project: Project, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["render", "small", "process", case.run_ids["process"]]) == 1
+    assert main(["step", "render", "small", "process", PROCESS.run_id(case)]) == 1
     assert "needs the settled bed" in capsys.readouterr().err
-    assert not project.run_folder(case, "process").exists()
+    assert not project.run_folder(case, PROCESS).exists()
 
 
 def test_render_writes_all_that_a_run_needs(case: Case, project: Project) -> None:
-    assert main(["render", "small", "fill", case.run_ids["fill"]]) == 0
-    names = {file.name for file in project.run_folder(case, "fill").iterdir()}
-    assert names == {"in.liggghts", "case.json", "columns.json", "balls.data"}
+    assert main(["step", "render", "small", "filling", FILLING.run_id(case)]) == 0
+    names = {file.name for file in project.run_folder(case, FILLING).iterdir()}
+    assert names == {"in.liggghts", "case.json", "columns.json", "particles.data"}
 
 
 def test_an_unknown_run_lists_the_known(case: Case, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["render", "small", "fill", "none"]) == 1
-    assert case.run_ids["fill"] in capsys.readouterr().err
+    assert main(["step", "render", "small", "filling", "none"]) == 1
+    assert FILLING.run_id(case) in capsys.readouterr().err
 
 
 def test_outside_a_project(

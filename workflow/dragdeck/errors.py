@@ -62,5 +62,5 @@ class EngineError(DragdeckError):
     """The engine is missing, too old, refused the deck or was stopped."""
 
 
-class GateError(DragdeckError):
+class RejectedRunError(DragdeckError):
     """A run ended, but what it left cannot be trusted."""

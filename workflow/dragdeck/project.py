@@ -5,12 +5,28 @@ The grammar of result paths stands here and nowhere else.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from dragdeck.cases import Case, SceneName, load_cases, study_file
+from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
-from dragdeck.plan import Points, plan_points, read_plan
+from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.scene import SceneType
+from dragdeck.sweep.cases import load_cases, study_file
+from dragdeck.sweep.plan import Points, plan_points, read_plan
+
+POINTS = "points"
+"""Folder of the process runs of a plan."""
+
+PLACES: dict[str, SceneType] = {**SCENES, POINTS: PROCESS}
+"""The scene of each folder of runs of a study."""
+
+
+def run_path(study: str, place: str, run: str) -> str:
+    """Path of the folder of a run from the project's root."""
+    return f"results/{study}/{place}/{run}"
 
 
 @dataclass(frozen=True)
@@ -63,17 +79,18 @@ class Project:
             )
         return plan_points(read_plan(file), file, self.cases(study)[0])
 
-    def point_folder(self, case: Case) -> Path:
-        """The folder of a process run of a plan."""
-        return self.root / "results" / case.study_name / "points" / case.run_ids["process"]
+    def results(self, study: str) -> Path:
+        """The results of a study."""
+        return self.root / "results" / study
 
-    def run_folder(self, case: Case, scene: SceneName) -> Path:
-        """The folder of one engine run."""
-        return self.root / "results" / case.study_name / scene / case.run_ids[scene]
+    def run_folder(self, case: Case, scene: SceneType, *, of_plan: bool = False) -> Path:
+        """The folder of one engine run; process runs of a plan stand apart, as points."""
+        place = POINTS if of_plan and scene.needs_bed else scene.name
+        return self.root / run_path(case.study_name, place, scene.run_id(case))
 
     def experiment_folder(self, group: str, run: str) -> Path:
         """The folder of a run of the `collide` scene, which belongs to no case of a study."""
-        return self.root / "results" / group / "collide" / run
+        return self.root / run_path(group, "collide", run)
 
 
 def find_project(start: Path) -> Project:
@@ -100,7 +117,7 @@ def study_templates(case: Case) -> Path:
     return case.file.parent / "templates"
 
 
-def by_run(cases: list[Case], scene: SceneName) -> dict[str, Case]:
+def by_run(cases: Iterable[Case], scene: SceneType) -> dict[str, Case]:
     """One case for each run of a scene: cases that share a run appear once.
 
     Returns
@@ -108,7 +125,7 @@ def by_run(cases: list[Case], scene: SceneName) -> dict[str, Case]:
     dict of str to Case
         In the order of the cases.
     """
-    found: dict[str, Case] = {}
+    runs: dict[str, Case] = {}
     for case in cases:
-        found.setdefault(case.run_ids[scene], case)
-    return found
+        runs.setdefault(scene.run_id(case), case)
+    return runs

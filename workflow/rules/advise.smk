@@ -13,9 +13,9 @@ rule advise:
         "../envs/python.yaml"
     threads: workflow.cores
     params:
-        cases=[case.digest("process") for case in by_run(CASES, "process").values()],
+        cases=[SCENES["process"].digest(case) for case in by_run(CASES, SCENES["process"]).values()],
         fidelity=fidelity_option,
         study=STUDY,
-        source=source_hash("dragdeck.forecast"),
+        source=source_hash("dragdeck.advice.forecast"),
     shell:
         "dragdeck advise {params.study} {params.fidelity} > {log} 2>&1"

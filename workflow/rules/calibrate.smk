@@ -2,125 +2,141 @@
 # used is refused before any drop is run.
 
 
+def drop_record(wildcards):
+    """The measured drop test of the study."""
+    return str(explained(record_file, CASES[0]).relative_to(PROJECT.root))
+
+
+def fall_time(wildcards):
+    """Free fall before the first impact of the drop test, s."""
+    study = CASES[0].study
+    return (2 * study.drop_test.height_m / study.gravity_m_s2) ** 0.5
+
+
+def calibration_inputs():
+    """What the drops of a calibration are made from: the study and the drop's templates."""
+    return [str(relative(CASES[0].file)), *templates_of("drop_test")]
+
+
 rule read_drop_record:
     input:
         drop_record,
     output:
-        of_calibration("record.json"),
+        of_study("calibration", "record.json"),
     log:
-        of_calibration("logs/record.log"),
+        of_study("calibration", "logs/record.log"),
     benchmark:
-        of_calibration("benchmarks/record.tsv")
+        of_study("calibration", "benchmarks/record.tsv")
     conda:
         "../envs/python.yaml"
     params:
         fall_time=fall_time,
-        source=source_hash("dragchain.record"),
+        source=source_hash("dragchain.calibration.force_record"),
     shell:
-        "dragchain record {input} --fall-time {params.fall_time} --out {output} 2>&1 | tee -i {log}"
+        "dragchain step record {input} --fall-time {params.fall_time} --out {output} 2>&1 | tee -i {log}"
 
 
 rule sweep_drops:
     input:
         calibration_inputs(),
-        of_calibration("record.json"),
+        of_study("calibration", "record.json"),
     output:
-        of_calibration("sweep/drops.json"),
+        of_study("calibration", "sweep/drops.json"),
     log:
-        of_calibration("logs/sweep.log"),
+        of_study("calibration", "logs/sweep.log"),
     benchmark:
-        of_calibration("benchmarks/sweep.tsv")
+        of_study("calibration", "benchmarks/sweep.tsv")
     conda:
         "../envs/python.yaml"
     params:
         study=STUDY,
         fidelity=fidelity_option,
-        source=source_hash("dragdeck.calibration"),
+        source=source_hash("dragdeck.campaigns.restitution_drops"),
     shell:
-        "dragdeck drops {params.study} sweep {params.fidelity}"
+        "dragdeck step drops {params.study} sweep {params.fidelity}"
         " --out $(dirname {output}) 2>&1 | tee -i {log}"
 
 
 rule fit_restitution:
     input:
         record=drop_record,
-        drops=of_calibration("sweep/drops.json"),
+        drops=of_study("calibration", "sweep/drops.json"),
     output:
-        result=of_calibration("result.json"),
-        impacts=of_calibration("impacts.csv"),
-        bias=of_calibration("bias.csv"),
+        result=of_study("calibration", "result.json"),
+        impacts=of_study("calibration", "impacts.csv"),
+        bias=of_study("calibration", "bias.csv"),
     log:
-        of_calibration("logs/fit.log"),
+        of_study("calibration", "logs/fit.log"),
     benchmark:
-        of_calibration("benchmarks/fit.tsv")
+        of_study("calibration", "benchmarks/fit.tsv")
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragchain.calibration"),
+        source=source_hash("dragchain.calibration.results"),
     shell:
-        "dragchain calibrate {input.record} --drops {input.drops}"
+        "dragchain step calibrate {input.record} --drops {input.drops}"
         " --out $(dirname {output.result}) 2>&1 | tee -i {log}"
 
 
 rule confirm_restitution:
     input:
         calibration_inputs(),
-        fit=of_calibration("result.json"),
+        fit=of_study("calibration", "result.json"),
     output:
-        of_calibration("confirm/drops.json"),
+        of_study("calibration", "confirm/drops.json"),
     log:
-        of_calibration("logs/confirm.log"),
+        of_study("calibration", "logs/confirm.log"),
     benchmark:
-        of_calibration("benchmarks/confirm.tsv")
+        of_study("calibration", "benchmarks/confirm.tsv")
     conda:
         "../envs/python.yaml"
     params:
         study=STUDY,
         fidelity=fidelity_option,
-        source=source_hash("dragdeck.calibration"),
+        source=source_hash("dragdeck.campaigns.restitution_drops"),
     shell:
-        "dragdeck drops {params.study} confirm {params.fidelity} --fit {input.fit}"
+        "dragdeck step drops {params.study} confirm {params.fidelity} --fit {input.fit}"
         " --out $(dirname {output}) 2>&1 | tee -i {log}"
 
 
 rule drop_for_trials:
     input:
         calibration_inputs(),
-        of_calibration("record.json"),
+        of_study("calibration", "record.json"),
     output:
-        of_calibration("trials/drops.json"),
+        of_study("calibration", "trials/drops.json"),
     log:
-        of_calibration("logs/trial_drops.log"),
+        of_study("calibration", "logs/trial_drops.log"),
     benchmark:
-        of_calibration("benchmarks/trial_drops.tsv")
+        of_study("calibration", "benchmarks/trial_drops.tsv")
     conda:
         "../envs/python.yaml"
     params:
         study=STUDY,
         fidelity=fidelity_option,
-        source=source_hash("dragdeck.calibration"),
+        source=source_hash("dragdeck.campaigns.restitution_drops"),
     shell:
-        "dragdeck drops {params.study} trials {params.fidelity} --count 10 --seed 1"
+        "dragdeck step drops {params.study} trials {params.fidelity} --count 10 --seed 1"
         " --out $(dirname {output}) 2>&1 | tee -i {log}"
 
 
 rule recover_trials:
     input:
-        sweep=of_calibration("sweep/drops.json"),
-        trials=of_calibration("trials/drops.json"),
+        sweep=of_study("calibration", "sweep/drops.json"),
+        trials=of_study("calibration", "trials/drops.json"),
     output:
-        summary=of_calibration("trials.json"),
-        rows=of_calibration("trials.csv"),
+        summary=of_study("calibration", "trials.json"),
+        rows=of_study("calibration", "trials.csv"),
     log:
-        of_calibration("logs/trials.log"),
+        of_study("calibration", "logs/trials.log"),
     benchmark:
-        of_calibration("benchmarks/trials.tsv")
+        of_study("calibration", "benchmarks/trials.tsv")
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragchain.calibration"),
+        source=source_hash("dragchain.calibration.results"),
     shell:
-        "dragchain trials --drops {input.sweep} --trials {input.trials}"
+        "dragchain step trials --drops {input.sweep} --trials {input.trials}"
         " --seed 1 --out {output.summary} 2>&1 | tee -i {log}"
 
 
@@ -128,27 +144,28 @@ rule write_calibration_report:
     input:
         rules.fit_restitution.output,
         rules.recover_trials.output,
-        of_calibration("sweep/drops.json"),
-        of_calibration("confirm/drops.json"),
+        of_study("calibration", "sweep/drops.json"),
+        of_study("calibration", "confirm/drops.json"),
         record=drop_record,
-        templates=page_templates("calibration.html.j2"),
+        templates=page_templates("calibration/calibration.html.j2"),
     output:
         page=report(
-            of_calibration("report.html"),
+            of_study("calibration", "report.html"),
             caption="../report/calibration.rst",
             category="Calibration",
             labels={"run": "drop test", "figure": "report"},
         ),
         figures=[
-            of_calibration(f"figures/{name}.png") for name in ("impacts", "fit", "bias", "trials")
+            of_study("calibration", f"figures/{name}.png")
+            for name in ("impacts", "fit", "bias", "trials")
         ],
     log:
-        of_calibration("logs/report.log"),
+        of_study("calibration", "logs/report.log"),
     benchmark:
-        of_calibration("benchmarks/report.tsv")
+        of_study("calibration", "benchmarks/report.tsv")
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragchain.calibration_report"),
+        source=source_hash("dragchain.calibration.report"),
     shell:
-        "dragchain calibration-report {input.record} $(dirname {output.page}) 2>&1 | tee -i {log}"
+        "dragchain step calibration-report {input.record} $(dirname {output.page}) 2>&1 | tee -i {log}"

@@ -3,24 +3,17 @@
 
 rule export_paraview:
     input:
-        multiext(
-            of_process("tables/"),
-            "rod_force.parquet",
-            "balls.parquet",
-            "contacts.parquet",
-            "network.parquet",
-            "chains.parquet",
-        ),
-        run=of_process("run.json"),
+        tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
+        run=of_run("process", "run.json"),
     output:
-        of_process("export/paraview/run.pvd"),
+        of_run("process", "export/paraview/run.pvd"),
     log:
-        of_process("logs/export.log"),
+        of_run("process", "logs/export.log"),
     benchmark:
-        of_process("benchmarks/export.tsv")
+        of_run("process", "benchmarks/export.tsv")
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragchain.export.writing"),
+        source=source_hash("dragchain.export.write"),
     shell:
         "dragchain export $(dirname {input.run}) --to paraview --replace > {log} 2>&1"

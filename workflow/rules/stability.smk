@@ -4,6 +4,18 @@
 STABILITY_MAP = config.get("stability_map", "studies/stability/map.yaml")
 
 
+def stability_templates():
+    """Every template that a deck of the stability map could use."""
+    files = sorted(PROJECT.templates.glob("*.j2"))
+    return [str(file.relative_to(PROJECT.root)) for file in files]
+
+
+def beds_of_regime(wildcards):
+    """Columns and drags start from settled beds."""
+    wanted = wildcards.regime in ("column", "drag")
+    return ["results/stability/points/beds.json"] if wanted else []
+
+
 # Beds that columns and drags start from.
 rule settle_beds:
     input:
@@ -19,12 +31,12 @@ rule settle_beds:
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragdeck.stability_map"),
+        source=source_hash("dragdeck.campaigns.stability_map"),
     shell:
-        "dragdeck stability beds --map {input.points} 2>&1 | tee -i {log}"
+        "dragdeck step stability beds --map {input.points} 2>&1 | tee -i {log}"
 
 
-rule run_points:
+rule run_regime:
     input:
         points=STABILITY_MAP,
         study="studies/stability/study.yaml",
@@ -41,9 +53,9 @@ rule run_points:
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragdeck.stability_map"),
+        source=source_hash("dragdeck.campaigns.stability_map"),
     shell:
-        "dragdeck stability {wildcards.regime} --map {input.points} 2>&1 | tee -i {log}"
+        "dragdeck step stability {wildcards.regime} --map {input.points} 2>&1 | tee -i {log}"
 
 
 rule write_stability:
@@ -52,7 +64,7 @@ rule write_stability:
             "results/stability/points/{regime}.json",
             regime=["impact", "settle", "column", "drag"],
         ),
-        templates=page_templates("stability.html.j2"),
+        templates=page_templates("stability/stability.html.j2"),
     output:
         page=report(
             "results/stability/report.html",
@@ -70,6 +82,6 @@ rule write_stability:
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragchain.stability_report"),
+        source=source_hash("dragchain.stability.report"),
     shell:
-        "dragchain stability --out $(dirname {output.page}) {input.lists} > {log} 2>&1"
+        "dragchain step stability --out $(dirname {output.page}) {input.lists} > {log} 2>&1"

@@ -4,29 +4,34 @@
 rule write_validation:
     input:
         measures=lambda wildcards: every_point("measures.json", VALIDATION),
-        loads=lambda wildcards: every_fill("tables/removal.json"),
+        loads=lambda wildcards: every_packing("tables/loading.json"),
         templates=page_templates(
-            *(f"validation/{name}.html.j2" for name in ("validation", "peaks", "scaling", "load"))
+            *(
+                f"validation/{name}.html.j2"
+                for name in ("validation", "peaks/peaks", "scaling", "load")
+            )
         ),
     output:
         page=report(
-            of_validation("report.html"),
+            of_study("validation", "report.html"),
             caption="../report/validation.rst",
             category="Validation",
             labels={"run": "all", "figure": "report"},
         ),
-        found=of_validation("validation.json"),
-        tables=multiext(of_validation(""), "fills.parquet", "effects.parquet", "statements.parquet"),
+        found=of_study("validation", "validation.json"),
+        tables=multiext(
+            of_study("validation", ""), "packings.parquet", "effects.parquet", "statements.parquet"
+        ),
     log:
-        of_validation("logs/report.log"),
+        of_study("validation", "logs/report.log"),
     benchmark:
-        of_validation("benchmarks/report.tsv")
+        of_study("validation", "benchmarks/report.tsv")
     conda:
         "../envs/python.yaml"
     params:
         command=f"snakemake validate --config study={STUDY} plan={VALIDATION}",
         runs=lambda wildcards, input: [str(Path(file).parent) for file in input.measures],
-        source=source_hash("dragchain.validation.page"),
+        source=source_hash("dragchain.validation.report"),
     shell:
-        "dragchain validate --out $(dirname {output.page}) --command '{params.command}'"
+        "dragchain step validate --out $(dirname {output.page}) --command '{params.command}'"
         " {params.runs} > {log} 2>&1"

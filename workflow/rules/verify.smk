@@ -1,12 +1,17 @@
-# Verification of the contact law on the engine: single impacts and a few balls.
+# Verification of the contact law on the engine: single impacts and a few particles.
 
 VERIFICATION_RUNS = list(suite_of(CASES[0].study))
+
+
+def of_experiment(run, file):
+    """Path of a file of a run of the verification suite."""
+    return f"{run_path('verification', 'collide', run)}/{file}"
 
 
 rule render_verification:
     input:
         templates_of("collide"),
-        suite="workflow/dragdeck/verification.yaml",
+        suite="workflow/dragdeck/campaigns/verification.yaml",
     output:
         [
             of_experiment(run, file)
@@ -22,9 +27,9 @@ rule render_verification:
     params:
         study=STUDY,
         fidelity=fidelity_option,
-        source=source_hash("dragdeck.verification", "dragdeck.render"),
+        source=source_hash("dragdeck.campaigns.verification", "dragdeck.decks.render"),
     shell:
-        "dragdeck verify {params.study} {params.fidelity} > {log} 2>&1"
+        "dragdeck step verify {params.study} {params.fidelity} > {log} 2>&1"
 
 
 rule run_verification:
@@ -42,7 +47,7 @@ rule run_verification:
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragdeck.runner"),
+        source=source_hash("dragdeck.engine.run_folder"),
     shell:
         "dragdeck run $(dirname {output}) > {log} 2>&1"
 
@@ -76,7 +81,7 @@ rule judge_verification:
         runs=[of_experiment(run, "") for run in VERIFICATION_RUNS],
         source=source_hash("dragchain.verification.report"),
     shell:
-        "dragchain verify --out $(dirname {output.page}) {params.runs} > {log} 2>&1"
+        "dragchain step verify --out $(dirname {output.page}) {params.runs} > {log} 2>&1"
 
 
 # Fails if a quantity failed, and leaves the report to look at.
@@ -94,4 +99,4 @@ rule pass_verdict:
     params:
         source=source_hash("dragchain.verification.report"),
     shell:
-        "dragchain verdict $(dirname {input}) > {output} 2> {log}"
+        "dragchain step verdict $(dirname {input}) > {output} 2> {log}"

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from dragchain.errors import ExportError
-from dragchain.parquet import write_json
+from dragchain.files import write_json
 
 LIST = "export.json"
 """What an export is of, and all the files that it wrote."""
@@ -51,11 +51,11 @@ def fresh_folder(target: Path, *, replace: bool) -> Iterator[Path]:
 def write_list(folder: Path, content: Mapping[str, object]) -> None:
     """Write what an export is of, with all files of its folder."""
     files = sorted(str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file())
-    write_json(folder / LIST, {"schema": 1, **content, "files": files})
+    write_json(folder / LIST, {"schema": 2, **content, "files": files})
 
 
 def _old_files(target: Path, replace: bool) -> set[str]:
-    """Return what an earlier export wrote into `target`."""
+    """What an earlier export wrote into `target`."""
     if target.exists() and not target.is_dir():
         raise ExportError(f"{target} is a file, not a folder\n  remedy: {_ELSEWHERE}")
     if not target.is_dir() or not any(target.iterdir()):

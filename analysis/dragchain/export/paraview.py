@@ -1,6 +1,6 @@
 """A run as a time series of ParaView: VTP files, joined by a VTM file a frame and a PVD file.
 
-The files are not compressed and name what a ball has as LIGGGHTS does in its own VTK
+The files are not compressed and name what a particle has as LIGGGHTS does in its own VTK
 files (``id``, ``radius``, ``v``, ``omega``), so that OVITO opens the same series.
 """
 
@@ -12,17 +12,18 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from dragchain.chains import ball_stress, major_stress
-from dragchain.export.moments import Moment, Moments
-from dragchain.frames import BALL
-from dragchain.network import contact_counts
-from dragchain.scene import placed, segments, tool_mesh
+from dragchain.export.frames import Moment, Moments
+from dragchain.figures.network_picture import segments
+from dragchain.network.chains import major_stress, particle_stress
+from dragchain.network.frame import PARTICLE
+from dragchain.network.statistics import contact_counts
+from dragchain.run.workpiece import placed, workpiece_mesh
 
 MAIN = "run.pvd"
 """The file to open: all there is."""
 
 _FRAMES = "frames"
-_CHAIN_ARRAYS = {"peters_chain": "peters", "rod_paths": "paths", "dominant": "dominant"}
+_CHAIN_ARRAYS = {"peters_chain": "peters", "widest_paths": "paths", "dominant": "dominant"}
 
 
 class ParaviewWriter:
@@ -41,7 +42,9 @@ class ParaviewWriter:
         self._with_chains = moments.has_chains
         self._width = len(str(moments.steps[-1]))
         case = moments.run.case
-        self._tool = None if case.tool is None else tool_mesh(moments.run.folder, case)
+        self._workpiece = (
+            None if case.workpiece is None else workpiece_mesh(moments.run.folder, case)
+        )
         self._series: dict[str, list[tuple[float, str]]] = {}
         (folder / _FRAMES).mkdir()
 
@@ -49,11 +52,11 @@ class ParaviewWriter:
         """Write the files of one frame."""
         import pyvista as pv
 
-        parts = {"balls": balls_mesh(moment, with_chains=self._with_chains)}
+        parts = {"particles": particles_mesh(moment, with_chains=self._with_chains)}
         if moment.network is not None:
             parts["contacts"] = contacts_mesh(moment, with_chains=self._with_chains)
-        if self._tool is not None and moment.tool is not None:
-            parts["tool"] = placed(self._tool, *moment.tool)
+        if self._workpiece is not None and moment.workpiece is not None:
+            parts["workpiece"] = placed(self._workpiece, *moment.workpiece)
         name = f"{moment.step:0{self._width}d}"
         frames = self._folder / _FRAMES
         pv.MultiBlock(parts).save(frames / f"{name}.vtm", compression=None)
@@ -74,7 +77,7 @@ class ParaviewWriter:
 
 
 def pvd(files: list[tuple[float, str]]) -> str:
-    """Return a PVD file, which lists times in s and the file of each."""
+    """A PVD file, which lists times in s and the file of each."""
     rows = [
         f'    <DataSet timestep="{time_s!r}" part="0" file={quoteattr(file)}/>\n'
         for time_s, file in files
@@ -86,37 +89,37 @@ def pvd(files: list[tuple[float, str]]) -> str:
     )
 
 
-def balls_mesh(moment: Moment, *, with_chains: bool) -> Any:
-    """Return the balls as points with what is known of each.
+def particles_mesh(moment: Moment, *, with_chains: bool) -> Any:
+    """The particles as points with what is known of each.
 
     ``id``, ``radius`` (m), ``v`` (m/s) and ``omega`` (rad/s); with contacts
     ``coordination_number`` and ``major_stress_pa`` (major compressive principal stress);
-    with chains ``peters_chain``, ``rod_paths`` and ``dominant``, see `_chains`.
+    with chains ``peters_chain``, ``widest_paths`` and ``dominant``, see `_chains`.
     """
     import pyvista as pv
 
-    balls = moment.balls
-    mesh = pv.PolyData(balls[["x_m", "y_m", "z_m"]].to_numpy(np.float64))
+    particles = moment.particles
+    mesh = pv.PolyData(particles[["x_m", "y_m", "z_m"]].to_numpy(np.float64))
     data = mesh.point_data
-    data["id"] = balls["ball_id"].to_numpy(np.int64)
-    data["radius"] = balls["radius_m"].to_numpy(np.float64)
-    data["v"] = balls[["vx_m_s", "vy_m_s", "vz_m_s"]].to_numpy(np.float64)
-    data["omega"] = balls[["wx_rad_s", "wy_rad_s", "wz_rad_s"]].to_numpy(np.float64)
+    data["id"] = particles["particle_id"].to_numpy(np.int64)
+    data["radius"] = particles["radius_m"].to_numpy(np.float64)
+    data["v"] = particles[["vx_m_s", "vy_m_s", "vz_m_s"]].to_numpy(np.float64)
+    data["omega"] = particles[["wx_rad_s", "wy_rad_s", "wz_rad_s"]].to_numpy(np.float64)
     if moment.network is not None:
         data["coordination_number"] = contact_counts(moment.network).astype(np.int32)
-        data["major_stress_pa"] = major_stress(ball_stress(moment.network))[0]
+        data["major_stress_pa"] = major_stress(particle_stress(moment.network))[0]
     if with_chains:
-        _chains(data, moment, "ball", len(balls))
+        _chains(data, moment, "particle", len(particles))
     return mesh
 
 
 def contacts_mesh(moment: Moment, *, with_chains: bool) -> Any:
-    """Return the contacts as lines from centre to centre, or from centre to contact point.
+    """The contacts as lines from centre to centre, or from centre to contact point.
 
-    Each has ``kind`` (0 between balls, 1 with the tool, 2 the floor, 3 the side), ``id1``
+    Each has ``kind`` (0 between particles, 1 with the workpiece, 2 the floor, 3 the side), ``id1``
     and ``id2`` (as ``a_id`` and ``b_id``), ``force_n`` (on the first), and the columns
     ``normal_force_n``, ``tangential_force_n`` and ``overlap_m``; with chains those of
-    `balls_mesh`. No two lines share a point, so that data of the lines can be moved to
+    `particles_mesh`. No two lines share a point, so that data of the lines can be moved to
     their points without a mean.
     """
     import pyvista as pv
@@ -129,7 +132,7 @@ def contacts_mesh(moment: Moment, *, with_chains: bool) -> Any:
     ends = np.arange(len(points)).reshape(-1, 2)
     mesh = pv.PolyData(points, lines=np.insert(ends, 0, 2, axis=1).ravel())
     data = mesh.cell_data
-    data["kind"] = np.asarray(BALL - frame.other, dtype=np.int32)
+    data["kind"] = np.asarray(PARTICLE - frame.other, dtype=np.int32)
     data["id1"] = contacts["a_id"].to_numpy(np.int64)
     data["id2"] = contacts["b_id"].to_numpy(np.int64)
     data["force_n"] = frame.force
@@ -141,7 +144,10 @@ def contacts_mesh(moment: Moment, *, with_chains: bool) -> Any:
 
 
 def _chains(data: Any, moment: Moment, what: str, size: int) -> None:
-    """Add number of the chain, number of rod paths, and dominance: 0 none, -1 not searched."""
+    """Add number of the chain, number of workpiece paths, and dominance.
+
+    0 none, -1 not searched.
+    """
     found = moment.membership
     for name, field in _CHAIN_ARRAYS.items():
         values = np.full(size, -1) if found is None else getattr(found, f"{what}_{field}")

@@ -1,4 +1,4 @@
-"""The balls of a run as one text file in the extended XYZ format.
+"""The particles of a run as one text file in the extended XYZ format.
 
 Of the text formats that OVITO reads, this one says in each frame's header what every
 column is and of which type, holds the time in s beside the step, and is read by other
@@ -13,20 +13,20 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 
-from dragchain.export.moments import Moment, Moments
-from dragchain.network import contact_counts
+from dragchain.export.frames import Moment, Moments
+from dragchain.network.statistics import contact_counts
 
 MAIN = "run.xyz"
 """The file to open."""
 
 COLUMNS = {
-    "id": ("ball_id",),
+    "id": ("particle_id",),
     "pos": ("x_m", "y_m", "z_m"),
     "velo": ("vx_m_s", "vy_m_s", "vz_m_s"),
     "omega": ("wx_rad_s", "wy_rad_s", "wz_rad_s"),
     "radius": ("radius_m",),
 }
-"""Columns of ``balls.parquet`` under the names by which OVITO knows them."""
+"""Columns of ``particles.parquet`` under the names by which OVITO knows them."""
 
 SPECIES = "X"
 """What each line begins with, as in any XYZ file: no chemical element."""
@@ -50,9 +50,9 @@ class XyzWriter:
 
     def add(self, moment: Moment) -> None:
         """Append one frame; numbers are written so that they read back to the last bit."""
-        columns: dict[str, pa.Array] = {"species": pa.repeat(SPECIES, len(moment.balls))}
+        columns: dict[str, pa.Array] = {"species": pa.repeat(SPECIES, len(moment.particles))}
         for name in (name for names in COLUMNS.values() for name in names):
-            columns[name] = pa.array(moment.balls[name].to_numpy())
+            columns[name] = pa.array(moment.particles[name].to_numpy())
         if moment.network is not None:
             columns["coordination"] = pa.array(contact_counts(moment.network))
         self._file.write(header(moment).encode())
@@ -65,7 +65,7 @@ class XyzWriter:
 
 
 def header(moment: Moment) -> str:
-    """Return the two lines before the balls of a frame."""
+    """The two lines before the particles of a frame."""
     kinds = [f"{name}:{'I' if name == 'id' else 'R'}:{len(of)}" for name, of in COLUMNS.items()]
     if moment.network is not None:
         kinds.append("Coordination:I:1")
@@ -75,6 +75,8 @@ def header(moment: Moment) -> str:
         f"Timestep={moment.step}",
         'pbc="F F F"',
     ]
-    if moment.tool is not None:
-        words.append(f'tool_m="{" ".join(map(repr, np.asarray(moment.tool[0]).tolist()))}"')
-    return f"{len(moment.balls)}\n{' '.join(words)}\n"
+    if moment.workpiece is not None:
+        words.append(
+            f'workpiece_m="{" ".join(map(repr, np.asarray(moment.workpiece[0]).tolist()))}"'
+        )
+    return f"{len(moment.particles)}\n{' '.join(words)}\n"

@@ -37,7 +37,7 @@ class Claim:
         """It holds if the whole interval lies above the null, does not if it lies below."""
         if self.estimate is None or None in self.estimate.values():
             return OPEN
-        low, high = self.estimate["low"], self.estimate["high"]
+        low, high = self.estimate["ci95_low"], self.estimate["ci95_high"]
         assert low is not None and high is not None
         if low > self.null:
             return HOLDS
@@ -50,24 +50,24 @@ def claims(found: Mapping[str, Any]) -> list[Claim]:
     depth = "contact forces grow with depth"
     rows = [
         Claim(
-            "forces ahead of the rod are far above those behind it",
-            "normal force on the rod, ahead over behind",
+            "forces ahead of the workpiece are far above those behind it",
+            "normal force on the workpiece, ahead over behind",
             found["ahead_behind"],
             1.0,
         ),
         Claim(
-            "the same in the network of the balls",
+            "the same in the network of the particles",
             "mean contact force in the corridor ahead over that behind",
             network["ratio"],
             1.0,
         ),
         Claim(
             "the active zone reaches far ahead",
-            "mean contact force at the bowl's wall ahead over that far from the rod",
+            "mean contact force at the bowl's wall ahead over that far from the workpiece",
             network["at_wall"],
             1.0,
         ),
-        Claim(depth, "slope of a contact's normal force", found["depth_slope_n_m"], 0.0, "N/m"),
+        Claim(depth, "slope of a contact's normal force", found["depth_slope_n_per_m"], 0.0, "N/m"),
         Claim(
             depth,
             "mean contact force in the deepest third over the shallowest",
@@ -82,7 +82,7 @@ def claims(found: Mapping[str, Any]) -> list[Claim]:
         ),
         Claim(
             "surfaces that point to the bowl's boundary are hit hardest",
-            "normal force on the outer half of the rod over the inner half",
+            "normal force on the outer half of the workpiece over the inner half",
             found["outer_over_inner"],
             1.0,
         ),

@@ -10,21 +10,22 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dragchain.collect import drag_start_s
-from dragchain.figures import BLUE, GREEN, GREY, ORANGE, RED, WIDTH_IN
-from dragchain.forces import find_drag_peaks, peak_separation_s, read_counted
-from dragchain.validation.fills import Point
+from dragchain.drag.force import read_counted
+from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
+from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED, WIDTH_IN
+from dragchain.run.kinematics import drag_start_s
+from dragchain.validation.runs_by_bed import Point
 
 Found = Mapping[str, Any]
 
 COLOURS = {"measured": GREEN, "published": ORANGE}
 
 
-def traces(fills: Sequence[Point], comparison: Sequence[Found]) -> Figure:
+def traces(packings: Sequence[Point], comparison: Sequence[Found]) -> Figure:
     """The drag of every fill over process time, its peaks marked, over the source's band."""
-    figure = Figure(figsize=(WIDTH_IN, 0.7 + 1.35 * len(fills)), layout="constrained")
-    panels = np.atleast_1d(figure.subplots(len(fills), 1, sharex=True, sharey=True))
-    for axes, point in zip(panels, fills, strict=True):
+    figure = Figure(figsize=(WIDTH_IN, 0.7 + 1.35 * len(packings)), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(len(packings), 1, sharex=True, sharey=True))
+    for axes, point in zip(panels, packings, strict=True):
         samples = read_counted(point.folder, ("time_s", "drag_n"))
         time_s = samples["time_s"].to_numpy(np.float64)
         drag = samples["drag_n"].to_numpy(np.float64)
@@ -49,8 +50,8 @@ def _bands(axes: Axes, comparison: Sequence[Found]) -> None:
     for row in comparison:
         colour = COLOURS.get(row["label"], GREY)
         axes.axhline(row["mean_n"], color=colour, linestyle="--", label=f"{row['label']} mean")
-        if row["sd_n"] and row["label"] == "measured":
-            low, high = row["mean_n"] - row["sd_n"], row["mean_n"] + row["sd_n"]
+        if row["std_n"] and row["label"] == "measured":
+            low, high = row["mean_n"] - row["std_n"], row["mean_n"] + row["std_n"]
             label = "measured, one standard deviation"
             axes.axhspan(low, high, color=colour, alpha=0.12, linewidth=0, label=label)
 
@@ -61,13 +62,17 @@ def comparison(force: Found, compared: Sequence[Found], effects: pd.DataFrame) -
     rows: list[tuple[str, float, float, float, str]] = []
     for row in compared:
         rows.append((row["label"], *(row["mean_n"],) * 3, COLOURS.get(row["label"], GREY)))
-    for row in force["fills"]:
+    for row in force["packings"]:
         own = row["drag_n"]
-        rows.append((f"fill {row['seed']}", own["mean"], own["ci_low"], own["ci_high"], BLUE))
-    rows.append(("fills together", *(together[k] for k in ("value", "low", "high")), "black"))
+        rows.append((f"fill {row['seed']}", own["mean"], own["ci95_low"], own["ci95_high"], BLUE))
+    rows.append(
+        ("fills together", *(together[k] for k in ("value", "ci95_low", "ci95_high")), "black")
+    )
     means = effects[(effects["quantity"] == "drag_mean") & (effects["field"] == "")]
     for one in means.to_dict("records"):
-        value, low, high = (together["value"] * (1.0 + one[k]) for k in ("change", "low", "high"))
+        value, low, high = (
+            together["value"] * (1.0 + one[k]) for k in ("change", "ci95_low", "ci95_high")
+        )
         rows.append((setting_name({str(k): v for k, v in one.items()}), value, low, high, GREY))
     figure = Figure(figsize=(WIDTH_IN, 0.9 + 0.27 * len(rows)), layout="constrained")
     axes = figure.subplots()
@@ -95,7 +100,9 @@ def assumed(effects: pd.DataFrame) -> Figure:
     names = []
     for place, row in enumerate(rows.to_dict("records")):
         names.append(f"{row['field']} = {row['value']:g} (is {row['reference_value']:g})")
-        axes.plot([100 * row["low"], 100 * row["high"]], [place, place], color=BLUE, linewidth=2)
+        axes.plot(
+            [100 * row["ci95_low"], 100 * row["ci95_high"]], [place, place], color=BLUE, linewidth=2
+        )
         axes.plot(100 * row["change"], place, "o", color=BLUE)
     axes.set_yticks(range(len(names)), names)
     axes.invert_yaxis()
@@ -109,24 +116,26 @@ def spectrum(found: Found) -> Figure:
     axes = figure.subplots()
     waves = np.array(found["waves_per_diameter"])
     density = {name: np.array(values) for name, values in found["density"].items()}
-    axes.fill_between(waves, density["low"], density["high"], color=BLUE, alpha=0.2, linewidth=0)
+    axes.fill_between(
+        waves, density["ci95_low"], density["ci95_high"], color=BLUE, alpha=0.2, linewidth=0
+    )
     axes.loglog(waves, density["mean"], color=BLUE, label="mean of the fills; band: all of them")
     half = found["half_wave"]["value"]
-    label = f"half of the variance lies to the left: waves over {half:.1f} ball diameters"
+    label = f"half of the variance lies to the left: waves over {half:.1f} particle diameters"
     axes.axvline(1.0 / half, color=RED, linestyle="--", label=label)
-    axes.set(xlabel="waves in a ball diameter of path", ylabel="power in N² ball diameters")
+    axes.set(xlabel="waves in a particle diameter of path", ylabel="power in N² particle diameters")
     axes.legend(loc="upper right")
     return figure
 
 
 def around(found: Found) -> Figure:
-    """Normal force on the tool by bearing, and that of a contact by depth."""
+    """Normal force on the workpiece by azimuth, and that of a contact by depth."""
     figure = Figure(figsize=(WIDTH_IN, 3.9), layout="constrained")
     left: Any = figure.add_subplot(1, 2, 1, projection="polar")
     right = figure.add_subplot(1, 2, 2)
-    bearing = found["bearing"]
-    edges = np.array(bearing["edges"])
-    middle, value, low, high = _bars(bearing)
+    azimuth = found["azimuth"]
+    edges = np.array(azimuth["edges"])
+    middle, value, low, high = _bars(azimuth)
     colours = np.where(np.abs(middle) < np.pi / 2, BLUE, ORANGE)
     left.set_theta_zero_location("N")
     left.bar(middle, 100 * value, width=np.diff(edges), color=colours, edgecolor="white")
@@ -149,25 +158,29 @@ def around(found: Found) -> Figure:
 
 def _bars(columns: Found) -> tuple[np.ndarray[Any, Any], ...]:
     edges = np.array(columns["edges"])
-    value, low, high = (np.array(columns[name]) for name in ("value", "low", "high"))
+    value, low, high = (np.array(columns[name]) for name in ("value", "ci95_low", "ci95_high"))
     return (edges[1:] + edges[:-1]) / 2, value, np.minimum(low, value), np.maximum(high, value)
 
 
 def corridor(network: Found) -> Figure:
-    """Mean contact force of the network ahead of the tool and behind it."""
+    """Mean contact force of the network ahead of the workpiece and behind it."""
     figure = Figure(figsize=(WIDTH_IN, 3.2), layout="constrained")
     axes = figure.subplots()
     edges = np.array(network["edges_diameters"])
     middle = (edges[1:] + edges[:-1]) / 2
     for name, colour in (("ahead", BLUE), ("behind", ORANGE)):
-        value, low, high = (np.array(network[f"{name}_n"][k]) for k in ("value", "low", "high"))
+        value, low, high = (
+            np.array(network[f"{name}_n"][k]) for k in ("value", "ci95_low", "ci95_high")
+        )
         axes.fill_between(middle, low, high, color=colour, alpha=0.2, linewidth=0)
         axes.plot(middle, value, "o-", color=colour, markersize=4, label=name)
-    axes.axhline(network["far_n"]["value"], color="black", linestyle="--", label="far from the rod")
+    axes.axhline(
+        network["far_n"]["value"], color="black", linestyle="--", label="far from the workpiece"
+    )
     wall = network["wall_diameters"]
     axes.axvline(wall, color=GREY, linewidth=2.0)
     axes.text(wall, 0.0, " bowl", color=GREY, va="bottom")
-    axes.set(xlabel="distance from the rod's surface in ball diameters", ylim=(0, None),
+    axes.set(xlabel="distance from the workpiece's surface in particle diameters", ylim=(0, None),
              ylabel="mean normal force\nof a contact in N", xlim=(0, wall + 0.5))  # fmt: skip
     axes.legend()
     return figure

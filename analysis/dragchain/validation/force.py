@@ -1,4 +1,4 @@
-"""The force on the tool over several fills, against measured and published figures."""
+"""The force on the workpiece over several fills, against measured and published figures."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ import numpy as np
 import pandas as pd
 from scipy import signal, stats
 
-from dragchain.case import Case
-from dragchain.collect import drag_start_s, mean_numbers
-from dragchain.effects import Fit, fit_effects
-from dragchain.findings import CONFIDENCE, Estimate, finite
-from dragchain.forces import find_drag_peaks, peak_separation_s, read_counted
-from dragchain.frames import Floats
-from dragchain.reference import Reference, read_references
-from dragchain.stats import estimate_mean
-from dragchain.validation.fills import Point, Points, over_fills
+from dragchain.arrays import Floats
+from dragchain.drag.force import read_counted
+from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
+from dragchain.report.findings import mean_numbers
+from dragchain.run.case import Case
+from dragchain.run.kinematics import drag_start_s
+from dragchain.run.reference import ReferenceDrag, reference_drags
+from dragchain.statistics.bed_effects import Fit, fit_effects
+from dragchain.statistics.correlated import estimate_mean
+from dragchain.statistics.estimate import CONFIDENCE, Estimate, finite
+from dragchain.validation.runs_by_bed import Point, Points, over_packings
 
 Found = dict[str, Any]
 
@@ -28,10 +30,10 @@ PROMINENCES = (0.5, 1.0, 2.0)
 """Least prominence of a peak in standard deviations of the drag; the middle one is the rule."""
 
 SEGMENT = 6.0
-"""Length of the spectrum's segments in ball diameters of path (Welch 1967)."""
+"""Length of the spectrum's segments in particle diameters of path (Welch 1967)."""
 
 
-def of_fills(points: Points) -> Found:
+def of_packings(points: Points) -> Found:
     """The force of every fill, and of all of them together.
 
     Returns
@@ -41,30 +43,30 @@ def of_fills(points: Points) -> Found:
         the interval over fills), ``alike`` (whether the fills differ by more than
         each knows its own mean), ``peaks`` and ``spectrum``.
     """
-    rows = [_fill_row(point) for point in points.fills]
+    rows = [_packing_row(point) for point in points.packings]
     together = {
         name: {
-            "mean": over_fills([row[name]["mean"] for row in rows]).as_json(),
-            "sd": over_fills([row[name]["sd"] for row in rows], ratio=True).as_json(),
+            "mean": over_packings([row[name]["mean"] for row in rows]).as_json(),
+            "std": over_packings([row[name]["std"] for row in rows], ratio=True).as_json(),
         }
         for name in COMPONENTS
     }
     return {
-        "fills": rows,
+        "packings": rows,
         "together": together,
         "alike": _alike(rows),
-        "peaks": _peaks(points.fills),
-        "spectrum": spectrum(points.fills),
+        "peaks": _peaks(points.packings),
+        "spectrum": spectrum(points.packings),
     }
 
 
-def _fill_row(point: Point) -> Found:
+def _packing_row(point: Point) -> Found:
     samples = read_counted(point.folder, tuple(COMPONENTS))
     cost = point.measures["cost"]
     return {
         "run": point.case.run,
         "seed": point.seed,
-        "fill_height_m": point.measures["single"]["fill_height"],
+        "bed_height_m": point.measures["single"]["bed_height"],
         "arc_m": point.measures["arc_m"],
         "steps": cost["steps"],
         "cpu_time_s": cost["cpu_time_s"],
@@ -79,22 +81,22 @@ def _alike(rows: Sequence[Found]) -> Found:
     weighted mean follows chi squared with N - 1 degrees of freedom if they do not.
     """
     means = np.array([row["drag_n"]["mean"] for row in rows])
-    weights = np.array([row["drag_n"]["standard_error"] for row in rows]) ** -2.0
+    weights = np.array([row["drag_n"]["se"] for row in rows]) ** -2.0
     centre = float(weights @ means / weights.sum())
     statistic = float(weights @ (means - centre) ** 2)
     return {
         "statistic": statistic,
         "p_value": float(stats.chi2.sf(statistic, len(rows) - 1)),
-        "sd_between_n": float(means.std(ddof=1)),
+        "std_between_n": float(means.std(ddof=1)),
         "standard_error_within_n": float(np.sqrt(np.mean(1.0 / weights))),
     }
 
 
-def _peaks(fills: Sequence[Point]) -> Found:
+def _peaks(packings: Sequence[Point]) -> Found:
     """Peaks by the rule of docs/outputs.md, at three least prominences."""
     counts: dict[float, list[float]] = {factor: [] for factor in PROMINENCES}
     times, largest = [], []
-    for point in fills:
+    for point in packings:
         samples = read_counted(point.folder, ("time_s", "drag_n"))
         time_s, drag = (samples[name].to_numpy(np.float64) for name in ("time_s", "drag_n"))
         for factor in PROMINENCES:
@@ -110,18 +112,18 @@ def _peaks(fills: Sequence[Point]) -> Found:
                 largest.append(float(peaks.drag_n.min(initial=math.inf)))
     return {
         "per_metre": {
-            f"{factor:g}": over_fills(found).as_json() for factor, found in counts.items()
+            f"{factor:g}": over_packings(found).as_json() for factor, found in counts.items()
         },
         "process_time_s": times,
         "largest_n": [finite(force) for force in largest],
     }
 
 
-def spectrum(fills: Sequence[Point]) -> Found:
+def spectrum(packings: Sequence[Point]) -> Found:
     """Power spectrum of the drag along the path, by Welch's method, mean over fills.
 
     Welch (1967), IEEE Trans. Audio Electroacoust. 15, 70-73: Hann windows of
-    `SEGMENT` ball diameters, half overlapping.
+    `SEGMENT` particle diameters, half overlapping.
 
     Returns
     -------
@@ -132,7 +134,7 @@ def spectrum(fills: Sequence[Point]) -> Found:
     """
     curves, halves = [], []
     grid = np.empty(0)
-    for point in fills:
+    for point in packings:
         drag = read_counted(point.folder, ("drag_n",))["drag_n"].to_numpy(np.float64)
         spacing = point.measures["arc_m"] / len(drag) / (2.0 * point.case.media.radius_mean_m)
         length = min(len(drag), round(SEGMENT / spacing))
@@ -145,10 +147,10 @@ def spectrum(fills: Sequence[Point]) -> Found:
         "waves_per_diameter": grid.tolist(),
         "density": {
             "mean": together.mean(axis=0).tolist(),
-            "low": together.min(axis=0).tolist(),
-            "high": together.max(axis=0).tolist(),
+            "ci95_low": together.min(axis=0).tolist(),
+            "ci95_high": together.max(axis=0).tolist(),
         },
-        "half_wave": over_fills(halves, ratio=True).as_json(),
+        "half_wave": over_packings(halves, ratio=True).as_json(),
         "segment": SEGMENT,
     }
 
@@ -158,29 +160,31 @@ def _half_wave(waves: Floats, density: Floats) -> float:
     return float(1.0 / np.interp(0.5 * total[-1], total - 0.5 * density, waves))
 
 
-def compare(mean: Mapping[str, float], sd: Mapping[str, float], case: Case) -> list[Found]:
+def compare(mean: Mapping[str, float], std: Mapping[str, float], case: Case) -> list[Found]:
     """Mean and standard deviation of the drag beside every reference figure of the study.
 
     Returns
     -------
     list of dict
-        ``label``, ``mean_n``, ``sd_n``; ``difference`` of our mean over it less one with
-        ``low`` and ``high``, and ``sd_ratio`` the same way, both from the interval over
+        ``label``, ``mean_n``, ``std_n``; ``difference`` of our mean over it less one with
+        ``low`` and ``high``, and ``std_ratio`` the same way, both from the interval over
         fills alone: no source says how well it knows its own mean.
     """
-    ours = Estimate(mean["value"], mean["low"], mean["high"])
-    return [_against(ours, sd, reference) for reference in read_references(case.reference)]
+    ours = Estimate(mean["value"], mean["ci95_low"], mean["ci95_high"])
+    return [_against(ours, std, reference) for reference in reference_drags(case.reference)]
 
 
-def _against(mean: Estimate, sd: Mapping[str, float], reference: Reference) -> Found:
+def _against(mean: Estimate, std: Mapping[str, float], reference: ReferenceDrag) -> Found:
     row: Found = {
         "label": reference.label,
         "mean_n": reference.mean_n,
-        "sd_n": reference.sd_n,
+        "std_n": reference.std_n,
         "difference": vars(reference.difference(mean)),
     }
-    if reference.sd_n is not None and reference.sd_n > 0.0:
-        row["sd_ratio"] = {name: sd[name] / reference.sd_n for name in ("value", "low", "high")}
+    if reference.std_n is not None and reference.std_n > 0.0:
+        row["std_ratio"] = {
+            name: std[name] / reference.std_n for name in ("value", "ci95_low", "ci95_high")
+        }
     return row
 
 
@@ -200,7 +204,7 @@ def effects(points: Points) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        A row a setting: ``knobs``, ``field``, ``value``, ``reference_value`` (of the input
+        A row a setting: ``parameters``, ``field``, ``value``, ``reference_value`` (of the input
         that it changes), ``runs``, ``quantity``, ``change low high`` (relative),
         ``exponent exponent_low exponent_high`` (of the change over that of the input).
 
@@ -216,7 +220,7 @@ def effects(points: Points) -> pd.DataFrame:
     ]
     sizes = {
         "mean": [abs(float(drag.mean())) for drag in drags],
-        "sd": [float(drag.std(ddof=1)) for drag in drags],
+        "std": [float(drag.std(ddof=1)) for drag in drags],
     }
     for quantity, values in sizes.items():
         fitted = _Fitted(points, values)
@@ -250,21 +254,23 @@ class _Fitted:
         reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, self.fit.degrees)) * error
         change = Estimate(*(math.expm1(edge) for edge in (value, value - reach, value + reach)))
         return {
-            "youngs_modulus_scale": own[0].knobs[0],
-            "timestep_fraction": own[0].knobs[1],
-            "speed_factor": own[0].knobs[2],
+            "youngs_modulus_scale": own[0].parameters[0],
+            "timestep_fraction": own[0].parameters[1],
+            "speed_factor": own[0].parameters[2],
             "runs": len(own),
             "field": next(iter(own[0].changed), ""),
             "value": next(iter(own[0].changed.values()), None),
             "reference_value": _input(base, own[0]),
             "change": change.value,
-            "low": change.low,
-            "high": change.high,
+            "ci95_low": change.ci95_low,
+            "ci95_high": change.ci95_high,
             **_exponent(value, reach, base, own[0]),
         }
 
     def _base(self, point: Point) -> Point:
-        alike = (one for one in self.points if one.knobs == point.knobs and not one.changed)
+        alike = (
+            one for one in self.points if one.parameters == point.parameters and not one.changed
+        )
         return (next(alike, self.points[0])) if point.changed else self.points[0]
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from dragchain.verification.law import (
+from dragchain.contact_law.impact import (
     SLIDING,
     Contact,
     Motion,
@@ -48,7 +48,7 @@ BOUNCES = 0.01
 """Energy after 1,000 impacts: one such bounce of ceramic on steel loses half of it."""
 
 AT_REST = 1e-3
-"""What is left of the motion of a column of balls after many of its periods."""
+"""What is left of the motion of a column of particles after many of its periods."""
 
 FITTED = 0.01
 """Slope of a velocity that still carries the ringing of the contact."""
@@ -189,7 +189,7 @@ def _scaled_patch(contact: Contact, before: Motion, after: Motion) -> float:
 
 
 def _scaled_spin(contact: Contact, before: Motion, after: Motion) -> float:
-    surface = contact.ball.radius_m * after.spin_rad_s
+    surface = contact.particle.radius_m * after.spin_rad_s
     return surface / (contact.friction * before.normal_m_s)
 
 
@@ -242,7 +242,7 @@ def _elastic(run: Recording) -> Iterator[Check]:
     (entry,) = run.case["contacts"]
     contact, (before, after) = run.contact(entry), run.impact(entry)
     overlap = np.maximum(run.overlap_m(entry), 0.0)
-    force = np.abs(run.force_n[:, entry["ball"] - 1, 2])
+    force = np.abs(run.force_n[:, entry["particle"] - 1, 2])
     speed = before.normal_m_s
     peak = largest_overlap(contact, speed)
     strongest = float(hertz_force(contact, peak))
@@ -312,7 +312,7 @@ def _oblique(run: Recording) -> Iterator[Check]:
 
 def _arm(contact: Contact, before: Motion) -> float:
     """Largest overlap over the radius: by half of it friction acts nearer to the centre."""
-    return largest_overlap(contact, before.normal_m_s) / contact.ball.radius_m
+    return largest_overlap(contact, before.normal_m_s) / contact.particle.radius_m
 
 
 def _time_step(run: Recording) -> Iterator[Check]:
@@ -354,7 +354,7 @@ def order_of_convergence(runs: Sequence[Recording]) -> list[Check]:
 
 
 def flight_energy(run: Recording) -> tuple[Any, Any]:
-    """Impacts before each flight of a bouncing ball, and the energy of flight over the first."""
+    """Impacts before each flight of a bouncing particle, and the relative energy of flight."""
     touching = (run.force_n[:, 0] != 0.0).any(axis=1)
     starts = np.flatnonzero(np.diff(touching.astype(np.int8)) == 1) + 1
     free = np.flatnonzero(~touching)
@@ -377,11 +377,11 @@ def momenta(run: Recording, entry: Mapping[str, Any]) -> tuple[Any, Any]:
     Change since the first frame, over the sum of the sizes of its parts;
     angular momentum about the first common centre of mass.
     """
-    pair = [entry["ball"], entry["partner"]]
-    balls = [run.ball(number) for number in pair]
+    pair = [entry["particle"], entry["partner"]]
+    particles = [run.particle(number) for number in pair]
     at = [number - 1 for number in pair]
-    mass = np.array([ball.mass_kg for ball in balls])[:, None]
-    inertia = np.array([ball.inertia_kg_m2 for ball in balls])[:, None]
+    mass = np.array([particle.mass_kg for particle in particles])[:, None]
+    inertia = np.array([particle.inertia_kg_m2 for particle in particles])[:, None]
     linear = mass * run.velocity_m_s[:, at]
     centre = (mass * run.position_m[0, at]).sum(axis=0) / mass.sum()
     orbital = np.cross(run.position_m[:, at] - centre, linear)
@@ -408,7 +408,9 @@ def column_loads(run: Recording) -> list[tuple[Contact, float, float]]:
     size = math.hypot(*run.case["gravity_m_s2"])
     found = []
     for at, entry in enumerate(run.case["contacts"]):
-        above = sum(run.ball(number + 1).mass_kg for number in range(at, len(run.case["bodies"])))
+        above = sum(
+            run.particle(number + 1).mass_kg for number in range(at, len(run.case["bodies"]))
+        )
         overlap = float(run.overlap_m(entry)[late].mean())
         found.append((run.contact(entry), above * size, overlap))
     return found
@@ -427,7 +429,7 @@ def _column(run: Recording) -> Iterator[Check]:
 
 
 def incline_reference(run: Recording, entry: Mapping[str, Any]) -> tuple[float, float]:
-    """Acceleration of a ball down the incline and of its spin, m/s2 and rad/s2.
+    """Acceleration of a particle down the incline and of its spin, m/s2 and rad/s2.
 
     It rolls without slip up to tan(angle) = 7/2 of the friction, and slips beyond.
     """
@@ -436,12 +438,12 @@ def incline_reference(run: Recording, entry: Mapping[str, Any]) -> tuple[float, 
     normal = size * math.cos(angle)
     drive = size * math.sin(angle)
     friction = min(drive / SLIDING, contact.friction * normal)
-    return drive - friction, -friction / (0.4 * contact.ball.radius_m)
+    return drive - friction, -friction / (0.4 * contact.particle.radius_m)
 
 
 def incline_slopes(run: Recording, entry: Mapping[str, Any]) -> tuple[float, float]:
     """The same, fitted to the second half of the run."""
-    at, half = entry["ball"] - 1, slice(len(run.time_s) // 2, None)
+    at, half = entry["particle"] - 1, slice(len(run.time_s) // 2, None)
     time = run.time_s[half]
     velocity = float(np.polyfit(time, run.velocity_m_s[half, at, 0], 1)[0])
     return velocity, -float(np.polyfit(time, run.spin_rad_s[half, at, 1], 1)[0])
@@ -460,8 +462,8 @@ def _incline(run: Recording) -> Iterator[Check]:
     weights = [
         (
             float(entry["value"]),
-            run.ball(entry["ball"]).mass_kg * gravity,
-            float(run.wall_force_n["plane"][half, entry["ball"] - 1, 2].mean()),
+            run.particle(entry["particle"]).mass_kg * gravity,
+            float(run.wall_force_n["plane"][half, entry["particle"] - 1, 2].mean()),
         )
         for entry in run.case["contacts"]
     ]

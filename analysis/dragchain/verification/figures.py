@@ -8,7 +8,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dragchain.figures import BLUE, GREEN, GREY, ORANGE, RED
+from dragchain.contact_law.impact import (
+    elastic_time,
+    hertz_force,
+    hertz_overlap,
+    integrated_impact,
+    largest_overlap,
+    limited_restitution,
+    sliding_impact,
+)
+from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
 from dragchain.verification.checks import (
     QUANTITIES,
     abscissa,
@@ -20,15 +29,6 @@ from dragchain.verification.checks import (
     incline_slopes,
     momenta,
     series_name,
-)
-from dragchain.verification.law import (
-    elastic_time,
-    hertz_force,
-    hertz_overlap,
-    integrated_impact,
-    largest_overlap,
-    limited_restitution,
-    sliding_impact,
 )
 from dragchain.verification.published import published
 from dragchain.verification.recording import Recording
@@ -86,7 +86,7 @@ def _elastic(runs: Sequence[Recording]) -> Figure:
         (entry,) = run.case["contacts"]
         contact, (before, _) = run.contact(entry), run.impact(entry)
         overlap = run.overlap_m(entry)
-        force = np.abs(run.force_n[:, entry["ball"] - 1, 2])
+        force = np.abs(run.force_n[:, entry["particle"] - 1, 2])
         inside = np.flatnonzero(overlap > 0)
         some = inside[:: max(1, len(inside) // 30)]
         line = np.linspace(0, largest_overlap(contact, before.normal_m_s), 100)
@@ -179,12 +179,12 @@ def _time_step(runs: Sequence[Recording]) -> Figure:
         name = f"limitForce {'on' if limit else 'off'}, order {fitted_order(rows):.2f}"
         left.loglog(steps, error, "o-", color=colours[limit], ms=4, label=name)
         left.loglog(steps, 1 / steps, ":", color=GREY, label="tolerance" if limit else None)
-        share = [
+        fraction = [
             100 * run.case["timestep_s"] / run.case["rayleigh_time_s"]
             for run in sorted(runs, key=lambda run: run.steps_per_contact)
             if run.case["limit_force"] == limit
         ]
-        right.loglog(share, error, "o-", color=colours[limit], ms=4)
+        right.loglog(fraction, error, "o-", color=colours[limit], ms=4)
     left.set(xlabel="time steps in a contact", ylabel="error of speed out over speed in")
     right.set(xlabel="time step in % of the Rayleigh time")
     return _legend(figure, left, 3)

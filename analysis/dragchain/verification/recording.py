@@ -10,16 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dragchain.case import load_outputs
-from dragchain.dumps import iter_frames
-from dragchain.errors import CaseError, GateError, TableError
-from dragchain.hertz import effective_modulus
-from dragchain.report import refusal
-from dragchain.verification.law import Ball, Contact, Motion
-
-Floats = NDArray[np.float64]
+from dragchain.arrays import Floats
+from dragchain.contact_law.hertz import effective_modulus
+from dragchain.contact_law.impact import Contact, Motion, Particle
+from dragchain.dumps.run_parts import iter_frames
+from dragchain.errors import DocumentError, RejectedRunError, TableError
+from dragchain.run.case import load_outputs
+from dragchain.run.completeness import refusal
 
 _VECTORS = {
     "position_m": ("x_m", "y_m", "z_m"),
@@ -39,9 +37,9 @@ class Recording:
         Content of ``case.json``.
     time_s : (T,) ndarray
     position_m, velocity_m_s, spin_rad_s, force_n : (T, N, 3) ndarray
-        Of N balls in the order of their ids; the force includes gravity.
+        Of N particles in the order of their ids; the force includes gravity.
     wall_force_n : mapping of str to (T, N, 3) ndarray
-        Of each wall on each ball.
+        Of each wall on each particle.
     """
 
     case: Mapping[str, Any]
@@ -57,22 +55,22 @@ class Recording:
         """Time steps in the shortest contact of the run."""
         return int(self.case["steps_per_contact"])
 
-    def ball(self, number: int) -> Ball:
-        """Mass and radius of a ball by its id."""
+    def particle(self, number: int) -> Particle:
+        """Mass and radius of a particle by its id."""
         body = self.case["bodies"][number - 1]
         density = self.case["types"][body["type"] - 1]["density_kg_m3"]
         radius = float(body["radius_m"])
-        return Ball(4 / 3 * math.pi * radius**3 * density, radius)
+        return Particle(4 / 3 * math.pi * radius**3 * density, radius)
 
     def contact(self, entry: Mapping[str, Any]) -> Contact:
         """The constants of a contact, from those of its two materials."""
-        kinds = [self._type(entry["ball"]), self._type(entry["partner"])]
+        kinds = [self._type(entry["particle"]), self._type(entry["partner"])]
         own, other = (self.case["types"][kind - 1] for kind in kinds)
         wall = isinstance(entry["partner"], str)
         pair = self._pair(sorted(kinds))
         return Contact(
-            ball=self.ball(entry["ball"]),
-            partner=None if wall else self.ball(entry["partner"]),
+            particle=self.particle(entry["particle"]),
+            partner=None if wall else self.particle(entry["partner"]),
             modulus_pa=effective_modulus(own, other),
             shear_pa=effective_shear(own, other),
             restitution=float(pair["restitution"]),
@@ -90,18 +88,18 @@ class Recording:
 
     def overlap_m(self, entry: Mapping[str, Any]) -> Floats:
         """Overlap of a contact, negative where there is a gap, shape (T,), m."""
-        ball, partner = entry["ball"] - 1, entry["partner"]
-        radius = self.case["bodies"][ball]["radius_m"]
+        particle, partner = entry["particle"] - 1, entry["partner"]
+        radius = self.case["bodies"][particle]["radius_m"]
         if isinstance(partner, str):
-            return np.asarray(radius - self.position_m[:, ball, 2])
-        apart = self.position_m[:, ball] - self.position_m[:, partner - 1]
+            return np.asarray(radius - self.position_m[:, particle, 2])
+        apart = self.position_m[:, particle] - self.position_m[:, partner - 1]
         radii = radius + self.case["bodies"][partner - 1]["radius_m"]
         return np.asarray(radii - np.linalg.norm(apart, axis=1))
 
     def motion(self, entry: Mapping[str, Any], at: int) -> Motion:
         """Relative motion of a contact along z at a frame; normal: the speed of approach."""
-        ball, partner = entry["ball"] - 1, entry["partner"]
-        velocity, spin = self.velocity_m_s[at, ball], -self.spin_rad_s[at, ball, 1]
+        particle, partner = entry["particle"] - 1, entry["partner"]
+        velocity, spin = self.velocity_m_s[at, particle], -self.spin_rad_s[at, particle, 1]
         if isinstance(partner, str):
             return Motion(-float(velocity[2]), float(velocity[0]), float(spin))
         relative = velocity - self.velocity_m_s[at, partner - 1]
@@ -119,7 +117,7 @@ class Recording:
         overlap = self.overlap_m(entry)
         if overlap[0] >= 0 or overlap[-1] >= 0 or not (overlap > 0).any():
             raise TableError(
-                f"{self.case['run']}: the impact of ball {entry['ball']} is not whole in it"
+                f"{self.case['run']}: the impact of particle {entry['particle']} is not whole in it"
             )
         before, after = self.motion(entry, 0), self.motion(entry, -1)
         return before, Motion(
@@ -134,8 +132,8 @@ class Recording:
         return self._crossing(overlap, last) - self._crossing(overlap, first - 1)
 
     def _crossing(self, overlap: Floats, at: int) -> float:
-        share = overlap[at] / (overlap[at] - overlap[at + 1])
-        return float(self.time_s[at] + share * (self.time_s[at + 1] - self.time_s[at]))
+        fraction = overlap[at] / (overlap[at] - overlap[at + 1])
+        return float(self.time_s[at] + fraction * (self.time_s[at + 1] - self.time_s[at]))
 
 
 def effective_shear(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
@@ -153,19 +151,19 @@ def read_recording(run_dir: Path) -> Recording:
 
     Raises
     ------
-    GateError
-        The run is not complete, or a gate of it failed.
-    CaseError, DumpError
+    RejectedRunError
+        The run is not complete, or an acceptance check of it failed.
+    DocumentError, DumpError
         A file of it cannot be used.
     """
     record = _json(run_dir / "run.json")
     if (reason := refusal(record)) is not None:
-        raise GateError(f"{run_dir} is refused: {reason}")
+        raise RejectedRunError(f"{run_dir} is refused: {reason}")
     case = _json(run_dir / "case.json")
     if case.get("scene") != "collide":
-        raise CaseError(run_dir / "case.json", "scene", "is not 'collide'")
+        raise DocumentError(run_dir / "case.json", "scene", "is not 'collide'")
     frames = [
-        (frame.step, frame.columns, np.argsort(frame.columns["ball_id"]))
+        (frame.step, frame.columns, np.argsort(frame.columns["particle_id"]))
         for frame in iter_frames(run_dir, load_outputs(run_dir)["bodies"])
     ]
 
@@ -192,5 +190,7 @@ def _json(file: Path) -> dict[str, Any]:
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise CaseError(file, None, "there is no such file", remedy="run the suite first") from None
+        raise DocumentError(
+            file, None, "there is no such file", remedy="run the suite first"
+        ) from None
     return dict(content)

@@ -10,10 +10,11 @@ from pathlib import Path
 import matplotlib
 import pandas as pd
 
-from dragchain.errors import GateError, TableError
-from dragchain.figures import STYLE, png
-from dragchain.frames import read_table, write_parquet
-from dragchain.page import data_uri, render_page
+from dragchain.errors import RejectedRunError, TableError
+from dragchain.figures.style import STYLE, png
+from dragchain.report.page import data_uri, render_page
+from dragchain.tables.by_step import read_table
+from dragchain.tables.parquet import write_parquet
 from dragchain.verification.checks import JUDGED, Check, judge
 from dragchain.verification.figures import draw
 from dragchain.verification.recording import Recording, read_recording
@@ -43,7 +44,7 @@ def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> pd.DataFrame:
 
     Raises
     ------
-    GateError
+    RejectedRunError
         A run is not complete.
     TableError
         No run is given, or an impact is not whole.
@@ -90,7 +91,7 @@ def verdict(report_dir: Path) -> str:
 
     Raises
     ------
-    GateError
+    RejectedRunError
         At least one failed: names each, with its error.
     TableError
         There is no summary.
@@ -105,7 +106,7 @@ def verdict(report_dir: Path) -> str:
         f" (allowed: {row.tolerance:.2g})"
         for row in bad.itertuples()
     ]
-    raise GateError("\n  ".join([f"{report_dir / 'verification.html'}: {found}", *lines]))
+    raise RejectedRunError("\n  ".join([f"{report_dir / 'verification.html'}: {found}", *lines]))
 
 
 def render(runs: Sequence[Recording], summary: pd.DataFrame) -> str:

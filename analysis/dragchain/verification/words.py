@@ -5,7 +5,7 @@ from __future__ import annotations
 LIMIT = (
     "The study's decks set limitForce on: the engine then never lets two bodies pull on each "
     "other. At the end of a damped impact the law would pull for a moment; cutting that off "
-    "removes damping, and the ball leaves faster than the deck's restitution says. By how much "
+    "removes damping, and the particle leaves faster than the deck's restitution says. By how much "
     "is known exactly: speed out over speed in is exp(-x (π - 2 arctan x)) with x = -ln(e)/π, "
     "at any speed, size and stiffness."
 )
@@ -14,7 +14,7 @@ DAMPER = (
     "The engine caps the spring of friction at friction times normal force, but adds its "
     "tangential damper outside that cap for as long as the spring itself has not reached it. "
     "At first touch the damper of a fast-sliding contact is far stronger than Coulomb's limit, so "
-    "the ball gets more tangential impulse than friction times normal impulse. Rigid-body "
+    "the particle gets more tangential impulse than friction times normal impulse. Rigid-body "
     "sliding is exceeded by the more, the lower the restitution; with e = 1 there is no damper "
     "and no excess."
 )
@@ -48,28 +48,31 @@ WORDS: dict[str, tuple[str, ...]] = {
     "elastic_pair": (
         "Overlap, force, duration and rebound against Hertz. The last row evaluates Hertz's "
         "force at every overlap the engine passed through.",
-        "The published force for limestone is met only if each ball moves at 10 m/s, which "
+        "The published force for limestone is met only if each particle moves at 10 m/s, which "
         "confirms constants and speeds.",
     ),
     "elastic_plane": (
-        "As test 1, against a plane. Rigid means a plane a million times stiffer than the ball: "
-        "the engine has no rigid material. The last series is the study's ball on its workpiece.",
+        "As test 1, against a plane. Rigid means a plane a million times stiffer than "
+        "the particle: "
+        "the engine has no rigid material. The last series is the study's particle on "
+        "its workpiece.",
     ),
     "restitution": (
         "Without limitForce the deck's restitution comes out at any value.",
         LIMIT,
-        "With the limit on no ball can rebound slower than about 0.21: that is what the smallest "
+        "With the limit on no particle can rebound slower than about 0.21: that is what "
+        "the smallest "
         "restitution the engine takes, 0.05, turns into.",
     ),
     "oblique_angle": (
         "Tangential restitution, spin and rebound angle of the contact patch over the angle of "
         "incidence, against the law integrated by scipy (all angles) and against rigid-body "
-        "sliding (where a rigid ball would slide from begin to end).",
+        "sliding (where a rigid particle would slide from begin to end).",
         ARM,
         SPRING,
     ),
     "oblique_study": (
-        "The study's ceramic ball on steel, with and without the limit on attraction.",
+        "The study's ceramic particle on steel, with and without the limit on attraction.",
         DAMPER,
         OTHER_DAMPING,
     ),
@@ -79,11 +82,12 @@ WORDS: dict[str, tuple[str, ...]] = {
         "contact sticks.",
         SPRING,
         CONTRADICTION,
-        "The polyethylene ball flattens by 3 % of its radius; its sliding spin is lower than that "
-        "of a rigid ball by half of this, as it must be.",
+        "The polyethylene particle flattens by 3 % of its radius; its sliding spin is "
+        "lower than that "
+        "of a rigid particle by half of this, as it must be.",
     ),
     "spin_plane": (
-        "A spinning ball falls on a plane. The law integrated by scipy is met at every spin.",
+        "A spinning particle falls on a plane. The law integrated by scipy is met at every spin.",
         DAMPER,
         LIMIT,
         "The published curves have a normal restitution of 0.50 exactly and slide with Coulomb's "
@@ -92,42 +96,47 @@ WORDS: dict[str, tuple[str, ...]] = {
         SPRING,
     ),
     "spin_pair": (
-        "The surfaces of two balls with opposite spins roll on each other like two gears: nothing "
+        "The surfaces of two particles with opposite spins roll on each other like two "
+        "gears: nothing "
         "tangential may happen at all.",
     ),
     "spin_pair_same": (
-        "Two balls with the same spin rub. The line of centres turns a little during the "
+        "Two particles with the same spin rub. The line of centres turns a little during the "
         "impact, which the reference leaves out: hence the error of the normal rebound is above "
         "that on a plane. The tangential error is largest for fast slip, which uses up the "
         "spring within a few time steps.",
         DAMPER,
     ),
     "spin_unequal": (
-        "The larger ball has five times the radius. A rigid one is also 1,000 times denser, so "
-        "that it hardly moves and the test becomes test 6; the second ball of the paper was not "
+        "The larger particle has five times the radius. A rigid one is also 1,000 times denser, so "
+        "that it hardly moves and the test becomes test 6; the second particle of the "
+        "paper was not "
         "available here. The last series has one material.",
         "The published points differ for the reasons given in test 6.",
         DAMPER,
     ),
     "time_step": (
-        "The rebound of the study's ball over the time step. With the limit on the error falls in "
+        "The rebound of the study's particle over the time step. With the limit on the "
+        "error falls in "
         "proportion to the step. Without it, it depends on where in a step the contact begins "
         "and ends, and scatters.",
     ),
     "bounce": (
-        "An elastic ball between two walls without gravity. Each impact begins at another place "
+        "An elastic particle between two walls without gravity. Each impact begins at "
+        "another place "
         "within a step, so the energy wanders without a trend.",
     ),
     "momentum": (
         "Oblique, spinning collisions along lines of centres in any direction. Angular momentum "
-        "holds because both balls feel the friction at one point.",
+        "holds because both particles feel the friction at one point.",
     ),
     "column": (
-        "Five balls placed on each other and left to ring until they rest. The floor carries the "
+        "Five particles placed on each other and left to ring until they rest. The floor "
+        "carries the "
         "weight, and each contact the weight above it.",
     ),
     "incline": (
-        "Balls of different friction on one incline of 30 degrees. A ball rolls as long as "
+        "Particles of different friction on one incline of 30 degrees. A particle rolls as long as "
         "tan(angle) is below 7/2 of the friction, and slips beyond; at 1 both formulae agree.",
     ),
 }

@@ -27,16 +27,16 @@ MAX_NEIGHBOURS = 5
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a tool is to work in, to tell whether its size makes sense.
+    """What a workpiece is to work in, to tell whether its size makes sense.
 
     Parameters
     ----------
-    bowl_radius_m, ball_radius_m : float
-        In metres; the ball's is the mean.
+    bowl_radius_m, particle_radius_m : float
+        In metres; the particle's is the mean.
     """
 
     bowl_radius_m: float
-    ball_radius_m: float
+    particle_radius_m: float
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def check(
     *,
     file: Path | str | None = None,
     field: str | None = None,
-    tool: bool = True,
+    workpiece: bool = True,
     surroundings: Surroundings | None = None,
     curvature_deg: float = CURVATURE_DEG,
 ) -> list[Finding]:
@@ -75,7 +75,7 @@ def check(
         In metres, welded, as `read` and the makers return it.
     file, field : optional
         Where the mesh comes from, for the message.
-    tool, surroundings, curvature_deg
+    workpiece, surroundings, curvature_deg
         As in `findings`.
 
     Returns
@@ -88,7 +88,9 @@ def check(
     InputError
         For the first error found.
     """
-    found = findings(mesh, tool=tool, surroundings=surroundings, curvature_deg=curvature_deg)
+    found = findings(
+        mesh, workpiece=workpiece, surroundings=surroundings, curvature_deg=curvature_deg
+    )
     for finding in found:
         if finding.severity == "error":
             raise InputError(
@@ -105,7 +107,7 @@ def check(
 def findings(
     mesh: Mesh,
     *,
-    tool: bool = True,
+    workpiece: bool = True,
     surroundings: Surroundings | None = None,
     curvature_deg: float = CURVATURE_DEG,
 ) -> list[Finding]:
@@ -115,7 +117,7 @@ def findings(
     ----------
     mesh : Mesh
         In metres, welded.
-    tool : bool
+    workpiece : bool
         Whether the mesh is a body and must be closed with its normals out.
     surroundings : Surroundings, optional
         To see whether the size is plausible.
@@ -131,7 +133,7 @@ def findings(
     if not degenerate:
         found += _sharp_angles(mesh, curvature_deg) + _overlaps(mesh, curvature_deg)
     found += _crowded_edges(mesh)
-    if tool:
+    if workpiece:
         found += _not_a_body(mesh)
     return sorted(found, key=lambda finding: finding.severity)
 
@@ -170,10 +172,10 @@ def _implausible_size(mesh: Mesh, scene: Surroundings) -> list[Finding]:
         return []
     limit = (
         f"narrower than the bowl (diameter {2 * scene.bowl_radius_m:g} m), no longer than ten "
-        f"bowls, no smaller than a ball's radius ({scene.ball_radius_m:g} m)"
+        f"bowls, no smaller than a particle's radius ({scene.particle_radius_m:g} m)"
     )
     return _error(
-        "the size of the tool makes no sense in this bowl",
+        "the size of the workpiece makes no sense in this bowl",
         " x ".join(f"{length:.4g}" for length in mesh.extent) + " m",
         limit,
         _unit_remedy(mesh, scene) if size > 0.0 else "export the mesh again",
@@ -185,7 +187,7 @@ def _plausible(mesh: Mesh, factor: float, scene: Surroundings) -> bool:
     bowl_m = 2.0 * scene.bowl_radius_m
     longest = max(width, depth, height)
     narrow = max(width, depth) < bowl_m
-    return bool(narrow and scene.ball_radius_m <= longest <= 10.0 * bowl_m)
+    return bool(narrow and scene.particle_radius_m <= longest <= 10.0 * bowl_m)
 
 
 def _unit_remedy(mesh: Mesh, scene: Surroundings) -> str:
@@ -193,7 +195,7 @@ def _unit_remedy(mesh: Mesh, scene: Surroundings) -> str:
         return "check the unit: in millimetres, declared as metres?"
     if _plausible(mesh, 1e3, scene):
         return "check the unit: in metres, declared as millimetres?"
-    return "check the unit that the file is declared in, or use a tool of another size"
+    return "check the unit that the file is declared in, or use a workpiece of another size"
 
 
 def _degenerate(mesh: Mesh) -> list[Finding]:
@@ -210,7 +212,7 @@ def _degenerate(mesh: Mesh) -> list[Finding]:
         "a facet has no area",
         _which(bad),
         f"higher than the engine's precision, {NODE_PRECISION_M:g} m",
-        "remove degenerate facets in a mesh tool and export again",
+        "remove degenerate facets in a mesh workpiece and export again",
     )
 
 
@@ -225,7 +227,7 @@ def _duplicates(mesh: Mesh) -> list[Finding]:
         "a facet is there twice",
         _which(bad),
         "every facet once",
-        "remove duplicate facets in a mesh tool and export again",
+        "remove duplicate facets in a mesh workpiece and export again",
     )
 
 
@@ -297,8 +299,8 @@ def _not_a_body(mesh: Mesh) -> list[Finding]:
         return _error(
             "the mesh is not closed",
             f"{loose} of {len(mesh.edge_use)} edges do not join exactly two facets",
-            "a tool is a body: exactly two facets at every edge",
-            "close the holes and remove inner walls in a mesh tool, then export again",
+            "a workpiece is a body: exactly two facets at every edge",
+            "close the holes and remove inner walls in a mesh workpiece, then export again",
         )
     if mesh.oriented and mesh.volume > 0.0:
         return []

@@ -1,4 +1,4 @@
-"""Surfaces made from a few lengths: the round tool, a bar with edges, the bowl."""
+"""Surfaces made from a few lengths: the round workpiece, a bar with edges, the bowl."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dragdeck.errors import InputError
 from dragdeck.mesh.surface import Floats, Integers, Mesh, weld
 
 MAX_FACETS = 200_000
-"""More facets than any tool needs: a facet size in the wrong unit."""
+"""More facets than any workpiece needs: a facet size in the wrong unit."""
 
 MIN_SIDES = 8
 """The coarsest polygon that still passes for a circle."""
@@ -36,8 +36,8 @@ def polygon_radius(radius_m: float, sides: int) -> float:
 
     By Cauchy's theorem (1841) the mean width of a convex outline is its
     perimeter over pi, so a polygon of the circle's perimeter is, averaged over
-    the directions of motion, exactly as wide as the circle; a ball's radius
-    adds to both alike. Width is what a tool shows to the bed it is dragged
+    the directions of motion, exactly as wide as the circle; a particle's radius
+    adds to both alike. Width is what a workpiece shows to the bed it is dragged
     through, hence this choice and not the inscribed polygon, which is too
     narrow, nor the one of equal area, which is too wide. The corners stand out
     by (pi / sides)^2 / 6 of the radius and the middles of the sides lie inside
@@ -53,7 +53,7 @@ def cylinder(
 
     The outline is a polygon of the circle's perimeter (see `polygon_radius`).
     The side is made of flat strips, one for each side of the polygon, cut into
-    right triangles, so that a ball which slides along the axis keeps its
+    right triangles, so that a particle which slides along the axis keeps its
     contact history; the caps are Delaunay triangulations.
 
     Parameters

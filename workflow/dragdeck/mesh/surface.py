@@ -158,10 +158,10 @@ def weld(mesh: Mesh, precision_m: float = NODE_PRECISION_M) -> Mesh:
 
 
 def place(mesh: Mesh) -> Mesh:
-    """Move a mesh to the tool's coordinates.
+    """Move a mesh to the workpiece's coordinates.
 
     The origin becomes the middle of the bounding box in x and y, at its lowest
-    z. The axes keep their directions: a tool is drawn upright, +z away from
+    z. The axes keep their directions: a workpiece is drawn upright, +z away from
     the floor.
     """
     if not len(mesh.triangles):
@@ -173,13 +173,13 @@ def place(mesh: Mesh) -> Mesh:
 
 @dataclass(frozen=True)
 class Envelope:
-    """The upright cylinder around the z axis that just holds a tool.
+    """The upright cylinder around the z axis that just holds a workpiece.
 
     Parameters
     ----------
     radius_m : float
         Distance of the outermost node from the axis, in metres: how near to a
-        wall the tool's reference point may come, whichever way the tool turns.
+        wall the workpiece's reference point may come, whichever way the workpiece turns.
     bottom_m, top_m : float
         Lowest and highest z, in metres.
     """

@@ -1,20 +1,25 @@
-"""A few balls and plane walls, placed and set in motion one by one."""
+"""A few particles and plane walls, placed and set in motion one by one."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import Literal
 
-from dragdeck import __version__, outputs
-from dragdeck.scenes.common import Deck, LeftOut, Materials, Scene, round_to
-from dragdeck.study import Material, Pair
-
-Vector = tuple[float, float, float]
+from dragdeck import __version__
+from dragdeck.decks import outputs
+from dragdeck.decks.case_file import CaseFile, CountOfRun, RanksOfRun
+from dragdeck.decks.data_file import Body as DataBody
+from dragdeck.decks.data_file import Vector, data_file
+from dragdeck.decks.deck import Deck, LeftOut, Materials, Scene, contact_law
+from dragdeck.documents import Part
+from dragdeck.physics.rounding import round_to
+from dragdeck.study.contact_law import Pair
+from dragdeck.study.model import Material
 
 FRAMES_TIMES_BODIES = 25_000
-"""Rows of the largest output of a run: every step for two balls, fewer frames for a rack."""
+"""Rows of the largest output of a run: every step for two particles, fewer frames for a rack."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +41,72 @@ class Wall:
     shape: str
 
 
-@dataclass(frozen=True)
-class Body:
-    """A ball: material type (from 1), radius (m), place (m), velocity (m/s) and spin (rad/s)."""
+class Body(Part):
+    """A particle: material type from 1, radius m, place m, velocity m/s and spin rad/s."""
 
     type: int
     radius_m: float
     position_m: Vector
     velocity_m_s: Vector = (0.0, 0.0, 0.0)
     spin_rad_s: Vector = (0.0, 0.0, 0.0)
+
+
+class ContactFacts(Part):
+    """A contact of an experiment: particles by number, or ``plane``; the value that is varied."""
+
+    particle: int
+    partner: int | str
+    value: float
+
+
+class ExperimentFacts(Part):
+    """What an experiment tests.
+
+    Attributes
+    ----------
+    test, number : str, int
+        Name and number of the test in the suite.
+    heading, series : str
+        For readers: the test, and the materials that meet.
+    vary : str
+        What differs from contact to contact.
+    """
+
+    test: str
+    number: int
+    heading: str
+    series: str
+    vary: str
+    steps_per_contact: int
+    contacts: Sequence[ContactFacts]
+    impacts: int | None = None
+    angle_deg: float | None = None
+
+
+class NamedMaterial(Material):
+    """A type's material."""
+
+    name: str
+
+
+class MeetingPair(Pair):
+    """What two types do to each other."""
+
+    types: tuple[int, int]
+
+
+class CollideCase(CaseFile, ExperimentFacts):
+    """A few particles and walls, one by one."""
+
+    scene: Literal["collide"] = "collide"
+    gravity_m_s2: Vector
+    limit_force: bool
+    fidelity: RanksOfRun
+    media: CountOfRun
+    types: Sequence[NamedMaterial]
+    pairs: Sequence[MeetingPair]
+    bodies: Sequence[Body]
+    walls: Sequence[Wall]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,8 +123,8 @@ class Experiment:
         Types (from 1, the smaller first) that meet, and what they do to each other.
     gravity_m_s2 : (float, float, float)
         The vector.
-    facts : mapping
-        What else goes into ``case.json``.
+    facts : ExperimentFacts
+        What is tested, for ``case.json``.
     """
 
     group: str
@@ -78,7 +140,7 @@ class Experiment:
     steps: int
     gravity_m_s2: Vector = (0.0, 0.0, 0.0)
     period: int | None = None
-    facts: Mapping[str, Any]
+    facts: ExperimentFacts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +151,7 @@ class CollideDeck(Deck):
     steps: int
 
 
-def collide_scene(experiment: Experiment) -> Scene:
+def collide_scene(experiment: Experiment) -> Scene[CollideCase]:
     """The scene of an experiment: one engine process, no checkpoints, no pair output."""
     every = experiment.period or frame_period(experiment.steps, len(experiment.bodies))
     last = experiment.steps // every * every
@@ -117,19 +179,19 @@ def collide_scene(experiment: Experiment) -> Scene:
     )
     return Scene(
         deck=deck,
-        case=_case(experiment, deck),
+        case=_case(experiment),
         steps=experiment.steps,
         files={"bodies.data": bodies_data(experiment)},
-        models={"every ball": "placed and set in motion by hand", "exact walls": "planes"},
+        models={"every particle": "placed and set in motion by hand", "exact walls": "planes"},
         leaves_out={
-            "output of pairs": LeftOut("forces on so few balls say all"),
-            "checkpoints": LeftOut("the run takes seconds"),
+            "output of pairs": LeftOut("forces on so few particles say all"),
+            "n_checkpoints": LeftOut("the run takes seconds"),
         },
     )
 
 
 def frame_period(steps: int, bodies: int) -> int:
-    """Steps between frames, so that a run of many balls stays small."""
+    """Steps between frames, so that a run of many particles stays small."""
     return max(1, math.ceil(steps * bodies / FRAMES_TIMES_BODIES))
 
 
@@ -144,40 +206,31 @@ def pair_table(
     """The engine's constants; pairs that never meet repeat one that does."""
     other = next(iter(pairs.values()))
     size = range(1, len(types) + 1)
-    table = [pairs.get((min(i, j), max(i, j)), other) for i in size for j in size]
+    tables, model = contact_law(
+        [[pairs.get((min(i, j), max(i, j)), other) for j in size] for i in size]
+    )
     return Materials(
         names=[name for name, _ in types],
         youngs_moduli_pa=[material.youngs_modulus_pa for _, material in types],
         poissons_ratios=[material.poissons_ratio for _, material in types],
-        restitutions=[pair.restitution for pair in table],
-        frictions=[pair.friction for pair in table],
+        pair_tables=tables,
+        contact_model=model,
     )
 
 
 def bodies_data(experiment: Experiment) -> str:
-    """The engine's data file, with a box that no ball can leave."""
+    """The data file, with a box that no particle can leave."""
     duration = experiment.steps * experiment.timestep_s
-    sides = [_side(experiment, axis, duration) for axis in range(3)]
-    box = "".join(
-        f"{low!r} {high!r} {axis}lo {axis}hi\n"
-        for axis, (low, high) in zip("xyz", sides, strict=True)
-    )
-    atoms, velocities = "", ""
-    for number, body in enumerate(experiment.bodies, start=1):
-        density = experiment.types[body.type - 1][1].density_kg_m3
-        place = " ".join(repr(float(x)) for x in body.position_m)
-        atoms += f"{number} {body.type} {2 * body.radius_m!r} {density!r} {place}\n"
-        motion = " ".join(repr(float(x)) for x in (*body.velocity_m_s, *body.spin_rad_s))
-        velocities += f"{number} {motion}\n"
-    count, types = len(experiment.bodies), len(experiment.types)
-    return (
-        f"{experiment.title}\n\n{count} atoms\n{types} atom types\n"
-        f"\n{box}\nAtoms\n\n{atoms}\nVelocities\n\n{velocities}"
-    )
+    x, y, z = (_side(experiment, axis, duration) for axis in range(3))
+    densities = [material.density_kg_m3 for _, material in experiment.types]
+    bodies = [
+        DataBody(density_kg_m3=densities[body.type - 1], **dict(body)) for body in experiment.bodies
+    ]
+    return data_file(experiment.title, len(experiment.types), (x, y, z), bodies)
 
 
 def _side(experiment: Experiment, axis: int, duration_s: float) -> tuple[float, float]:
-    """Bounds of the box along an axis: where the fastest ball could get, and some room, m."""
+    """Bounds of the box along an axis: where the fastest particle could get, and some room, m."""
     places = [body.position_m[axis] for body in experiment.bodies]
     speed = max(math.hypot(*body.velocity_m_s) for body in experiment.bodies)
     fall = 0.5 * math.hypot(*experiment.gravity_m_s2) * duration_s**2
@@ -194,30 +247,26 @@ def _direction(vector: Vector, size: float) -> Vector:
     return (x, y, z)
 
 
-def _case(experiment: Experiment, deck: CollideDeck) -> dict[str, Any]:
-    return {
-        "schema": 1,
-        "study": experiment.group,
-        "title": experiment.title,
-        "scene": "collide",
-        "run": experiment.run,
-        "timestep_s": experiment.timestep_s,
-        "rayleigh_time_s": experiment.rayleigh_time_s,
-        "gravity_m_s2": list(experiment.gravity_m_s2),
-        "limit_force": experiment.limit_force,
-        "fidelity": {"ranks": 1, "skin_m": deck.skin_m},
-        "media": {"count": len(experiment.bodies)},
-        "types": [
-            {"name": name, **material.model_dump(mode="json")}
-            for name, material in experiment.types
+def _case(experiment: Experiment) -> CollideCase:
+    return CollideCase(
+        study=experiment.group,
+        title=experiment.title,
+        run=experiment.run,
+        timestep_s=experiment.timestep_s,
+        rayleigh_time_s=experiment.rayleigh_time_s,
+        versions={"dragdeck": __version__},
+        gravity_m_s2=experiment.gravity_m_s2,
+        limit_force=experiment.limit_force,
+        fidelity=RanksOfRun(ranks=1),
+        media=CountOfRun(count=len(experiment.bodies)),
+        types=[
+            NamedMaterial(name=name, **material.model_dump()) for name, material in experiment.types
         ],
-        "pairs": [
-            {"types": list(types), **pair.model_dump(mode="json")}
+        pairs=[
+            MeetingPair(types=types, **pair.model_dump())
             for types, pair in experiment.pairs.items()
         ],
-        "bodies": [asdict(body) for body in experiment.bodies],
-        "walls": [asdict(wall) for wall in experiment.walls],
-        "phases": [],
-        "versions": {"dragdeck": __version__},
-        **experiment.facts,
-    }
+        bodies=experiment.bodies,
+        walls=experiment.walls,
+        **dict(experiment.facts),
+    )

@@ -1,51 +1,56 @@
-"""The process: the tool plunges into the settled bed and is dragged along its path."""
+"""The process: the workpiece plunges into the settled bed and is dragged along its path."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
-from dragdeck import outputs
-from dragdeck.cases import Case
-from dragdeck.derive import ball_mass, effective_modulus, hertz_contact_time
+from dragdeck.cases.bed import bed_radii, bed_rayleigh_time, particle_material, skin
+from dragdeck.cases.case import Case, file_digest, materials_content, mesh_file
+from dragdeck.decks import outputs
+from dragdeck.decks.case_file import (
+    CircleOfRun,
+    LineOfRun,
+    Phase,
+    ProcessCase,
+    StatisticsOfRun,
+    WorkpieceOfRun,
+)
+from dragdeck.decks.deck import Deck, LeftOut, Scene
+from dragdeck.decks.outputs import Output
 from dragdeck.errors import InputError
 from dragdeck.mesh import Mesh, bowl
-from dragdeck.motion import Leg, farthest_reach, legs, plunge_point, start_heading
-from dragdeck.outputs import Output
-from dragdeck.ranks import warnings as rank_warnings
-from dragdeck.scenes.common import (
-    Deck,
-    LeftOut,
-    Scene,
-    ball_material,
-    base_case,
-    bed_radii,
-    bed_rayleigh_time,
-    flat,
-    material_table,
-    round_to,
-    skin,
-    timestep,
-)
-from dragdeck.scenes.fill import (
+from dragdeck.physics.contact_mechanics import effective_modulus, hertz_contact_time, particle_mass
+from dragdeck.physics.domain_split import warnings as rank_warnings
+from dragdeck.physics.rounding import round_to, timestep
+from dragdeck.scenes.dimensionless import describe
+from dragdeck.scenes.drop_test import DROP_TEST
+from dragdeck.scenes.filling import (
+    FILLING,
     bed_limits,
     box_top,
     expected_surface,
-    first_balls,
+    filling_content,
+    first_particles,
+    partners_in_bed,
     rank_split,
 )
-from dragdeck.scenes.numbers import describe
-from dragdeck.scenes.tool import tool_length, tool_mesh, tool_radius
-from dragdeck.study import CirclePath, CylinderShape, MeshShape, Study
+from dragdeck.scenes.motion import Leg, farthest_reach, legs, plunge_point, start_direction
+from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
+from dragdeck.scenes.workpiece import workpiece_length, workpiece_mesh, workpiece_radius
+from dragdeck.study.base import Json
+from dragdeck.study.contact_law import explained
+from dragdeck.study.model import CirclePath, CylinderShape, MeshShape, Study
+
+WORKPIECE_MESH = "workpiece.stl"
 
 FEWEST_STEPS_PER_CONTACT = 5
-"""Below this many steps in a contact at the tool's speed a warning is given."""
+"""Below this many steps in a contact at the workpiece's speed a warning is given."""
 
 JAMMING_GAP = 2.0
-"""Ball diameters between tool and bowl below which a warning is given: an arch of
-two balls at 1.7 diameters held a rod until the force was 190 N, and then left the bowl."""
+"""Particle diameters between workpiece and bowl below which a warning is given: an arch of two
+particles at 1.7 diameters held a workpiece until the force was 190 N, and then left the bowl."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,7 @@ class TimedLeg:
     leg: Leg
     start_step: int
     end_step: int
-    heading_rad: float
+    direction_rad: float
 
     name = property(lambda self: self.leg.name)
     kind = property(lambda self: self.leg.kind)
@@ -65,7 +70,7 @@ class TimedLeg:
 
     @property
     def speed_m_s(self) -> float:
-        """Speed of the tool's axis, m/s."""
+        """Speed of the workpiece's axis, m/s."""
         return math.hypot(*self.leg.velocity_m_s)
 
     @property
@@ -86,9 +91,9 @@ class ProcessDeck(Deck):
     bowl_type: int
     bowl_radius_m: float
     bowl_facets: bool
-    tool_type: int
-    tool_start_m: tuple[float, float, float]
-    tool_turn_deg: float
+    workpiece_type: int
+    workpiece_start_m: tuple[float, float, float]
+    workpiece_turn_deg: float
     legs: Sequence[TimedLeg]
 
 
@@ -101,23 +106,7 @@ class Periods:
     network: int
 
 
-@dataclass(frozen=True)
-class Bed:
-    """A settled bed, as measured in the fill.
-
-    Attributes
-    ----------
-    surface_m : float
-        Its mean height above the floor.
-    top_m : float
-        The highest point of any ball.
-    """
-
-    surface_m: float
-    top_m: float
-
-
-def process_scene(case: Case, bed: Bed | None = None) -> Scene:
+def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     """The process run of a case.
 
     Parameters
@@ -130,7 +119,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene:
     Raises
     ------
     InputError
-        The tool does not fit between path and bowl, would reach below the
+        The workpiece does not fit between path and bowl, would reach below the
         floor, or has a mesh that cannot be used.
     """
     study = case.study
@@ -143,19 +132,19 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene:
     periods = output_periods(study, dt)
     clear = round_to(bed.top_m + study.media.radius_mean_m, 6)
     start = (*plunge_point(study.motion), clear)
-    dive = start[2] - (surface - study.motion.submersion_m)
+    dive = start[2] - (surface - study.motion.immersion_depth_m)
     timed = timed_legs(legs(study.motion, dive, fidelity.speed_factor), study, dt, periods.network)
     drag, last = timed[-1], timed[-1].end_step
     types = study.type_names()
-    top = box_top(study, first_balls(study))
+    top = box_top(study, first_particles(study))
     check_headroom(case, clear, top)
     parts = rank_split(case, top)
     deck = ProcessDeck(
         title=study.title,
         study=case.study_name,
         scene="process",
-        run=case.run_ids["process"],
-        source=f"../../fill/{case.run_ids['fill']}/fill.restart",
+        run=PROCESS.run_id(case),
+        source=f"../../filling/{FILLING.run_id(case)}/packing.restart",
         materials=material_table(study, types, fidelity.youngs_modulus_scale, case),
         limit_force=study.contact.limit_force,
         gravity_m_s2=study.gravity_m_s2,
@@ -168,20 +157,16 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene:
         bowl_type=types.index(study.bowl.material) + 1,
         bowl_radius_m=study.bowl.radius_m,
         bowl_facets=study.bowl.facet_size_m is not None,
-        tool_type=types.index(study.workpiece.material) + 1,
-        tool_start_m=start,
-        tool_turn_deg=_tool_turn(study),
+        workpiece_type=types.index(study.workpiece.material) + 1,
+        workpiece_start_m=start,
+        workpiece_turn_deg=_workpiece_turn(study),
         legs=timed,
     )
     return Scene(
         deck=deck,
-        case={
-            **base_case(case, "process", dt, rayleigh),
-            **_process_case(case, surface, timed),
-            "limits": bed_limits(study, top, max(leg.speed_m_s for leg in timed)),
-        },
+        case=_process_case(case, bed.surface_m, timed, top, dt, rayleigh),
         steps=last,
-        meshes={"tool.stl": tool_mesh(case), **bowl_meshes(study, top)},
+        meshes={WORKPIECE_MESH: workpiece_mesh(case), **bowl_meshes(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
         warnings=[*_warnings(case, dt), *rank_warnings(parts)],
@@ -194,7 +179,7 @@ def _expected_bed(study: Study) -> Bed:
 
 
 def check_fit(case: Case, surface_m: float) -> None:
-    """Refuse a tool that leaves the bowl or goes through its floor.
+    """Refuse a workpiece that leaves the bowl or goes through its floor.
 
     Raises
     ------
@@ -202,47 +187,48 @@ def check_fit(case: Case, surface_m: float) -> None:
         Names the field that has to change.
     """
     study = case.study
-    radius, reach = tool_radius(case), farthest_reach(study.motion)
+    radius, reach = workpiece_radius(case), farthest_reach(study.motion)
     gap = study.bowl.radius_m - reach - radius
     if gap <= 0:
         raise InputError(
-            "the tool does not fit between its path and the bowl",
+            "the workpiece does not fit between its path and the bowl",
             file=case.file,
             field="motion.path",
-            value=f"axis up to {reach:.4g} m from the bowl's axis, tool radius {radius:.4g} m",
+            value=f"axis up to {reach:.4g} m from the bowl's axis, workpiece radius {radius:.4g} m",
             limit=f"together below the bowl's radius {study.bowl.radius_m:g} m",
-            remedy="use a smaller path or tool, or a wider bowl",
+            remedy="use a smaller path or workpiece, or a wider bowl",
         )
     deepest = surface_m - 2 * float(bed_radii(study).max())
-    if study.motion.submersion_m > deepest:
-        below = study.motion.submersion_m > surface_m
+    if study.motion.immersion_depth_m > deepest:
+        below = study.motion.immersion_depth_m > surface_m
         raise InputError(
-            "the tool would reach below the floor"
+            "the workpiece would reach below the floor"
             if below
-            else "the tool would crush balls between its tip and the floor",
+            else "the workpiece would crush particles between its tip and the floor",
             file=case.file,
-            field="motion.submersion_m",
-            value=study.motion.submersion_m,
-            limit=f"at most {deepest:.4g} m: a bed {surface_m:.4g} m high less one largest ball",
-            remedy="submerge the tool less, or fill in more balls",
+            field="motion.immersion_depth_m",
+            value=study.motion.immersion_depth_m,
+            limit=f"at most {deepest:.4g} m: a bed {surface_m:.4g} m high less one "
+            f"largest particle",
+            remedy="submerge the workpiece less, or fill in more particles",
         )
 
 
 def check_headroom(case: Case, tip_m: float, top_m: float) -> None:
-    """Refuse a tool that would stick out of the simulation box before it goes in.
+    """Refuse a workpiece that would stick out of the simulation box before it goes in.
 
     Raises
     ------
     InputError
-        The tool is too long.
+        The workpiece is too long.
     """
     longest = top_m - tip_m - 0.001
-    if tool_length(case) > longest:
+    if workpiece_length(case) > longest:
         raise InputError(
-            "the tool is longer than the simulation box above the bed",
+            "the workpiece is longer than the simulation box above the bed",
             file=case.file,
             field="workpiece.shape",
-            value=f"length {tool_length(case):.4g} m",
+            value=f"length {workpiece_length(case):.4g} m",
             limit=f"at most {longest:.4g} m",
             remedy="cut the mesh off higher up, or state a higher bowl (bowl.height_m)",
         )
@@ -252,8 +238,8 @@ def output_periods(study: Study, timestep_s: float) -> Periods:
     """Steps between frames: at least the asked rates, each a multiple of the faster one."""
     rates = study.outputs
     per_second = study.chosen_fidelity().speed_factor * timestep_s
-    force = max(1, math.floor(1 / (rates.tool_force_hz * per_second)))
-    contacts = force * max(1, math.floor(1 / (rates.tool_contacts_hz * per_second * force)))
+    force = max(1, math.floor(1 / (rates.workpiece_force_hz * per_second)))
+    contacts = force * max(1, math.floor(1 / (rates.workpiece_contacts_hz * per_second * force)))
     network = contacts * max(1, math.floor(1 / (rates.network_hz * per_second * contacts)))
     return Periods(force, contacts, network)
 
@@ -274,7 +260,7 @@ def timed_legs(plan: Sequence[Leg], study: Study, timestep_s: float, period: int
             x, y, z = (round_to(slower * v, 12) for v in leg.velocity_m_s)
             leg = replace(leg, velocity_m_s=(x, y, z))
         timed = replace(leg, duration_s=round_to(duration, 12))
-        found.append(TimedLeg(timed, start, start + steps, start_heading(study.motion)))
+        found.append(TimedLeg(timed, start, start + steps, start_direction(study.motion)))
         start += steps
     return found
 
@@ -282,69 +268,87 @@ def timed_legs(plan: Sequence[Leg], study: Study, timestep_s: float, period: int
 def _outputs(periods: Periods, first: int, last: int, facets: bool) -> tuple[Output, ...]:
     return (
         outputs.thermo(periods.network, last),
-        outputs.rod_force(periods.force, last),
-        outputs.rod_balls(periods.contacts, first, last),
-        outputs.rod_contacts(periods.contacts, first, last, facets),
-        outputs.balls(periods.network, first, last, facets),
+        outputs.workpiece_force(periods.force, last),
+        outputs.workpiece_particles(periods.contacts, first, last),
+        outputs.workpiece_contacts(periods.contacts, first, last, facets),
+        outputs.particles(periods.network, first, last, facets),
         outputs.contacts(periods.network, first, last),
     )
 
 
 def _checkpoint_steps(study: Study, last: int) -> int:
-    count = study.outputs.checkpoints
+    count = study.outputs.n_checkpoints
     return math.ceil(last / (count + 1)) if count else 0
 
 
-def _tool_turn(study: Study) -> float:
+def _workpiece_turn(study: Study) -> float:
     """A mesh looks along +x in its own file: turn it into the direction of motion, degrees."""
     if not isinstance(study.workpiece.shape, MeshShape):
         return 0.0
-    return math.degrees(start_heading(study.motion))
+    return math.degrees(start_direction(study.motion))
 
 
-def _process_case(case: Case, surface_m: float, timed: Sequence[TimedLeg]) -> Mapping[str, Any]:
+def _process_case(
+    case: Case,
+    surface_m: float,
+    timed: Sequence[TimedLeg],
+    top_m: float,
+    timestep_s: float,
+    rayleigh_s: float,
+) -> ProcessCase:
     study = case.study
-    fidelity = study.chosen_fidelity()
-    speed = study.motion.speed_m_s * fidelity.speed_factor
-    return {
-        "case": case.name,
-        "inputs": flat(study.model_dump(mode="json", include=_INPUTS)),
-        "upstream": {scene: case.run_ids[scene] for scene in ("fill", "drop")},
-        "numbers": describe(case),
-        "surface_m": surface_m,
-        "tool": {
-            "kind": study.workpiece.shape.kind,
-            "radius_m": tool_radius(case),
-            "length_m": tool_length(case),
-            "mesh": "tool.stl",
-            "submersion_m": study.motion.submersion_m,
-        },
-        "motion": {
-            **_path(study),
-            "speed_m_s": speed,
-            "start_heading_rad": start_heading(study.motion),
-        },
-        "phases": [
-            {"name": leg.name, "start_step": leg.start_step, "end_step": leg.end_step}
-            for leg in timed
+    return case_of_study(
+        ProcessCase,
+        case,
+        PROCESS.run_id(case),
+        {name: value for name, value in study.plain().items() if name in _INPUTS},
+        timestep_s,
+        rayleigh_s,
+        asked=case.advised,
+        case=case.name,
+        upstream={scene.name: scene.run_id(case) for scene in (FILLING, DROP_TEST)},
+        numbers=describe(case),
+        surface_m=surface_m,
+        workpiece=WorkpieceOfRun(
+            kind=study.workpiece.shape.kind,
+            radius_m=workpiece_radius(case),
+            length_m=workpiece_length(case),
+            mesh=WORKPIECE_MESH,
+            immersion_depth_m=study.motion.immersion_depth_m,
+        ),
+        motion=_motion(case),
+        phases=[
+            Phase(name=leg.name, start_step=leg.start_step, end_step=leg.end_step) for leg in timed
         ],
-        "statistics": {"run_in_s": study.motion.run_in_m / speed},
-    }
+        statistics=StatisticsOfRun(transient_s=study.motion.transient_m / case.axis_speed_m_s),
+        limits=bed_limits(study, top_m, max(leg.speed_m_s for leg in timed)),
+    )
 
 
-_INPUTS = {
-    "materials", "pairs", "media", "bowl", "workpiece", "motion", "contact", "drop", "fill",
-    "outputs", "gravity_m_s2", "seed",
-}  # fmt: skip
+_INPUTS = (
+    *("materials", "pairs", "media", "bowl", "workpiece", "motion", "contact", "drop_test"),
+    *("filling", "outputs", "gravity_m_s2", "seed"),
+)
 
 
-def _path(study: Study) -> dict[str, Any]:
-    path = study.motion.path
-    turns = {"turns_with_path": study.motion.turns_with_path}
-    if isinstance(path, CirclePath):
-        return {"kind": "circle", "radius_m": path.radius_m, "sense": path.sense, **turns}
-    heading = math.radians(path.heading_deg)
-    return {"kind": "line", "start_m": list(path.start_m), "heading_rad": heading, **turns}
+def _motion(case: Case) -> CircleOfRun | LineOfRun:
+    motion = case.study.motion
+    speed, direction = case.axis_speed_m_s, start_direction(motion)
+    if isinstance(motion.path, CirclePath):
+        return CircleOfRun(
+            axis_speed_m_s=speed,
+            start_direction_rad=direction,
+            orientation=motion.orientation,
+            radius_m=motion.path.radius_m,
+            direction=motion.path.direction,
+        )
+    return LineOfRun(
+        axis_speed_m_s=speed,
+        start_direction_rad=direction,
+        orientation=motion.orientation,
+        start_m=motion.path.start_m,
+        direction_rad=math.radians(motion.path.direction_deg),
+    )
 
 
 def bowl_meshes(study: Study, top_m: float) -> dict[str, Mesh]:
@@ -356,40 +360,44 @@ def bowl_meshes(study: Study, top_m: float) -> dict[str, Mesh]:
 
 
 def _models(study: Study) -> dict[str, str]:
+    optional, _ = explained(study.pairs.values())
     bowl = "exact plane and cylinder" if study.bowl.facet_size_m is None else "facets, as asked"
     return {
-        "ball-ball, ball-tool, ball-bowl": "all three carry the chains",
-        f"bowl: {bowl}": "its contacts end the chains, read from the force on each ball",
-        "tool as facets": "the engine moves meshes only",
-        f"total force, {study.outputs.tool_force_hz:g} Hz": "drag, its spread and its peaks",
-        f"tool contacts, {study.outputs.tool_contacts_hz:g} Hz": "few, so cheap at a high rate",
-        f"network and balls, {study.outputs.network_hz:g} Hz": "chains; positions serve both",
+        "particle-particle, particle-workpiece, particle-bowl": "all three carry the chains",
+        f"bowl: {bowl}": "its contacts end the chains, read from the force on each particle",
+        **{words: "as the study gives it" for words in optional},
+        "workpiece as facets": "the engine moves meshes only",
+        f"total force, {study.outputs.workpiece_force_hz:g} Hz": "drag, its spread and its peaks",
+        f"workpiece contacts, "
+        f"{study.outputs.workpiece_contacts_hz:g} Hz": "few, so cheap at a high rate",
+        f"network and particles, {study.outputs.network_hz:g} Hz": "chains; positions serve both",
     }
 
 
 def _leaves_out(study: Study) -> dict[str, LeftOut]:
-    tool, network = study.outputs.tool_contacts_hz, study.outputs.network_hz
+    _, absent = explained(study.pairs.values())
+    workpiece, network = study.outputs.workpiece_contacts_hz, study.outputs.network_hz
     found = {
         "positions, torques, areas of contacts": LeftOut(
-            "the balls of the same step have the positions; no report reads the rest",
+            "the particles of the same step have the positions; no report reads the rest",
             "contact_columns",
         ),
         "network during plunge and approach": LeftOut(
             "no statistic counts them", "network_before_drag"
         ),
         "wear, stress and heat of the mesh": LeftOut("no report reads them"),
-        "rolling friction": LeftOut("the study gives none"),
+        **{words: LeftOut("the study gives none") for words in absent},
     }
-    if network < tool:
-        found[f"network at {tool:g} Hz"] = LeftOut("chains need no such rate", "network_rate")
+    if network < workpiece:
+        found[f"network at {workpiece:g} Hz"] = LeftOut("chains need no such rate", "network_rate")
     if study.bowl.facet_size_m is None:
         found["facets of the bowl"] = LeftOut(
             "slower, and no report asks for contacts per bowl facet", "bowl_facets"
         )
     shape = study.workpiece.shape
     if isinstance(shape, CylinderShape) and shape.facet_length_m > shape.facet_size_m:
-        found["short facets along the rod"] = LeftOut(
-            "a straight side needs none", "rod_short_facets"
+        found["short facets along the workpiece"] = LeftOut(
+            "a straight side needs none", "workpiece_short_facets"
         )
     return found
 
@@ -398,26 +406,88 @@ def _warnings(case: Case, timestep_s: float) -> list[str]:
     study = case.study
     diameter = 2 * study.media.radius_mean_m
     found = []
-    gap = study.bowl.radius_m - farthest_reach(study.motion) - tool_radius(case)
+    gap = study.bowl.radius_m - farthest_reach(study.motion) - workpiece_radius(case)
     if gap < JAMMING_GAP * diameter:
         found.append(
-            f"the gap between tool and bowl is {gap / diameter:.2g} ball diameters, less than "
-            f"{JAMMING_GAP:g}: balls can jam in it, with forces far beyond those of the bed"
+            f"the gap between workpiece and bowl is {gap / diameter:.2g} particle "
+            f"diameters, less than "
+            f"{JAMMING_GAP:g}: particles can jam in it, with forces far beyond those of the bed"
         )
     steps = contact_steps(study, timestep_s)
     if steps < FEWEST_STEPS_PER_CONTACT:
         found.append(
-            f"a contact at the tool's speed takes {steps:.1f} steps, fewer than "
+            f"a contact at the workpiece's speed takes {steps:.1f} steps, fewer than "
             f"{FEWEST_STEPS_PER_CONTACT}: single impacts are not resolved"
         )
     return found
 
 
 def contact_steps(study: Study, timestep_s: float) -> float:
-    """Steps of an elastic impact of a ball on the tool at the tool's speed."""
+    """Steps of an elastic impact of a particle on the workpiece at the workpiece's speed."""
     fidelity = study.chosen_fidelity()
-    ball, tool = ball_material(study), study.materials[study.workpiece.material]
+    particle, workpiece = particle_material(study), study.materials[study.workpiece.material]
     radius = study.media.radius_mean_m
-    modulus = effective_modulus(ball, tool, fidelity.youngs_modulus_scale)
+    modulus = effective_modulus(particle, workpiece, fidelity.youngs_modulus_scale)
     speed = study.motion.speed_m_s * fidelity.speed_factor
-    return hertz_contact_time(ball_mass(ball, radius), radius, modulus, speed) / timestep_s
+    return hertz_contact_time(particle_mass(particle, radius), radius, modulus, speed) / timestep_s
+
+
+def _impact_speed(case: Case) -> float:
+    """Speed of the fastest motion of the workpiece, m/s."""
+    motion, factor = case.study.motion, case.study.chosen_fidelity().speed_factor
+    return factor * max(motion.speed_m_s, motion.plunge_speed_m_s, motion.approach_speed_m_s)
+
+
+def _partners(case: Case) -> list[tuple[str, str, float]]:
+    workpiece = ("workpiece", case.study.workpiece.material, workpiece_radius(case))
+    return [*partners_in_bed(case), workpiece]
+
+
+def _content(case: Case) -> Json:
+    """What a process depends on."""
+    study = case.study
+    shape = study.workpiece.shape
+    mesh = {"mesh": file_digest(mesh_file(case, shape))} if isinstance(shape, MeshShape) else {}
+    return {
+        "filling": dict(filling_content(case)),
+        "materials": materials_content(study, study.workpiece.material),
+        "pair": study.pair(study.media.material, study.workpiece.material).plain(),
+        "facet_size_m": study.bowl.facet_size_m,
+        "workpiece": study.workpiece.plain(),
+        "motion": study.motion.plain(),
+        "outputs": study.outputs.plain(),
+        "fidelity": study.chosen_fidelity().plain(),
+        **mesh,
+    }
+
+
+PROCESS = SceneType(
+    name="process",
+    slug=lambda case: case.name,
+    content=_content,
+    build=process_scene,
+    inputs=(WORKPIECE_MESH,),
+    tables=(
+        "thermo.parquet",
+        "workpiece_force.parquet",
+        "workpiece_contacts.parquet",
+        "particles.parquet",
+        "contacts.parquet",
+        "closure.json",
+    ),
+    network=("network.parquet", "chains.parquet", "clusters.parquet"),
+    loading=("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp"),
+    figures=(
+        "forces",
+        "network_xy",
+        "network_xz",
+        "force_around_workpiece",
+        "force_depth",
+        "chains_peaks",
+    ),
+    regime="drag",
+    impact_speed=_impact_speed,
+    partners=_partners,
+    particle_steps_per_s=7e6,
+    needs_bed=True,
+)

@@ -1,0 +1,1 @@
+"""The Hertz-Mindlin contact law as exact formulae."""

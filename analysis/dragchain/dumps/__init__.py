@@ -1,0 +1,1 @@
+"""Readers of what LIGGGHTS writes, frame by frame."""

@@ -1,0 +1,131 @@
+"""Any dump of the engine as frames or as a Parquet table, without a run folder.
+
+`read_dump` gives the frames, `dump_to_parquet` writes them; both stream, and neither
+needs a ``columns.json``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from dragchain.dumps.decompress import CODECS, Content
+from dragchain.dumps.fast_reader import Batch, read_batches
+from dragchain.dumps.frame import Frame
+from dragchain.errors import DumpError
+from dragchain.run.case import Output, OutputKind
+
+_HEAD_BYTES = 1 << 16
+_KINDS: dict[bytes, OutputKind] = {b"ENTRIES": "local", b"ATOMS": "custom"}
+
+
+def read_dump(source: Path | str, columns: Sequence[str] | None = None) -> Iterator[Frame]:
+    """Frames of a ``dump custom`` or ``dump local``, text or binary.
+
+    Parameters
+    ----------
+    source : Path or str
+        The file; or, of a dump of one frame a file, its pattern with ``*`` for the step.
+        A name that ends in ``.bin`` is that of a binary dump; one that ends in ``.gz``,
+        ``.zst``, ``.bz2`` or ``.lz4`` besides that of a compressed one.
+    columns : sequence of str, optional
+        Names of the columns. A binary dump does not hold them and needs them, in order;
+        a text dump must have all of these, in any order. By default those of its header.
+
+    Yields
+    ------
+    Frame
+        In the order of the file, or of the steps in the names of the files. Columns
+        named ``id``, ``type`` or ``..._id`` are int64, all others float64. Memory is
+        bounded by the largest frame.
+
+    Raises
+    ------
+    TruncatedDumpError
+        If a file ends inside a frame.
+    DumpError
+        If there is no such file, it is not such a dump, or a number is not finite.
+        Either error names file, frame and byte; the frames before have come by then.
+    """
+    files = dump_files(source)
+    for batch in read_batches(files, output_of(files[0], columns)):
+        yield from batch.frames()
+
+
+def steps_of_rows(batch: Batch) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """Step of each row of a batch, (N,)."""
+    return np.repeat(batch.steps, batch.counts)
+
+
+def dump_files(source: Path | str) -> list[Path]:
+    """Files of a dump; those that ``*`` stands for in the order of their steps.
+
+    Raises
+    ------
+    DumpError
+        If there is none.
+    """
+    source = Path(source)
+    before, star, after = source.name.partition("*")
+    if not star:
+        files = [source] if source.is_file() else []
+    else:
+        name = re.compile(re.escape(before) + r"([0-9]+)" + re.escape(after))
+        found = [(name.fullmatch(file.name), file) for file in source.parent.glob(source.name)]
+        files = [file for _, file in sorted((int(m.group(1)), file) for m, file in found if m)]
+    if not files:
+        raise DumpError(source, "there is no such file", remedy="check the name of the dump")
+    return files
+
+
+def output_of(file: Path, columns: Sequence[str] | None) -> Output:
+    """What a file holds, by its name and its first lines."""
+    name = file.with_suffix("") if file.suffix in CODECS else file
+    if name.suffix == ".bin":
+        if columns is None:
+            raise DumpError(
+                file,
+                "a binary dump does not say what its columns are",
+                remedy="give their names in the order of the deck's dump command",
+            )
+        return _output(file, "custom", columns, binary=True)
+    kind, names = _header(file)
+    return _output(file, kind, columns or names)
+
+
+def _output(
+    file: Path, kind: OutputKind, columns: Sequence[str], *, binary: bool = False
+) -> Output:
+    """A dump of unknown steps, of which the file says all."""
+    return Output(
+        name=file.name,
+        kind=kind,
+        binary=binary,
+        pattern="{part}",
+        columns=tuple(columns),
+        engine_columns=None,
+        period_steps=1,
+        first_step=0,
+        last_step=None,
+    )
+
+
+def _header(file: Path) -> tuple[OutputKind, list[str]]:
+    """Kind of a text dump, and the names of its columns."""
+    with Content(file) as content:
+        head = bytearray(_HEAD_BYTES)
+        lines = bytes(head[: content.fill(memoryview(head))]).split(b"\n", 9)
+    words = lines[8].split() if len(lines) > 9 else []
+    if len(words) < 3 or words[0] != b"ITEM:" or words[1] not in _KINDS:
+        raise DumpError(
+            file,
+            f"found {lines[0][:60]!r}, and no names of columns",
+            frame=0,
+            offset=0,
+            expected="the header of a text dump of LIGGGHTS",
+            remedy="give a dump custom or a dump local; a binary one must be named .bin",
+        )
+    return _KINDS[words[1]], [word.decode("ascii", "replace") for word in words[2:]]

@@ -1,0 +1,161 @@
+"""Export of a run: frame by frame, into a folder of its own."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from dragchain.errors import ExportError
+from dragchain.export import paraview, xyz
+from dragchain.export.folder import fresh_folder, write_list
+from dragchain.export.frames import Moment, Moments, Selection
+from dragchain.tables.run_folder import Run
+
+Report = Callable[[str], object]
+
+
+class Writer(Protocol):
+    """Writes the frames of one export."""
+
+    def add(self, moment: Moment) -> None:
+        """Write one frame."""
+
+    def close(self) -> None:
+        """Write what comes after the last one."""
+
+
+FORMATS: dict[str, tuple[str, Callable[[Path, Moments], Writer]]] = {
+    "paraview": (paraview.MAIN, paraview.ParaviewWriter),
+    "xyz": (xyz.MAIN, xyz.XyzWriter),
+}
+"""The file to open and the writer of each format."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written: the file to open, frames, and bytes on disk."""
+
+    file: Path
+    frames: int
+    size: int
+
+
+def write_export(
+    run_dir: Path | str,
+    to: str,
+    out: Path | None = None,
+    selection: Selection | None = None,
+    *,
+    replace: bool = False,
+    report: Report = lambda text: None,
+) -> Exported:
+    """Write the frames of a run for another program.
+
+    Memory is bounded by the largest frame. Before the second frame the size of the whole
+    is told, and refused if the disk has less room.
+
+    Parameters
+    ----------
+    run_dir : Path or str
+        Folder of a fill or process run with its tables made.
+    to : str
+        ``paraview`` or ``xyz``.
+    out : Path, optional
+        The folder; ``export/<to>`` in the run's if None. It must be new or empty.
+    selection : Selection, optional
+        The frames; all if None.
+    replace : bool
+        Whether an earlier export in `out` may go.
+    report : callable
+        Takes a sentence for the user.
+
+    Returns
+    -------
+    Exported
+        What was written.
+
+    Raises
+    ------
+    DocumentError, TableError
+        If the run folder or a table cannot be used.
+    ExportError
+        If there is nothing to export, no room for it, or something in its place.
+    """
+    if to not in FORMATS:
+        raise ExportError(f"the format is {to!r}, not one of {', '.join(FORMATS)}")
+    main, writer_of = FORMATS[to]
+    run = Run.open(run_dir)
+    moments = Moments.of(run, Selection() if selection is None else selection)
+    target = run.folder / "export" / to if out is None else out
+    with fresh_folder(target, replace=replace) as folder:
+        _write(folder, writer_of, moments, report)
+        size = folder_size(folder)
+        write_list(folder, _content(to, moments, size))
+    return Exported(target / main, len(moments), size)
+
+
+def _write(
+    folder: Path,
+    writer_of: Callable[[Path, Moments], Writer],
+    moments: Moments,
+    report: Report,
+) -> None:
+    writer = writer_of(folder, moments)
+    try:
+        for number, moment in enumerate(moments):
+            writer.add(moment)
+            if number == 0:
+                _foresee(folder, len(moments), report)
+    finally:
+        writer.close()
+
+
+def _foresee(folder: Path, frames: int, report: Report) -> None:
+    """Tell the size from that of the first frame; there must be room for it."""
+    size, free = frames * folder_size(folder), shutil.disk_usage(folder).free
+    report(f"{frames} frames, about {size / 1e6:.1f} MB")
+    if size > free:
+        raise ExportError(
+            f"{folder.parent}: there is no room for {frames} frames\n"
+            f"  value:  about {size / 1e6:.0f} MB\n"
+            f"  limit:  {free / 1e6:.0f} MB are free\n"
+            "  remedy: take fewer with --every, --from-time and --to-time, or name a folder on"
+            " another disk with --out"
+        )
+
+
+def folder_size(folder: Path) -> int:
+    """The size of all files of a folder, in bytes."""
+    return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+
+
+def _content(to: str, moments: Moments, size: int) -> dict[str, object]:
+    case = moments.run.case
+    return {
+        "format": to,
+        "study": case.study,
+        "scene": case.scene,
+        "run": case.run,
+        "frames": len(moments),
+        "first_time_s": float(moments.times_s[0]),
+        "last_time_s": float(moments.times_s[-1]),
+        "bytes": size,
+    }
+
+
+def export_command(
+    run_dir: Path,
+    to: str,
+    out: Path | None,
+    from_time: float | None,
+    to_time: float | None,
+    every: int,
+    replace: bool,
+) -> str:
+    """Export frames as the command line asks for; what to say at the end."""
+    selection = Selection(from_time, to_time, every)
+    done = write_export(run_dir, to, out, selection, replace=replace, report=print)
+    return f"{done.frames} frames, {done.size / 1e6:.1f} MB: {done.file}"

@@ -1,0 +1,381 @@
+"""Pictures of the interaction network, as in Fig. 4b and 4c of Uhlmann et al. (2015).
+
+One cylinder a contact: from centre to centre of two particles, or from a particle's centre to its
+contact point with workpiece or bowl. Its colour runs from green (no force) to red (the frame's
+largest normal force), its radius is proportional to the normal force and reaches the mean particle
+radius at the largest.
+
+The pictures are rendered off screen by VTK. On a machine without a display that needs EGL with a
+software driver: on Debian and Ubuntu the packages ``libegl1`` and ``libgl1-mesa-dri``.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dragchain.arrays import Floats, Ints
+from dragchain.errors import DragchainError, TableError
+from dragchain.network.chains import WidestPath, dominant_path, widest_paths
+from dragchain.network.frame import NetworkFrame, read_frames
+from dragchain.run.case import Case
+from dragchain.run.kinematics import drag_start_s, needed
+from dragchain.run.workpiece import placed, workpiece_mesh
+from dragchain.tables.by_step import read_table
+from dragchain.tables.workpiece_pose import workpiece_places
+
+View = Literal["xy", "xz"]
+
+PICTURE_TIME_S = 4.5
+"""Process time, counted from the start of the drag, at which the paper shows the network."""
+
+COLOURS = ("#1e8f4e", "#f0c929", "#c8102e")
+_PIXELS_PER_MM = 14
+_SIDES = 18
+_MARGIN_M = 0.004
+_FADED = 0.3
+
+WINDOW_DIAMETERS = 12.0
+"""Mean particle diameters to either side of the workpiece that a picture of a wider bowl shows."""
+
+DEPTH_DIAMETERS = 6.0
+"""Mean particle diameters before and behind the workpiece whose contacts are then seen from the
+side."""
+
+_MOST_PIXELS = 1400
+"""Most pixels along an edge of a picture: a bowl of 100 mm at full resolution."""
+
+
+class RenderError(DragchainError):
+    """Off-screen rendering does not work on this machine."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What one picture shows; lengths in m, forces in N.
+
+    Attributes
+    ----------
+    frame : NetworkFrame
+        The network frame.
+    workpiece_m : (3,) float
+        Centre of the workpiece's bottom face at the frame.
+    workpiece_turn_rad : float
+        Angle about the vertical by which the workpiece is turned from its STL file,
+        where it looks along +x.
+    dominant : WidestPath or None
+        The frame's dominant workpiece path.
+    process_time_s : float
+        Time since the drag began.
+    """
+
+    frame: NetworkFrame
+    workpiece_m: Floats
+    workpiece_turn_rad: float
+    dominant: WidestPath | None
+    process_time_s: float
+
+
+def segments(frame: NetworkFrame) -> Floats:
+    """The axis of each contact's cylinder, (M, 2, 3) in m."""
+    end = frame.point.copy()
+    inner = frame.between_particles()
+    end[inner] = frame.centre[frame.b[inner]]
+    return np.stack([frame.centre[frame.a], end], axis=1)
+
+
+def cylinder_radii(
+    normal_force_n: Floats, radius_mean_m: float, largest_n: float | None = None
+) -> Floats:
+    """Return radii proportional to the force, (M,) in m: the mean particle radius at `largest_n`.
+
+    That is the largest of the forces if None; pictures that are to be compared share one.
+    """
+    largest = normal_force_n.max(initial=0.0) if largest_n is None else largest_n
+    if largest <= 0.0:
+        return np.zeros_like(normal_force_n)
+    return np.asarray(np.clip(normal_force_n, 0.0, None) / largest * radius_mean_m)
+
+
+def picture_step(steps: Floats, process_time_s: Floats, wanted_s: float = PICTURE_TIME_S) -> int:
+    """The step nearest to `wanted_s`, or the last one if the frames do not reach that far.
+
+    Parameters
+    ----------
+    steps, process_time_s : (N,) array
+        The counted network frames; N is at least 1.
+    wanted_s
+        Time since the drag began.
+    """
+    period = np.diff(process_time_s).max(initial=0.0)
+    inside = process_time_s[0] - period <= wanted_s <= process_time_s[-1] + period
+    row = int(np.abs(process_time_s - wanted_s).argmin()) if inside else -1
+    return int(steps[row])
+
+
+def load_scene(run_dir: Path, case: Case, wanted_s: float = PICTURE_TIME_S) -> Scene:
+    """Read what the picture of a process run shows at the frame nearest to `wanted_s`.
+
+    Raises
+    ------
+    TableError
+        If a table is missing or holds no counted network frame.
+    """
+    tables = run_dir / "tables"
+    network = read_table(tables / "network.parquet", ["step", "time_s"])
+    start_s = drag_start_s(case)
+    step = picture_step(
+        network["step"].to_numpy(np.float64),
+        network["time_s"].to_numpy(np.float64) - start_s,
+        wanted_s,
+    )
+    frame = next(read_frames(run_dir, (step, step)), None)
+    if frame is None:
+        raise TableError(f"particles.parquet lacks step {step}, which network.parquet has")
+    workpiece_m, workpiece_turn_rad = workpiece_places(run_dir, case)(step)
+    return Scene(
+        frame=frame,
+        workpiece_m=workpiece_m,
+        workpiece_turn_rad=workpiece_turn_rad,
+        dominant=dominant_path(frame, widest_paths(frame)),
+        process_time_s=frame.time_s - start_s,
+    )
+
+
+def check_rendering() -> None:
+    """Render one empty picture in a process of its own, for VTK ends the process where it cannot.
+
+    Raises
+    ------
+    RenderError
+        If that process fails.
+    """
+    _prefer_egl()
+    code = "import pyvista; pyvista.Plotter(off_screen=True, window_size=(8, 8)).screenshot()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        said = re.sub(r"\x1b\[[0-9;]*m", "", done.stderr).strip().splitlines()
+        raise RenderError(
+            f"off-screen rendering ended with status {done.returncode}: "
+            f"{said[-1] if said else 'no message'}\n  remedy: install EGL with a software driver "
+            "(Debian, Ubuntu: libegl1 and libgl1-mesa-dri)"
+        )
+
+
+def _prefer_egl() -> None:
+    """Spare VTK the search for an X server where there is none."""
+    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+
+@dataclass(frozen=True)
+class Window:
+    """The part of the bowl that a picture shows.
+
+    Attributes
+    ----------
+    low, high : (2,) float
+        Corners in m along the axes of the view.
+    contacts : (M,) bool or None
+        The contacts of the frame that are drawn; None: all.
+    """
+
+    low: Floats
+    high: Floats
+    contacts: NDArray[np.bool_] | None = None
+
+
+def window(case: Case, scene: Scene, view: View) -> Window:
+    """The whole bowl, or the workpiece's surroundings if the bowl is much wider than they are.
+
+    Only contacts whose point lies in the surroundings are then drawn: `WINDOW_DIAMETERS` to
+    either side of the workpiece and, seen from the side, `DEPTH_DIAMETERS` before and behind it.
+    """
+    bowl_m = needed(case.bowl, "bowl").radius_m + _MARGIN_M
+    floor = (-_MARGIN_M, 1.25 * needed(case.surface_m, "surface_m"))
+    diameter = 2.0 * case.media.radius_mean_m
+    half = WINDOW_DIAMETERS * diameter
+    whole = shows_all(case)
+    middle = np.zeros(2) if whole else scene.workpiece_m[:2]
+    low = np.full(2, -bowl_m) if whole else np.maximum(middle - half, -bowl_m)
+    high = np.full(2, bowl_m) if whole else np.minimum(middle + half, bowl_m)
+    corners = (low, high)
+    if view == "xz":
+        corners = (np.array([low[0], floor[0]]), np.array([high[0], floor[1]]))
+    if whole:
+        return Window(*corners)
+    point = scene.frame.point[:, :2]
+    near = np.logical_and(point >= low, point <= high).all(axis=1)
+    if view == "xz":
+        near &= np.abs(point[:, 1] - middle[1]) <= DEPTH_DIAMETERS * diameter
+    return Window(*corners, np.asarray(near))
+
+
+def shows_all(case: Case) -> bool:
+    """Whether pictures of a case show its whole bowl."""
+    reach = needed(case.bowl, "bowl").radius_m + _MARGIN_M
+    return reach <= WINDOW_DIAMETERS * 2.0 * case.media.radius_mean_m
+
+
+def cut_words(case: Case, view: View) -> str:
+    """What a picture leaves out, in words; empty if it shows the whole bowl."""
+    if shows_all(case):
+        return ""
+    words = f"shown: up to {WINDOW_DIAMETERS:g} particle diameters beside the workpiece"
+    if view == "xy":
+        return words
+    return words + f", {DEPTH_DIAMETERS:g} before and behind it"
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a picture is rendered.
+
+    Attributes
+    ----------
+    pixels_per_mm : float
+        Resolution; less where a picture would be larger than VTK renders well.
+    largest_n : float or None
+        Normal force at the red end of the colours and at the mean particle radius; the frame's
+        largest if None.
+    kept : (k,) ndarray of int or None
+        Contacts that stay opaque while the others are seen through; None: all are opaque.
+    """
+
+    pixels_per_mm: float = _PIXELS_PER_MM
+    largest_n: float | None = None
+    kept: Ints | None = None
+
+
+def render(
+    run_dir: Path, case: Case, scene: Scene, view: View, look: Look | None = None
+) -> tuple[NDArray[np.uint8], Floats]:
+    """Render one view in parallel projection.
+
+    Returns
+    -------
+    image : (H, W, 3) array of uint8
+        The picture.
+    extent : (4,) array
+        Its left, right, lower and upper edge in mm along the axes of `view`.
+    """
+    _prefer_egl()
+    import pyvista as pv
+
+    look = Look() if look is None else look
+    part = window(case, scene, view)
+    low, high = part.low, part.high
+    pixels_per_mm = min(look.pixels_per_mm, _MOST_PIXELS / float((high - low).max() * 1e3))
+    size = np.ceil((high - low) * 1e3 * pixels_per_mm).astype(int)
+    plotter: Any = pv.Plotter(off_screen=True, window_size=size.tolist(), lighting="light kit")
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.enable_depth_peeling(number_of_peels=8)
+    _add_bowl(plotter, case, view)
+    _add_workpiece(plotter, run_dir, case, scene)
+    _add_contacts(plotter, scene.frame, case.media.radius_mean_m, look, part.contacts)
+    away = max(1.0, 2.0 * needed(case.bowl, "bowl").radius_m)
+    _aim(plotter, (low + high) / 2, float(high[1] - low[1]), view, away)
+    image: NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
+    plotter.close()
+    return image, np.array([low[0], high[0], low[1], high[1]]) * 1e3
+
+
+def _aim(plotter: Any, middle: Floats, height: float, view: View, away_m: float) -> None:
+    x, other = middle
+    camera = plotter.camera
+    camera.focal_point = (x, other, 0.0) if view == "xy" else (x, 0.0, other)
+    camera.position = (x, other, away_m) if view == "xy" else (x, -away_m, other)
+    camera.up = (0.0, 1.0, 0.0) if view == "xy" else (0.0, 0.0, 1.0)
+    camera.parallel_projection = True
+    camera.parallel_scale = height / 2
+    plotter.renderer.reset_camera_clipping_range()
+
+
+def _add_bowl(plotter: Any, case: Case, view: View) -> None:
+    import pyvista as pv
+
+    radius = needed(case.bowl, "bowl").radius_m
+    height = 1.2 * needed(case.surface_m, "surface_m")
+    wall = pv.Cylinder(
+        center=(0, 0, height / 2),
+        direction=(0, 0, 1),
+        radius=radius,
+        height=height,
+        resolution=120,
+        capping=False,
+    )
+    floor = pv.Disc(inner=0.0, outer=radius, c_res=120)
+    plotter.add_mesh(wall, color="#7a8694", opacity=0.04)
+    plotter.add_mesh(floor, color="#7a8694", opacity=0.06 if view == "xy" else 0.5)
+    ring = pv.Disc(inner=radius, outer=radius + 0.0006, c_res=120)
+    plotter.add_mesh(ring, color="#4a5561")
+
+
+def _add_workpiece(plotter: Any, run_dir: Path, case: Case, scene: Scene) -> None:
+    workpiece = placed(workpiece_mesh(run_dir, case), scene.workpiece_m, scene.workpiece_turn_rad)
+    plotter.add_mesh(workpiece, color="#59636e", opacity=0.45)
+
+
+def _add_contacts(
+    plotter: Any,
+    frame: NetworkFrame,
+    radius_mean_m: float,
+    look: Look,
+    within: NDArray[np.bool_] | None,
+) -> None:
+    force = frame.normal_force
+    largest = float(force.max(initial=0.0)) if look.largest_n is None else look.largest_n
+    shown = force > 0.0 if within is None else (force > 0.0) & within
+    if look.kept is None:
+        _add_tubes(plotter, frame, np.flatnonzero(shown), radius_mean_m, largest, 1.0)
+        return
+    kept = np.isin(np.arange(force.size), look.kept)
+    _add_tubes(plotter, frame, np.flatnonzero(shown & ~kept), radius_mean_m, largest, _FADED)
+    _add_tubes(plotter, frame, np.flatnonzero(shown & kept), radius_mean_m, largest, 1.0)
+
+
+def _add_tubes(
+    plotter: Any,
+    frame: NetworkFrame,
+    shown: Ints,
+    radius_mean_m: float,
+    largest_n: float,
+    opacity: float,
+) -> None:
+    import pyvista as pv
+
+    if not shown.size:
+        return
+    force = frame.normal_force[shown]
+    axis = segments(frame)[shown]
+    lines = np.arange(2 * shown.size).reshape(-1, 2)
+    mesh = pv.PolyData(axis.reshape(-1, 3), lines=np.insert(lines, 0, 2, axis=1).ravel())
+    mesh["force"] = np.repeat(force, 2)
+    mesh["radius"] = np.repeat(cylinder_radii(force, radius_mean_m, largest_n), 2)
+    tubes = mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES, capping=True)
+    plotter.add_mesh(
+        tubes,
+        scalars="force",
+        cmap=colour_map(),
+        clim=(0.0, largest_n),
+        opacity=opacity,
+        ambient=0.35,
+        diffuse=0.7,
+        show_scalar_bar=False,
+    )
+
+
+def colour_map() -> Any:
+    """The colour map of the pictures, green over yellow to red."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("network", list(COLOURS))

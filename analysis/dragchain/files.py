@@ -1,0 +1,42 @@
+"""Files that are either whole or not there."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def draft_of(file: Path) -> Iterator[Path]:
+    """A path to write to; what was written takes the file's place when the block ends.
+
+    If the block ends in an exception, nothing is left behind, and an older file of that name
+    stays as it was.
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    draft = file.with_name(f".{os.getpid()}.{file.name}")
+    try:
+        yield draft
+        os.replace(draft, file)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def write_text(file: Path, text: str) -> None:
+    """Write a text file that appears under its name only once it is whole."""
+    with draft_of(file) as draft:
+        draft.write_text(text, encoding="utf-8")
+
+
+def write_bytes(file: Path, content: bytes) -> None:
+    """Write a file that appears under its name only once it is whole."""
+    with draft_of(file) as draft:
+        draft.write_bytes(content)
+
+
+def write_json(file: Path, content: Mapping[str, object]) -> None:
+    """Write a JSON file that appears under its name only once it is whole."""
+    write_text(file, json.dumps(content, indent=1, allow_nan=False) + "\n")

@@ -1,0 +1,1 @@
+"""What the media do to the workpiece: contact events and facet maps."""

@@ -1,0 +1,278 @@
+"""Stays of particles on the workpiece.
+
+How long, how hard, and whether they hit, slide, roll or rest.
+
+An event is a particle's uninterrupted stay: it carries force in consecutive samples,
+and its passing from facet to facet does not end it. One sample without force
+ends it. What happens between two samples is not seen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from dragchain.arrays import Floats, Ints
+from dragchain.contact_law.hertz import contact_time, effective_modulus
+from dragchain.errors import TableError
+from dragchain.run.case import Case
+from dragchain.run.kinematics import motion_of
+
+IMPACT, SLIDING, ROLLING, RESTING = TYPES = ("impact", "sliding", "rolling", "resting")
+
+AMOUNTS = (
+    *("normal_impulse_n_s", "tangential_impulse_n_s", "relative_path_m", "sliding_m"),
+    *("force_slide_n_m", "friction_work_j"),
+)
+"""What is summed over contacts and time; see docs/removal.md."""
+
+POINT = ["workpiece_x_m", "workpiece_y_m", "workpiece_z_m"]
+SLIP = ["workpiece_slip_x_m_s", "workpiece_slip_y_m_s", "workpiece_slip_z_m_s"]
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """The limits between the types of contact.
+
+    Attributes
+    ----------
+    mobilised : float
+        A contact slides in a sample if its tangential force is at least this
+        share of friction coefficient times normal force.
+    impact_times : float
+        An impact lasts no longer than this many Hertz contact times of a mean
+        particle that meets the workpiece at the workpiece's speed, or than one sample if that
+        is longer.
+    rest : float
+        A particle rests if its mean speeds of sliding and rolling add up to less
+        than this share of the workpiece's speed.
+    slide_to_roll : float
+        A particle slides if its mean speed of sliding is at least this multiple of
+        that of rolling. It is 2 for a particle that slides without turning, and 0
+        for one that rolls without slip.
+    """
+
+    mobilised: float = 0.99
+    impact_times: float = 5.0
+    rest: float = 0.1
+    slide_to_roll: float = 1.0
+
+    def varied(self) -> dict[str, Thresholds]:
+        """Each limit of the types halved and doubled, and named."""
+        names = ("impact_times", "rest", "slide_to_roll")
+        return {
+            f"{name} x {factor:g}": replace(self, **{name: getattr(self, name) * factor})
+            for name in names
+            for factor in (0.5, 2.0)
+        }
+
+    def as_json(self) -> dict[str, float]:
+        """The limits by name."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Particle and workpiece in contact.
+
+    Attributes
+    ----------
+    friction : float
+        Coefficient of friction between the two.
+    contact_time_s : float
+        Time for which a mean particle that meets the workpiece at the workpiece's speed touches it.
+    """
+
+    friction: float
+    contact_time_s: float
+
+
+def surfaces(case: Case) -> Surfaces:
+    """Return friction and contact time of particle and workpiece from the inputs of ``case.json``.
+
+    The time is that of an elastic impact on a plane; see `contact_time`.
+
+    Raises
+    ------
+    TableError
+        If ``case.json`` does not give the materials.
+    """
+    particle, workpiece = (_input(case, f"{body}.material") for body in ("media", "workpiece"))
+    friction = next(
+        (
+            case.inputs[name]
+            for pair in (f"{particle}-{workpiece}", f"{workpiece}-{particle}")
+            if (name := f"pairs.{pair}.friction") in case.inputs
+        ),
+        None,
+    )
+    if not isinstance(friction, int | float):
+        raise TableError(f"case.json has no inputs.pairs.{particle}-{workpiece}.friction")
+    names = ("youngs_modulus_pa", "poissons_ratio")
+    materials = [
+        {name: _number(case, f"materials.{material}.{name}") for name in names}
+        for material in (particle, workpiece)
+    ]
+    modulus = case.fidelity.youngs_modulus_scale * effective_modulus(*materials)
+    radius = case.media.radius_mean_m
+    mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * radius**3
+    time_s = contact_time(mass, radius, modulus, motion_of(case).axis_speed_m_s)
+    return Surfaces(float(friction), float(time_s))
+
+
+def _input(case: Case, name: str) -> object:
+    if name not in case.inputs:
+        raise TableError(f"case.json has no inputs.{name}, which the types of contact need")
+    return case.inputs[name]
+
+
+def _number(case: Case, name: str) -> float:
+    value = _input(case, name)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TableError(f"case.json: inputs.{name} is {value!r}, not a number")
+    return float(value)
+
+
+def find_events(rows: pd.DataFrame, frames: int, interval_s: float) -> tuple[pd.DataFrame, Ints]:
+    """Find the stays of particles on the workpiece.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        N contacts with force: ``frame`` (0 to `frames` - 1), ``time_s``,
+        ``particle_id``, ``facet_id``, ``normal_force_n``, `POINT` and `SLIP` in the
+        workpiece's frame, ``mobilised`` and `AMOUNTS`.
+    frames : int
+        Number of frames.
+    interval_s : float
+        Time between frames, s.
+
+    Returns
+    -------
+    events : DataFrame
+        A row an event, in the order of time and particle. Sums are over all
+        contacts of the particle; where it has several at once, paths follow the one
+        with the largest normal force.
+    event : (N,) ndarray of int64
+        The event of each row.
+    """
+    order = np.lexsort((-rows["normal_force_n"], rows["frame"], rows["particle_id"]))
+    particle, frame = (rows[name].to_numpy(np.int64)[order] for name in ("particle_id", "frame"))
+    leaves = np.r_[True, (np.diff(particle) != 0) | (np.diff(frame) > 1)][: len(rows)]
+    chosen = np.r_[True, (np.diff(particle) != 0) | (np.diff(frame) != 0)][: len(rows)]
+    found = np.cumsum(leaves) - 1
+    first = order[leaves]
+    rank = np.lexsort((rows["particle_id"].to_numpy()[first], rows["frame"].to_numpy()[first]))
+    place = np.empty_like(rank)
+    place[rank] = np.arange(len(rank))
+    event = np.empty(len(rows), dtype=np.int64)
+    event[order] = place[found]
+    strongest = order[chosen]
+    touch = np.empty(len(rows), dtype=np.int64)
+    touch[order] = np.cumsum(chosen) - 1
+    events = _sums(rows, event, strongest, touch, frames, interval_s)
+    moves = rows[[*POINT, *SLIP]].iloc[strongest]
+    for name, path in _paths(moves, event[strongest], interval_s).items():
+        events[name] = np.bincount(path[0], path[1], len(events))
+    rolled = events["rolling_m"] / (events["samples"] - 1).where(events["samples"] > 1)
+    events["rolling_m_s"] = rolled / interval_s
+    events["slide_to_roll"] = events["sliding_m"] / (events["duration_s"] * events["rolling_m_s"])
+    return events, event
+
+
+def _sums(
+    rows: pd.DataFrame,
+    event: Ints,
+    strongest: Ints,
+    touch: Ints,
+    frames: int,
+    interval_s: float,
+) -> pd.DataFrame:
+    """The columns of the events that need no paths.
+
+    `touch` is the particle-and-frame of each row, as an index into `strongest`.
+    """
+    count = int(event.max(initial=-1)) + 1
+    force = np.bincount(touch, rows["normal_force_n"], len(strongest))
+    of_touch = event[strongest]
+    samples = np.bincount(of_touch, minlength=count)
+    begins = np.full(count, frames)
+    np.minimum.at(begins, event, rows["frame"])
+    ends = np.zeros(count, dtype=np.int64)
+    np.maximum.at(ends, event, rows["frame"])
+    peak = np.zeros(count)
+    np.maximum.at(peak, of_touch, force)
+    heads = rows.iloc[_heads(event, rows)]
+    sums = {name: np.bincount(event, rows[name], count) for name in AMOUNTS}
+    loaded = np.bincount(event, rows["normal_impulse_n_s"] * rows["mobilised"], count)
+    impulse = sums["normal_impulse_n_s"]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = sums["tangential_impulse_n_s"] / impulse
+        fraction = loaded / impulse
+    return pd.DataFrame(
+        {
+            "event_id": np.arange(count),
+            "particle_id": heads["particle_id"].to_numpy(),
+            "facet_id": heads["facet_id"].to_numpy(),
+            "frame": begins,
+            "start_s": heads["time_s"].to_numpy(),
+            "samples": samples,
+            "duration_s": samples * interval_s,
+            "whole": (begins > 0) & (ends < frames - 1),
+            "azimuth_rad": heads["azimuth_rad"].to_numpy(),
+            "depth_m": heads["depth_m"].to_numpy(),
+            "peak_normal_force_n": peak,
+            "mean_normal_force_n": impulse / (samples * interval_s),
+            **sums,
+            "tangential_over_normal": ratio,
+            "mobilised_fraction": fraction,
+        }
+    )
+
+
+def _heads(event: Ints, rows: pd.DataFrame) -> Ints:
+    """The first row of each event, the strongest if there are several."""
+    order = np.lexsort((-rows["normal_force_n"], rows["frame"], event))
+    return np.asarray(order[np.r_[True, np.diff(event[order]) > 0][: len(order)]])
+
+
+def _paths(rows: pd.DataFrame, event: Ints, interval_s: float) -> dict[str, tuple[Ints, Floats]]:
+    """Return event and length of each piece of path between two samples of an event.
+
+    `rows` are sorted by particle and frame, one for each. The contact point moves by
+    d over the workpiece's surface and by d - s over the particle's, s being the slip. The
+    rolling distance is that of the mean, d - s / 2: zero where a particle turns on
+    the spot or is carried along, and d where it rolls without slip (the rolling
+    speed of Johnson 1985, section 8.1).
+    """
+    same = np.diff(event) == 0
+    moved = np.diff(rows[POINT].to_numpy(), axis=0)[same]
+    slip = rows[SLIP].to_numpy() * interval_s
+    slipped = (0.5 * (slip[1:] + slip[:-1]))[same]
+    of = event[1:][same]
+    return {
+        "contact_path_m": (of, np.linalg.norm(moved, axis=1)),
+        "rolling_m": (of, np.linalg.norm(moved - 0.5 * slipped, axis=1)),
+    }
+
+
+def event_types(
+    events: pd.DataFrame, case: Case, interval_s: float, limits: Thresholds
+) -> NDArray[np.str_]:
+    """Name the type of each event, (E,).
+
+    In this order: an impact is short, a resting particle moves little, a sliding one
+    slides fast for what it rolls, and all else rolls. An event that begins before
+    the first sample or ends after the last is no impact; if but one sample of it
+    is seen, it passes for rolling.
+    """
+    longest = max(limits.impact_times * surfaces(case).contact_time_s, interval_s)
+    speed = motion_of(case).axis_speed_m_s
+    sliding, rolling = events["sliding_m"] / events["duration_s"], events["rolling_m_s"]
+    short = events["whole"] & (events["duration_s"] <= longest * (1 + 1e-9))
+    rests = sliding + rolling < limits.rest * speed
+    slides = sliding >= limits.slide_to_roll * rolling
+    return np.select([short, rests, slides], [IMPACT, RESTING, SLIDING], ROLLING)

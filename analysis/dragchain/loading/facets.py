@@ -1,0 +1,120 @@
+"""Load, sliding and friction work of each facet of the workpiece."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from dragchain.arrays import Floats
+from dragchain.errors import TableError
+from dragchain.loading.contact_events import AMOUNTS, POINT
+from dragchain.loading.samples import WORKPIECE, Sampled
+from dragchain.run.case import Case
+from dragchain.run.kinematics import needed
+from dragchain.run.workpiece import Surface, off_facet
+from dragchain.statistics.bootstrap import block_length
+
+OFF_FACET = 1e-5
+"""Largest distance of a contact point from its facet over the workpiece's length: rounding."""
+
+BLOCK_ROWS = 100_000
+"""Contacts that are held against their facets at once."""
+
+UNCERTAIN = ("normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
+"""Sums of a facet that come with a standard error."""
+
+
+def check_facets(sampled: Sampled, surface: Surface, case: Case) -> float:
+    """How far contact points lie off their facets at most, m, if that is rounding."""
+    facet = sampled.rows["facet_id"].to_numpy()
+    if facet.min() < 0 or facet.max() >= len(surface.corners):
+        raise TableError(
+            f"workpiece_contacts.parquet names facet {facet.max()}, but the workpiece's "
+            f"mesh has facets"
+            f" 0 to {len(surface.corners) - 1}: is it the mesh of this run?"
+        )
+    point = sampled.rows[POINT].to_numpy()
+    parts = np.array_split(np.arange(len(facet)), 1 + len(facet) // BLOCK_ROWS)
+    off = np.concatenate([off_facet(point[part], surface.corners[facet[part]]) for part in parts])
+    limit = OFF_FACET * needed(case.workpiece, "workpiece").length_m
+    worst = int(off.argmax())
+    if off[worst] > limit:
+        raise TableError(
+            f"a contact point of facet {facet[worst]} lies {off[worst]:.3g} m off it, more than"
+            f" {limit:.3g} m: facet numbers and mesh do not belong together"
+        )
+    return float(off[worst])
+
+
+# --- facets ----------------------------------------------------------------------------------
+
+
+def facet_table(sampled: Sampled, surface: Surface, events: pd.DataFrame) -> pd.DataFrame:
+    """The sums of each facet, a row a facet in the order of their numbers."""
+    rows, count = sampled.rows, len(surface.corners)
+    facet = rows["facet_id"].to_numpy()
+    peak = np.zeros(count)
+    np.maximum.at(peak, facet, rows["normal_force_n"])
+    samples = np.bincount(facet, minlength=count)
+    names = (*AMOUNTS, *WORKPIECE)
+    sums = {name: np.bincount(facet, rows[name], count) for name in names}
+    errors = {f"{name}_se": _standard_error(sampled, name, count) for name in UNCERTAIN}
+    area = surface.areas
+    return pd.DataFrame(
+        {
+            "facet_id": np.arange(count),
+            **_axes("centre", "_m", surface.centres),
+            **_axes("normal", "", surface.normals),
+            "area_m2": area,
+            "samples": samples,
+            "events": np.bincount(events["facet_id"], minlength=count),
+            "mean_contacts": samples / sampled.frames,
+            **sums,
+            **errors,
+            "peak_normal_force_n": peak,
+            "mean_pressure_pa": sums["normal_impulse_n_s"]
+            / (area * sampled.frames * sampled.interval_s),
+            "force_slide_pa": sums["force_slide_n_m"] / (area * sampled.path_m),
+            "friction_work_pa": sums["friction_work_j"] / (area * sampled.path_m),
+        }
+    )
+
+
+def _standard_error(sampled: Sampled, name: str, count: int) -> Floats:
+    """The standard error of a sum of each facet, (count,), by batch means.
+
+    The samples are cut into batches that outlast the memory of the whole workpiece's
+    series (`block_length`); the batches' spread gives the error.
+    """
+    rows = sampled.rows
+    series = np.bincount(rows["frame"], rows[name], sampled.frames)
+    batches = max(2, sampled.frames // block_length(series[:, None].astype(np.float64)))
+    batch = rows["frame"].to_numpy() * batches // sampled.frames
+    at = batch * count + rows["facet_id"].to_numpy()
+    sums = np.bincount(at, rows[name], batches * count).reshape(batches, count)
+    return np.asarray(np.sqrt(batches) * sums.std(axis=0, ddof=1))
+
+
+def _axes(name: str, unit: str, vectors: Floats) -> dict[str, Floats]:
+    return {f"{name}_{axis}{unit}": column for axis, column in zip("xyz", vectors.T, strict=True)}
+
+
+def write_vtp(surface: Surface, facets: pd.DataFrame, file: Path) -> None:
+    """Write the workpiece's mesh in its own frame with a cell array for each column of `facets`."""
+    mesh = as_polydata(surface)
+    for name in facets:
+        mesh.cell_data[name] = facets[name].to_numpy()
+    draft = file.with_name(f".{file.stem}.part.vtp")
+    mesh.save(draft)
+    draft.replace(file)
+
+
+def as_polydata(surface: Surface) -> Any:
+    """The facets as PyVista's mesh, in their order."""
+    import pyvista as pv
+
+    points, at = np.unique(surface.corners.reshape(-1, 3), axis=0, return_inverse=True)
+    return pv.PolyData(points, faces=np.insert(at.reshape(-1, 3), 0, 3, axis=1).ravel())

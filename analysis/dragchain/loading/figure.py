@@ -1,0 +1,268 @@
+"""The picture of a workpiece: where particles press and slide on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from dragchain.drag.around import AZIMUTH_BINS
+from dragchain.drag.azimuth import circumference, parts
+from dragchain.figures import network_picture as scene
+from dragchain.figures.style import BLUE, GREY, STYLE, WIDTH_IN, png
+from dragchain.loading.facets import as_polydata
+from dragchain.loading.samples import Sampled
+from dragchain.loading.summary import DEPTH_BINS
+from dragchain.run.case import Case, Circle
+from dragchain.run.kinematics import needed
+from dragchain.run.workpiece import Surface
+
+COLOURS = "magma_r"
+QUANTITY = "force_slide_pa"
+LABEL = (
+    "normal force times sliding distance, per area of the workpiece\nand metre of its way, in N/m²"
+)
+
+
+@dataclass(frozen=True)
+class Eye:
+    """A side of the workpiece.
+
+    Where the eye is in the workpiece's frame, and what the view is called.
+    """
+
+    x: float
+    y: float
+    label: str
+    motion: str
+
+
+VIEWS = {
+    "front": Eye(1.0, 0.0, "from ahead", "⊙ motion"),
+    "left": Eye(0.0, 1.0, "from the left", "← motion"),
+    "rear": Eye(-1.0, 0.0, "from behind", "⊗ motion"),
+    "right": Eye(0.0, -1.0, "from the right", "motion →"),
+}
+
+_PIXELS = 900
+_BESIDE_IN, _AROUND_IN, _TALLEST_IN = 1.3, 2.3, 3.5
+"""What labels take of the width and height of the figure, and how high its panels are at most."""
+
+
+def draw_workpiece(
+    run_dir: Path,
+    case: Case,
+    sampled: Sampled,
+    surface: Surface,
+    facets: pd.DataFrame,
+    found: dict[str, Any],
+) -> Path:
+    """Draw ``figures/workpiece.png``: facets of the workpiece by force times sliding distance.
+
+    A cylinder is shown from ahead, from behind and unrolled; any other workpiece
+    from its four sides. Beside it stands the profile over depth.
+
+    Raises
+    ------
+    RenderError
+        If pictures cannot be rendered here.
+    """
+    scene.check_rendering()
+    cylinder = needed(case.workpiece, "workpiece").kind == "cylinder"
+    names = ("front", "rear") if cylinder else tuple(VIEWS)
+    scale = Normalize(0.0, _largest(facets))
+    with matplotlib.rc_context(STYLE):
+        widths = [1.0, 1.0, 2.8, 2.4] if cylinder else [1.0] * 4 + [1.4]
+        height = _height_in(case, widths[0] / sum(widths))
+        figure = Figure(figsize=(WIDTH_IN, height), layout="constrained")
+        panels = figure.subplots(1, len(widths), sharey=True, width_ratios=widths)
+        mesh = _coloured(surface, facets)
+        for axes, name in zip(panels, names, strict=False):
+            _view(axes, mesh, name, scale, case)
+        if cylinder:
+            _unrolled(panels[2], sampled, scale, case)
+        _profile(panels[-1], found)
+        panels[0].set_ylabel("depth in mm")
+        panels[0].set_ylim(_depths(case)[::-1])
+        bar = figure.colorbar(
+            ScalarMappable(scale, COLOURS),
+            ax=panels.tolist(),
+            location="bottom",
+            extend="max",
+            shrink=0.6,
+            aspect=40,
+        )
+        bar.set_label(LABEL)
+        figure.suptitle(_title(found, case), fontsize=9.5, x=0.02, ha="left")
+        return _save(run_dir / "figures" / "workpiece.png", png(figure))
+
+
+def _height_in(case: Case, fraction: float) -> float:
+    """The figure's height, that a view of this share of the width has a workpiece fill it."""
+    high, low = _depths(case)
+    view_in = fraction * (WIDTH_IN - _BESIDE_IN)
+    fits = view_in * (low - high) / (2e3 * _half_width(case))
+    return _AROUND_IN + min(_TALLEST_IN, fits)
+
+
+def _half_width(case: Case) -> float:
+    """Return half of the width that is shown, m."""
+    return 1.15 * needed(case.workpiece, "workpiece").radius_m
+
+
+def _save(file: Path, picture: bytes) -> Path:
+    """Write a picture to a temporary file and then put it in its place."""
+    file.parent.mkdir(exist_ok=True)
+    draft = file.with_name(f".{file.name}.tmp")
+    draft.write_bytes(picture)
+    draft.replace(file)
+    return file
+
+
+def _largest(facets: pd.DataFrame) -> float:
+    """The top of the colour scale: what 99 % of the loaded area stays below."""
+    loaded = facets[facets[QUANTITY] > 0.0].sort_values(QUANTITY)
+    if loaded.empty:
+        return 1.0
+    fraction = loaded["area_m2"].cumsum() / loaded["area_m2"].sum()
+    return float(loaded[QUANTITY].to_numpy()[np.searchsorted(fraction, 0.99)])
+
+
+def _coloured(surface: Surface, facets: pd.DataFrame) -> Any:
+    mesh = as_polydata(surface)
+    mesh.cell_data[QUANTITY] = facets[QUANTITY].to_numpy()
+    return mesh
+
+
+def _depths(case: Case) -> tuple[float, float]:
+    """The shallowest and the deepest depth that is shown, mm."""
+    deepest = needed(case.workpiece, "workpiece").immersion_depth_m * 1e3
+    return -0.25 * deepest, 1.06 * deepest
+
+
+def _view(axes: Axes, mesh: Any, name: str, scale: Normalize, case: Case) -> None:
+    """Set a rendered side of the workpiece on axes of width and depth in mm."""
+    image, half = _render(mesh, name, scale, case), 1e3 * _half_width(case)
+    high, low = _depths(case)
+    axes.imshow(image, extent=(-half, half, low, high), interpolation="antialiased")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle="--")
+    axes.grid(False)
+    axes.set(xlabel="width in mm")
+    eye = VIEWS[name]
+    axes.xaxis.set_major_locator(MaxNLocator(2, integer=True))
+    when = eye.motion if _keeps_heading(case) else "(at the start)"
+    axes.set_title(f"{eye.label}\n{when}", fontsize=8.5)
+
+
+def _keeps_heading(case: Case) -> bool:
+    """Whether the workpiece's motion has one direction in its own frame."""
+    motion = case.motion
+    return not isinstance(motion, Circle) or motion.orientation == "follow_path"
+
+
+def _render(mesh: Any, name: str, scale: Normalize, case: Case) -> NDArray[np.uint8]:
+    """A side of the workpiece in parallel projection."""
+    import pyvista as pv
+
+    high, low = _depths(case)
+    height = (low - high) * 1e-3
+    tip = needed(case.workpiece, "workpiece").immersion_depth_m
+    half = _half_width(case)
+    size = (max(8, round(_PIXELS * 2 * half / height)), _PIXELS)
+    plotter: Any = pv.Plotter(off_screen=True, window_size=list(size))
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.add_mesh(
+        mesh,
+        scalars=QUANTITY,
+        cmap=COLOURS,
+        clim=(scale.vmin, scale.vmax),
+        lighting=False,
+        show_edges=True,
+        edge_color="#c9ced6",
+        line_width=0.5,
+        show_scalar_bar=False,
+    )
+    middle = (0.0, 0.0, tip - 0.5e-3 * (high + low))
+    eye = VIEWS[name]
+    camera = plotter.camera
+    camera.focal_point = middle
+    camera.position = (eye.x, eye.y, middle[2])
+    camera.up = (0.0, 0.0, 1.0)
+    camera.parallel_projection = True
+    camera.parallel_scale = height / 2
+    plotter.renderer.reset_camera_clipping_range()
+    image: NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
+    plotter.close()
+    return image
+
+
+def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> None:
+    """Draw the mantle of a cylinder unrolled: azimuth against depth."""
+    workpiece = needed(case.workpiece, "workpiece")
+    rows = sampled.rows[sampled.rows["workpiece_z_m"] > 1e-3 * workpiece.length_m]
+    azimuths = circumference(AZIMUTH_BINS)
+    shallowest = 1e-3 * _depths(case)[0]
+    depths = np.linspace(shallowest, workpiece.immersion_depth_m, DEPTH_BINS + 1)
+    middles, half = 0.5 * (azimuths[:-1] + azimuths[1:]), 0.5 * rows["force_slide_n_m"]
+    sums = np.zeros((DEPTH_BINS, AZIMUTH_BINS))
+    for part in parts(rows["azimuth_rad"].to_numpy(np.float64), AZIMUTH_BINS):
+        grid = [depths, azimuths]
+        sums += np.histogram2d(rows["depth_m"], middles[part], grid, weights=half)[0]
+    area = workpiece.radius_m * (azimuths[1] - azimuths[0]) * (depths[1] - depths[0])
+    shown = sums / (area * sampled.path_m)
+    axes.pcolormesh(np.degrees(azimuths), depths * 1e3, shown, cmap=COLOURS, norm=scale)
+    axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle="--")
+    axes.axhline(workpiece.immersion_depth_m * 1e3, color=GREY, linewidth=0.8)
+    axes.set_xticks(np.arange(-180, 181, 90), ["back", "right", "ahead", "left", "back"])
+    axes.grid(False)
+    axes.set(xlabel="azimuth from the motion")
+    axes.set_title("mantle, unrolled\n(dashed: surface at rest)", fontsize=8.5)
+
+
+def _profile(axes: Axes, found: dict[str, Any]) -> None:
+    """Draw force times sliding distance against depth with its interval."""
+    profile = found["profiles"]["depth"]
+    edges = np.asarray(profile["edges"]) * 1e3
+    value, low, high = (
+        1e-3 * np.array(profile["force_slide"][key], dtype=np.float64)
+        for key in ("value", "ci95_low", "ci95_high")
+    )
+    middle = (edges[:-1] + edges[1:]) / 2
+    axes.barh(middle, value, height=0.9 * np.diff(edges), color=BLUE, alpha=0.75)
+    error = np.abs([value - np.minimum(low, value), np.maximum(high, value) - value])
+    axes.errorbar(value, middle, xerr=error, fmt="none", ecolor="black", elinewidth=0.9)
+    axes.set(xlabel="force times sliding\nin N m per m of way\nand mm of depth", xlim=(0.0, None))
+    axes.set_title("by depth, end included\n(bars: 95 % interval)", fontsize=8.5)
+
+
+def _title(found: dict[str, Any], case: Case) -> str:
+    """Say what the picture is of; shares are unknown where nothing slides."""
+    work, fraction, front = (
+        {key: np.nan if number is None else number for key, number in estimate.items()}
+        for estimate in (
+            found["per_metre"]["friction_work_j"],
+            found["friction_fraction_of_work"],
+            found["front_fraction"]["force_slide_n_m"],
+        )
+    )
+    return (
+        f"{case.case or case.run}: sliding of particles on the workpiece, "
+        f"{found['path_m'] * 1e3:.0f} mm of"
+        f" its way in {found['time_s']:.1f} s\n"
+        f"friction work {work['value']:.3g} J a metre ({work['ci95_low']:.3g} to {work['ci95_high']:.3g}),"
+        f" {100 * fraction['value']:.1f} % of all work of the workpiece\n"
+        f"front half: {100 * front['value']:.0f} % of force times sliding"
+        f" ({100 * front['ci95_low']:.0f} to {100 * front['ci95_high']:.0f})"
+    )

@@ -1,0 +1,1 @@
+"""The contact network: statistics, force chains and clusters."""

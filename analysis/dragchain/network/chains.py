@@ -1,0 +1,416 @@
+"""Force chains of one network frame, by two definitions.
+
+``peters``
+    Quasi-linear chains of highly stressed particles (Peters, Muthuswamy, Wibowo and Tordesillas
+    2005, Phys. Rev. E 72, 041307), see `peters_chains`.
+``widest_path``
+    For each strong workpiece contact the path through strong contacts to the bowl whose weakest
+    contact is strongest, see `widest_paths`.
+
+As long as no two contacts bear the same force, no result depends on the numbering of the particles
+or on the order of the contacts. Where equal forces leave a choice, the contact counts that comes
+first in the frame, which in ``contacts.parquet`` is the one with the lower ids.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from dragchain.arrays import Floats, Ints
+from dragchain.network import graph_kernels as kernels
+from dragchain.network.frame import FLOOR, KINDS, SIDE, WORKPIECE, NetworkFrame
+from dragchain.run.kinematics import wrap_angle
+
+ALPHA_RAD = np.pi / 4
+"""Largest angle between a particle's principal direction and the line to the next particle of a
+chain."""
+
+LEAST_PARTICLES = 3
+"""Fewer particles are no chain (Peters et al. 2005)."""
+
+STRESS_FACTOR = 1.0
+"""Least major principal stress of a chain's particles, as a multiple of the frame's mean."""
+
+THRESHOLD = 1.0
+"""Least normal force of a workpiece path's contacts, as a multiple of the frame's mean."""
+
+
+@dataclass(frozen=True)
+class WidestPath:
+    """A path from a workpiece contact to the bowl.
+
+    Attributes
+    ----------
+    particles : sequence of int
+        Rows of the frame's particles, from the workpiece on; only the particle on the workpiece if
+        `end` is None.
+    contacts : sequence of int
+        Rows of the frame's contacts in the same order, the workpiece's first and the bowl's last.
+    end : int or None
+        `FLOOR` or `SIDE`, None if no path of strong contacts leads to the bowl.
+    """
+
+    particles: tuple[int, ...]
+    contacts: tuple[int, ...]
+    end: int | None
+
+
+@dataclass(frozen=True)
+class ChainRows:
+    """C chains, one after another, as rows of a frame.
+
+    Attributes
+    ----------
+    particles, contacts : (K,) and (L,) ndarray of int64
+        Rows of the particles and of the contacts, in the order of each chain.
+    particle_starts, contact_starts : (C + 1,) ndarray of int64
+        Where each chain begins in `particles` and in `contacts`, and where the last one ends.
+    """
+
+    particles: Ints
+    contacts: Ints
+    particle_starts: Ints
+    contact_starts: Ints
+
+    def __len__(self) -> int:
+        return len(self.particle_starts) - 1
+
+    def particle_lists(self) -> list[list[int]]:
+        """The rows of each chain's particles."""
+        return _split(self.particles, self.particle_starts)
+
+
+def _split(values: Ints, starts: Ints) -> list[list[int]]:
+    flat, at = values.tolist(), starts.tolist()
+    return [flat[begin:end] for begin, end in pairwise(at)]
+
+
+# --- stress and Peters' chains ---------------------------------------------------------------
+
+
+def particle_stress(frame: NetworkFrame) -> Floats:
+    """Each particle's mean stress tensor in Pa, compression positive, (N, 3, 3).
+
+    The sum over the particle's contacts of branch vector (centre to contact point) times force on
+    the particle, over the particle's volume, made symmetric (Weber 1966; Peters et al. 2005, eq.
+    1). Contacts with workpiece and bowl count too.
+    """
+    other = np.where(frame.between_particles(), frame.b, -1)
+    total: Floats = kernels.particle_moments(frame.a, other, frame.centre, frame.point, frame.force)
+    volume = 4.0 / 3.0 * np.pi * frame.radius**3
+    return (total + total.transpose(0, 2, 1)) / (2.0 * volume[:, None, None])
+
+
+def major_stress(stress: Floats) -> tuple[Floats, Floats]:
+    """The major compressive principal stress in Pa, (N,), and its axis, (N, 3)."""
+    values, vectors = np.linalg.eigh(stress)
+    return values[:, -1], vectors[:, :, -1]
+
+
+def peters_chains(
+    frame: NetworkFrame,
+    alpha_rad: float = ALPHA_RAD,
+    stress_factor: float = STRESS_FACTOR,
+    major: tuple[Floats, Floats] | None = None,
+) -> list[list[int]]:
+    """The quasi-linear force chains as ordered rows of the frame's particles.
+
+    A particle is highly stressed when its major compressive principal stress is above
+    `stress_factor` times the mean of all particles (1 in the paper). Two highly stressed particles
+    in contact are linked when the line of their centres is within `alpha_rad` of the principal
+    axis of both; at least `LEAST_PARTICLES` linked particles are a chain (Peters et al. 2005).
+    Ours is the rule for more than one candidate at the same end of a particle: candidates are
+    taken by falling normal force (of equal ones the first of the frame), each end of an axis holds
+    one link, and no link closes a ring, so that every chain is a path and no particle is in two
+    chains. A chain starts at its higher end, and the chains come by the height of their starts.
+    `major` is what `major_stress` returns for the frame, if it is known already.
+    """
+    return peters_rows(frame, alpha_rad, stress_factor, major).particle_lists()
+
+
+def peters_rows(
+    frame: NetworkFrame,
+    alpha_rad: float = ALPHA_RAD,
+    stress_factor: float = STRESS_FACTOR,
+    major: tuple[Floats, Floats] | None = None,
+) -> ChainRows:
+    """The chains of `peters_chains` with the contacts between their particles."""
+    stress, axis = major_stress(particle_stress(frame)) if major is None else major
+    high = stress > stress_factor * stress.mean() if stress.size else stress > 0.0
+    candidates, end = _candidates(frame, alpha_rad, high, axis)
+    near, by = kernels.link_particles(
+        frame.particle_id.size, frame.a[candidates], frame.b[candidates], end[0], end[1]
+    )
+    ends = np.flatnonzero((near >= 0).sum(axis=1) == 1)
+    ends = ends[np.lexsort(-frame.centre[ends].T)]
+    particles, pairs, starts = kernels.walk_links(near, by, ends, LEAST_PARTICLES)
+    return ChainRows(particles, candidates[pairs], starts, starts - np.arange(len(starts)))
+
+
+def _candidates(
+    frame: NetworkFrame, alpha_rad: float, high: NDArray[np.bool_], axis: Floats
+) -> tuple[Ints, NDArray[np.bool_]]:
+    """The linkable contacts by falling force, and at which end of either axis they link."""
+    inner = np.flatnonzero(frame.between_particles())
+    inner = inner[high[frame.a[inner]] & high[frame.b[inner]]]
+    first, second = frame.a[inner], frame.b[inner]
+    line = frame.centre[second] - frame.centre[first]
+    line /= np.linalg.norm(line, axis=1, keepdims=True)
+    cosine = np.stack(
+        [np.einsum("ci,ci->c", axis[first], line), -np.einsum("ci,ci->c", axis[second], line)]
+    )
+    aligned = np.flatnonzero((np.abs(cosine) >= np.cos(alpha_rad)).all(axis=0))
+    aligned = aligned[np.argsort(-frame.normal_force[inner[aligned]], kind="stable")]
+    return inner[aligned], cosine[:, aligned] > 0
+
+
+# --- paths from the workpiece to the bowl
+# ----------------------------------------------------------
+
+
+def widest_paths(
+    frame: NetworkFrame, threshold: float = THRESHOLD, *, with_workpiece: bool = True
+) -> list[WidestPath]:
+    """Return one path for each strong workpiece contact, by falling force of that contact.
+
+    Contacts whose normal force is above `threshold` times the mean of all the frame's contacts are
+    strong. A path leads from the workpiece contact through strong contacts between particles to a
+    strong contact with floor or side. Of all such paths the widest counts: the one whose weakest
+    contact (its bottleneck, workpiece and bowl contacts included) is strongest; among several the
+    one with the fewest contacts, then the one with the largest sum of forces, then the one that is
+    found first from the workpiece on, level by level, where contacts are taken in the order of the
+    frame. The widest path of a graph runs along its maximum spanning tree (Hu 1961, Oper. Res. 9,
+    898-900); the tie rule is ours.
+
+    With `with_workpiece` false the forces of workpiece contacts play no part, not even in the
+    mean: a path leads from every particle that the workpiece pushes, and its bottleneck is that of
+    the contacts behind that particle.
+    """
+    rows = path_rows(frame, threshold, with_workpiece=with_workpiece)
+    pairs = zip(rows.particle_lists(), _split(rows.contacts, rows.contact_starts), strict=True)
+    return [
+        WidestPath(tuple(particles), tuple(links), _end(frame, links)) for particles, links in pairs
+    ]
+
+
+def _end(frame: NetworkFrame, contacts: list[int]) -> int | None:
+    return int(frame.other[contacts[-1]]) if len(contacts) > 1 else None
+
+
+def path_rows(
+    frame: NetworkFrame, threshold: float = THRESHOLD, *, with_workpiece: bool = True
+) -> ChainRows:
+    """The paths of `widest_paths`; one that leads nowhere has the workpiece contact alone."""
+    force = frame.normal_force
+    strong = np.flatnonzero(force > threshold * frame.mean_force_n(with_workpiece=with_workpiece))
+    pushed = strong if with_workpiece else np.flatnonzero(force > 0.0)
+    workpieces = pushed[frame.other[pushed] == WORKPIECE]
+    workpieces = workpieces[np.argsort(-force[workpieces], kind="stable")]
+    links = strong[frame.other[strong] != WORKPIECE]
+    bowl = frame.particle_id.size
+    ends = frame.a[links], np.where(frame.between_particles()[links], frame.b[links], bowl)
+    strength, start = force[links], frame.a[workpieces]
+    width = kernels.widths(*ends, strength, np.argsort(-strength), bowl + 1, bowl)[start]
+    least = np.minimum(width, force[workpieces]) if with_workpiece else width
+    net, space = kernels.adjacency(*ends, bowl + 1), kernels.search_space(bowl + 1)
+    particles, contacts = [], []
+    for number in range(len(workpieces)):
+        particle, link = start[number : number + 1], links[:0]
+        if width[number] > -np.inf:
+            particle, link = kernels.shortest_path(
+                net, strength, start[number], bowl, least[number], number, space
+            )
+        particles.append(particle)
+        contacts.append(np.append(workpieces[number], links[link]))
+    return ChainRows(_joined(particles), _joined(contacts), _starts(particles), _starts(contacts))
+
+
+def _joined(parts: list[Ints]) -> Ints:
+    return np.concatenate([np.empty(0, dtype=np.int64), *parts])
+
+
+def _starts(parts: list[Ints]) -> Ints:
+    return np.cumsum([0, *map(len, parts)])
+
+
+# --- measures --------------------------------------------------------------------------------
+_COLUMNS: dict[str, str] = {
+    "step": "int64",
+    "time_s": "float64",
+    "definition": "str",
+    "n_particles": "int64",
+    "particle_ids": "object",
+    "bottleneck_n": "float64",
+    "mean_force_n": "float64",
+    "length_m": "float64",
+    "azimuth_rad": "float64",
+    "inclination_rad": "float64",
+    "altitude_m": "float64",
+    "major_stress_mean_pa": "float64",
+    "reaches_bowl": "bool",
+    "end_kind": "str",
+    "dominant": "bool",
+}
+
+
+def chain_table(
+    frame: NetworkFrame,
+    *,
+    alpha_rad: float = ALPHA_RAD,
+    stress_factor: float = STRESS_FACTOR,
+    threshold: float = THRESHOLD,
+) -> pd.DataFrame:
+    """The chains of a frame by both definitions, a row each.
+
+    Returns
+    -------
+    DataFrame
+        ``definition`` (`peters` or `widest_path`), ``n_particles``, ``particle_ids`` (list, in
+        order), ``bottleneck_n`` and ``mean_force_n`` (smallest and mean normal force of the
+        chain's contacts), ``length_m`` (polyline through the centres; a workpiece path's begins at
+        the workpiece contact and ends at the bowl contact), ``azimuth_rad`` (direction from first
+        to last point in the xy plane, counter-clockwise from the workpiece's heading, in (-pi,
+        pi]), ``inclination_rad`` (the same line's angle above the horizontal), ``altitude_m``
+        (mean height of the centres above the floor), ``major_stress_mean_pa`` (peters only),
+        ``reaches_bowl``, ``end_kind`` (`floor`, `side` or `none`) and ``dominant``: the workpiece
+        path of the frame with the largest bottleneck, by mean force where two are equal. A
+        workpiece contact without a path to the bowl has a row with ``reaches_bowl`` false, the
+        particle on the workpiece only, and NaN for bottleneck, mean force, length and angles. A
+        chain by Peters et al. has no direction: it is listed from its higher end, and reaches the
+        bowl if one of its particles touches it; ``end_kind`` is then `none` all the same.
+    """
+    tables = [_peters_table(frame, alpha_rad, stress_factor), _path_table(frame, threshold)]
+    count = sum(len(table["particle_ids"]) for table in tables)
+    moment = {"step": np.full(count, frame.step), "time_s": np.full(count, frame.time_s)}
+    return pd.DataFrame(
+        {
+            name: _column(kind, [moment[name]] if name in moment else [t[name] for t in tables])
+            for name, kind in _COLUMNS.items()
+        }
+    )
+
+
+def _column(kind: str, parts: Sequence[Any]) -> Any:
+    """A column of a table made of its parts."""
+    if kind in ("str", "object"):
+        values = [value for part in parts for value in part]
+        return pd.array(values, dtype="str") if kind == "str" else values
+    return np.concatenate(parts).astype(kind)
+
+
+def dominant_path(
+    frame: NetworkFrame, paths: Iterable[WidestPath], *, with_workpiece: bool = True
+) -> WidestPath | None:
+    """The path to the bowl with the largest bottleneck, or None if no path leads there.
+
+    With `with_workpiece` false the workpiece contacts' forces do not count.
+    """
+
+    def strength(path: WidestPath) -> tuple[float, float]:
+        forces = frame.normal_force[list(path.contacts[0 if with_workpiece else 1 :])]
+        return float(forces.min()), float(forces.mean())
+
+    whole = [path for path in paths if path.end is not None]
+    return max(whole, key=strength) if whole else None
+
+
+def _peters_table(frame: NetworkFrame, alpha_rad: float, stress_factor: float) -> dict[str, Any]:
+    major = major_stress(particle_stress(frame))
+    rows = peters_rows(frame, alpha_rad, stress_factor, major)
+    on_bowl = np.zeros(frame.particle_id.size, dtype=bool)
+    on_bowl[frame.a[(frame.other == FLOOR) | (frame.other == SIDE)]] = True
+    return {
+        **_measures(frame, rows),
+        **_shape(frame, frame.centre[rows.particles], rows.particle_starts),
+        "particle_ids": _ids(frame, rows),
+        "definition": ["peters"] * len(rows),
+        "major_stress_mean_pa": _of_each(rows.particle_starts, major[0][rows.particles], _mean),
+        "reaches_bowl": _of_each(rows.particle_starts, on_bowl[rows.particles], _any),
+        "end_kind": ["none"] * len(rows),
+        "dominant": np.zeros(len(rows), dtype=bool),
+    }
+
+
+def _path_table(frame: NetworkFrame, threshold: float) -> dict[str, Any]:
+    rows = path_rows(frame, threshold)
+    whole = np.diff(rows.contact_starts) > 1
+    first = rows.contacts[rows.contact_starts[:-1]]
+    last = rows.contacts[rows.contact_starts[1:] - 1]
+    starts = rows.particle_starts + 2 * np.arange(len(rows) + 1)
+    points = np.empty((starts[-1], 3))
+    inner = np.ones(len(points), dtype=bool)
+    inner[starts[:-1]] = inner[starts[1:] - 1] = False
+    points[inner] = frame.centre[rows.particles]
+    points[starts[:-1]], points[starts[1:] - 1] = frame.point[first], frame.point[last]
+    found = _measures(frame, rows) | _shape(frame, points, starts)
+    for name in ("bottleneck_n", "mean_force_n", "length_m", "azimuth_rad", "inclination_rad"):
+        found[name] = np.where(whole, found[name], np.nan)
+    order = np.lexsort((-found["mean_force_n"], -found["bottleneck_n"]))
+    dominant = np.zeros(len(rows), dtype=bool)
+    dominant[order[:1]] = whole[order[:1]]
+    kinds = frame.other[last].tolist()
+    return {
+        **found,
+        "particle_ids": _ids(frame, rows),
+        "definition": ["widest_path"] * len(rows),
+        "major_stress_mean_pa": np.full(len(rows), np.nan),
+        "reaches_bowl": whole,
+        "end_kind": [
+            KINDS[kind] if there else "none" for kind, there in zip(kinds, whole, strict=True)
+        ],
+        "dominant": dominant,
+    }
+
+
+def _ids(frame: NetworkFrame, rows: ChainRows) -> list[list[int]]:
+    return _split(frame.particle_id[rows.particles], rows.particle_starts)
+
+
+def _measures(frame: NetworkFrame, rows: ChainRows) -> dict[str, NDArray[Any]]:
+    forces = frame.normal_force[rows.contacts]
+    return {
+        "n_particles": np.diff(rows.particle_starts),
+        "bottleneck_n": _of_each(rows.contact_starts, forces, lambda x: x.min(axis=1)),
+        "mean_force_n": _of_each(rows.contact_starts, forces, _mean),
+        "altitude_m": _of_each(rows.particle_starts, frame.centre[rows.particles, 2], _mean),
+    }
+
+
+def _shape(frame: NetworkFrame, points: Floats, starts: Ints) -> dict[str, Floats]:
+    """Return length and direction of polylines, one after another."""
+    line = points[starts[1:] - 1] - points[starts[:-1]]
+    x, y, z = np.ascontiguousarray(line.T)
+    return {
+        "length_m": _of_each(starts, points, _length),
+        "azimuth_rad": wrap_angle(np.arctan2(y, x) - frame.direction_rad),
+        "inclination_rad": np.arctan2(z, np.hypot(x, y)),
+    }
+
+
+def _of_each(starts: Ints, values: NDArray[Any], measure: Callable[[Any], NDArray[Any]]) -> Floats:
+    """Measure each chain's values: all chains of one length at once, (n, length, ...)."""
+    found = np.empty(len(starts) - 1)
+    lengths = np.diff(starts)
+    for length in np.unique(lengths):
+        which = np.flatnonzero(lengths == length)
+        found[which] = measure(values[starts[which][:, None] + np.arange(length)])
+    return found
+
+
+def _mean(values: NDArray[Any]) -> Floats:
+    return np.asarray(values.mean(axis=1))
+
+
+def _any(values: NDArray[Any]) -> NDArray[np.bool_]:
+    return np.asarray(values.any(axis=1))
+
+
+def _length(points: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1))

@@ -1,0 +1,80 @@
+"""Statistics of the contact network, frame by frame.
+
+Only frames inside the counted stretch of the drag are used: those between the first and the last
+sample that ``workpiece_force.parquet`` marks as ``counted``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dragchain.arrays import Ints
+from dragchain.network.clusters import Clusters, frame_clusters
+from dragchain.network.frame import KINDS, NetworkFrame
+
+LEAST_CONTACTS = 4
+"""A particle with fewer contacts is a rattler. Four is the mean number with which frictional
+spheres are isostatic; Thornton (2000) leaves out only particles with fewer than two."""
+
+
+def contact_counts(frame: NetworkFrame) -> Ints:
+    """The number of contacts of each particle, those with workpiece and bowl included, (N,)."""
+    size = frame.particle_id.size
+    return np.bincount(frame.a, minlength=size) + np.bincount(
+        frame.b[frame.between_particles()], minlength=size
+    )
+
+
+def coordination_number(counts: NDArray[np.integer[Any]]) -> float:
+    """The mean number of contacts per particle.
+
+    Without walls that is 2 M / N for M contacts (Thornton 2000, Geotechnique 50, 43-53); a contact
+    with workpiece or bowl counts once, for the particle.
+    """
+    return float(counts.mean()) if counts.size else float("nan")
+
+
+def mechanical_coordination_number(
+    counts: NDArray[np.integer[Any]], least: int = LEAST_CONTACTS
+) -> float:
+    """The mean number of contacts of the particles that carry load.
+
+    After Thornton (2000, Geotechnique 50, 43-53), whose (2 M - N1) / (N - N0 - N1) is the case
+    ``least=2``: particles with fewer than `least` contacts are left out as carriers, while their
+    contacts still count for the carriers that they touch. NaN where no particle is left.
+    """
+    return coordination_number(counts[counts >= least])
+
+
+def frame_statistics(frame: NetworkFrame, clusters: Clusters | None = None) -> dict[str, float]:
+    """Return one row of ``network.parquet``; forces in N, NaN where a frame has no contact.
+
+    `clusters` is what `frame_clusters` returns for the frame, if it is known already.
+    """
+    clusters = clusters or frame_clusters(frame)
+    counts = contact_counts(frame)
+    normal = frame.normal_force
+    mean = float(normal.mean()) if normal.size else float("nan")
+    of_kind = {
+        f"n_particle_{name}_contacts": int((frame.other == kind).sum())
+        for kind, name in KINDS.items()
+    }
+    return {
+        "step": frame.step,
+        "time_s": frame.time_s,
+        "n_particles": frame.particle_id.size,
+        "n_contacts": normal.size,
+        **of_kind,
+        "coordination_number": coordination_number(counts),
+        "mechanical_coordination_number": mechanical_coordination_number(counts),
+        "rattler_fraction": float((counts < LEAST_CONTACTS).mean())
+        if counts.size
+        else float("nan"),
+        "normal_force_mean_n": mean,
+        "normal_force_max_n": float(normal.max()) if normal.size else float("nan"),
+        "above_mean_fraction": float((normal > mean).mean()) if normal.size else float("nan"),
+        **{f"{name}_n": force for name, force in clusters.percolation_n.items()},
+    }

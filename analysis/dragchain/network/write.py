@@ -1,0 +1,47 @@
+"""The tables of a run's contact network."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from dragchain.errors import TableError
+from dragchain.network.chains import chain_table
+from dragchain.network.clusters import cluster_rows, frame_clusters
+from dragchain.network.frame import read_frames
+from dragchain.network.statistics import frame_statistics
+from dragchain.tables.parquet import TableParts, write_parquet
+
+
+def write_chains(run_dir: Path) -> None:
+    """Write the tables ``network``, ``clusters`` and ``chains`` of a process run.
+
+    They hold the frames of the counted stretch of the drag and no others. One frame is in memory
+    at a time.
+
+    Raises
+    ------
+    TableError
+        If a table is missing, or if the counted stretch holds no network frame.
+    """
+    network: list[dict[str, float]] = []
+    grown: list[dict[str, NDArray[Any]]] = []
+    tables = run_dir / "tables"
+    with TableParts(tables / "chains.parquet") as found:
+        for frame in read_frames(run_dir):
+            clusters = frame_clusters(frame)
+            network.append(frame_statistics(frame, clusters))
+            grown.append(cluster_rows(frame, clusters))
+            found.write(chain_table(frame))
+        if not network:
+            raise TableError(
+                f"{run_dir}: the counted stretch of the drag holds no network frame; "
+                "write the outputs contacts and particles more often or run longer"
+            )
+    write_parquet(pd.DataFrame(network), tables / "network.parquet")
+    columns = {name: np.concatenate([part[name] for part in grown]) for name in grown[0]}
+    write_parquet(pd.DataFrame(columns), tables / "clusters.parquet")

@@ -1,0 +1,1 @@
+"""The report on a study: findings, figures and the page."""

@@ -1,0 +1,83 @@
+"""Pages: each one HTML file that needs no other file and no network.
+
+All pages extend ``page.html.j2``, which has the head, the style and the frame, and share the
+macros of ``macros.html.j2`` and the filters of `dragchain.notation`.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import jinja2
+from PIL import Image
+
+from dragchain.report import notation
+
+LARGE_PICTURE = 200_000
+"""Bytes above which a page holds a picture as WebP; ``figures/`` keeps the PNG."""
+
+HEADING = re.compile(r'<h2 id="([^"]+)">(.*?)</h2>')
+
+Filters = Mapping[str, Callable[..., object]]
+
+
+def render_page(template: str, filters: Filters | None = None, **content: object) -> str:
+    """A page as text.
+
+    Parameters
+    ----------
+    template : str
+        Path below the package, for example ``validation/validation.html.j2``.
+    filters : mapping, optional
+        Filters of this page alone, by name.
+    **content
+        What the template shows. A name that it uses and that is not given is an error.
+    """
+    page = page_environment(filters).get_template(template).render(**content)
+    return page.replace(" %", "\N{NO-BREAK SPACE}%")
+
+
+def page_environment(filters: Filters | None = None) -> jinja2.Environment:
+    """The environment of all pages, with further filters if need be."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("dragchain", ""),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    shared = ("number", "measured", "fixed", "percent", "fraction", "interval")
+    environment.filters |= {name: getattr(notation, name) for name in shared}
+    environment.filters |= {"slug": slug, "sections": sections, **(filters or {})}
+    return environment
+
+
+def slug(title: str) -> str:
+    """A title as the name of an anchor: small letters, digits and hyphens."""
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
+
+
+def sections(body: str) -> list[tuple[str, str]]:
+    """Return anchor and title, as HTML, of every section of a page's body."""
+    return HEADING.findall(body)
+
+
+def data_uri(picture: bytes, kind: str = "png") -> str:
+    """A picture as a data URI, a large PNG as the smaller WebP."""
+    if kind == "png" and len(picture) > LARGE_PICTURE:
+        small = io.BytesIO()
+        with Image.open(io.BytesIO(picture)) as image:
+            image.save(small, format="webp", quality=90)
+        kind, picture = "webp", small.getvalue()
+    return f"data:image/{kind};base64,{base64.b64encode(picture).decode('ascii')}"
+
+
+def file_uri(picture: Path) -> str | None:
+    """A PNG or GIF file as a data URI, None if there is no such file."""
+    if not picture.is_file():
+        return None
+    return data_uri(picture.read_bytes(), picture.suffix.removeprefix("."))

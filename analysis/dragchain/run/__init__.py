@@ -1,0 +1,1 @@
+"""What a run folder says before any dump is read."""

@@ -1,0 +1,258 @@
+"""What a run models (``case.json``) and what its outputs hold (``columns.json``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
+
+from dragchain.documents import Document, Part
+
+Scene = Literal["drop_test", "filling", "process"]
+OutputKind = Literal["print", "custom", "local"]
+
+
+class Fidelity(Part):
+    """How much accuracy a run spends on speed."""
+
+    name: str
+    youngs_modulus_scale: PositiveFloat
+    timestep_fraction: PositiveFloat
+    speed_factor: PositiveFloat
+    skin_m: PositiveFloat
+    ranks: int
+
+
+class Media(Part):
+    """The particles, as asked for in the study."""
+
+    count: int
+    radius_mean_m: PositiveFloat
+    radius_std_m: float
+    density_kg_m3: PositiveFloat
+
+
+class Bowl(Part):
+    """The container: a cylinder about the z axis that stands on z = 0."""
+
+    radius_m: PositiveFloat
+    walls: Literal["primitive", "mesh"]
+
+
+class Workpiece(Part):
+    """The body that is dragged through the particles."""
+
+    kind: Literal["cylinder", "mesh"]
+    radius_m: PositiveFloat
+    length_m: PositiveFloat
+    mesh: str
+    immersion_depth_m: float
+
+
+class Circle(Part):
+    """A drag on a circle about the bowl's axis.
+
+    ``direction`` is seen from above; ``start_direction_rad`` is the direction of
+    motion when the drag begins, from x towards y; a workpiece with the
+    orientation ``follow_path`` turns with its path.
+    """
+
+    kind: Literal["circle"]
+    axis_speed_m_s: PositiveFloat
+    radius_m: PositiveFloat
+    direction: Literal["ccw", "cw"]
+    start_direction_rad: float
+    orientation: Literal["follow_path", "fixed"]
+
+    @property
+    def sign(self) -> int:
+        """1 for a counter-clockwise path, -1 for a clockwise one."""
+        return 1 if self.direction == "ccw" else -1
+
+
+class Line(Part):
+    """A drag along a straight line that leaves ``start_m`` along ``direction_rad``."""
+
+    kind: Literal["line"]
+    axis_speed_m_s: PositiveFloat
+    start_m: tuple[float, float]
+    direction_rad: float
+
+
+class Phase(Part):
+    """A stretch of the run: the steps after ``start_step`` up to ``end_step``."""
+
+    name: str
+    start_step: int
+    end_step: int
+
+
+class Assumption(Part):
+    """A value that the study's source does not give."""
+
+    field: str
+    value: Any
+    why: str
+
+
+class Statistics(Part):
+    """What the statistics of a process leave out."""
+
+    transient_s: float
+
+
+class PublishedDrag(Part):
+    """A drag force that the study's source gives, N; negative: against the motion."""
+
+    drag_mean_n: float
+    drag_std_n: float | None = None
+
+
+class Reference(Part):
+    """Published figures to stand beside the results."""
+
+    source: str
+    experiment: PublishedDrag | None = None
+    simulation: PublishedDrag | None = None
+
+
+class Case(Document):
+    """The content of ``case.json``.
+
+    ``bowl`` is None in a drop test; ``case``, ``workpiece``, ``motion``, ``surface_m``
+    and ``statistics`` are None outside a process; ``restitution`` is None outside a
+    drop test. ``numbers`` are the dimensionless numbers of a process; ``asked`` is
+    the tolerance that its settings were chosen for, if any.
+    """
+
+    study: str
+    scene: Scene
+    run: str
+    case: str | None = None
+    upstream: Mapping[str, str] = {}
+    timestep_s: PositiveFloat
+    rayleigh_time_s: PositiveFloat
+    gravity_m_s2: float
+    fidelity: Fidelity
+    inputs: Mapping[str, Any]
+    numbers: Mapping[str, float] = {}
+    media: Media
+    bowl: Bowl | None = None
+    workpiece: Workpiece | None = None
+    surface_m: PositiveFloat | None = None
+    motion: Annotated[Circle | Line, Field(discriminator="kind")] | None = None
+    phases: tuple[Phase, ...]
+    statistics: Statistics | None = None
+    restitution: float | None = None
+    assumptions: tuple[Assumption, ...]
+    reference: Reference | None = None
+    versions: Mapping[str, str]
+    asked: Mapping[str, Any] | None = None
+
+    @model_validator(mode="after")
+    def _of_its_scene(self) -> Self:
+        needed = {
+            "drop_test": ("restitution",),
+            "filling": ("bowl",),
+            "process": ("bowl", "case", "workpiece", "motion", "surface_m", "statistics"),
+        }
+        for name in needed[self.scene]:
+            assert getattr(self, name) is not None, f"{name} is missing, which a {self.scene} has"
+        for before, after in pairwise(self.phases):
+            assert before.end_step == after.start_step, (
+                f"phases: {after.name} does not start where {before.name} ends"
+            )
+        return self
+
+
+class Output(Part):
+    """One raw output of LIGGGHTS, as ``columns.json`` describes it.
+
+    Frames are expected at ``first_step`` and every ``period_steps`` after it up
+    to ``last_step``. Where that is None LIGGGHTS decides during the run: any
+    of these steps may be left out, and there is no known last one.
+    """
+
+    name: str = ""
+    kind: OutputKind
+    binary: bool
+    pattern: str
+    columns: tuple[str, ...]
+    engine_columns: tuple[str, ...] | None
+    period_steps: PositiveInt
+    first_step: int
+    last_step: int | None
+
+    @property
+    def header(self) -> tuple[str, ...]:
+        """What LIGGGHTS writes in the header of a text file."""
+        return self.columns if self.engine_columns is None else self.engine_columns
+
+    @model_validator(mode="after")
+    def _can_be(self) -> Self:
+        assert self.pattern.count("{part}") == 1, (
+            f"pattern is {self.pattern!r}, without {{part}} once"
+        )
+        assert self.kind == "custom" or not self.binary, f"a {self.kind} output is always text"
+        assert self.columns and len(set(self.columns)) == len(self.columns), (
+            "columns is empty or names a column twice"
+        )
+        assert len(self.header) == len(self.columns), "engine_columns has another length"
+        assert self.kind != "print" or self.columns[0] == "step", (
+            "columns does not begin with step, as a print output must"
+        )
+        return self
+
+
+class Columns(Document):
+    """The content of ``columns.json``."""
+
+    outputs: Mapping[str, Output]
+
+
+def load_case(run_dir: Path | str) -> Case:
+    """Read ``case.json`` of a run folder.
+
+    Parameters
+    ----------
+    run_dir : Path or str
+        The run folder.
+
+    Returns
+    -------
+    Case
+        Its content, checked for the keys that its scene needs.
+
+    Raises
+    ------
+    DocumentError
+        If the file is absent, is not JSON, has another schema number, or lacks
+        a key or has a value of the wrong type.
+    """
+    return Case.read(Path(run_dir) / "case.json")
+
+
+def load_outputs(run_dir: Path | str) -> dict[str, Output]:
+    """Read ``columns.json`` of a run folder.
+
+    Parameters
+    ----------
+    run_dir : Path or str
+        The run folder.
+
+    Returns
+    -------
+    dict of str to Output
+        The raw outputs by name. An output that is not in it was not written.
+
+    Raises
+    ------
+    DocumentError
+        If the file is absent, is not JSON, has another schema number, or lacks
+        a key or has a value of the wrong type.
+    """
+    outputs = Columns.read(Path(run_dir) / "columns.json").outputs
+    return {name: output.model_copy(update={"name": name}) for name, output in outputs.items()}

@@ -1,0 +1,59 @@
+"""Figures of a study's source, to set our own beside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dragchain.errors import TableError
+from dragchain.run.case import Reference
+from dragchain.statistics.estimate import Estimate
+
+
+@dataclass(frozen=True)
+class ReferenceDrag:
+    """A mean drag of the source.
+
+    Attributes
+    ----------
+    label : str
+        ``experiment`` or ``simulation``.
+    mean_n : float
+        In N, not zero.
+    std_n : float or None
+        Its standard deviation in N, None if the source gives none.
+    source : str
+        Where it stands.
+    """
+
+    label: str
+    mean_n: float
+    std_n: float | None
+    source: str
+
+    def difference(self, ours: Estimate) -> Estimate:
+        """Relative difference of our mean to this one; its interval is that of our mean alone."""
+        low, high = sorted(edge / self.mean_n - 1.0 for edge in (ours.ci95_low, ours.ci95_high))
+        return Estimate(ours.value / self.mean_n - 1.0, low, high)
+
+
+def reference_drags(reference: Reference | None) -> list[ReferenceDrag]:
+    """Every mean drag of a study's ``reference``, the experiment first.
+
+    Raises
+    ------
+    TableError
+        If one is zero, and so no force to compare with.
+    """
+    if reference is None:
+        return []
+    found = []
+    for label in ("experiment", "simulation"):
+        drag = getattr(reference, label)
+        if drag is None:
+            continue
+        if drag.drag_mean_n == 0.0:
+            raise TableError(
+                f"case.json: reference.{label}.drag_mean_n is 0, nothing to compare with"
+            )
+        found.append(ReferenceDrag(label, drag.drag_mean_n, drag.drag_std_n, reference.source))
+    return found

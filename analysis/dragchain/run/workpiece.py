@@ -1,0 +1,128 @@
+"""The workpiece: its mesh, its frame and where it is at a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dragchain.arrays import Floats
+from dragchain.errors import TableError
+from dragchain.run.case import Case, Circle
+from dragchain.run.kinematics import motion_of, needed
+
+
+def workpiece_mesh(run_dir: Path, case: Case) -> Any:
+    """Read the workpiece's mesh, as it lies in its file.
+
+    Raises
+    ------
+    TableError
+        If the file is not there.
+    """
+    import pyvista as pv
+
+    path = run_dir / needed(case.workpiece, "workpiece").mesh
+    if not path.is_file():
+        raise TableError(f"{path} is not there, though case.json names it as the workpiece's mesh")
+    return pv.read(path)
+
+
+def placed(workpiece: Any, workpiece_m: Floats, turn_rad: float) -> Any:
+    """The workpiece's mesh turned about the vertical and put to its reference point."""
+    turned = workpiece.rotate_z(np.degrees(turn_rad), inplace=False)
+    return turned.translate(workpiece_m, inplace=False)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The M facets of a workpiece in its own frame.
+
+    The reference point is the origin; +x is the direction of motion when the
+    drag begins, and z is up.
+
+    Attributes
+    ----------
+    corners : (M, 3, 3) ndarray
+        Corners of the facets in the order of the STL file, which is also that
+        of the engine's numbers, from 0, m.
+    """
+
+    corners: Floats
+
+    @property
+    def centres(self) -> Floats:
+        """Centres, (M, 3), m."""
+        return np.asarray(self.corners.mean(axis=1))
+
+    @property
+    def areas(self) -> Floats:
+        """Areas, (M,), m2."""
+        return np.asarray(0.5 * np.linalg.norm(self._crossed(), axis=1))
+
+    @property
+    def normals(self) -> Floats:
+        """Unit normals, (M, 3), by the order of the corners."""
+        return np.asarray(self._crossed() / (2.0 * self.areas)[:, None])
+
+    def _crossed(self) -> Floats:
+        first, second, third = self.corners.transpose(1, 0, 2)
+        return np.asarray(np.cross(second - first, third - first))
+
+
+def workpiece_turn(direction_rad: Floats, case: Case) -> Floats:
+    """Angle of the workpiece's own frame about the vertical at these directions, rad."""
+    motion = motion_of(case)
+    if isinstance(motion, Circle) and motion.orientation == "fixed":
+        return np.full_like(direction_rad, motion.start_direction_rad)
+    return direction_rad
+
+
+def turned(vectors: Floats, angle_rad: Floats | float) -> Floats:
+    """Turn (..., 3) vectors about the vertical."""
+    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-1)
+
+
+def read_surface(run_dir: Path, case: Case) -> Surface:
+    """Read the workpiece's mesh into its own frame.
+
+    The STL file of a user's mesh looks along +x as it is; a cylinder is put into
+    the bed unturned, whatever its heading.
+
+    Raises
+    ------
+    TableError
+        If the file is not there.
+    """
+    import meshio
+
+    workpiece = needed(case.workpiece, "workpiece")
+    file = run_dir / workpiece.mesh
+    if not file.is_file():
+        raise TableError(f"{file} is not there, though case.json names it as the workpiece's mesh")
+    with np.errstate(over="ignore"):
+        mesh = meshio.read(file)
+    corners = np.asarray(mesh.points[mesh.cells_dict["triangle"]], dtype=np.float64)
+    motion = motion_of(case)
+    if workpiece.kind == "cylinder":
+        start = motion.start_direction_rad if isinstance(motion, Circle) else motion.direction_rad
+        corners = turned(corners, -start)
+    return Surface(corners)
+
+
+def off_facet(point_m: Floats, corners: Floats) -> Floats:
+    """The distance of (N, 3) points from (N, 3, 3) triangles, (N,) in m."""
+    edges = np.roll(corners, -1, axis=1) - corners
+    away = point_m[:, None] - corners
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    inside = (np.einsum("ijk,ijk->ij", np.cross(edges, away), normal[:, None]) >= 0).all(axis=1)
+    along = np.einsum("ijk,ijk->ij", away, edges) / np.einsum("ijk,ijk->ij", edges, edges)
+    nearest = corners + np.clip(along, 0.0, 1.0)[..., None] * edges
+    from_edges = np.linalg.norm(point_m[:, None] - nearest, axis=2).min(axis=1)
+    from_plane = np.abs(np.einsum("ij,ij->i", away[:, 0], normal))
+    return np.asarray(np.where(inside, from_plane, from_edges))

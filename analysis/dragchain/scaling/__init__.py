@@ -1,0 +1,1 @@
+"""Power laws of the mean drag."""

@@ -1,0 +1,1 @@
+"""The map of stable and unstable time steps."""

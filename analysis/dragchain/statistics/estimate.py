@@ -1,0 +1,92 @@
+"""A value with its confidence interval."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+CONFIDENCE = 0.95
+"""Level of every interval."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its 95 % confidence interval, NaN where it is not known."""
+
+    value: float
+    ci95_low: float
+    ci95_high: float
+
+    def contains(self, value: float) -> bool:
+        """Whether a value is within the interval."""
+        return self.ci95_low <= value <= self.ci95_high
+
+    def exp(self, factor: float = 1.0, minus: float = 0.0) -> Estimate:
+        """The estimate of ``exp(factor * x) - minus``, for a positive factor."""
+        low, value, high = (
+            np.exp(factor * np.array([self.ci95_low, self.value, self.ci95_high])) - minus
+        )
+        return Estimate(float(value), float(low), float(high))
+
+    def as_json(self) -> dict[str, float | None]:
+        """The numbers by name, None where one is not finite."""
+        return {name: finite(number) for name, number in vars(self).items()}
+
+    def as_columns(self, name: str, unit: str = "") -> dict[str, float]:
+        """The numbers as columns: ``<name>_mean_<unit>``, ``<name>_ci95_low_<unit>`` and so on."""
+        end = f"_{unit}" if unit else ""
+        return {
+            f"{name}_mean{end}": self.value,
+            f"{name}_ci95_low{end}": self.ci95_low,
+            f"{name}_ci95_high{end}": self.ci95_high,
+        }
+
+
+def finite(number: float) -> float | None:
+    """The number, or None where JSON has no way to write it."""
+    return float(number) if np.isfinite(number) else None
+
+
+def estimate_columns(estimates: Sequence[Estimate]) -> dict[str, list[float | None]]:
+    """Estimates as columns ``value``, ``ci95_low`` and ``ci95_high``."""
+    rows = [estimate.as_json() for estimate in estimates]
+    return {name: [row[name] for row in rows] for name in ("value", "ci95_low", "ci95_high")}
+
+
+def student_quantile(degrees: float, confidence: float = CONFIDENCE) -> float:
+    """Half-width of a two-sided interval of Student's t, in standard errors."""
+    from scipy.stats import t
+
+    return float(t.ppf(0.5 + 0.5 * confidence, degrees))
+
+
+def normal_quantile(confidence: float = CONFIDENCE) -> float:
+    """Half-width of a two-sided interval of the normal distribution, in standard deviations."""
+    from statistics import NormalDist
+
+    return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
+
+
+def t_interval(value: float, se: float, degrees: float) -> Estimate:
+    """The value with its interval, from its standard error and the degrees of freedom."""
+    half = student_quantile(degrees) * se
+    return Estimate(value, value - half, value + half)
+
+
+def mean_of(values: ArrayLike) -> Estimate:
+    """The mean of independent values with Student's t interval; NaN for fewer than two."""
+    known = np.asarray(values, dtype=np.float64)
+    mean = float(known.mean()) if known.size else math.nan
+    if known.size < 2:
+        return Estimate(mean, math.nan, math.nan)
+    return t_interval(mean, float(known.std(ddof=1)) / math.sqrt(known.size), known.size - 1)
+
+
+def estimate_from(numbers: Mapping[str, float | None]) -> Estimate:
+    """An estimate from its JSON; NaN for a number that is not known."""
+    value, low, high = (numbers[name] for name in ("value", "ci95_low", "ci95_high"))
+    return Estimate(*(math.nan if number is None else number for number in (value, low, high)))

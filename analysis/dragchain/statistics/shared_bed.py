@@ -1,0 +1,88 @@
+"""Generalised least squares of runs, some of which start from the same bed.
+
+How much those have in common is estimated by the restricted likelihood (Patterson and Thompson
+1971, Biometrika 58, 545), which differs with what else is known: `dragchain.effects` estimates
+one variance of all runs, `dragchain.powerlaw` what comes on top of each run's known error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dragchain.arrays import Floats
+
+
+def same(labels: Sequence[Hashable]) -> Floats:
+    """1 where two runs have the same label, else 0, (N, N)."""
+    numbers = {label: number for number, label in enumerate(dict.fromkeys(labels))}
+    codes = np.array([numbers[label] for label in labels])
+    return np.asarray(codes[:, None] == codes[None, :], dtype=np.float64)
+
+
+def alike(same_bed: Floats, fraction: float) -> Floats:
+    """Covariance of runs of which those from the same bed share a part, over the variance."""
+    return np.asarray((1.0 - fraction) * np.eye(len(same_bed)) + fraction * same_bed)
+
+
+@dataclass(frozen=True)
+class Whitened:
+    """A linear model whose residuals are independent and of equal variance.
+
+    Attributes
+    ----------
+    root : (N, N) ndarray
+        Lower Cholesky factor of the covariance.
+    design : (N, P) ndarray
+    values : (N,) ndarray
+        Design and values, each multiplied by the inverse of `root`.
+    """
+
+    root: Floats
+    design: Floats
+    values: Floats
+
+    @classmethod
+    def of(cls, design: Floats, values: Floats, covariance: Floats) -> Whitened:
+        """Whiten a design (N, P) and values (N,) by their covariance (N, N)."""
+        root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+        left, right = (np.linalg.solve(root, one) for one in (design, values))
+        return cls(root, np.asarray(left), np.asarray(right))
+
+    @cached_property
+    def effects(self) -> Floats:
+        """The effects by least squares, (P,)."""
+        found = np.linalg.lstsq(self.design, self.values, rcond=None)[0]
+        return np.asarray(found, dtype=np.float64)
+
+    @cached_property
+    def residuals(self) -> Floats:
+        """What the effects leave, (N,)."""
+        return np.asarray(self.values - self.design @ self.effects)
+
+    @cached_property
+    def square(self) -> float:
+        """Sum of the squared residuals."""
+        return float(np.sum(self.residuals**2))
+
+    @property
+    def degrees(self) -> int:
+        """Runs less effects."""
+        return int(len(self.values) - self.design.shape[1])
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of the effects for a variance of one, (P, P)."""
+        return np.asarray(np.linalg.inv(self.design.T @ self.design))
+
+    @property
+    def log_determinants(self) -> float:
+        """What the restricted likelihood takes off for the covariance and for the effects.
+
+        Half of the sum of ``ln |V|`` and ``ln |X' V^-1 X|``, V the covariance and X the design.
+        """
+        _, triangle = np.linalg.qr(self.design)
+        return float(np.log(np.diag(self.root)).sum() + np.log(np.abs(np.diag(triangle))).sum())

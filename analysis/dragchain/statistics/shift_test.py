@@ -1,0 +1,209 @@
+"""Tests of a series against events by circular shifts, over several runs.
+
+A shift moves all events of a run by the same number of frames, round the end to the beginning. It
+keeps the autocorrelation of the series and the spacing of the events and breaks only what ties the
+one to the other (as the associations of `dragchain.findings` do). Runs are shifted independently
+of each other, so their joint null distribution is that of the mean over runs of one shift each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import t as student
+
+from dragchain.arrays import Floats, Ints
+
+SHIFTS = 19_999
+"""Random shifts of the joint null distribution: the smallest p-value is 1 in 20,000."""
+
+SEED = 20150101
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Window:
+    """Frames that count for an event: from `first` to `last` frames after it."""
+
+    first: int
+    last: int
+
+
+@dataclass(frozen=True)
+class ShiftTest:
+    """A statistic at the events against its null distribution.
+
+    Attributes
+    ----------
+    value : float
+        Mean over the runs; NaN if no run has a value.
+    low, high : float
+        95 % interval from the spread over the runs (Student's t); NaN for fewer than two.
+    p_greater, p_less, p_two_sided : float
+        Share of shifts, the true position included, whose statistic is at least as large, as
+        small, or as far from the mean of the null distribution.
+    by_run : sequence of float
+        The statistic of every run.
+    """
+
+    value: float
+    ci95_low: float
+    ci95_high: float
+    p_greater: float
+    p_less: float
+    p_two_sided: float
+    by_run: tuple[float, ...]
+
+
+def shifted_means(series: Floats, events: Ints, window: Window) -> Floats:
+    """Mean of a series around the events, for every circular shift of the events.
+
+    Parameters
+    ----------
+    series : (N,) ndarray
+        One value a frame; NaN where there is none. Such frames count in no mean.
+    events : (K,) ndarray of int
+        Frames of the events.
+    window : Window
+        Frames around each event.
+
+    Returns
+    -------
+    (N,) ndarray
+        Element s: events moved s frames later; NaN where no frame has a value.
+    """
+    count = len(series)
+    near = np.zeros(count)
+    offsets = np.arange(window.first, window.last + 1)
+    np.add.at(near, (events[:, None] + offsets).ravel() % count, 1.0)
+    there = np.isfinite(series)
+    sums = _correlate(near, np.where(there, series, 0.0))
+    weights = np.rint(_correlate(near, there.astype(np.float64)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(weights > 0, sums / weights, np.nan))
+
+
+def _correlate(near: Floats, series: Floats) -> Floats:
+    spectrum = np.conj(np.fft.rfft(near)) * np.fft.rfft(series)
+    return np.asarray(np.fft.irfft(spectrum, len(series)))
+
+
+def standardised(series: Floats, means: Floats) -> Floats:
+    """Return means less the series' mean over its standard deviation (divisor N - 1)."""
+    known = series[np.isfinite(series)]
+    spread = float(known.std(ddof=1)) if len(known) > 1 else 0.0
+    if spread == 0.0:
+        return np.full(len(means), np.nan)
+    return np.asarray((means - known.mean()) / spread)
+
+
+def draw_shifts(lengths: Sequence[int], count: int = SHIFTS, seed: int = SEED) -> Ints:
+    """Draw shifts for runs of these numbers of frames, (count, runs); the same every time."""
+    parts = np.random.default_rng(seed).random((count, len(lengths)))
+    return np.asarray(np.floor(parts * np.asarray(lengths)), dtype=np.int64)
+
+
+def joint(by_shift: Sequence[Floats], shifts: Ints) -> Floats:
+    """The mean over runs for each row of `shifts`, runs without a value left out.
+
+    Parameters
+    ----------
+    by_shift : sequence of (N_r, ...) ndarray
+        A run's statistic for each of its circular shifts.
+    shifts : (S, R) ndarray of int
+        A shift for each run, modulo its number of frames.
+    """
+    drawn = np.stack(
+        [run[shifts[:, at] % len(run)] for at, run in enumerate(by_shift)], axis=0
+    )  # fmt: skip
+    there = np.isfinite(drawn)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(there, drawn, 0.0).sum(axis=0) / there.sum(axis=0))
+
+
+def shift_test(
+    by_shift: Sequence[Floats],
+    shifts: Ints,
+    combine: Callable[[Floats], Floats] | None = None,
+) -> ShiftTest:
+    """Test the true position, shift 0 of every run, against joint shifts.
+
+    Parameters
+    ----------
+    by_shift : sequence of (N_r,) or (N_r, k) ndarray
+        As for `joint`.
+    shifts : (S, R) ndarray of int
+        As drawn by `draw_shifts`.
+    combine : callable, optional
+        Turns means over runs, (..., k), into the statistic, (...).
+    """
+    reduce = combine if combine is not None else lambda means: means
+    zero = np.zeros((1, len(by_shift)), dtype=np.int64)
+    value = float(reduce(joint(by_shift, zero))[0])
+    null = reduce(joint(by_shift, shifts))
+    runs = tuple(float(reduce(run[:1])[0]) for run in by_shift)
+    if not np.isfinite(value):
+        return ShiftTest(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, runs)
+    null = null[np.isfinite(null)]
+    middle = null.mean()
+    return ShiftTest(
+        value,
+        *interval(runs),
+        _p_value(null >= value - _ROUNDING),
+        _p_value(null <= value + _ROUNDING),
+        _p_value(np.abs(null - middle) >= abs(value - middle) - _ROUNDING),
+        runs,
+    )
+
+
+def _p_value(reached: np.typing.NDArray[np.bool_]) -> float:
+    return float((1 + reached.sum()) / (1 + len(reached)))
+
+
+def interval(values: ArrayLike, confidence: float = 0.95) -> tuple[float, float]:
+    """Return Student's t interval of the mean of independent values, NaN for fewer than two."""
+    known = np.asarray(values, dtype=np.float64)
+    known = known[np.isfinite(known)]
+    if len(known) < 2:
+        return float("nan"), float("nan")
+    reach = student.ppf(0.5 + confidence / 2, len(known) - 1) * known.std(ddof=1)
+    reach /= np.sqrt(len(known))
+    return float(known.mean() - reach), float(known.mean() + reach)
+
+
+def band(by_shift: Sequence[Floats], shifts: Ints, lags: Ints) -> float:
+    """How far from zero a curve over lags reaches by chance.
+
+    Parameters
+    ----------
+    by_shift : sequence of (N_r,) ndarray
+        A run's standardised statistic for each shift, of events alone (a window of one frame).
+    shifts : (S, R) ndarray of int
+        Shifts of the null distribution.
+    lags : (L,) ndarray of int
+        Lags of the curve in frames.
+
+    Returns
+    -------
+    float
+        The half-width that 95 % of shifted data sets keep at all lags at once.
+    """
+    largest = np.zeros(len(shifts))
+    for lag in lags:
+        curve = joint(by_shift, shifts + lag)
+        np.maximum(largest, np.abs(np.nan_to_num(curve)), out=largest)
+    return float(np.quantile(largest, 0.95))
+
+
+def holm(p_values: ArrayLike) -> Floats:
+    """Adjust p-values for their number (Holm 1979, Scand. J. Statist. 6, 65-70); NaN stays NaN."""
+    given = np.asarray(p_values, dtype=np.float64)
+    adjusted = np.full(given.shape, np.nan)
+    known = np.flatnonzero(np.isfinite(given))
+    order = known[np.argsort(given[known], kind="stable")]
+    factors = np.arange(len(order), 0, -1)
+    adjusted[order] = np.minimum(np.maximum.accumulate(factors * given[order]), 1.0)
+    return adjusted

@@ -1,0 +1,1 @@
+"""From raw outputs to the Parquet tables of a run."""

@@ -1,0 +1,115 @@
+"""The settled bed: how high it stands and how dense it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dragchain.arrays import Floats
+from dragchain.dumps.frame import Frame
+from dragchain.errors import TableError
+from dragchain.run.case import Case
+from dragchain.run.kinematics import needed
+
+
+def describe_bed(particles: Frame, case: Case) -> dict[str, object]:
+    """Describe a settled bed.
+
+    Parameters
+    ----------
+    particles : Frame
+        The last frame of ``particles``, N particles.
+    case : Case
+        The case of the fill.
+
+    Returns
+    -------
+    dict
+        The content of ``packing.json``: ``bed_height_m`` (see `bed_height`),
+        ``top_m`` (the highest point of any particle), ``solid_fraction`` (volume of
+        the particles over that of the bowl up to the fill height), ``particles``,
+        ``radius_mean_m``, ``radius_std_m`` (divisor N, as the study states it)
+        and ``kinetic_energy_ratio``, the mean translational kinetic energy of a
+        particle over what the mean particle gains in a fall through its own diameter,
+        ``mean(m v^2 / 2) / (mean(m) g d)``.
+
+    Raises
+    ------
+    TableError
+        If there are no particles or the bowl is narrower than a particle.
+    """
+    if particles.rows == 0:
+        raise TableError(
+            f"step {particles.step}: the last frame of particles is empty, there is no bed"
+        )
+    radius = particles.vectors("radius_m")[:, 0]
+    bowl_radius = needed(case.bowl, "bowl").radius_m
+    height = bed_height(particles.vectors("x_m", "y_m", "z_m"), radius, bowl_radius)
+    volume = 4.0 / 3.0 * np.pi * radius**3
+    mass = volume * case.media.density_kg_m3
+    energy = 0.5 * mass * (particles.vectors("vx_m_s", "vy_m_s", "vz_m_s") ** 2).sum(axis=1)
+    scale = mass.mean() * case.gravity_m_s2 * 2.0 * radius.mean()
+    return {
+        "bed_height_m": height,
+        "top_m": float((particles.columns["z_m"] + radius).max()),
+        "solid_fraction": float(volume.sum() / (np.pi * bowl_radius**2 * height)),
+        "n_particles": particles.rows,
+        "radius_mean_m": float(radius.mean()),
+        "radius_std_m": float(radius.std()),
+        "kinetic_energy_ratio": float(energy.mean() / scale),
+    }
+
+
+def bed_height(centre_m: Floats, radius_m: Floats, bowl_radius_m: float) -> float:
+    """Mean height at which a thin vertical probe meets the bed.
+
+    The probe comes down at the points of a square grid, one mean particle diameter
+    d apart and centred on the bowl's axis, that lie within R - d/2 of it. It
+    stops on the highest particle above or below which the point lies: at
+    ``z + sqrt(r^2 - s^2)``, s being its horizontal distance from the particle's
+    centre, or on the floor if there is none.
+
+    Parameters
+    ----------
+    centre_m : (N, 3) ndarray
+        Centres, m, from the bowl's axis and floor.
+    radius_m : (N,) ndarray
+        Radii, m.
+    bowl_radius_m : float
+        Inner radius R of the bowl, m.
+
+    Returns
+    -------
+    float
+        The height above the floor, m.
+
+    Raises
+    ------
+    TableError
+        If the bowl is narrower than a particle.
+    """
+    pitch = 2.0 * float(radius_m.mean())
+    reach = bowl_radius_m - 0.5 * pitch
+    if reach < 0.0:
+        raise TableError(
+            f"a particle of {pitch:g} m does not fit into a bowl of {bowl_radius_m:g} m"
+        )
+    half = int(reach / pitch)
+    heights = _probe_heights(centre_m, radius_m, pitch, half)
+    index = np.arange(-half, half + 1)
+    inside = pitch * np.hypot(index[:, None], index[None, :]) <= reach
+    return float(heights[inside].mean())
+
+
+def _probe_heights(centre_m: Floats, radius_m: Floats, pitch: float, half: int) -> Floats:
+    """Heights at the points ``pitch * (i, j)``, i and j from -half to half, shape (M, M)."""
+    heights = np.zeros((2 * half + 1, 2 * half + 1))
+    nearest = np.rint(centre_m[:, :2] / pitch).astype(np.int64)
+    span = int(np.ceil(radius_m.max() / pitch))
+    shifts = range(-span, span + 1)
+    for shift in ((i, j) for i in shifts for j in shifts):
+        point = nearest + np.array(shift)
+        rest = radius_m**2 - ((pitch * point - centre_m[:, :2]) ** 2).sum(axis=1)
+        hit = (rest >= 0.0) & (np.abs(point) <= half).all(axis=1)
+        top = centre_m[hit, 2] + np.sqrt(rest[hit])
+        np.maximum.at(heights, tuple(point[hit].T + half), top)
+    return heights

@@ -1,0 +1,50 @@
+"""Any dump of LIGGGHTS as a Parquet table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from dragchain.dumps.any_dump import dump_files, output_of, steps_of_rows
+from dragchain.dumps.fast_reader import read_batches
+from dragchain.errors import DumpError
+
+
+def dump_to_parquet(
+    source: Path | str, target: Path | str, columns: Sequence[str] | None = None
+) -> int:
+    """Write the frames of a dump into one Parquet table, as they are read.
+
+    Parameters
+    ----------
+    source, columns
+        As in `read_dump`.
+    target : Path or str
+        The table: ``step``, then the dump's columns.
+
+    Returns
+    -------
+    int
+        The number of frames.
+
+    Raises
+    ------
+    TruncatedDumpError, DumpError
+        As in `read_dump`. The table then holds the frames before, as the error says.
+    """
+    from dragchain.tables.parquet import TableWriter
+
+    files = dump_files(source)
+    output = output_of(files[0], columns)
+    frames, broken = 0, None
+    with TableWriter(Path(target), ("step", *output.columns)) as table:
+        try:
+            for batch in read_batches(files, output):
+                table.write({"step": steps_of_rows(batch), **batch.columns})
+                frames += len(batch.steps)
+        except DumpError as error:
+            broken = error
+    if broken is not None:
+        broken.kept = f"{frames} frames, which are in {target}"
+        raise broken
+    return frames

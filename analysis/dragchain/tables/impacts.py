@@ -1,0 +1,137 @@
+"""Impacts of one particle that is dropped on a plate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dragchain.dumps.frame import Columns
+from dragchain.errors import TableError
+from dragchain.tables.by_step import read_table
+
+IMPACTS = (
+    *("impact", "start_time_s", "duration_s", "peak_force_n"),
+    *("speed_in_m_s", "speed_out_m_s", "restitution", "time_since_first_s"),
+)
+"""Columns of ``impacts.parquet``."""
+
+
+def find_impacts(rows: Columns, timestep_s: float) -> dict[str, NDArray[np.generic]]:
+    """Measure every impact in the samples around them.
+
+    The samples are split where steps are missing. In each stretch an impact is
+    an unbroken run of samples with a force, the short pull at the end included
+    that an unlimited damper gives; it starts with the first of them and lasts
+    as many steps as there are. The speeds are those of the sample
+    before and of the sample after it, both in free flight, so one step of
+    gravity off at the most.
+
+    Parameters
+    ----------
+    rows : dict of str to (N,) ndarray
+        ``step time_s z_m vz_m_s force_n``, steps increasing.
+    timestep_s : float
+        The time step, s.
+
+    Returns
+    -------
+    dict of str to (M,) ndarray
+        The columns of ``impacts.parquet``, M impacts numbered from 1 in order
+        of time. ``restitution`` is ``speed_out_m_s / speed_in_m_s``.
+
+    Raises
+    ------
+    TableError
+        If there is no impact, a stretch holds none, or one begins or ends
+        inside an impact.
+    """
+    steps = np.asarray(rows["step"], dtype=np.int64)
+    stretch = np.cumsum(np.diff(steps, prepend=steps[:1] - 1) != 1)
+    touching = np.asarray(rows["force_n"]) != 0.0
+    _check_stretches(steps, stretch, touching)
+    first, last = _runs(touching)
+    speed = np.asarray(rows["vz_m_s"], dtype=np.float64)
+    speed_in, speed_out = -speed[first - 1], speed[last + 1]
+    if not ((speed_in > 0.0) & (speed_out > 0.0)).all():
+        raise TableError("a particle does not come down before, or go up after, one of its impacts")
+    start = np.asarray(rows["time_s"], dtype=np.float64)[first]
+    force = np.asarray(rows["force_n"], dtype=np.float64)
+    return {
+        "impact": np.arange(1, len(first) + 1),
+        "start_time_s": start,
+        "duration_s": (last - first + 1) * timestep_s,
+        "peak_force_n": np.maximum.reduceat(force, first),
+        "speed_in_m_s": speed_in,
+        "speed_out_m_s": speed_out,
+        "restitution": speed_out / speed_in,
+        "time_since_first_s": start - start[0],
+    }
+
+
+def _check_stretches(
+    steps: NDArray[np.int64], stretch: NDArray[np.int64], touching: NDArray[np.bool_]
+) -> None:
+    if not touching.any():
+        raise TableError("impacts holds no sample with a force: the particle never met the plate")
+    begins = np.flatnonzero(np.diff(stretch, prepend=stretch[0] - 1))
+    ends = np.append(begins[1:], len(steps)) - 1
+    for begin, end in zip(begins, ends, strict=True):
+        where = f"impacts, steps {steps[begin]} to {steps[end]}"
+        if not touching[begin : end + 1].any():
+            raise TableError(f"{where}: no force among them; the window missed the impact")
+        if touching[begin] or touching[end]:
+            raise TableError(f"{where}: they begin or end inside an impact; widen the window")
+
+
+def _runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First and last index of each run of true values."""
+    edges = np.diff(mask.astype(np.int8), prepend=0, append=0)
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+
+
+@dataclass(frozen=True)
+class Restitution:
+    """Restitution of all impacts of a drop.
+
+    Attributes
+    ----------
+    mean, lowest, highest : float
+        Of the ratios of speeds.
+    impacts : int
+        Number of impacts.
+    """
+
+    mean: float
+    lowest: float
+    highest: float
+    impacts: int
+
+
+def effective_restitution(run_dir: Path | str) -> Restitution:
+    """Restitution that a drop shows, which need not be the one in its deck.
+
+    With ``limitForce on`` the engine cuts the attractive end of every impact,
+    and with it some of the damping, so a particle rebounds faster than the deck's
+    coefficient says.
+
+    Parameters
+    ----------
+    run_dir : Path or str
+        The run folder of a drop, with its tables made.
+
+    Returns
+    -------
+    Restitution
+        Over all impacts.
+
+    Raises
+    ------
+    TableError
+        If ``impacts.parquet`` is not there.
+    """
+    file = Path(run_dir) / "tables" / "impacts.parquet"
+    ratio = read_table(file, ["restitution"])["restitution"].to_numpy()
+    return Restitution(float(ratio.mean()), float(ratio.min()), float(ratio.max()), len(ratio))

@@ -1,0 +1,226 @@
+"""All contacts of a network frame in one form: point, force on body a, normal part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dragchain.arrays import Floats, Ints, places
+from dragchain.dumps.frame import Frame
+from dragchain.errors import TableError
+from dragchain.tables.workpiece_contacts import WallContacts, tangential_force
+
+KINDS = ("particle-particle", "particle-workpiece", "particle-floor", "particle-side")
+"""Kinds of contact; their position is the code in `ContactRows.kind`."""
+
+BODY = {"particle-workpiece": 0, "particle-floor": -1, "particle-side": -2}
+"""``b_id`` of the bodies that are not particles."""
+
+_CENTRE = ("x_m", "y_m", "z_m")
+_FORCE = ("force_x_n", "force_y_n", "force_z_n")
+_FLOOR = ("floor_force_x_n", "floor_force_y_n", "floor_force_z_n")
+_SIDE = ("side_force_x_n", "side_force_y_n", "side_force_z_n")
+
+
+@dataclass(frozen=True)
+class ContactRows:
+    """N contacts, forces on body a.
+
+    Attributes
+    ----------
+    kind : (N,) ndarray of int8
+        Index into `KINDS`.
+    a_id, b_id : (N,) ndarray of int64
+        Body a, a particle, and body b, a particle or one of `BODY`.
+    point_m, force_n : (N, 3) ndarray
+        Contact point and force on body a.
+    normal_force_n, tangential_force_n, overlap_m : (N,) ndarray
+        Normal part of the force, positive in compression; magnitude of the
+        rest; overlap.
+    """
+
+    kind: NDArray[np.int8]
+    a_id: Ints
+    b_id: Ints
+    point_m: Floats
+    force_n: Floats
+    normal_force_n: Floats
+    tangential_force_n: Floats
+    overlap_m: Floats
+
+
+@dataclass(frozen=True)
+class _Particles:
+    """The particles of a frame in the order of their ids."""
+
+    step: int
+    ids: Ints
+    centres: Floats
+    radii: Floats
+
+    def rows_of(self, ids: Ints) -> Ints:
+        """Row of each particle; an error names the first that is not there."""
+        rows = places(ids, self.ids)
+        lost = np.flatnonzero(rows < 0)
+        if lost.size:
+            raise TableError(
+                f"step {self.step}: particle {int(ids[lost[0]])} is in a contact but not "
+                f"in particles"
+            )
+        return rows
+
+
+def contact_rows(
+    particles: Frame,
+    contacts: Frame,
+    workpiece: WallContacts,
+    bowl: WallContacts,
+    bowl_radius_m: float,
+) -> ContactRows:
+    """Bring the contacts of one step into one form.
+
+    A contact with floor, side or workpiece is one that carries force; overlaps
+    without force (`WallContacts.silent`) are left out.
+
+    Parameters
+    ----------
+    particles, contacts : Frame
+        ``particles`` and ``contacts`` of one step.
+    workpiece, bowl : WallContacts
+        Contacts on the workpiece and on a meshed bowl at the same step.
+    bowl_radius_m : float
+        Inner radius of the bowl, about the z axis.
+
+    Returns
+    -------
+    ContactRows
+        Sorted by kind, body a and body b.
+
+    Raises
+    ------
+    TableError
+        If the frames are of different steps, a particle is there twice, or a contact names an
+        unknown one.
+    """
+    if particles.step != contacts.step:
+        raise TableError(
+            f"contacts has step {contacts.step} where particles has step {particles.step}"
+        )
+    order = np.argsort(particles.columns["particle_id"])
+    known = _Particles(
+        particles.step,
+        np.asarray(particles.columns["particle_id"][order], dtype=np.int64),
+        particles.vectors(*_CENTRE)[order],
+        np.asarray(particles.columns["radius_m"][order], dtype=np.float64),
+    )
+    twice = np.flatnonzero(np.diff(known.ids) == 0)
+    if twice.size:
+        raise TableError(
+            f"step {particles.step}: particles has particle {int(known.ids[twice[0]])} twice"
+        )
+    smallest = float(known.radii.min(initial=np.inf))
+    groups = [
+        _particle_particle(known, contacts),
+        _mesh(workpiece.select(~workpiece.silent), "particle-workpiece"),
+        *_meshed_bowl(bowl.select(~bowl.silent), smallest),
+    ]
+    if _FLOOR[0] in particles.columns:
+        groups.append(_floor(known, particles.vectors(*_FLOOR)[order]))
+    if _SIDE[0] in particles.columns:
+        groups.append(_side(known, particles.vectors(*_SIDE)[order], bowl_radius_m))
+    return _joined(groups)
+
+
+def _particle_particle(particles: _Particles, contacts: Frame) -> ContactRows:
+    """Contact point: centre 1 + (R1 - overlap / 2) n, with n from particle 1 to particle 2."""
+    first = np.asarray(contacts.columns["particle1_id"], dtype=np.int64)
+    second = np.asarray(contacts.columns["particle2_id"], dtype=np.int64)
+    at_first, at_second = particles.rows_of(first), particles.rows_of(second)
+    centre = particles.centres[at_first]
+    between = particles.centres[at_second] - centre
+    away = between / np.linalg.norm(between, axis=1, keepdims=True)
+    overlap = np.asarray(contacts.columns["overlap_m"], dtype=np.float64)
+    point = centre + (particles.radii[at_first] - 0.5 * overlap)[:, None] * away
+    return _rows(
+        "particle-particle", first, second, point, contacts.vectors(*_FORCE), -away, overlap
+    )
+
+
+def _floor(particles: _Particles, force_n: Floats) -> ContactRows:
+    touching = (force_n != 0.0).any(axis=1)
+    normal = np.tile([0.0, 0.0, 1.0], (int(touching.sum()), 1))
+    overlap = particles.radii[touching] - particles.centres[touching, 2]
+    return _wall("particle-floor", particles, touching, force_n[touching], normal, overlap)
+
+
+def _side(particles: _Particles, force_n: Floats, bowl_radius_m: float) -> ContactRows:
+    touching = (force_n != 0.0).any(axis=1)
+    across = particles.centres[touching, :2]
+    distance = np.linalg.norm(across, axis=1)
+    normal = np.column_stack([-across / distance[:, None], np.zeros(len(across))])
+    overlap = particles.radii[touching] - (bowl_radius_m - distance)
+    return _wall("particle-side", particles, touching, force_n[touching], normal, overlap)
+
+
+def _wall(
+    kind: str,
+    particles: _Particles,
+    touching: NDArray[np.bool_],
+    force_n: Floats,
+    normal: Floats,
+    overlap_m: Floats,
+) -> ContactRows:
+    """Contact point where the engine has friction act: R - overlap / 2 from the centre."""
+    ids = particles.ids[touching]
+    reach = particles.radii[touching] - 0.5 * overlap_m
+    point = particles.centres[touching] - reach[:, None] * normal
+    others = np.full(len(ids), BODY[kind])
+    return _rows(kind, ids, others, point, force_n, normal, overlap_m)
+
+
+def _mesh(wall: WallContacts, kind: str) -> ContactRows:
+    others = np.full(len(wall.particle_id), BODY[kind])
+    return _rows(
+        kind, wall.particle_id, others, wall.point_m, wall.force_n, wall.normal, wall.overlap_m
+    )
+
+
+def _meshed_bowl(bowl: WallContacts, smallest_radius_m: float) -> list[ContactRows]:
+    """Contacts with a meshed bowl.
+
+    A side contact lies as high as a particle's centre, or higher.
+    """
+    low = bowl.point_m[:, 2] < 0.5 * smallest_radius_m
+    return [_mesh(bowl.select(low), "particle-floor"), _mesh(bowl.select(~low), "particle-side")]
+
+
+def _rows(
+    kind: str,
+    a_id: Ints,
+    b_id: Ints,
+    point_m: Floats,
+    force_n: Floats,
+    normal: Floats,
+    overlap_m: Floats,
+) -> ContactRows:
+    """Rows of one kind; `normal` points from the contact into body a."""
+    return ContactRows(
+        kind=np.full(len(a_id), KINDS.index(kind), dtype=np.int8),
+        a_id=a_id,
+        b_id=b_id.astype(np.int64),
+        point_m=point_m,
+        force_n=force_n,
+        normal_force_n=np.asarray(np.einsum("ij,ij->i", force_n, normal)),
+        tangential_force_n=tangential_force(force_n, normal),
+        overlap_m=overlap_m,
+    )
+
+
+def _joined(groups: list[ContactRows]) -> ContactRows:
+    names = ContactRows.__dataclass_fields__
+    parts = [np.concatenate([getattr(group, name) for group in groups]) for name in names]
+    rows = ContactRows(*parts)
+    order = np.lexsort((rows.b_id, rows.a_id, rows.kind))
+    return ContactRows(*(getattr(rows, name)[order] for name in names))

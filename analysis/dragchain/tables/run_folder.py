@@ -1,0 +1,51 @@
+"""A run folder: its case, its raw outputs and its tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from dragchain.dumps.frame import Columns, Frame
+from dragchain.dumps.run_parts import iter_frames, iter_prints
+from dragchain.run.case import Case, Output, load_case, load_outputs
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run folder with what its two JSON files say.
+
+    Attributes
+    ----------
+    folder : Path
+        The run folder.
+    case : Case
+        What the run models.
+    outputs : mapping of str to Output
+        The raw outputs that it wrote.
+    """
+
+    folder: Path
+    case: Case
+    outputs: Mapping[str, Output]
+
+    @classmethod
+    def open(cls, run_dir: Path | str) -> Run:
+        """Read ``case.json`` and ``columns.json`` of a run folder."""
+        return cls(Path(run_dir), load_case(run_dir), load_outputs(run_dir))
+
+    def wrote(self, *names: str) -> bool:
+        """Whether the run wrote all these outputs."""
+        return all(name in self.outputs for name in names)
+
+    def table(self, name: str) -> Path:
+        """Path of a table."""
+        return self.folder / "tables" / name
+
+    def frames(self, name: str) -> Iterator[Frame]:
+        """Frames of a dump."""
+        return iter_frames(self.folder, self.outputs[name])
+
+    def prints(self, name: str) -> Iterator[Columns]:
+        """Blocks of rows of a ``fix print`` output."""
+        return iter_prints(self.folder, self.outputs[name])

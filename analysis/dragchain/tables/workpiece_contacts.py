@@ -1,0 +1,289 @@
+"""Contacts on the workpiece: their geometry joined with the forces that were applied.
+
+``workpiece_contacts`` says where the particles touch the workpiece, but its forces are
+evaluated a second time for output; ``workpiece_particles`` says what force each particle
+received. One `RodFrame` joins the two for one step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dragchain.arrays import Floats, Ints
+from dragchain.dumps.frame import Frame
+from dragchain.dumps.run_parts import iter_frames
+from dragchain.errors import TableError
+from dragchain.run.case import Output
+
+BOWL_MESH = 1
+"""``mesh_id`` of a contact when the bowl is a mesh too."""
+
+_POINT = ("point_x_m", "point_y_m", "point_z_m")
+_CENTRE = ("x_m", "y_m", "z_m")
+_FORCE = ("force_x_n", "force_y_n", "force_z_n")
+_VELOCITY = ("vx_m_s", "vy_m_s", "vz_m_s")
+_SPIN = ("wx_rad_s", "wy_rad_s", "wz_rad_s")
+
+
+@dataclass(frozen=True)
+class WallContacts:
+    """N contacts of particles with one body, forces **on the particles**.
+
+    Attributes
+    ----------
+    particle_id, facet_id : (N,) ndarray of int64
+        The particle and the facet of the body.
+    point_m : (N, 3) ndarray
+        Contact point.
+    force_n, evaluated_n : (N, 3) ndarray
+        Force on the particle as applied, and as the engine evaluated it for output.
+    normal : (N, 3) ndarray
+        Unit vector from the contact point to the particle's centre; zero where the
+        particle received no force, because no centre is written then.
+    surface_m_s : (N, 3) ndarray
+        Velocity of the particle's surface at the contact point, v + w x r with r
+        from the particle's centre; NaN where the particle received no force, and
+        everywhere if ``workpiece_particles`` holds no velocities.
+    overlap_m : (N,) ndarray
+        Overlap.
+    silent : (N,) ndarray of bool
+        Contacts of particles that received no force: they overlap, but damping
+        would have made the force attractive and the engine cuts that to zero.
+    """
+
+    particle_id: Ints
+    facet_id: Ints
+    point_m: Floats
+    force_n: Floats
+    evaluated_n: Floats
+    normal: Floats
+    surface_m_s: Floats
+    overlap_m: Floats
+    silent: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        """The number of contacts N."""
+        return len(self.particle_id)
+
+    def select(self, mask: NDArray[np.bool_]) -> WallContacts:
+        """Keep the contacts of a mask of shape (N,)."""
+        return WallContacts(*(getattr(self, name)[mask] for name in self.__dataclass_fields__))
+
+    def normal_force_n(self) -> Floats:
+        """Component of the force along the normal, shape (N,), positive in compression."""
+        return np.asarray(np.einsum("ij,ij->i", self.force_n, self.normal))
+
+    def tangential_force_n(self) -> Floats:
+        """Magnitude of what remains of the force, shape (N,)."""
+        return tangential_force(self.force_n, self.normal)
+
+
+@dataclass(frozen=True)
+class WorkpieceFrame:
+    """What touches the meshes at one step.
+
+    Attributes
+    ----------
+    step : int
+        The step.
+    workpiece, bowl : WallContacts
+        Contacts on the workpiece and, if the bowl is a mesh, on the bowl.
+    unplaced_n : (K, 3) ndarray
+        Forces applied to particles for which no contact was written.
+    opening : bool
+        Whether its forces may have been evaluated anew; see `Frame`.
+    """
+
+    step: int
+    workpiece: WallContacts
+    bowl: WallContacts
+    unplaced_n: Floats
+    opening: bool
+
+
+def tangential_force(force_n: Floats, normal: Floats) -> Floats:
+    """Magnitude of the part of (N, 3) forces that is normal to (N, 3) unit vectors."""
+    along = np.einsum("ij,ij->i", force_n, normal)[:, None] * normal
+    return np.asarray(np.linalg.norm(force_n - along, axis=1))
+
+
+@dataclass(frozen=True)
+class WorkpiecePair:
+    """``workpiece_particles`` and ``workpiece_contacts`` of one step, not joined yet."""
+
+    particles: Frame
+    contacts: Frame
+
+    @property
+    def step(self) -> int:
+        """The step."""
+        return self.particles.step
+
+    def join(self) -> WorkpieceFrame:
+        """Give every contact the force that its particle received; see `join_workpiece_frame`."""
+        return join_workpiece_frame(self.particles, self.contacts)
+
+
+def iter_workpiece_pairs(run_dir: Path, outputs: Mapping[str, Output]) -> Iterator[WorkpiecePair]:
+    """What `iter_workpiece_frames` joins, for those who need some steps only."""
+    particles = iter_frames(run_dir, outputs["workpiece_particles"])
+    contacts = iter_frames(run_dir, outputs["workpiece_contacts"])
+    for particle_frame, contact_frame in zip_longest(particles, contacts):
+        if particle_frame is None or contact_frame is None:
+            raise TableError(
+                "one of workpiece_particles and workpiece_contacts ends before the other"
+            )
+        yield WorkpiecePair(particle_frame, contact_frame)
+
+
+def iter_workpiece_frames(run_dir: Path, outputs: Mapping[str, Output]) -> Iterator[WorkpieceFrame]:
+    """Contacts on the workpiece, step by step.
+
+    Parameters
+    ----------
+    run_dir : Path
+        The run folder.
+    outputs : mapping of str to Output
+        Must hold ``workpiece_particles`` and ``workpiece_contacts``.
+
+    Yields
+    ------
+    RodFrame
+        One for each step of the two outputs.
+
+    Raises
+    ------
+    TableError
+        If the two outputs hold different steps, or a particle comes twice.
+    DumpError
+        If one of them cannot be read.
+    """
+    return (pair.join() for pair in iter_workpiece_pairs(run_dir, outputs))
+
+
+def join_workpiece_frame(particles: Frame, contacts: Frame) -> WorkpieceFrame:
+    """Give every contact the force that its particle received.
+
+    The force of a particle with one contact is that contact's. A particle with k
+    contacts received A in all while E_1 ... E_k were evaluated for output:
+    contact i gets E_i + (A - sum of E) / k, so that the contacts of a particle add
+    up to what moved it.
+
+    Parameters
+    ----------
+    particles, contacts : Frame
+        ``workpiece_particles`` and ``workpiece_contacts`` of one step.
+
+    Returns
+    -------
+    RodFrame
+        The contacts, sorted by particle and facet.
+
+    Raises
+    ------
+    TableError
+        If the frames are of different steps, or a particle comes twice.
+    """
+    if particles.step != contacts.step:
+        raise TableError(
+            f"workpiece_particles has step {particles.step} where workpiece_contacts has "
+            f"step {contacts.step};"
+            " both must be written with one period"
+        )
+    particle_ids = np.asarray(particles.columns["particle_id"], dtype=np.int64)
+    order = np.argsort(particle_ids)
+    order = order[(particles.vectors(*_FORCE)[order] != 0.0).any(axis=1)]
+    known = particle_ids[order]
+    if (np.diff(known) == 0).any():
+        raise TableError(
+            f"step {particles.step}: workpiece_particles holds a particle more than once"
+        )
+    applied = particles.vectors(*_FORCE)[order]
+    centres = particles.vectors(*_CENTRE)[order]
+    motion = _motion(particles, order)
+    contacts = _sorted(contacts)
+    all_contacts = _place(contacts, known, applied, centres, motion)
+    unplaced = np.ones(len(known), dtype=np.bool_)
+    unplaced[np.searchsorted(known, all_contacts.particle_id[~all_contacts.silent])] = False
+    on_bowl = contacts.columns.get("mesh_id", np.zeros(contacts.rows)) == BOWL_MESH
+    return WorkpieceFrame(
+        particles.step,
+        all_contacts.select(~on_bowl),
+        all_contacts.select(on_bowl),
+        applied[unplaced],
+        particles.opening,
+    )
+
+
+def _sorted(contacts: Frame) -> Frame:
+    order = np.lexsort((contacts.columns["facet_id"], contacts.columns["particle_id"]))
+    return Frame(contacts.step, {name: col[order] for name, col in contacts.columns.items()})
+
+
+def _motion(particles: Frame, order: Ints) -> tuple[Floats, Floats]:
+    """Velocity and spin of the particles in `order`, (K, 3) each.
+
+    NaN if the run did not write them.
+    """
+    if not {*_VELOCITY, *_SPIN} <= particles.columns.keys():
+        unknown = np.full((len(order), 3), np.nan)
+        return unknown, unknown
+    return particles.vectors(*_VELOCITY)[order], particles.vectors(*_SPIN)[order]
+
+
+def _place(
+    contacts: Frame,
+    known: Ints,
+    applied: Floats,
+    centres: Floats,
+    motion: tuple[Floats, Floats],
+) -> WallContacts:
+    """Join contacts with the particles `known`, of which all else is given in that order."""
+    ids = np.asarray(contacts.columns["particle_id"], dtype=np.int64)
+    at = np.searchsorted(known, ids)
+    silent = np.append(known, 0)[at] != ids
+    at[silent] = 0
+    evaluated = contacts.vectors(*_FORCE)
+    force = np.zeros_like(evaluated)
+    normal = np.zeros_like(evaluated)
+    surface = np.full_like(evaluated, np.nan)
+    points = contacts.vectors(*_POINT)
+    loud = ~silent
+    force[loud] = _fraction(evaluated[loud], at[loud], applied)
+    normal[loud] = _unit(centres[at[loud]] - points[loud])
+    velocity, spin = (values[at[loud]] for values in motion)
+    surface[loud] = velocity + np.cross(spin, points[loud] - centres[at[loud]])
+    return WallContacts(
+        particle_id=ids,
+        facet_id=np.asarray(contacts.columns["facet_id"], dtype=np.int64),
+        point_m=points,
+        force_n=force,
+        evaluated_n=evaluated,
+        normal=normal,
+        surface_m_s=surface,
+        overlap_m=np.asarray(contacts.columns["overlap_m"], dtype=np.float64),
+        silent=silent,
+    )
+
+
+def _fraction(evaluated: Floats, at: Ints, applied: Floats) -> Floats:
+    """Correct (N, 3) evaluated forces to add up to (K, 3) applied ones, particle by particle."""
+    count = np.bincount(at, minlength=len(applied))
+    total = np.column_stack(
+        [np.bincount(at, weights=evaluated[:, k], minlength=len(applied)) for k in range(3)]
+    )
+    missing = (applied - total)[at] / count[at][:, None]
+    return np.where(count[at][:, None] == 1, applied[at], evaluated + missing)
+
+
+def _unit(vectors: Floats) -> Floats:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    if (length == 0.0).any():
+        raise TableError("a contact point on the workpiece coincides with a particle's centre")
+    return np.asarray(vectors / length)

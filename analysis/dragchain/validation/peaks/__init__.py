@@ -1,0 +1,1 @@
+"""Whether force chains explain the peaks of the drag."""

@@ -1,0 +1,351 @@
+"""The fit of the restitution, on drops whose answer is known on paper."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import binom
+
+from dragchain.calibration.fit import (
+    Sweep,
+    bias_rows,
+    calibrate,
+    emulate,
+    observe,
+    prepare,
+    sample_impact,
+)
+from dragchain.calibration.force_record import Measured, measure
+from dragchain.calibration.results import put_for, result
+from dragchain.calibration.simulated_drops import DropRun, Drops, Purpose, Waveform, waveform
+from dragchain.calibration.synthetic_record import Sensor, coverage, record_of, run_trials
+from dragchain.errors import RecordError, TableError
+
+G, HEIGHT = 9.81, 0.010
+FALL_S = math.sqrt(2 * HEIGHT / G)
+BIAS = 0.02
+"""Made-up engine: it rebounds with the deck's value plus this times (1 - value)."""
+
+
+def rebound(deck: float, bias: float) -> float:
+    return deck + bias * (1 - deck)
+
+
+def paper_drop(
+    deck: float,
+    *,
+    bias: float = 0.0,
+    height: float = HEIGHT,
+    purpose: Purpose = "reference",
+    contact_s: float = 25e-6,
+    jitter: float = 0.0,
+    limit_force: bool = True,
+) -> DropRun:
+    """A drop by the laws of free flight; contacts are sin^1.5, peaks go with v^1.2."""
+    e = rebound(deck, bias) + jitter
+    speeds = math.sqrt(2 * G * height) * e ** np.arange(4)
+    down, impacts = math.sqrt(2 * height / G), []
+    for before, after in pairwise(speeds):
+        time = down + np.linspace(-0.1, 1.1, 601) * contact_s
+        phase = np.clip((time - down) / contact_s, 0, 1)
+        peak = 23.0 * float(before / speeds[0]) ** 1.2
+        force = peak * np.sin(np.pi * phase) ** 1.5
+        middle = down + contact_s / 2
+        impacts.append(Waveform(time, force, down, down + contact_s, middle, peak))
+        down += contact_s + 2 * float(after) / G
+    modulus = 1.0 if purpose != "production" else 0.01
+    return DropRun(purpose, deck, limit_force, height, modulus, 1e-7, 0.01, speeds, tuple(impacts))
+
+
+def paper_drops(
+    bias: float = BIAS, jitter: float = 0.0, peaks: str = "auto", height_std: float = 1e-4
+) -> Drops:
+    """A sweep; production is biased and its contacts are six times as long."""
+    random = np.random.default_rng(0)
+    runs = []
+    for option in (True, False):
+        for deck in np.round(np.arange(0.4, 1.001, 0.05), 2):
+            runs.append(paper_drop(float(deck), limit_force=option))
+            for _ in range(2):
+                noise = float(random.normal(0, jitter))
+                runs.append(
+                    paper_drop(
+                        float(deck),
+                        bias=bias if option else 0.0,
+                        purpose="production",
+                        contact_s=150e-6,
+                        jitter=noise,
+                        limit_force=option,
+                    )
+                )
+    known = {
+        "study": "paper",
+        "pair": "a-b",
+        "height_m": HEIGHT,
+        "height_std_m": height_std,
+        "gravity_m_s2": G,
+        "limit_force": True,
+        "peaks": peaks,
+        "fall_time_s": FALL_S,
+    }
+    return Drops(known, tuple(runs))
+
+
+@pytest.fixture(scope="module")
+def sweep() -> Sweep:
+    return prepare(paper_drops())
+
+
+def record(
+    e: float, *, rate: float = 500e3, noise: float = 0.05, seed: int = 1, height: float = HEIGHT
+) -> Measured:
+    sensor = Sensor(rate, noise, offset_n=4.0, drift_n_per_s=1.0, resolution_n=0.005)
+    made = record_of(paper_drop(e, height=height), sensor, np.random.default_rng(seed))
+    return measure(made, fall_time_s=FALL_S)
+
+
+# --- drops -----------------------------------------------------------------------------------
+
+
+def test_speeds_and_times_at_the_surface_follow_from_free_flight() -> None:
+    """A particle falls from h, touches for 20 us, leaves upwards; samples every 7 us."""
+    radius, fall, up, contact = 0.003, 0.44, 0.31, 20e-6
+    time = np.arange(-50, 60) * 7e-6 + 1e-6
+    before = -fall * time - G * time**2 / 2  # height above the surface, touching at t = 0
+    after = up * (time - contact) - G * (time - contact) ** 2 / 2
+    inside = (time > 0) & (time < contact)
+    gap = np.where(time <= 0, before, np.where(inside, -1e-6, after))
+    speed = np.where(time <= 0, -fall - G * time, up - G * (time - contact))
+    force = np.where(inside, 20.0, 0.0)
+    window = {"time_s": time, "z_m": gap + radius, "vz_m_s": speed, "force_n": force}
+    shape, fast_in, fast_out = waveform(window, radius, G)
+    assert fast_in == pytest.approx(fall, rel=1e-9)
+    assert fast_out == pytest.approx(up, rel=1e-9)
+    assert shape.down_s == pytest.approx(0.0, abs=1e-12)
+    assert shape.up_s == pytest.approx(contact, abs=1e-12)
+
+
+def test_a_window_that_cuts_an_impact_is_refused() -> None:
+    window = {
+        "time_s": np.arange(5.0),
+        "z_m": np.full(5, 0.0029),
+        "vz_m_s": np.zeros(5),
+        "force_n": np.ones(5),
+    }
+    with pytest.raises(TableError, match="not whole"):
+        waveform(window, 0.003, G)
+
+
+def test_the_sweep_is_smooth_and_knows_its_inverse() -> None:
+    drops = paper_drops()
+    model = emulate(drops.select("production", True), HEIGHT, G)
+    for deck in (0.42, 0.68, 0.93):
+        out = rebound(deck, BIAS)
+        assert model.rebound(deck) == pytest.approx(out, abs=1e-10)
+        assert model.flights_s[0](deck) == pytest.approx(2 * FALL_S * out, rel=1e-9)
+        assert model.flights_s[1](deck) == pytest.approx(2 * FALL_S * out**2, rel=1e-9)
+        assert model.inverse(out) == pytest.approx(deck, abs=1e-9)
+    assert model.inverse(0.2) is None
+
+
+def test_the_height_of_a_drop_does_not_matter_to_the_sweep() -> None:
+    runs = [paper_drop(e, height=h) for e in np.linspace(0.4, 1, 8) for h in (0.0098, 0.0101)]
+    model = emulate(runs, HEIGHT, G)
+    assert model.flights_s[0](0.7) == pytest.approx(2 * FALL_S * 0.7, rel=1e-9)
+    assert model.errors.max() < 1e-10
+
+
+def test_a_sweep_of_few_values_is_refused() -> None:
+    with pytest.raises(TableError, match="more than 5 values"):
+        emulate([paper_drop(e) for e in (0.5, 0.6, 0.7, 0.8)], HEIGHT, G)
+
+
+# --- sampling --------------------------------------------------------------------------------
+
+
+def test_fine_sampling_changes_nothing() -> None:
+    measured = record(0.7, rate=20e6, noise=1e-4)
+    shape = paper_drop(0.7).impacts[0]
+    seen = sample_impact(shape, measured, measured.impacts[0].peak_n)
+    assert seen.peak_ratio == pytest.approx(1.0, abs=1e-3)
+    assert seen.time_bias_s == pytest.approx(0.0, abs=1e-9)
+    assert seen.width_s == pytest.approx(
+        2 * math.acos(0.5 ** (1 / 1.5)) / math.pi * 25e-6, rel=1e-3
+    )
+
+
+def test_coarse_sampling_misses_the_peak_by_a_known_share() -> None:
+    """The highest of samples d apart is F(x) with |x| < d/2 and x even: mean by quadrature."""
+    rate = 200e3
+    measured = record(0.7, rate=rate, noise=1e-3)
+    off = np.linspace(-0.5, 0.5, 20001) / rate / 25e-6
+    wanted = np.cos(np.pi * off) ** 1.5
+    seen = sample_impact(paper_drop(0.7).impacts[0], measured, 23.0)
+    error = wanted.std() / math.sqrt(200)
+    assert seen.peak_ratio == pytest.approx(wanted.mean(), abs=5 * error)
+    assert seen.peak_std == pytest.approx(wanted.std(), rel=0.2)
+
+
+def test_a_rate_that_misses_contacts_is_refused() -> None:
+    with pytest.raises(RecordError) as refused:
+        measured = record(0.7, rate=30e3, noise=1e-3, seed=4)
+        sample_impact(paper_drop(0.7).impacts[0], measured, 23.0)
+    assert refused.value.reason in ("coarse", "impacts")
+
+
+def test_the_first_impact_is_in_every_uncertainty(sweep: Sweep) -> None:
+    measured = record(0.7)
+    samplings = [sample_impact(shape, measured, 20.0) for shape in sweep.reference_runs[5].impacts]
+    got = observe(measured, samplings, with_peaks=True)
+    assert got.covariance.shape == (4, 4)
+    assert got.covariance[0, 1] == pytest.approx(samplings[0].time_std_s ** 2)
+    assert got.covariance[0, 0] == pytest.approx(
+        samplings[0].time_std_s ** 2 + samplings[1].time_std_s ** 2
+    )
+    assert not got.covariance[:2, 2:].any()
+
+
+# --- the fit ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("e", [0.5, 0.68, 0.9])
+def test_the_bias_of_production_is_corrected(sweep: Sweep, e: float) -> None:
+    """The particle rebounds with e; production must be given (e - b) / (1 - b)."""
+    got = calibrate(record(e), sweep)
+    put = (e - BIAS) / (1 - BIAS)
+    assert got.fit.low < put < got.fit.high
+    assert got.fit_reference.low < e < got.fit_reference.high
+    assert got.fit.high - got.fit.low < 1e-3
+    assert abs(put - e) > got.fit.high - got.fit.low  # what would be wrong without it
+
+
+def test_a_wrong_height_is_found_out(sweep: Sweep) -> None:
+    """0.2 mm off, twice its stated uncertainty: the ratio of the flights does not know it."""
+    got = calibrate(record(0.68, height=0.0102), sweep)
+    assert got.fit.height_m == pytest.approx(0.0102, abs=5e-6)
+    assert got.fit.low < (0.68 - BIAS) / (1 - BIAS) < got.fit.high
+
+
+def test_a_particle_that_rebounds_unevenly_widens_the_interval(sweep: Sweep) -> None:
+    """As a spinning or uneven particle does: chi square tells, and the interval grows."""
+    measured = record(0.68)
+    third = measured.impacts[2]
+    late = type(third)(**{**vars(third), "centroid_s": third.centroid_s + 1.5e-3})
+    uneven = Measured(**{**vars(measured), "impacts": (*measured.impacts[:2], late)})
+    good, bad = calibrate(measured, sweep).fit, calibrate(uneven, sweep).fit
+    assert good.p_value is not None and bad.p_value is not None
+    assert good.p_value > 0.01 > bad.p_value
+    assert bad.inflation == pytest.approx(math.sqrt(bad.chi2 / bad.degrees))
+    assert bad.high - bad.low > 3 * (good.high - good.low)
+
+
+def test_a_slow_sensor_gives_its_times_only(sweep: Sweep) -> None:
+    """A low pass of 60 us spreads each impact: peaks then go with the impulse, not the force."""
+    made = record_of(paper_drop(0.68), Sensor(1e6, 0.0), np.random.default_rng(1))
+    kernel = np.exp(-np.arange(600) / 60.0)
+    slow = np.convolve(made.force_n, kernel / kernel.sum())[: len(made.force_n)]
+    slow += np.random.default_rng(2).normal(0, 0.01, len(slow))
+    measured = measure(type(made)(made.time_s, slow, made.interval_s), fall_time_s=FALL_S)
+    got = calibrate(measured, sweep)
+    assert not got.with_peaks
+    assert "too slow" in got.why
+    assert got.fit.low < (0.68 - BIAS) / (1 - BIAS) < got.fit.high
+    forced = calibrate(measured, prepare(paper_drops(peaks="yes")))
+    assert forced.with_peaks
+    assert forced.fit.chi2 > 20 * got.fit.chi2  # what comparing them would have done
+
+
+def test_two_impacts_cannot_be_tested(sweep: Sweep) -> None:
+    measured = record(0.68)
+    two = Measured(**{**vars(measured), "impacts": measured.impacts[:2]})
+    times_only = prepare(paper_drops(peaks="no"))
+    got = calibrate(two, times_only)
+    assert (got.fit.degrees, got.fit.p_value, got.fit.inflation) == (0, None, 1.0)
+    assert got.fit.low < (0.68 - BIAS) / (1 - BIAS) < got.fit.high
+    # one flight and a height known to 1 %: the restitution is known to half of that
+    half = (got.fit.high - got.fit.low) / 2
+    assert half == pytest.approx(1.96 * 0.5 * 0.01 * 0.68 / (1 - BIAS), rel=0.02)
+
+
+@pytest.mark.parametrize("e", [0.3, 0.39])
+def test_a_restitution_outside_the_sweep_is_refused(sweep: Sweep, e: float) -> None:
+    with pytest.raises(RecordError) as refused:
+        calibrate(record(e, noise=0.01), sweep)
+    assert refused.value.reason == "range"
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    e=st.floats(0.5, 0.9),
+    rate=st.floats(250e3, 2e6),
+    noise=st.floats(0.01, 0.2),
+    seed=st.integers(0, 10**6),
+)
+def test_any_rate_and_noise_recovers_the_rebound(
+    sweep: Sweep, e: float, rate: float, noise: float, seed: int
+) -> None:
+    """Twice the interval's half width: far outside, something is biased, not unlucky."""
+    got = calibrate(record(e, rate=rate, noise=noise, seed=seed), sweep).fit_reference
+    half = max(got.high - got.restitution, got.restitution - got.low)
+    assert abs(got.restitution - e) < 2 * half
+
+
+def test_intervals_hold_what_they_say() -> None:
+    """160 records of one drop, against a sweep without any error of its own.
+
+    The interval is 95 %, so the number that holds is binomial: within the
+    limits but for one chance in 1,000.
+    """
+    count = 160
+    rows = run_trials([paper_drop(0.68)], prepare(paper_drops()), seed=5, sensors=count)
+    low, high = binom.ppf([5e-4, 1 - 5e-4], count, 0.95)
+    assert low <= sum(row["deck_held"] for row in rows) <= high
+    assert high < count  # an interval that always holds would fail
+
+
+# --- tables ----------------------------------------------------------------------------------
+
+
+def test_the_bias_table_is_the_rebound_of_the_drops() -> None:
+    rows = bias_rows(paper_drops())
+    for row in rows:
+        biased = row["purpose"] == "production" and row["limit_force"]
+        wanted = rebound(row["restitution_deck"], BIAS if biased else 0.0)
+        assert row["restitution_effective"] == pytest.approx(wanted, abs=1e-9)
+    assert len(rows) == 4 * 13
+
+
+def test_what_to_put_is_read_off_each_curve() -> None:
+    rows = put_for(paper_drops(), {"value": 0.7, "low": 0.69, "high": 0.71})
+    (used,) = [row for row in rows if row["used"]]
+    assert used["value"] == pytest.approx((0.7 - BIAS) / (1 - BIAS), abs=1e-9)
+    for row in rows:
+        if not row["used"]:
+            assert row["value"] == pytest.approx(0.7, abs=1e-9)
+
+
+def test_the_result_names_the_field_and_the_value(sweep: Sweep) -> None:
+    got = result(calibrate(record(0.68), sweep), paper_drops())
+    assert got["put"]["field"] == "pairs.a-b.restitution"
+    assert got["put"]["value"] == pytest.approx((0.68 - BIAS) / (1 - BIAS), abs=1e-3)
+    assert got["direct"]["first_impact"] == pytest.approx(0.68, abs=1e-3)
+    assert got["direct"]["second_impact"] == pytest.approx(0.68, abs=1e-3)
+    assert got["correction"] == pytest.approx(-BIAS * (1 - 0.68) / (1 - BIAS), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("held", "low", "high"),
+    [(9, 0.5550, 0.9975), (10, 0.6915, 1.0), (0, 0.0, 0.3085)],
+)
+def test_coverage_with_the_interval_of_clopper_and_pearson(
+    held: int, low: float, high: float
+) -> None:
+    """n = 10: for none and all, 1 - 0.025^(1/10) = 0.3085 exactly."""
+    got = coverage([True] * held + [False] * (10 - held))
+    assert got["low"] == pytest.approx(low, abs=1e-4)
+    assert got["high"] == pytest.approx(high, abs=1e-4)

@@ -1,0 +1,316 @@
+"""A measured drop test: what is read, what is found, what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from dragchain.calibration.force_record import (
+    Measured,
+    check_samples,
+    measure,
+    parse_record,
+    read_record,
+)
+from dragchain.errors import RecordError
+
+Floats = NDArray[np.float64]
+
+FALL_S = 0.045
+STARTS_S = (0.0200, 0.0850, 0.1320)
+PEAKS_N = (23.5, 15.8, 10.7)
+CONTACT_S = 200e-6
+"""Longer than a ceramic particle's, so that slow rates can be tried."""
+
+
+def half_sines(time_s: Floats, power: float = 1.0) -> Floats:
+    """Impacts of known start, duration and peak: sin^power over the contact."""
+    force = np.zeros_like(time_s)
+    for start, peak in zip(STARTS_S, PEAKS_N, strict=True):
+        phase = (time_s - start) / CONTACT_S
+        inside = (phase > 0) & (phase < 1)
+        force[inside] += peak * np.sin(np.pi * phase[inside]) ** power
+    return force
+
+
+def samples(
+    rate_hz: float = 500e3,
+    *,
+    noise_n: float = 0.05,
+    offset_n: float = 0.0,
+    drift_n_per_s: float = 0.0,
+    power: float = 1.0,
+    phase: float = 0.3,
+    seed: int = 1,
+) -> tuple[Floats, Floats]:
+    time = (np.arange(int(0.15 * rate_hz)) + phase) / rate_hz
+    noise = np.random.default_rng(seed).normal(0.0, noise_n, len(time))
+    return time, half_sines(time, power) + offset_n + drift_n_per_s * time + noise
+
+
+def found(time_s: Floats, force_n: Floats) -> Measured:
+    return measure(check_samples(time_s, force_n), fall_time_s=FALL_S)
+
+
+# --- what is found ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("power", [1.0, 1.5])
+def test_known_pulses_are_found(power: float) -> None:
+    """Half sines, and sin^1.5, which a Hertz impact nearly is: middle, peak, impulse, width."""
+    got = found(*samples(offset_n=3.0, drift_n_per_s=0.5, power=power))
+    step = got.interval_s
+    for impact, start, peak in zip(got.impacts, STARTS_S, PEAKS_N, strict=True):
+        assert impact.centroid_s == pytest.approx(start + CONTACT_S / 2, abs=0.2 * step)
+        assert impact.peak_time_s == pytest.approx(start + CONTACT_S / 2, abs=10 * step)
+        assert impact.peak_n == pytest.approx(peak, abs=5 * 0.05)
+        assert start <= impact.start_s <= start + 0.1 * CONTACT_S
+    first = got.impacts[0]
+    if power == 1.0:
+        assert first.impulse_n_s == pytest.approx(2 / np.pi * PEAKS_N[0] * CONTACT_S, rel=2e-3)
+    half = 2 * np.arccos(0.5 ** (1 / power)) / np.pi * CONTACT_S
+    assert first.width_s == pytest.approx(half, rel=0.03)
+
+
+def test_baseline_and_noise_are_found() -> None:
+    got = found(*samples(noise_n=0.08, offset_n=-7.0, drift_n_per_s=2.0))
+    count = 0.15 * 500e3
+    assert got.offset_n == pytest.approx(-7.0, abs=6 * 2 * 0.08 / np.sqrt(count))
+    assert got.drift_n_per_s == pytest.approx(
+        2.0, abs=6 * np.sqrt(12) / 0.15 * 0.08 / np.sqrt(count)
+    )
+    assert got.noise_n == pytest.approx(0.08, rel=0.03)  # a median deviation of 7e4: 0.4 %
+
+
+def test_a_ringing_sensor_makes_no_more_impacts() -> None:
+    time, force = samples()
+    for start in STARTS_S:
+        since = time - start - CONTACT_S
+        ring = 4.0 * np.exp(-since / 3e-4) * np.sin(2 * np.pi * 2e4 * since)
+        force += np.where(since > 0, ring, 0.0)
+    got = found(time, force)
+    assert [impact.start_s for impact in got.impacts] == pytest.approx(list(STARTS_S), abs=1e-5)
+
+
+def test_a_negative_force_is_turned_and_said() -> None:
+    time, force = samples(offset_n=1.0)
+    upright, turned = found(time, force), found(time, -force)
+    assert turned.impacts == upright.impacts
+    assert any("sign" in note for note in turned.notes)
+    assert not upright.notes
+
+
+def test_two_impacts_are_enough_but_it_is_said() -> None:
+    time, force = samples()
+    got = found(time[time < 0.12], force[time < 0.12])
+    assert len(got.impacts) == 2
+    assert any("only 2 impacts" in note for note in got.notes)
+
+
+def test_only_the_first_three_count() -> None:
+    time, force = samples()
+    late = (time - 0.146) / CONTACT_S
+    force += np.where((late > 0) & (late < 1), 7 * np.sin(np.pi * np.clip(late, 0, 1)), 0)
+    assert len(found(time, force).impacts) == 3
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    rate=st.floats(40e3, 1.5e6),
+    phase=st.floats(0, 1, exclude_max=True),
+    offset=st.floats(-50, 50),
+    seed=st.integers(0, 10**6),
+)
+def test_any_rate_gives_the_same_times(rate: float, phase: float, offset: float, seed: int) -> None:
+    """From 8 samples an impact up, the times since the first are right to a quarter interval."""
+    got = found(*samples(rate, phase=phase, offset_n=offset, seed=seed))
+    since = np.array([impact.centroid_s for impact in got.impacts]) - got.impacts[0].centroid_s
+    wanted = np.array(STARTS_S) - STARTS_S[0]
+    assert np.abs(since - wanted).max() < 0.25 * got.interval_s + 1e-7
+
+
+# --- reading ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("header", "time_unit", "force_unit"),
+    [
+        ("time_s,force_n", 1.0, 1.0),
+        ("time_ms;force_kn", 1e-3, 1e3),
+        ("force_mn\ttime_us", 1e-6, 1e-3),
+        ("Channel,TIME_S , Force_N", 1.0, 1.0),
+    ],
+)
+def test_columns_say_their_unit(header: str, time_unit: float, force_unit: float) -> None:
+    mark = next(mark for mark in (";", "\t", ",") if mark in header)
+    names = [name.strip().lower() for name in header.split(mark)]
+    rows = [
+        mark.join(str({"t": k, "f": 2 * k, "c": 9}[name[0]]) for name in names) for k in range(3)
+    ]
+    time, force = parse_record("\n".join(["# a comment", header, *rows]))
+    assert time == pytest.approx(np.arange(3) * time_unit)
+    assert force == pytest.approx(2 * np.arange(3) * force_unit)
+
+
+def test_a_file_is_read(tmp_path: Path) -> None:
+    time, force = samples(50e3)
+    file = tmp_path / "record.csv"
+    rows = [f"{t:.7f},{f:.3f}" for t, f in zip(time, force, strict=True)]
+    file.write_text("\n".join(["time_s,force_n", *rows]))
+    record = read_record(file)
+    assert record.interval_s == pytest.approx(2e-5, rel=1e-6)
+    assert record.force_n == pytest.approx(force, abs=5.1e-4)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "columns"),
+        ("t,f\n0,1\n", "columns"),
+        ("time_s,time_ms,force_n\n0,0,1\n", "columns"),
+        ("time_s;force_n\n0,1;2,5\n", "numbers"),
+        ("time_s,force_n\n0,high\n", "numbers"),
+        ("time_s,force_n\n0,1\n1e-5,2\n", "short"),
+    ],
+)
+def test_a_file_that_is_none_is_refused(tmp_path: Path, text: str, reason: str) -> None:
+    file = tmp_path / "record.csv"
+    file.write_text(text)
+    with pytest.raises(RecordError) as refused:
+        read_record(file)
+    assert refused.value.reason == reason
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RecordError, match="cannot be read"):
+        read_record(tmp_path / "none.csv")
+
+
+# --- refusals --------------------------------------------------------------------------------
+
+Change = Callable[[Floats, Floats], tuple[Floats, Floats]]
+
+
+def swapped(time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    time = time.copy()
+    time[[500, 501]] = time[[501, 500]]
+    return time, force
+
+
+def stamped_twice(time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    time = time.copy()
+    time[501] = time[500]
+    return time, force
+
+
+def with_a_hole(time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    keep = np.ones(len(time), dtype=bool)
+    keep[30_000:30_100] = False
+    return time[keep], force[keep]
+
+
+def not_a_number(time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    force = force.copy()
+    force[77] = np.nan
+    return time, force
+
+
+def late_trigger(time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    keep = time > STARTS_S[0] - 1e-5
+    return time[keep], force[keep]
+
+
+def drowned(time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    return time, force + np.random.default_rng(2).normal(0, 3.5, len(time))
+
+
+def nothing(time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    return time, force - half_sines(time)
+
+
+def one_impact(time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    return time[time < 0.08], force[time < 0.08]
+
+
+def slow(time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    """4 kHz: one sample every 250 us in contacts of 200 us."""
+    at = slice(7 + 5, None, 125)  # some sample falls into the first contact
+    return time[at], force[at]
+
+
+def long_flight(time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    """A second particle, or a hand: the next impact is later than a rebound can be."""
+    force = force - half_sines(time)
+    for start, peak in ((0.02, 23.5), (0.05, 15.8), (0.13, 10.7)):
+        phase = (time - start) / CONTACT_S
+        force = force + np.where(
+            (phase > 0) & (phase < 1), peak * np.sin(np.pi * np.clip(phase, 0, 1)), 0
+        )
+    return time, force
+
+
+REFUSALS: dict[str, tuple[Change, str]] = {
+    "time runs backwards": (swapped, "time"),
+    "a time given twice": (stamped_twice, "time"),
+    "samples are missing": (with_a_hole, "uneven"),
+    "not a number": (not_a_number, "numbers"),
+    "the trigger came late": (late_trigger, "baseline"),
+    "noise as high as the impacts": (drowned, "baseline"),
+    "no impact": (nothing, "impacts"),
+    "one impact": (one_impact, "impacts"),
+    "sampled too coarsely": (slow, "coarse"),
+    "not one particle's impacts": (long_flight, "order"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSALS)
+def test_what_cannot_be_used_is_refused(name: str) -> None:
+    change, reason = REFUSALS[name]
+    found(*samples())  # without the change it can be used
+    with pytest.raises(RecordError) as refused:
+        found(*change(*samples()))
+    assert refused.value.reason == reason
+    assert refused.value.limit or refused.value.remedy
+
+
+@pytest.mark.parametrize("rate", [50e3, 200e3, 1e6, 5e6])
+@pytest.mark.parametrize("level", [6.0, 12.0, 20.0])
+def test_a_clipped_converter_is_refused(rate: float, level: float) -> None:
+    """Clipped at one, two or all three impacts, as a converter does: after the noise."""
+    time, force = samples(rate, offset_n=2.0)
+    with pytest.raises(RecordError) as refused:
+        found(time, np.minimum(force, level + 2.0))
+    assert refused.value.reason == "clipped"
+
+
+@pytest.mark.parametrize("rate", [200e3, 1e6, 5e6])
+def test_a_clipped_amplifier_is_refused(rate: float) -> None:
+    """Noise on top of the flat part, so that no two samples are equal."""
+    time, force = samples(rate, noise_n=0.0)
+    noise = np.random.default_rng(3).normal(0.0, 0.02, len(time))
+    with pytest.raises(RecordError) as refused:
+        found(time, np.minimum(force, 12.0) + noise)
+    assert refused.value.reason == "clipped"
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    rate=st.floats(40e3, 1.5e6),
+    phase=st.floats(0, 1, exclude_max=True),
+    bits=st.integers(10, 16),
+    noise=st.floats(0.002, 0.3),
+    seed=st.integers(0, 10**6),
+)
+def test_a_whole_record_is_never_called_clipped(
+    rate: float, phase: float, bits: int, noise: float, seed: int
+) -> None:
+    """Whatever rate and resolution: Hertz-like impacts are not flat."""
+    time, force = samples(rate, phase=phase, noise_n=noise, power=1.5, seed=seed)
+    quantum = 50.0 / 2**bits
+    assert len(found(time, np.round(force / quantum) * quantum).impacts) == 3

@@ -1,0 +1,607 @@
+"""What other programs' readers find in an export is what the tables hold."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+import pyvista as pv
+from paths import ROOT
+from tiny_run_files import CHAIN_Z_M, LAST, RADIUS_M, TIMESTEP_S, workpiece_x_m
+
+from dragchain.cli import main
+from dragchain.errors import ExportError, TableError
+from dragchain.export.chain_membership import Membership, chain_membership
+from dragchain.export.folder import fresh_folder
+from dragchain.export.frames import Moments, Selection
+from dragchain.export.write import write_export
+from dragchain.network.chains import (
+    WidestPath,
+    chain_table,
+    dominant_path,
+    peters_chains,
+    widest_paths,
+)
+from dragchain.network.frame import NetworkFrame, read_frames
+from dragchain.network.statistics import contact_counts
+from dragchain.network.write import write_chains
+from dragchain.tables.run_folder import Run
+from dragchain.tables.write import write_tables
+
+STEPS = range(0, LAST + 1, 20)
+COUNTED = range(40, LAST + 1, 20)
+PLACE = ["x_m", "y_m", "z_m"]
+SPEED = ["vx_m_s", "vy_m_s", "vz_m_s"]
+SPIN = ["wx_rad_s", "wy_rad_s", "wz_rad_s"]
+FORCE = ["force_x_n", "force_y_n", "force_z_n"]
+
+
+@pytest.fixture
+def run(tiny_run: Path) -> Path:
+    """Return the tiny run with its tables, chains and a mesh of the workpiece."""
+    write_tables(tiny_run)
+    write_chains(tiny_run)
+    workpiece = pv.Cylinder(center=(0, 0, 0.03), direction=(0, 0, 1), radius=0.005, height=0.06)
+    workpiece.triangulate().save(tiny_run / "workpiece.stl")
+    return tiny_run
+
+
+def table(run_dir: Path, name: str) -> pd.DataFrame:
+    return pd.read_parquet(run_dir / "tables" / f"{name}.parquet")
+
+
+def series(file: Path) -> dict[float, Any]:
+    """Read every time of a PVD file."""
+    reader = pv.PVDReader(file)
+    found = {}
+    for time_s in reader.time_values:
+        reader.set_active_time_value(time_s)
+        (found[time_s],) = reader.read()
+    return found
+
+
+# --- ParaView --------------------------------------------------------------------------------
+
+
+def test_paraview_reads_what_the_tables_hold(run: Path) -> None:
+    done = write_export(run, "paraview")
+    assert done.file == run / "export/paraview/run.pvd"
+    particles, contacts = table(run, "particles"), table(run, "contacts")
+    found = series(done.file)
+    assert list(found) == sorted(set(particles["time_s"])) == [s * TIMESTEP_S for s in STEPS]
+    for time_s, blocks in found.items():
+        assert blocks.keys() == ["particles", "contacts", "workpiece"]
+        of_particles = particles[particles["time_s"] == time_s].sort_values("particle_id")
+        points = blocks["particles"]
+        np.testing.assert_array_equal(points.points, of_particles[PLACE])
+        np.testing.assert_array_equal(points["id"], of_particles["particle_id"])
+        np.testing.assert_array_equal(points["radius"], of_particles["radius_m"])
+        np.testing.assert_array_equal(points["v"], of_particles[SPEED])
+        np.testing.assert_array_equal(points["omega"], of_particles[SPIN])
+        of_contacts = contacts[contacts["time_s"] == time_s]
+        lines = blocks["contacts"]
+        assert lines.n_lines == lines.n_cells == len(of_contacts)
+        np.testing.assert_array_equal(lines["id1"], of_contacts["a_id"])
+        np.testing.assert_array_equal(lines["id2"], of_contacts["b_id"])
+        np.testing.assert_array_equal(lines["force_n"], of_contacts[FORCE])
+        for name in ("normal_force_n", "tangential_force_n", "overlap_m"):
+            np.testing.assert_array_equal(lines[name], of_contacts[name])
+
+
+def test_the_parts_are_series_of_their_own_too(run: Path) -> None:
+    folder = write_export(run, "paraview").file.parent
+    whole = series(folder / "run.pvd")
+    for name in ("particles", "contacts", "workpiece"):
+        part = series(folder / f"{name}.pvd")
+        assert list(part) == list(whole)
+        assert all(part[time_s] == whole[time_s][name] for time_s in whole)
+
+
+def test_lines_go_from_centre_to_centre_or_to_the_contact_point(run: Path) -> None:
+    last = list(series(write_export(run, "paraview").file).values())[-1]
+    lines, particles = last["contacts"], last["particles"]
+    contacts = table(run, "contacts")
+    point = contacts[contacts["step"] == LAST][["point_x_m", "point_y_m", "point_z_m"]].to_numpy()
+    centre = dict(zip(particles["id"].tolist(), particles.points, strict=True))
+    kinds = {
+        0: "particle-particle",
+        1: "particle-workpiece",
+        2: "particle-floor",
+        3: "particle-side",
+    }
+    assert contacts[contacts["step"] == LAST]["kind"].tolist() == [kinds[k] for k in lines["kind"]]
+    ends = lines.points[lines.lines.reshape(-1, 3)[:, 1:]]
+    for row, (start, end) in enumerate(ends):
+        other = int(lines["id2"][row])
+        np.testing.assert_array_equal(start, centre[int(lines["id1"][row])])
+        np.testing.assert_array_equal(end, centre[other] if other > 0 else point[row])
+
+
+def test_each_particle_has_its_contacts_and_its_stress(run: Path) -> None:
+    """Particle 1 touches workpiece and particle 2, particle 2 the side too, 3 floor and 4, and 4
+    only 3."""
+    particles = list(series(write_export(run, "paraview").file).values())[-1]["particles"]
+    assert dict(zip(particles["id"], particles["coordination_number"], strict=True)) == {
+        1: 2, 2: 2, 3: 2, 4: 1
+    }  # fmt: skip
+    force = table(run, "contacts").query(f"step == {LAST} and kind == 'particle-workpiece'")[
+        "normal_force_n"
+    ]
+    volume = 4 / 3 * np.pi * RADIUS_M**3
+    along = 2 * RADIUS_M * float(force.iloc[0]) / volume  # of the chain, less the shear's part
+    assert particles["major_stress_pa"][0] == pytest.approx(along, rel=0.05)
+
+
+def test_chains_mark_particles_and_contacts_where_they_were_searched(run: Path) -> None:
+    """The chain from the workpiece over particles 1 and 2 to the side is the only, dominant
+    path."""
+    found = series(write_export(run, "paraview").file)
+    for step, blocks in zip(STEPS, found.values(), strict=True):
+        particles, lines = blocks["particles"], blocks["contacts"]
+        on_path = np.isin(particles["id"], [1, 2])
+        in_path = np.isin(lines["id1"], [1, 2])
+        assert in_path.sum() == (3 if step >= 20 else 0)
+        for name in ("widest_paths", "dominant"):
+            if step in COUNTED:
+                np.testing.assert_array_equal(particles[name], on_path)
+                np.testing.assert_array_equal(lines[name], in_path)
+            else:
+                assert (particles[name] == -1).all() and (lines[name] == -1).all()
+        assert set(particles["peters_chain"]) == {
+            0 if step in COUNTED else -1
+        }  # three particles at least
+
+
+def test_without_chain_tables_there_are_no_chains(run: Path) -> None:
+    (run / "tables/chains.parquet").unlink()
+    blocks = next(iter(series(write_export(run, "paraview").file).values()))
+    for name in ("particles", "contacts"):
+        assert not {"peters_chain", "widest_paths", "dominant"} & set(blocks[name].array_names)
+
+
+def test_the_workpiece_is_where_the_force_was_measured(run: Path) -> None:
+    stl = pv.read(run / "workpiece.stl")
+    for step, blocks in zip(
+        STEPS, series(write_export(run, "paraview").file).values(), strict=True
+    ):
+        moved = stl.points + np.array([workpiece_x_m(step), 0.0, 0.02])
+        np.testing.assert_allclose(blocks["workpiece"].points, moved, atol=1e-8)
+        assert blocks["workpiece"].n_cells == stl.n_cells
+
+
+def test_the_workpiece_turns_with_its_path(run: Path, edit_json) -> None:
+    def circle(case: dict[str, Any]) -> None:
+        case["motion"] = {
+            "kind": "circle", "axis_speed_m_s": 1e-4, "radius_m": 0.02, "direction": "ccw",
+            "start_direction_rad": 0.0, "orientation": "follow_path",
+        }  # fmt: skip
+
+    edit_json(run / "case.json", circle)
+    force = table(run, "workpiece_force").assign(direction_rad=np.pi / 2)
+    force.to_parquet(run / "tables/workpiece_force.parquet")
+    workpiece = series(write_export(run, "paraview").file)[LAST * TIMESTEP_S]["workpiece"]
+    x, y, z = pv.read(run / "workpiece.stl").points.T
+    moved = np.column_stack([workpiece_x_m(LAST) - y, x, z + 0.02])
+    np.testing.assert_allclose(workpiece.points, moved, atol=1e-8)
+
+
+def test_a_frame_without_contacts_has_none(run: Path) -> None:
+    contacts = table(run, "contacts")
+    contacts[contacts["step"] != 60].to_parquet(run / "tables/contacts.parquet")
+    (run / "tables/chains.parquet").unlink()
+    folder = write_export(run, "paraview").file.parent
+    lines = series(folder / "contacts.pvd")
+    assert [mesh.n_cells for mesh in lines.values()] == [2, 5, 5, 0, 5, 5]
+    particles = series(folder / "particles.pvd")[60 * TIMESTEP_S]
+    assert set(particles["coordination_number"]) == {0}
+
+
+def test_a_filling_has_particles_only(run: Path, edit_json) -> None:
+    edit_json(
+        run / "case.json", lambda case: case.update(scene="filling", workpiece=None, motion=None)
+    )
+    edit_json(
+        run / "columns.json",
+        lambda content: content["outputs"].pop("contacts"),
+    )
+    for format_ in ("paraview", "xyz"):
+        folder = write_export(run, format_).file.parent
+    assert "Coordination" not in (folder / "run.xyz").read_text()
+    found = series(run / "export/paraview/run.pvd")
+    assert {tuple(blocks.keys()) for blocks in found.values()} == {("particles",)}
+    assert not (run / "export/paraview/contacts.pvd").exists()
+
+
+# --- chain membership ------------------------------------------------------------------------
+
+
+def random_frame(seed: int) -> NetworkFrame:
+    """Return 40 particles in a cube with random forces; several of them press the workpiece
+    twice."""
+    rng = np.random.default_rng(seed)
+    centre = rng.random((40, 3))
+    pairs = np.array([(i, j) for i in range(40) for j in range(i) if rng.random() < 0.15])
+    walls = rng.integers(0, 40, 60)
+    body = rng.choice([0, -1, -2], 60)
+    a, b = np.concatenate([pairs[:, 0], walls]), np.concatenate([pairs[:, 1], np.full(60, -1)])
+    inner = b >= 0
+    point = centre[a] + 0.05 * rng.normal(size=(a.size, 3))
+    point[inner] = (centre[a] + centre[b])[inner] / 2
+    normal = rng.gamma(2.0, 1.0, a.size)
+    return NetworkFrame(
+        step=1, time_s=0.1, direction_rad=0.0, particle_id=np.arange(1, 41) * 3, centre=centre,
+        radius=np.full(40, 0.1), a=a, b=b,
+        other=np.concatenate([np.ones(len(pairs), dtype=int), body]),
+        point=point, force=(centre[a] - point) * normal[:, None], normal_force=normal,
+    )  # fmt: skip
+
+
+def test_membership_from_the_table_is_that_of_the_search() -> None:
+    doubles = ends = 0
+    for frame in map(random_frame, range(40)):
+        found = chain_membership(frame, chain_table(frame))
+        paths = widest_paths(frame)
+        check_membership(frame, found, paths)
+        doubles += len(paths) - len({path.particles[0] for path in paths})
+        ends += sum(path.end is not None for path in paths)
+    assert doubles > 10 and ends > 100  # of one particle with two contacts on the workpiece; in all
+
+
+def check_membership(frame: NetworkFrame, found: Membership, paths: list[WidestPath]) -> None:
+    whole = [path for path in paths if path.end is not None]
+    particles, contacts = np.zeros(40, dtype=int), np.zeros(frame.a.size, dtype=int)
+    for path in whole:
+        particles[list(path.particles)] += 1
+        contacts[list(path.contacts)] += 1
+    np.testing.assert_array_equal(found.particle_paths, particles)
+    np.testing.assert_array_equal(found.contact_paths, contacts)
+    best = dominant_path(frame, paths)
+    assert best is not None
+    assert set(np.flatnonzero(found.contact_dominant)) == set(best.contacts)
+    assert set(np.flatnonzero(found.particle_dominant)) == set(best.particles)
+    for number, chain in enumerate(peters_chains(frame), start=1):
+        assert set(np.flatnonzero(found.particle_peters == number)) == set(chain)
+        assert (found.contact_peters == number).sum() == len(chain) - 1
+
+
+def test_a_chain_that_the_frame_does_not_have_is_an_error(run: Path) -> None:
+    chains = table(run, "chains")
+    chains["particle_ids"] = [[1, 77] for _ in range(len(chains))]
+    chains.to_parquet(run / "tables/chains.parquet")
+    with pytest.raises(TableError, match="a chain of step 40 has a particle that"):
+        write_export(run, "paraview")
+    chains["particle_ids"] = [[1, 4] for _ in range(len(chains))]
+    chains.to_parquet(run / "tables/chains.parquet")
+    with pytest.raises(TableError, match="a chain of step 40 has a contact that"):
+        write_export(run, "paraview")
+
+
+# --- extended XYZ ----------------------------------------------------------------------------
+
+
+def read_xyz(file: Path) -> list[tuple[dict[str, str], dict[str, np.ndarray]]]:
+    """Read extended XYZ by the letter: each frame's keys, and the columns that it declares."""
+    lines = iter(file.read_text().splitlines())
+    frames = []
+    for count in lines:
+        keys = dict(word.split("=", 1) for word in shlex.split(next(lines)))
+        rows = [next(lines).split(" ") for _ in range(int(count))]
+        words, columns, at = keys["Properties"].split(":"), {}, 0
+        for name, kind, width in zip(words[::3], words[1::3], map(int, words[2::3]), strict=True):
+            read = {"S": str, "I": int, "R": float}[kind]
+            columns[name] = np.array([[read(v) for v in row[at : at + width]] for row in rows])
+            at += width
+        assert all(len(row) == at for row in rows)
+        frames.append((keys, columns))
+    return frames
+
+
+def test_xyz_holds_what_the_tables_hold(run: Path) -> None:
+    done = write_export(run, "xyz")
+    assert done.file == run / "export/xyz/run.xyz"
+    particles = table(run, "particles")
+    frames = read_xyz(done.file)
+    assert [int(keys["Timestep"]) for keys, _ in frames] == list(STEPS)
+    last = None
+    for (keys, columns), last in zip(frames, read_frames(run, (0, LAST)), strict=True):
+        step = int(keys["Timestep"])
+        rows = particles[particles["step"] == step].sort_values("particle_id")
+        assert float(keys["Time"]) == rows["time_s"].iloc[0]
+        workpiece_m = [float(value) for value in keys["workpiece_m"].split()]
+        np.testing.assert_allclose(workpiece_m, [workpiece_x_m(step), 0.0, 0.02], rtol=1e-14)
+        assert keys["pbc"] == "F F F" and "Lattice" not in keys
+        assert list(columns) == [
+            "species", "id", "pos", "velo", "omega", "radius", "Coordination"
+        ]  # fmt: skip
+        assert set(columns["species"].ravel()) == {"X"}
+        np.testing.assert_array_equal(columns["id"].ravel(), rows["particle_id"])
+        np.testing.assert_array_equal(columns["pos"], rows[PLACE])
+        np.testing.assert_array_equal(columns["velo"], rows[SPEED])
+        np.testing.assert_array_equal(columns["omega"], rows[SPIN])
+        np.testing.assert_array_equal(columns["radius"].ravel(), rows["radius_m"])
+        np.testing.assert_array_equal(columns["Coordination"].ravel(), contact_counts(last))
+    assert last is not None and (frames[-1][1]["pos"][:2, 2] == CHAIN_Z_M).all()
+
+
+# --- which frames ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("selection", "steps"),
+    [
+        (Selection(), [0, 20, 40, 60, 80, 100]),
+        (Selection(first_s=0.04), [40, 60, 80, 100]),
+        (Selection(first_s=0.0401, last_s=0.0801), [40, 60, 80]),
+        (Selection(first_s=0.041, last_s=0.079), [60]),
+        (Selection(every=4), [0, 80]),
+        (Selection(first_s=0.02, every=3), [20, 80]),
+    ],
+)
+def test_frames_are_those_asked_for(run: Path, selection: Selection, steps: list[int]) -> None:
+    frames = read_xyz(write_export(run, "xyz", selection=selection).file)
+    assert [int(keys["Timestep"]) for keys, _ in frames] == steps
+
+
+def test_row_groups_and_batches_may_cut_a_frame(run: Path, monkeypatch) -> None:
+    whole = write_export(run, "paraview", run / "whole").file.parent
+    for name in ("particles", "contacts", "workpiece_force", "chains"):
+        table(run, name).to_parquet(run / f"tables/{name}.parquet", row_group_size=3)
+    monkeypatch.setattr("dragchain.tables.by_step.PIECE_ROWS", 2)
+    cut = write_export(run, "paraview", run / "cut").file.parent
+    files = sorted(file.relative_to(whole) for file in whole.rglob("*.vt*"))
+    assert len(files) == 6 * 4
+    assert all((whole / file).read_bytes() == (cut / file).read_bytes() for file in files)
+
+
+def test_row_groups_without_a_wanted_frame_are_not_read(run: Path, monkeypatch) -> None:
+    table(run, "particles").to_parquet(run / "tables/particles.parquet", row_group_size=4)
+    for name in ("contacts", "workpiece_force"):
+        table(run, name).to_parquet(run / f"tables/{name}.parquet")
+    moments = Moments.of(Run.open(run), Selection(first_s=0.02, every=4))
+    assert moments.steps.tolist() == [20, 100]
+    read: list[int] = []
+    plain = pq.ParquetFile.read_row_group
+
+    def noted(file, number, **options):
+        if file.num_row_groups > 1:
+            read.append(number)
+        return plain(file, number, **options)
+
+    monkeypatch.setattr(pq.ParquetFile, "read_row_group", noted)
+    assert [moment.step for moment in moments] == [20, 100]
+    assert read == [1, 5]
+
+
+# --- errors ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["particles", "contacts", "workpiece_force"])
+def test_a_missing_table_is_named_with_its_command(run: Path, name: str) -> None:
+    (run / f"tables/{name}.parquet").unlink()
+    with pytest.raises(TableError, match=rf"{name}.parquet is not there: run `dragchain tables"):
+        write_export(run, "xyz")
+    assert not any((run / "export").glob("*"))
+
+
+def test_a_missing_mesh_of_the_workpiece_is_an_error(run: Path) -> None:
+    (run / "workpiece.stl").unlink()
+    with pytest.raises(TableError, match=r"workpiece.stl is not there, though case.json names it"):
+        write_export(run, "paraview")
+
+
+def test_steps_that_fall_are_an_error(run: Path) -> None:
+    table(run, "contacts")[::-1].to_parquet(run / "tables/contacts.parquet")
+    (run / "tables/chains.parquet").unlink()
+    with pytest.raises(TableError, match=r"contacts.parquet .*: step 80 comes after step 100: .*"):
+        write_export(run, "xyz")
+
+
+def test_chains_without_a_column_name_the_command_that_makes_them(run: Path) -> None:
+    file = run / "tables/chains.parquet"
+    table(run, "chains").drop(columns="dominant").to_parquet(file)
+    with pytest.raises(TableError, match=r"no column dominant: .* again: dragchain chains"):
+        write_export(run, "xyz")
+
+
+def test_an_unknown_format_is_an_error(run: Path, capsys) -> None:
+    with pytest.raises(ExportError, match="'vtk', not one of paraview, xyz"):
+        write_export(run, "vtk")
+    with pytest.raises(SystemExit) as caught:
+        main(["export", str(run), "--to", "vtk"])
+    assert caught.value.code == 2
+
+
+def test_an_interval_without_frames_says_where_they_are(run: Path) -> None:
+    with pytest.raises(ExportError, match=r"no frame from 0.5 s to 0.7 s\n.* of 0 to 0.1 s\n"):
+        write_export(run, "xyz", selection=Selection(0.5, 0.7))
+    with pytest.raises(ExportError, match="--every is 0"):
+        write_export(run, "xyz", selection=Selection(every=0))
+
+
+def test_a_run_without_particles_has_nothing_to_export(run: Path, edit_json) -> None:
+    edit_json(run / "columns.json", lambda content: content["outputs"].pop("particles"))
+    with pytest.raises(ExportError, match="wrote no output particles"):
+        write_export(run, "paraview")
+
+
+# --- the folder ------------------------------------------------------------------------------
+
+
+def test_the_list_names_every_file(run: Path) -> None:
+    done = write_export(run, "paraview", selection=Selection(every=2))
+    folder = done.file.parent
+    listed = json.loads((folder / "export.json").read_text())
+    found = {str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file()}
+    assert set(listed["files"]) == found - {"export.json"}
+    assert listed["run"] == "tiny-00000000" and listed["frames"] == done.frames == 3
+    assert (
+        listed["bytes"]
+        == done.size
+        == sum((folder / name).stat().st_size for name in found)
+        - (folder / "export.json").stat().st_size
+    )
+
+
+def test_an_export_is_not_written_over_unasked(run: Path) -> None:
+    folder = write_export(run, "xyz").file.parent
+    before = {file: file.read_bytes() for file in folder.iterdir()}
+    with pytest.raises(ExportError, match="holds an export already"):
+        write_export(run, "xyz", selection=Selection(every=2))
+    assert {file: file.read_bytes() for file in folder.iterdir()} == before
+
+
+def test_replacing_takes_the_files_of_the_export_and_no_others(run: Path) -> None:
+    folder = write_export(run, "paraview").file.parent
+    (folder / "mine.pvsm").write_text("a state of ParaView")
+    (folder / "frames/mine.txt").write_text("notes")
+    write_export(run, "paraview", selection=Selection(0.1), replace=True)
+    assert len(series(folder / "run.pvd")) == 1
+    assert (folder / "mine.pvsm").read_text() == "a state of ParaView"
+    assert sorted(file.name for file in (folder / "frames").iterdir()) == [
+        "100", "100.vtm", "mine.txt"
+    ]  # fmt: skip
+
+
+def test_a_file_of_the_user_is_never_written_over(run: Path) -> None:
+    folder = write_export(run, "paraview", selection=Selection(0.1)).file.parent
+    (folder / "frames/000.vtm").write_text("mine")
+    with pytest.raises(ExportError, match=r"000.vtm is in the way"):
+        write_export(run, "paraview", replace=True)
+    assert (folder / "frames/000.vtm").read_text() == "mine"
+    assert len(series(folder / "run.pvd")) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{}", "does not list an export"),
+        ("run.xyz", "does not list an export"),
+        ('{"files": ["../mine.txt"]}', "names files of other folders"),
+    ],
+)
+def test_a_list_that_is_none_removes_nothing(run: Path, text: str, message: str) -> None:
+    folder = write_export(run, "xyz").file.parent
+    (folder.parent / "mine.txt").write_text("notes")
+    (folder / "export.json").write_text(text)
+    with pytest.raises(ExportError, match=message):
+        write_export(run, "xyz", replace=True)
+    assert (folder.parent / "mine.txt").exists() and (folder / "run.xyz").exists()
+
+
+@pytest.mark.parametrize("replace", [False, True])
+def test_a_folder_with_other_files_is_left_alone(run: Path, tmp_path: Path, replace: bool) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    write_export(run, "xyz", mine)
+    shutil.move(mine / "run.xyz", mine / "export.json")
+    (mine / "export.json").rename(mine / "data.xyz")
+    with pytest.raises(ExportError, match="files that are no export"):
+        write_export(run, "xyz", mine, replace=replace)
+    with pytest.raises(ExportError, match="is a file, not a folder"):
+        write_export(run, "xyz", mine / "data.xyz", replace=replace)
+    assert [file.name for file in mine.iterdir()] == ["data.xyz"]
+
+
+def test_nothing_is_left_of_an_export_that_ends_early(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), fresh_folder(tmp_path / "a/b", replace=False) as folder:
+        (folder / "half").write_text("written")
+        raise KeyboardInterrupt
+    assert not any((tmp_path / "a").iterdir())
+
+
+def test_no_more_is_written_than_the_disk_has_room_for(run: Path, monkeypatch) -> None:
+    usage = shutil.disk_usage(run)._replace(free=20_000)
+    monkeypatch.setattr("shutil.disk_usage", lambda folder: usage)
+    told: list[str] = []
+    with pytest.raises(ExportError, match=r"no room for 6 frames\n.*\n.* 0 MB are free"):
+        write_export(run, "paraview", report=told.append)
+    assert told[0].startswith("6 frames, about 0.")
+    assert not any((run / "export").iterdir())
+
+
+# --- the command -----------------------------------------------------------------------------
+
+
+def test_the_command_tells_size_and_file(run: Path, tmp_path: Path, capsys) -> None:
+    arguments = ["--to", "xyz", "--out", str(tmp_path / "out"), "--from-time", "0.04"]
+    assert main(["export", str(run), *arguments, "--to-time", "0.08", "--every", "2"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told == ["2 frames, about 0.0 MB", f"2 frames, 0.0 MB: {tmp_path / 'out/run.xyz'}"]
+    assert main(["export", str(run), *arguments]) == 1
+    assert "holds an export already" in capsys.readouterr().err
+    assert main(["export", str(run), *arguments, "--replace"]) == 0
+
+
+def test_the_pages_lines_run(run: Path, monkeypatch) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/export.md").read_text(), re.DOTALL)
+    monkeypatch.chdir(write_export(run, "paraview").file.parent)
+    names: dict[str, Any] = {}
+    exec(code, names)
+    assert names["spheres"].n_cells > 4 * 100
+    assert names["pushed"].n_cells == 3
+
+
+PEAK = """
+import re, sys
+from pathlib import Path
+from dragchain.export import frames
+from dragchain.export.write import write_export
+import pyvista
+
+def peak():
+    status = Path("/proc/self/status").read_text()
+    return 1024 * int(re.search(r"VmHWM:\\s*(\\d+)", status).group(1))
+
+frames._BATCH_ROWS = 8192  # which the short run fills too
+short, long, to = sys.argv[1:]
+write_export(short, to)
+before = peak()
+assert write_export(long, to).frames == 240
+print(before, peak())
+"""
+
+
+@pytest.mark.parametrize("to", ["paraview", "xyz"])
+def test_memory_does_not_grow_with_the_run(run: Path, tmp_path: Path, to: str) -> None:
+    """Twelve times the frames take no more than a few batches of rows more."""
+    for name, frames in (("short", 20), ("long", 240)):
+        shutil.copytree(run, tmp_path / name)
+        for drop in ("chains", "network"):
+            (tmp_path / name / f"tables/{drop}.parquet").unlink()
+        make_long(run, tmp_path / name, frames)
+    command = [sys.executable, "-c", PEAK, tmp_path / "short", tmp_path / "long", to]
+    before, after = map(int, subprocess.check_output(command, text=True).split())
+    print(before, after)
+    assert after - before < 20e6
+
+
+def make_long(run: Path, folder: Path, frames: int) -> None:
+    """Repeat the last frame with 300 times its particles and contacts."""
+    last = {name: table(run, name).query(f"step == {LAST}") for name in ("particles", "contacts")}
+    for name, ids in (("particles", ["particle_id"]), ("contacts", ["a_id", "b_id"])):
+        many = pd.concat([last[name]] * 300, ignore_index=True)
+        for column in ids:
+            shift = 4 * np.repeat(np.arange(300), len(last[name]))
+            many[column] += np.where(many[column] > 0, shift, 0)
+        parts = [many.assign(step=20 * n, time_s=0.02 * n) for n in range(frames)]
+        file = folder / f"tables/{name}.parquet"
+        pd.concat(parts).to_parquet(file, row_group_size=8192)
+    force = table(run, "workpiece_force")
+    steps = np.arange(2, 20 * frames, 2)
+    rows = force.iloc[np.zeros(len(steps), dtype=int)].assign(step=steps)
+    rows.to_parquet(folder / "tables/workpiece_force.parquet", row_group_size=512)
+
+
+def test_moments_are_as_many_as_they_say(run: Path) -> None:
+    moments = Moments.of(Run.open(run), Selection(every=2))
+    assert len(moments) == 3 == len(list(moments))

@@ -1,0 +1,330 @@
+"""Load, sliding and friction work on a workpiece, on contacts made by hand."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import pyvista as pv
+from changed import changed
+from loading_files import (
+    DT,
+    FRAMES,
+    HIT,
+    MU,
+    PLATE,
+    REST,
+    ROLL,
+    SIZE,
+    SLIDE,
+    SPEED,
+    START,
+    case_json,
+    contact,
+    made_contacts,
+    write_run,
+)
+from PIL import Image
+
+from dragchain.errors import TableError
+from dragchain.loading.contact_events import Thresholds, event_types, find_events, surfaces
+from dragchain.loading.samples import sample
+from dragchain.loading.write import read_loading, write_loading
+from dragchain.run.case import Circle, load_case
+from dragchain.run.kinematics import workpiece_velocity
+from dragchain.run.workpiece import off_facet, read_surface, turned
+from dragchain.tables.workpiece_contacts import WallContacts
+from dragchain.tables.write import workpiece_contact_rows
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = write_run(tmp_path_factory.mktemp("made") / "run", made_contacts())
+    write_loading(folder)
+    return folder
+
+
+@pytest.fixture
+def facets(run: Path) -> pd.DataFrame:
+    return pd.read_parquet(run / "tables/facets.parquet")
+
+
+@pytest.fixture
+def events(run: Path) -> pd.DataFrame:
+    return pd.read_parquet(run / "tables/contact_events.parquet")
+
+
+def test_a_facet_gets_what_its_contacts_bring(facets: pd.DataFrame) -> None:
+    """The slider and the hits are on facet 0; the roller leaves facet 1 at y = 0."""
+    on_1 = sum(-0.009 + 0.06 * DT * i < 0 for i in range(FRAMES))
+    impulse = [200 * 1.0 + (FRAMES - on_1) * 2.0 + 2 * 3.0, on_1 * 2.0 + 100 * 0.5]
+    np.testing.assert_allclose(facets["normal_impulse_n_s"], np.array(impulse) * DT)
+    np.testing.assert_allclose(facets["sliding_m"], [200 * 0.04 * DT, 0.0])
+    np.testing.assert_allclose(facets["force_slide_n_m"], [200 * 0.04 * DT * 1.0, 0.0])
+    np.testing.assert_allclose(facets["friction_work_j"], [200 * 0.04 * DT * MU, 0.0])
+    assert facets["samples"].tolist() == [200 + FRAMES - on_1 + 2, on_1 + 100]
+    assert facets["events"].tolist() == [3, 2]
+    assert facets["peak_normal_force_n"].tolist() == [3.0, 2.0]
+    np.testing.assert_allclose(facets["area_m2"], SIZE**2 / 2)
+    np.testing.assert_allclose(facets[["normal_x", "normal_y", "normal_z"]], [[1, 0, 0]] * 2)
+
+
+def test_shares_of_area_and_way(facets: pd.DataFrame) -> None:
+    area, way = SIZE**2 / 2, SPEED * FRAMES * DT
+    np.testing.assert_allclose(facets["force_slide_pa"], facets["force_slide_n_m"] / area / way)
+    pressure = facets["normal_impulse_n_s"] / area / (FRAMES * DT)
+    np.testing.assert_allclose(facets["mean_pressure_pa"], pressure)
+
+
+def test_every_particle_gets_the_type_it_was_made_for(events: pd.DataFrame) -> None:
+    found = events[["particle_id", "type", "samples"]].apply(tuple, axis=1).tolist()
+    assert found == [
+        (ROLL, "rolling", FRAMES),
+        (SLIDE, "sliding", 200),
+        (HIT, "impact", 1),
+        (HIT, "impact", 1),
+        (REST, "resting", 100),
+    ]
+    assert events["whole"].tolist() == [False, True, True, True, True]
+
+
+def test_the_paths_of_a_rolling_and_of_a_sliding_particle(events: pd.DataFrame) -> None:
+    rolling, sliding = events.iloc[0], events.iloc[1]
+    assert rolling["rolling_m"] == pytest.approx(0.06 * DT * (FRAMES - 1))
+    assert rolling["sliding_m"] == rolling["friction_work_j"] == 0.0
+    assert rolling["contact_path_m"] == pytest.approx(rolling["rolling_m"])
+    assert sliding["contact_path_m"] == pytest.approx(0.04 * DT * 199)
+    assert sliding["rolling_m"] == pytest.approx(0.04 * DT * 199 / 2)
+    assert sliding["slide_to_roll"] == pytest.approx(2.0)
+    assert (rolling["mobilised_fraction"], sliding["mobilised_fraction"]) == (0.0, 1.0)
+    assert rolling["tangential_over_normal"] == pytest.approx(0.5 * MU)
+
+
+def test_a_gap_of_one_sample_ends_a_stay_and_a_change_of_facet_does_not(run: Path) -> None:
+    case = load_case(run)
+    whole = sample(run, case, Thresholds())
+    rows = whole.rows[~((whole.rows["particle_id"] == ROLL) & (whole.rows["frame"] == 120))]
+    events, event = find_events(rows.reset_index(drop=True), whole.frames, whole.interval_s)
+    rolled = events[events["particle_id"] == ROLL]
+    assert rolled["samples"].tolist() == [120, 179]
+    assert rows["facet_id"][rows["particle_id"] == ROLL].nunique() == 2
+    assert len(event) == len(rows)
+    np.testing.assert_array_equal(events["particle_id"].to_numpy()[event], rows["particle_id"])
+
+
+def test_a_particle_with_two_contacts_has_one_stay_with_the_sum_of_both(tmp_path: Path) -> None:
+    both = [
+        row
+        for i in range(20, 60)
+        for row in (
+            contact(i, SLIDE, (0.004, 0.002), (-1.0, 0.0, MU), (0.0, 0.04)),
+            contact(i, SLIDE, (-0.004, 0.012), (-2.0, 0.0, 0.0)),
+        )
+    ]
+    folder = write_run(tmp_path / "run", both)
+    write_loading(folder)
+    events = pd.read_parquet(folder / "tables/contact_events.parquet")
+    assert events["samples"].tolist() == [40]
+    assert events["peak_normal_force_n"].tolist() == [3.0]
+    assert events["normal_impulse_n_s"][0] == pytest.approx(40 * 3.0 * DT)
+    assert events["contact_path_m"].tolist() == [0.0]
+
+
+def test_totals_are_the_sums_over_facets_and_over_events(
+    run: Path, facets: pd.DataFrame, events: pd.DataFrame
+) -> None:
+    found = read_loading(run)
+    for name in ("normal_impulse_n_s", "tangential_impulse_n_s", "force_slide_n_m", "sliding_m"):
+        assert facets[name].sum() == pytest.approx(found["totals"][name], rel=1e-12)
+        assert events[name].sum() == pytest.approx(found["totals"][name], rel=1e-12)
+    workpiece = pd.read_parquet(run / "tables/workpiece_force.parquet")
+    for axis in ("drag", "lateral", "vertical"):
+        assert facets[f"{axis}_impulse_n_s"].sum() == pytest.approx(
+            workpiece[f"{axis}_n"].sum() * DT
+        )
+    assert found["closure"]["workpiece_relative_error"] < 1e-12
+    assert found["closure"]["point_off_facet_max_m"] < 1e-12
+
+
+def test_a_force_that_no_facet_has_is_told(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", made_contacts())
+    file = folder / "tables/workpiece_force.parquet"
+    workpiece = pd.read_parquet(file)
+    workpiece["lateral_n"] += 0.5
+    workpiece.to_parquet(file)
+    write_loading(folder)
+    closure = read_loading(folder)["closure"]
+    assert closure["unplaced_impulse_n_s"]["lateral"] == pytest.approx(0.5 * FRAMES * DT)
+    assert closure["unplaced_impulse_n_s"]["drag"] == pytest.approx(0.0, abs=1e-12)
+    assert closure["workpiece_relative_error"] > 0.01
+
+
+def test_the_work_of_the_workpiece_is_drag_times_way(run: Path) -> None:
+    found = read_loading(run)
+    drag = 200 * 1.0 + FRAMES * 2.0 + 2 * 3.0 + 100 * 0.5
+    assert found["totals"]["workpiece_work_j"] == pytest.approx(drag * DT * SPEED)
+    fraction = 200 * 0.04 * DT * MU / (drag * DT * SPEED)
+    assert found["friction_fraction_of_work"]["value"] == pytest.approx(fraction)
+    assert found["load_while_sliding_fraction"]["value"] == pytest.approx(200 / drag)
+    assert found["types"]["rolling"]["fraction_of"]["normal_impulse_n_s"]["value"] == pytest.approx(
+        2.0 * FRAMES / drag
+    )
+    assert found["types"]["impact"]["events"] == 2
+    assert found["path_m"] == pytest.approx(SPEED * FRAMES * DT)
+
+
+def test_an_interval_holds_its_value_and_has_a_width(run: Path) -> None:
+    per_metre = read_loading(run)["per_metre"]["force_slide_n_m"]
+    assert per_metre["ci95_low"] < per_metre["value"] < per_metre["ci95_high"]
+
+
+def test_fewer_samples_change_the_number_of_stays(run: Path) -> None:
+    """Every tenth sees the two hits as one stay of two samples, or not at all."""
+    table = {row["every"]: row for row in read_loading(run)["sampling"]}
+    assert table[10]["largest_relative_error"]["sliding_m"] == pytest.approx(0.0, abs=1e-12)
+    assert table[10]["events"] == pytest.approx(3 + 1 / 10)
+    assert table[2]["events"] == pytest.approx(3 + 1)
+    assert table[2]["fraction_of"]["force_slide_n_m"]["sliding"] == 1.0
+
+
+def test_the_vtp_file_holds_the_table(run: Path, facets: pd.DataFrame) -> None:
+    mesh = pv.read(run / "tables/workpiece.vtp")
+    assert mesh.n_cells == 2
+    for name in facets:
+        np.testing.assert_allclose(mesh.cell_data[name], facets[name])
+    centres = facets[["centre_x_m", "centre_y_m", "centre_z_m"]]
+    np.testing.assert_allclose(mesh.cell_centers().points, centres, atol=1e-9)
+
+
+def test_the_picture_is_whole(run: Path) -> None:
+    with Image.open(run / "figures/workpiece.png") as picture:
+        shown = np.asarray(picture.convert("RGB"))
+    assert shown.shape[0] > 500
+    assert shown.std() > 10
+
+
+def test_a_mesh_of_another_run_is_refused(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "run", made_contacts())
+    first, second = PLATE.split("facet normal", 2)[1:]
+    swapped = f"solid plate\nfacet normal{second.replace('endsolid plate', '').rstrip()}\n"
+    (folder / "workpiece.stl").write_text(f"{swapped}facet normal{first}endsolid plate\n")
+    with pytest.raises(TableError, match="do not belong together"):
+        write_loading(folder)
+    (folder / "workpiece.stl").write_text(PLATE.split("endfacet")[0] + "endfacet\nendsolid plate\n")
+    with pytest.raises(TableError, match="names facet 1, but"):
+        write_loading(folder)
+
+
+def test_a_run_without_a_workpiece_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "case.json").write_text(json.dumps(case_json() | {"scene": "filling"}))
+    with pytest.raises(TableError, match="only a process run has a workpiece"):
+        write_loading(tmp_path)
+
+
+def test_missing_friction_is_named(run: Path) -> None:
+    case = load_case(run)
+    inputs = {k: v for k, v in case.inputs.items() if "friction" not in k}
+    with pytest.raises(TableError, match=r"pairs\.ceramic-steel\.friction"):
+        surfaces(changed(case, inputs=inputs))
+
+
+def test_the_contact_time_is_that_of_hertz(run: Path) -> None:
+    """Against the integral of Johnson (1985), eq. 11.23: 2.94 times overlap over speed."""
+    case = load_case(run)
+    modulus = 0.01 * 2e11 / (2 * (1 - 0.3**2))
+    mass = 2500 * 4 / 3 * np.pi * 3e-3**3
+    overlap = (15 * mass * SPEED**2 / (16 * np.sqrt(3e-3) * modulus)) ** 0.4
+    assert surfaces(case).contact_time_s == pytest.approx(2.94 * overlap / SPEED, rel=5e-3)
+
+
+def test_longer_impacts_count_as_impacts_when_asked(run: Path, events: pd.DataFrame) -> None:
+    case = load_case(run)
+    times = 0.1 / surfaces(case).contact_time_s
+    limits = Thresholds(impact_times=times * 1.001)
+    kinds = event_types(events, case, DT, limits)
+    assert kinds.tolist() == ["rolling", "sliding", "impact", "impact", "impact"]
+
+
+def test_a_point_off_a_triangle_by_hand() -> None:
+    triangle = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=float)
+    points = np.array([[0.2, 0.2, 0.5], [-3, 0, 4], [1, 1, 0], [0.25, 0.25, 0]])
+    off = off_facet(points, np.repeat(triangle, 4, axis=0))
+    np.testing.assert_allclose(off, [0.5, 5.0, np.sqrt(0.5), 0.0])
+
+
+# --- the workpiece's motion -----------------------------------------------------------------------
+
+
+def circle(turns: bool, sense: int = 1) -> dict[str, Any]:
+    return {
+        "kind": "circle", "radius_m": 0.05, "direction": "ccw" if sense > 0 else "cw",
+        "orientation": "follow_path" if turns else "fixed",
+        "start_direction_rad": sense * np.pi / 2,
+    }  # fmt: skip
+
+
+def made_case(tmp_path: Path, **motion: Any) -> Any:
+    (tmp_path / "case.json").write_text(json.dumps(case_json(**motion)))
+    return load_case(tmp_path)
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_workpiece_that_turns_moves_faster_farther_out(tmp_path: Path, sense: int) -> None:
+    """Reference point on the x axis, 50 mm from the bowl's axis; the point 10 mm beyond it."""
+    steps, reference = np.array([200]), np.array([[0.05, 0.0]])
+    point = np.array([[0.06, 0.01, 0.02]])
+    turning = made_case(tmp_path, **circle(True, sense))
+    moving = made_case(tmp_path, **circle(False, sense))
+    rate = sense * SPEED / 0.05
+    exact = [[-rate * 0.01, rate * 0.06, 0.0]]
+    np.testing.assert_allclose(workpiece_velocity(steps, point, reference, turning), exact)
+    level = [[0.0, sense * SPEED, 0.0]]
+    np.testing.assert_allclose(
+        workpiece_velocity(steps, point, reference, moving), level, atol=1e-15
+    )
+    assert np.isnan(workpiece_velocity(np.array([START]), point, reference, turning)).all()
+
+
+@pytest.mark.parametrize("turns", [True, False])
+def test_a_particle_that_moves_with_the_workpiece_does_not_slip(
+    tmp_path: Path, turns: bool
+) -> None:
+    """A particle glued to a turning workpiece spins with it; one on a workpiece that does not
+    turn, not."""
+    case = made_case(tmp_path, **circle(turns))
+    reference, centre = np.array([0.0, 0.05]), np.array([-0.013, 0.05, 0.02])
+    point = centre + np.array([0.003, 0, 0])
+    spin = np.array([0, 0, SPEED / 0.05 if turns else 0.0])
+    velocity = np.cross(spin, centre) if turns else np.array([-SPEED, 0.0, 0.0])
+    surface = velocity + np.cross(spin, point - centre)
+    contacts = WallContacts(
+        particle_id=np.array([1]), facet_id=np.array([0]), point_m=point[None],
+        force_n=np.array([[-1.0, 0, 0]]), evaluated_n=np.zeros((1, 3)),
+        normal=np.array([[-1.0, 0, 0]]), surface_m_s=surface[None],
+        overlap_m=np.zeros(1), silent=np.array([False]),
+    )  # fmt: skip
+    rows = workpiece_contact_rows(200, contacts, reference, case)
+    slip = [rows[f"slip_{axis}_m_s"][0] for axis in "xyz"]
+    np.testing.assert_allclose([*slip, rows["normal_velocity_m_s"][0]], 0.0, atol=1e-15)
+    wrong = workpiece_contact_rows(
+        200, contacts, reference, made_case(tmp_path, **circle(not turns))
+    )
+    assert abs(wrong["slip_y_m_s"][0]) + abs(wrong["normal_velocity_m_s"][0]) > 1e-3
+
+
+def test_a_cylinder_is_turned_back_into_its_own_frame(tmp_path: Path) -> None:
+    """Its STL file goes into the bed unturned: what looks ahead at the start becomes +x."""
+    (tmp_path / "workpiece.stl").write_text(PLATE)
+    case = made_case(tmp_path, **circle(True))
+    assert isinstance(case.motion, Circle)
+    as_mesh = read_surface(tmp_path, case)
+    np.testing.assert_allclose(as_mesh.normals, [[1, 0, 0]] * 2)
+    case = changed(case, workpiece=changed(case.workpiece, kind="cylinder"))
+    np.testing.assert_allclose(read_surface(tmp_path, case).normals, [[0, -1, 0]] * 2, atol=1e-12)
+    np.testing.assert_allclose(turned(np.array([0.0, 2.0, 1.0]), 0.0), [0, 2, 1])
+    quarter = turned(np.array([[0.0, 2.0, 1.0]]), np.array([-np.pi / 2]))
+    np.testing.assert_allclose(quarter, [[2, 0, 1]], atol=1e-12)

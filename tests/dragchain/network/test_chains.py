@@ -1,0 +1,284 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from networks import R, make_frame, row
+
+from dragchain.network.chains import (
+    chain_table,
+    dominant_path,
+    major_stress,
+    particle_stress,
+    peters_chains,
+    widest_paths,
+)
+from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame
+
+# a weak contact of two far particles brings the mean of the frame down
+WEAK = {91: (0.5, 0.5, 0.03), 92: (0.5, 0.5 + 2 * R, 0.03), 93: (0.5, 0.5 + 4 * R, 0.03)}
+WEAK_CONTACTS = [(91, 92, 0.001), (92, 93, 0.001)] + [(91, FLOOR, 0.001)] * 60
+
+
+def paths_of(frame: NetworkFrame) -> pd.DataFrame:
+    table = chain_table(frame)
+    return table[table["definition"] == "widest_path"].reset_index(drop=True)
+
+
+def test_straight_chain_gives_exactly_its_path() -> None:
+    contacts = [(1, WORKPIECE, 4.0), (1, 2, 3.0), (2, 3, 5.0), (3, SIDE, 6.0), *WEAK_CONTACTS]
+    paths = paths_of(make_frame(row(3) | WEAK, contacts, direction_rad=math.pi / 2))
+    assert len(paths) == 1
+    path = paths.iloc[0]
+    assert path["particle_ids"] == [1, 2, 3]
+    assert path["n_particles"] == 3
+    assert path["bottleneck_n"] == 3.0
+    assert path["mean_force_n"] == pytest.approx(4.5)
+    assert path["length_m"] == pytest.approx(6 * R)
+    assert path["azimuth_rad"] == pytest.approx(-math.pi / 2)
+    assert path["inclination_rad"] == pytest.approx(0.0)
+    assert path["altitude_m"] == pytest.approx(0.03)
+    assert path["reaches_bowl"] and path["dominant"]
+    assert path["end_kind"] == "side"
+
+
+def test_downward_path_has_its_inclination() -> None:
+    centres = {1: (0.0, 0.0, 3 * R), 2: (0.0, 0.0, R)}
+    contacts = [(1, WORKPIECE, 4.0), (1, 2, 3.0), (2, FLOOR, 2.0), *WEAK_CONTACTS]
+    paths = paths_of(make_frame(centres | WEAK, contacts))
+    # from (-R, 0, 3R) on the workpiece to (0, 0, 0) on the floor
+    assert paths["inclination_rad"][0] == pytest.approx(-math.atan(3.0))
+    assert paths["length_m"][0] == pytest.approx(4 * R)
+    assert paths["end_kind"][0] == "floor"
+    assert paths["altitude_m"][0] == pytest.approx(2 * R)
+
+
+def test_the_stronger_of_two_chains_is_dominant() -> None:
+    centres = row(3) | row(3, first=11, y=0.05) | WEAK
+    contacts = [(1, WORKPIECE, 9.0), (1, 2, 2.0), (2, 3, 9.0), (3, SIDE, 9.0)]
+    contacts += [(11, WORKPIECE, 4.0), (11, 12, 4.0), (12, 13, 4.0), (13, SIDE, 3.0)]
+    paths = paths_of(make_frame(centres, contacts + WEAK_CONTACTS))
+    assert paths["particle_ids"].tolist() == [[1, 2, 3], [11, 12, 13]]
+    assert paths["bottleneck_n"].tolist() == [2.0, 3.0]
+    assert paths["dominant"].tolist() == [False, True]
+
+
+def test_a_detour_with_the_stronger_bottleneck_wins() -> None:
+    centres = row(3) | {4: (R, 2 * R, 0.03), 5: (3 * R, 2 * R, 0.03)} | WEAK
+    contacts = [(1, WORKPIECE, 9.0), (1, 3, 2.0), (3, SIDE, 9.0)]
+    contacts += [(1, 4, 5.0), (4, 5, 6.0), (5, 3, 4.0), *WEAK_CONTACTS]
+    path = paths_of(make_frame(centres, contacts)).iloc[0]
+    assert path["particle_ids"] == [1, 4, 5, 3]
+    assert path["bottleneck_n"] == 4.0
+
+
+def test_equal_bottlenecks_go_by_fewer_links_then_by_force() -> None:
+    centres = row(3) | {4: (R, 2 * R, 0.03), 5: (R, -2 * R, 0.03), 6: (R, 4 * R, 0.03)} | WEAK
+    contacts = [(1, WORKPIECE, 9.0), (3, SIDE, 2.0)]
+    contacts += [(1, 2, 3.0), (2, 3, 3.0)]
+    contacts += [(1, 4, 8.0), (4, 3, 8.0)]
+    contacts += [(1, 5, 9.0), (5, 6, 9.0), (6, 3, 9.0), *WEAK_CONTACTS]
+    path = paths_of(make_frame(centres, contacts)).iloc[0]
+    assert path["particle_ids"] == [1, 4, 3]
+
+
+def test_a_weak_start_takes_the_short_way_at_its_own_bottleneck() -> None:
+    # width alone would send the path round over the stronger contacts of the upper way
+    centres = row(2) | {3: (R, 2 * R, 0.03), 4: (3 * R, 2 * R, 0.03)} | WEAK
+    contacts = [
+        (1, WORKPIECE, 2.0),
+        (1, 2, 3.0),
+        (1, 3, 9.0),
+        (3, 4, 9.0),
+        (4, 2, 9.0),
+        (2, SIDE, 9.0),
+    ]
+    path = paths_of(make_frame(centres, contacts + WEAK_CONTACTS)).iloc[0]
+    assert path["particle_ids"] == [1, 2]
+    assert path["bottleneck_n"] == 2.0
+
+
+def test_two_workpiece_contacts_share_a_trunk() -> None:
+    centres = row(4) | {11: (2 * R, 2 * R, 0.03)} | WEAK
+    contacts = [(1, WORKPIECE, 7.0), (11, WORKPIECE, 5.0), (1, 2, 6.0), (11, 2, 4.0)]
+    contacts += [(2, 3, 9.0), (3, 4, 9.0), (4, SIDE, 9.0), *WEAK_CONTACTS]
+    paths = paths_of(make_frame(centres, contacts))
+    assert paths["particle_ids"].tolist() == [[1, 2, 3, 4], [11, 2, 3, 4]]
+    assert paths["bottleneck_n"].tolist() == [6.0, 4.0]
+
+
+def test_a_cut_path_does_not_reach_the_bowl() -> None:
+    contacts = [(1, WORKPIECE, 4.0), (1, 2, 3.0), (2, 3, 0.0005), (3, SIDE, 6.0), *WEAK_CONTACTS]
+    paths = paths_of(make_frame(row(3) | WEAK, contacts))
+    assert paths["particle_ids"].tolist() == [[1]]
+    assert not paths["reaches_bowl"][0] and not paths["dominant"][0]
+    assert paths["end_kind"][0] == "none"
+    assert math.isnan(paths["bottleneck_n"][0]) and math.isnan(paths["azimuth_rad"][0])
+
+
+def test_a_weak_workpiece_contact_starts_no_path() -> None:
+    contacts = [(1, WORKPIECE, 0.1), (1, 2, 3.0), (2, 3, 3.0), (3, SIDE, 3.0)]
+    frame = make_frame(row(3), contacts)
+    assert widest_paths(frame) == []
+    assert len(widest_paths(frame, threshold=0.01)) == 1
+
+
+def test_an_empty_frame_has_no_chain_but_keeps_its_columns() -> None:
+    table = chain_table(make_frame(row(3), []))
+    assert table.empty
+    assert table["dominant"].dtype == bool
+    assert dominant_path(make_frame(row(3), []), []) is None
+
+
+def test_stress_of_a_squeezed_particle_is_force_over_area() -> None:
+    # two opposite contacts: sigma = 2 F R / V = 3 F / (2 pi R^2)
+    frame = make_frame(row(3), [(1, 2, 2.0), (2, 3, 2.0)])
+    stress, axis = major_stress(particle_stress(frame))
+    assert stress[1] == pytest.approx(3 * 2.0 / (2 * math.pi * R**2))
+    assert stress[0] == pytest.approx(stress[1] / 2)
+    assert abs(axis[1]) == pytest.approx([1.0, 0.0, 0.0])
+
+
+def test_wall_contacts_count_in_the_stress() -> None:
+    frame = make_frame({1: (0.0, 0.0, R)}, [(1, FLOOR, 2.0)])
+    stress, axis = major_stress(particle_stress(frame))
+    assert stress[0] == pytest.approx(2.0 * R / (4 / 3 * math.pi * R**3))
+    assert abs(axis[0]) == pytest.approx([0.0, 0.0, 1.0])
+
+
+def squeezed_row(bend_rad: float = 0.0) -> NetworkFrame:
+    """Return three particles between two walls, the third turned away by `bend_rad`, and
+    rattlers."""
+    turn = np.array([math.cos(bend_rad), math.sin(bend_rad), 0.0])
+    centres = row(2) | {3: tuple(np.array([2 * R, 0, 0.03]) + 2 * R * turn)} | WEAK
+    contacts = [(1, WORKPIECE, 5.0), (1, 2, 5.0), (2, 3, 5.0), (3, SIDE, 5.0), *WEAK_CONTACTS]
+    return make_frame(centres, contacts, walls={SIDE: tuple(turn)})
+
+
+def chain_ids(frame: NetworkFrame) -> list[list[int]]:
+    return [frame.particle_id[chain].tolist() for chain in peters_chains(frame)]
+
+
+def test_a_squeezed_row_is_one_peters_chain() -> None:
+    frame = squeezed_row()
+    assert [sorted(ids) for ids in chain_ids(frame)] == [[1, 2, 3]]
+    assert chain_ids(frame)[0][1] == 2
+    table = chain_table(frame)
+    peters = table[table["definition"] == "peters"].iloc[0]
+    assert peters["length_m"] == pytest.approx(4 * R)
+    assert peters["bottleneck_n"] == 5.0
+    assert peters["major_stress_mean_pa"] == pytest.approx(3 * 5.0 / (2 * math.pi * R**2))
+    assert peters["reaches_bowl"]
+
+
+@pytest.mark.parametrize(("bend_deg", "chained"), [(80.0, True), (100.0, False)])
+def test_a_bend_beyond_twice_alpha_breaks_a_chain(bend_deg: float, chained: bool) -> None:
+    # the middle particle's axis halves the bend, so either link is bend / 2 off the axis
+    assert bool(chain_ids(squeezed_row(math.radians(bend_deg)))) is chained
+
+
+def test_two_particles_are_no_chain() -> None:
+    frame = make_frame(
+        row(2) | WEAK, [(1, WORKPIECE, 5.0), (1, 2, 5.0), (2, SIDE, 5.0), *WEAK_CONTACTS]
+    )
+    assert peters_chains(frame) == []
+
+
+def test_a_branch_keeps_the_stronger_link() -> None:
+    centres = row(3) | {4: (2 * R + 2 * R * math.cos(0.7), 2 * R * math.sin(0.7), 0.03)} | WEAK
+    contacts = [(1, WORKPIECE, 9.0), (1, 2, 9.0), (2, 3, 7.0), (3, SIDE, 7.0), (2, 4, 4.0)]
+    contacts += [(4, SIDE, 4.0), *WEAK_CONTACTS]
+    assert [sorted(ids) for ids in chain_ids(make_frame(centres, contacts))] == [[1, 2, 3]]
+
+
+def test_a_ring_is_not_closed() -> None:
+    angles = np.arange(8) * math.pi / 4
+    centres = {
+        k + 1: (float(R * math.cos(a)), float(R * math.sin(a)), 0.03) for k, a in enumerate(angles)
+    }
+    contacts = [(k + 1, (k + 1) % 8 + 1, 5.0 + 0.1 * k) for k in range(8)]
+    chains = chain_ids(make_frame(centres | WEAK, contacts + WEAK_CONTACTS))
+    assert [sorted(ids) for ids in chains] == [list(range(1, 9))]
+    # the weakest link, between particles 1 and 2, is where the ring stays open
+    assert {chains[0][0], chains[0][-1]} == {1, 2}
+
+
+def test_a_chain_is_listed_from_its_higher_end() -> None:
+    centres = {k: (0.0, 0.0, R + 2 * R * k) for k in (0, 1, 2)}
+    centres = {k + 1: centre for k, centre in centres.items()}
+    contacts = [(1, FLOOR, 5.0), (1, 2, 5.0), (2, 3, 5.0), (3, WORKPIECE, 5.0), *WEAK_CONTACTS]
+    frame = make_frame(centres | WEAK, contacts, walls={WORKPIECE: (0.0, 0.0, 1.0)})
+    assert chain_ids(frame) == [[3, 2, 1]]
+
+
+def packing(
+    seed: int,
+) -> tuple[dict[int, tuple[float, float, float]], list[tuple[int, int, float]]]:
+    """Return a small jittered lattice of particles with random forces between near neighbours."""
+    random = np.random.default_rng(seed)
+    grid = np.stack(np.meshgrid(*[np.arange(4)] * 3), axis=-1).reshape(-1, 3) * 2 * R
+    grid = grid + random.uniform(-0.3 * R, 0.3 * R, grid.shape) + 0.01
+    centres = {k + 1: tuple(centre) for k, centre in enumerate(grid.tolist())}
+    gaps = np.linalg.norm(grid[:, None] - grid[None], axis=-1)
+    near = [(i, j) for i, j in np.argwhere(gaps < 2.3 * R).tolist() if i < j]
+    contacts = [(i + 1, j + 1, float(random.exponential())) for i, j in near]
+    order = np.argsort(grid[:, 0])
+    contacts += [(int(k) + 1, WORKPIECE, float(random.exponential())) for k in order[:12]]
+    contacts += [(int(k) + 1, SIDE, float(random.exponential())) for k in order[-12:]]
+    return centres, contacts
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None)
+def test_numbering_and_order_change_nothing(seed: int) -> None:
+    centres, contacts = packing(seed)
+    random = np.random.default_rng(seed + 1)
+    new = dict(zip(centres, (1 + random.permutation(len(centres))).tolist(), strict=True))
+    shuffled = [
+        (new[b], new[a], force)
+        if b > 0 and random.random() < 0.5
+        else (new[a], new.get(b, b), force)
+        for a, b, force in contacts
+    ]
+    random.shuffle(shuffled)
+    plain = chain_table(make_frame(centres, contacts))
+    mixed = chain_table(make_frame({new[k]: c for k, c in centres.items()}, shuffled))
+    plain["particle_ids"] = plain["particle_ids"].map(
+        lambda particles: [new[particle] for particle in particles]
+    )
+    keys = ["definition", "mean_force_n", "altitude_m"]
+    pd.testing.assert_frame_equal(
+        plain.sort_values(keys, ignore_index=True), mixed.sort_values(keys, ignore_index=True)
+    )
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None)
+def test_no_path_is_wider_than_the_one_found(seed: int) -> None:
+    centres, contacts = packing(seed)
+    frame = make_frame(centres, contacts)
+    least = frame.mean_force_n()
+    for path in widest_paths(frame):
+        forces = frame.normal_force[list(path.contacts)]
+        workpiece_particle = frame.particle_id[path.particles[0]]
+        bottleneck = float(forces.min()) if path.end is not None else least
+        assert reaches(contacts, workpiece_particle, max(bottleneck, least)) is (
+            path.end is not None
+        )
+        if path.end is not None and bottleneck < forces[0]:
+            assert not reaches(contacts, workpiece_particle, np.nextafter(bottleneck, np.inf))
+
+
+def reaches(contacts: list[tuple[int, int, float]], start: int, least: float) -> bool:
+    """Tell by flooding whether contacts of at least `least` join a particle to the side."""
+    strong = [(a, b) for a, b, force in contacts if force >= least and b != WORKPIECE]
+    wet = {int(start)}
+    while True:
+        more = {b for a, b in strong if a in wet} | {a for a, b in strong if b in wet and b > 0}
+        if more <= wet:
+            return SIDE in wet
+        wet |= more

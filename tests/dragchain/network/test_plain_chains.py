@@ -1,0 +1,99 @@
+"""The arrays and compiled loops against the plain oracle: the same to the last bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from networks import random_frame, real_frame
+from plain_chains import plain_paths, plain_peters, plain_stress, plain_table
+
+from dragchain.network.chains import (
+    chain_table,
+    dominant_path,
+    particle_stress,
+    peters_chains,
+    widest_paths,
+)
+from dragchain.network.frame import NetworkFrame
+
+frames = st.builds(
+    random_frame,
+    st.integers(0, 2**32 - 1),
+    edge=st.integers(2, 7),
+    levels=st.sampled_from([None, 1, 2, 5]),
+    jitter=st.sampled_from([0.0, 0.3]),
+)
+
+
+def assert_same_table(frame: NetworkFrame) -> None:
+    found, plain = chain_table(frame), plain_table(frame)
+    if plain.empty:
+        assert found.empty
+        return
+    plain = plain[list(found.columns)].astype(found.dtypes.to_dict())
+    pd.testing.assert_frame_equal(found, plain, check_exact=True)
+
+
+@given(frames)
+@settings(max_examples=60, deadline=None)
+def test_tables_of_random_networks(frame: NetworkFrame) -> None:
+    assert_same_table(frame)
+
+
+@given(frames, st.sampled_from([0.3, 1.0, 2.0]), st.booleans())
+@settings(max_examples=60, deadline=None)
+def test_paths_of_random_networks(
+    frame: NetworkFrame, threshold: float, with_workpiece: bool
+) -> None:
+    plain = plain_paths(frame, threshold, with_workpiece=with_workpiece)
+    found = widest_paths(frame, threshold, with_workpiece=with_workpiece)
+    assert found == plain
+    best = dominant_path(frame, found, with_workpiece=with_workpiece)
+    assert best == dominant_path(frame, plain, with_workpiece=with_workpiece)
+
+
+@given(frames, st.sampled_from([30.0, 45.0, 60.0]), st.sampled_from([0.3, 1.0, 2.0]))
+@settings(max_examples=60, deadline=None)
+def test_peters_chains_of_random_networks(frame: NetworkFrame, angle: float, factor: float) -> None:
+    alpha = float(np.radians(angle))
+    np.testing.assert_array_equal(particle_stress(frame), plain_stress(frame))
+    assert peters_chains(frame, alpha, factor) == plain_peters(frame, alpha, factor)
+
+
+def test_the_networks_hold_what_is_compared() -> None:
+    """Ties, chains of many lengths, paths that lead nowhere and some that lead far."""
+    tables = [chain_table(random_frame(seed, levels=5)) for seed in range(20)]
+    table = pd.concat(tables, ignore_index=True)
+    paths = table[table["definition"] == "widest_path"]
+    assert set(table["n_particles"]) >= {1, 2, 3, 4, 5, 6, 7, 8}
+    assert set(paths["end_kind"]) == {"floor", "side", "none"}
+    forces = random_frame(0, levels=5).normal_force
+    assert np.unique(forces).size < forces.size / 50
+
+
+def test_the_table_of_a_real_frame() -> None:
+    frame = real_frame()
+    assert frame.normal_force.size == 3442
+    assert len(chain_table(frame)) > 50
+    assert_same_table(frame)
+
+
+@pytest.mark.parametrize("with_workpiece", [True, False])
+def test_paths_of_a_real_frame_at_every_threshold(with_workpiece: bool) -> None:
+    frame = real_frame()
+    for threshold in (0.0, 0.5, 1.0, 2.0, 10.0):
+        found = widest_paths(frame, threshold, with_workpiece=with_workpiece)
+        assert found == plain_paths(frame, threshold, with_workpiece=with_workpiece)
+
+
+def test_a_real_frame_with_rounded_forces_has_ties() -> None:
+    frame = real_frame()
+    step = frame.mean_force_n() / 2.0
+    forces = np.ceil(frame.normal_force / step) * step
+    assert np.unique(forces).size < 100
+    assert_same_table(replace(frame, normal_force=forces))

@@ -1,0 +1,111 @@
+"""What a run was expected to cost, beside what it did."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from report_files import PICTURES, case_json, make_run, page_of, process_findings, run_json
+
+from dragchain.errors import TableError
+from dragchain.report.cost_check import actual_interval, cost_rows, prediction_for, read_advice
+from dragchain.report.study_report import write_report
+from dragchain.run.case import Case
+
+ASKED = {
+    "tolerance": 0.05, "quantity": "drag_mean", "label": "mean drag", "held_to": 0.025,
+    "error": 0.012, "ci95_low": -0.018, "ci95_high": 0.042, "bound": 0.037, "relative_cost": 0.04,
+    "half_width": 0.03, "outside": ["depth over particle diameter 3 is outside of 6 to 8"],
+    "fallback": None, "source": "measured 2026-01-02 on small, plan made",
+}  # fmt: skip
+
+
+def option(**more: Any) -> dict[str, Any]:
+    """The option whose settings and inputs are those of `case_json`."""
+    settings = {
+        "youngs_modulus_scale": 0.01, "timestep_fraction": 0.77, "speed_factor": 1.0, "ranks": 2,
+    }  # fmt: skip
+    return {
+        "role": "advised", "settings": settings | more,
+        "inputs": case_json("process", "workpiece-1")["inputs"],
+        "steps": {"filling": 80_000, "process": 150_000},
+        "steps_per_s": {"filling": 4000.0, "process": 3000.0},
+        "wall_time_s": {"filling": 20.0, "process": 50.0},
+        "source": "a short run of this study, 2 ranks",
+    }  # fmt: skip
+
+
+def advice_file(folder: Path, *options: dict[str, Any], schema: int = 2) -> Path:
+    file = folder / "advice.json"
+    file.write_text(json.dumps({"schema": schema, "cases": [{"options": list(options)}]}))
+    return file
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    case = case_json("process", "workpiece-1", asked=ASKED)
+    return make_run(tmp_path / "results", case, process_findings(), PICTURES)
+
+
+def test_the_report_compares_cost_and_tolerance(run: Path, tmp_path: Path) -> None:
+    file = advice_file(tmp_path, option(ranks=1), option())
+    write_report(tmp_path, [run], file)
+    words = " ".join(page_of(tmp_path).words.split())
+    assert "Predicted and actual cost" in words
+    assert "150 000 160 000 3000 2100 50 76 1.52 a short run" in spaced(tmp_path)
+    assert "mean drag within 5 %" in words and "+1.2 %" in words and "+3.7 %" in words
+    assert "outside of 6 to 8" in words and "held to 2.5 %" in words
+    assert "4.0 %" in words  # 0.1 N either way of 2.5 N
+
+
+def spaced(folder: Path) -> str:
+    """The words of a page with a space between its cells."""
+    text = re.sub(r"<[^>]+>", " ", (folder / "report.html").read_text(encoding="utf-8"))
+    return " ".join(text.split())
+
+
+def test_no_advice_no_comparison(run: Path, tmp_path: Path) -> None:
+    write_report(tmp_path, [run])
+    words = page_of(tmp_path).words
+    assert "Tolerance and settings" in words and "Predicted and actual" not in words
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        option(youngs_modulus_scale=0.02), option(timestep_fraction=0.5),
+        option(speed_factor=2.0), option(ranks=1), option() | {"inputs": {"seed": 2}},
+    ],
+)  # fmt: skip
+def test_a_prediction_of_other_settings_is_not_compared(run: Path, other: dict[str, Any]) -> None:
+    case = Case.read(run / "case.json")
+    assert prediction_for(case, [other]) is None
+    assert prediction_for(case, [other, option()]) == option()
+
+
+def test_only_scenes_that_were_run_and_predicted_have_a_row() -> None:
+    (row,) = cost_rows(option(), {"process": run_json(), "drop_test": run_json()})
+    assert (row.scene, row.steps, row.actual_steps) == ("process", 150_000, 160_000)
+    assert row.ratio == pytest.approx(76 / 50)
+
+
+def test_the_interval_of_a_run_is_that_of_the_asked_force() -> None:
+    forces = process_findings()["forces"]
+    found = actual_interval(ASKED, forces)
+    assert found == {
+        "mean": -2.5,
+        "ci95_low": -2.6,
+        "ci95_high": -2.4,
+        "fraction": pytest.approx(0.04),
+    }
+    assert actual_interval(ASKED | {"quantity": "chain_count"}, forces) is None
+
+
+def test_a_missing_or_foreign_advice_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(TableError, match="dragdeck advise"):
+        read_advice(tmp_path / "advice.json")
+    with pytest.raises(TableError, match="schema is 1"):
+        read_advice(advice_file(tmp_path, schema=1))

@@ -1,0 +1,350 @@
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import pyvista as pv
+from changed import changed
+from figure_files import (
+    LAST,
+    STEP_S,
+    R,
+    case_json,
+    columns_json,
+    network_tables,
+    printed,
+    resistance,
+    save,
+    workpiece_contacts_table,
+    workpiece_force_table,
+)
+from PIL import Image
+
+from dragchain.errors import SeriesError, TableError
+from dragchain.figures import network_picture as scene
+from dragchain.network.frame import NetworkFrame
+from dragchain.network.write import write_chains
+from dragchain.report.findings import compare, dominant_bottlenecks, read_findings, write_findings
+from dragchain.report.run_figures import drag_of_cases, energy_ratio, write_figures
+from dragchain.run.case import Case, PublishedDrag, Reference, load_case
+from dragchain.statistics.correlated import estimate_mean
+
+
+@pytest.fixture(scope="module")
+def process(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a made process run with tables and chains."""
+    run_dir = tmp_path_factory.mktemp("process")
+    (run_dir / "case.json").write_text(json.dumps(case_json("process")))
+    columns_json(run_dir, {"workpiece_contacts": printed(["step"], 10)})
+    contacts, particles = network_tables()
+    save(workpiece_force_table(), run_dir, "workpiece_force")
+    save(contacts, run_dir, "contacts")
+    save(particles, run_dir, "particles")
+    save(workpiece_contacts_table(), run_dir, "workpiece_contacts")
+    workpiece = pv.Cylinder(center=(0, 0, 0.025), direction=(0, 0, 1), radius=0.002, height=0.05)
+    workpiece.triangulate().save(run_dir / "workpiece.stl")
+    write_chains(run_dir)
+    return run_dir
+
+
+def test_findings_of_a_process_are_those_of_its_tables(process: Path) -> None:
+    found = write_findings(process)
+    assert found == read_findings(process)
+    steps = np.arange(200, LAST + 1, 2)
+    assert found["forces"]["drag_n"]["mean"] == pytest.approx(-resistance(steps).mean())
+    assert found["process_time_zero_s"] == pytest.approx(0.1)
+    assert found["peaks"]["count"] == 1
+    assert found["peaks"]["process_time_s"] == pytest.approx([0.23])
+    assert found["peaks"]["largest_n"] == pytest.approx(-5.0)
+    assert found["workpiece_frames"] == 31
+    assert found["ahead_behind"]["ratio"]["value"] == pytest.approx(3.0)
+    assert found["ahead_behind"]["ahead_n"]["value"] == pytest.approx(3.0)
+    assert found["depth"]["slope_n_per_m"]["value"] == pytest.approx(200.0)
+    assert found["network"]["frames"] == 16
+    assert found["chains"]["widest_paths_per_frame"] == 1.0
+    assert found["chains"]["widest_paths_to_side_fraction"] == 1.0
+    assert found["chains"]["dominant_azimuth_mean_rad"] == pytest.approx(0.0)
+
+
+def test_a_chain_that_carries_the_drag_is_associated_with_it(process: Path) -> None:
+    found = write_findings(process)["association"]
+    assert found["rank_correlation"] == pytest.approx(1.0)
+    # no other shift fits as well
+    assert found["p_value"] == pytest.approx(1 / 16)
+    assert found["frames_at_peaks"] == 2
+    assert found["bottleneck_at_peaks_mean_n"] > found["bottleneck_elsewhere_mean_n"]
+
+
+def test_a_frame_without_a_path_has_no_bottleneck() -> None:
+    network = pd.DataFrame({"step": [1, 2, 3]})
+    chains = pd.DataFrame(
+        {"step": [1, 1, 3], "dominant": [False, True, True], "bottleneck_n": [9.0, 2.0, 4.0]}
+    )
+    assert dominant_bottlenecks(network, chains).tolist() == [2.0, 0.0, 4.0]
+
+
+def reference(**drag: float) -> Reference:
+    return Reference(source="x", experiment=PublishedDrag(**drag))
+
+
+def test_comparison_is_relative_to_the_reference() -> None:
+    ours = estimate_mean(np.array([-1.98, -2.0] * 8))
+    row = compare(ours, reference(drag_mean_n=-2.59, drag_std_n=0.66))
+    assert row[0]["label"] == "experiment"
+    assert row[0]["difference_percent"] == pytest.approx(100 * (1.99 / 2.59 - 1))
+    assert row[0]["ci95_low"] < row[0]["difference_percent"] < row[0]["ci95_high"]
+    assert row[0]["std_n"] == 0.66
+    assert compare(ours, None) == []
+
+
+def test_a_reference_of_zero_is_refused() -> None:
+    with pytest.raises(TableError, match="experiment.drag_mean_n is 0"):
+        compare(estimate_mean(np.arange(8.0)), reference(drag_mean_n=0.0))
+
+
+def test_process_figures_are_whole_pictures(process: Path) -> None:
+    written = write_figures(process)
+    names = [
+        "forces",
+        "force_around_workpiece",
+        "force_depth",
+        "chains_peaks",
+        "network_xy",
+        "network_xz",
+    ]
+    assert [path.stem for path in written] == names
+    assert sorted(path.name for path in (process / "figures").iterdir()) == sorted(
+        f"{name}.png" for name in names
+    )
+    for path in written:
+        with Image.open(path) as picture:
+            picture.load()
+            assert min(picture.size) > 400
+            assert len(picture.convert("RGB").getcolors(1 << 24) or []) > 20
+
+
+def test_a_run_without_chains_names_the_missing_table(process: Path, tmp_path: Path) -> None:
+    for name in ("case.json", "columns.json"):
+        (tmp_path / name).write_bytes((process / name).read_bytes())
+    save(workpiece_force_table(), tmp_path, "workpiece_force")
+    with pytest.raises(TableError, match=r"network\.parquet"):
+        write_figures(tmp_path)
+
+
+def test_a_short_drag_has_no_statistics(process: Path, tmp_path: Path) -> None:
+    (tmp_path / "case.json").write_bytes((process / "case.json").read_bytes())
+    table = workpiece_force_table()
+    save(table.assign(in_statistics=table["step"] > LAST - 10), tmp_path, "workpiece_force")
+    with pytest.raises(SeriesError):
+        write_figures(tmp_path)
+
+
+# --- the network's pictures ------------------------------------------------------------------
+
+
+def network_frame(normal_force: list[float], *, direction_rad: float = 0.0) -> NetworkFrame:
+    """Return two particles on the x axis in contact with each other and with the side."""
+    return NetworkFrame(
+        step=300, time_s=0.3, direction_rad=direction_rad, particle_id=np.array([4, 7]),
+        centre=np.array([[-R, 0.0, 0.015], [R, 0.0, 0.015]]), radius=np.array([R, R]),
+        a=np.array([0, 1]), b=np.array([1, -1]), other=np.array([1, -2]),
+        point=np.array([[0.0, 0.0, 0.015], [2 * R, 0.0, 0.015]]), force=np.zeros((2, 3)),
+        normal_force=np.array(normal_force),
+    )  # fmt: skip
+
+
+def test_cylinders_join_centres_or_end_at_the_wall() -> None:
+    assert scene.segments(network_frame([1.0, 2.0])).tolist() == [
+        [[-R, 0.0, 0.015], [R, 0.0, 0.015]],
+        [[R, 0.0, 0.015], [2 * R, 0.0, 0.015]],
+    ]
+
+
+def test_the_largest_force_has_the_mean_particle_radius() -> None:
+    radii = scene.cylinder_radii(np.array([0.0, 1.0, 4.0]), R)
+    assert radii == pytest.approx([0.0, R / 4, R])
+    assert scene.cylinder_radii(np.zeros(2), R).tolist() == [0.0, 0.0]
+    assert scene.cylinder_radii(np.array([]), R).size == 0
+
+
+@pytest.mark.parametrize(
+    ("wanted", "expected"), [(4.6, 3), (4.4, 2), (3.0, 1), (5.4, 3), (9.0, 3), (1.0, 3)]
+)
+def test_picture_is_of_the_nearest_frame_or_the_last(wanted: float, expected: int) -> None:
+    times = np.array([3.6, 4.2, 4.8])
+    assert scene.picture_step(np.array([1.0, 2.0, 3.0]), times, wanted) == expected
+
+
+def test_the_workpiece_moves_by_its_reference_point(process: Path) -> None:
+    shown = scene.load_scene(process, load_case(process))
+    assert shown.frame.step == LAST
+    assert shown.workpiece_turn_rad == pytest.approx(0.0)
+    assert shown.workpiece_m == pytest.approx([0.01, 0.0, 0.01])
+    assert shown.process_time_s == pytest.approx(0.4)
+    assert shown.dominant is not None
+    assert shown.dominant.particles == (0, 1)
+
+
+def pixel(image: Any, extent: Any, across_mm: float, up_mm: float) -> Any:
+    """Return the colour at a place of the picture."""
+    rows, columns = image.shape[:2]
+    column = int((across_mm - extent[0]) / (extent[1] - extent[0]) * columns)
+    row = int((extent[3] - up_mm) / (extent[3] - extent[2]) * rows)
+    return image[row, column].astype(int)
+
+
+def is_red(colour: Any) -> bool:
+    return bool(colour[0] > 130 and colour[1] < 90 and colour[2] < 90)
+
+
+@pytest.mark.parametrize(("view", "level_mm"), [("xy", 0.0), ("xz", 15.0)])
+def test_a_rendered_contact_is_where_its_axes_say(
+    process: Path, view: scene.View, level_mm: float
+) -> None:
+    case = load_case(process)
+    far = np.array([0.015, 0.012, 0.01])
+    shown = scene.Scene(network_frame([2.0, 0.5]), far, 0.0, None, 0.2)
+    image, extent = scene.render(process, case, shown, view)
+    assert is_red(pixel(image, extent, 0.0, level_mm))
+    assert is_red(pixel(image, extent, -2.5, level_mm + 2.0))
+    assert not is_red(pixel(image, extent, 0.0, level_mm + 3.5))
+    assert not is_red(pixel(image, extent, -4.0, level_mm))
+    # the weaker contact, a quarter as thick, goes on to the side
+    weak = pixel(image, extent, 5.0, level_mm)
+    assert weak[1] > weak[2] + 40 and not is_red(weak)
+    assert min(pixel(image, extent, 5.0, level_mm + 1.5)) > 200
+
+
+def widened(case: Case, radius_m: float) -> Case:
+    assert case.bowl is not None
+    return changed(case, bowl=changed(case.bowl, radius_m=radius_m))
+
+
+def test_a_bowl_not_much_wider_than_the_window_is_shown_whole(process: Path) -> None:
+    case = load_case(process)
+    shown = scene.Scene(network_frame([1.0, 1.0]), np.array([0.01, 0.0, 0.01]), 0.0, None, 0.2)
+    part = scene.window(case, shown, "xy")
+    assert part.contacts is None and part.low.tolist() == [-0.024, -0.024]
+    assert scene.cut_words(case, "xz") == ""
+
+
+def test_a_wide_bowl_is_cut_to_the_surroundings_of_the_workpiece(process: Path) -> None:
+    case = widened(load_case(process), 0.5)
+    reach = 2 * R * scene.WINDOW_DIAMETERS
+    depth = 2 * R * scene.DEPTH_DIAMETERS
+    workpiece = np.array([0.5 + 0.004 - reach / 2, 0.1, 0.01])
+    frame = network_frame([1.0, 1.0])
+    places = np.array([[0.0, 1.1 * depth, 0.0], [-1.1 * reach, 0.0, 0.0]]) + workpiece
+    shown = scene.Scene(replace(frame, point=places), workpiece, 0.0, None, 0.2)
+    above, side = (scene.window(case, shown, view) for view in ("xy", "xz"))
+    assert above.low.tolist() == pytest.approx((workpiece[:2] - reach).tolist())
+    assert above.high.tolist() == pytest.approx([0.504, 0.1 + reach])  # no farther than the bowl
+    assert above.contacts is not None and above.contacts.tolist() == [True, False]
+    assert side.contacts is not None and side.contacts.tolist() == [False, False]
+    assert f"{scene.WINDOW_DIAMETERS:g} particle diameters" in scene.cut_words(case, "xy")
+
+
+def test_a_picture_of_a_wide_bowl_has_no_more_pixels_than_vtk_takes(process: Path) -> None:
+    case = widened(load_case(process), 2.0)
+    frame = network_frame([2.0, 0.5])
+    shown = scene.Scene(frame, np.array([0.015, 0.012, 0.01]), 0.0, None, 0.2)
+    image, extent = scene.render(process, case, shown, "xy", scene.Look(pixels_per_mm=40.0))
+    assert max(image.shape[:2]) <= 1401
+    assert is_red(pixel(image, extent, 0.0, 0.0))
+
+
+def test_a_missing_workpiece_mesh_is_named(process: Path, tmp_path: Path) -> None:
+    case = load_case(process)
+    shown = scene.Scene(network_frame([1.0, 1.0]), np.zeros(3), 0.0, None, 0.2)
+    with pytest.raises(TableError, match=r"workpiece\.stl"):
+        scene.render(tmp_path, case, shown, "xy")
+
+
+def test_a_machine_that_cannot_render_is_told_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere.json")
+    with pytest.raises(scene.RenderError, match="libgl1-mesa-dri"):
+        scene.check_rendering()
+
+
+# --- fill and drop ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def filling(tmp_path: Path) -> Path:
+    content = case_json("filling")
+    content["phases"] = [{"name": "settle", "start_step": 0, "end_step": LAST}]
+    content["settled"] = {"energy_ratio": 1e-5}
+    (tmp_path / "case.json").write_text(json.dumps(content))
+    bed = {
+        "bed_height_m": 0.07,
+        "solid_fraction": 0.59,
+        "n_particles": 3,
+        "kinetic_energy_ratio": 1e-7,
+    }
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables" / "packing.json").write_text(json.dumps(bed))
+    return tmp_path
+
+
+def test_a_filling_without_thermo_has_no_figure(filling: Path) -> None:
+    assert write_figures(filling) == []
+    assert read_findings(filling)["bed"]["solid_fraction"] == 0.59
+    assert read_findings(filling)["rest_energy_ratio"] == 1e-5
+
+
+def test_a_filling_is_drawn_from_its_thermo_table(filling: Path) -> None:
+    energy = 1e-3 * np.exp(-np.arange(30.0))
+    table = pd.DataFrame({"time_s": np.arange(30.0), "n_particles": 3, "kinetic_energy_j": energy})
+    table["rotational_energy_j"] = 0.0
+    table.loc[0, "n_particles"] = 0
+    save(table, filling, "thermo")
+    assert [path.name for path in write_figures(filling)] == ["filling.png"]
+
+
+def test_energy_ratio_of_particles_that_fell_their_diameter_is_one(filling: Path) -> None:
+    case: Case = load_case(filling)
+    mass = 2500.0 * 4 / 3 * math.pi * R**3
+    ratio = energy_ratio(np.array([2 * mass * 10.0 * 2 * R]), np.array([2.0]), case)
+    assert ratio == pytest.approx([1.0])
+
+
+def test_a_drop_is_drawn_with_its_restitution(tmp_path: Path) -> None:
+    content = case_json("drop_test")
+    content["phases"] = []
+    (tmp_path / "case.json").write_text(json.dumps(content))
+    columns = ["step", "time_s", "z_m", "vz_m_s", "force_n"]
+    columns_json(tmp_path, {"impacts": printed(columns, 1, None)})
+    lines = [" ".join(columns)]
+    for first in (10, 200, 300):
+        lines += [
+            f"{first + k} {(first + k) * STEP_S} 0 {k - 6} {max(0, 9 - (k - 6) ** 2)}"
+            for k in range(13)
+        ]
+    (tmp_path / "out.1.txt").write_text("\n".join(lines) + "\n")
+    impacts = {
+        "impact": [1, 2, 3], "start_time_s": [0.014, 0.204, 0.304], "duration_s": 0.005,
+        "peak_force_n": 9.0, "speed_in_m_s": 1.0, "speed_out_m_s": 0.7,
+        "restitution": [0.70, 0.72, 0.74], "time_since_first_s": [0.0, 0.19, 0.29],
+    }  # fmt: skip
+    save(pd.DataFrame(impacts), tmp_path, "impacts")
+    assert [path.name for path in write_figures(tmp_path)] == ["drop_test.png"]
+    ratio = read_findings(tmp_path)["restitution"]
+    assert ratio["mean"] == pytest.approx(0.72)
+    assert ratio["input"] == 0.7
+
+
+def test_overview_has_a_row_a_case() -> None:
+    force = {"mean": -2.0, "ci95_low": -2.2, "ci95_high": -1.8}
+    figure = drag_of_cases(["a", "b"], [force, force], [("measured", -2.59)])
+    axes = figure.axes[0]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["a", "b"]
+    assert axes.get_xlabel().endswith("interval")

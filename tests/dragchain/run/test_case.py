@@ -1,0 +1,143 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from dragchain import DocumentError, load_case, load_outputs
+from dragchain.run.case import Circle, Line, Statistics
+
+
+def test_reads_a_process(tiny_run: Path) -> None:
+    case = load_case(tiny_run)
+    assert (case.scene, case.case, case.statistics) == (
+        "process",
+        "tiny",
+        Statistics(transient_s=0.02),
+    )
+    assert case.bowl is not None
+    assert case.bowl.radius_m == 0.04
+    assert case.motion == Line(
+        kind="line", axis_speed_m_s=1e-4, start_m=(0.0, 0.0), direction_rad=0.0
+    )
+    assert [phase.name for phase in case.phases] == ["plunge", "drag"]
+    assert case.restitution is None
+
+
+def test_reads_a_circle(tiny_run: Path, edit_json) -> None:
+    circle = {
+        "kind": "circle",
+        "axis_speed_m_s": 0.01,
+        "radius_m": 0.02,
+        "direction": "cw",
+        "orientation": "follow_path",
+    }
+    edit_json(
+        tiny_run / "case.json", lambda c: c.update(motion={**circle, "start_direction_rad": 1.5})
+    )
+    assert load_case(tiny_run).motion == Circle(**circle, start_direction_rad=1.5)
+
+
+def test_a_drop_needs_neither_bowl_nor_workpiece(tiny_run: Path, edit_json) -> None:
+    def to_drop(case):
+        for key in ("case", "bowl", "workpiece", "motion", "surface_m", "statistics"):
+            del case[key]
+        case.update(scene="drop_test", restitution=0.68)
+
+    edit_json(tiny_run / "case.json", to_drop)
+    case = load_case(tiny_run)
+    assert (case.bowl, case.workpiece, case.restitution) == (None, None, 0.68)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda c: c.update(schema=1), r"case\.json: schema: is 1, this dragchain reads 2"),
+        (
+            lambda c: c.update(scene="stir"),
+            r"scene: is 'stir': Input should be 'drop_test', 'filling' or 'process'",
+        ),
+        (lambda c: c["bowl"].pop("radius_m"), r"case\.json: bowl\.radius_m: is missing"),
+        (
+            lambda c: c["bowl"].update(radius_m="4e-2"),
+            r"radius_m: is '4e-2': Input should be a valid number",
+        ),
+        (
+            lambda c: c["bowl"].update(radius_m=-1),
+            r"radius_m: is -1: Input should be greater than 0",
+        ),
+        (
+            lambda c: c.update(timestep_s=True),
+            r"timestep_s: is True: Input should be a valid number",
+        ),
+        (
+            lambda c: c["media"].update(count=4.5),
+            r"media\.count: is 4\.5: Input should be a valid integer",
+        ),
+        (lambda c: c.update(workpiece=None), "workpiece is missing, which a process has"),
+        (lambda c: c["phases"][1].update(start_step=30), "drag does not start where plunge ends"),
+        (lambda c: c["phases"][1].pop("name"), r"phases\[1\]\.name: is missing"),
+        (lambda c: c.update(gravity_m_s2=float("nan")), "is not a JSON object|finite number"),
+    ],
+)
+def test_says_what_is_wrong_with_a_case(tiny_run: Path, edit_json, change, message) -> None:
+    edit_json(tiny_run / "case.json", change)
+    with pytest.raises(DocumentError, match=message):
+        load_case(tiny_run)
+
+
+def test_a_missing_case_and_a_broken_one_are_told_apart(tiny_run: Path) -> None:
+    (tiny_run / "case.json").write_text("{")
+    with pytest.raises(DocumentError, match="is not a JSON object"):
+        load_case(tiny_run)
+    (tiny_run / "case.json").unlink()
+    with pytest.raises(DocumentError, match="there is no such file"):
+        load_case(tiny_run)
+
+
+def test_reads_outputs(tiny_run: Path) -> None:
+    outputs = load_outputs(tiny_run)
+    assert list(outputs) == [
+        *(
+            "thermo",
+            "workpiece_force",
+            "workpiece_particles",
+            "workpiece_contacts",
+            "contacts",
+            "particles",
+        ),
+    ]
+    assert outputs["workpiece_force"].header == outputs["workpiece_force"].columns
+    assert outputs["contacts"].header == tuple(f"c_x[{i}]" for i in range(6))
+
+
+def test_the_last_step_may_be_open(tiny_run: Path, edit_json) -> None:
+    edit_json(tiny_run / "columns.json", lambda c: c["outputs"]["thermo"].update(last_step=None))
+    assert load_outputs(tiny_run)["thermo"].last_step is None
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"kind": "movie"}, r"outputs\.contacts\.kind: is 'movie'"),
+        ({"binary": True}, "a local output is always text"),
+        ({"pattern": "contacts.dump"}, r"pattern is 'contacts.dump', without \{part\}"),
+        ({"engine_columns": ["a"]}, "engine_columns has another length"),
+        ({"columns": ["a", "a"]}, "names a column twice"),
+        ({"period_steps": 0}, "period_steps: is 0: Input should be greater than 0"),
+    ],
+)
+def test_says_what_is_wrong_with_an_output(tiny_run: Path, edit_json, change, message) -> None:
+    edit_json(tiny_run / "columns.json", lambda c: c["outputs"]["contacts"].update(change))
+    with pytest.raises(DocumentError, match=message):
+        load_outputs(tiny_run)
+
+
+def test_an_error_names_file_and_remedy(tiny_run: Path) -> None:
+    file = tiny_run / "columns.json"
+    file.write_text(json.dumps({"schema": 2}))
+    with pytest.raises(DocumentError) as caught:
+        load_outputs(tiny_run)
+    assert (caught.value.file, caught.value.field) == (file, "outputs")
+    assert "remedy:" in str(caught.value)

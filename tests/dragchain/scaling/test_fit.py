@@ -1,0 +1,204 @@
+"""Scalings from run folders whose drag follows a law that is known."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from tiny_run_files import DENSITY_KG_M3, GRAVITY_M_S2, RADIUS_M, WORKPIECE_RADIUS_M, case_json
+
+from dragchain.cli import main
+from dragchain.errors import TableError
+from dragchain.report.page import page_environment
+from dragchain.scaling.fit import (
+    Expectation,
+    draw_scalings,
+    find,
+    read_runs,
+    read_scalings,
+    table,
+    write_scaling,
+)
+from dragchain.statistics.power_law import Estimate, Runs, fit_power_law
+
+DEPTH = "motion.immersion_depth_m"
+LEVELS = (0.01, 0.02, 0.04)
+Writer = Callable[..., Path]
+
+
+@pytest.fixture
+def write_run(tmp_path: Path) -> Writer:
+    """Write a run folder whose drag has a mean and correlated noise of 5 % of it."""
+
+    def write(drag_n: float, seed: int = 1, **inputs: object) -> Path:
+        case = case_json()
+        case["run"] = "-".join([*(f"{value}" for value in inputs.values()), f"seed{seed}"])
+        case["inputs"] |= {**inputs, "seed": seed}
+        case["upstream"]["filling"] = f"filling-{seed}"
+        case["workpiece"]["immersion_depth_m"] = inputs.get(DEPTH, 0.03)
+        case["motion"] = {
+            **{
+                "kind": "circle",
+                "axis_speed_m_s": 0.01,
+                "radius_m": 0.02,
+                "direction": "ccw",
+            },
+            **{"start_direction_rad": 1.57, "orientation": "follow_path"},
+        }
+        folder = tmp_path / case["run"]
+        (folder / "tables").mkdir(parents=True)
+        (folder / "case.json").write_text(json.dumps(case))
+        noise = np.random.default_rng(seed).normal(size=2000)
+        smooth = np.convolve(noise, np.full(10, 10**-0.5), "same")
+        drag = -drag_n * (1.0 + 0.05 * (smooth - smooth.mean()))
+        zero = np.zeros(2000)
+        columns = {
+            "in_statistics": zero == 0,
+            "drag_n": drag,
+            "lateral_n": noise,
+            "vertical_n": zero,
+        }
+        pd.DataFrame(columns).to_parquet(folder / "tables" / "workpiece_force.parquet")
+        return folder
+
+    return write
+
+
+@pytest.fixture
+def quadratic(write_run: Writer) -> list[Path]:
+    """Two beds at three depths: 2000 N/m2 times the depth squared, 3 % more in one bed."""
+    return [
+        write_run(2000.0 * depth**2 * (1.0 + 0.03 * seed), seed, **{DEPTH: depth})
+        for depth in LEVELS
+        for seed in (1, 2)
+    ]
+
+
+def test_a_quadratic_drag_agrees_with_two_and_not_with_one(quadratic: list[Path]) -> None:
+    runs = read_runs(quadratic, DEPTH)
+    found = find(runs, DEPTH, Expectation(2.0, "somebody 1999"))
+    assert found["verdict"] == "agrees"
+    assert found["fit"]["exponent"]["value"] == pytest.approx(2.0, abs=0.01)
+    assert found["statement"].endswith("the interval holds the 2 of somebody 1999")
+    other = find(runs, DEPTH, Expectation(1.0))
+    assert other["verdict"] == "deviates" and "excludes the 1" in other["statement"]
+    assert find(runs, DEPTH, Expectation())["verdict"] == "no expectation"
+
+
+def test_the_size_is_compared_with_the_weight_on_the_workpiece(quadratic: list[Path]) -> None:
+    run = read_runs(quadratic, DEPTH)[0]
+    scale = DENSITY_KG_M3 * GRAVITY_M_S2 * 2.0 * WORKPIECE_RADIUS_M
+    assert run.eta == pytest.approx(2000.0 * 1.03 / scale)
+    found = find(read_runs(quadratic, DEPTH), DEPTH, Expectation(2.0))
+    assert found["eta"]["ci95_low"] < 2000.0 * 1.045 / scale < found["eta"]["ci95_high"]
+    assert run.gap_particles == pytest.approx(
+        (0.040 - 0.020 - WORKPIECE_RADIUS_M) / (2.0 * RADIUS_M)
+    )
+    assert run.floor_particles == pytest.approx((0.050 - 0.01) / (2.0 * RADIUS_M))
+
+
+def test_an_expectation_for_some_levels_is_judged_there(write_run: Writer) -> None:
+    field = "motion.speed_m_s"
+    folders = [
+        write_run(2.0 * max(1.0, speed / 0.02) ** 0.5, seed, **{field: speed})
+        for speed in (0.005, 0.01, 0.02, 0.08)
+        for seed in (1, 2)
+    ]
+    runs = read_runs(folders, field)
+    assert find(runs, field, Expectation(0.0))["verdict"] == "deviates"
+    slow = find(runs, field, Expectation(0.0, within=(0.005, 0.02)))
+    assert slow["verdict"] == "agrees" and slow["fit_within"]["runs"] == 6
+    assert slow["fit_within"]["change_per_decade"]["value"] == pytest.approx(0.0, abs=0.01)
+    assert slow["local_exponents"][-1]["value"] == pytest.approx(0.5, abs=0.01)
+    assert slow["two_terms"] is None
+
+
+def test_the_command_writes_all_that_a_page_needs(
+    quadratic: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    words = ["step", "scaling", "--out", str(out), "--field", DEPTH, "--expected", "2"]
+    assert main([*words, *map(str, quadratic)]) == 0
+    assert "agrees" in capsys.readouterr().out
+    found = json.loads((out / "scaling.json").read_text())
+    rows = pd.read_csv(out / "scaling.csv")
+    assert rows[DEPTH].tolist() == list(LEVELS) and rows.runs.tolist() == [2, 2, 2]
+    assert (rows.drag_n_ci95_low < rows.drag_n).all()
+    assert rows.local_exponent.iloc[0] == pytest.approx(2.0, abs=0.01)
+    assert (out / "scaling.png").stat().st_size > 10_000
+    assert len(draw_scalings([found, found, found]).axes) == 4
+
+
+def test_runs_that_differ_in_more_than_the_field_are_refused(write_run: Writer) -> None:
+    folders = [
+        write_run(1.0, **{DEPTH: depth, "media.count": count})
+        for depth, count in zip(LEVELS, (4, 4, 5), strict=True)
+    ]
+    with pytest.raises(TableError, match=r"media\.count is 5.*it is 4"):
+        read_runs(folders, DEPTH)
+
+
+@pytest.mark.parametrize("value", ["deep", None, True, -1.0])
+def test_a_field_without_a_number_is_refused(write_run: Writer, value: Any) -> None:
+    folder = write_run(1.0, other=value)
+    with pytest.raises(TableError, match="numbers above 0"):
+        read_runs([folder], "other")
+
+
+def test_a_drag_along_the_motion_is_refused(write_run: Writer, tmp_path: Path) -> None:
+    folder = write_run(-1.0, **{DEPTH: 0.01})
+    with pytest.raises(TableError, match="along the motion"):
+        write_scaling(tmp_path / "out", [folder], DEPTH, Expectation())
+
+
+def test_the_scalings_of_the_package_are_whole() -> None:
+    scalings = read_scalings()
+    assert [found["study"] for found in scalings] == [
+        f"drag-{name}" for name in ("depth", "diameter", "speed", "friction")
+    ]
+    for found in scalings:
+        assert found["commands"] and found["engine"] and found["started"]
+        assert asdict(_refit(found)) == pytest.approx(found["fit"]["exponent"], abs=1e-4)
+        assert list(table(found)[found["field"]]) == [level["x"] for level in found["levels"]]
+
+
+def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
+    scalings = read_scalings()
+    template = page_environment().get_template("validation/scaling.html.j2")
+    page = template.render(found=scalings, picture=lambda name: f"data:image/png;base64,{name}")
+    assert 'src="data:image/png;base64,scaling.png"' in page
+    for found in scalings:
+        assert found["statement"] in page
+        assert all(html.escape(remark, quote=True) in page for remark in found["remarks"])
+
+
+def test_the_remarks_name_a_lack_of_fit(write_run: Writer) -> None:
+    field = "motion.speed_m_s"
+    bent = {0.005: 1.0, 0.01: 1.0, 0.02: 1.0, 0.04: 1.8, 0.08: 1.0}
+    folders = [
+        write_run(drag, seed, **{field: speed}) for speed, drag in bent.items() for seed in (1, 2)
+    ]
+    words = " ".join(find(read_runs(folders, field), field, Expectation(0.0))["remarks"])
+    assert "does not hold" in words and "40 mm/s by +" in words
+    assert "Ten times the level changes the drag by" in words
+
+
+def test_one_bed_is_told(write_run: Writer) -> None:
+    folders = [write_run(depth, **{DEPTH: depth}) for depth in (*LEVELS, 0.05)]
+    words = " ".join(find(read_runs(folders, DEPTH), DEPTH, Expectation(1.0))["remarks"])
+    assert "too few runs of one level" in words and "start from one bed" in words
+
+
+def _refit(found: dict[str, Any]) -> Estimate:
+    """The exponent from the runs in a record."""
+    runs = pd.DataFrame(found["runs"])
+    drag = runs.drag_n.to_numpy()
+    errors = runs.standard_error_n.to_numpy() / drag
+    return fit_power_law(Runs(runs.level.to_numpy(), drag, errors, list(runs.bed))).exponent

@@ -1,0 +1,132 @@
+"""Effects of settings with a random bed: known effects, coverage of intervals, pairing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from dragchain.errors import SeriesError
+from dragchain.statistics.bed_effects import Factors, fit_effects, lack_of_fit
+
+REFERENCE = {"modulus": 1.0, "step": 0.2}
+SEEDS = range(4)
+POINTS = [(1.0, 0.2), (0.1, 0.2), (0.01, 0.2), (1.0, 0.5), (0.01, 0.5)]
+TRUE = {1.0: 0.0, 0.1: 0.05, 0.01: 0.1, 0.2: 0.0, 0.5: -0.04}
+
+RUNS = [({"modulus": modulus, "step": step}, seed) for modulus, step in POINTS for seed in SEEDS]
+SETTINGS = [setting for setting, _ in RUNS]
+BEDS = [seed for _, seed in RUNS]
+EXPECTED = np.array([TRUE[one["modulus"]] + TRUE[one["step"]] for one in SETTINGS])
+
+
+def factors(additive: bool) -> Factors:
+    return Factors(SETTINGS, REFERENCE, additive)
+
+
+def simulated(rng: np.random.Generator, bed_fraction: float, beds: list[int]) -> np.ndarray:
+    bed = rng.normal(0.0, np.sqrt(bed_fraction), len(set(beds)))
+    chance = rng.normal(0.0, np.sqrt(1.0 - bed_fraction), len(beds))
+    return EXPECTED + 0.03 * (bed[beds] + chance)
+
+
+def weights(own: Factors, setting: dict[str, float]) -> np.ndarray:
+    return own.row(setting) - own.row(REFERENCE)
+
+
+@pytest.mark.parametrize("additive", [True, False])
+def test_effects_without_chance_are_found_exactly(additive: bool) -> None:
+    own = factors(additive)
+    fit = fit_effects(own.design(), EXPECTED, BEDS)
+    for setting, expected in zip(SETTINGS, EXPECTED, strict=True):
+        assert fit.contrast(weights(own, setting))[0] == pytest.approx(expected, abs=1e-12)
+    assert fit.degrees == len(RUNS) - (4 if additive else 5)
+
+
+def test_additive_effects_tell_what_was_not_run() -> None:
+    unseen = {"modulus": 0.1, "step": 0.5}
+    assert factors(True).tells(unseen) and not factors(False).tells(unseen)
+    assert not factors(True).tells({"modulus": 0.001, "step": 0.2})
+    assert factors(False).tells(REFERENCE)
+    fit = fit_effects(factors(True).design(), EXPECTED, BEDS)
+    assert fit.contrast(weights(factors(True), unseen))[0] == pytest.approx(0.01)
+
+
+def held(bed_fraction: float, known: bool, trials: int = 200) -> int:
+    """How many of the 95 % intervals of a difference hold it."""
+    rng = np.random.default_rng(20260101)
+    own, count = factors(True), 0
+    design, contrast = own.design(), weights(own, {"modulus": 0.01, "step": 0.5})
+    for _ in range(trials):
+        values = simulated(rng, bed_fraction, BEDS)
+        fit = fit_effects(design, values, BEDS, bed_fraction if known else None)
+        found, error = fit.contrast(contrast)
+        count += abs(found - 0.06) <= error * stats.t.ppf(0.975, fit.degrees)
+    return count
+
+
+@pytest.mark.parametrize("bed_fraction", [0.0, 0.7])
+def test_intervals_hold_the_truth_as_often_as_they_say(bed_fraction: float) -> None:
+    count = held(bed_fraction, known=True, trials=1000)
+    assert stats.binomtest(count, 1000, 0.95).pvalue > 0.01, count
+
+
+@pytest.mark.parametrize("bed_fraction", [0.0, 0.7])
+def test_an_estimated_share_costs_little_of_that(bed_fraction: float) -> None:
+    count = held(bed_fraction, known=False)
+    assert stats.binomtest(count, 200, 0.93, alternative="less").pvalue > 0.01, count
+
+
+def test_the_share_of_the_bed_is_found() -> None:
+    rng = np.random.default_rng(7)
+    design = factors(True).design()
+    fractions = [
+        fit_effects(design, simulated(rng, 0.7, BEDS), BEDS).bed_fraction for _ in range(60)
+    ]
+    none = [fit_effects(design, simulated(rng, 0.0, BEDS), BEDS).bed_fraction for _ in range(60)]
+    assert np.median(fractions) > 0.5 and np.median(none) < 0.1
+
+
+def test_a_difference_on_the_same_beds_is_narrower() -> None:
+    rng = np.random.default_rng(11)
+    own = factors(True)
+    contrast = weights(own, {"modulus": 0.01, "step": 0.2})
+    apart = list(range(len(RUNS)))
+
+    def scatter(beds: list[int]) -> tuple[float, float]:
+        fits = [fit_effects(own.design(), simulated(rng, 0.8, beds), beds) for _ in range(80)]
+        found = [fit.contrast(contrast) for fit in fits]
+        return float(np.std([one for one, _ in found])), float(np.mean([e for _, e in found]))
+
+    (paired, paired_error), (single, single_error) = scatter(BEDS), scatter(apart)
+    assert paired < 0.7 * single and paired_error < 0.7 * single_error
+
+
+def test_chance_disagrees_with_additivity_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(5)
+    additive, full = factors(True).design(), factors(False).design()
+    found = []
+    for _ in range(300):
+        values = simulated(rng, 0.5, BEDS)
+        fits = [fit_effects(design, values, BEDS, bed_fraction=0.5) for design in (additive, full)]
+        found.append(lack_of_fit(*fits))
+    assert stats.kstest(found, "uniform").pvalue > 0.01
+
+
+def test_an_interaction_is_noticed_and_the_same_model_fits_itself() -> None:
+    rng = np.random.default_rng(3)
+    values = simulated(rng, 0.0, BEDS)
+    values[-len(SEEDS) :] += 0.3
+    additive = fit_effects(factors(True).design(), values, BEDS, bed_fraction=0.0)
+    full = fit_effects(factors(False).design(), values, BEDS, bed_fraction=0.0)
+    assert lack_of_fit(additive, full) < 1e-4
+    assert lack_of_fit(full, full) == 1.0
+
+
+def test_too_few_runs_and_effects_that_go_together_are_refused() -> None:
+    with pytest.raises(SeriesError, match="run more seeds"):
+        fit_effects(np.eye(2), np.zeros(2), ["a", "b"])
+    settings = [REFERENCE, {"modulus": 0.1, "step": 0.5}] * 3
+    design = Factors(settings, REFERENCE, additive=True).design()
+    with pytest.raises(SeriesError, match="cannot be told apart"):
+        fit_effects(design, np.zeros(6), list(range(6)))

@@ -1,0 +1,119 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.signal import lfilter
+
+from dragchain import SeriesError, estimate_mean
+from dragchain.statistics.correlated import autocorrelation_time, autocovariance
+
+
+def ar1(phi: float, count: int, seed: int) -> np.ndarray:
+    """Stationary x_t = phi x_(t-1) + noise; tau = (1 + phi) / (1 - phi) / 2, sd 1."""
+    noise = np.random.default_rng(seed).normal(size=count) * np.sqrt(1 - phi**2)
+    noise[0] /= np.sqrt(1 - phi**2)
+    return np.asarray(lfilter([1.0], [1.0, -phi], noise))
+
+
+def test_the_autocovariance_of_four_samples_by_hand() -> None:
+    """1 2 3 4 about 2.5: lag 0 (2.25+0.25+0.25+2.25)/4, lag 1 (0.75-0.25+0.75)/3, ..."""
+    np.testing.assert_allclose(autocovariance([1, 2, 3, 4]), [1.25, 1.25 / 3, -0.75, -2.25])
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.5, 0.9, 0.98])
+def test_the_autocorrelation_time_of_an_ar1_process(phi) -> None:
+    exact = 0.5 * (1 + phi) / (1 - phi)
+    assert autocorrelation_time(ar1(phi, 400_000, seed=1)) == pytest.approx(exact, rel=0.05)
+
+
+def test_independent_samples_are_known_as_well_as_their_number_says() -> None:
+    estimate = estimate_mean(np.random.default_rng(2).normal(3.0, 2.0, size=10_000))
+    assert estimate.autocorrelation_samples == pytest.approx(0.5, abs=0.05)
+    assert estimate.effective_samples == pytest.approx(10_000, rel=0.1)
+    assert estimate.se == pytest.approx(0.02, rel=0.1)
+    assert estimate.reliable
+
+
+@pytest.mark.parametrize(("phi", "level"), [(0.0, 0.95), (0.8, 0.95), (0.9, 0.8)])
+def test_the_interval_covers_the_mean_as_often_as_it_says(phi, level) -> None:
+    """600 series of 100 autocorrelation times; 4 % is 2.5 standard errors at the least."""
+    count = int(100 * 0.5 * (1 + phi) / (1 - phi)) + 1
+    estimates = [estimate_mean(ar1(phi, count, seed), confidence=level) for seed in range(600)]
+    assert all(estimate.samples == count for estimate in estimates)
+    covered = np.mean([e.ci95_low <= 0.0 <= e.ci95_high for e in estimates])
+    assert covered == pytest.approx(level, abs=0.04)
+
+
+def test_taking_a_correlated_series_for_independent_would_not_cover() -> None:
+    series = [ar1(0.9, 1000, seed) for seed in range(200)]
+    naive = np.mean([abs(s.mean()) <= 1.96 * s.std(ddof=1) / np.sqrt(len(s)) for s in series])
+    assert naive < 0.6
+
+
+def test_a_short_series_is_not_reliable() -> None:
+    assert not estimate_mean(ar1(0.98, 1000, seed=3)).reliable
+    assert estimate_mean(ar1(0.98, 20_000, seed=3)).reliable
+
+
+def test_a_trend_is_not_reliable() -> None:
+    assert not estimate_mean(np.linspace(0, 1, 5000)).reliable
+
+
+def test_a_constant_series_has_an_interval_of_no_width_but_is_not_reliable() -> None:
+    estimate = estimate_mean(np.full(100, 0.1))
+    assert estimate.mean == pytest.approx(0.1)
+    assert estimate.ci95_high - estimate.ci95_low == pytest.approx(0.0, abs=1e-15)
+    assert estimate.autocorrelation_samples == 0.5
+    assert not estimate.reliable
+
+
+def test_mean_and_spread_by_hand() -> None:
+    estimate = estimate_mean([1, 2, 3, 4, 5, 6, 7, 8])
+    assert (estimate.mean, estimate.samples) == (4.5, 8)
+    assert estimate.std == pytest.approx(np.sqrt(6.0))
+
+
+@given(st.floats(-100, 100), st.floats(0.01, 100), st.integers(0, 50))
+def test_scale_and_shift_pass_through(shift, scale, seed) -> None:
+    series = ar1(0.7, 300, seed)
+    plain, moved = estimate_mean(series), estimate_mean(shift + scale * series)
+    assert moved.effective_samples == pytest.approx(plain.effective_samples, rel=1e-6)
+    assert moved.ci95_low == pytest.approx(shift + scale * plain.ci95_low, rel=1e-6, abs=1e-9)
+    assert plain.ci95_low < plain.mean < plain.ci95_high
+
+
+@pytest.mark.parametrize(
+    ("series", "message"),
+    [
+        ([], r"shape \(0,\)"),
+        ([1.0] * 7, "need 8 samples"),
+        (np.zeros((10, 2)), r"shape \(10, 2\)"),
+        ([*[1.0] * 9, float("nan")], "sample 9 of the series is nan"),
+        ([*[1.0] * 9, float("inf")], "sample 9 of the series is inf"),
+    ],
+)
+def test_refuses_a_series_without_statistics(series, message) -> None:
+    with pytest.raises(SeriesError, match=message):
+        estimate_mean(series)
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0, 95])
+def test_refuses_a_confidence_outside_0_to_1(level) -> None:
+    with pytest.raises(SeriesError, match="not between 0 and 1"):
+        estimate_mean(np.arange(10.0), confidence=level)
+
+
+def test_the_autocorrelation_time_of_short_series_is_hardly_biased() -> None:
+    """22 autocorrelation times of 4.5 samples; without the factor the mean is 3.2."""
+    times = [autocorrelation_time(ar1(0.8, 100, seed)) for seed in range(1000)]
+    assert np.mean(times) == pytest.approx(4.5, rel=0.1)
+
+
+def test_the_interval_is_students() -> None:
+    """Eight samples that alternate: tau 1/2, 7 degrees of freedom, t = 2.365 at 95 %."""
+    estimate = estimate_mean([1.0, -1.0] * 4)
+    assert estimate.effective_samples == 8.0
+    assert estimate.se == pytest.approx(np.sqrt(8 / 7 / 8))
+    assert estimate.ci95_high / estimate.se == pytest.approx(2.365, abs=1e-3)

@@ -1,0 +1,96 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from changed import changed
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dragchain import Frame, TableError, load_case
+from dragchain.tables.bed import bed_height, describe_bed
+
+NAMES = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s", "radius_m")
+
+
+def frame(rows):
+    table = np.array(rows, dtype=float).reshape(-1, len(NAMES))
+    return Frame(0, {name: table[:, i] for i, name in enumerate(NAMES)})
+
+
+def test_one_particle_under_the_only_probe() -> None:
+    """The bowl is 1.4 wide, the particle 1: one probe, on the axis."""
+    assert bed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), 0.7) == 1.0
+
+
+def test_a_probe_meets_a_particle_on_its_flank() -> None:
+    """0.3 off the centre of a particle of radius 0.5: 0.4 above the centre."""
+    height = bed_height(np.array([[0.3, 0, 0.5]]), np.array([0.5]), 0.8)
+    assert height == pytest.approx(0.9)
+
+
+def test_where_no_particle_lies_the_probe_meets_the_floor() -> None:
+    """Bowl of radius 1.5, pitch 1: probes on the axis and at distance 1, 5 in all."""
+    height = bed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), 1.5)
+    assert height == pytest.approx(1.0 / 5)
+
+
+def test_the_highest_particle_counts() -> None:
+    centres = np.array([[0, 0, 0.5], [0, 0, 1.5]])
+    assert bed_height(centres, np.array([0.5, 0.5]), 0.7) == 2.0
+
+
+def test_a_large_particle_reaches_over_several_probes() -> None:
+    """Radii 3.1 and ten of 0.1: pitch 2 * 4.1 / 11, the large particle covers all probes."""
+    radius = np.array([3.1] + [0.1] * 10)
+    centres = np.array([[0, 0, 3.1]] + [[0, 0, 0.1]] * 10)
+    pitch = 2 * radius.mean()
+    bowl = 2.5 * pitch
+    spots = [(i, j) for i in range(-3, 4) for j in range(-3, 4) if np.hypot(i, j) <= 2]
+    exact = np.mean([3.1 + np.sqrt(3.1**2 - pitch**2 * (i * i + j * j)) for i, j in spots])
+    assert bed_height(centres, radius, bowl) == pytest.approx(exact)
+
+
+@given(st.lists(st.tuples(*[st.floats(-1, 1)] * 2, st.floats(0.1, 3), st.floats(0.1, 0.4))))
+@settings(max_examples=60, deadline=None)
+def test_it_is_what_a_plain_search_finds(particles) -> None:
+    particles = [*particles, (0.0, 0.0, 0.3, 0.3)]
+    table = np.array(particles)
+    pitch = 2 * table[:, 3].mean()
+    spots = [pitch * np.array([i, j]) for i in range(-8, 9) for j in range(-8, 9)]
+    tops = []
+    for spot in spots:
+        if np.hypot(*spot) > 1.2 - pitch / 2:
+            continue
+        rest = table[:, 3] ** 2 - ((table[:, :2] - spot) ** 2).sum(axis=1)
+        hits = [z + np.sqrt(r) for z, r in zip(table[:, 2], rest, strict=True) if r >= 0]
+        tops.append(max(hits, default=0.0))
+    assert bed_height(table[:, :3], table[:, 3], 1.2) == pytest.approx(np.mean(tops), rel=1e-6)
+
+
+def test_a_bowl_narrower_than_a_particle_is_an_error() -> None:
+    with pytest.raises(TableError, match="does not fit"):
+        bed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), 0.4)
+
+
+def test_describes_a_bed_of_one_particle_by_hand(tiny_run: Path) -> None:
+    """Radius 0.03 in a bowl of 0.04: height 0.06, 4/3 r^3 / (R^2 h); v^2 / 2 over g d."""
+    case = changed(load_case(tiny_run), gravity_m_s2=10.0)
+    bed = describe_bed(frame([[0, 0, 0.03, 0.1, 0, 0.2, 0.03]]), case)
+    assert bed["bed_height_m"] == pytest.approx(0.06)
+    assert bed["solid_fraction"] == pytest.approx(4 / 3 * 0.03**3 / (0.04**2 * 0.06))
+    assert bed["kinetic_energy_ratio"] == pytest.approx(0.5 * 0.05 / (10 * 0.06))
+    assert (bed["n_particles"], bed["radius_mean_m"], bed["radius_std_m"]) == (1, 0.03, 0.0)
+
+
+def test_the_spread_of_radii_is_that_of_the_bed(tiny_run: Path) -> None:
+    rows = [[0, 0, 0.01, 0, 0, 0, r] for r in (0.009, 0.010, 0.011)]
+    bed = describe_bed(frame(rows), load_case(tiny_run))
+    assert bed["radius_std_m"] == pytest.approx(0.001 * (2 / 3) ** 0.5)
+    assert bed["kinetic_energy_ratio"] == 0.0
+
+
+def test_an_empty_bowl_is_an_error(tiny_run: Path) -> None:
+    with pytest.raises(TableError, match="there is no bed"):
+        describe_bed(frame([]), load_case(tiny_run))

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dragchain.errors import TableError
+from dragchain.tables.impacts import find_impacts
+
+DT = 0.5
+
+
+def rows(samples):
+    """Samples of (step, speed upwards, force)."""
+    table = np.array(samples, dtype=float)
+    return {
+        "step": table[:, 0].astype(np.int64),
+        "time_s": DT * table[:, 0],
+        "z_m": np.zeros(len(table)),
+        "vz_m_s": table[:, 1],
+        "force_n": table[:, 2],
+    }
+
+
+FIRST = [(10, -4, 0), (11, -3, 5), (12, 0, 9), (13, 2, 3), (14, 3, 0)]
+SECOND = [(40, -3, 0), (41, 0, 7), (42, 1.5, 0), (43, 1, 0)]
+
+
+def test_measures_two_impacts_by_hand() -> None:
+    found = find_impacts(rows(FIRST + SECOND), DT)
+    assert found["impact"].tolist() == [1, 2]
+    assert found["start_time_s"].tolist() == [5.5, 20.5]
+    assert found["duration_s"].tolist() == [1.5, 0.5]
+    assert found["peak_force_n"].tolist() == [9, 7]
+    assert found["speed_in_m_s"].tolist() == [4, 3]
+    assert found["speed_out_m_s"].tolist() == [3, 1.5]
+    assert found["restitution"].tolist() == [0.75, 0.5]
+    assert found["time_since_first_s"].tolist() == [0, 15]
+
+
+def test_two_impacts_in_one_stretch_are_two() -> None:
+    close = [(15, -2, 0), (16, 0, 4), (17, 1, 0)]
+    assert find_impacts(rows(FIRST + close), DT)["restitution"].tolist() == [0.75, 0.5]
+
+
+def test_a_pull_at_the_end_belongs_to_the_impact() -> None:
+    pulled = [(0, -2, 0), (1, 0, 8), (2, 1.9, -1), (3, 1.5, 0)]
+    found = find_impacts(rows(pulled), DT)
+    assert found["restitution"].tolist() == [0.75]
+    assert found["duration_s"].tolist() == [1.0]
+
+
+def test_a_particle_without_loss_rebounds_as_fast() -> None:
+    found = find_impacts(rows([(0, -2, 0), (1, 0, 8), (2, 2, 0)]), DT)
+    assert found["restitution"].tolist() == [1]
+
+
+@pytest.mark.parametrize(
+    ("samples", "message"),
+    [
+        ([(0, -1, 0), (1, -2, 0)], "the particle never met the plate"),
+        ([*FIRST, (40, -3, 0), (41, -3, 0)], "steps 40 to 41: no force among them"),
+        (FIRST[1:], "steps 11 to 14: they begin or end inside an impact"),
+        (FIRST + SECOND[:2], "steps 40 to 41: they begin or end inside an impact"),
+        ([(0, 1, 0), (1, 0, 8), (2, 2, 0)], "does not come down before"),
+    ],
+)
+def test_refuses_samples_that_do_not_show_impacts(samples, message) -> None:
+    with pytest.raises(TableError, match=message):
+        find_impacts(rows(samples), DT)

@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from dragchain.dumps.frame import Frame
+from dragchain.errors import TableError
+from dragchain.tables.workpiece_contacts import join_workpiece_frame
+
+PARTICLES = ("particle_id", "x_m", "y_m", "z_m", "radius_m", "force_x_n", "force_y_n", "force_z_n")
+CONTACTS = (
+    *("point_x_m", "point_y_m", "point_z_m", "facet_id", "particle_id"),
+    *("force_x_n", "force_y_n", "force_z_n", "overlap_m"),
+)
+
+
+def frame(names, rows, step=100):
+    table = np.array(rows, dtype=float).reshape(-1, len(names))
+    columns = {name: table[:, i] for i, name in enumerate(names)}
+    for name in names:
+        if name.endswith("_id"):
+            columns[name] = columns[name].astype(np.int64)
+    return Frame(step, columns)
+
+
+def test_a_single_contact_takes_the_applied_force() -> None:
+    particles = frame(PARTICLES, [[5, 3, 0, 0, 1, 2.0, 0.5, 0]])
+    contacts = frame(CONTACTS, [[2, 0, 0, 9, 5, 1.9, 0.4, 0, 1e-6]])
+    workpiece = join_workpiece_frame(particles, contacts).workpiece
+    np.testing.assert_array_equal(workpiece.force_n, [[2.0, 0.5, 0]])
+    np.testing.assert_array_equal(workpiece.evaluated_n, [[1.9, 0.4, 0]])
+    np.testing.assert_array_equal(workpiece.normal, [[1, 0, 0]])
+    assert workpiece.normal_force_n().tolist() == [2.0]
+    assert workpiece.tangential_force_n().tolist() == [0.5]
+
+
+def test_contacts_of_one_particle_share_the_difference_equally() -> None:
+    particles = frame(PARTICLES, [[5, 1, 1, 0, 1, 3.0, 2.0, 0]])
+    contacts = frame(CONTACTS, [[1, 0, 0, 2, 5, 0, 1.5, 0, 1e-6], [0, 1, 0, 1, 5, 2.0, 0, 0, 1e-6]])
+    workpiece = join_workpiece_frame(particles, contacts).workpiece
+    assert workpiece.facet_id.tolist() == [1, 2]
+    np.testing.assert_allclose(workpiece.force_n, [[2.5, 0.25, 0], [0.5, 1.75, 0]])
+    np.testing.assert_allclose(workpiece.force_n.sum(axis=0), [3.0, 2.0, 0])
+
+
+def test_rows_come_back_sorted_whatever_their_order() -> None:
+    particles = frame(PARTICLES, [[9, 3, 0, 0, 1, 1, 0, 0], [2, 0, 3, 0, 1, 0, 4, 0]])
+    contacts = frame(CONTACTS, [[2, 0, 0, 1, 9, 1, 0, 0, 1e-6], [0, 2, 0, 3, 2, 0, 1, 0, 2e-6]])
+    workpiece = join_workpiece_frame(particles, contacts).workpiece
+    assert workpiece.particle_id.tolist() == [2, 9]
+    np.testing.assert_array_equal(workpiece.force_n, [[0, 4, 0], [1, 0, 0]])
+    assert workpiece.overlap_m.tolist() == [2e-6, 1e-6]
+
+
+def test_a_contact_without_an_applied_force_carries_none() -> None:
+    contacts = frame(CONTACTS, [[2, 0, 0, 9, 5, 0, 0.1, 0, 1e-6]])
+    for rows in ([], [[5, 3, 0, 0, 1, 0, 0, 0]]):
+        joined = join_workpiece_frame(frame(PARTICLES, rows), contacts)
+        assert joined.workpiece.silent.tolist() == [True]
+        np.testing.assert_array_equal(joined.workpiece.force_n, [[0, 0, 0]])
+        assert joined.workpiece.normal_force_n().tolist() == [0]
+        assert len(joined.unplaced_n) == 0
+
+
+def test_a_force_without_a_contact_is_kept_apart() -> None:
+    joined = join_workpiece_frame(frame(PARTICLES, [[5, 3, 0, 0, 1, 2, 0, 1]]), frame(CONTACTS, []))
+    assert len(joined.workpiece) == 0
+    np.testing.assert_array_equal(joined.unplaced_n, [[2, 0, 1]])
+
+
+def test_an_empty_frame_has_no_contacts() -> None:
+    joined = join_workpiece_frame(frame(PARTICLES, []), frame(CONTACTS, []))
+    assert (len(joined.workpiece), len(joined.bowl), len(joined.unplaced_n)) == (0, 0, 0)
+
+
+def test_contacts_with_a_meshed_bowl_are_told_from_the_tools() -> None:
+    particles = frame(PARTICLES, [[5, 3, 0, 0, 1, 2, 0, 0], [6, 0, 3, 0, 1, 0, -1, 0]])
+    rows = [[2, 0, 0, 9, 5, 2, 0, 0, 1e-6, 0], [0, 4, 0, 1, 6, 0, -1, 0, 1e-6, 1]]
+    joined = join_workpiece_frame(particles, frame((*CONTACTS, "mesh_id"), rows))
+    assert joined.workpiece.particle_id.tolist() == [5]
+    assert joined.bowl.particle_id.tolist() == [6]
+    assert joined.bowl.normal_force_n().tolist() == [1]
+
+
+def test_frames_that_do_not_belong_together_are_refused() -> None:
+    with pytest.raises(TableError, match="step 100 where workpiece_contacts has step 200"):
+        join_workpiece_frame(frame(PARTICLES, []), frame(CONTACTS, [], step=200))
+    twice = frame(PARTICLES, [[5, 3, 0, 0, 1, 2, 0, 1], [5, 3, 0, 0, 1, 2, 0, 1]])
+    with pytest.raises(TableError, match="holds a particle more than once"):
+        join_workpiece_frame(twice, frame(CONTACTS, []))
+    same = frame(CONTACTS, [[3, 0, 0, 9, 5, 1, 0, 0, 1e-6]])
+    with pytest.raises(TableError, match="coincides with a particle's centre"):
+        join_workpiece_frame(frame(PARTICLES, [[5, 3, 0, 0, 1, 2, 0, 1]]), same)
+
+
+forces = st.floats(-10, 10, allow_nan=False)
+
+
+@given(
+    owners=st.lists(st.integers(1, 4), max_size=8),
+    applied=arrays.arrays(np.float64, (4, 3), elements=forces),
+    data=st.data(),
+)
+@settings(max_examples=80, deadline=None)
+def test_contacts_of_a_particle_always_add_up_to_its_force(owners, applied, data) -> None:
+    evaluated = data.draw(arrays.arrays(np.float64, (len(owners), 3), elements=forces))
+    particles = frame(PARTICLES, [[i + 1, 9, 9, 9, 1, *applied[i]] for i in range(4)])
+    rows = [[0, 0, i, i, owner, *evaluated[i], 1e-6] for i, owner in enumerate(owners)]
+    joined = join_workpiece_frame(particles, frame(CONTACTS, rows))
+    for particle in set(owners):
+        total = joined.workpiece.force_n[joined.workpiece.particle_id == particle].sum(axis=0)
+        np.testing.assert_allclose(total, applied[particle - 1], atol=1e-12)
+    placed = joined.workpiece.force_n.sum(axis=0) + joined.unplaced_n.sum(axis=0)
+    np.testing.assert_allclose(placed, applied.sum(axis=0), atol=1e-12)

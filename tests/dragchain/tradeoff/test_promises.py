@@ -1,0 +1,98 @@
+"""Promises on other scenes: known errors, known scatter."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tradeoff_files import measures, write
+
+from dragchain.errors import TableError
+from dragchain.tradeoff.compare import Error
+from dragchain.tradeoff.promises import check_promises, failures, verdict, write_checks
+
+FULL, SOFT = (1.0, 0.64, 1.0), (0.01, 0.64, 1.0)
+ASKED = {"tolerance": 0.1, "quantity": "drag_mean"}
+
+
+def scene(depth: float, ratio: float, rng: np.random.Generator, runs: int = 6) -> list[Any]:
+    """Runs of a scene: full stiffness, and a promise that errs by a known ratio."""
+    inputs = {"motion.immersion_depth_m": depth}
+    full = [measures(FULL, seed, rng, inputs=inputs) for seed in range(1, runs + 1)]
+    soft = [
+        measures(SOFT, seed, rng, inputs=inputs, effects={"drag_mean": ratio})
+        for seed in range(1, runs + 1)
+    ]
+    return [{**run, "asked": None} for run in full] + [{**run, "asked": ASKED} for run in soft]
+
+
+def test_promises_are_kept_and_broken_by_their_errors(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    files = write(tmp_path, [*scene(0.05, 1.02, rng), *scene(0.03, 1.3, rng)])
+    kept, broken = check_promises(files)
+    assert (kept.verdict, broken.verdict) == ("kept", "broken")
+    assert kept.error.ci95_low < 0.02 < kept.error.ci95_high
+    assert broken.error.ci95_low < 0.3 < broken.error.ci95_high
+    assert dict(broken.scene) == {"motion.immersion_depth_m": "0.03"}
+    assert (kept.runs, kept.failed, kept.reference_runs) == (6, 0, 6) and kept.met
+
+
+def test_a_promise_kept_by_the_skin_of_its_teeth_is_not_met(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    asked = {**ASKED, "tolerance": 0.2, "held_to": 0.1}
+    runs = [{**run, "asked": run["asked"] and asked} for run in scene(0.05, 1.12, rng)]
+    (check,) = check_promises(write(tmp_path, runs))
+    assert check.verdict == "kept" and not check.met
+
+
+def test_few_runs_leave_a_promise_open(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    files = write(tmp_path, scene(0.05, 1.08, rng, runs=2))
+    (check,) = check_promises(files)
+    assert check.verdict == "open"
+
+
+def test_the_interval_holds_the_error_as_often_as_it_says(tmp_path: Path) -> None:
+    rng = np.random.default_rng(11)
+    held = 0
+    for trial in range(120):
+        (check,) = check_promises(write(tmp_path / str(trial), scene(0.05, 1.1, rng, runs=2)))
+        held += check.error.ci95_low <= 0.1 <= check.error.ci95_high
+    assert 107 <= held <= 119  # 114 expected, standard deviation 2.4
+
+
+def test_a_failed_run_does_not_count(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    failed = measures(SOFT, 7, rng, failure=[{"name": "within its limits", "seen": "1 particle"}])
+    inputs = {**failed["inputs"], "motion.immersion_depth_m": 0.05}
+    files = write(tmp_path, [*scene(0.05, 1.0, rng), {**failed, "inputs": inputs, "asked": ASKED}])
+    (check,) = check_promises(files)
+    assert (check.runs, check.failed, check.verdict) == (6, 1, "kept") and not check.met
+    (lost,) = failures(files)
+    assert lost["asked"] and lost["seen"] == "1 particle"
+
+
+def test_without_full_stiffness_there_is_nothing_to_compare_with(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    files = write(tmp_path, [run for run in scene(0.05, 1.0, rng) if run["asked"]])
+    with pytest.raises(TableError, match="no run at full stiffness"):
+        check_promises(files)
+
+
+def test_what_is_written_can_be_read(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    write_checks(tmp_path / "out", write(tmp_path, scene(0.05, 1.0, rng)))
+    (row,) = json.loads((tmp_path / "out" / "promises.json").read_text())["checks"]
+    assert row["verdict"] == "kept" and row["numbers"]["particles"] == 1422
+    assert (tmp_path / "out" / "promises.csv").read_text().startswith("scene,")
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [(-0.09, 0.09, "kept"), (-0.11, 0.02, "open"), (0.11, 0.2, "broken"), (-0.3, -0.2, "broken")],
+)
+def test_verdicts(low: float, high: float, expected: str) -> None:
+    assert verdict(Error(0.0, 0.0, low, high, 0.0, False), 0.1) == expected

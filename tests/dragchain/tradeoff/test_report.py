@@ -1,0 +1,198 @@
+"""The page of a trade on measures whose effects are known."""
+
+from __future__ import annotations
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from pages import stands_alone
+from tradeoff_files import measures, write, write_drop
+from tradeoff_runs import BOTH, FAILURE, contents
+
+from dragchain.cli import main as dragchain
+from dragchain.errors import TableError
+from dragchain.tradeoff.compare import compare, read_runs
+from dragchain.tradeoff.findings import choose_drop, read_costs, read_drops
+from dragchain.tradeoff.rows import verdicts
+from dragchain.tradeoff.words import percent, plainly, times
+
+COSTS = [
+    {"name": "plain", "scene": "process", "what": "the <plain> deck", "ratio": 2.0,
+     "ci95_low": 1.9, "ci95_high": 2.1},
+]  # fmt: skip
+
+
+def drops(folder: Path) -> list[Path]:
+    return [
+        write_drop(folder / "fine", 0.02, [0.9, 0.88, 0.86], 100.0),
+        write_drop(folder / "coarse", 0.1, [0.909, 0.88, 0.86], 20.0),
+        write_drop(folder / "coarser", 0.2, [0.9, 0.99, 0.86], 10.0),
+    ]
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("tradeoff")
+    rng = np.random.default_rng(9)
+    found = [
+        *contents(),
+        measures((0.01, 0.8, 1.0), 1, rng, cpu_time_s=3.0, failure=FAILURE),
+        measures((1.0, 0.2, 5.0), 1, rng, cpu_time_s=20.0),
+        measures(BOTH, 1, rng, inputs={"bowl.facet_size_m": 0.005}),
+    ]
+    files = write(folder / "runs", found)
+    costs = folder / "costs.json"
+    costs.write_text(json.dumps(COSTS))
+    arguments = ["step", "tradeoff", "--out", folder / "out", "--reference", files[0].parent]
+    arguments += ["--costs", costs, "--plan", "long", "--drops", *drops(folder / "drops"), "--"]
+    assert dragchain([str(one) for one in [*arguments, *files]]) == 0
+    return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def summary(made: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((made / "tradeoff.json").read_text())
+    return content
+
+
+class Text(HTMLParser):
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.parts: list[str] = []
+        self.images: list[str] = []
+        self.feed(re.sub(r"(?s)<style>.*?</style>", "", page))
+
+    def handle_data(self, data: str) -> None:
+        self.parts.append(data)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        assert tag not in ("script", "link")
+        self.images += [str(value) for name, value in attrs if name == "src"]
+
+
+@pytest.fixture(scope="module")
+def text(made: Path) -> Text:
+    return Text((made / "report.html").read_text())
+
+
+def test_the_page_needs_nothing_else_and_shows_no_broken_number(made: Path, text: Text) -> None:
+    stands_alone((made / "report.html").read_text())
+    words = " ".join(text.parts)
+    assert not re.search(r"\b(nan|inf|None|NaN)\b", words)
+    assert len(text.images) == 4
+
+
+def test_what_is_not_resolved_is_never_a_zero(text: Text) -> None:
+    assert "not resolved" in text.parts
+    assert not {"+0.0\N{NO-BREAK SPACE}%", "0\N{NO-BREAK SPACE}%"} & set(text.parts)
+
+
+def test_the_page_says_what_to_choose_and_what_softness_ruins(text: Text) -> None:
+    words = " ".join(" ".join(text.parts).replace("\N{NO-BREAK SPACE}", " ").split())
+    assert "Mean drag, within 2" in words and "Contacts on the workpiece, within 2" in words
+    assert "E x 0.01, 50 % of Rayleigh (20 times cheaper than the reference" in words
+    assert "The <plain> deck: it takes 2 times (1.9 to 2.1)" in words
+    assert "every particle kept" in words and "12 particles" in words
+    assert "Inertial number of the scene: 0.004 at speed x 1, 0.02 at speed x 5" in words
+
+
+def test_softness_ruins_what_it_was_made_to_ruin(tmp_path: Path) -> None:
+    files = write(tmp_path, contents())
+    (row,) = verdicts(compare(*read_runs(files, files[0].parent)))
+    assert row["level"] == "E x 0.01"
+    assert "mean normal force of a contact on the workpiece" in row["ruined"]
+    assert "mean lateral force" in row["ruined"]
+    assert "contacts on the workpiece" in row["kept"] and "fill height" in row["kept"]
+
+
+def test_the_file_for_the_advisor(summary: dict[str, Any]) -> None:
+    assert set(summary) == {
+        "schema", "measured", "commands", "plan", "study", "versions", "machine", "runs",
+        "engine_hours", "scene", "reference", "quantities", "settings", "drop_test", "costs",
+        "checks",
+    }  # fmt: skip
+    assert summary["schema"] == 2 and summary["plan"] == "long" and summary["runs"] == 16
+    assert summary["measured"] == "2026-01-04"
+    assert set(summary["versions"]) == {"dragdeck", "engine", "python", "numpy"}
+    assert summary["scene"] == {"inertial_number": 0.004, "particles": 1422}
+    assert summary["costs"] == COSTS and summary["checks"] == []
+    parameters = {"youngs_modulus_scale": 1.0, "timestep_fraction": 0.2, "speed_factor": 1.0}
+    assert summary["reference"] == parameters
+    wall = 4 * 100 + 3 * (10 + 40 + 5) + 3 + 20 + 100
+    assert summary["engine_hours"] == pytest.approx(wall / 3600, rel=1e-5)
+    quantity = summary["quantities"]["drag_mean"]
+    assert quantity["reference"] == pytest.approx(-2.6, rel=0.03)
+    assert {"label", "unit", "se", "run_std", "arc_m"} <= set(quantity)
+
+
+def test_settings_for_the_advisor_change_the_fidelity_alone(summary: dict[str, Any]) -> None:
+    settings = {(one["youngs_modulus_scale"], one["timestep_fraction"], one["speed_factor"]): one
+                for one in summary["settings"]}  # fmt: skip
+    assert len(settings) == len(summary["settings"]) == 6
+    own = settings[BOTH]
+    assert (own["seeds"], own["runs"], own["failed"]) == (3, 3, 0)
+    assert own["relative_cost"] == pytest.approx(0.05)
+    assert set(own["errors"]["drag_mean"]) == {
+        "error", "se", "ci95_low", "ci95_high", "bound", "resolved", "alone"
+    }  # fmt: skip
+    failed = settings[0.01, 0.8, 1.0]
+    assert (failed["failed"], failed["errors"]) == (1, {})
+
+
+def test_drops_are_compared_with_the_finest(summary: dict[str, Any], tmp_path: Path) -> None:
+    assert [row["timestep_fraction"] for row in summary["drop_test"]] == [0.02, 0.1, 0.2]
+    assert summary["drop_test"][1]["restitution_error"] == pytest.approx(0.01)  # the worst impact
+    assert summary["drop_test"][1]["relative_cost"] == pytest.approx(0.2)
+    found = read_drops(drops(tmp_path))
+    assert found[1].bound == pytest.approx(0.01) and found[2].bound == pytest.approx(0.125)
+    assert choose_drop(found, 0.02) == found[1]
+    assert choose_drop(found, 0.2) == found[2]
+    assert choose_drop(found, 0.005) is None
+    assert read_drops([]) == []
+
+
+def test_tables_and_figures_are_there(made: Path) -> None:
+    for name in ("pareto", "contact_forces", "path", "drop_test"):
+        assert (made / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    runs, errors = (pd.read_csv(made / f"{name}.csv") for name in ("runs", "errors"))
+    assert len(runs) == len(pd.read_parquet(made / "runs.parquet")) == 16
+    assert len(errors) == len(pd.read_parquet(made / "errors.parquet"))
+    assert {"ci95_low", "ci95_high", "bound", "relative_cost"} <= set(errors)
+
+
+def test_a_page_of_a_single_setting(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    files = write(tmp_path / "runs", [measures((1.0, 0.2, 1.0), n, rng) for n in (1, 2, 3)])
+    arguments = [
+        "step",
+        "tradeoff",
+        "--out",
+        tmp_path / "out",
+        "--reference",
+        files[0].parent,
+        *files,
+    ]
+    assert dragchain([str(one) for one in arguments]) == 0
+    words = " ".join(Text((tmp_path / "out" / "report.html").read_text()).parts)
+    assert "no setting has two complete runs" in words and not re.search(r"\bnan\b", words)
+
+
+def test_costs_without_a_key_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "costs.json"
+    file.write_text(json.dumps({"costs": [{"name": "plain"}]}))
+    with pytest.raises(TableError, match="no list of costs"):
+        read_costs(file)
+
+
+def test_numbers_in_words() -> None:
+    assert [percent(x) for x in (0.1234, -0.0123, 0.00049, 0.0)] == [
+        "+12", "\N{MINUS SIGN}1.2", "+0.05", "0"
+    ]  # fmt: skip
+    assert plainly(0.05) == "5" and plainly(0.2) == "20"
+    assert times(41.7) == "42" and times(float("nan")) == "\N{EN DASH}"

@@ -1,0 +1,307 @@
+"""What things left out cost: statistics, the timed decks, two variants on the engine."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import pytest
+
+from dragdeck.campaigns.cost_timing import BLOCK, blocks, costs, measure
+from dragdeck.campaigns.cost_variants import (
+    BASES,
+    CONTACT_WIDTH,
+    Edit,
+    TimedDeck,
+    Variant,
+    at_rest_deck,
+    geometric,
+    standard_case,
+    timed_deck,
+    variant_case,
+    variants,
+    workpiece_in_deck,
+)
+from dragdeck.cases.case import Case
+from dragdeck.cli import main
+from dragdeck.decks.render import environment
+from dragdeck.errors import InputError
+from dragdeck.outlook.explain import Cost, explanation, price_of
+from dragdeck.project import Project
+from dragdeck.scenes.drop_test import drop_scene
+from dragdeck.scenes.filling import filling_scene
+from dragdeck.scenes.process import process_scene
+from dragdeck.scenes.scene import Bed
+from dragdeck.sweep.cases import load_cases
+
+BED = Bed(surface_m=0.045, top_m=0.05)
+STEPS = 1000
+
+
+@pytest.fixture
+def base(case: Case) -> Case:
+    return standard_case(case)
+
+
+@pytest.fixture
+def templates(project: Project) -> jinja2.Environment:
+    return environment(project.templates)
+
+
+def deck_of(base: Case, name: str, templates: jinja2.Environment) -> TimedDeck:
+    found = {variant.name: variant for variant in [*BASES.values(), *variants(base)]}[name]
+    return timed_deck(base, found, templates, STEPS, BED, "bed.restart")
+
+
+def lines(text: str) -> list[str]:
+    return [line for line in text.splitlines() if line and not line.startswith("#")]
+
+
+def test_the_interval_of_known_ratios() -> None:
+    """Logarithms 0, 1, 2: mean 1, standard error 1 / sqrt(3), t of 2 degrees 4.30265."""
+    found = geometric([1.0, math.e, math.e**2])
+    assert found.ci95_low is not None and found.ci95_high is not None
+    assert found.ratio == pytest.approx(math.e)
+    assert math.log(found.ci95_high) - 1 == pytest.approx(4.302652730 / math.sqrt(3))
+    assert 1 - math.log(found.ci95_low) == pytest.approx(4.302652730 / math.sqrt(3))
+
+
+def test_one_round_has_no_interval() -> None:
+    found = geometric([2.0])
+    assert (found.ratio, found.ci95_low, found.ci95_high) == (pytest.approx(2.0), None, None)
+
+
+@pytest.mark.parametrize("deck", ["run 2\n", "run 1\nrun 1\n"])
+def test_an_edit_that_does_not_fit_is_refused(deck: str) -> None:
+    with pytest.raises(InputError, match="has not the text to change"):
+        Edit(r"^run 1$", "run 3").apply(deck)
+
+
+def test_an_edit_changes_its_line_alone() -> None:
+    assert Edit(r"^run (\d)$", r"run \g<1>0").apply("rerun 1\nrun 1\n") == "rerun 1\nrun 10\n"
+
+
+def row(number: int, cpu: float, base_cpu: float, name: str = "finer") -> dict[str, Any]:
+    base = {"cpu_time_s": base_cpu, "wall_time_s": 1.0, "steps": 100}
+    return {
+        "name": name, "round": number, "cpu_time_s": cpu, "wall_time_s": 0.5, "steps": 200,
+        "base": base,
+    }  # fmt: skip
+
+
+def test_a_cost_counts_steps_or_seconds() -> None:
+    """Twice the steps in 6 s and 1.5 s against 1 s: 3 and 0.75 a step, their mean is 1.5."""
+    rows = [row(0, 6.0, 1.0), row(1, 1.5, 1.0)]
+    steps_s = {"standard": 1e-5, "finer": 0.5e-5}
+    (step,) = costs([Variant("finer", "", unit="per_step")], rows, steps_s)
+    (second,) = costs([Variant("finer", "")], rows, steps_s)
+    assert step["ratio"] == step["per_step"] == second["per_step"] == pytest.approx(1.5)
+    assert second["ratio"] == second["per_second"] == step["per_second"] == pytest.approx(3.0)
+    assert step["wall_ratio"] == pytest.approx(0.25)
+    assert second["wall_ratio"] == pytest.approx(0.5)
+    assert step["ci95_low"] < 0.75 and step["ci95_high"] > 3.0
+    assert second["ci95_low"] == pytest.approx(2 * step["ci95_low"])
+    assert (step["rounds"], step["steps"]) == (2, 200)
+
+
+def test_every_round_times_every_variant_once_in_another_order(base: Case) -> None:
+    chosen = variants(base)
+    orders = [[v.name for block in blocks(chosen, number) for v in block] for number in range(3)]
+    assert all(sorted(order) == sorted(v.name for v in chosen) for order in orders)
+    assert len({tuple(order) for order in orders}) == 3
+    for block in blocks(chosen, 1):
+        assert len({variant.base for variant in block}) == 1 and len(block) <= BLOCK
+
+
+def test_every_variant_differs_from_its_base(base: Case, templates: jinja2.Environment) -> None:
+    chosen = variants(base)
+    assert len({variant.name for variant in chosen}) == len(chosen)
+    for variant in chosen:
+        deck, beside = (deck_of(base, name, templates) for name in (variant.name, variant.base))
+        other_mesh = {
+            name: len(mesh.triangles) for name, mesh in deck.meshes.items()
+        } != {name: len(mesh.triangles) for name, mesh in beside.meshes.items()}  # fmt: skip
+        other_text = lines(deck.whole) != lines(beside.whole)
+        other_bed = variant_case(base, variant).study.media != base.study.media
+        assert other_mesh or other_text or other_bed or deck.ranks != beside.ranks, variant.name
+        assert lines(deck.whole) != lines(deck.start), variant.name
+
+
+def test_the_standard_drag_is_the_process_without_what_goes_before(
+    base: Case, templates: jinja2.Environment
+) -> None:
+    scene = process_scene(base, BED)
+    text = deck_of(base, "standard", templates).whole
+    steps = int(re.findall(r"^if .* then \"run (\d+) upto\"", text, re.MULTILINE)[0])
+    assert -0.05 <= (steps - STEPS) / scene.deck.thermo_steps < 1
+    assert steps % scene.deck.thermo_steps == 0
+    start = re.findall(r"reference_point (\S+) (\S+) (\S+)", text)[0]
+    study = base.study
+    height = BED.surface_m - study.motion.immersion_depth_m
+    assert [float(value) for value in start] == pytest.approx(
+        [study.motion.path.radius_m, 0.0, height], abs=1e-9
+    )
+    assert "move_plunge" not in text and "move_drag" in text
+
+
+def test_the_plain_deck(base: Case, templates: jinja2.Environment) -> None:
+    plain, standard = (deck_of(base, name, templates) for name in ("plain", "standard"))
+    fraction = base.study.chosen_fidelity().timestep_fraction
+    assert plain.timestep_s / standard.timestep_s == pytest.approx(0.2 / fraction, rel=1e-3)
+    assert "neighbor 0.001 bin" in plain.whole
+    assert "bowl.stl" in plain.whole and "bowl.stl" in plain.meshes
+    assert plain.ranks == 1
+    assert all(line in plain.whole for line in lines(standard.whole) if line.startswith("compute"))
+
+
+def test_all_columns_are_asked_for_and_written(base: Case, templates: jinja2.Environment) -> None:
+    text = deck_of(base, "plain_columns", templates).whole
+    for output, compute in (
+        ("contacts", "particle_contacts"),
+        ("workpiece_contacts", "workpiece_contacts"),
+    ):
+        (dump,) = re.findall(rf"^dump write_{output} .*$", text, re.MULTILINE)
+        assert dump.count(f"c_{compute}[") == CONTACT_WIDTH
+        assert f"compute {compute} all" in text and "torque_tangential history" in text
+
+
+def test_before_the_drag_only_forces_and_energies_are_written(
+    base: Case, templates: jinja2.Environment
+) -> None:
+    text = deck_of(base, "before_drag", templates).whole
+    assert re.findall(r"^(?:dump|fix) write_(\w+)", text, re.MULTILINE) == [
+        "thermo",
+        "workpiece_force",
+    ]
+
+
+def test_every_step_of_a_drop_is_written_from_its_begin(
+    base: Case, templates: jinja2.Environment
+) -> None:
+    text = deck_of(base, "drop_every_step", templates).whole
+    assert text.count("fix write_impacts") == 1 and "unfix write_impacts" not in text
+    assert text.index("fix write_impacts") < text.index("run 0") < text.index("run ${flight}")
+
+
+def test_beds_keep_particles_but_no_workpiece(base: Case, templates: jinja2.Environment) -> None:
+    meshed = variant_case(base, Variant("", "", {"bowl.facet_size_m": 0.005}))
+    for text in (
+        workpiece_in_deck(base, BED, "packing.restart", templates),
+        at_rest_deck(meshed, BED, "bed.restart", templates),
+    ):
+        assert text.index("unfix workpiece\n") < text.index("write_restart bed.restart")
+        assert ("unfix bowl" in text) == ("fix bowl" in text)
+        assert "dump write_" not in text and "move_drag" not in text
+
+
+def test_what_is_left_out_names_variants_that_there_are(base: Case) -> None:
+    known = {variant.name for variant in variants(base)}
+    scenes = (drop_scene(base), filling_scene(base), process_scene(base))
+    named = {left.cost for scene in scenes for left in scene.leaves_out.values() if left.cost}
+    assert len(named) >= 6 and named <= known
+
+
+def test_a_price_is_quoted_with_engine_and_date() -> None:
+    cost = {"name": "bowl_facets", "ratio": 1.9, "ci95_low": 1.85, "ci95_high": 1.951}
+    tradeoff = {"versions": {"engine": "3.8.0"}, "measured": "2026-11-21", "costs": [cost]}
+    said = "putting it back costs 1.9x (1.85 to 1.95), LIGGGHTS 3.8.0, 2026-11-21"
+    assert price_of("bowl_facets", tradeoff) == said
+    assert "not measured" in price_of("bowl_facets", {})
+    single = {**tradeoff, "costs": [{**cost, "ci95_low": None, "ci95_high": None}]}
+    assert price_of("bowl_facets", single).startswith("putting it back costs 1.9x, LIGGGHTS")
+
+
+@pytest.mark.parametrize(
+    ("high", "unit", "scene", "shown"),
+    [(0.95, "per_second", "process", True), (1.01, "per_second", "process", False),
+     (None, "per_second", "process", False), (0.95, "per_step", "process", False),
+     (0.95, "per_second", "filling", False)],
+)  # fmt: skip
+def test_explain_names_what_is_surely_cheaper(
+    base: Case, high: float | None, unit: str, scene: str, shown: bool
+) -> None:
+    cost = {
+        "name": "workpiece_wide_facets", "what": "wide facets", "scene": scene, "unit": unit,
+        "ratio": 0.9, "ci95_low": None if high is None else 0.85, "ci95_high": high,
+    }  # fmt: skip
+    tradeoff = {"versions": {"engine": "3.8.0"}, "measured": "2026-11-21", "costs": [cost]}
+    table = explanation(process_scene(base), Cost(1, 1.0, ""), (), tradeoff)
+    assert ("wide facets" in list(table.columns[1].cells)) == shown
+    assert any("not measured" in str(cell) for cell in table.columns[2].cells)
+
+
+def test_a_filling_is_timed_over_whole_frames(base: Case, templates: jinja2.Environment) -> None:
+    deck = deck_of(base, "filling_contacts", templates)
+    (period,) = re.findall(r"^dump write_contacts all local (\d+) ", deck.whole, re.MULTILINE)
+    (steps,) = re.findall(r"^run (\d+)$", deck.whole, re.MULTILINE)
+    assert int(steps) % int(period) == 0
+    assert 1 / (int(period) * deck.timestep_s) == pytest.approx(20, rel=1e-3)
+    assert re.findall(r"^run (\d+)$", deck.start, re.MULTILINE) == ["1"]
+
+
+def test_a_measurement_is_not_overwritten(
+    case: Case,
+    project: Project,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(project.root)
+    (project.root / "costs.json").write_text("kept")
+    assert main(["costs", "small", "--out", "costs.json"]) == 1
+    assert "there already" in capsys.readouterr().err
+    assert (project.root / "costs.json").read_text() == "kept"
+
+
+@pytest.mark.parametrize("option", ["--rounds", "--seconds"])
+def test_nothing_to_time_is_refused(
+    option: str, case: Case, project: Project, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(project.root)
+    assert main(["costs", "small", "--out", "costs.json", option, "0"]) == 1
+    assert option in capsys.readouterr().err
+
+
+@pytest.mark.engine
+def test_two_variants_on_the_engine(
+    small: dict[str, Any], write_study: Any, project: Project, tmp_path: Path
+) -> None:
+    small["media"]["count"] = 120
+    small["bowl"]["radius_m"] = 0.02
+    small["workpiece"]["shape"]["radius_m"] = 0.0035
+    small["motion"]["path"]["radius_m"] = 0.008
+    small["motion"]["immersion_depth_m"] = 0.01
+    (case,) = load_cases(write_study(small))
+    chosen = ("contact_columns", "step_0.2")
+    said: list[str] = []
+
+    def time_them(out: Path, rounds: int) -> dict[str, Any]:
+        results = project.root / "results" / "small"
+        measure(
+            case, results, project.templates, out, said.append, rounds=rounds, seconds=0.04,
+            only=chosen,
+        )  # fmt: skip
+        found: dict[str, Any] = json.loads(out.read_text())
+        return found
+
+    first = time_them(tmp_path / "costs.json", 1)
+    beds = [line for line in said if line.startswith("making the bed")]
+    kept = json.loads((tmp_path / "costs" / "rounds.json").read_text())["rows"]
+    found = time_them(tmp_path / "again.json", 2)
+    rows = json.loads((tmp_path / "costs" / "rounds.json").read_text())["rows"]
+    assert len(kept) == 2 and len(rows) == 4 and rows[:2] == kept
+    assert beds == [line for line in said if line.startswith("making the bed")] and beds
+    assert found["versions"]["engine"].startswith("3.")
+    columns, step = found["costs"]
+    assert (columns["name"], step["name"]) == ("contact_columns", "step_0.2")
+    assert columns["steps"] == found["bases"][0]["steps"]
+    assert step["per_second"] == pytest.approx(
+        step["per_step"] * found["bases"][0]["timestep_s"] / step["timestep_s"]
+    )
+    for cost in found["costs"]:
+        assert cost["ci95_low"] < cost["ratio"] < cost["ci95_high"] and cost["rounds"] == 2
+    assert first["costs"][0]["ci95_low"] is None

@@ -1,0 +1,245 @@
+"""The drops of a calibration, and the recovery of a known restitution on the real engine."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scipy.integrate import solve_ivp
+
+from dragchain.calibration.fit import calibrate, prepare
+from dragchain.calibration.force_record import measure, read_record
+from dragchain.calibration.report import write_report
+from dragchain.calibration.results import (
+    confirmed,
+    write_calibration,
+    write_synthetic,
+    write_trials,
+)
+from dragchain.calibration.simulated_drops import read_drops
+from dragchain.calibration.synthetic_record import Sensor
+from dragdeck.campaigns.restitution_drops import (
+    Drop,
+    confirmation,
+    drop_case,
+    full,
+    production,
+    record_file,
+    run_drops,
+    settings,
+    sweep,
+    trials,
+)
+from dragdeck.cases.case import Case
+from dragdeck.cli import main
+from dragdeck.decks.render import environment
+from dragdeck.errors import InputError
+from dragdeck.physics.contact_mechanics import hertz_contact_time, rayleigh_time
+from dragdeck.project import Project
+from dragdeck.scenes.drop_test import DROP_TEST, DropFidelity, drop_scene
+from dragdeck.sweep.cases import load_cases
+
+WriteStudy = Callable[..., Path]
+
+
+@pytest.fixture
+def measured_case(small: dict[str, Any], write_study: WriteStudy) -> Case:
+    """The small study with a measured drop test, at a modulus and step of its own."""
+    small["calibration"] = {"record": "record.csv"}
+    small["fidelities"]["quick"].update(youngs_modulus_scale=0.01, timestep_fraction=0.5)
+    (only,) = load_cases(write_study(small))
+    return only
+
+
+# --- which drops -----------------------------------------------------------------------------
+
+
+def test_the_default_drop_is_at_full_modulus_and_the_studys_step(case: Case) -> None:
+    scene = drop_scene(case)
+    assert scene.deck == drop_scene(case, DropFidelity()).deck
+    assert scene.case["youngs_modulus_scale"] == 1.0
+    ratio = scene.deck.timestep_s / scene.case["rayleigh_time_s"]
+    assert ratio == pytest.approx(case.study.drop_test.timestep_fraction, rel=1e-3)
+
+
+def test_a_drop_can_run_as_the_process_does(measured_case: Case) -> None:
+    chosen = measured_case.study.chosen_fidelity()
+    coarse = production(measured_case.study)
+    scene = drop_scene(measured_case, coarse)
+    assert scene.deck.materials.youngs_moduli_pa[0] == pytest.approx(77e9 * 0.01)
+    assert scene.deck.timestep_s == coarse.timestep_s
+    # of the mean particle, a little larger than the smallest, which sets the step
+    assert scene.deck.timestep_s < chosen.timestep_fraction * scene.case["rayleigh_time_s"]
+    particle = measured_case.study.materials["ceramic"]
+    assert scene.case["rayleigh_time_s"] == pytest.approx(10 * rayleigh_time(particle, 3.27e-3))
+
+
+def test_softer_particles_touch_for_longer(measured_case: Case) -> None:
+    """Hertz: with the modulus to the power of -2/5."""
+    hard = drop_scene(measured_case, DropFidelity(1.0, 1e-7)).deck.impact_steps  # type: ignore[attr-defined]
+    soft = drop_scene(measured_case, DropFidelity(0.01, 1e-7)).deck.impact_steps  # type: ignore[attr-defined]
+    wanted = hertz_contact_time(1, 1, 0.01, 1) / hertz_contact_time(1, 1, 1.0, 1)
+    assert soft / hard == pytest.approx(wanted, rel=0.02)
+
+
+def test_the_sweep_covers_both_contact_options(measured_case: Case) -> None:
+    drops = list(sweep(measured_case.study))
+    assert len({drop.name for drop in drops}) == len(drops)
+    for purpose in ("production", "reference"):
+        for option in (True, False):
+            values = {
+                d.restitution for d in drops if (d.purpose, d.limit_force) == (purpose, option)
+            }
+            assert min(values) == 0.4 and max(values) == 1.0
+            assert len(values) >= 7
+    heights = {d.height_m for d in drops if d.purpose == "production"}
+    path = 0.4429 * (production(measured_case.study).timestep_s or 0.0)
+    assert max(heights) - min(heights) == pytest.approx(0.75 * path, rel=1e-3)
+
+
+def test_trials_are_seeded(measured_case: Case) -> None:
+    study = measured_case.study
+    first, again, other = (list(trials(study, 5, seed)) for seed in (3, 3, 4))
+    assert first == again != other
+    assert len({drop.height_m for drop in first}) == 5
+
+
+def test_a_drop_changes_only_what_it_says(measured_case: Case) -> None:
+    drop = Drop("x", "trial", 0.8, False, 0.011, DropFidelity())
+    changed = drop_case(measured_case, drop).study
+    assert changed.pair("ceramic", "steel").restitution == 0.8
+    assert changed.pair("ceramic", "ceramic") == measured_case.study.pair("ceramic", "ceramic")
+    assert (changed.contact.limit_force, changed.drop_test.height_m) == (False, 0.011)
+    assert changed.materials == measured_case.study.materials
+
+
+def test_a_calibration_does_not_rename_any_run(case: Case, measured_case: Case) -> None:
+    assert DROP_TEST.run_id(case) == DROP_TEST.run_id(measured_case)
+
+
+def test_a_study_without_a_record_is_told_so(case: Case, measured_case: Case) -> None:
+    with pytest.raises(InputError, match="names no measured drop test"):
+        settings(case)
+    with pytest.raises(InputError, match="no such record"):
+        record_file(measured_case)
+    (measured_case.file.parent / "record.csv").write_text("")
+    assert record_file(measured_case).name == "record.csv"
+
+
+def test_confirm_asks_for_the_fit(
+    measured_case: Case, project: Project, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    monkeypatch.chdir(project.root)
+    assert main(["drops", "small", "confirm", "--out", "anywhere"]) == 1
+    assert "--fit" in capsys.readouterr().err
+
+
+# --- the real engine -------------------------------------------------------------------------
+
+
+def short_sweep(case: Case) -> list[Drop]:
+    """A sweep of seven values: enough for the fit, seconds to run."""
+    coarse, fine = production(case.study), full(case.study, 0.04)
+    found = []
+    for value in (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0):
+        for option in (True, False):
+            for phase in (0, 1) if option else (0,):
+                name = f"p-{value}-{option}-{phase}"
+                height = 0.010 + 3e-6 * phase
+                found.append(Drop(name, "production", value, option, height, coarse))
+        found.append(Drop(f"r-{value}", "reference", value, True, 0.010 + 1e-8 * value, fine))
+    found += [
+        Drop(f"r-{value}-f", "reference", value, False, 0.010, fine)
+        for value in (0.4, 0.5, 0.6, 0.7, 0.8, 1.0)
+    ]
+    return found
+
+
+@pytest.mark.engine
+@pytest.mark.slow
+def test_a_known_restitution_is_recovered(measured_case: Case, project: Project) -> None:
+    """Two drops at another step and height, as noisy records: in the stated intervals.
+
+    And the whole way from a CSV to the page.
+    """
+    case, folder = measured_case, project.root / "calibration"
+    templates = environment(project.templates)
+
+    def run(drops: list[Drop], name: str) -> Path:
+        return run_drops(case, drops, folder / name, templates, lambda line: None)
+
+    listed = run(short_sweep(case), "sweep")
+    known = [
+        Drop(f"trial-{k}", "trial", value, True, height, full(case.study, 0.02))
+        for k, (value, height) in enumerate([(0.68, 0.01008), (0.86, 0.00995)])
+    ]
+    made = run(known, "trials")
+    ready, drops = prepare(read_drops(listed)), read_drops(made)
+    for drop, truth in zip(known, drops.runs, strict=True):
+        record = folder / f"{drop.name}.csv"
+        write_synthetic(made, drop.name, Sensor(500e3, 0.1, 3.0, 0.5, 0.01), 7, record)
+        got = calibrate(measure(read_record(record), fall_time_s=ready.known["fall_time_s"]), ready)
+        assert got.fit_reference.low < drop.restitution < got.fit_reference.high
+        low, high = (ready.production.rebound(e) for e in (got.fit.low, got.fit.high))
+        assert low < truth.rebound.mean() < high
+        assert got.fit_reference.height_m == pytest.approx(drop.height_m, abs=2e-5)
+
+    result = json.loads(write_calibration(folder / "trial-0.csv", listed, folder).read_text())
+    values = (result["fit"]["restitution"], result["fit_full"]["restitution"])
+    checked = confirmed(read_drops(run(list(confirmation(case.study, *values))[::2], "confirm")))
+    spread = 4 * checked["std"]
+    assert checked["effective"] == pytest.approx(result["measured"]["value"], abs=spread)
+    write_trials(listed, made, 1, 1, folder / "trials.json")
+    page = write_report(folder / "trial-0.csv", folder).read_text()
+    assert f"restitution: {result['put']['value']:.4g}" in page
+    assert page.count("data:image/") == 4
+    assert "http" not in page
+
+
+def truncated_rebound(deck: float) -> float:
+    """Rebound of a Hertz contact with damping whose force ends where it would pull.
+
+    m x'' = -k x^(3/2) - a sqrt(m k) x^(1/4) x' with
+    a = sqrt(5) |ln e| / sqrt(ln^2 e + pi^2) (Antypov and Elliott 2011), in units
+    of m = k = 1 and an impact speed of 1, integrated until the force is zero.
+    """
+    log = math.log(deck)
+    damping = math.sqrt(5.0) * abs(log) / math.hypot(log, math.pi)
+
+    def force(state: tuple[float, float]) -> float:
+        overlap, speed = max(state[0], 0.0), state[1]
+        return float(overlap**1.5 + damping * overlap**0.25 * speed)
+
+    def ends(_: float, state: tuple[float, float]) -> float:
+        return force(state) if state[1] < 0 else 1.0
+
+    ends.terminal = True  # type: ignore[attr-defined]
+    path = solve_ivp(
+        lambda _, state: (state[1], -force(state)), (0, 10), (1e-12, 1.0), events=ends,
+        rtol=1e-10, atol=1e-13,
+    )  # fmt: skip
+    return float(-path.y[1, -1])
+
+
+@pytest.mark.engine
+def test_limit_force_changes_the_rebound_as_the_law_says(
+    measured_case: Case, project: Project
+) -> None:
+    """The converged engine gives the deck's value back, but not with limitForce."""
+    fine = full(measured_case.study, 0.02)
+    drops = [
+        Drop(f"{o}-{e}", "reference", e, o, 0.010, fine) for o in (True, False) for e in (0.5, 0.8)
+    ]
+    out = run_drops(
+        measured_case, drops, project.root / "two", environment(project.templates), print
+    )
+    for run in read_drops(out).runs:
+        wanted = truncated_rebound(run.restitution) if run.limit_force else run.restitution
+        # gravity acts during the contact too, the more the slower: a few 1e-4
+        assert run.rebound.mean() == pytest.approx(wanted, abs=1e-3)
+    assert truncated_rebound(0.5) - 0.5 > 0.04  # far more than what is allowed above

@@ -1,0 +1,192 @@
+"""Decks: golden files, determinism, overridden blocks, errors in templates."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from paths import ROOT
+
+from dragdeck.cases.case import Case
+from dragdeck.decks.render import deck_text, environment, write_run
+from dragdeck.errors import InputError
+from dragdeck.project import Project
+from dragdeck.scenes.process import PROCESS, process_scene
+from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.scene import Bed
+from dragdeck.sweep.cases import load_cases
+
+GOLDEN = ROOT / "tests/golden"
+BED = Bed(surface_m=0.038, top_m=0.0446)
+
+
+def render(case: Case, project: Project, scene: str) -> str:
+    templates = environment(project.templates, case.file.parent / "templates")
+    return deck_text(SCENES[scene].build(case, BED), templates)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_deck_is_as_it_was(
+    case: Case, project: Project, scene: str, request: pytest.FixtureRequest
+) -> None:
+    golden = GOLDEN / f"{scene}.in.liggghts"
+    text = render(case, project, scene)
+    if request.config.getoption("--update"):
+        golden.write_text(text)
+    assert text == golden.read_text(), "run pytest --update if the change is meant"
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_a_deck_is_always_the_same(case: Case, project: Project, scene: str) -> None:
+    assert render(case, project, scene) == render(case, project, scene)
+
+
+def test_the_outputs_of_the_deck_are_those_of_columns_json(
+    case: Case, project: Project, tmp_path: Path
+) -> None:
+    scene = process_scene(case, BED)
+    write_run(scene, tmp_path / "run", environment(project.templates))
+    deck = (tmp_path / "run/in.liggghts").read_text()
+    outputs = json.loads((tmp_path / "run/columns.json").read_text())["outputs"]
+    assert set(outputs) == {
+        "thermo",
+        "workpiece_force",
+        "workpiece_particles",
+        "workpiece_contacts",
+        "particles",
+        "contacts",
+    }
+    for output in outputs.values():
+        assert output["pattern"].replace("{part}", "${part}") in deck
+        if output["engine_columns"]:
+            assert " ".join(output["engine_columns"]) in deck
+
+
+def own_template(case: Case, text: str) -> None:
+    file = case.file.parent / "templates/process.in.j2"
+    file.parent.mkdir()
+    file.write_text(text)
+
+
+def test_a_study_may_change_one_block(case: Case, project: Project) -> None:
+    plain = render(case, project, "process")
+    own_template(
+        case,
+        '{% extends "base/process.in.j2" %}\n{% block extra %}\n# mine: {{ deck.run }}\n'
+        "{% endblock %}\n",
+    )
+    changed = render(case, project, "process")
+    assert f"# mine: {PROCESS.run_id(case)}" in changed
+    body = [line for line in changed.splitlines() if not line.startswith("# ") and line]
+    assert body == [line for line in plain.splitlines() if not line.startswith("# ") and line]
+    assert "base/process.in.j2" in changed  # the header names every template
+
+
+def test_a_missing_value_names_template_line_and_variable(case: Case, project: Project) -> None:
+    own_template(
+        case,
+        '{% extends "base/process.in.j2" %}\n{% block extra %}\n\n{{ deck.colour }}\n'
+        "{% endblock %}\n",
+    )
+    with pytest.raises(InputError) as caught:
+        render(case, project, "process")
+    assert caught.value.field == "line 4"
+    assert "process.in.j2" in str(caught.value)
+    assert "colour" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{% block extra %}", "template syntax"),
+        ('{% extends "base/nothing.in.j2" %}', "no such template"),
+        ('{% extends "base/process.in.j2" %}{% block extra %}{{ "x" | num }}{% endblock %}', "'x'"),
+    ],
+)
+def test_a_broken_template_is_explained(
+    case: Case, project: Project, text: str, words: str
+) -> None:
+    own_template(case, text)
+    with pytest.raises(InputError) as caught:
+        render(case, project, "process")
+    assert words in str(caught.value)
+
+
+def test_nothing_is_written_when_a_template_fails(
+    case: Case, project: Project, tmp_path: Path
+) -> None:
+    own_template(case, '{% extends "base/process.in.j2" %}{% block run %}{{ no }}{% endblock %}')
+    templates = environment(project.templates, case.file.parent / "templates")
+    with pytest.raises(InputError):
+        write_run(process_scene(case, BED), tmp_path / "run", templates)
+    assert not (tmp_path / "run").exists()
+
+
+def test_every_rate_is_at_least_the_asked(case: Case) -> None:
+    scene = process_scene(case, BED)
+    dt = scene.deck.timestep_s
+    asked = {
+        "workpiece_force": 1000,
+        "workpiece_particles": 200,
+        "workpiece_contacts": 200,
+        "particles": 20,
+        "contacts": 20,
+    }
+    periods = {output.name: output.period_steps for output in scene.deck.outputs}
+    for name, rate in asked.items():
+        assert 1 / (periods[name] * dt) >= rate
+    assert periods["workpiece_particles"] % periods["workpiece_force"] == 0
+    assert periods["contacts"] % periods["workpiece_contacts"] == 0
+    assert scene.steps % periods["contacts"] == 0
+
+
+def test_the_tip_ends_at_the_asked_depth(case: Case) -> None:
+    deck: Any = process_scene(case, BED).deck
+    tip = list(deck.workpiece_start_m)
+    for leg in deck.legs[:-1]:
+        seconds = (leg.end_step - leg.start_step) * deck.timestep_s
+        tip = [x + v * seconds for x, v in zip(tip, leg.velocity_m_s, strict=True)]
+    assert tip == pytest.approx([0.010, 0.0, 0.038 - 0.015], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "words"),
+    [
+        (
+            ("motion", "path"),
+            {"kind": "circle", "radius_m": 0.0215},
+            "between its path and the bowl",
+        ),
+        (("motion", "immersion_depth_m"), 0.05, "below the floor"),
+        (("motion", "immersion_depth_m"), 0.035, "crush particles"),
+        (("media", "count"), 5000, "more particles than the bowl holds"),
+        (("fidelities", "quick"), {"youngs_modulus_scale": 1e-5}, "so soft a material"),
+        (("media", "radius_mean_m"), 0.022, "does not fit into the bowl"),
+    ],
+)
+def test_an_impossible_scene_is_refused(
+    small: dict[str, Any],
+    write_study: Callable[..., Path],
+    field: tuple[str, str],
+    value: Any,
+    words: str,
+) -> None:
+    small[field[0]][field[1]] = value
+    if field == ("media", "radius_mean_m"):
+        small["media"]["count"] = 1
+    (case,) = load_cases(write_study(small))
+    with pytest.raises(InputError) as caught:
+        for scene in SCENES.values():
+            scene.build(case, BED)
+    assert words in str(caught.value)
+    assert caught.value.limit
+    assert caught.value.remedy
+
+
+def test_a_narrow_gap_is_a_warning(small: dict[str, Any], write_study: Callable[..., Path]) -> None:
+    small["motion"]["path"]["radius_m"] = 0.016
+    (case,) = load_cases(write_study(small))
+    assert any("jam" in warning for warning in process_scene(case, BED).warnings)

@@ -1,0 +1,141 @@
+"""What tells a whole output file from one that was cut short."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from dragdeck.decks.case_file import CountOfRun, RanksOfRun, SettlingCriterion
+from dragdeck.decks.outputs import Kind, OutputOfRun
+from dragdeck.engine.acceptance import check_run
+from dragdeck.engine.frames import last_frame
+from dragdeck.engine.record import RunInputs
+
+
+def written(kind: Kind, name: str, columns: Sequence[str], last_step: int | None) -> OutputOfRun:
+    return OutputOfRun(
+        kind=kind,
+        binary=kind == "custom",
+        pattern=f"{name}.{{part}}.txt",
+        columns=columns,
+        engine_columns=None,
+        period_steps=1,
+        first_step=0,
+        last_step=last_step,
+    )
+
+
+PRINT = written("print", "force", ["step", "force_n"], None)
+LOCAL = written("local", "contacts", ["a_id", "force_n"], None)
+CUSTOM = written("custom", "particles", ["a_id", "force_n"], None)
+
+
+def text_frame(step: int, rows: list[str]) -> str:
+    box = "ITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
+    head = (
+        f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ENTRIES\n{len(rows)}\n{box}ITEM: ENTRIES a b \n"
+    )
+    return head + "".join(row + "\n" for row in rows)
+
+
+def binary_frame(step: int, chunks: list[list[float]]) -> bytes:
+    rows = sum(len(chunk) for chunk in chunks) // 2
+    head = struct.pack("<qqi6i6d2i", step, rows, 0, *[1] * 6, *[0.0] * 6, 2, len(chunks))
+    return head + b"".join(struct.pack(f"<i{len(c)}d", len(c), *c) for c in chunks)
+
+
+@pytest.mark.parametrize(
+    ("output", "content", "step"),
+    [
+        (PRINT, b"step force_n\n10 1.5\n20 1.6\n", 20),
+        (PRINT, b"step force_n\n10 1.5\n20 1", None),
+        (PRINT, b"step force_n\n10 1.5\n20\n", None),
+        (PRINT, b"step force_n\n", None),
+        (LOCAL, (text_frame(5, ["1 2"]) + text_frame(9, ["1 2", "3 4"])).encode(), 9),
+        (LOCAL, text_frame(7, []).encode(), 7),
+        (LOCAL, text_frame(9, ["1 2", "3 4"])[:-3].encode(), None),
+        (LOCAL, text_frame(9, ["1 2", "3 4"])[:-4].encode(), None),
+        (LOCAL, b"", None),
+        (CUSTOM, binary_frame(3, [[1, 2], []]) + binary_frame(6, [[1, 2, 3, 4]]), 6),
+        (CUSTOM, binary_frame(3, [[]]), 3),
+        (CUSTOM, binary_frame(3, [[1, 2]])[:-1], None),
+        (CUSTOM, (binary_frame(3, [[1, 2]]) * 2)[:-70], None),
+        (CUSTOM, b"", None),
+    ],
+)
+def test_the_last_frame_counts_only_if_whole(
+    tmp_path: Path, output: OutputOfRun, content: bytes, step: int | None
+) -> None:
+    file = tmp_path / "output"
+    file.write_bytes(content)
+    assert last_frame(file, output) == step
+
+
+INPUTS = RunInputs(
+    scene="process", run="a", fidelity=RanksOfRun(ranks=1), media=CountOfRun(count=2)
+)
+HEAD = "step time_s n_particles kinetic_energy_j rotational_energy_j fastest_particle_m_s\n"
+THERMO = written("print", "thermo", HEAD.split(), 20)
+GRID = "  1 by 1 by 1 MPI processor grid\n"
+GOOD = HEAD + "10 0.1 2 1e-9 0 0.1\n20 0.2 2 1e-9 0 0.1\n"
+
+
+def failed(folder: Path, inputs: RunInputs, status: int = 0, parts: int = 1) -> set[str]:
+    """Codes of the checks that did not pass."""
+    checks = check_run(folder, inputs, {"thermo": THERMO}, status, parts, ranks=1)
+    return {check.code for check in checks if not check.passed}
+
+
+@pytest.mark.parametrize(
+    ("screen", "thermo", "status", "fails"),
+    [
+        ("DRAGDECK END\n", GOOD, 0, set()),
+        ("DRAGDECK END\n", GOOD, 1, {"ended"}),
+        ("", GOOD, 0, {"ended"}),
+        ("ERROR: Bad\nDRAGDECK END\n", GOOD, 0, {"no_engine_error"}),
+        ("Dangerous builds = 3\nDRAGDECK END\n", GOOD, 0, {"neighbour_builds"}),
+        ("DRAGDECK END\n", GOOD.replace(" 2 ", " 1 "), 0, {"particles_kept"}),
+        ("DRAGDECK END\n", GOOD.replace("1e-9", "nan"), 0, {"finite_numbers"}),
+        ("DRAGDECK END\n", GOOD.replace("20 0.2", "15 0.2"), 0, {"output_complete"}),
+        ("DRAGDECK END\n", HEAD, 0, {"particles_kept", "finite_numbers", "output_complete"}),
+    ],
+)
+def test_each_check_sees_its_own_fault(
+    tmp_path: Path, screen: str, thermo: str, status: int, fails: set[str]
+) -> None:
+    (tmp_path / "screen.1.txt").write_text(GRID + screen)
+    (tmp_path / "thermo.1.txt").write_text(thermo)
+    assert failed(tmp_path, INPUTS, status) == fails
+
+
+def test_a_bed_that_did_not_settle_fails(tmp_path: Path) -> None:
+    (tmp_path / "screen.1.txt").write_text(GRID + "DRAGDECK NOT SETTLED: energy ratio 0.1\n")
+    (tmp_path / "thermo.1.txt").write_text(GOOD)
+    filling = INPUTS.model_copy(update={"settled": SettlingCriterion(energy_ratio=1e-6)})
+    assert failed(tmp_path, filling) == {"ended", "at_rest"}
+
+
+def test_a_row_that_the_interruption_cut_short_does_not_fail_a_resumed_run(tmp_path: Path) -> None:
+    (tmp_path / "screen.1.txt").write_text(GRID)
+    (tmp_path / "thermo.1.txt").write_text(HEAD + "10 0.1 2 1e-9 0 0.1\n11 0.11 2 1e-")
+    (tmp_path / "screen.2.txt").write_text(GRID + "DRAGDECK END\n")
+    (tmp_path / "thermo.2.txt").write_text(GOOD)
+    assert failed(tmp_path, INPUTS, parts=2) == set()
+
+
+def test_a_lost_particle_has_its_own_reason(tmp_path: Path) -> None:
+    for words, reason in (("Lost atoms: 299 of 300", "lost_particles"), ("Bad", "other")):
+        (tmp_path / "screen.1.txt").write_text(f"ERROR: {words}\n")
+        checks = check_run(tmp_path, INPUTS, {}, 1, 1, ranks=1)
+        assert [check.reason for check in checks if check.code == "no_engine_error"] == [reason]
+
+
+@pytest.mark.parametrize("cut", [0, 1, 30])
+def test_a_frame_longer_than_the_first_look_is_found(tmp_path: Path, cut: int) -> None:
+    content = (text_frame(5, ["1 2"]) + text_frame(9, ["3 4"] * 50)).encode()
+    file = tmp_path / "output"
+    file.write_bytes(content[: len(content) - cut])
+    assert last_frame(file, LOCAL, tail_bytes=16) == (None if cut else 9)

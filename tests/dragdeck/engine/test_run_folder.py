@@ -1,0 +1,252 @@
+"""Runs on the real engine: to the end, interrupted, killed, failed, changed."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from dragdeck.cases.case import Case
+from dragdeck.decks.render import environment, write_run
+from dragdeck.engine.record import RunRecord
+from dragdeck.engine.run_folder import fingerprint, run
+from dragdeck.engine.watch import Progress, Watcher
+from dragdeck.errors import EngineError, InputError, RejectedRunError
+from dragdeck.project import Project
+from dragdeck.scenes.drop_test import DROP_TEST, drop_scene
+from dragdeck.scenes.filling import FILLING, filling_scene
+from dragdeck.sweep.cases import load_cases
+
+pytestmark = pytest.mark.engine
+
+
+def silent(line: str) -> None:
+    """Report nothing."""
+
+
+@pytest.fixture
+def filling(case: Case, project: Project) -> Path:
+    """A rendered fill, not yet run."""
+    folder = project.run_folder(case, FILLING)
+    write_run(filling_scene(case), folder, environment(project.templates))
+    return folder
+
+
+def state(folder: Path) -> RunRecord:
+    return RunRecord.read(folder / "state.json")
+
+
+def test_a_filling_keeps_every_particle_and_comes_to_rest(filling: Path) -> None:
+    result = run(filling, silent)
+    assert result.state == "complete"
+    assert all(check.passed for check in result.checks)
+    assert {check.code for check in result.checks} >= {"at_rest", "particles_kept", "within_limits"}
+    assert (filling / "packing.restart").is_file()
+    assert not list(filling.glob("checkpoint.*"))
+
+
+def test_a_complete_run_is_not_repeated(filling: Path) -> None:
+    run(filling, silent)
+    first = (filling / "run.json").read_text()
+    (filling / "run.json").unlink()  # as Snakemake does before it runs a rule again
+    run(filling, silent)
+    assert (filling / "run.json").read_text() == first
+
+
+def test_a_comment_in_the_deck_changes_nothing(filling: Path) -> None:
+    before = fingerprint(filling)
+    deck = filling / "in.liggghts"
+    deck.write_text("# another title\n" + deck.read_text())
+    assert fingerprint(filling) == before
+    deck.write_text(deck.read_text().replace("timestep ", "timestep 0"))
+    assert fingerprint(filling) != before
+
+
+def test_a_changed_deck_moves_the_old_run_aside(
+    filling: Path, small: dict[str, Any], write_study: Callable[..., Path], project: Project
+) -> None:
+    run(filling, silent)
+    old = (filling / "particles.1.bin").read_bytes()
+    deck = filling / "in.liggghts"
+    deck.write_text(deck.read_text().replace("9.81", "9.80"))
+    lines: list[str] = []
+    run(filling, lines.append)
+    (kept,) = (filling / "archive").iterdir()
+    assert (kept / "particles.1.bin").read_bytes() == old
+    assert "9.81" in (kept / "as_run/in.liggghts").read_text()
+    assert any(str(kept) in line for line in lines)
+
+
+def start(folder: Path) -> subprocess.Popen[bytes]:
+    """Run in a process of its own, which can be signalled."""
+    words = [sys.executable, "-m", "dragdeck.cli", "run", str(folder), "--every", "1"]
+    return subprocess.Popen(words, stderr=subprocess.PIPE)
+
+
+def wait_for(condition: Callable[[], object], seconds: float = 30) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.02)
+
+
+def has_checkpoint(folder: Path) -> Callable[[], bool]:
+    return lambda: len(list(folder.glob("checkpoint.*"))) > 1
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_leaves_a_checkpoint_and_the_run_goes_on(
+    small: dict[str, Any],
+    write_study: Callable[..., Path],
+    project: Project,
+    ranks: int,
+    number: signal.Signals,
+) -> None:
+    small["fidelities"]["quick"].update(ranks=ranks, filling_timestep_fraction=0.05)
+    (case,) = load_cases(write_study(small))
+    folder = project.run_folder(case, FILLING)
+    write_run(filling_scene(case), folder, environment(project.templates))
+    process = start(folder)
+    wait_for(has_checkpoint(folder))
+    process.send_signal(number)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert b"stopped as asked" in said
+    assert b"checkpoint at step" in said
+    assert state(folder).state == "stopped"
+    assert not (folder / "run.json").exists()
+
+    result = run(folder, silent)
+    assert [part.part for part in result.parts] == [1, 2]
+    assert result.parts[1].from_step > 0
+    assert result.state == "complete"
+
+
+def test_a_killed_engine_is_never_a_result(
+    small: dict[str, Any], write_study: Callable[..., Path], project: Project
+) -> None:
+    small["fidelities"]["quick"].update(filling_timestep_fraction=0.05)
+    (case,) = load_cases(write_study(small))
+    folder = project.run_folder(case, FILLING)
+    write_run(filling_scene(case), folder, environment(project.templates))
+    process = start(folder)
+    wait_for(has_checkpoint(folder))
+    for child in psutil.Process(process.pid).children(recursive=True):
+        os.kill(child.pid, signal.SIGKILL)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert b"the engine was killed" in said
+    assert not (folder / "run.json").exists()
+    assert run(folder, silent).state == "complete"
+
+
+def test_a_queue_that_signals_the_engine_too_stops_the_run(
+    small: dict[str, Any], write_study: Callable[..., Path], project: Project
+) -> None:
+    small["fidelities"]["quick"].update(filling_timestep_fraction=0.05)
+    (case,) = load_cases(write_study(small))
+    folder = project.run_folder(case, FILLING)
+    write_run(filling_scene(case), folder, environment(project.templates))
+    process = start(folder)
+    wait_for(has_checkpoint(folder))
+    (engine,) = psutil.Process(process.pid).children()
+    engine.send_signal(signal.SIGTERM)
+    _, said = process.communicate(timeout=60)
+    assert b"stopped as asked" in said
+    assert state(folder).parts[0].exit_status == 0
+    assert not list(folder.glob("restart_forced_*"))
+
+    (folder / "restart_forced_liggghts_7.data").touch()  # the runner was killed before it looked
+    assert run(folder, silent).parts[1].from_step > 0
+    assert not (folder / "archive").exists()
+
+
+def test_the_engines_error_reaches_the_user_and_is_not_retried(filling: Path) -> None:
+    deck = filling / "in.liggghts"
+    good = deck.read_text()
+    deck.write_text(good.replace(" 0.86 ", " 0.01 "))
+    with pytest.raises(RejectedRunError, match=r"ERROR.*[Rr]estitution"):
+        run(filling, silent)
+    assert not (filling / "run.json").exists()
+    begun = state(filling).started
+    with pytest.raises(RejectedRunError, match="--again"):
+        run(filling, silent)
+    assert state(filling).started == begun
+    deck.write_text(good)
+    run(filling, silent)
+    assert (filling / "run.json").is_file()
+
+
+def test_a_truncated_output_fails_its_check(filling: Path) -> None:
+    deck = filling / "in.liggghts"
+    deck.write_text(
+        deck.read_text().replace(
+            "write_restart packing.restart",
+            "undump write_particles\nshell truncate -s -5 particles.1.bin\nwrite_restart "
+            "packing.restart",
+        )
+    )
+    with pytest.raises(RejectedRunError, match=r"particles whole: particles\.1\.bin is cut short"):
+        run(filling, silent)
+
+
+def test_a_lost_particle_fails(filling: Path) -> None:
+    data = filling / "particles.data"
+    lines = data.read_text().splitlines()
+    first = lines.index("Velocities") + 2
+    lines[first] = "1 0 0 50.0 0 0 0"  # straight up and out
+    data.write_text("\n".join(lines) + "\n")
+    # whoever sees it first: the engine, or the watcher of the run's limits
+    with pytest.raises(RejectedRunError, match=r"Lost atoms|299 particles at step"):
+        run(filling, silent)
+
+
+def test_a_folder_without_a_deck_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"case\.json: there is no such file"):
+        run(tmp_path, silent)
+
+
+def test_a_missing_engine_leaves_no_trace(filling: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DRAGDECK_ENGINE", "no-such-engine")
+    with pytest.raises(EngineError):
+        run(filling, silent)
+    assert not (filling / "state.json").exists()
+
+
+def test_a_drop_has_three_impacts(case: Case, project: Project) -> None:
+    folder = project.run_folder(case, DROP_TEST)
+    write_run(drop_scene(case), folder, environment(project.templates))
+    run(folder, silent)
+    rows = (folder / "impacts.1.txt").read_text().splitlines()
+    assert rows.count(rows[0]) == 3
+    forces = [float(row.split()[-1]) for row in rows if row != rows[0]]
+    touching = [force > 0 for force in forces]
+    starts = sum(now and not before for before, now in itertools.pairwise([False, *touching]))
+    assert starts == 3
+
+
+def test_progress_waits_for_the_first_row(tmp_path: Path) -> None:
+    """The engine opens its file before it writes to it."""
+    lines: list[str] = []
+    file = tmp_path / "thermo.1.txt"
+    watch = Watcher(file, ["step", "time_s"], 0, 100, None, lines.append, 1.0)
+    for seconds, text in ((1.0, ""), (2.0, "step time_s\n"), (3.0, "step time_s\n50 0.1 9 0 0\n")):
+        file.write_text(text)
+        watch(seconds)
+    assert len(lines) == 1
+    assert lines[0].startswith("step 50 of 100 (50 %)")
+
+
+def test_progress_says_how_long() -> None:
+    shown = str(Progress(step=250, steps=1000, steps_per_s=10.0))
+    assert shown == "step 250 of 1,000 (25 %), 10 steps/s, 1 min 15 s left"

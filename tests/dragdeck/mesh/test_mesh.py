@@ -1,0 +1,526 @@
+"""Meshes against what geometry says they must be, and against the engine itself."""
+
+from __future__ import annotations
+
+import math
+import os
+import runpy
+import shutil
+import subprocess
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import yaml
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from dragdeck import mesh as m
+from dragdeck.errors import InputError
+
+MESHES = Path(__file__).parents[3] / "meshes"
+SCENE = m.Surroundings(bowl_radius_m=0.04, particle_radius_m=0.00202)
+
+TETRAHEDRON = m.Mesh(
+    points=np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * 0.01,
+    triangles=np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
+)
+
+
+def needle(tip_deg: float) -> m.Mesh:
+    """A closed body with a facet whose sharpest angle is the given one."""
+    half = 0.02 * math.tan(math.radians(tip_deg) / 2)
+    points = [[0, 0, 0], [0.02, -half, 0], [0.02, half, 0], [0.01, 0, 0.01]]
+    return m.Mesh(np.array(points), TETRAHEDRON.triangles)
+
+
+def with_facets(*facets: list[int]) -> m.Mesh:
+    return m.Mesh(TETRAHEDRON.points, np.array(facets))
+
+
+def problems(mesh: m.Mesh, **options: object) -> list[str]:
+    return [finding.problem for finding in m.findings(mesh, **options)]  # type: ignore[arg-type]
+
+
+# --- the properties of a mesh -------------------------------------------------
+
+
+def test_tetrahedron_by_hand():
+    assert TETRAHEDRON.closed
+    assert TETRAHEDRON.oriented
+    assert TETRAHEDRON.volume == pytest.approx(1e-6 / 6)
+    slanted = math.sqrt(3) / 2
+    assert TETRAHEDRON.facet_areas == pytest.approx(np.array([0.5, 0.5, slanted, 0.5]) * 1e-4)
+    assert TETRAHEDRON.normals[2] == pytest.approx(np.full(3, 1 / math.sqrt(3)))
+    assert TETRAHEDRON.bounds.tolist() == [[0, 0, 0], [0.01, 0.01, 0.01]]
+    assert TETRAHEDRON.neighbours.tolist() == [3, 3, 3, 3]
+    assert np.sort(TETRAHEDRON.angles_deg[0]) == pytest.approx([45, 45, 90])
+    assert TETRAHEDRON.angles_deg[2] == pytest.approx([60, 60, 60])
+    assert problems(TETRAHEDRON) == []
+
+
+def test_volume_does_not_depend_on_the_place():
+    far = m.Mesh(TETRAHEDRON.points + np.array([3.0, -5.0, 7.0]), TETRAHEDRON.triangles)
+    assert far.volume == pytest.approx(TETRAHEDRON.volume, rel=1e-9)
+
+
+def test_bounds_ignore_nodes_that_no_facet_uses():
+    points = np.vstack([TETRAHEDRON.points, [9.0, 9.0, 9.0]])
+    assert m.Mesh(points, TETRAHEDRON.triangles).bounds.max() == 0.01
+
+
+def test_a_mesh_cannot_be_changed_by_accident():
+    with pytest.raises(ValueError, match="read-only"):
+        TETRAHEDRON.points[0, 0] = 1.0
+
+
+def test_a_facet_cannot_name_a_node_that_is_not_there():
+    with pytest.raises(ValueError, match=r"0 \.\.\. 3"):
+        with_facets([0, 1, 4])
+
+
+# --- made meshes ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("facet_size_m", [0.0005, 0.001, 0.0025, 0.005])
+def test_cylinder_against_the_formulas(facet_size_m: float):
+    radius, length = 0.005, 0.08
+    workpiece = m.cylinder(radius, length, facet_size_m)
+    sides = m.polygon_sides(radius, facet_size_m)
+    corner = m.polygon_radius(radius, sides)
+    section = sides / 2 * corner**2 * math.sin(math.tau / sides)
+    assert workpiece.closed
+    assert workpiece.volume == pytest.approx(section * length, rel=1e-12)
+    on_side = np.abs(workpiece.normals[:, 2]) < 0.5
+    assert workpiece.facet_areas[on_side].sum() == pytest.approx(
+        math.tau * radius * length, rel=1e-12
+    )
+    assert workpiece.facet_areas[~on_side].sum() == pytest.approx(2 * section, rel=1e-12)
+    assert workpiece.bounds[:, 2].tolist() == [0.0, length]
+    assert m.place(workpiece).points == pytest.approx(workpiece.points, abs=1e-15)
+    assert m.envelope(workpiece).radius_m == pytest.approx(corner)
+    assert m.findings(workpiece, surroundings=SCENE) == []
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    radius=st.floats(1e-4, 0.05),
+    slenderness=st.floats(0.3, 20),
+    refinement=st.floats(1.0, 12.0),
+)
+def test_every_cylinder_is_a_body_of_shapely_facets(
+    radius: float, slenderness: float, refinement: float
+):
+    length, facet = radius * slenderness, radius / refinement
+    workpiece = m.cylinder(radius, length, facet)
+    assert workpiece.closed
+    assert workpiece.oriented
+    assert workpiece.volume > 0
+    assert m.findings(workpiece) == []
+    assert workpiece.angles_deg.min() > 15
+    on_side = np.abs(workpiece.normals[:, 2]) < 0.5
+    legs = np.sort(np.linalg.norm(workpiece.edge_vectors[on_side], axis=2), axis=1)[:, :2]
+    sides = m.polygon_sides(radius, facet)
+    assert legs.max() <= max(facet, math.tau * radius / sides) * (1 + 1e-9)
+
+
+@settings(deadline=None)
+@given(radius=st.floats(1e-3, 1.0), sides=st.integers(8, 400), heading=st.floats(0, math.tau))
+def test_the_polygon_is_on_average_as_wide_as_the_circle(radius: float, sides: int, heading: float):
+    corner = m.polygon_radius(radius, sides)
+    angles = math.tau * np.arange(sides) / sides
+    turns = heading + np.linspace(0, math.tau / sides, 2001)[:-1]
+    across = corner * np.cos(angles[:, None] - turns)
+    width = across.max(axis=0) - across.min(axis=0)
+    assert width.mean() == pytest.approx(2 * radius, rel=1e-5)
+
+
+def test_bowl_holds_the_round_bowl_and_opens_upwards():
+    bowl = m.bowl(0.04, 0.08, 0.005)
+    assert not bowl.closed
+    assert bowl.oriented
+    assert problems(bowl, workpiece=False) == []
+    on_side = np.abs(bowl.normals[:, 2]) < 0.5
+    middle = bowl.corners.mean(axis=1)
+    to_axis = np.einsum("mc,mc->m", bowl.normals[on_side], middle[on_side])
+    assert to_axis == pytest.approx(-0.04)
+    assert (bowl.normals[~on_side, 2] == 1.0).all()
+    assert middle[~on_side, 2] == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("radius_m", -0.005), ("length_m", 0.0), ("facet_size_m", math.nan), ("radius_m", math.inf)],
+)
+def test_cylinder_refuses_what_is_no_length(field: str, value: float):
+    sizes = {"radius_m": 0.005, "length_m": 0.08, "facet_size_m": 0.001} | {field: value}
+    with pytest.raises(InputError) as caught:
+        m.cylinder(**sizes)
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize("facet_size_m", [0.006, 1e-6])
+def test_cylinder_refuses_too_coarse_and_too_many_facets(facet_size_m: float):
+    with pytest.raises(InputError) as caught:
+        m.cylinder(0.005, 0.08, facet_size_m)
+    assert caught.value.field == "facet_size_m"
+    assert caught.value.remedy
+
+
+# --- placing and welding --------------------------------------------------------
+
+
+@given(st.tuples(*[st.floats(-1, 1)] * 3))
+def test_place_undoes_any_shift(shift: tuple[float, float, float]):
+    moved = m.place(m.Mesh(TETRAHEDRON.points + shift, TETRAHEDRON.triangles))
+    assert moved.bounds == pytest.approx(
+        np.array([[-0.005, -0.005, 0], [0.005, 0.005, 0.01]]), abs=1e-12
+    )
+
+
+def test_weld_joins_nodes_within_the_precision_only():
+    loose = m.Mesh(TETRAHEDRON.corners.reshape(-1, 3), np.arange(12))
+    noise = np.random.default_rng(1).uniform(-2e-9, 2e-9, (12, 3))
+    rough = m.Mesh(loose.points + noise, loose.triangles)
+    assert not loose.closed
+    assert len(m.weld(rough).points) == 4
+    assert m.weld(rough).closed
+    assert not m.weld(m.Mesh(loose.points + 100 * noise, loose.triangles)).closed
+
+
+# --- checks -----------------------------------------------------------------------
+
+
+def test_empty_mesh():
+    assert problems(m.Mesh(np.empty((0, 3)), np.empty((0, 3)))) == ["the mesh is empty"]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_coordinate_that_is_no_number(value: float):
+    points = TETRAHEDRON.points.copy()
+    points[3, 1] = value
+    assert problems(m.Mesh(points, TETRAHEDRON.triangles)) == ["a coordinate is not a number"]
+
+
+def test_degenerate_facets():
+    assert "a facet has no area" in problems(with_facets([0, 1, 1]), workpiece=False)
+    flat = m.Mesh(np.array([[0, 0, 0], [0.01, 0, 0], [0.02, 1e-9, 0]]), [[0, 1, 2]])
+    assert "a facet has no area" in problems(flat, workpiece=False)
+
+
+def test_duplicate_facet_whichever_way_it_runs():
+    for again in ([0, 2, 1], [1, 2, 0]):
+        found = problems(with_facets(*TETRAHEDRON.triangles.tolist(), again))
+        assert found[0] == "a facet is there twice"
+
+
+def test_open_box():
+    with pytest.raises(InputError, match="not closed") as caught:
+        m.check(
+            with_facets([0, 2, 1], [0, 1, 3], [1, 2, 3]), file="box.stl", field="workpiece.mesh"
+        )
+    assert str(caught.value).startswith("box.stl: workpiece.mesh: ")
+    assert str(caught.value.value).startswith("3 of 6 edges")
+
+
+def test_an_open_surface_is_fine_where_no_body_is_needed():
+    assert m.check(with_facets([0, 2, 1], [0, 1, 3], [1, 2, 3]), workpiece=False) == []
+
+
+def test_normals_are_only_a_warning():
+    inside_out = m.Mesh(TETRAHEDRON.points, TETRAHEDRON.triangles[:, ::-1])
+    one_turned = with_facets([0, 1, 2], *TETRAHEDRON.triangles[1:].tolist())
+    for body in (inside_out, one_turned):
+        (finding,) = m.check(body)
+        assert (finding.severity, finding.problem[:11]) == ("warning", "the normals")
+
+
+def test_sharp_angles():
+    assert problems(needle(0.6)) == []
+    assert [f.severity for f in m.findings(needle(0.3))] == ["warning"]
+    assert "the angle of a facet is too sharp for the engine" in problems(needle(0.2))
+    assert "the angle of a facet is too sharp for the engine" in problems(
+        needle(0.6), curvature_deg=1.0
+    )
+
+
+def fan(blades: int) -> m.Mesh:
+    angle = math.tau * np.arange(blades) / blades
+    tips = np.column_stack([np.cos(angle), np.sin(angle), np.full(blades, 0.5)])
+    points = np.vstack([[0, 0, 0], [0, 0, 1], tips]) * 0.01
+    return m.Mesh(points, [[0, 1, 2 + blade] for blade in range(blades)])
+
+
+def test_neighbours_at_one_edge():
+    crowded = "too many facets meet at the edges of one"
+    assert crowded not in problems(fan(5), workpiece=False)
+    assert crowded in problems(fan(7), workpiece=False)
+
+
+def folded() -> m.Mesh:
+    points = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.6, 0.5, 0]]) * 0.01
+    return m.Mesh(points, [[0, 1, 2], [0, 1, 3]])
+
+
+def test_coplanar_facets_on_top_of_each_other():
+    assert problems(folded(), workpiece=False) == [
+        "two facets of one plane lie on top of each other"
+    ]
+    flat = m.Mesh(folded().points * [1, -1, 1], [[1, 0, 2]])
+    assert problems(flat, workpiece=False) == []
+
+
+@pytest.mark.parametrize(
+    ("factor", "remedy"),
+    [(1e3, "in millimetres, declared as metres?"), (1e-3, "in metres, declared as millimetres?")],
+)
+def test_wrong_unit_is_named(factor: float, remedy: str):
+    workpiece = m.cylinder(0.005, 0.08, 0.005)
+    wrong = m.Mesh(workpiece.points * factor, workpiece.triangles)
+    with pytest.raises(InputError) as caught:
+        m.check(wrong, surroundings=SCENE)
+    assert remedy in str(caught.value.remedy)
+
+
+def test_workpiece_wider_than_the_bowl():
+    with pytest.raises(InputError, match="no sense in this bowl"):
+        m.check(m.cylinder(0.041, 0.08, 0.01), surroundings=SCENE)
+
+
+# --- files ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("ascii.stl", {"binary": False}),
+        ("binary.STL", {"binary": True, "file_format": "stl"}),
+        ("body.obj", {}),
+        ("ascii.ply", {"binary": False}),
+        ("binary.ply", {"binary": True}),
+        ("binary.vtk", {"binary": True}),
+    ],
+)
+def test_formats_come_back_in_metres(tmp_path: Path, name: str, options: dict[str, object]):
+    workpiece = m.cylinder(0.005, 0.02, 0.0025)
+    cells = [("triangle", workpiece.triangles.astype(np.int32))]
+    meshio.Mesh(workpiece.points * 1e3, cells).write(tmp_path / name, **options)
+    again = m.read(tmp_path / name, "mm")
+    assert len(again.triangles) == len(workpiece.triangles)
+    assert again.closed
+    assert again.volume == pytest.approx(workpiece.volume, rel=1e-6)
+    assert again.bounds == pytest.approx(workpiece.bounds, abs=1e-9)
+
+
+def test_vtk_polygon_data_is_refused_with_a_way_out(tmp_path: Path):
+    import pyvista
+
+    pyvista.Cylinder().save(tmp_path / "body.vtk")
+    with pytest.raises(InputError) as caught:
+        m.read(tmp_path / "body.vtk", "mm")
+    assert "POLYDATA" in str(caught.value.value)
+    assert "unstructured grid" in str(caught.value.remedy)
+
+
+@settings(max_examples=60, deadline=None)
+@example(part=0.9453125, suffix=".stl")
+@given(part=st.floats(0.0, 0.99), suffix=st.sampled_from([".stl", ".obj", ".ply", ".vtk"]))
+def test_a_file_cut_short_never_passes(
+    tmp_path_factory: pytest.TempPathFactory, part: float, suffix: str
+):
+    whole, cut = (tmp_path_factory.mktemp("cut") / f"{name}{suffix}" for name in ("whole", "cut"))
+    cells = [("triangle", TETRAHEDRON.triangles.astype(np.int32))]
+    meshio.Mesh(TETRAHEDRON.points, cells).write(whole)
+    content = whole.read_bytes()
+    cut.write_bytes(content[: int(part * len(content))])
+    with pytest.raises(InputError):
+        m.check(m.read(cut, "m"))
+
+
+def test_binary_stl_whose_header_says_solid(tmp_path: Path):
+    path = tmp_path / "cad.stl"
+    meshio.Mesh(TETRAHEDRON.points, [("triangle", TETRAHEDRON.triangles)]).write(path, binary=True)
+    path.write_bytes(b"solid by some CAD".ljust(80) + path.read_bytes()[80:])
+    assert m.read(path, "m").closed
+
+
+def test_quadrilaterals_are_cut_along_the_shorter_diagonal(tmp_path: Path):
+    path = tmp_path / "kite.obj"
+    path.write_text("v 0 -1 0\nv 3 0 0\nv 0 1 0\nv -3 0 0\nf 1 2 3 4\nf 2 3 4 1\n")
+    kite = m.read(path, "m")
+    longest = np.linalg.norm(kite.edge_vectors, axis=2).max()
+    assert len(kite.triangles) == 4
+    assert longest == pytest.approx(math.sqrt(10))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("five.obj", b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv .5 2 0\nv 0 1 0\nf 1 2 3 4 5\n", "neither"),
+        ("cut.stl", b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvert", "damaged"),
+        ("cut.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "damaged"),
+        ("part.step", b"ISO-10303-21;", "unknown mesh format"),
+    ],
+)
+def test_files_that_are_refused(tmp_path: Path, name: str, content: bytes, problem: str):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=problem) as caught:
+        m.read(path, "mm")
+    assert caught.value.file == path
+    assert caught.value.remedy
+
+
+def test_missing_file_and_unknown_unit(tmp_path: Path):
+    with pytest.raises(InputError, match="no such mesh file"):
+        m.read(tmp_path / "none.stl", "mm")
+    with pytest.raises(InputError, match="unknown length unit") as caught:
+        m.read(tmp_path / "none.stl", "furlong")
+    assert "mm" in str(caught.value.limit)
+
+
+@pytest.mark.parametrize("content", [b"", b"solid x\nendsolid x\n"])
+def test_file_without_facets_is_an_empty_mesh(tmp_path: Path, content: bytes):
+    (tmp_path / "empty.stl").write_bytes(content)
+    with pytest.raises(InputError, match="the mesh is empty"):
+        m.check(m.read(tmp_path / "empty.stl", "m"))
+
+
+def test_write_stl_is_exact_deterministic_and_replaces(tmp_path: Path):
+    path = tmp_path / "workpiece.stl"
+    path.write_text("old")
+    workpiece = m.cylinder(0.005, 0.08, 0.0025)
+    m.write_stl(workpiece, path)
+    first = path.read_bytes()
+    m.write_stl(m.cylinder(0.005, 0.08, 0.0025), path)
+    assert path.read_bytes() == first
+    assert first.startswith(b"solid mesh\nfacet normal ")
+    assert b"-0 " not in first
+    assert b"\r" not in first
+    assert [file.name for file in tmp_path.iterdir()] == ["workpiece.stl"]
+    again = m.read(path, "m")
+    assert again.closed
+    assert again.corners == pytest.approx(workpiece.corners, abs=1e-10)
+
+
+def test_write_stl_leaves_the_old_file_if_it_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    path = tmp_path / "workpiece.stl"
+    path.write_text("old")
+
+    def full_disk(*_: object) -> None:
+        raise OSError("no space left")
+
+    monkeypatch.setattr(os, "replace", full_disk)
+    with pytest.raises(OSError, match="no space"):
+        m.write_stl(TETRAHEDRON, path)
+    assert path.read_text() == "old"
+    assert [file.name for file in tmp_path.iterdir()] == ["workpiece.stl"]
+
+
+# --- the meshes that come with the project ------------------------------------------
+
+
+def manifest() -> dict[str, dict[str, object]]:
+    listed: dict[str, dict[str, object]] = yaml.safe_load((MESHES / "manifest.yaml").read_text())[
+        "meshes"
+    ]
+    return listed
+
+
+def test_every_mesh_is_in_the_manifest():
+    files = {file.name for file in MESHES.iterdir() if file.suffix not in {".yaml", ".py"}}
+    assert files - {"__pycache__"} == set(manifest())
+
+
+@pytest.mark.parametrize("name", sorted(manifest()))
+def test_the_manifest_is_true(name: str):
+    entry = manifest()[name]
+    unit = str(entry["unit"])
+    body = m.read(MESHES / name, unit)
+    assert body.closed is entry["closed"]
+    assert len(body.triangles) == entry["facets"]
+    assert body.bounds / m.UNITS[unit] == pytest.approx(np.array(entry["bounds"]), abs=1e-6)
+    assert m.findings(body, workpiece=bool(entry["closed"]), surroundings=SCENE) == []
+
+
+def test_the_generator_makes_the_file_that_is_there():
+    made = runpy.run_path(str(MESHES / "make_meshes.py"))["hex_bar"]()
+    assert made == (MESHES / "hex_bar.stl").read_text()
+
+
+# --- the engine's own opinion ---------------------------------------------------------
+
+DECK = """\
+atom_style granular
+atom_modify map array
+boundary f f f
+newton off
+communicate single vel yes
+units si
+hard_particles yes
+region box block -0.06 0.06 -0.06 0.06 -0.02 0.15 units box
+create_box 2 box
+neighbor 0.001 bin
+neigh_modify delay 0
+fix m1 all property/global youngsModulus peratomtype 77e7 210e7
+fix m2 all property/global poissonsRatio peratomtype 0.19 0.30
+fix m3 all property/global coefficientRestitution peratomtypepair 2 0.86 0.68 0.68 0.68
+fix m4 all property/global coefficientFriction peratomtypepair 2 0.34 0.28 0.28 0.28
+pair_style gran model hertz tangential history
+pair_coeff * *
+timestep 1e-5
+fix workpiece all mesh/surface/stress file workpiece.stl type 2
+fix wall all wall/gran model hertz tangential history mesh n_meshes 1 meshes workpiece
+fix move all nve/sphere
+create_atoms 1 single 0.05 0.05 0.1 units box
+set group all diameter 0.004 density 2500
+run 0
+"""
+
+
+def engine_reads(mesh: m.Mesh, folder: Path) -> tuple[bool, str]:
+    engine = os.environ.get("DRAGDECK_ENGINE") or "liggghts"
+    assert shutil.which(engine), f"{engine} is missing: ./run installs it"
+    m.write_stl(mesh, folder / "workpiece.stl")
+    (folder / "in.liggghts").write_text(DECK)
+    done = subprocess.run(
+        [engine, "-in", "in.liggghts"],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    return done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.engine
+@pytest.mark.parametrize("facet_size_m", [0.0005, 0.002, 0.005])
+def test_engine_reads_every_cylinder_without_a_warning(tmp_path: Path, facet_size_m: float):
+    workpiece = m.cylinder(0.005, 0.08, facet_size_m)
+    read, output = engine_reads(workpiece, tmp_path)
+    assert read, output
+    assert f"containing {len(workpiece.triangles)} triangle(s) successful" in output
+    assert "WARNING" not in output
+
+
+@pytest.mark.engine
+@pytest.mark.parametrize(
+    ("mesh", "reads"),
+    [
+        (needle(0.3), True),
+        (needle(0.2), False),
+        (fan(6), True),
+        (fan(7), False),
+        (with_facets(*TETRAHEDRON.triangles.tolist(), [0, 2, 1]), False),
+        (m.bowl(0.04, 0.08, 0.005), True),
+    ],
+    ids=["blunt", "sharp", "five neighbours", "six neighbours", "duplicate", "bowl"],
+)
+def test_engine_agrees_with_the_checks(tmp_path: Path, mesh: m.Mesh, reads: bool):
+    read, output = engine_reads(mesh, tmp_path)
+    errors = [found for found in m.findings(mesh, workpiece=False) if found.severity == "error"]
+    assert read is reads, output
+    assert bool(errors) is not reads

@@ -1,0 +1,225 @@
+"""What is said of a time step before a run, and the points of the map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from paths import ROOT
+
+from dragdeck.campaigns.stability_map import load_points, point_case
+from dragdeck.cases.bed import particle_material, smallest_radius
+from dragdeck.cases.case import Case
+from dragdeck.cli import main
+from dragdeck.errors import InputError
+from dragdeck.outlook.timestep import expected_error, measured, outlook, safe_fraction
+from dragdeck.physics.contact_mechanics import effective_modulus, rayleigh_time
+from dragdeck.project import Project
+from dragdeck.scenes.filling import FILLING, filling_scene
+from dragdeck.scenes.impact import Impact, effective_body, impact_scene
+from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.workpiece import workpiece_radius
+from dragdeck.sweep.cases import load_cases
+
+MAP = ROOT / "studies" / "stability" / "map.yaml"
+TABLE = {
+    "steps_per_contact": [5.0, 50.0],
+    "worst": [3e-1, 3e-3],
+    "ordinary_worst": [1e-1, 1e-3],
+}
+
+
+@pytest.mark.parametrize(
+    ("steps", "error", "inside"),
+    [(5.0, 1e-1, True), (50.0, 1e-3, True), (math.sqrt(250.0), 1e-2, True), (2.0, 1e-1, False),
+     (500.0, 1e-3, False)],
+)  # fmt: skip
+def test_errors_are_interpolated_on_logarithmic_scales(
+    steps: float, error: float, inside: bool
+) -> None:
+    found = expected_error(steps, 0.9, TABLE)
+    assert found.value == pytest.approx(error, rel=1e-9)
+    assert found.measured is inside
+    assert expected_error(steps, 0.2, TABLE).value == pytest.approx(3 * error, rel=1e-9)
+
+
+def test_the_measured_table_is_of_a_real_map() -> None:
+    known = measured()
+    steps = known["restitution_error"]["steps_per_contact"]
+    assert steps == sorted(steps) and len(steps) == len(known["restitution_error"]["worst"])
+    assert known["engine_versions"] and known["measured"] and known["commands"]
+    for row in known["regimes"].values():
+        assert 0 < row["recommended_fraction"] < row["safe_fraction"] <= row["ordinary_fraction"]
+
+
+def test_unlike_bodies_are_looked_at_too(case: Case) -> None:
+    pairs = {pair.bodies: pair for pair in outlook(case, PROCESS, 1e-5)}
+    assert set(pairs) == {"particle on particle", "particle on bowl", "particle on workpiece"}
+    smallest = rayleigh_time(particle_material(case.study), smallest_radius(case.study), 1e-3)
+    assert pairs["particle on workpiece"].limiting == "particle"
+    assert pairs["particle on workpiece"].rayleigh_fraction == pytest.approx(
+        1e-5 / smallest, rel=1e-12
+    )
+    # Johnson 1985, eq. 11.24: a plane doubles m and R, and steel is stiffer
+    ceramic, steel = (case.study.materials[name] for name in ("ceramic", "steel"))
+    stiffer = effective_modulus(ceramic, steel) / effective_modulus(ceramic, ceramic)
+    ratio = (
+        pairs["particle on bowl"].steps_per_contact
+        / pairs["particle on particle"].steps_per_contact
+    )
+    assert ratio == pytest.approx((2**2 / 2 / stiffer**2) ** 0.2, rel=1e-12)
+
+
+def test_the_body_with_the_smaller_rayleigh_time_limits(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    """A stiff, light and thin workpiece is faster than a particle."""
+    small["workpiece"] = {
+        "material": "light",
+        "shape": {"kind": "cylinder", "radius_m": 0.0005, "facet_size_m": 0.0005},
+    }
+    small["materials"]["light"] = {
+        "youngs_modulus_pa": 300e9, "poissons_ratio": 0.2, "density_kg_m3": 1000,
+    }  # fmt: skip
+    small["pairs"]["ceramic-light"] = {"restitution": 0.6, "friction": 0.3}
+    (case,) = load_cases(write_study(small))
+    (workpiece,) = [
+        pair for pair in outlook(case, PROCESS, 1e-6) if pair.bodies == "particle on workpiece"
+    ]
+    known = rayleigh_time(case.study.materials["light"], workpiece_radius(case), 1e-3)
+    assert workpiece.limiting == "workpiece"
+    assert workpiece.rayleigh_fraction == pytest.approx(1e-6 / known, rel=1e-12)
+
+
+def test_strong_damping_has_its_own_safe_step(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    (case,) = load_cases(write_study(small))
+    ordinary, _ = safe_fraction(case, FILLING)
+    small["pairs"]["ceramic-steel"]["restitution"] = 0.1
+    (damped,) = load_cases(write_study(small))
+    assert safe_fraction(damped, FILLING)[0] < ordinary
+
+
+def test_explain_names_every_pair(
+    case: Case,
+    project: Project,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(project.root)
+    assert main(["explain", "small", "process"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    for words in (
+        "particle on workpiece",
+        "particle on bowl",
+        "steps per contact",
+        "safe step",
+        "safety",
+    ):
+        assert words in said
+
+
+@pytest.mark.engine
+def test_check_says_what_the_step_means(
+    case: Case,
+    project: Project,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(project.root)
+    assert main(["check", "small"]) == 0
+    said = capsys.readouterr().out
+    assert "particle on workpiece: " in said and "particle on plate: " in said
+    assert "error of restitution up to" in said
+
+
+# --- points ------------------------------------------------------------------------------------
+
+
+def test_the_map_spans_what_it_promises() -> None:
+    impact = load_points(MAP, "impact")
+    for axis, low, high in (
+        ("youngs_modulus_pa", 5e6, 1e12),
+        ("speed_m_s", 1e-4, 10),
+        ("restitution", 0.05, 1),
+        ("friction", 0, 2),
+        ("size_ratio", 0, 10),
+    ):
+        values = [point.settings[axis] for point in impact]
+        assert min(values) == low and max(values) == high
+    fractions = [point.fraction for point in impact if not point.reference]
+    assert min(fractions) == 0.05 and max(fractions) == 4
+    speeds = {point.settings["workpiece_speed_m_s"] for point in load_points(MAP, "drag")}
+    assert min(speeds) == 0.001 and max(speeds) == 1
+
+
+def test_points_are_named_once_and_each_condition_has_its_reference() -> None:
+    for regime in ("impact", "settle", "column", "drag"):
+        points = load_points(MAP, regime)
+        names = [point.name for point in points]
+        assert len(set(names)) == len(names)
+        conditions = {point.condition for point in points}
+        assert {point.condition for point in points if point.reference} == conditions
+        assert sum(point.reference for point in points) == len(conditions)
+
+
+def test_an_unknown_setting_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "map.yaml"
+    file.write_text(
+        "settle:\n  base: {restitution: 0.5}\n  fractions: [1]\n  reference: 0.1\n"
+        "  axes: {colour: {values: [1]}}\n"
+    )
+    with pytest.raises(InputError, match="colour is not among"):
+        load_points(file, "settle")
+    with pytest.raises(InputError, match="no such regime"):
+        load_points(file, "drag")
+
+
+@pytest.fixture
+def base() -> Case:
+    (found,) = load_cases(ROOT / "studies" / "stability" / "study.yaml")
+    return found
+
+
+def test_a_point_sets_its_values(base: Case) -> None:
+    settings = {
+        "youngs_modulus_pa": 5e6, "restitution": 0.3, "friction": 2.0, "workpiece_speed_m_s": 1.0,
+    }  # fmt: skip
+    study = point_case(base, settings, 4.0).study
+    assert {(pair.restitution, pair.friction) for pair in study.pairs.values()} == {(0.3, 2.0)}
+    fidelity = study.chosen_fidelity()
+    assert fidelity.youngs_modulus_scale * 77e9 == pytest.approx(5e6)
+    assert fidelity.timestep_fraction == fidelity.filling_timestep_fraction == 4.0
+    assert study.motion.speed_m_s == 1.0
+    assert study.motion.path.revolutions == 2.0  # type: ignore[union-attr]
+
+
+def test_like_particles_have_half_the_modulus_of_one(base: Case) -> None:
+    """E* = E / (2 (1 - nu^2)) and G* = G / (2 (2 - nu)) of two like bodies."""
+    particle = filling_scene(base).case.contact_moduli["particle"]
+    young, nu = 77e9 * 1e-3, 0.19
+    assert particle.modulus_pa == pytest.approx(young / (2 * (1 - nu**2)), rel=1e-12)
+    shear = young / (2 * (1 + nu))
+    assert particle.shear_pa == pytest.approx(shear / (2 * (2 - nu)), rel=1e-12)
+
+
+def test_a_large_particle_is_almost_a_plate() -> None:
+    radius, mass = effective_body(1.0, 100.0, 1.0)
+    assert radius == pytest.approx(100 / 101) and mass == pytest.approx(1.0, rel=1e-5)
+    assert effective_body(1.0, 0.0, 1.0) == (1.0, 1.0)
+    assert effective_body(1.0, 1.0, 1.0) == (0.5, 0.5)
+
+
+def test_impacts_begin_at_different_moments_of_a_step(base: Case) -> None:
+    settings = {"youngs_modulus_pa": 77e9, "restitution": 0.86, "friction": 0.34}
+    scene = impact_scene(point_case(base, settings, 0.2), "a-run", Impact(0.5, 0.0, 0.0), 0.2)
+    rows = scene.files["particles.data"].split("Atoms\n\n")[1].split("\n\n")[0].splitlines()
+    radius = base.study.media.radius_mean_m
+    gaps = [float(row.split()[-1]) - radius for row in rows]
+    step = 0.5 * scene.deck.timestep_s
+    phases = sorted(gap / step - 1 for gap in gaps)
+    assert phases == pytest.approx([(n + 0.5) / 16 for n in range(16)], abs=1e-6)

@@ -1,0 +1,194 @@
+"""Cases, and what their runs are named by."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dragdeck.cases.case import Case
+from dragdeck.errors import InputError
+from dragdeck.project import Project, by_run
+from dragdeck.scenes.drop_test import DROP_TEST
+from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.registry import SCENES
+from dragdeck.sweep.cases import load_cases, study_file
+
+
+@pytest.fixture
+def ids(small: dict[str, Any], write_study: Callable[..., Path]) -> Callable[..., dict[str, str]]:
+    """Run ids of the small study after a change."""
+
+    def changed(change: Callable[[dict[str, Any]], object] = lambda data: None) -> dict[str, str]:
+        data = copy.deepcopy(small)
+        change(data)
+        (case,) = load_cases(write_study(data))
+        return {name: scene.run_id(case) for name, scene in SCENES.items()}
+
+    return changed
+
+
+def put(path: str, value: Any) -> Callable[[dict[str, Any]], None]:
+    def change(data: dict[str, Any]) -> None:
+        *parents, last = path.split(".")
+        for name in parents:
+            data = data.setdefault(name, {})
+        data[last] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "scenes"),
+    [
+        ("title", "another", set()),
+        ("assumptions", [{"field": "seed", "why": "any"}], set()),
+        ("reference", {"source": "somebody"}, set()),
+        ("motion.speed_m_s", 0.03, {"process"}),
+        ("motion.immersion_depth_m", 0.01, {"process"}),
+        ("outputs.network_hz", 10, {"process"}),
+        ("bowl.facet_size_m", 0.005, {"process"}),
+        ("drop_test.height_m", 0.02, {"drop_test"}),
+        ("seed", 2, {"filling", "process"}),
+        ("media.count", 200, {"filling", "process"}),
+        ("pairs.ceramic-ceramic.friction", 0.5, {"filling", "process"}),
+        ("contact.limit_force", False, {"drop_test", "filling", "process"}),
+        ("fidelities.quick.timestep_fraction", 0.4, {"process"}),
+        ("fidelities.quick.youngs_modulus_scale", 0.01, {"filling", "process"}),
+    ],
+)
+def test_a_run_is_named_by_what_it_depends_on(
+    ids: Callable[..., dict[str, str]], field: str, value: Any, scenes: set[str]
+) -> None:
+    before, after = ids(), ids(put(field, value))
+    assert {scene for scene in SCENES if before[scene] != after[scene]} == scenes
+
+
+def test_the_order_of_keys_does_not_matter(ids: Callable[..., dict[str, str]]) -> None:
+    def reverse(data: dict[str, Any]) -> None:
+        for key in reversed(list(data)):
+            data[key] = data.pop(key)
+
+    assert ids(reverse) == ids()
+
+
+def test_a_matrix_makes_every_combination(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    small["sweep"] = {"motion.speed_m_s": [0.01, 0.02], "seed": [1, 2, 3]}
+    cases = load_cases(write_study(small))
+    assert len(cases) == len({PROCESS.run_id(case) for case in cases}) == 6
+    assert cases[3].name == "quick_speed_m_s-0.02_seed-1"
+    assert cases[3].study.motion.speed_m_s == 0.02
+    assert len(by_run(cases, FILLING)) == 3
+    assert len(by_run(cases, DROP_TEST)) == 1
+
+
+@pytest.mark.parametrize(
+    ("sweep", "words"),
+    [
+        ({"motion.colour": [1]}, "motion.colour: unknown key"),
+        ({"seed": []}, "sweep.seed: no values"),
+        ({"seed": [1, 1]}, "given twice"),
+        ({"bowl.radius_m.deeper": [1]}, "leads through a value"),
+        ({"motion.speed_m_s": [0.01, -1]}, "motion.speed_m_s"),
+    ],
+)
+def test_a_wrong_matrix_is_explained(
+    small: dict[str, Any], write_study: Callable[..., Path], sweep: dict[str, Any], words: str
+) -> None:
+    small["sweep"] = sweep
+    with pytest.raises(InputError) as caught:
+        load_cases(write_study(small))
+    assert words in str(caught.value)
+
+
+def test_the_fidelity_of_the_command_line_goes_first(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    (case,) = load_cases(write_study(small), "draft")
+    assert case.study.fidelity == "draft"
+    assert PROCESS.run_id(case).startswith("draft-")
+
+
+def test_an_unknown_study_lists_the_known(project: Project, case: Case) -> None:
+    with pytest.raises(InputError, match="one of: small"):
+        study_file(project.studies, "large")
+
+
+def test_an_edited_mesh_names_another_run(
+    project: Project, small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    small["workpiece"]["shape"] = {"kind": "mesh", "file": "workpiece.stl", "unit": "mm"}
+    file = write_study(small)
+    (file.parent / "workpiece.stl").write_text("one")
+    (before,) = load_cases(file)
+    first = PROCESS.run_id(before)
+    (file.parent / "workpiece.stl").write_text("two")
+    (after,) = load_cases(file)
+    assert first != PROCESS.run_id(after)
+    assert FILLING.run_id(before) == FILLING.run_id(after)
+
+
+SCALING = {"field": "motion.immersion_depth_m", "expected_exponent": 2, "source": "somebody"}
+DEPTHS = [0.010, "1.5e-2", 0.020]
+
+
+def test_a_scaling_is_part_of_no_run(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    data = {**small, "sweep": {"motion.immersion_depth_m": DEPTHS, "seed": [1, 2]}}
+    before = load_cases(write_study(data))
+    after = load_cases(write_study({**data, "scaling": SCALING}))
+    assert len(after) == 6
+    for one, other in zip(before, after, strict=True):
+        for scene in SCENES.values():
+            assert scene.run_id(one) == scene.run_id(other)
+            assert scene.digest(one) == scene.digest(other)
+    assert after[0].study.scaling is not None and before[0].study.scaling is None
+
+
+@pytest.mark.parametrize(
+    ("scaling", "sweep", "field", "words"),
+    [
+        ({"field": "motion.depth_m"}, {}, "scaling.field", "not a field of sweep"),
+        ({}, {"motion.speed_m_s": [0.01, 0.02]}, "sweep", "another field varies"),
+        (
+            {},
+            {"motion.immersion_depth_m": [0.01, 0.02]},
+            "sweep.motion.immersion_depth_m",
+            "too few levels",
+        ),
+        ({"fit_range": [0.01, 0.015]}, {}, "sweep.motion.immersion_depth_m", "too few levels"),
+        ({"fit_range": [0.02, 0.01]}, {}, "scaling", "not up"),
+        ({"field": "seed"}, {}, "scaling", "seed"),
+        ({"slope": 2}, {}, "scaling.slope", "unknown key"),
+        (
+            {"field": "workpiece.shape.kind"},
+            {"motion.immersion_depth_m": None, "workpiece.shape.kind": ["cylinder"] * 1},
+            "sweep.workpiece.shape.kind",
+            "numbers above 0",
+        ),
+    ],
+)
+def test_a_scaling_that_the_matrix_cannot_tell_is_refused(
+    small: dict[str, Any],
+    write_study: Callable[..., Path],
+    scaling: dict[str, Any],
+    sweep: dict[str, Any],
+    field: str,
+    words: str,
+) -> None:
+    varied = {"motion.immersion_depth_m": DEPTHS, "seed": [1, 2], **sweep}
+    data = {
+        **small,
+        "sweep": {name: values for name, values in varied.items() if values},
+        "scaling": {**SCALING, **scaling},
+    }
+    with pytest.raises(InputError, match=words) as caught:
+        load_cases(write_study(data))
+    assert caught.value.field == field

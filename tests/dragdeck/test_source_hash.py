@@ -1,0 +1,47 @@
+"""Which modules stand behind a command."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dragdeck.source_hash import source_files, source_hash
+
+
+def test_everything_behind_the_renderer_is_found() -> None:
+    found = source_files("dragdeck.decks.render", "dragdeck.scenes.process")
+    assert {"dragdeck.decks.render", "dragdeck.scenes.process", "dragdeck.mesh.shapes"} <= set(
+        found
+    )
+    assert "dragdeck.engine.run_folder" not in found
+    assert not any(name.startswith("dragchain") for name in found)
+
+
+def test_lazy_imports_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "lazybox"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "late.py").write_text("")
+    (package / "soon.py").write_text("def run():\n    from lazybox import late\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert "lazybox.late" in source_files("lazybox.soon")
+
+
+def test_only_an_edit_behind_a_module_changes_its_hash(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "toybox"
+    package.mkdir()
+    for name, text in {
+        "__init__": "",
+        "one": "from toybox.two import thing\n",
+        "two": "thing = 1\n",
+        "three": "from toybox import one\n",
+    }.items():
+        (package / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    before = {name: source_hash(f"toybox.{name}") for name in ("one", "two", "three")}
+    (package / "one.py").write_text("from toybox.two import thing  # edited\n")
+    after = {name: source_hash(f"toybox.{name}") for name in ("one", "two", "three")}
+    assert {name for name in before if before[name] != after[name]} == {"one", "three"}

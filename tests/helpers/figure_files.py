@@ -1,0 +1,120 @@
+"""Shared by tests of several modules."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+R = 0.003
+STEP_S = 1e-3
+DRAG_START = 100
+LAST = 500
+PERIOD = 20
+
+
+def case_json(scene_name: str) -> dict[str, Any]:
+    return {
+        "schema": 2, "study": "made", "scene": scene_name, "run": f"made-{scene_name}",
+        "case": "made case", "upstream": {}, "timestep_s": STEP_S, "rayleigh_time_s": 2e-3,
+        "gravity_m_s2": 10.0,
+        "fidelity": {
+            "name": "draft", "youngs_modulus_scale": 0.01, "timestep_fraction": 0.5,
+            "speed_factor": 1.0, "skin_m": 0.001, "ranks": 1,
+        },
+        "inputs": {"media.count": 3},
+        "media": {"count": 3, "radius_mean_m": R, "radius_std_m": 0.0, "density_kg_m3": 2500.0},
+        "bowl": {"radius_m": 0.02, "walls": "primitive"},
+        "workpiece": {"kind": "cylinder", "radius_m": 0.002, "length_m": 0.05,
+        "mesh": "workpiece.stl",
+                 "immersion_depth_m": 0.02},
+
+               "surface_m": 0.03,
+        "motion": {"kind": "line", "axis_speed_m_s": 0.1, "start_m": [-0.01, 0.0], "direction_rad": 0.0},
+        "phases": [
+            {"name": "plunge", "start_step": 0, "end_step": DRAG_START},
+            {"name": "drag", "start_step": DRAG_START, "end_step": LAST},
+        ],
+        "statistics": {"transient_s": 0.1}, "restitution": 0.7, "assumptions": [],
+        "reference": {"source": "a paper", "experiment": {"drag_mean_n": -4.0}},
+        "versions": {"dragdeck": "0.1.0"},
+    }  # fmt: skip
+
+
+def columns_json(run_dir: Path, outputs: dict[str, Any]) -> None:
+    content = {"schema": 2, "outputs": outputs}
+    (run_dir / "columns.json").write_text(json.dumps(content))
+
+
+def printed(columns: list[str], period: int, last: int | None = LAST) -> dict[str, Any]:
+    return {
+        "kind": "print", "binary": False, "pattern": "out.{part}.txt", "columns": columns,
+        "engine_columns": None, "period_steps": period, "first_step": 0, "last_step": last,
+    }  # fmt: skip
+
+
+def save(table: pd.DataFrame, run_dir: Path, name: str) -> None:
+    (run_dir / "tables").mkdir(exist_ok=True)
+    table.to_parquet(run_dir / "tables" / f"{name}.parquet", index=False)
+
+
+def resistance(steps: Any) -> Any:
+    """Return 2 N with a bump of 3 N around step 330."""
+    return 2.0 + 3.0 * np.exp(-(((np.asarray(steps) - 330) / 30.0) ** 2))
+
+
+def workpiece_x(steps: Any) -> Any:
+    return -0.01 + 5e-5 * np.clip(np.asarray(steps) - DRAG_START, 0, None)
+
+
+def workpiece_force_table() -> pd.DataFrame:
+    steps = np.arange(2, LAST + 1, 2)
+    plunge = np.clip(steps, 0, DRAG_START) / DRAG_START
+    return pd.DataFrame(
+        {
+            "step": steps, "time_s": steps * STEP_S,
+            "phase": np.where(steps <= DRAG_START, "plunge", "drag"),
+            "ref_x_m": workpiece_x(steps), "ref_y_m": 0.0, "ref_z_m": 0.04 - 0.03 * plunge,
+            "direction_rad": 0.0, "drag_n": -resistance(steps),
+            "lateral_n": 0.1 * np.sin(steps), "vertical_n": 0.2 * np.cos(steps),
+            "in_statistics": steps >= 200,
+        }
+    )  # fmt: skip
+
+
+def network_tables() -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return contacts and particles: a chain of two particles from the workpiece to the side, and
+    a third."""
+    contacts, particles = [], []
+    for step in range(0, LAST + 1, PERIOD):
+        force = float(resistance(step))
+        time_s = step * STEP_S
+        for particle, (x, y) in {1: (0.011, 0.0), 2: (0.017, 0.0), 3: (0.0, -0.016)}.items():
+            particles.append([step, time_s, particle, x, y, 0.015, R])
+        for a, b, x, y, pull in [
+            (1, 0, 0.008, 0.0, force), (1, 2, 0.014, 0.0, -force), (2, -2, 0.02, 0.0, -force),
+            (3, -1, 0.0, -0.016, 0.01),
+        ]:  # fmt: skip
+            row = [step, time_s, a, b, x, y, 0.015 if b != -1 else 0.012, pull, 0.0, 0.0]
+            contacts.append([*row, abs(pull)])
+    axes = ("x", "y", "z")
+    head = ["step", "time_s"]
+    columns = [*head, "a_id", "b_id", *(f"point_{i}_m" for i in axes)]
+    columns += [*(f"force_{i}_n" for i in axes), "normal_force_n"]
+    return (
+        pd.DataFrame(contacts, columns=columns),
+        pd.DataFrame(particles, columns=[*head, "particle_id", "x_m", "y_m", "z_m", "radius_m"]),
+    )
+
+
+def workpiece_contacts_table() -> pd.DataFrame:
+    steps = np.arange(0, LAST + 1, 10)
+    ahead = pd.DataFrame(
+        {"step": steps, "azimuth_rad": 0.0, "depth_m": 0.015, "normal_force_n": 3.0}
+    )
+    behind = ahead.assign(azimuth_rad=3.0, depth_m=0.005, normal_force_n=1.0)
+    table = pd.concat([ahead, behind], ignore_index=True)
+    return table.assign(in_statistics=table["step"] >= 200)

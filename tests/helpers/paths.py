@@ -1,0 +1,7 @@
+"""Where the tests find the project."""
+
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+DATA = ROOT / "tests" / "data"
+SMALL_STUDY = DATA / "small_study.yaml"

@@ -1,0 +1,30 @@
+"""Snakemake started on a copy of the project."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from paths import ROOT
+
+
+def snakemake(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    words = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
+    paths = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis")])
+    scripts = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    environment = {**os.environ, "PYTHONPATH": paths, "PATH": scripts}
+    environment.pop("DISPLAY", None)
+    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
+
+
+def jobs(folder: Path, *arguments: str) -> set[str]:
+    """Names of the rules that would run."""
+    shown = snakemake(folder, "--dry-run", *arguments)
+    assert shown.returncode == 0, shown.stdout + shown.stderr
+    table = shown.stdout
+    if "Job stats:" not in table:
+        return set()
+    rows = table.split("Job stats:")[1].split("total")[0].splitlines()[3:]
+    return {row.split()[0] for row in rows if row.strip()} - {"all"}

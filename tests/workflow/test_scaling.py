@@ -1,0 +1,55 @@
+"""A small scaling through the workflow, on the real engine."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from paths import ROOT, SMALL_STUDY
+from snakemake_calls import jobs, snakemake
+
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+SCALING = ("scaling", "--config", "study=small")
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the project with a small study of four depths."""
+    folder = tmp_path_factory.mktemp("scaling")
+    for name in ("workflow", "analysis", "meshes", "profiles", "templates", "Snakefile"):
+        (folder / name).symlink_to(ROOT / name)
+    data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
+    data["sweep"] = {"motion.immersion_depth_m": [0.008, 0.012, 0.016, 0.020]}
+    data["scaling"] = {
+        "field": "motion.immersion_depth_m",
+        "expected_exponent": 0,
+        "source": "nobody",
+    }
+    data["fidelity"] = {"youngs_modulus_scale": 1e-4, "timestep_fraction": 0.5, "ranks": 1}
+    (folder / "studies/small").mkdir(parents=True)
+    (folder / "studies/small/study.yaml").write_text(yaml.safe_dump(data))
+    return folder
+
+
+def test_the_drag_grows_with_the_depth(project: Path) -> None:
+    done = snakemake(project, *SCALING)
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = json.loads((project / "results/small/scaling/scaling.json").read_text())
+    assert found["commands"] == ["snakemake scaling --config study=small"]
+    assert [level["x"] for level in found["levels"]] == [0.008, 0.012, 0.016, 0.020]
+    assert 0.5 < found["fit"]["exponent"]["value"] < 3.5
+    assert found["engine"] and found["expected"]["source"] == "nobody"
+    assert jobs(project, *SCALING) - {"scaling"} == set()
+
+
+def test_a_study_without_the_block_says_so(project: Path) -> None:
+    study = project / "studies/plain/study.yaml"
+    study.parent.mkdir()
+    study.write_text(SMALL_STUDY.read_text())
+    done = snakemake(project, "scaling", "--dry-run", "--config", "study=plain")
+    assert done.returncode != 0
+    assert "scaling: a required key is missing" in done.stdout + done.stderr

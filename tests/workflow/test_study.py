@@ -1,0 +1,168 @@
+"""The whole workflow on the real engine: a small study from its file to its report."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+import pyvista as pv
+import yaml
+from fat_files import fatten
+from pages import stands_alone
+from paths import ROOT, SMALL_STUDY
+from snakemake_calls import jobs, snakemake
+
+from dragchain import write_tables
+from dragchain.network.write import write_chains
+
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the project in which the small study was run."""
+    folder = tmp_path_factory.mktemp("project")
+    for name in ("workflow", "analysis", "meshes", "profiles", "Snakefile"):
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "templates").mkdir()
+    for file in (ROOT / "templates").iterdir():
+        (folder / "templates" / file.name).write_bytes(file.read_bytes())
+    data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
+    data["sweep"] = {"motion.immersion_depth_m": [0.012, 0.016]}
+    (folder / "studies/small").mkdir(parents=True)
+    (folder / "studies/small/study.yaml").write_text(yaml.safe_dump(data))
+    done = snakemake(folder, "all", "--config", "study=small")
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+STUDY = ("all", "--config", "study=small")
+
+
+def test_the_report_has_a_row_a_case(finished: Path) -> None:
+    report = finished / "results/small/report"
+    summary = pd.read_parquet(report / "summary.parquet")
+    assert len(summary) == len(pd.read_csv(report / "summary.csv")) == 2
+    assert (summary.drag_ci95_low_n < summary.drag_mean_n).all()
+    assert (summary.drag_mean_n < summary.drag_ci95_high_n).all()
+    assert summary.bed_height_m.nunique() == 1
+    assert 0.5 < summary.solid_fraction[0] < 0.64
+    assert stands_alone((report / "report.html").read_text()).images
+
+
+def test_cases_share_their_filling_and_drop(finished: Path) -> None:
+    results = finished / "results/small"
+    assert len(list((results / "filling").iterdir())) == 1
+    assert len(list((results / "drop_test").iterdir())) == 1
+    assert len(list((results / "process").iterdir())) == 2
+
+
+def test_the_forces_on_the_workpiece_close(finished: Path) -> None:
+    for run in (finished / "results/small/process").iterdir():
+        closure = yaml.safe_load((run / "tables/closure.json").read_text())
+        assert closure["verdict"] == "pass"
+
+
+def test_the_workpiece_goes_where_it_should(finished: Path) -> None:
+    (run,) = (finished / "results/small/process").glob("*0.016*")
+    force = pd.read_parquet(run / "tables/workpiece_force.parquet")
+    filling = yaml.safe_load(
+        next((finished / "results/small/filling").iterdir())
+        .joinpath("tables/packing.json")
+        .read_text()
+    )
+    drag = force[force.phase == "drag"]
+    assert abs(drag.ref_z_m - (filling["bed_height_m"] - 0.016)).max() < 1e-6
+    radius = (drag.ref_x_m**2 + drag.ref_y_m**2) ** 0.5
+    assert abs(radius - 0.010).max() < 1e-6
+
+
+def test_particles_that_stick_to_the_workpiece_move_with_it(finished: Path) -> None:
+    """Below the limit of friction a particle's surface follows the workpiece's, however that
+    moves."""
+    for run in (finished / "results/small/process").iterdir():
+        contacts = pd.read_parquet(run / "tables/workpiece_contacts.parquet")
+        pressed = contacts[contacts["in_statistics"] & (contacts["normal_force_n"] > 5e-3)]
+        slip = (pressed[["slip_x_m_s", "slip_y_m_s", "slip_z_m_s"]] ** 2).sum(axis=1) ** 0.5
+        most = 0.28 * pressed["normal_force_n"]
+        sticks = pressed["tangential_force_n"] < 0.8 * most
+        slides = pressed["tangential_force_n"] > 0.99 * most
+        assert sticks.sum() > 30
+        assert slip[sticks].median() < 0.1 * slip[slides].median()
+        assert (run / "tables/workpiece.vtp").is_file()
+
+
+def test_all_contact_columns_would_give_the_same_tables(finished: Path, tmp_path: Path) -> None:
+    """Real frames with columns that nobody reads; what the engine wrote stays digit by digit."""
+    (run,) = (finished / "results/small/process").glob("*0.016*")
+    fatten(run, tmp_path / "fat")
+    write_tables(tmp_path / "fat")
+    write_chains(tmp_path / "fat")
+    for name in ("contacts", "workpiece_contacts", "network", "chains"):
+        lean, fat = (
+            pd.read_parquet(folder / f"tables/{name}.parquet") for folder in (run, tmp_path / "fat")
+        )
+        assert len(lean) > 0
+        pd.testing.assert_frame_equal(lean, fat, check_exact=True)
+
+
+def test_the_readmes_pandas_lines_run(finished: Path) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert len([line for line in code.splitlines() if line]) == 5
+    stand_in = code.replace("uhlmann2015", "small")
+    done = subprocess.run(
+        [sys.executable, "-c", stand_in], cwd=finished, capture_output=True, text=True, check=True
+    )
+    assert "drag_mean_n" in done.stdout
+
+
+def test_nothing_is_left_to_do(finished: Path) -> None:
+    assert jobs(finished, *STUDY) == set()
+
+
+def test_frames_are_exported_when_asked_for(finished: Path) -> None:
+    export = ("export", "--config", "study=small")
+    assert jobs(finished, *export) == {"export", "export_paraview"}
+    done = snakemake(finished, *export)
+    assert done.returncode == 0, done.stderr
+    for run in (finished / "results/small/process").iterdir():
+        times = set(pd.read_parquet(run / "tables/particles.parquet", columns=["time_s"])["time_s"])
+        assert pv.PVDReader(run / "export/paraview/run.pvd").time_values == sorted(times)
+    assert jobs(finished, *export) == set()
+    again = snakemake(finished, *export, "--forcerun", "export_paraview")
+    assert again.returncode == 0, again.stderr
+
+
+def test_an_edited_template_runs_what_depends_on_it(finished: Path) -> None:
+    template = finished / "templates/process.in.j2"
+    text = template.read_text()
+    template.write_text(text.replace("{% block run %}", "{% block run %}\n# a remark"))
+    done = snakemake(finished, *STUDY)
+    assert done.returncode == 0, done.stderr
+    told = done.stdout + done.stderr
+    assert "rule run_process" in told
+    assert "rule run_filling" not in told
+    assert "rule render_filling" not in told
+    assert told.count("these inputs were run before") == 2  # a remark changes no result
+    assert jobs(finished, *STUDY) == set()
+
+
+def test_a_new_case_runs_alone(finished: Path) -> None:
+    file = finished / "studies/small/study.yaml"
+    data = yaml.safe_load(file.read_text())
+    data["sweep"]["motion.immersion_depth_m"].append(0.014)
+    file.write_text(yaml.safe_dump(data))
+    wanted = jobs(finished, "process", "--config", "study=small")
+    assert wanted == {"render_process", "run_process", "tabulate_process", "process"}
+
+
+def test_an_unknown_study_stops_before_anything_runs(finished: Path) -> None:
+    done = snakemake(finished, "all", "--config", "study=large")
+    assert done.returncode != 0
+    assert "unknown study 'large'" in done.stdout + done.stderr
+    assert not (finished / "results/large").exists()

@@ -1,0 +1,1 @@
+"""From a tolerance to settings."""

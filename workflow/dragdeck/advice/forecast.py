@@ -1,0 +1,384 @@
+"""What a study's run will take and how far it may err: `dragdeck advise`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from dragdeck import __version__
+from dragdeck.advice.advise import (
+    Advice,
+    Error,
+    Option,
+    Spread,
+    percent,
+    process_options,
+    with_option,
+)
+from dragdeck.cases.case import Case
+from dragdeck.decks.case_file import AdvisedSettings
+from dragdeck.decks.deck import StudyScene
+from dragdeck.documents import Document, Part
+from dragdeck.outlook.explain import Cost, expected_cost
+from dragdeck.outlook.measured import measured_tradeoff
+from dragdeck.scenes.drop_test import drop_scene
+from dragdeck.scenes.filling import filling_scene
+from dragdeck.scenes.process import PROCESS, process_scene
+from dragdeck.study.base import Json
+from dragdeck.study.model import CirclePath, Fidelity, Study, Tolerance
+
+SCALE = 1e-3
+"""On the modulus of the short run; more where the engine refuses so soft a particle."""
+
+
+class Speed(Part):
+    """A measured speed of the engine on this machine.
+
+    Attributes
+    ----------
+    filling_steps_per_s, drag_steps_per_s : float
+    particles, ranks : int
+    engine_version : str
+    """
+
+    filling_steps_per_s: float
+    drag_steps_per_s: float
+    particles: int
+    ranks: int
+    engine_version: str
+
+    def of(self, particles: int) -> Speed:
+        """The speed with another number of particles: a step takes a time a particle."""
+        ratio = self.particles / particles
+        filling, drag = ratio * self.filling_steps_per_s, ratio * self.drag_steps_per_s
+        return Speed(
+            filling_steps_per_s=filling,
+            drag_steps_per_s=drag,
+            particles=particles,
+            ranks=self.ranks,
+            engine_version=self.engine_version,
+        )
+
+
+DEFAULT_TOLERANCE = Tolerance(tolerance=0.05)
+"""What is advised for where a study asks for nothing."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What an option costs on this machine.
+
+    Attributes
+    ----------
+    role : str
+        ``advised``, ``cheaper``, ``dearer``, ``reference`` or ``own``.
+    option : Option
+    case : Case
+        With the option's settings.
+    inputs : mapping
+        Of the process run, as in its ``case.json``: tells which run this is about.
+    steps : mapping of str to int
+        Of each scene that the tolerance concerns: fill and process, or the drop.
+    wall_times_s : mapping of str to float
+        Expected, of the same scenes.
+    source : str
+        Where the speed comes from.
+    """
+
+    role: str
+    option: Option
+    case: Case
+    inputs: Json
+    steps: Mapping[str, int]
+    wall_times_s: Mapping[str, float]
+    source: str
+
+    def for_file(self) -> OptionEntry:
+        """An entry of ``options`` in ``advice.json``."""
+        error = self.option.error
+        chosen = self.case.study.chosen_fidelity()
+        return OptionEntry(
+            role=self.role,
+            settings=chosen.model_copy(update={"ranks": self.case.ranks}),
+            drop_timestep_fraction=self.option.drop_timestep_fraction,
+            error=error,
+            relative_cost=self.option.relative_cost,
+            inputs=self.inputs,
+            steps=self.steps,
+            wall_time_s=self.wall_times_s,
+            steps_per_s={
+                scene: round(steps / self.wall_times_s[scene], 1)
+                for scene, steps in self.steps.items()
+            },
+            source=self.source,
+        )
+
+
+class OptionEntry(Part):
+    """An option of ``advice.json``: settings, their error, and what their runs will take."""
+
+    role: str
+    settings: Fidelity
+    drop_timestep_fraction: float | None
+    error: Error | None
+    relative_cost: float
+    inputs: Json
+    steps: Mapping[str, int]
+    wall_time_s: Mapping[str, float]
+    steps_per_s: Mapping[str, float]
+    source: str
+
+
+class AdvisedCase(Part):
+    """A case of ``advice.json``: its process run, what was asked, and the options."""
+
+    case: str
+    run: str
+    asked: AdvisedSettings
+    options: Sequence[OptionEntry]
+
+
+class AdviceFile(Document):
+    """``advice.json``: what the runs of a study will take, and how far they may err."""
+
+    study: str
+    date: str
+    versions: Mapping[str, str | None]
+    speed: Speed | None
+    cases: Sequence[AdvisedCase]
+
+
+def question(case: Case, tolerance: float | None, quantity: str | None) -> Tolerance:
+    """The tolerance that is advised for: of the command line, of the study, or the default.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        The command line asks for what no study may.
+    """
+    base = case.asked or DEFAULT_TOLERANCE
+    named = {"tolerance": tolerance, "quantity": quantity}
+    given = {name: value for name, value in named.items() if value is not None}
+    return Tolerance.model_validate({**base.model_dump(), **given})
+
+
+def own_option(case: Case, asked: Tolerance, tradeoff: Mapping[str, Any]) -> Option | None:
+    """The measured option that a study without a tolerance has chosen itself, if it has."""
+    if case.asked is not None or asked.quantity == "restitution":
+        return None
+    fidelity = case.study.chosen_fidelity()
+    for option in process_options(case, tradeoff, asked):
+        if option.same_settings(fidelity):
+            return replace(option, fidelity=fidelity)
+    return None
+
+
+def roles(advice: Advice, own: Option | None) -> Iterator[tuple[str, Option]]:
+    """Roles and options of an advice, each option once."""
+    found = {
+        "advised": advice.chosen,
+        "cheaper": advice.cheaper,
+        "dearer": advice.dearer,
+        "reference": advice.reference,
+        "own": own,
+    }
+    seen: list[Option] = []
+    for role, option in found.items():
+        if option is not None and option not in seen:
+            seen.append(option)
+            yield role, option
+
+
+def forecast(case: Case, role: str, option: Option, speed: Speed | None, results: Path) -> Forecast:
+    """Steps and wall time of an option.
+
+    Parameters
+    ----------
+    case : Case
+        Of the study.
+    role : str
+    option : Option
+    speed : Speed or None
+        Of this machine; None: what earlier runs took, or an assumption.
+    results : Path
+        The study's results.
+    """
+    chosen = replace(case, study=with_option(case.study, option))
+    process = process_scene(chosen)
+    about_drop = option.drop_timestep_fraction is not None
+    scenes: list[StudyScene] = (
+        [drop_scene(chosen)] if about_drop else [filling_scene(chosen), process]
+    )
+    costs = {scene.deck.scene: _cost(scene, speed, results) for scene in scenes}
+    return Forecast(
+        role=role,
+        option=option,
+        case=chosen,
+        inputs=process.case.inputs,
+        steps={scene: cost.steps for scene, cost in costs.items()},
+        wall_times_s={scene: cost.wall_time_s for scene, cost in costs.items()},
+        source=list(costs.values())[-1].source,
+    )
+
+
+def _cost(scene: StudyScene, speed: Speed | None, results: Path) -> Cost:
+    """Steps and wall time of a scene, by the speed of this machine if it was measured."""
+    name = scene.deck.scene
+    if speed is None or name == "drop_test":
+        return expected_cost(scene, results / name)
+    here = speed.of(scene.case.media.count)
+    rate = here.filling_steps_per_s
+    if name == "process":
+        modulus = scene.case.fidelity.youngs_modulus_scale
+        rate = here.drag_steps_per_s * step_cost(SCALE) / step_cost(modulus)
+    ranks = f"{speed.ranks} rank{'s' if speed.ranks > 1 else ''}"
+    return Cost(scene.steps, scene.steps / rate, f"a short run of this study, {ranks}")
+
+
+def step_cost(scale: float, tradeoff: Mapping[str, Any] | None = None) -> float:
+    """Time of a step of the drag at a modulus scale, over that at the others that were timed.
+
+    Soft particles have more contacts, and their steps cost more. Interpolated over
+    logarithms; 1 where nothing was timed.
+
+    Parameters
+    ----------
+    scale : float
+        Factor on every Young's modulus.
+    trade : mapping, optional
+        Instead of `measured_tradeoff`.
+    """
+    costs = (measured_tradeoff() if tradeoff is None else tradeoff)["costs"]
+    timed = {
+        float(cost["name"].removeprefix("modulus_")): float(cost["per_step"])
+        for cost in costs
+        if cost["name"].startswith("modulus_")
+    }
+    if not timed:
+        return 1.0
+    levels = sorted(timed)
+    logs = [math.log(timed[level]) for level in levels]
+    return math.exp(np.interp(math.log(scale), np.log(levels), logs))
+
+
+def advice_file(
+    case: Case, advices: Sequence[tuple[Advice, Sequence[Forecast]]], speed: Speed | None
+) -> AdviceFile:
+    """The content of ``advice.json``."""
+    return AdviceFile(
+        study=case.study_name,
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        versions={"dragdeck": __version__, "engine": speed.engine_version if speed else None},
+        speed=speed,
+        cases=[
+            AdvisedCase(
+                case=rows[0].case.name,
+                run=PROCESS.run_id(rows[0].case),
+                asked=advice.for_case,
+                options=[row.for_file() for row in rows],
+            )
+            for advice, rows in advices
+        ],
+    )
+
+
+def tables(
+    case: Case, advice: Advice, rows: Sequence[Forecast], own: Option | None
+) -> Iterator[Table]:
+    """What `dragdeck advise` prints of a case: the options, and what must be said of them."""
+    asked = advice.asked
+    title = f"{case.study_name} {case.name}: {advice.label} within {percent(asked.tolerance)}"
+    table = Table(title=title, title_justify="left")
+    for name in ("", "settings", "error (95 %)", "bound", "cost", "steps", "wall time"):
+        table.add_column(name)
+    for row in rows:
+        option = row.option
+        error = "errors are against it" if option.error is None else str(option.error)
+        bound = "" if option.error is None else percent(option.error.bound)
+        style = "bold" if row.role == "advised" else None
+        cost, steps = f"{option.relative_cost:.3g}", f"{sum(row.steps.values()):,}"
+        wall = clock(sum(row.wall_times_s.values()))
+        table.add_row(row.role, str(option), error, bound, cost, steps, wall, style=style)
+    yield table
+    said = Table(show_header=False)
+    said.add_column(style="bold")
+    said.add_column()
+    for what, text in [*remarks(advice, case.study), *_about(case, advice, rows[0], own)]:
+        said.add_row(what, text)
+    yield said
+
+
+def _about(
+    case: Case, advice: Advice, advised: Forecast, own: Option | None
+) -> Iterator[tuple[str, str]]:
+    yield "cost", f"processor time over the reference's; advised: 1/{advice.speedup:.3g} of it"
+    yield "errors", f"relative to the reference settings, {advice.source}"
+    yield "wall time", f"{' and '.join(advised.steps)}; speed: {advised.source}"
+    if case.asked is None:
+        yield "asked", "the study asks for no tolerance; it keeps its own fidelity"
+    if case.asked is None and advice.chosen.drop_timestep_fraction is None:
+        yield "its own", _of_own(case, advice, own)
+
+
+def _of_own(case: Case, advice: Advice, own: Option | None) -> str:
+    """What is known of the fidelity of a study that asks for no tolerance."""
+    name, settings = case.fidelity_name, case.study.chosen_fidelity()
+    if advice.reference.same_settings(settings):
+        return f"{name} has the reference settings"
+    if own is None or own.error is None:
+        return f"{name} is none of the measured settings that may be used here"
+    return (
+        f"{name}: error of {advice.label} {own.error}, bound {percent(own.error.bound)}, "
+        f"cost {own.relative_cost:.3g}"
+    )
+
+
+def remarks(advice: Advice, study: Study) -> list[tuple[str, str]]:
+    """What must be said of an advice: a heading and a sentence each."""
+    found = [("outside", str(number)) for number in advice.outside]
+    if advice.outside:
+        text = (
+            f"the error is held to {percent(advice.held_to)} instead (an assumption: nothing "
+            "measured says how it grows there)"
+        )
+        found.append(("safe side", text))
+    if advice.fallback:
+        found.append(("fallback", advice.fallback))
+    cheaper = advice.cheaper
+    if cheaper is not None and cheaper.error is not None:
+        bound = cheaper.error.limit
+        text = f"may err by up to {percent(bound)}, {percent(bound - advice.held_to)} too much"
+        found.append(("cheaper", f"{cheaper}: {text}"))
+    if advice.spread is not None:
+        found.append(("chance", _of_chance(advice, advice.spread, study)))
+    return found
+
+
+def _of_chance(advice: Advice, spread: Spread, study: Study) -> str:
+    """The uncertainty of one run, and what would bring it below the tolerance."""
+    text = (
+        f"one run's {advice.label} is uncertain by {percent(spread.half_width)} either way (95 %) "
+        f"over {spread.counted_m:.3g} m of counted path"
+    )
+    if spread.half_width <= advice.asked.tolerance:
+        return text
+    length = spread.needed_m + study.motion.transient_m
+    path = study.motion.path
+    whole = f"{length:.3g} m"
+    if isinstance(path, CirclePath):
+        whole = f"{length / (2 * math.pi * path.radius_m):.3g} revolutions"
+    seeds = math.ceil(spread.needed_m / spread.counted_m)
+    return f"{text}: more than the tolerance, which takes {whole}, or the mean over {seeds} seeds"
+
+
+def clock(seconds: float) -> str:
+    """A time in minutes and seconds."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest:02d} s"

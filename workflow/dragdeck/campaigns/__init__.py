@@ -1,0 +1,1 @@
+"""Sets of many small runs: verification, stability map, calibration, costs."""

@@ -1,0 +1,168 @@
+"""How fast this machine runs a study: a short run of its own decks.
+
+Steps per second depend on the number of particles and of contacts, hardly on the
+modulus. So a soft bed is settled, which takes few steps, and the workpiece is
+dragged through it for some thousand of them. What happens in one step, the way
+of the workpiece and the share of steps with output, is that of the settings asked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import jinja2
+
+from dragdeck.advice.forecast import SCALE, Speed
+from dragdeck.campaigns.stability_map import tabulate
+from dragdeck.cases.bed import bed_rayleigh_time
+from dragdeck.cases.case import Case
+from dragdeck.decks.deck import AnyScene
+from dragdeck.decks.render import write_run
+from dragdeck.engine.log import loops
+from dragdeck.engine.record import RunRecord
+from dragdeck.engine.run_folder import run
+from dragdeck.errors import EngineError, RejectedRunError
+from dragdeck.physics.rounding import timestep
+from dragdeck.physics.similarity import softest_scale
+from dragdeck.scenes.filling import FILLING, expected_surface, filling_scene
+from dragdeck.scenes.motion import plunge_point, start_point
+from dragdeck.scenes.process import PROCESS, process_scene
+from dragdeck.scenes.scene import read_bed
+from dragdeck.study.model import CirclePath, Fidelity, Motion, Outputs, Study
+
+TIMESTEP_FRACTION = 0.5
+"""Step of its process over the Rayleigh time."""
+
+DRAG_STEPS = 6000
+"""Steps that are timed."""
+
+ARRIVAL_STEPS = 3000
+"""Steps in which the workpiece goes in, and steps in which it goes to its path."""
+
+LONGEST_PERIOD_STEPS = 1000
+"""Most steps between frames of the slowest output; the legs are multiples of it."""
+
+Report = Callable[[str], None]
+
+
+def measure_machine_speed(
+    case: Case, folder: Path, templates: jinja2.Environment, report: Report
+) -> Speed:
+    """Run a study's bed and drag for some seconds and see how fast they are.
+
+    Parameters
+    ----------
+    case : Case
+        At the settings whose speed is asked.
+    folder : Path
+        Gets the runs.
+    templates : jinja2.Environment
+    report : callable
+        Gets a line a run.
+
+    Raises
+    ------
+    EngineError, RejectedRunError
+        The short run failed, so nothing is known of the speed.
+    """
+    short = short_case(case)
+    filling, process = (folder / scene.name / scene.run_id(short) for scene in (FILLING, PROCESS))
+    settled = _run(filling_scene(short), filling, templates, report)
+    tabulate(filling)
+    scene = process_scene(short, read_bed(filling / "tables" / "packing.json"))
+    _run(scene, process, templates, report)
+    return Speed(
+        filling_steps_per_s=settled.steps_per_s,
+        drag_steps_per_s=last_loop((process / "screen.1.txt").read_text(errors="replace")),
+        particles=case.study.media.count,
+        ranks=settled.ranks,
+        engine_version=settled.engine_version,
+    )
+
+
+def _run(scene: AnyScene, folder: Path, templates: jinja2.Environment, report: Report) -> RunRecord:
+    write_run(scene, folder, templates)
+    try:
+        return run(folder, report)
+    except RejectedRunError as error:
+        raise RejectedRunError(
+            f"{error}\n  the calibration of the speed failed; without it: dragdeck advise --quick"
+        ) from None
+
+
+def last_loop(screen: str) -> float:
+    """Steps per second of the engine's last ``run`` command: that of the drag.
+
+    Raises
+    ------
+    EngineError
+        The engine's output has no such line.
+    """
+    timed = loops(screen)
+    if not timed or timed[-1].wall_time_s <= 0:
+        raise EngineError("LIGGGHTS does not say how long its last run took")
+    return timed[-1].steps_per_s
+
+
+def short_case(case: Case) -> Case:
+    """The case as it is run for its speed: soft, quickly on the path, and soon done."""
+    study = case.study
+    asked = study.chosen_fidelity()
+    soft = Fidelity(
+        youngs_modulus_scale=max(SCALE, softest_scale(study)),
+        timestep_fraction=min(TIMESTEP_FRACTION, asked.timestep_fraction),
+        filling_timestep_fraction=asked.filling_timestep_fraction,
+        skin_m=asked.skin_m,
+        ranks=case.ranks,
+    )
+    changed = study.model_copy(update={"fidelity": soft})
+    dt = _timestep(changed)
+    pace = asked.speed_factor * _timestep(study) / dt
+    update = {"motion": _motion(changed, pace, dt), "outputs": _outputs(study.outputs, pace, dt)}
+    return Case(case.file, {}, changed.model_copy(update=update))
+
+
+def _timestep(study: Study) -> float:
+    return timestep(bed_rayleigh_time(study), study.chosen_fidelity().timestep_fraction)
+
+
+def _motion(study: Study, pace: float, timestep_s: float) -> Motion:
+    """A plunge, an approach and a drag of few steps.
+
+    Parameters
+    ----------
+    study : Study
+    pace : float
+        On the drag's speed, so that the workpiece's way in a step stays as it is.
+    timestep_s : float
+    """
+    motion = study.motion
+    speed = pace * motion.speed_m_s
+    length, arrival_s = speed * DRAG_STEPS * timestep_s, ARRIVAL_STEPS * timestep_s
+    here, there = plunge_point(motion), start_point(motion)
+    way = math.dist(here, there) or motion.immersion_depth_m
+    path = motion.path
+    if isinstance(path, CirclePath):
+        turns = length / (2 * math.pi * path.radius_m)
+        path = path.model_copy(update={"revolutions": turns})
+    else:
+        path = path.model_copy(update={"length_m": min(length, path.length_m)})
+    return motion.model_copy(
+        update={
+            "path": path,
+            "speed_m_s": speed,
+            "plunge_speed_m_s": expected_surface(study) / arrival_s,
+            "approach_speed_m_s": way / arrival_s,
+            "transient_m": 0.0,
+        }
+    )
+
+
+def _outputs(outputs: Outputs, pace: float, timestep_s: float) -> Outputs:
+    """As many frames a step as asked, or more: no leg is shorter than a frame."""
+    least = 1 / (LONGEST_PERIOD_STEPS * timestep_s)
+    names = ("workpiece_force_hz", "workpiece_contacts_hz", "network_hz")
+    rates = {name: max(pace * getattr(outputs, name), least) for name in names}
+    return outputs.model_copy(update={**rates, "n_checkpoints": 0})

@@ -1,0 +1,350 @@
+"""The drops that a calibration of the restitution needs.
+
+A measured drop test is compared with drops of the same particle on the same plate,
+run as the process runs: same modulus, step and contact options. Which drops
+those are stands here; what they say is for dragchain to find out.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import jinja2
+import numpy as np
+
+from dragdeck.cases.bed import bed_rayleigh_time, particle_material
+from dragdeck.cases.case import Case
+from dragdeck.decks.render import environment, write_run
+from dragdeck.documents import Document, Part
+from dragdeck.engine.run_folder import run
+from dragdeck.errors import InputError
+from dragdeck.files import replace_text
+from dragdeck.physics.contact_mechanics import (
+    effective_modulus,
+    fall_speed,
+    hertz_contact_time,
+    particle_mass,
+    rayleigh_time,
+)
+from dragdeck.physics.rounding import timestep
+from dragdeck.project import find_project, study_templates
+from dragdeck.scenes.drop_test import DropFidelity, drop_scene
+from dragdeck.study.model import Calibration, Study
+
+DROPS_FILE = "drops.json"
+IMPACTS = 3
+"""Impacts compared (Uhlmann et al. 2015, section 4)."""
+
+RESTITUTIONS = tuple(round(0.05 * k, 2) for k in range(8, 21))
+"""Deck values of the sweep: 0.40, 0.45, ... 1.00."""
+
+OTHER_RESTITUTIONS = RESTITUTIONS[::2]
+"""With the contact option that the study does not use."""
+
+PHASES = 4
+"""Production drops per deck value. Their heights differ by a share of a step's
+path, so that the first contact begins at another place within a time step."""
+
+REFERENCE_FRACTION = 0.01
+"""Finest time step of the sweep over the Rayleigh time: restitution converged to 1e-4."""
+
+TRIAL_FRACTION = 0.005
+"""Time step of a trial's record over the Rayleigh time: half the sweep's finest."""
+
+GOLDEN = 0.618
+"""Share of a step between the phases of reference drops, one a deck value."""
+
+TRIAL_RANGE = (0.5, 0.9)
+"""Deck values of the trials' records."""
+
+Purpose = Literal["production", "reference", "confirm", "trial"]
+
+
+class FittedRestitution(Part):
+    """A restitution of the input script that a drop test asks for."""
+
+    restitution: float
+
+
+class FitFile(Document):
+    """What is read of a calibration's ``result.json``."""
+
+    remedy = "make it with: snakemake calibrate"
+
+    fit: FittedRestitution
+    fit_full: FittedRestitution
+
+
+@dataclass(frozen=True)
+class Drop:
+    """One drop to run.
+
+    Attributes
+    ----------
+    name : str
+        Of its folder.
+    purpose : str
+        ``production``: as the process runs; ``reference``: full modulus, fine
+        step; ``confirm``: production at the fitted value; ``trial``: to make a
+        record of.
+    restitution : float
+        In the deck.
+    limit_force : bool
+    height_m : float
+    fidelity : DropFidelity
+    """
+
+    name: str
+    purpose: Purpose
+    restitution: float
+    limit_force: bool
+    height_m: float
+    fidelity: DropFidelity
+
+
+def settings(case: Case) -> Calibration:
+    """The calibration section of a study.
+
+    Raises
+    ------
+    InputError
+        It has none.
+    """
+    if case.study.calibration is None:
+        raise InputError(
+            "the study names no measured drop test",
+            file=case.file,
+            field="calibration",
+            remedy="add calibration: {record: FILE.csv}; docs/calibration.md describes the file",
+        )
+    return case.study.calibration
+
+
+def record_file(case: Case) -> Path:
+    """The record of a study, a CSV file.
+
+    Raises
+    ------
+    InputError
+        The study names none, or there is no such file.
+    """
+    file = case.file.parent / settings(case).record
+    if not file.is_file():
+        raise InputError(
+            "no such record",
+            file=case.file,
+            field="calibration.record",
+            value=settings(case).record,
+            limit=f"a file in {case.file.parent}",
+            remedy="put the CSV there, or correct the name",
+        )
+    return file
+
+
+def production(study: Study) -> DropFidelity:
+    """Modulus and time step of the study's process runs."""
+    fidelity = study.chosen_fidelity()
+    dt = timestep(bed_rayleigh_time(study), fidelity.timestep_fraction)
+    return DropFidelity(fidelity.youngs_modulus_scale, dt)
+
+
+def sweep(study: Study) -> Iterator[Drop]:
+    """Drops over a range of deck values, with limitForce on and off.
+
+    At production several drops a value, over the phase of the first contact in
+    its step; at the reference, where the step is fine, one, each at another
+    phase.
+    """
+    coarse, fine = production(study), full(study, REFERENCE_FRACTION)
+    for limit_force in (True, False):
+        used = limit_force == study.contact.limit_force
+        word = "limited" if limit_force else "free"
+        for number, value in enumerate(RESTITUTIONS if used else OTHER_RESTITUTIONS):
+            for phase in range(PHASES):
+                height = _height(study, coarse, (phase + 0.5) / PHASES)
+                name = f"production-{word}-{value:.2f}-{phase}"
+                yield Drop(name, "production", value, limit_force, height, coarse)
+            height = _height(study, fine, (number * GOLDEN) % 1.0)
+            name = f"reference-{word}-{value:.2f}"
+            yield Drop(name, "reference", value, limit_force, height, fine)
+
+
+def confirmation(study: Study, restitution: float, full_restitution: float) -> Iterator[Drop]:
+    """Drops at the fitted values: production over the phases, and one at full modulus."""
+    coarse, option = production(study), study.contact.limit_force
+    for phase in range(2 * PHASES):
+        height = _height(study, coarse, (phase + 0.25) / (2 * PHASES))
+        yield Drop(f"confirm-{phase}", "confirm", restitution, option, height, coarse)
+    fine = full(study, REFERENCE_FRACTION)
+    height = study.drop_test.height_m
+    yield Drop("confirm-full", "reference", full_restitution, option, height, fine)
+
+
+def trials(study: Study, count: int, seed: int) -> Iterator[Drop]:
+    """Drops with seeded deck values and heights, to make records with a known answer.
+
+    The height is drawn about the study's with ``calibration.height_std_m``, as
+    if it had been set by hand.
+    """
+    random = np.random.default_rng(seed)
+    section = study.calibration
+    spread = section.height_std_m if section else 0.0
+    finer = full(study, TRIAL_FRACTION)
+    for number in range(1, count + 1):
+        value = round(float(random.uniform(*TRIAL_RANGE)), 4)
+        height = study.drop_test.height_m + float(random.normal(0.0, spread))
+        option = study.contact.limit_force
+        yield Drop(f"trial-{number:03d}", "trial", value, option, height, finer)
+
+
+def full(study: Study, fraction: float) -> DropFidelity:
+    """Full modulus, and a step that is a share of the mean particle's Rayleigh time."""
+    rayleigh = rayleigh_time(particle_material(study), study.media.radius_mean_m)
+    return DropFidelity(1.0, timestep(rayleigh, fraction))
+
+
+def _height(study: Study, fidelity: DropFidelity, phase: float) -> float:
+    """The study's height, less or more by up to half of a step's path at the plate, m."""
+    return study.drop_test.height_m + (phase - 0.5) * _step_path(study, fidelity)
+
+
+def _step_path(study: Study, fidelity: DropFidelity) -> float:
+    """How far the particle falls in the step in which it meets the plate, m."""
+    speed = fall_speed(study.drop_test.height_m, study.gravity_m_s2)
+    return speed * (fidelity.timestep_s or 0.0)
+
+
+def drop_case(case: Case, drop: Drop) -> Case:
+    """The case with a drop's restitution, height and contact option in place."""
+    study = case.study
+    particle, plate = study.media.material, study.workpiece.material
+    pair = study.pair(particle, plate).model_copy(update={"restitution": drop.restitution})
+    key = f"{particle}-{plate}" if f"{particle}-{plate}" in study.pairs else f"{plate}-{particle}"
+    changed = study.model_copy(
+        update={
+            "pairs": {**study.pairs, key: pair},
+            "drop_test": study.drop_test.model_copy(
+                update={"height_m": drop.height_m, "impacts": max(IMPACTS, study.drop_test.impacts)}
+            ),
+            "contact": study.contact.model_copy(update={"limit_force": drop.limit_force}),
+        }
+    )
+    return Case(case.file, case.settings, changed)
+
+
+def run_drops(
+    case: Case,
+    drops: Sequence[Drop],
+    folder: Path,
+    templates: jinja2.Environment,
+    report: Callable[[str], None],
+) -> Path:
+    """Run drops, each in a folder of its own, and list them in ``drops.json``.
+
+    A drop that was run before with the same inputs is not run again.
+
+    Parameters
+    ----------
+    case : Case
+    drops : sequence of Drop
+    folder : Path
+        Gets a folder a drop, and the list.
+    templates : jinja2.Environment
+    report : callable
+        Gets a line now and then.
+
+    Returns
+    -------
+    Path
+        The list.
+    """
+    rows = []
+    for number, drop in enumerate(drops, start=1):
+        place = folder / drop.name
+        scene = drop_scene(drop_case(case, drop), drop.fidelity)
+        write_run(scene, place, templates)
+        run(place, lambda line: None)
+        rows.append(_row(drop, scene.deck.timestep_s, scene.case.rayleigh_time_s))
+        if number % 20 == 0 or number == len(drops):
+            report(f"{number} of {len(drops)} drops done")
+    listed = {"schema": 2, **_known(case), "drops": rows}
+    file = folder / DROPS_FILE
+    replace_text(file, json.dumps(listed, indent=1, allow_nan=False) + "\n")
+    return file
+
+
+def _row(drop: Drop, timestep_s: float, rayleigh_s: float) -> dict[str, Any]:
+    return {
+        "folder": drop.name,
+        "purpose": drop.purpose,
+        "restitution": drop.restitution,
+        "limit_force": drop.limit_force,
+        "height_m": drop.height_m,
+        "youngs_modulus_scale": drop.fidelity.youngs_modulus_scale,
+        "timestep_s": timestep_s,
+        "timestep_fraction": timestep_s / rayleigh_s,
+    }
+
+
+def _known(case: Case) -> dict[str, Any]:
+    """What dragchain has to know of the study."""
+    study, section = case.study, settings(case)
+    particle, plate = study.media.material, study.workpiece.material
+    radius, modulus = (
+        study.media.radius_mean_m,
+        effective_modulus(particle_material(study), study.materials[plate]),
+    )
+    speed = fall_speed(study.drop_test.height_m, study.gravity_m_s2)
+    mass = particle_mass(particle_material(study), radius)
+    return {
+        "study": case.study_name,
+        "title": study.title,
+        "pair": f"{particle}-{plate}",
+        "fidelity": case.fidelity_name,
+        "record": section.record,
+        "height_m": study.drop_test.height_m,
+        "height_std_m": section.height_std_m,
+        "peaks": section.peaks,
+        "gravity_m_s2": study.gravity_m_s2,
+        "limit_force": study.contact.limit_force,
+        "restitution_now": study.pair(particle, plate).restitution,
+        "fall_time_s": math.sqrt(2 * study.drop_test.height_m / study.gravity_m_s2),
+        "contact_time_s": hertz_contact_time(mass, radius, modulus, speed),
+    }
+
+
+def drops_command(
+    study: str,
+    fidelity: str | None,
+    out: Path,
+    set: str,
+    fit: Path | None,
+    count: int,
+    seed: int,
+) -> None:
+    """Run one set of drop tests.
+
+    Raises
+    ------
+    InputError
+        A confirmation without a fit.
+    """
+    project = find_project(Path.cwd())
+    case = project.cases(study, fidelity)[0]
+    if set == "sweep":
+        drops = list(sweep(case.study))
+    elif set == "trials":
+        drops = list(trials(case.study, count, seed))
+    elif fit is not None:
+        fitted = FitFile.read(fit)
+        drops = list(confirmation(case.study, fitted.fit.restitution, fitted.fit_full.restitution))
+    else:
+        raise InputError("nothing to confirm", field="--fit", remedy="give the fit's result.json")
+    templates = environment(project.templates, study_templates(case))
+    run_drops(case, drops, out, templates, lambda line: print(line, file=sys.stderr))

@@ -1,0 +1,1 @@
+"""A case of a study: its settings, its runs and its media."""

@@ -1,0 +1,135 @@
+"""A case: one combination of a study's sweep at one fidelity, and how its runs are named."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import JsonValue
+
+from dragdeck.cases.ranks import auto_ranks, cores_here
+from dragdeck.decks.case_file import AdvisedSettings
+from dragdeck.errors import InputError
+from dragdeck.study.base import Json
+from dragdeck.study.model import MeshShape, Study, Tolerance
+
+SAID_BY_NAME = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
+"""The settings that the name of a fidelity without a name says."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One combination of a study's sweep.
+
+    Attributes
+    ----------
+    file : Path
+        The study file.
+    settings : mapping
+        The sweep fields and their values in this case.
+    study : Study
+        With those values in place; its sweep is empty.
+    asked : Tolerance or None
+        What the settings in `study` were found for, if they were.
+    advised : AdvisedSettings or None
+        What is expected of them then.
+    beside : int
+        Cases that can run beside each other, this one among them.
+    """
+
+    file: Path
+    settings: Mapping[str, Any]
+    study: Study
+    asked: Tolerance | None = None
+    advised: AdvisedSettings | None = None
+    beside: int = 1
+
+    @property
+    def ranks(self) -> int:
+        """MPI ranks of a run of the filling or the process.
+
+        What ``ranks: auto`` comes to on this machine is no part of a run's name.
+        """
+        asked = self.study.chosen_fidelity().ranks
+        if asked == "auto":
+            return auto_ranks(self.study.media.count, self.beside, cores_here())
+        return asked
+
+    @property
+    def axis_speed_m_s(self) -> float:
+        """Speed at which the workpiece's axis is driven along its path, m/s."""
+        return self.study.motion.speed_m_s * self.study.chosen_fidelity().speed_factor
+
+    @property
+    def study_name(self) -> str:
+        """Name of the study: its folder's."""
+        return self.file.parent.name
+
+    @property
+    def name(self) -> str:
+        """Readable name: the fidelity and the sweep values."""
+        parts = [f"{field.rsplit('.', 1)[-1]}-{value}" for field, value in self.settings.items()]
+        return slug("_".join([self.fidelity_name, *parts]))
+
+    @property
+    def fidelity_name(self) -> str:
+        """Name of the fidelity; settings without a name are called by their values."""
+        if self.asked is not None:
+            name = f"tolerance-{self.asked.tolerance:g}"
+            default = self.asked.quantity == Tolerance.model_fields["quantity"].default
+            return name if default else f"{name}-{self.asked.quantity}"
+        fidelity = self.study.fidelity
+        if isinstance(fidelity, str):
+            return fidelity
+        chosen = self.study.chosen_fidelity()
+        name = f"E{chosen.youngs_modulus_scale:g}_dt{chosen.timestep_fraction:g}"
+        return name if chosen.speed_factor == 1 else f"{name}_v{chosen.speed_factor:g}"
+
+
+def mesh_file(case: Case, shape: MeshShape) -> Path:
+    """The file of a mesh: beside the study, in its meshes/, or in the project's meshes/.
+
+    Raises
+    ------
+    InputError
+        No such file in any of these places.
+    """
+    folder = case.file.parent
+    places = (folder, folder / "meshes", folder.parent.parent / "meshes")
+    for place in places:
+        if (place / shape.file).is_file():
+            return place / shape.file
+    raise InputError(
+        "no such mesh file",
+        file=case.file,
+        field="workpiece.shape.file",
+        value=shape.file,
+        limit="a file in " + ", ".join(str(place) for place in places),
+        remedy="put the mesh there, or correct the name",
+    )
+
+
+def materials_content(study: Study, *names: str) -> dict[str, JsonValue]:
+    """Materials as plain data, by name."""
+    return {name: study.materials[name].plain() for name in sorted(set(names))}
+
+
+def digest(content: Json) -> str:
+    """8 hex digits of plain data."""
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+
+def file_digest(file: Path) -> str:
+    """SHA-256 of a file's bytes."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def slug(text: str) -> str:
+    """A text as a part of a folder's name."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.")

@@ -1,0 +1,55 @@
+"""How many MPI ranks a run gets."""
+
+from __future__ import annotations
+
+import os
+
+from dragdeck.errors import InputError
+
+CORES_VARIABLE = "DRAGDECK_CORES"
+"""Environment variable: cores that ``ranks: auto`` may count on, if not those seen here."""
+
+FEWEST_PARTICLES_A_RANK = 5000
+"""``ranks: auto`` gives no rank fewer particles. Two ranks of 5,000 particles were measured to take
+1.08 times the processor time of one with all (docs/big.md); smaller runs are soon done
+anyway, and on a machine that others use too their ranks wait for each other."""
+
+
+def auto_ranks(particles: int, cases: int, cores: int) -> int:
+    """Ranks of a run of a study with that many cases.
+
+    Ranks wait for each other, cases do not: where there are as many cases as cores, each
+    gets one. The cores that are left share a case as long as each has enough particles.
+
+    Parameters
+    ----------
+    particles : int
+        In one run.
+    cases : int
+        That can run beside each other.
+    cores : int
+        Of the machine.
+    """
+    return max(1, min(cores // cases, particles // FEWEST_PARTICLES_A_RANK))
+
+
+def cores_here() -> int:
+    """Cores that this process may use, or the number in `CORES_VARIABLE`.
+
+    Raises
+    ------
+    InputError
+        The variable is no number above zero.
+    """
+    told = os.environ.get(CORES_VARIABLE)
+    if told is None:
+        return len(os.sched_getaffinity(0))
+    if not told.isdecimal() or int(told) < 1:
+        raise InputError(
+            "not a number of cores",
+            field=CORES_VARIABLE,
+            value=told,
+            limit="a whole number, at least 1",
+            remedy="correct the environment variable, or unset it",
+        )
+    return int(told)

@@ -1,0 +1,194 @@
+"""What the commands of ``dragdeck`` do, and some of its steps."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+from pydantic import ValidationError
+from rich.table import Table
+
+from dragdeck.advice.advise import Advice, breaking_note, with_option
+from dragdeck.advice.advise import advise as advised_settings
+from dragdeck.advice.forecast import (
+    AdviceFile,
+    Speed,
+    advice_file,
+    forecast,
+    own_option,
+    question,
+    roles,
+    tables,
+)
+from dragdeck.campaigns.machine_speed import measure_machine_speed
+from dragdeck.cases.case import Case
+from dragdeck.decks.deck import StudyScene
+from dragdeck.decks.render import deck_text, environment, write_run
+from dragdeck.engine.process import find_engine
+from dragdeck.engine.run_folder import outcome as run_to_outcome
+from dragdeck.engine.run_folder import run as run_folder
+from dragdeck.errors import InputError
+from dragdeck.outlook import bed as bed_outlook
+from dragdeck.outlook import timestep as timestep_outlook
+from dragdeck.outlook.explain import expected_cost, explanation, show
+from dragdeck.outlook.measured import measured_tradeoff
+from dragdeck.project import Project, by_run, find_project, study_templates
+from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.scene import Bed, SceneType, read_bed
+from dragdeck.study.yaml import explained
+
+
+def report(line: str) -> None:
+    """Say something on the way."""
+    print(line, file=sys.stderr, flush=True)
+
+
+def scene_type(name: str) -> SceneType:
+    """A scene by its name.
+
+    Raises
+    ------
+    InputError
+        There is none of this name.
+    """
+    if name not in SCENES:
+        raise InputError("no such scene", value=name, limit=f"one of: {', '.join(SCENES)}")
+    return SCENES[name]
+
+
+def check(study: str, fidelity: str | None) -> None:
+    """Build every input script of a study and look for LIGGGHTS; run nothing."""
+    project = find_project(Path.cwd())
+    every = project.cases(study, fidelity)
+    templates = environment(project.templates, study_templates(every[0]))
+    warnings: dict[str, None] = {}
+    for kind in SCENES.values():
+        for run_id, case in by_run(every, kind).items():
+            scene = kind.build(case, None)
+            deck_text(scene, templates)
+            print(f"{kind.name} {run_id}: time step {scene.deck.timestep_s:.3g} s")
+            for what, text in _expectations(case, kind, scene):
+                print(f"  {what}: {text}")
+            warnings.update(dict.fromkeys(f"{case.name}: {text}" for text in scene.warnings))
+    for warning in warnings:
+        print(f"warning: {warning}")
+    print(f"{study}: {len(every)} case(s) can be run; LIGGGHTS {find_engine().version}")
+
+
+def explain(study: str, fidelity: str | None, scene: str | None) -> None:
+    """Show what the input scripts of a study model, leave out and cost."""
+    project = find_project(Path.cwd())
+    every = project.cases(study, fidelity)
+    results = project.results(study)
+    kinds = [scene_type(scene)] if scene else list(SCENES.values())
+    runs = ((kind, case) for kind in kinds for case in by_run(every, kind).values())
+    built = ((kind, case, kind.build(case, None)) for kind, case in runs)
+    show(
+        explanation(one, expected_cost(one, results / kind.name), _expectations(case, kind, one))
+        for kind, case, one in built
+    )
+
+
+def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:
+    """What is known of a scene's time step and bed before it is run."""
+    notes = timestep_outlook.notes(case, kind, scene)
+    if kind.needs_bed:
+        notes += breaking_note(case)
+    return [*notes, *([] if kind.single_particle else bed_outlook.notes(case))]
+
+
+def cases(study: str, fidelity: str | None, plan: str | None) -> None:
+    """List the cases of a study, or the points of a plan, with their runs."""
+    project = find_project(Path.cwd())
+    every = project.points(study, plan).processes if plan else project.cases(study, fidelity)
+    table = Table("case", *SCENES)
+    for case in every:
+        table.add_row(case.name, *(kind.run_id(case) for kind in SCENES.values()))
+    show([table])
+
+
+def advise(
+    study: str, fidelity: str | None, tolerance: float | None, quantity: str | None, quick: bool
+) -> None:
+    """Show the settings for a tolerance, with their error and cost, and keep them."""
+    project = find_project(Path.cwd())
+    every = list(by_run(project.cases(study, fidelity), SCENES["process"]).values())
+    results, tradeoff = project.results(study), measured_tradeoff()
+    try:
+        asked = [question(case, tolerance, quantity) for case in every]
+    except ValidationError as error:
+        raise explained(error, "command line") from None
+    advices = [advised_settings(case, wanted) for case, wanted in zip(every, asked, strict=True)]
+    untimed = quick or all(wanted.quantity == "restitution" for wanted in asked)
+    speed = None if untimed else _machine_speed(project, every[0], advices[0])
+    rows = []
+    for case, advice in zip(every, advices, strict=True):
+        own = own_option(case, advice.asked, tradeoff)
+        options = [forecast(case, *row, speed, results) for row in roles(advice, own)]
+        rows.append((advice, options))
+        show(tables(case, advice, options, own))
+    _keep(results / "advice.json", advice_file(every[0], rows, speed))
+
+
+def _machine_speed(project: Project, case: Case, advice: Advice) -> Speed:
+    """The speed of this machine at the advised settings."""
+    chosen = replace(case, study=with_option(case.study, advice.chosen))
+    templates = environment(project.templates, study_templates(case))
+    with tempfile.TemporaryDirectory(prefix="dragdeck-") as folder:
+        return measure_machine_speed(chosen, Path(folder), templates, report)
+
+
+def _keep(file: Path, content: AdviceFile) -> None:
+    """Write a file where that is possible; what was printed counts without it."""
+    try:
+        content.write(file)
+    except OSError as error:
+        report(f"not written: {error}")
+
+
+def run(folder: Path, outcome: Path | None, again: bool, every_s: float) -> None:
+    """Run the input script in a folder, or resume it."""
+    if outcome is not None:
+        run_to_outcome(folder, outcome, report, every_s=every_s)
+    else:
+        run_folder(folder, report, again=again, every_s=every_s)
+
+
+def render(
+    study: str, fidelity: str | None, plan: str | None, scene: str, run: str, packing: Path | None
+) -> None:
+    """Write the input files of one run."""
+    project = find_project(Path.cwd())
+    kind = scene_type(scene)
+    points = project.points(study, plan) if plan else None
+    every = points.of(kind) if points else project.cases(study, fidelity)
+    runs = by_run(every, kind)
+    if run not in runs:
+        raise InputError(
+            f"no {scene} run of this name",
+            file=f"studies/{study}",
+            value=run,
+            limit=f"one of: {', '.join(runs)}",
+            remedy="list them with: dragdeck cases",
+        )
+    case = runs[run]
+    built = kind.build(case, _bed(kind, packing))
+    for warning in built.warnings:
+        report(f"warning: {warning}")
+    folder = project.run_folder(case, kind, of_plan=plan is not None)
+    write_run(built, folder, environment(project.templates, study_templates(case)))
+
+
+def _bed(kind: SceneType, packing: Path | None) -> Bed | None:
+    """The settled bed; an input script is never written on a guess."""
+    if not kind.needs_bed:
+        return None
+    if packing is None:
+        raise InputError(
+            f"a {kind.name} needs the settled bed",
+            field="--packing",
+            remedy="give the packing.json that dragchain made of the filling",
+        )
+    return read_bed(packing)

@@ -1,0 +1,1 @@
+"""Input scripts and the other files that a run starts from."""

@@ -1,0 +1,232 @@
+"""``case.json``: what a run models, for whoever reads its output."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+from pydantic import JsonValue
+
+from dragdeck.documents import Document, Part
+from dragdeck.physics.run_limits import RunLimits
+from dragdeck.study.model import Reference
+
+
+class RanksOfRun(Part):
+    """MPI ranks of a run."""
+
+    ranks: int
+
+
+class CountOfRun(Part):
+    """Particles of a run."""
+
+    count: int
+
+
+class FidelityOfRun(RanksOfRun):
+    """The settings of a run that trade accuracy for speed."""
+
+    name: str
+    youngs_modulus_scale: float
+    timestep_fraction: float
+    filling_timestep_fraction: float
+    speed_factor: float
+    skin_m: float
+
+
+class MediaOfRun(CountOfRun):
+    """The particles: their number, and the radii and density that the study asks for."""
+
+    radius_mean_m: float
+    radius_std_m: float
+    density_kg_m3: float
+
+
+class BowlOfRun(Part):
+    """The bowl: a cylinder about the z axis that stands on z = 0."""
+
+    radius_m: float
+    walls: Literal["primitive", "mesh"]
+
+
+class AssumptionOfRun(Part):
+    """A value that the study's source does not give."""
+
+    field: str
+    value: JsonValue
+    why: str
+
+
+class Phase(Part):
+    """A stretch of the run: the steps after the first one up to the last."""
+
+    name: str
+    start_step: int
+    end_step: int
+
+
+class ContactModuli(Part):
+    """Effective moduli of the contact of two bodies, softened as the run is, Pa."""
+
+    modulus_pa: float
+    shear_pa: float
+
+
+class CaseFile(Document):
+    """What the case files of all scenes share.
+
+    Attributes
+    ----------
+    run : str
+        The run id, and the name of the run's folder.
+    inputs : mapping
+        The values that the run depends on, by dotted name; of a process all of the study.
+    """
+
+    study: str
+    title: str
+    scene: str
+    run: str
+    timestep_s: float
+    rayleigh_time_s: float
+    versions: Mapping[str, str]
+    phases: Sequence[Phase] = ()
+
+
+class CaseOfStudy(CaseFile):
+    """A run of a study's case.
+
+    Attributes
+    ----------
+    contact_moduli : mapping
+        Of a particle with a ``particle``, the ``bowl`` and the ``workpiece``.
+    """
+
+    gravity_m_s2: float
+    fidelity: FidelityOfRun
+    inputs: Mapping[str, JsonValue]
+    media: MediaOfRun
+    bowl: BowlOfRun
+    contact_moduli: Mapping[str, ContactModuli]
+    assumptions: Sequence[AssumptionOfRun]
+    reference: Reference | None
+
+
+class DropTestCase(CaseOfStudy):
+    """A drop test: the restitution of the input script, and the factor on every modulus."""
+
+    scene: Literal["drop_test"] = "drop_test"
+    restitution: float
+    youngs_modulus_scale: float
+
+
+class SettlingCriterion(Part):
+    """When a bed rests: mean kinetic energy of a particle over m g d."""
+
+    energy_ratio: float
+
+
+class FillingCase(CaseOfStudy):
+    """A filling."""
+
+    scene: Literal["filling"] = "filling"
+    settled: SettlingCriterion
+    limits: RunLimits
+
+
+class WorkpieceOfRun(Part):
+    """The workpiece: radius of the cylinder around it, length, mesh file, depth of its tip."""
+
+    kind: Literal["cylinder", "mesh"]
+    radius_m: float
+    length_m: float
+    mesh: str
+    immersion_depth_m: float
+
+
+class MotionOfRun(Part):
+    """The drag as it is driven: the speed of the workpiece's axis, and its first direction."""
+
+    kind: str
+    axis_speed_m_s: float
+    start_direction_rad: float
+    orientation: Literal["follow_path", "fixed"]
+
+
+class CircleOfRun(MotionOfRun):
+    """A circle about the bowl's axis, its direction seen from above."""
+
+    kind: Literal["circle"] = "circle"
+    radius_m: float
+    direction: Literal["ccw", "cw"]
+
+
+class LineOfRun(MotionOfRun):
+    """A straight line."""
+
+    kind: Literal["line"] = "line"
+    start_m: tuple[float, float]
+    direction_rad: float
+
+
+class StatisticsOfRun(Part):
+    """The first seconds of the drag that no statistic counts."""
+
+    transient_s: float
+
+
+class AdvisedSettings(Part):
+    """The tolerance that a run's settings were chosen for, and what is expected of them.
+
+    Attributes
+    ----------
+    held_to : float
+        The tolerance that the settings meet: the asked one, or less outside of the measured
+        range.
+    error, ci95_low, ci95_high, bound : float or None
+        Expected error, its interval and the bound of its size; None for the reference.
+    half_width : float or None
+        Of the 95 % interval of one run's value, relative.
+    """
+
+    tolerance: float
+    quantity: str
+    label: str
+    held_to: float
+    error: float | None
+    ci95_low: float | None
+    ci95_high: float | None
+    bound: float | None
+    relative_cost: float
+    half_width: float | None
+    outside: Sequence[str]
+    fallback: str | None
+    source: str
+
+
+class ProcessCase(CaseOfStudy):
+    """A process run: the workpiece dragged through a settled bed.
+
+    Attributes
+    ----------
+    case : str
+        The case's readable name.
+    upstream : mapping
+        Run ids of the filling and the drop test that it belongs to.
+    numbers : mapping
+        The scene's dimensionless numbers at full modulus and the study's own speed.
+    surface_m : float
+        The settled surface above the floor.
+    """
+
+    scene: Literal["process"] = "process"
+    case: str
+    upstream: Mapping[str, str]
+    numbers: Mapping[str, float]
+    surface_m: float
+    workpiece: WorkpieceOfRun
+    motion: CircleOfRun | LineOfRun
+    statistics: StatisticsOfRun
+    limits: RunLimits
+    asked: AdvisedSettings | None = None

@@ -1,0 +1,154 @@
+"""A scene as data: what its input script and its ``case.json`` are made from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from dragdeck import __version__
+from dragdeck.decks.case_file import CaseFile, CaseOfStudy
+from dragdeck.decks.outputs import Output
+from dragdeck.mesh import Mesh
+from dragdeck.physics.domain_split import ENGINE_CHOOSES
+from dragdeck.physics.engine_limits import ENGINE_HARD_PA
+from dragdeck.study.contact_law import Pair, contact_model, present
+
+
+@dataclass(frozen=True)
+class PairTable:
+    """A coefficient of all pairs of types: LIGGGHTS's property, row by row."""
+
+    name: str
+    engine: str
+    values: Sequence[float]
+
+
+@dataclass(frozen=True)
+class Materials:
+    """Material constants and the contact law, as LIGGGHTS wants them.
+
+    Attributes
+    ----------
+    names : sequence of str
+        The material of each type, in LIGGGHTS's order; the particles are first.
+    youngs_moduli_pa, poissons_ratios : sequence of float
+        One per type.
+    pair_tables : sequence of PairTable
+        The coefficients that some pair has.
+    contact_model : str
+        For particles and walls alike.
+    """
+
+    names: Sequence[str]
+    youngs_moduli_pa: Sequence[float]
+    poissons_ratios: Sequence[float]
+    pair_tables: Sequence[PairTable]
+    contact_model: str
+
+
+def contact_law(pairs: Sequence[Sequence[Pair]]) -> tuple[list[PairTable], str]:
+    """Pair tables and contact model of a square table of pairs."""
+    every = [pair for row in pairs for pair in row]
+    tables = [
+        PairTable(name, row.engine, [getattr(pair, name) for pair in every])
+        for name, row in present(every).items()
+    ]
+    return tables, contact_model(every)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Deck:
+    """What every template sees as ``deck``.
+
+    Attributes
+    ----------
+    source : str
+        The data or restart file that the run starts from.
+    gravity_direction : (float, float, float)
+        Unit vector of gravity.
+    checkpoint_steps : int
+        Steps between restart points; 0 for none.
+    processors : str
+        How the ranks are laid out along x, y and z.
+    """
+
+    title: str
+    study: str
+    scene: str
+    run: str
+    source: str
+    materials: Materials
+    limit_force: bool
+    gravity_m_s2: float
+    skin_m: float
+    timestep_s: float
+    outputs: Sequence[Output]
+    gravity_direction: tuple[float, float, float] = (0, 0, -1)
+    thermo_steps: int = 0
+    checkpoint_steps: int = 0
+    processors: str = ENGINE_CHOOSES
+    version: str = __version__
+    templates: str = ""
+
+    @property
+    def hard(self) -> bool:
+        """Whether a modulus is above the engine's usual range."""
+        return max(self.materials.youngs_moduli_pa) > ENGINE_HARD_PA
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Why a deck leaves something out.
+
+    Attributes
+    ----------
+    why : str
+    cost : str, optional
+        The variant of `dragdeck.costs` that puts it back.
+    """
+
+    why: str
+    cost: str | None = None
+
+
+K = TypeVar("K", bound=CaseFile, covariant=True)
+
+
+@dataclass(frozen=True)
+class Scene(Generic[K]):
+    """All that one engine run needs, before any file is written.
+
+    Attributes
+    ----------
+    deck : Deck
+    case : CaseFile
+    steps : int
+        Steps expected; an estimate where the engine decides.
+    files : mapping of str to str
+        Other input files: name to content.
+    meshes : mapping of str to Mesh
+        Mesh files, by name.
+    models : mapping of str to str
+        What the deck models, and why.
+    leaves_out : mapping of str to LeftOut
+        What it leaves out.
+    warnings : sequence of str
+        What the user should know before the run.
+    """
+
+    deck: Deck
+    case: K
+    steps: int
+    files: Mapping[str, str] = field(default_factory=dict)
+    meshes: Mapping[str, Mesh] = field(default_factory=dict)
+    models: Mapping[str, str] = field(default_factory=dict)
+    leaves_out: Mapping[str, LeftOut] = field(default_factory=dict)
+    warnings: Sequence[str] = ()
+
+
+StudyScene = Scene[CaseOfStudy]
+"""A run of a study's case."""
+
+AnyScene = Scene[CaseFile]
+"""A run of any scene."""

@@ -1,0 +1,244 @@
+"""What the engine is asked to write, column by column.
+
+A deck's dump lines and the ``columns.json`` beside it are both made from these
+definitions, so that no reader has to guess a column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from dragdeck.documents import Document, Part
+
+Kind = Literal["print", "custom", "local"]
+
+
+class OutputOfRun(Part):
+    """A raw output file, for whoever reads it.
+
+    Attributes
+    ----------
+    kind : str
+        ``print``, ``custom`` or ``local``: the engine command that writes it.
+    pattern : str
+        File name, with ``{part}`` for the part number.
+    columns, engine_columns : sequence of str
+        Our name of each column, and the engine's where the file has it in its header.
+    period_steps, first_step, last_step : int
+        When frames are written. `last_step` is None where the engine decides.
+    """
+
+    kind: Kind
+    binary: bool
+    pattern: str
+    columns: Sequence[str]
+    engine_columns: Sequence[str] | None
+    period_steps: int
+    first_step: int
+    last_step: int | None
+
+
+class ColumnsFile(Document):
+    """``columns.json``: the raw output files of a run."""
+
+    remedy = "write it with: dragdeck step render"
+
+    outputs: Mapping[str, OutputOfRun]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: our name, and what the engine calls the quantity.
+
+    Attributes
+    ----------
+    name : str
+        With the unit at the end.
+    engine : str
+        An engine expression: an atom attribute, ``f_id[i]``, ``c_id[i]``, or the
+        formula of an equal-style variable.
+    whole : bool
+        An id: written without decimals.
+    """
+
+    name: str
+    engine: str
+    whole: bool = False
+
+
+@dataclass(frozen=True)
+class Output:
+    """A raw output file.
+
+    Attributes
+    ----------
+    name : str
+        Also the first part of the file's name.
+    kind : str
+        ``print``, ``custom`` or ``local``: the engine command that writes it.
+    columns : tuple of Column
+    period_steps, first_step, last_step : int
+        When frames are written. `last_step` is None where the engine decides.
+    binary : bool
+    """
+
+    name: str
+    kind: Kind
+    columns: tuple[Column, ...]
+    period_steps: int
+    first_step: int
+    last_step: int | None
+    binary: bool = False
+
+    @property
+    def pattern(self) -> str:
+        """File name, with ``{part}`` for the part number."""
+        ending = {"print": "txt", "custom": "bin" if self.binary else "dump", "local": "dump"}
+        return f"{self.name}.{{part}}.{ending[self.kind]}"
+
+    @property
+    def file(self) -> str:
+        """File name as a deck writes it, with the engine's variable for the part."""
+        return self.pattern.replace("{part}", "${part}")
+
+    @property
+    def text_format(self) -> str:
+        """The engine's number format of one row."""
+        return " ".join("%.0f" if column.whole else "%.9g" for column in self.columns)
+
+    def as_part(self) -> OutputOfRun:
+        """The entry of ``columns.json``."""
+        named = self.kind != "print" and not self.binary
+        return OutputOfRun(
+            kind=self.kind,
+            binary=self.binary,
+            pattern=self.pattern,
+            columns=[column.name for column in self.columns],
+            engine_columns=[column.engine for column in self.columns] if named else None,
+            period_steps=self.period_steps,
+            first_step=self.first_step,
+            last_step=self.last_step,
+        )
+
+
+def _vector(name: str, unit: str, source: str, first: int = 1) -> tuple[Column, ...]:
+    return tuple(
+        Column(f"{name}_{axis}_{unit}", f"{source}[{first + i}]") for i, axis in enumerate("xyz")
+    )
+
+
+_POSITION = tuple(Column(f"{axis}_m", axis) for axis in "xyz")
+_VELOCITY = tuple(Column(f"v{axis}_m_s", f"v{axis}") for axis in "xyz")
+_SPIN = tuple(Column(f"w{axis}_rad_s", f"omega{axis}") for axis in "xyz")
+_ID = Column("particle_id", "id", whole=True)
+_RADIUS = Column("radius_m", "radius")
+_STEP = Column("step", "step", whole=True)
+_TIME = Column("time_s", "step*dt")
+
+
+def thermo(period: int, last: int | None) -> Output:
+    """Particle count, kinetic energies and the largest speed of a particle over time."""
+    columns = (
+        _STEP,
+        _TIME,
+        Column("n_particles", "atoms", whole=True),
+        Column("kinetic_energy_j", "c_kinetic"),
+        Column("rotational_energy_j", "c_rotation"),
+        Column("fastest_particle_m_s", "c_fastest_particle"),
+    )
+    return Output("thermo", "print", columns, period, period, last)
+
+
+def settled_particles() -> Output:
+    """Every particle of the settled bed, one frame."""
+    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS)
+    return Output("particles", "custom", columns, 1, 0, None, binary=True)
+
+
+def workpiece_force(period: int, last: int) -> Output:
+    """Force and torque on the workpiece, and where its reference point is."""
+    columns = (
+        _STEP,
+        _TIME,
+        *_vector("force", "n", "f_workpiece"),
+        *_vector("torque", "n_m", "f_workpiece", 4),
+        *_vector("ref", "m", "f_workpiece", 7),
+    )
+    return Output("workpiece_force", "print", columns, period, period, last)
+
+
+def workpiece_particles(period: int, first: int, last: int) -> Output:
+    """Particles that the workpiece pushes: how they move, and the force as applied."""
+    force = _vector("force", "n", "f_force_workpiece_wall")
+    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *force)
+    return Output("workpiece_particles", "custom", columns, period, first, last, binary=True)
+
+
+def workpiece_contacts(period: int, first: int, last: int, bowl_facets: bool) -> Output:
+    """Contacts of the workpiece's facets, with the force as evaluated again.
+
+    With `bowl_facets`, the bowl's too, told apart by the mesh id.
+    """
+    mesh = (Column("mesh_id", "c_workpiece_contacts[7]", whole=True),) if bowl_facets else ()
+    columns = (
+        *_vector("point", "m", "c_workpiece_contacts", 1),
+        *mesh,
+        Column("facet_id", "c_workpiece_contacts[8]", whole=True),
+        Column("particle_id", "c_workpiece_contacts[9]", whole=True),
+        *_vector("force", "n", "c_workpiece_contacts", 10),
+        Column("overlap_m", "c_workpiece_contacts[13]"),
+    )
+    return Output("workpiece_contacts", "local", columns, period, first, last)
+
+
+def contacts(period: int, first: int, last: int) -> Output:
+    """Contacts between particles."""
+    columns = (
+        Column("particle1_id", "c_particle_contacts[1]", whole=True),
+        Column("particle2_id", "c_particle_contacts[2]", whole=True),
+        *_vector("force", "n", "c_particle_contacts", 4),
+        Column("overlap_m", "c_particle_contacts[7]"),
+    )
+    return Output("contacts", "local", columns, period, first, last)
+
+
+def particles(period: int, first: int, last: int, bowl_facets: bool) -> Output:
+    """Every particle, with the forces of an exact bowl on it as applied."""
+    bowl = (
+        *_vector("floor_force", "n", "f_force_floor"),
+        *_vector("side_force", "n", "f_force_side"),
+    )
+    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *(() if bowl_facets else bowl))
+    return Output("particles", "custom", columns, period, first, last, binary=True)
+
+
+def bodies(period: int, last: int, walls: Sequence[str]) -> Output:
+    """Every particle of a small scene: motion, the force and torque on it, that of each wall."""
+    columns = (
+        *(_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS),
+        *(Column(f"force_{axis}_n", f"f{axis}") for axis in "xyz"),
+        *(Column(f"torque_{axis}_n_m", f"tq{axis}") for axis in "xyz"),
+        *(column for wall in walls for column in _vector(f"{wall}_force", "n", f"f_force_{wall}")),
+    )
+    return Output("bodies", "custom", columns, period, 0, last, binary=True)
+
+
+def impacts() -> Output:
+    """Every step near an impact of the drop test."""
+    columns = (
+        _STEP,
+        _TIME,
+        Column("z_m", "xcm(all,z)"),
+        Column("vz_m_s", "vcm(all,z)"),
+        Column("force_n", "c_plate_force"),
+    )
+    return Output("impacts", "print", columns, 1, 0, None)
+
+
+def particles_and_forces(period: int, last: int) -> Output:
+    """Every particle with the total force on it, as applied."""
+    force = tuple(Column(f"force_{axis}_n", f"f{axis}") for axis in "xyz")
+    columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *force)
+    return Output("particles", "custom", columns, period, 0, last, binary=True)

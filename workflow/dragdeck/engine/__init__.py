@@ -1,0 +1,1 @@
+"""LIGGGHTS as a process: start, watch, resume, accept."""

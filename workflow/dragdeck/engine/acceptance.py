@@ -1,0 +1,150 @@
+"""The acceptance checks that a finished run must pass before it counts as a result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+from dragdeck.decks.outputs import OutputOfRun
+from dragdeck.engine import log
+from dragdeck.engine.frames import last_frame
+from dragdeck.engine.limits import breach, within
+from dragdeck.engine.record import AcceptanceCheck, CheckCode, CheckReason, RunInputs
+
+
+def check_run(
+    folder: Path,
+    inputs: RunInputs,
+    outputs: Mapping[str, OutputOfRun],
+    exit_status: int,
+    parts: int,
+    ranks: int,
+) -> list[AcceptanceCheck]:
+    """Look at all that a run left.
+
+    Parameters
+    ----------
+    folder : Path
+        The run's folder.
+    inputs : RunInputs
+        From ``case.json``.
+    outputs : mapping of str to OutputOfRun
+        From ``columns.json``.
+    exit_status : int
+        Of the last part.
+    parts : int
+        Number of parts; the last one has the end.
+    ranks : int
+        That were asked for.
+    """
+    screens = [_text(folder / f"screen.{part}.txt") for part in range(1, parts + 1)]
+    checks = [
+        _ended(screens[-1], exit_status),
+        _no_errors(screens[-1]),
+        _neighbour_builds("".join(screens)),
+    ]
+    if inputs.settled is not None:
+        checks.append(_at_rest(screens[-1]))
+    if "thermo" in outputs:
+        samples = _samples(folder, outputs["thermo"], parts)
+        checks += _thermo(samples, inputs.media.count)
+    checks += [_complete(folder, name, output, parts) for name, output in outputs.items()]
+    checks.append(ranks_check(log.decomposition(screens[-1]), ranks))
+    if inputs.limits is not None and "thermo" in outputs:
+        # once more on all rows: the watch may not have looked at the last ones
+        checks.append(breach(samples, inputs.limits) or within(inputs.limits))
+    return checks
+
+
+def _check(
+    code: CheckCode,
+    name: str,
+    passed: bool,
+    seen: str,
+    limit: str,
+    reason: CheckReason | None = None,
+) -> AcceptanceCheck:
+    return AcceptanceCheck(
+        code=code,
+        reason=None if passed else reason,
+        name=name,
+        passed=passed,
+        seen=seen,
+        limit=limit,
+    )
+
+
+def _text(file: Path) -> str:
+    return file.read_text(encoding="utf-8", errors="replace") if file.is_file() else ""
+
+
+def _ended(screen: str, exit_status: int) -> AcceptanceCheck:
+    at_end = log.reached_end(screen)
+    seen = f"exit status {exit_status}, {'end' if at_end else 'no end'} of the deck reached"
+    passed = at_end and exit_status == 0
+    return _check("ended", "ended by itself", passed, seen, "exit status 0 at the end")
+
+
+def _no_errors(screen: str) -> AcceptanceCheck:
+    errors = log.engine_errors(screen)
+    seen = "; ".join(errors) or "none"
+    reason: CheckReason = "lost_particles" if "Lost atoms" in seen else "other"
+    return _check("no_engine_error", "no engine error", not errors, seen, "none", reason)
+
+
+def _neighbour_builds(screens: str) -> AcceptanceCheck:
+    dangerous, name = log.dangerous_builds(screens), "no dangerous neighbour builds"
+    return _check("neighbour_builds", name, dangerous == 0, str(dangerous), "0")
+
+
+def _at_rest(screen: str) -> AcceptanceCheck:
+    rests, seen = log.settling(screen)
+    return _check("at_rest", "bed at rest", rests, seen, "SETTLED")
+
+
+def _samples(folder: Path, output: OutputOfRun, parts: int) -> list[log.Sample]:
+    """All whole rows of all parts."""
+    texts = [_text(folder / output.pattern.format(part=part)) for part in range(1, parts + 1)]
+    return [
+        sample for text in texts for sample in log.read_samples(text.splitlines(), output.columns)
+    ]
+
+
+def _thermo(samples: list[log.Sample], count: int) -> list[AcceptanceCheck]:
+    finite = bool(samples) and all(sample.finite for sample in samples)
+    fewest = min((sample.n_particles for sample in samples), default=0)
+    seen, limit = f"{fewest} particles at the fewest", f"{count} asked"
+    return [
+        _check("particles_kept", "every particle kept", fewest == count, seen, limit),
+        _check("finite_numbers", "finite numbers", finite, f"{len(samples)} thermo rows", "no NaN"),
+    ]
+
+
+def _complete(folder: Path, name: str, output: OutputOfRun, parts: int) -> AcceptanceCheck:
+    limit = "last frame whole" if output.last_step is None else f"to step {output.last_step}"
+    file = folder / output.pattern.format(part=parts)
+    step = last_frame(file, output) if file.is_file() else None
+    if not file.is_file():
+        passed, seen = False, f"no {file.name}"
+    elif step is None:
+        passed, seen = False, f"{file.name} is cut short or empty"
+    else:
+        passed, seen = output.last_step in (None, step), f"to step {step}"
+    return _check("output_complete", f"{name} whole", passed, seen, limit)
+
+
+def ranks_check(decomposition: log.Decomposition | None, ranks: int) -> AcceptanceCheck:
+    """Whether LIGGGHTS ran on the ranks that were asked for.
+
+    A LIGGGHTS that was built for another MPI than its launcher's runs once per rank, each
+    with all particles, and all write the same files.
+    """
+    name, limit = "split as asked", f"{ranks} rank{'s' if ranks > 1 else ''}"
+    if decomposition is None:
+        return _check("ranks", name, False, "LIGGGHTS names no processor grid", limit)
+    seen = " by ".join(map(str, decomposition.grid))
+    if decomposition.particles:
+        least, most = decomposition.particles.least, decomposition.particles.most
+        seen += f", {least:,} to {most:,} particles per rank"
+    return _check("ranks", name, math.prod(decomposition.grid) == ranks, seen, limit)

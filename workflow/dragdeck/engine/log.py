@@ -1,0 +1,141 @@
+"""What LIGGGHTS prints on its screen, and the rows of its ``thermo`` output."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dragdeck.documents import Part
+
+
+class ParticlesPerRank(Part):
+    """Mean, largest and smallest number of particles on a rank."""
+
+    mean: float
+    most: int
+    least: int
+
+
+class Decomposition(Part):
+    """The split that LIGGGHTS made of the simulation box.
+
+    Attributes
+    ----------
+    grid : (int, int, int)
+        Ranks along x, y and z.
+    particles : ParticlesPerRank or None
+        At the end of the last ``run`` command; None before one has ended.
+    """
+
+    grid: tuple[int, int, int]
+    particles: ParticlesPerRank | None
+
+
+def decomposition(screen: str) -> Decomposition | None:
+    """The split that LIGGGHTS printed; None where it printed none."""
+    grids = re.findall(r"^ *(\d+) by (\d+) by (\d+) MPI processor grid$", screen, re.MULTILINE)
+    if not grids:
+        return None
+    loads = re.findall(r"^Nlocal: +(\S+) ave (\d+) max (\d+) min$", screen, re.MULTILINE)
+    particles = None
+    if loads:
+        mean, most, least = loads[-1]
+        particles = ParticlesPerRank(mean=float(mean), most=int(most), least=int(least))
+    x, y, z = (int(count) for count in grids[-1])
+    return Decomposition(grid=(x, y, z), particles=particles)
+
+
+def engine_errors(screen: str) -> list[str]:
+    """The ERROR lines of LIGGGHTS, once each, in order."""
+    return list(dict.fromkeys(re.findall(r"^.*?(ERROR.*?)\s*$", screen, flags=re.MULTILINE)))
+
+
+def reached_end(screen: str) -> bool:
+    """Whether LIGGGHTS came to the last line of the input script."""
+    return re.search(r"^DRAGDECK END$", screen, flags=re.MULTILINE) is not None
+
+
+def dangerous_builds(screen: str) -> int:
+    """How often a neighbour list may have been built too late."""
+    return sum(int(count) for count in re.findall(r"Dangerous builds = (\d+)", screen))
+
+
+def settling(screen: str) -> tuple[bool, str]:
+    """Whether a bed came to rest, and the words in which the input script says so."""
+    line = re.search(r"^DRAGDECK ((NOT )?SETTLED: .*)$", screen, flags=re.MULTILINE)
+    return (False, "no word of it") if line is None else (line.group(2) is None, line.group(1))
+
+
+def last_step(screen: str) -> int | None:
+    """The last step in the table that LIGGGHTS prints."""
+    rows = re.findall(r"^ *(\d+) +\d+ ", screen, flags=re.MULTILINE)
+    return int(rows[-1]) if rows else None
+
+
+@dataclass(frozen=True)
+class Loop:
+    """One ``run`` command: wall time, s, and steps."""
+
+    wall_time_s: float
+    steps: int
+
+    @property
+    def steps_per_s(self) -> float:
+        """Speed of the command."""
+        return self.steps / self.wall_time_s
+
+
+def loops(screen: str) -> list[Loop]:
+    """The ``run`` commands that ended, in order."""
+    found = re.findall(r"^Loop time of (\S+) on \d+ procs for (\d+) steps", screen, re.MULTILINE)
+    return [Loop(float(seconds), int(steps)) for seconds, steps in found]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One row of ``thermo``: energies of all particles together, J; largest speed, m/s."""
+
+    step: int
+    n_particles: int
+    kinetic_energy_j: float
+    rotational_energy_j: float
+    fastest_particle_m_s: float
+
+    @property
+    def mean_energy_j(self) -> float:
+        """Kinetic energy per particle, rotation included, J; NaN without particles."""
+        total = self.kinetic_energy_j + self.rotational_energy_j
+        return total / self.n_particles if self.n_particles else math.nan
+
+    @property
+    def finite(self) -> bool:
+        """Whether energies and speed are finite."""
+        return math.isfinite(
+            self.kinetic_energy_j + self.rotational_energy_j + self.fastest_particle_m_s
+        )
+
+
+def read_samples(rows: Sequence[str], columns: Sequence[str]) -> list[Sample]:
+    """Rows of a ``thermo`` file; headers, and a row that was cut short, are left out."""
+    samples = []
+    for row in rows:
+        words = row.split()
+        if len(words) != len(columns) or not words[0].isdigit():
+            continue
+        try:
+            values = dict(zip(columns, (float(word) for word in words), strict=True))
+        except ValueError:
+            continue
+        count = values["n_particles"]
+        samples.append(
+            Sample(
+                step=int(values["step"]),
+                n_particles=int(count) if math.isfinite(count) else 0,
+                kinetic_energy_j=values["kinetic_energy_j"],
+                rotational_energy_j=values["rotational_energy_j"],
+                fastest_particle_m_s=values["fastest_particle_m_s"],
+            )
+        )
+    return samples

@@ -1,0 +1,244 @@
+"""The engine as a process: find it, start it, watch it, stop it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import psutil
+
+from dragdeck.errors import EngineError
+
+ENGINE_VARIABLE = "DRAGDECK_ENGINE"
+"""Environment variable with the path of an engine of one's own."""
+
+LAUNCHER_VARIABLE = "DRAGDECK_LAUNCHER"
+"""Environment variable with a launcher of one's own, for example ``srun --mpi=pmix``."""
+
+QUEUE_VARIABLES = ("SLURM_", "PMI")
+"""Beginnings of the names of a queue's variables."""
+
+OLDEST_VERSION = (3, 8, 0)
+"""Oldest engine that the decks were run on."""
+
+POLL_S = 0.2
+Watch = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Engine:
+    """An engine that can be run.
+
+    Attributes
+    ----------
+    path : str
+    version : str
+        As it prints it, for example ``3.8.0``.
+    """
+
+    path: str
+    version: str
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How an engine process ended.
+
+    Attributes
+    ----------
+    exit_status : int
+        Negative: killed by that signal.
+    asked : bool
+        It was asked to stop.
+    wall_time_s : float
+    cpu_time_s : float
+        Processor time of all ranks together.
+    """
+
+    exit_status: int
+    asked: bool
+    wall_time_s: float
+    cpu_time_s: float
+
+
+def find_engine() -> Engine:
+    """Find LIGGGHTS and its version.
+
+    Raises
+    ------
+    EngineError
+        Not found, not LIGGGHTS, or older than `OLDEST_VERSION`.
+    """
+    wanted = os.environ.get(ENGINE_VARIABLE, "liggghts")
+    path = shutil.which(wanted)
+    if path is None:
+        raise EngineError(
+            f"no engine: {wanted!r} is not an executable file\n"
+            f"  remedy: install Debian's package liggghts, or set {ENGINE_VARIABLE} "
+            "to the path of a LIGGGHTS of your own"
+        )
+    return Engine(path, _version(path))
+
+
+@cache
+def _version(path: str) -> str:
+    words = [path, "-h"]
+    shown = subprocess.run(
+        words, capture_output=True, text=True, check=False, timeout=60, env=_environment(words)
+    )
+    found = re.search(r"LIGGGHTS[^\n]*?(\d+)\.(\d+)\.(\d+)", shown.stdout)
+    oldest = ".".join(map(str, OLDEST_VERSION))
+    if found is None:
+        raise EngineError(
+            f"{path} does not say that it is LIGGGHTS\n"
+            f"  limit:  LIGGGHTS {oldest} or newer\n  remedy: correct {ENGINE_VARIABLE}"
+        )
+    version = tuple(int(part) for part in found.groups())
+    if version < OLDEST_VERSION:
+        raise EngineError(
+            f"{path} is too old\n  value:  {'.'.join(found.groups())}\n"
+            f"  limit:  {oldest} or newer\n  remedy: install a newer one"
+        )
+    return ".".join(found.groups())
+
+
+def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | None) -> list[str]:
+    """The command line of a run.
+
+    Parameters
+    ----------
+    engine : Engine
+    deck : str
+        Name of the deck file.
+    ranks : int
+    part : int
+        Number of this part of the run, from 1.
+    source : Path, optional
+        The checkpoint to go on from.
+    """
+    words = [engine.path, "-in", deck, "-log", f"engine.{part}.log", "-var", "part", str(part)]
+    if source is not None:
+        words += ["-var", "resume", "1", "-var", "from", source.name]
+    if ranks == 1:
+        return words
+    if own := _own_launcher():
+        return [*own, "-n", str(ranks), *words]
+    launcher = shutil.which("mpirun")
+    if launcher is None:
+        raise EngineError(
+            f"{ranks} ranks were asked for, but there is no mpirun\n"
+            "  remedy: install Open MPI (it comes with Debian's liggghts), or set ranks to 1"
+        )
+    idle = ["--mca", "mpi_yield_when_idle", "1"]  # free, and kind to whoever shares the cores
+    return [launcher, "-np", str(ranks), "--bind-to", "none", "--oversubscribe", *idle, *words]
+
+
+def _own_launcher() -> list[str]:
+    """The launcher that the user named, if any."""
+    words = shlex.split(os.environ.get(LAUNCHER_VARIABLE, ""))
+    if words and shutil.which(words[0]) is None:
+        raise EngineError(
+            f"no launcher: {words[0]!r} is not an executable file\n"
+            f"  remedy: correct {LAUNCHER_VARIABLE}, or unset it to use mpirun"
+        )
+    return words
+
+
+def execute(words: Sequence[str], folder: Path, screen: Path, watch: Watch) -> Ending:
+    """Run the engine to its end.
+
+    SIGINT or SIGTERM to this process ends the engine at once; its last
+    checkpoint stays. (The engine can write one more when it gets the signal
+    itself, but each rank heeds the signal in a step of its own, and two ranks
+    in different steps wait for each other for ever.)
+
+    Parameters
+    ----------
+    words : sequence of str
+        The command line.
+    folder : Path
+        Where to run.
+    screen : Path
+        Takes all that the engine prints.
+    watch : callable
+        Called about five times a second with the seconds since the start.
+    """
+    begun = time.monotonic()
+    with screen.open("wb") as sink:
+        process = subprocess.Popen(
+            words,
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=sink,
+            stderr=subprocess.STDOUT,
+            env=_environment(list(words)),
+            start_new_session=True,  # a Ctrl-C reaches us, not the engine
+        )
+        with _heeding_signals() as asked:
+            try:
+                while (cpu_time_s := _ended(process)) is None and not asked:
+                    watch(time.monotonic() - begun)
+                    time.sleep(POLL_S if time.monotonic() - begun > 1 else 0.02)
+            finally:
+                if process.returncode is None:
+                    end_all(process.pid)
+                    cpu_time_s = _ended(process, options=0)
+    assert cpu_time_s is not None
+    return Ending(process.returncode, bool(asked), time.monotonic() - begun, cpu_time_s)
+
+
+def _ended(process: subprocess.Popen[bytes], options: int = os.WNOHANG) -> float | None:
+    """Processor time of a process and all it started, s; None while it runs."""
+    pid, status, usage = os.wait4(process.pid, options)
+    if pid == 0:
+        return None
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return usage.ru_utime + usage.ru_stime
+
+
+def _environment(words: list[str]) -> dict[str, str]:
+    """What a command sees of our environment.
+
+    Only a launcher of the user's own sees the queue that we may be in. Open MPI would
+    hold a lone engine in a Slurm step for a rank that ``srun`` started, and look for the
+    others; ``mpirun`` would ask Slurm for nodes, and our ranks stay on this one.
+    """
+    own = words[:1] == _own_launcher()[:1]
+    hidden = () if own else QUEUE_VARIABLES
+    seen = {name: value for name, value in os.environ.items() if not name.startswith(hidden)}
+    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    return {**seen, "OMP_NUM_THREADS": "1", **(allowed if os.geteuid() == 0 else {})}
+
+
+@contextlib.contextmanager
+def _heeding_signals() -> Iterator[list[int]]:
+    """While inside, SIGINT and SIGTERM are noted in the list instead of acting."""
+    asked: list[int] = []
+    before = {}
+    with contextlib.suppress(ValueError):  # not the main thread: nobody signals us here
+        for number in (signal.SIGINT, signal.SIGTERM):
+            before[number] = signal.signal(number, lambda got, _: asked.append(got))
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def end_all(pid: int) -> None:
+    """Kill a process and all that it started: mpirun's ranks have groups of their own."""
+    with contextlib.suppress(psutil.NoSuchProcess):
+        top = psutil.Process(pid)
+        for process in (*top.children(recursive=True), top):
+            with contextlib.suppress(psutil.NoSuchProcess):
+                process.kill()

@@ -1,0 +1,119 @@
+"""What is known of a run: the documents beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from pydantic import Field
+
+from dragdeck.decks.case_file import CountOfRun, Phase, RanksOfRun, SettlingCriterion
+from dragdeck.documents import Document, Part
+from dragdeck.engine.log import Decomposition
+from dragdeck.physics.run_limits import RunLimits
+
+State = Literal["running", "stopped", "failed", "complete"]
+CheckCode = Literal[
+    "ended",
+    "no_engine_error",
+    "neighbour_builds",
+    "at_rest",
+    "particles_kept",
+    "finite_numbers",
+    "within_limits",
+    "output_complete",
+    "ranks",
+]
+CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", "energy", "speed"]
+
+
+class AcceptanceCheck(Part):
+    """A condition that a run must meet to count as a result.
+
+    Attributes
+    ----------
+    code : str
+        What is checked.
+    reason : str, optional
+        Why the check did not pass, where a code has several reasons.
+    name, seen, limit : str
+        For readers: the condition, what was seen, and what it asks for.
+    """
+
+    code: CheckCode
+    reason: CheckReason | None = None
+    name: str
+    passed: bool
+    seen: str
+    limit: str
+
+
+class RunPart(Part):
+    """A part of a run: from its start or a checkpoint to its end or the next interruption."""
+
+    part: int
+    checkpoint: str | None = Field(alias="from")
+    from_step: int
+    wall_time_s: float | None = None
+    cpu_time_s: float | None = None
+    exit_status: int | None = None
+    to_step: int | None = None
+
+
+class RunRecord(Document):
+    """How far a run is, or how it ended: ``state.json``, ``run.json`` and ``outcome.json``.
+
+    Steps, times and checks are those of a run that has ended.
+
+    Attributes
+    ----------
+    inputs : str
+        Hash of all that the run depends on.
+    started : str
+        Date and time of the first start.
+    steps_per_s : float or None
+        Of all parts; None for a run too short to measure it.
+    stopped_early : bool
+        Whether it was stopped because it passed a limit.
+    """
+
+    state: State
+    inputs: str
+    started: str
+    engine_version: str
+    ranks: int
+    parts: Sequence[RunPart] = ()
+    checks: Sequence[AcceptanceCheck] = ()
+    decomposition: Decomposition | None = None
+    steps: int = 0
+    steps_per_s: float | None = None
+    wall_time_s: float = 0.0
+    cpu_time_s: float = 0.0
+    stopped_early: bool = False
+
+    @property
+    def last_part(self) -> RunPart:
+        """The part that runs or ran last."""
+        return self.parts[-1]
+
+
+class RunInputs(Document):
+    """What the runner reads of ``case.json``.
+
+    Attributes
+    ----------
+    settled : SettlingCriterion or None
+        Of a run that must end with a bed at rest.
+    limits : RunLimits or None
+        Of a run that is watched.
+    """
+
+    remedy = "write it with: dragdeck step render"
+
+    scene: str
+    run: str
+    fidelity: RanksOfRun
+    media: CountOfRun
+    phases: Sequence[Phase] = ()
+    settled: SettlingCriterion | None = None
+    limits: RunLimits | None = None

@@ -1,0 +1,147 @@
+"""What a deck models, what it leaves out, and what it is expected to cost."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from dragdeck.decks.deck import StudyScene
+from dragdeck.outlook.measured import tradeoff_if_measured
+from dragdeck.scenes.registry import SCENES
+
+
+@dataclass(frozen=True)
+class Cost:
+    """An expected cost and where the expectation comes from."""
+
+    steps: int
+    wall_time_s: float
+    source: str
+
+
+def expected_cost(scene: StudyScene, results: Path) -> Cost:
+    """Steps and wall time to expect.
+
+    Parameters
+    ----------
+    scene : Scene
+    results : Path
+        The folder of the study's runs of this scene: measured ones are used, those with
+        as many particles if there are any, the others as if a step took a time a particle.
+    """
+    drop = scene.deck.scene == "drop_test"
+    count = 1 if drop else scene.case.media.count
+    measured = [(1 if drop else particles, rate) for particles, rate in _measured(results)]
+    measured = [(particles, rate) for particles, rate in measured if particles == count] or measured
+    if measured:
+        rate = sum(particles / count * rate for particles, rate in measured) / len(measured)
+        return Cost(scene.steps, scene.steps / rate, f"{len(measured)} run(s) of this study here")
+    rate = SCENES[scene.deck.scene].particle_steps_per_s / count
+    return Cost(scene.steps, scene.steps / rate, "assumed: no run of this study measured here")
+
+
+def _measured(results: Path) -> Iterable[tuple[int, float]]:
+    """Particles and steps a second of each run."""
+    for file in results.glob("*/run.json"):
+        speed = json.loads(file.read_text(encoding="utf-8"))["steps_per_s"]
+        case = file.with_name("case.json")
+        if speed and case.is_file():
+            media = json.loads(case.read_text(encoding="utf-8"))["media"]
+            yield int(media["count"]), float(speed)
+
+
+def price_of(name: str, tradeoff: Mapping[str, Any]) -> str:
+    """What putting a thing back costs, as measured.
+
+    Parameters
+    ----------
+    name : str
+        A variant of `dragdeck.costs`.
+    trade : mapping
+        Its ``costs`` give for each variant the ratio of processor times, with a
+        95 % interval if there were rounds enough for one.
+    """
+    found = next((cost for cost in tradeoff.get("costs", ()) if cost["name"] == name), None)
+    if found is None:
+        return "cost of putting it back: not measured"
+    return f"putting it back costs {_ratio(found, tradeoff)}"
+
+
+def cheaper_choices(scene: str, tradeoff: Mapping[str, Any]) -> Iterable[tuple[str, str]]:
+    """What was measured to make a scene cheaper, beyond doubt, by a simulated second."""
+    for cost in tradeoff.get("costs", ()):
+        sure = cost["ci95_high"] is not None and cost["ci95_high"] < 1
+        if sure and cost["scene"] == scene and cost.get("unit", "per_second") == "per_second":
+            yield cost["what"], f"{_ratio(cost, tradeoff)}; what it does to the results is not said"
+
+
+def _ratio(cost: Mapping[str, Any], tradeoff: Mapping[str, Any]) -> str:
+    interval = (
+        "" if cost["ci95_low"] is None else f" ({cost['ci95_low']:.3g} to {cost['ci95_high']:.3g})"
+    )
+    engine, date = tradeoff["versions"]["engine"], tradeoff["measured"]
+    return f"{cost['ratio']:.3g}x{interval}, LIGGGHTS {engine}, {date}"
+
+
+def explanation(
+    scene: StudyScene,
+    cost: Cost,
+    notes: Iterable[tuple[str, str]] = (),
+    tradeoff: Mapping[str, Any] | None = None,
+) -> Table:
+    """The table of one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    cost : Cost
+    notes : iterable of (str, str)
+        What its time step means for each pair of bodies.
+    trade : mapping, optional
+        Measured costs, if not those of `tradeoff_if_measured`.
+    """
+    tradeoff = tradeoff_if_measured() if tradeoff is None else tradeoff
+    deck = scene.deck
+    table = Table(title=f"{deck.study}: {deck.scene} {deck.run}", title_justify="left")
+    table.add_column("")
+    table.add_column("what", style="bold")
+    table.add_column("why or how much")
+    for what, why in scene.models.items():
+        table.add_row("models", what, why)
+    table.add_section()
+    for what, left in scene.leaves_out.items():
+        price = f"; {price_of(left.cost, tradeoff)}" if left.cost else ""
+        table.add_row("leaves out", what, f"{left.why}{price}")
+    table.add_section()
+    rayleigh = scene.case.rayleigh_time_s
+    fraction = deck.timestep_s / rayleigh
+    table.add_row(
+        "costs", "time step", f"{deck.timestep_s:.3g} s, {100 * fraction:.3g} % of Rayleigh"
+    )
+    table.add_row("", "steps", f"about {cost.steps:,}")
+    minutes, seconds = divmod(round(cost.wall_time_s), 60)
+    table.add_row("", "wall time", f"about {minutes} min {seconds:02d} s ({cost.source})")
+    for what, text in cheaper_choices(deck.scene, tradeoff):
+        table.add_row("cheaper", what, text)
+    table.add_section()
+    for what, text in notes:
+        table.add_row("expects", what, text)
+    for warning in scene.warnings:
+        table.add_section()
+        table.add_row("warning", warning, "", style="yellow")
+    return table
+
+
+def show(tables: Iterable[Table]) -> None:
+    """Print tables, wide enough for their text when nobody looks at a terminal."""
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=150)
+    for table in tables:
+        console.print(table)

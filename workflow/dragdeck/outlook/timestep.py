@@ -1,0 +1,208 @@
+"""What to expect of a time step: shares of the Rayleigh time, steps per contact, errors.
+
+The errors and the safe steps were measured on the engine by the stability map;
+``data/stability.json`` holds them with engine version and date.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import resources
+from typing import Any
+
+from dragdeck.cases.bed import particle_material, smallest_radius
+from dragdeck.cases.case import Case
+from dragdeck.decks.deck import StudyScene
+from dragdeck.physics.contact_mechanics import (
+    effective_modulus,
+    hertz_contact_time,
+    particle_mass,
+    rayleigh_time,
+)
+from dragdeck.scenes.scene import SceneType
+from dragdeck.study.model import Study
+
+ORDINARY_RESTITUTION = 0.5
+"""The map tells apart conditions below and above: strong damping needs smaller steps."""
+
+
+@dataclass(frozen=True)
+class Expected:
+    """An error read from the measured table.
+
+    Attributes
+    ----------
+    value : float
+        Largest absolute error of the restitution that was seen.
+    measured : bool
+        Whether the number of steps lies within the measured range; if not,
+        `value` is that of the range's nearest end.
+    """
+
+    value: float
+    measured: bool
+
+
+@dataclass(frozen=True)
+class PairOutlook:
+    """What a time step means for two bodies that meet.
+
+    Attributes
+    ----------
+    bodies : str
+    limiting : str
+        The body with the smaller Rayleigh time.
+    rayleigh_fraction : float
+        Time step over that time.
+    speed_m_s : float
+        Expected speed of an impact.
+    steps_per_contact : float
+        Elastic Hertz contact time at that speed over the time step.
+    error : Expected
+    """
+
+    bodies: str
+    limiting: str
+    rayleigh_fraction: float
+    speed_m_s: float
+    steps_per_contact: float
+    error: Expected
+
+    def __str__(self) -> str:
+        outside = "" if self.error.measured else " (outside of the measured range)"
+        return (
+            f"{100 * self.rayleigh_fraction:.3g} % of the Rayleigh time ({self.limiting}), "
+            f"{self.steps_per_contact:.3g} steps per contact at {self.speed_m_s:.3g} m/s, "
+            f"error of restitution up to {self.error.value:.2g}{outside}"
+        )
+
+
+@lru_cache(maxsize=1)
+def measured() -> dict[str, Any]:
+    """The measured map: ``data/stability.json`` of this package."""
+    file = resources.files("dragdeck").joinpath("data").joinpath("stability.json")
+    found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    return found
+
+
+def expected_error(
+    steps: float, restitution: float, table: Mapping[str, Sequence[float]]
+) -> Expected:
+    """Error of the restitution at a number of steps per contact.
+
+    Parameters
+    ----------
+    steps : float
+    restitution : float
+        From `ORDINARY_RESTITUTION` on, the errors of such impacts count.
+    table : mapping
+        ``steps_per_contact``, rising, and the errors seen there, ``worst`` and
+        ``ordinary_worst``. Between them the error is interpolated on
+        logarithmic scales.
+    """
+    ordinary = restitution >= ORDINARY_RESTITUTION
+    known, errors = table["steps_per_contact"], table["ordinary_worst" if ordinary else "worst"]
+    if steps <= known[0] or steps >= known[-1]:
+        end = 0 if steps <= known[0] else -1
+        return Expected(errors[end], steps == known[end])
+    after = next(n for n, value in enumerate(known) if value > steps)
+    low, high = known[after - 1], known[after]
+    fraction = math.log(steps / low) / math.log(high / low)
+    return Expected(errors[after - 1] ** (1 - fraction) * errors[after] ** fraction, True)
+
+
+def outlook(case: Case, scene: SceneType, timestep_s: float) -> list[PairOutlook]:
+    """Every pair of bodies that meets in a scene, unlike ones included.
+
+    LIGGGHTS's own check of the time step looks at particles of one material only.
+
+    Parameters
+    ----------
+    case : Case
+    scene : SceneType
+    timestep_s : float
+    """
+    study = case.study
+    scale = 1.0 if scene.single_particle else study.chosen_fidelity().youngs_modulus_scale
+    radius = study.media.radius_mean_m if scene.single_particle else smallest_radius(study)
+    speed = scene.impact_speed(case)
+    return [
+        _pair(study, other, others_radius, radius, scale, speed, timestep_s, name)
+        for name, other, others_radius in scene.partners(case)
+    ]
+
+
+def _pair(
+    study: Study,
+    other: str,
+    others_radius: float,
+    radius: float,
+    scale: float,
+    speed: float,
+    timestep_s: float,
+    name: str,
+) -> PairOutlook:
+    particle, partner = particle_material(study), study.materials[other]
+    times = {"particle": rayleigh_time(particle, radius, scale)}
+    times.setdefault(name, rayleigh_time(partner, others_radius, scale))
+    limiting = min(times, key=lambda body: times[body])
+    mass = particle_mass(particle, radius)
+    # the engine meets walls and facets as planes: half of it all for two particles
+    fraction = 0.5 if name == "particle" else 1.0
+    modulus = effective_modulus(particle, partner, scale)
+    contact = hertz_contact_time(fraction * mass, fraction * radius, modulus, speed)
+    steps = contact / timestep_s
+    pair = study.pair(study.media.material, other)
+    return PairOutlook(
+        bodies=f"particle on {name}",
+        limiting=limiting,
+        rayleigh_fraction=timestep_s / times[limiting],
+        speed_m_s=speed,
+        steps_per_contact=steps,
+        error=expected_error(steps, pair.restitution, measured()["restitution_error"]),
+    )
+
+
+def safe_fraction(case: Case, scene: SceneType) -> tuple[float, str]:
+    """Largest step over the Rayleigh time that was safe in the scene's regime, and where from.
+
+    Strongly damped particles have a limit of their own. The safety factor is not in it.
+    """
+    known = measured()
+    lowest = min(pair.restitution for pair in case.study.pairs.values())
+    strong = lowest < ORDINARY_RESTITUTION
+    damping = "any restitution" if strong else f"restitution of {ORDINARY_RESTITUTION:g} or more"
+    engine = ", ".join(known["engine_versions"])
+    source = f"{scene.regime}, {damping}; LIGGGHTS {engine}, {known['measured']}"
+    return _regime_fraction(scene, lowest), source
+
+
+def _regime_fraction(scene: SceneType, lowest_restitution: float) -> float:
+    row = measured()["regimes"][scene.regime]
+    strong = lowest_restitution < ORDINARY_RESTITUTION
+    return float(row["safe_fraction"] if strong else row["ordinary_fraction"])
+
+
+def largest_fraction(scene: SceneType, lowest_restitution: float) -> float:
+    """Largest step over the Rayleigh time that keeps the safety factor."""
+    return float(measured()["safety_factor"]) * _regime_fraction(scene, lowest_restitution)
+
+
+def notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:
+    """What ``check`` and ``explain`` say of a scene's time step: a heading and a text each."""
+    step = scene.deck.timestep_s
+    found = [(pair.bodies, str(pair)) for pair in outlook(case, kind, step)]
+    fraction, source = safe_fraction(case, kind)
+    factor = float(measured()["safety_factor"])
+    own = step / scene.case.rayleigh_time_s
+    verdict = "within" if own <= factor * fraction * (1 + 1e-9) else "ABOVE"
+    text = (
+        f"{100 * own:.3g} % is {verdict} {100 * factor * fraction:.3g} %: "
+        f"{factor:g} (safety factor) times the {100 * fraction:.3g} % measured to be "
+        f"safe ({source})"
+    )
+    return [*found, ("safe step", text)]

@@ -1,0 +1,1 @@
+"""Formulae and limits that need no study file."""

@@ -1,0 +1,170 @@
+"""How LIGGGHTS splits its box among ranks, and how many particles each gets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+MOST_OVER_MEAN = 1.5
+"""A warning is given where the fullest rank has more than this times the mean."""
+
+ENGINE_CHOOSES = "* * 1"
+"""The engine splits the floor as evenly as it can, and never the height."""
+
+_POINTS = 129
+"""Points across a cell at which the width of the bowl is taken."""
+
+Counts = tuple[int, int, int]
+Fractions = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FilledBowl:
+    """Particles in a round bowl within the engine's box, as far as the split goes.
+
+    Attributes
+    ----------
+    particles : int
+    radius_m, height_m : float
+        Of the space they fill, from the floor at z = 0.
+    half_width_m, bottom_m, top_m : float
+        The box: from minus to plus `half_width_m` along x and y.
+    reach_m : float
+        How far beyond its cell a rank looks for neighbours.
+    """
+
+    particles: int
+    radius_m: float
+    height_m: float
+    half_width_m: float
+    bottom_m: float
+    top_m: float
+    reach_m: float
+
+
+@dataclass(frozen=True)
+class Split:
+    """A grid of ranks and the particles it is expected to give them.
+
+    Attributes
+    ----------
+    grid : (int, int, int)
+        Ranks along x, y and z.
+    largest : float
+        Particles that the fullest rank knows of, its own and its neighbours'.
+    particles : list of float
+        Own particles of each rank.
+    """
+
+    grid: Counts
+    largest: float
+    particles: list[float]
+
+    @property
+    def mean(self) -> float:
+        """Own particles a rank."""
+        return sum(self.particles) / len(self.particles)
+
+    @property
+    def idle(self) -> int:
+        """Ranks without a particle to expect."""
+        return sum(particles < 0.5 for particles in self.particles)
+
+    @property
+    def most_over_mean(self) -> float:
+        """Own particles of the fullest rank over the mean."""
+        return max(self.particles) / self.mean
+
+    @property
+    def line(self) -> str:
+        """What the deck's ``processors`` gets; the engine's own choice where it is this one."""
+        x, y, z = self.grid
+        most_even = min(abs(a - b) for a, b, c in _grids(x * y) if c == 1)
+        return ENGINE_CHOOSES if z == 1 and abs(x - y) == most_even else f"{x} {y} {z}"
+
+    def __str__(self) -> str:
+        shown = " x ".join(str(count) for count in self.grid)
+        if len(self.particles) == 1:
+            return f"{shown}: one rank, {self.mean:,.0f} particles"
+        return (
+            f"{shown}: {min(self.particles):,.0f} to {max(self.particles):,.0f} particles a rank, "
+            f"{self.largest:,.0f} with those of its neighbours"
+        )
+
+
+def split(ranks: int, filled: FilledBowl) -> Split:
+    """The grid in which the busiest rank has the least to do.
+
+    A flat wide bowl is split along the floor, a tall column along its height, if the box
+    has not much room above it.
+    """
+    found = [_split(grid, filled) for grid in _grids(ranks)]
+    return min(found, key=lambda one: (float(f"{one.largest:.6g}"), one.grid[2], -one.grid[0]))
+
+
+def _grids(ranks: int) -> Iterator[Counts]:
+    """All ways to write a number as a product of three."""
+    factors = [n for n in range(1, ranks + 1) if ranks % n == 0]
+    for x, y in product(factors, factors):
+        if ranks % (x * y) == 0:
+            yield x, y, ranks // (x * y)
+
+
+def _split(grid: Counts, filled: FilledBowl) -> Split:
+    """What a grid gives each rank."""
+    own, known = (
+        filled.particles
+        * np.outer(_floor_fractions(grid, filled, reach), _height_fractions(grid[2], filled, reach))
+        for reach in (0.0, filled.reach_m)
+    )
+    return Split(grid, float(known.max()), own.ravel().tolist())
+
+
+def _floor_fractions(grid: Counts, filled: FilledBowl, reach_m: float) -> Fractions:
+    """Share of the bowl's floor in each cell of x and y, widened by a reach."""
+    radius, half_width = filled.radius_m, filled.half_width_m
+    x_edges, y_edges = (_edges(n, -half_width, half_width) for n in grid[:2])
+    fractions = np.empty(grid[:2])
+    for i, j in product(range(grid[0]), range(grid[1])):
+        x_ends = np.array([x_edges[i] - reach_m, x_edges[i + 1] + reach_m])
+        first, last = np.arcsin(np.clip(x_ends / radius, -1, 1))
+        angles = np.linspace(first, last, _POINTS)
+        chord = radius * np.cos(angles)  # half of it, at x = radius sin(angle)
+        low, high = (
+            np.clip(y, -chord, chord) for y in (y_edges[j] - reach_m, y_edges[j + 1] + reach_m)
+        )
+        fractions[i, j] = np.trapezoid((high - low) * chord, angles) / (np.pi * radius**2)
+    return fractions
+
+
+def _height_fractions(count: int, filled: FilledBowl, reach_m: float) -> Fractions:
+    """Share of the bed's height in each layer of cells, widened by a reach."""
+    edges = _edges(count, filled.bottom_m, filled.top_m)
+    low = np.clip(edges[:-1] - reach_m, 0, filled.height_m)
+    high = np.clip(edges[1:] + reach_m, 0, filled.height_m)
+    return np.asarray((high - low) / filled.height_m)
+
+
+def _edges(count: int, low: float, high: float) -> Fractions:
+    return np.linspace(low, high, count + 1)
+
+
+def warnings(found: Split) -> list[str]:
+    """What a user should know of a split before the run."""
+    ranks = len(found.particles)
+    if found.idle:
+        return [
+            f"{found.idle} of {ranks} ranks would have no particle, in a grid of "
+            f"{' x '.join(map(str, found.grid))}: take another number (fidelity.ranks)"
+        ]
+    if found.most_over_mean > MOST_OVER_MEAN:
+        return [
+            f"the fullest of {ranks} ranks would have {found.most_over_mean:.2g} times the mean "
+            f"number of particles, more than {MOST_OVER_MEAN:g}: a number with more factors splits "
+            "more evenly (fidelity.ranks)"
+        ]
+    return []

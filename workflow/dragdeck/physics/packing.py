@@ -1,0 +1,128 @@
+"""The particles before they fall: their radii and first positions.
+
+The engine gets every particle by name from a data file instead of inserting them at
+random: exactly the asked number with exactly the asked mean and spread, without
+a chance to fall short, at a cost that grows linearly.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from dragdeck.errors import InputError
+
+Array = NDArray[np.float64]
+
+CUTOFF_STD = 2.5
+"""Radii lie within this many standard deviations of the untruncated normal."""
+
+SPACING = 1.2
+"""Lattice spacing over the largest diameter: room to jitter, and to fall."""
+
+FIRST_SPEED_M_S = 0.3
+"""Standard deviation of each component of the particles' first velocities, m/s; the
+vertical one points down."""
+
+
+@dataclass(frozen=True)
+class Particles:
+    """Particles in the air above the bowl's floor.
+
+    Attributes
+    ----------
+    radii_m : (N,) array
+    positions_m : (N, 3) array
+        Centres; no two particles touch.
+    velocities_m_s : (N, 3) array
+    """
+
+    radii_m: Array
+    positions_m: Array
+    velocities_m_s: Array
+
+    @property
+    def top_m(self) -> float:
+        """Height of the highest point, m."""
+        return float((self.positions_m[:, 2] + self.radii_m).max())
+
+    @property
+    def volume_m3(self) -> float:
+        """Total volume of the particles, m3."""
+        return float((4 / 3 * np.pi * self.radii_m**3).sum())
+
+
+def radii(count: int, mean_m: float, std_m: float) -> Array:
+    """Radii of a truncated normal distribution whose sample mean and spread are exact.
+
+    Quantiles of the normal distribution cut at `CUTOFF_STD`, then centred and
+    scaled: their mean is `mean_m` and their standard deviation (population
+    form) is `std_m`, to rounding.
+
+    Returns
+    -------
+    (count,) array
+        In ascending order, m.
+    """
+    if count == 1 or std_m == 0:
+        return np.full(count, mean_m)
+    tail = stats.norm.cdf(-CUTOFF_STD)
+    levels = tail + (1 - 2 * tail) * (np.arange(count) + 0.5) / count
+    scores = stats.norm.ppf(levels)
+    scores = (scores - scores.mean()) / scores.std()
+    return np.asarray(mean_m + std_m * scores, dtype=np.float64)
+
+
+def pour(particle_radii_m: Array, bowl_radius_m: float, seed: int) -> Particles:
+    """Place particles on a jittered lattice inside a cylinder, in random order.
+
+    Parameters
+    ----------
+    particle_radii_m : (N,) array
+    bowl_radius_m : float
+    seed : int
+        Of the order of the radii, the jitter and the first velocities.
+
+    Raises
+    ------
+    InputError
+        The largest particle does not fit into the bowl.
+    """
+    random = np.random.default_rng(seed)
+    largest = float(particle_radii_m.max())
+    sites = _sites(len(particle_radii_m), bowl_radius_m, largest)
+    jitter = (SPACING - 1) * largest * 0.999
+    velocities = random.normal(0.0, FIRST_SPEED_M_S, sites.shape)
+    velocities[:, 2] = -np.abs(velocities[:, 2])  # none leaves through the top
+    return Particles(
+        radii_m=random.permutation(particle_radii_m),
+        positions_m=sites + random.uniform(-jitter, jitter, sites.shape),
+        velocities_m_s=velocities,
+    )
+
+
+def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Array:
+    """The lowest `count` points of a square lattice in the bowl, (count, 3)."""
+    step = 2 * SPACING * largest_m
+    room = largest_m * (1 + math.sqrt(2) * (SPACING - 1))  # the jitter is along x and along y
+    reach = bowl_radius_m - room
+    if reach < 0:
+        widest = largest_m * bowl_radius_m / room
+        raise InputError(
+            "the largest particle does not fit into the bowl with room to fall",
+            field="media.radius_mean_m",
+            value=f"largest radius {largest_m:.6g} m",
+            limit=f"at most {widest:.6g} m in a bowl of radius {bowl_radius_m:g} m",
+            remedy="use smaller particles or a wider bowl",
+        )
+    line = np.arange(-np.floor(reach / step), np.floor(reach / step) + 1) * step
+    x, y = (grid.ravel() for grid in np.meshgrid(line, line))
+    inside = x**2 + y**2 <= reach**2
+    layer = np.column_stack([x[inside], y[inside]])
+    layers = -(-count // len(layer))
+    heights = np.repeat(SPACING * largest_m + step * np.arange(layers), len(layer))
+    return np.column_stack([np.tile(layer, (layers, 1)), heights])[:count]

@@ -1,0 +1,68 @@
+"""Energies and speeds that no run of a scene can have."""
+
+from __future__ import annotations
+
+import math
+
+from dragdeck.documents import Part
+
+ENERGY_FACTOR = 4.0
+"""How far above the energy that a particle can have at all a run is stopped. An
+assumption: 1 is the physical bound of the mean; the rest is room for a bed
+whose elastic energy is set free and for what a workpiece gives to single particles."""
+
+SPEED_FACTOR = 4.0
+"""How far above the speed of a fall through the box plus the push from outside a
+single particle may be. An assumption: 1 is what one contact can give; a particle that is
+squeezed out between others gets more."""
+
+
+class RunLimits(Part):
+    """What no sample of a run may be beyond, and why.
+
+    Attributes
+    ----------
+    n_particles : int
+        Fewer mean that one was lost.
+    mean_kinetic_energy_j : float
+        Of a particle, spin included.
+    speed_m_s : float
+        Of the fastest particle.
+    """
+
+    n_particles: int
+    mean_kinetic_energy_j: float
+    speed_m_s: float
+    why: str
+
+
+def run_limits(
+    particles: int, mass_kg: float, gravity_m_s2: float, height_m: float, speed_m_s: float
+) -> RunLimits:
+    """The limits of a run.
+
+    No particle of a bed can gain more than by a free fall through the whole box,
+    ``m g H``, on top of the largest speed v that something in the scene has from
+    outside, ``m v^2 / 2``: contacts only take energy away.
+
+    Parameters
+    ----------
+    particles : int
+        How many there are.
+    mass_kg : float
+        Mass of the mean particle.
+    gravity_m_s2 : float
+    height_m : float
+        Height H of the simulation box.
+    speed_m_s : float
+        Largest speed v that comes from outside: the first speed of a particle, or
+        that of the workpiece.
+    """
+    available = mass_kg * (gravity_m_s2 * height_m + 0.5 * speed_m_s**2)
+    return RunLimits(
+        n_particles=particles,
+        mean_kinetic_energy_j=ENERGY_FACTOR * available,
+        speed_m_s=SPEED_FACTOR * math.sqrt(2 * available / mass_kg),
+        why=f"{ENERGY_FACTOR:g} times m (g H + v^2 / 2): a fall of {height_m:.3g} m "
+        f"and a speed of {speed_m_s:.3g} m/s",
+    )

@@ -1,0 +1,356 @@
+"""The fill: the particles fall into the bowl and come to rest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from dragdeck.cases.bed import (
+    bed_radii,
+    bed_rayleigh_time,
+    particle_material,
+    skin,
+    smallest_radius,
+)
+from dragdeck.cases.case import Case, materials_content
+from dragdeck.decks import outputs
+from dragdeck.decks.case_file import FillingCase, SettlingCriterion
+from dragdeck.decks.data_file import Body, data_file
+from dragdeck.decks.deck import Deck, LeftOut, Scene
+from dragdeck.errors import InputError
+from dragdeck.physics.contact_mechanics import (
+    DENSEST_RANDOM_PACKING,
+    SOLID_FRACTION_ESTIMATE,
+    bed_height,
+    bed_overlap,
+    bed_pressure,
+    effective_modulus,
+    fall_speed,
+    particle_mass,
+)
+from dragdeck.physics.domain_split import FilledBowl, Split, split
+from dragdeck.physics.domain_split import warnings as rank_warnings
+from dragdeck.physics.packing import FIRST_SPEED_M_S, Particles, pour
+from dragdeck.physics.rounding import timestep
+from dragdeck.physics.run_limits import RunLimits, run_limits
+from dragdeck.physics.similarity import rounded
+from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
+from dragdeck.study.base import Json
+from dragdeck.study.model import Study
+
+CHECK_INTERVAL_S = 0.02
+"""Time between two looks at the kinetic energy, about the fall over one particle."""
+
+MOST_OVERLAP = 0.01
+"""Overlap over the diameter, by the weight of the bed, above which a warning is given: an
+assumption; forces on the workpiece are several times those of the weight."""
+
+SETTLING_ESTIMATE_S = 0.5
+"""Time from the last particle's arrival to rest, an estimate used for expectations only."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FillingDeck(Deck):
+    """What the fill template sees."""
+
+    bowl_type: int
+    bowl_radius_m: float
+    energy_ratio: float
+    energy_unit_j: float
+    check_steps: int
+    most_checks: int
+    max_time_s: float
+
+
+def filling_scene(case: Case) -> Scene[FillingCase]:
+    """The fill of a case.
+
+    Raises
+    ------
+    InputError
+        More particles than the bowl holds; a particle wider than the bowl; a modulus
+        that the engine refuses.
+    """
+    study = case.study
+    check_capacity(case)
+    fidelity = study.chosen_fidelity()
+    rayleigh = bed_rayleigh_time(study)
+    dt = timestep(rayleigh, fidelity.filling_timestep_fraction)
+    check_steps = max(1, math.ceil(CHECK_INTERVAL_S / dt))
+    particles = first_particles(study)
+    top = box_top(study, particles)
+    longest = study.filling.max_time_s
+    types = _filling_types(study)
+    parts = rank_split(case, top)
+    deck = FillingDeck(
+        title=f"Fill: {study.title}",
+        study=case.study_name,
+        scene="filling",
+        run=FILLING.run_id(case),
+        source="particles.data",
+        materials=material_table(study, types, fidelity.youngs_modulus_scale, case),
+        limit_force=study.contact.limit_force,
+        gravity_m_s2=study.gravity_m_s2,
+        skin_m=skin(study),
+        timestep_s=dt,
+        outputs=(outputs.thermo(check_steps, None), outputs.settled_particles()),
+        thermo_steps=check_steps,
+        checkpoint_steps=5 * check_steps,
+        processors=parts.line,
+        bowl_type=types.index(study.bowl.material) + 1,
+        bowl_radius_m=study.bowl.radius_m,
+        energy_ratio=study.filling.energy_ratio,
+        energy_unit_j=_energy_unit(study),
+        check_steps=check_steps,
+        most_checks=math.ceil(longest / (check_steps * dt)),
+        max_time_s=longest,
+    )
+    return Scene(
+        deck=deck,
+        case=case_of_study(
+            FillingCase,
+            case,
+            FILLING.run_id(case),
+            filling_content(case),
+            dt,
+            rayleigh,
+            settled=SettlingCriterion(energy_ratio=study.filling.energy_ratio),
+            limits=bed_limits(
+                study, top, float(np.linalg.norm(particles.velocities_m_s, axis=1).max())
+            ),
+        ),
+        steps=round(_expected_time(study, particles) / dt),
+        files={"particles.data": _particles_data(particles, study, top, len(types))},
+        models={
+            "every particle by name": "exactly the asked number, mean and spread of radii",
+            "rest by a criterion": f"kinetic energy below {study.filling.energy_ratio:g} m "
+            f"g d a particle",
+            "a step of its own": "particles in flight collide faster than a bed at rest",
+        },
+        leaves_out={
+            "the workpiece": LeftOut("it comes later; cases that differ in it share this fill"),
+            "contact output": LeftOut("nobody reads contacts before the drag", "filling_contacts"),
+            "facets of the bowl": LeftOut(
+                "particles fall the same onto an exact plane and cylinder"
+            ),
+        },
+        warnings=[
+            *rank_warnings(parts),
+            *overlap_warnings(study),
+            *_skin_warnings(study, particles, dt),
+        ],
+    )
+
+
+def _filling_types(study: Study) -> list[str]:
+    """A material for each engine type; a type the fill has no use for repeats the bowl's."""
+    particle, bowl = study.media.material, study.bowl.material
+    used = list(dict.fromkeys((particle, bowl)))
+    return used + [bowl] * (len(study.type_names()) - len(used))
+
+
+def first_particles(study: Study) -> Particles:
+    """The particles of a study before they fall."""
+    return pour(bed_radii(study), study.bowl.radius_m, study.seed)
+
+
+def check_capacity(case: Case) -> None:
+    """Refuse more particles than the bowl can hold.
+
+    Raises
+    ------
+    InputError
+        Even the densest random packing would stand above the rim.
+    """
+    study = case.study
+    media, bowl = study.media, study.bowl
+    height = _height(study, DENSEST_RANDOM_PACKING)
+    if height > bowl.height_m:
+        most = math.floor(media.count * bowl.height_m / height)
+        raise InputError(
+            "more particles than the bowl holds",
+            file=case.file,
+            field="media.count",
+            value=f"{media.count}, which stand at least {height:.4g} m high",
+            limit=f"{most} particles in a bowl {bowl.height_m:g} m high, at a solid fraction of "
+            f"{DENSEST_RANDOM_PACKING} (random close packing)",
+            remedy="take fewer particles, or a wider or higher bowl",
+        )
+
+
+def expected_surface(study: Study) -> float:
+    """Height of the settled bed before it exists, m: an estimate."""
+    return _height(study, SOLID_FRACTION_ESTIMATE)
+
+
+def _height(study: Study, solid_fraction: float) -> float:
+    """Height of the study's particles in its bowl at a solid fraction, m."""
+    volume = float((4 / 3 * np.pi * bed_radii(study) ** 3).sum())
+    return bed_height(volume, study.bowl.radius_m, solid_fraction)
+
+
+def box_top(study: Study, particles: Particles) -> float:
+    """Top of the simulation box, m.
+
+    Room for the falling particles, and for a workpiece above the bed.
+
+    It must not depend on the workpiece: cases with other workpieces share this fill, and
+    their runs inherit the box from its restart file.
+    """
+    diameter = 2 * study.media.radius_mean_m
+    above_bed = 2 * expected_surface(study) + 8 * diameter
+    return math.ceil(100 * max(particles.top_m, above_bed, 2 * study.bowl.height_m) + 5) / 100
+
+
+def rank_split(case: Case, top_m: float) -> Split:
+    """How the box of a case is split among its ranks.
+
+    Parameters
+    ----------
+    case : Case
+    top_m : float
+        Top of the box.
+    """
+    study = case.study
+    filled = FilledBowl(
+        particles=study.media.count,
+        radius_m=study.bowl.radius_m,
+        height_m=expected_surface(study),
+        half_width_m=_half_width(study),
+        bottom_m=-study.media.radius_mean_m,
+        top_m=top_m,
+        reach_m=2 * float(bed_radii(study).max()) + skin(study),
+    )
+    return split(case.ranks, filled)
+
+
+def floor_overlap(study: Study) -> float:
+    """Overlap of two particles at the floor under the bed's weight, over the diameter.
+
+    An estimate.
+    """
+    particle, scale = particle_material(study), study.chosen_fidelity().youngs_modulus_scale
+    pressure = bed_pressure(particle.density_kg_m3, study.gravity_m_s2, expected_surface(study))
+    return bed_overlap(effective_modulus(particle, particle, scale), pressure)
+
+
+def overlap_warnings(study: Study) -> list[str]:
+    """A warning where particles are too soft for the bed above them."""
+    overlap = floor_overlap(study)
+    if overlap <= MOST_OVERLAP:
+        return []
+    scale = study.chosen_fidelity().youngs_modulus_scale
+    stiffer = rounded(scale * (overlap / MOST_OVERLAP) ** 1.5, up=True)
+    return [
+        f"the weight of the bed presses particles at the floor {100 * overlap:.2g} % of a diameter "
+        f"into each other, more than {100 * MOST_OVERLAP:g} %: the bed is denser than a real one; "
+        f"take a fidelity.youngs_modulus_scale of at least {stiffer:g}"
+    ]
+
+
+def _skin_warnings(study: Study, particles: Particles, timestep_s: float) -> list[str]:
+    """A warning where a falling particle outruns the neighbour lists, which fails the run."""
+    speed = FIRST_SPEED_M_S + fall_speed(_free_fall(study, particles), study.gravity_m_s2)
+    least = rounded(2 * speed * timestep_s, up=True)
+    if skin(study) >= least:
+        return []
+    return [
+        f"particles fall at up to {speed:.2g} m/s, more than half the neighbour skin of "
+        f"{skin(study):.2g} m in a step: the run would fail for dangerous neighbour builds; take "
+        f"a fidelity.skin_m of at least {least:g}, or a smaller fidelity.filling_timestep_fraction"
+    ]
+
+
+def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:
+    """Limits of a run with the whole bed in a box of that height."""
+    mass = particle_mass(particle_material(study), study.media.radius_mean_m)
+    return run_limits(study.media.count, mass, study.gravity_m_s2, top_m, speed_m_s)
+
+
+def _energy_unit(study: Study) -> float:
+    """Number of particles times m g d of the mean particle, J."""
+    media = study.media
+    mass = particle_mass(particle_material(study), media.radius_mean_m)
+    return media.count * mass * study.gravity_m_s2 * 2 * media.radius_mean_m
+
+
+def _expected_time(study: Study, particles: Particles) -> float:
+    fall = fall_speed(_free_fall(study, particles), study.gravity_m_s2) / study.gravity_m_s2
+    return fall + SETTLING_ESTIMATE_S
+
+
+def _free_fall(study: Study, particles: Particles) -> float:
+    """Height that the highest particle falls to the bed, m."""
+    return max(particles.top_m - expected_surface(study), 0.0)
+
+
+def _half_width(study: Study) -> float:
+    """Half of the box's width, m."""
+    return study.bowl.radius_m + 2 * study.media.radius_mean_m
+
+
+def _particles_data(particles: Particles, study: Study, top_m: float, types: int) -> str:
+    side = _half_width(study)
+    box = ((-side, side), (-side, side), (-study.media.radius_mean_m, top_m))
+    density = particle_material(study).density_kg_m3
+    columns = (particles.radii_m, particles.positions_m, particles.velocities_m_s)
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    bodies = [Body(1, radius, density, place, velocity) for radius, place, velocity in rows]
+    return data_file("particles before they fall", types, box, bodies)
+
+
+def filling_content(case: Case) -> Json:
+    """What a filling depends on: less than a process, so that many share one."""
+    study = case.study
+    particle, bowl = study.media.material, study.bowl.material
+    fidelity, outer = study.chosen_fidelity().plain(), study.bowl.plain()
+    settings = ("youngs_modulus_scale", "filling_timestep_fraction", "skin_m", "ranks")
+    return {
+        "materials": materials_content(study, particle, bowl),
+        "pairs": [study.pair(particle, other).plain() for other in (particle, bowl)],
+        "types": len(study.type_names()),
+        "media": study.media.plain(),
+        "bowl": {name: value for name, value in outer.items() if name != "facet_size_m"},
+        "gravity_m_s2": study.gravity_m_s2,
+        "contact": study.contact.plain(),
+        "filling": study.filling.plain(),
+        "seed": study.seed,
+        "fidelity": {name: fidelity[name] for name in settings if name in fidelity},
+    }
+
+
+def _impact_speed(case: Case) -> float:
+    """Speed of the highest particle that is thrown down and falls to the floor, m/s."""
+    particles = first_particles(case.study)
+    first = float((particles.velocities_m_s**2).sum(axis=1).max())
+    return math.sqrt(first + fall_speed(particles.top_m, case.study.gravity_m_s2) ** 2)
+
+
+def partners_in_bed(case: Case) -> list[tuple[str, str, float]]:
+    """What a particle of a bed meets."""
+    study = case.study
+    return [
+        ("particle", study.media.material, smallest_radius(study)),
+        ("bowl", study.bowl.material, study.bowl.radius_m),
+    ]
+
+
+def _build(case: Case, bed: Bed | None) -> Scene[FillingCase]:
+    return filling_scene(case)
+
+
+FILLING = SceneType(
+    name="filling",
+    slug=lambda case: f"{case.study.media.count}-particles",
+    content=filling_content,
+    build=_build,
+    inputs=("particles.data",),
+    tables=("packing.json", "thermo.parquet"),
+    figures=("filling",),
+    regime="settle",
+    impact_speed=_impact_speed,
+    partners=partners_in_bed,
+    particle_steps_per_s=9e6,
+)

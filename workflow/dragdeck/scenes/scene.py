@@ -1,0 +1,274 @@
+"""What a scene is to the rest of the project, and what all scenes share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from dragdeck import __version__
+from dragdeck.cases.bed import particle_material, skin
+from dragdeck.cases.case import Case, digest, slug
+from dragdeck.decks.case_file import (
+    AssumptionOfRun,
+    BowlOfRun,
+    CaseOfStudy,
+    ContactModuli,
+    FidelityOfRun,
+    MediaOfRun,
+)
+from dragdeck.decks.deck import Materials, StudyScene, contact_law
+from dragdeck.documents import Document
+from dragdeck.errors import InputError
+from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear
+from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
+from dragdeck.physics.rounding import round_to
+from dragdeck.study.base import Json
+from dragdeck.study.model import Study
+
+C = TypeVar("C", bound=CaseOfStudy)
+
+
+@dataclass(frozen=True)
+class Bed:
+    """A settled bed.
+
+    Attributes
+    ----------
+    surface_m : float
+        Its mean height above the floor.
+    top_m : float
+        The highest point of any particle.
+    """
+
+    surface_m: float
+    top_m: float
+
+
+class PackingFile(Document):
+    """What is read of a filling's ``packing.json``."""
+
+    remedy = "make it with: dragchain tables FILLING_DIR"
+
+    bed_height_m: float
+    top_m: float
+
+
+def read_bed(file: Path) -> Bed:
+    """The settled bed that a ``packing.json`` describes.
+
+    Raises
+    ------
+    InputError
+        The file is missing or another version's.
+    """
+    packing = PackingFile.read(file)
+    return Bed(packing.bed_height_m, packing.top_m)
+
+
+@dataclass(frozen=True)
+class SceneType:
+    """What one engine run models: all that the rest of the project asks of it.
+
+    Attributes
+    ----------
+    name : str
+        Of the scene, its template and its folder of results.
+    slug : callable
+        The readable start of a case's run id.
+    content : callable
+        The plain values that a case's run depends on, and nothing more: they name it.
+    build : callable
+        The scene of a case; the settled bed matters to those that start from one.
+    inputs : tuple of str
+        Files of a run's folder beside deck, case.json and columns.json.
+    tables, network, loading, figures : tuple of str
+        Files that dragchain makes of a run: tables of its raw output, of the contact network
+        and its chains, of the loading of the workpiece, and figures.
+    needs_bed : bool
+        Whether it starts from the bed of a filling.
+    single_particle : bool
+        Whether it is a single particle at full modulus and not a bed.
+    regime : str
+        Of the stability map, whose limits apply here.
+    impact_speed : callable
+        Largest speed that an impact is expected to have, m/s.
+    partners : callable
+        What a particle meets: name, material and radius, m, of each body.
+    particle_steps_per_s : float
+        Particles times steps per second to expect where no run was measured.
+    """
+
+    name: str
+    slug: Callable[[Case], str]
+    content: Callable[[Case], Json]
+    build: Callable[[Case, Bed | None], StudyScene]
+    inputs: tuple[str, ...]
+    tables: tuple[str, ...]
+    figures: tuple[str, ...]
+    regime: str
+    impact_speed: Callable[[Case], float]
+    partners: Callable[[Case], Sequence[tuple[str, str, float]]]
+    particle_steps_per_s: float
+    needs_bed: bool = False
+    single_particle: bool = False
+    network: tuple[str, ...] = ()
+    loading: tuple[str, ...] = ()
+
+    def run_id(self, case: Case) -> str:
+        """Run id of a case: a readable slug and 8 hex digits of what the run depends on."""
+        return f"{slug(self.slug(case))}-{digest(self.content(case))}"
+
+    def digest(self, case: Case) -> str:
+        """Hash of all that the run's files say, remarks included.
+
+        Two cases that share a run have the same digest, and an edit of the study that does not
+        concern the scene does not change it.
+        """
+        remarks = case.study.model_dump(mode="json", include={"title", "assumptions", "reference"})
+        asked = case.advised.model_dump(mode="json") if case.advised and self.needs_bed else None
+        return digest({"study": remarks, "content": dict(self.content(case)), "asked": asked})
+
+
+def case_of_study(
+    kind: type[C],
+    of: Case,
+    run: str,
+    inputs: Json,
+    timestep_s: float,
+    rayleigh_time_s: float,
+    *,
+    ranks: int | None = None,
+    **own: Any,
+) -> C:
+    """The content of ``case.json`` of a run of a study's case.
+
+    Parameters
+    ----------
+    kind : type
+        The model of the scene's case file.
+    of : Case
+    run : str
+        The run id.
+    inputs : mapping
+        What the run depends on.
+    timestep_s, rayleigh_time_s : float
+    ranks : int, optional
+        MPI ranks; the case's if None.
+    **own
+        What this scene's case file has beyond the others', or has otherwise.
+    """
+    study = of.study
+    fidelity = study.chosen_fidelity().model_dump()
+    entries = {
+        "study": of.study_name,
+        "title": study.title,
+        "run": run,
+        "timestep_s": timestep_s,
+        "rayleigh_time_s": rayleigh_time_s,
+        "gravity_m_s2": study.gravity_m_s2,
+        "fidelity": FidelityOfRun(
+            name=of.fidelity_name, **{**fidelity, "skin_m": skin(study), "ranks": ranks or of.ranks}
+        ),
+        "inputs": flat(inputs),
+        "media": MediaOfRun(
+            count=study.media.count,
+            radius_mean_m=study.media.radius_mean_m,
+            radius_std_m=study.media.radius_std_m,
+            density_kg_m3=particle_material(study).density_kg_m3,
+        ),
+        "bowl": BowlOfRun(
+            radius_m=study.bowl.radius_m,
+            walls="primitive" if study.bowl.facet_size_m is None else "mesh",
+        ),
+        "contact_moduli": _contact_moduli(study),
+        "assumptions": _assumptions(study),
+        "reference": study.reference,
+        "versions": {"dragdeck": __version__},
+    }
+    return kind(**{**entries, **own})
+
+
+def _contact_moduli(study: Study) -> dict[str, ContactModuli]:
+    scale, particle = study.chosen_fidelity().youngs_modulus_scale, particle_material(study)
+    others = {
+        "particle": study.media.material,
+        "bowl": study.bowl.material,
+        "workpiece": study.workpiece.material,
+    }
+    return {
+        name: ContactModuli(
+            modulus_pa=effective_modulus(particle, study.materials[other], scale),
+            shear_pa=effective_shear(particle, study.materials[other], scale),
+        )
+        for name, other in others.items()
+    }
+
+
+def _assumptions(study: Study) -> list[AssumptionOfRun]:
+    values = flat(study.plain())
+    return [
+        AssumptionOfRun(field=entry.field, value=values.get(entry.field), why=entry.why)
+        for entry in study.assumptions
+    ]
+
+
+def flat(data: Json, prefix: str = "") -> Json:
+    """Nested mappings as one mapping of dotted names."""
+    values: dict[str, Any] = {}
+    for key, value in data.items():
+        if isinstance(value, dict):
+            values.update(flat(value, f"{prefix}{key}."))
+        else:
+            values[f"{prefix}{key}"] = value
+    return values
+
+
+def material_table(study: Study, names: Sequence[str], scale: float, case: Case) -> Materials:
+    """The constants of the given materials, and their contact law.
+
+    Parameters
+    ----------
+    study : Study
+    names : sequence of str
+        The material of each type, the particles first.
+    scale : float
+        Factor on every Young's modulus.
+    case : Case
+        For the error message.
+
+    Raises
+    ------
+    InputError
+        A scaled modulus is softer than LIGGGHTS takes.
+    """
+    materials = [study.materials[name] for name in names]
+    moduli = [round_to(scale * material.youngs_modulus_pa, 12) for material in materials]
+    for name, modulus in zip(names, moduli, strict=True):
+        _check_modulus(name, modulus, scale, case)
+    size = range(len(names))
+    with_particle = [study.pair(names[0], name) for name in names]
+    # pairs without a particle never touch: they repeat one with a particle
+    tables, model = contact_law([[with_particle[max(i, j)] for j in size] for i in size])
+    return Materials(
+        names=names,
+        youngs_moduli_pa=moduli,
+        poissons_ratios=[material.poissons_ratio for material in materials],
+        pair_tables=tables,
+        contact_model=model,
+    )
+
+
+def _check_modulus(name: str, modulus_pa: float, scale: float, case: Case) -> None:
+    if modulus_pa >= ENGINE_SOFTEST_PA:
+        return
+    least = ENGINE_SOFTEST_PA / case.study.materials[name].youngs_modulus_pa
+    raise InputError(
+        "LIGGGHTS refuses so soft a material",
+        file=case.file,
+        field="fidelity.youngs_modulus_scale",
+        value=f"{scale:g}, which makes {name} {modulus_pa:.3g} Pa",
+        limit=f"at least {ENGINE_SOFTEST_PA:.0e} Pa, a scale of {least:.3g} for {name}",
+        remedy="choose a larger scale",
+    )

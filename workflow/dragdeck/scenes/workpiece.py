@@ -1,0 +1,56 @@
+"""The workpiece of a case, generated or from the user's mesh."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from dragdeck.cases.case import Case, mesh_file
+from dragdeck.mesh import Mesh, Surroundings, check, cylinder, envelope, place, read
+from dragdeck.physics.rounding import round_to
+from dragdeck.study.model import CylinderShape, MeshShape
+
+FREEBOARD_DIAMETERS = 4
+"""A generated workpiece stands this many particle diameters out of the bed."""
+
+
+def workpiece_mesh(case: Case) -> Mesh:
+    """The workpiece with its tip's centre in the origin.
+
+    Raises
+    ------
+    InputError
+        The mesh file is missing or cannot be used.
+    """
+    shape = case.study.workpiece.shape
+    if isinstance(shape, CylinderShape):
+        return _workpiece(shape, workpiece_length(case))
+    media = case.study.media
+    surroundings = Surroundings(case.study.bowl.radius_m, media.radius_mean_m)
+    return _from_file(mesh_file(case, shape), shape.unit, surroundings)
+
+
+def workpiece_length(case: Case) -> float:
+    """Length of the workpiece along its axis, m."""
+    study = case.study
+    if isinstance(study.workpiece.shape, MeshShape):
+        return envelope(workpiece_mesh(case)).length_m
+    freeboard = FREEBOARD_DIAMETERS * 2 * study.media.radius_mean_m
+    return round_to(study.motion.immersion_depth_m + freeboard, 6)
+
+
+def workpiece_radius(case: Case) -> float:
+    """Radius of the upright cylinder around the workpiece, m."""
+    return envelope(workpiece_mesh(case)).radius_m
+
+
+@lru_cache(maxsize=8)
+def _workpiece(shape: CylinderShape, length_m: float) -> Mesh:
+    return cylinder(shape.radius_m, length_m, shape.facet_size_m, shape.facet_length_m)
+
+
+@lru_cache(maxsize=8)
+def _from_file(file: Path, unit: str, surroundings: Surroundings) -> Mesh:
+    mesh = read(file, unit)
+    check(mesh, file=file, field="workpiece.shape", surroundings=surroundings)
+    return place(mesh)

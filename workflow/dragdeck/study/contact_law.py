@@ -1,0 +1,150 @@
+"""The contact law: one row for each coefficient of a pair of materials.
+
+A coefficient is a field of `Pair` with a `Coefficient` in its annotation. Everything else that
+deals with coefficients is made from these rows: the study's fields with their limits, LIGGGHTS's
+properties and model keywords for particles and walls alike, run ids, what `explain` says, the
+numbers that scenes are compared by, and the range of the advisor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from dragdeck.study.base import Model, Number
+
+BASE_MODEL = "hertz tangential history"
+"""Hertz-Mindlin with the history of the tangential spring (LIGGGHTS: ``pair gran``)."""
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A coefficient of a pair, as LIGGGHTS and its readers know it.
+
+    Attributes
+    ----------
+    engine : str
+        LIGGGHTS's property, one number per pair of types.
+    words : str
+        What it is called in a sentence.
+    model : str
+        Keywords that the contact model needs for it; none where it always counts.
+    compared : {"each", "lowest"}
+        Which value of a scene must lie within the measured range: that of each of the pairs
+        particle-particle and particle-workpiece, or the lowest of all pairs.
+    """
+
+    engine: str
+    words: str
+    model: str = ""
+    compared: Literal["each", "lowest"] = "each"
+
+
+class Pair(Model):
+    """What two materials do to each other.
+
+    A coefficient with a default is absent at its default: it is then no part of the contact
+    model, of the input script, or of a run's name.
+    """
+
+    restitution: Annotated[
+        Number,
+        Field(gt=0.05, le=1, description="coefficient of normal restitution; LIGGGHTS takes "
+              "(0.05, 1]"),
+        Coefficient("coefficientRestitution", "restitution", compared="lowest"),
+    ]  # fmt: skip
+    friction: Annotated[
+        Number,
+        Field(ge=0, le=10, description="Coulomb friction coefficient, dimensionless"),
+        Coefficient("coefficientFriction", "friction"),
+    ]
+
+    def absent(self) -> set[str]:
+        """Coefficients at their default."""
+        return {
+            name
+            for name, field in type(self).model_fields.items()
+            if not field.is_required() and getattr(self, name) == field.default
+        }
+
+
+class Contact(Model):
+    """Options of the contact law."""
+
+    limit_force: bool = Field(
+        default=True,
+        description="no attraction at the end of an impact (dry particles do not stick)",
+    )
+
+
+@cache
+def coefficients() -> Mapping[str, Coefficient]:
+    """Every coefficient by the name of its field."""
+    return {
+        name: next(item for item in field.metadata if isinstance(item, Coefficient))
+        for name, field in Pair.model_fields.items()
+    }
+
+
+def present(pairs: Iterable[Pair]) -> Mapping[str, Coefficient]:
+    """The coefficients that some pair has."""
+    every = list(pairs)
+    absent = set.intersection(*(pair.absent() for pair in every))
+    return {name: row for name, row in coefficients().items() if name not in absent}
+
+
+def contact_model(pairs: Iterable[Pair]) -> str:
+    """LIGGGHTS's contact model with what these pairs need."""
+    return " ".join([BASE_MODEL, *(row.model for row in present(pairs).values() if row.model)])
+
+
+def explained(pairs: Iterable[Pair]) -> tuple[list[str], list[str]]:
+    """Words for the optional coefficients that a scene models, and for those it leaves out."""
+    there = present(pairs)
+    optional = {name: row for name, row in coefficients().items() if row.model}
+    return (
+        [row.words for name, row in optional.items() if name in there],
+        [row.words for name, row in optional.items() if name not in there],
+    )
+
+
+def compared_numbers(particle: Pair, workpiece: Pair, pairs: Iterable[Pair]) -> dict[str, float]:
+    """The coefficients by which scenes are compared.
+
+    Parameters
+    ----------
+    particle, workpiece : Pair
+        Of a particle with a particle and with the workpiece.
+    pairs : iterable of Pair
+        All pairs of the scene.
+
+    Returns
+    -------
+    dict
+        ``particle_<name>`` and ``workpiece_<name>``, or ``lowest_<name>``.
+    """
+    every = list(pairs)
+    numbers: dict[str, float] = {}
+    for name, row in present(every).items():
+        if row.compared == "lowest":
+            numbers[f"lowest_{name}"] = min(getattr(pair, name) for pair in every)
+        else:
+            numbers[f"particle_{name}"] = getattr(particle, name)
+            numbers[f"workpiece_{name}"] = getattr(workpiece, name)
+    return numbers
+
+
+def compared_labels() -> dict[str, str]:
+    """Words for every number of `compared_numbers`."""
+    labels: dict[str, str] = {}
+    for name, row in coefficients().items():
+        if row.compared == "lowest":
+            labels[f"lowest_{name}"] = f"lowest {row.words}"
+        else:
+            labels[f"particle_{name}"] = f"{row.words} of particle on particle"
+            labels[f"workpiece_{name}"] = f"{row.words} of particle on workpiece"
+    return labels

@@ -1,0 +1,120 @@
+"""The fields of a study file as a page, made from the model itself."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
+
+_INTRODUCTION = """# The study file
+
+`studies/<name>/study.yaml` is YAML. All values are SI; numbers may be written
+`5e6`. A key that is not listed here is refused. `*` stands for a name of yours.
+A dotted name, such as `motion.speed_m_s`, is how errors, `sweep` and
+`assumptions` name a field.
+
+This page is made from the model: `./run dragdeck step fields > docs/study.md`.
+"""
+
+
+def page() -> str:
+    """Return the page as Markdown."""
+    lines = [_INTRODUCTION, "| field | limits | default | meaning |", "| --- | --- | --- | --- |"]
+    for name, limits, default, meaning in _rows(Study, ""):
+        lines.append(f"| `{name}` | {limits} | {default} | {meaning} |")
+    lines += ["", "## Built-in fidelities", "", _fidelities(), ""]
+    return "\n".join(lines)
+
+
+def _rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, str]]:
+    """Name, limits, default and meaning of every field, depth first."""
+    for name, field in model.model_fields.items():
+        path = f"{prefix}{name}"
+        inner = list(_models(field.annotation))
+        if not inner or _also_plain(field.annotation):
+            yield path, _limits(field), _default(field), field.description or ""
+        for part, many in inner:
+            kind = f"[{_kind(part)}]" if len(inner) > 1 else ""
+            yield from _rows(part, f"{path}{kind}.{'*.' if many else ''}")
+
+
+def _also_plain(annotation: Any) -> bool:
+    """Whether a plain value may stand where a model may."""
+    return any(get_args(part)[:1] == (str,) for part in get_args(annotation))
+
+
+def _kind(model: type[BaseModel]) -> str:
+    """Return the word by which a model is told from its alternatives."""
+    if model is Fidelity:
+        return "settings"
+    kind = model.model_fields.get("kind")
+    return str(get_args(kind.annotation)[0]) if kind else model.__name__.lower()
+
+
+def _models(annotation: Any, many: bool = False) -> Iterator[tuple[type[BaseModel], bool]]:
+    """The models within a type, and whether there can be several of each."""
+    origin = get_origin(annotation)
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation, many
+    elif origin in (Union, types.UnionType):
+        for part in get_args(annotation):
+            yield from _models(part, many)
+    elif origin is Annotated:
+        yield from _models(get_args(annotation)[0], many)
+    elif origin in (list, dict):
+        yield from _models(get_args(annotation)[-1], True)
+
+
+_SIGNS = {Gt: ("above", "gt"), Ge: ("at least", "ge"), Lt: ("below", "lt"), Le: ("at most", "le")}
+
+
+def _limits(field: FieldInfo) -> str:
+    if get_origin(field.annotation) is Literal:
+        return " or ".join(repr(value) for value in get_args(field.annotation))
+    parts = get_args(field.annotation) if _is_union(field.annotation) else ()
+    if parts and all(get_origin(part) is Annotated for part in parts):
+        return " or ".join(filter(None, map(_limits_of_part, parts)))
+    bounds = [(_SIGNS[type(item)], item) for item in field.metadata if type(item) in _SIGNS]
+    return ", ".join(f"{words} {getattr(item, name):g}" for (words, name), item in bounds)
+
+
+def _is_union(annotation: Any) -> bool:
+    return get_origin(annotation) in (Union, types.UnionType)
+
+
+def _limits_of_part(part: Any) -> str:
+    """Limits of one of several plain forms of a value; of a model they stand with its fields."""
+    annotation, *metadata = get_args(part)
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return ""
+    return _limits(FieldInfo.from_annotation(Annotated[annotation, *metadata]))  # type: ignore[arg-type]
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    if field.default is PydanticUndefined or field.default is None:
+        return "none"
+    return f"{field.default!r}"
+
+
+def _fidelities() -> str:
+    names = list(Fidelity.model_fields)
+    lines = ["| name | " + " | ".join(names) + " |", "| --- " * (len(names) + 1) + "|"]
+    for name, fidelity in BUILT_IN_FIDELITIES.items():
+        values = [getattr(fidelity, field) for field in names]
+        shown = ["none" if value is None else f"{value:g}" for value in values]
+        lines.append(f"| `{name}` | " + " | ".join(shown) + " |")
+    return "\n".join(lines)
+
+
+def show() -> None:
+    """Print the page."""
+    print(page(), end="")

@@ -1,0 +1,1 @@
+"""The cases of a study: sweeps and plans."""

@@ -1,0 +1,206 @@
+"""The cases of a study file: one per combination of its sweep."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from dragdeck.cases.case import Case
+from dragdeck.errors import InputError
+from dragdeck.study.model import STUDY_FILE, Scaling, Tolerance
+from dragdeck.study.yaml import read_yaml, validate
+
+
+def load_cases(file: Path, fidelity: str | None = None) -> list[Case]:
+    """All cases of a study file.
+
+    Parameters
+    ----------
+    file : Path
+        The study file.
+    fidelity : str, optional
+        Instead of the study's own.
+
+    Raises
+    ------
+    InputError
+        The file cannot be used; the message names field, value and limit.
+    """
+    data = read_yaml(file)
+    if fidelity is not None:
+        data["fidelity"] = fidelity
+    validate({**data, "sweep": {}}, file)
+    study = validate(data, file)
+    sweep = study.sweep
+    if study.scaling is not None:
+        _check_scaling(study.scaling, sweep, file)
+    plain = {**data, "sweep": {}}
+    return beside_each_other(
+        [settle_case(file, plain, settings) for settings in _combinations(sweep, file)]
+    )
+
+
+def beside_each_other(cases: Iterable[Case]) -> list[Case]:
+    """The same cases, each knowing how many there are."""
+    known = list(cases)
+    return [replace(case, beside=len(known)) for case in known]
+
+
+LEAST_LEVELS = 3
+"""Levels that a power law is fitted to: two would fit any."""
+
+
+def _check_scaling(scaling: Scaling, sweep: Mapping[str, list[Any]], file: Path) -> None:
+    """Refuse a scaling that the sweep cannot tell.
+
+    Raises
+    ------
+    InputError
+        Its field is not in the sweep, is not alone there but for the seed, or has
+        a level that is no number above zero; or too few levels are within its range.
+    """
+    field = scaling.field
+    if field not in sweep:
+        raise InputError(
+            "not a field of sweep",
+            file=file,
+            field="scaling.field",
+            value=field,
+            limit=f"one of: {', '.join(name for name in sweep if name != 'seed') or 'none here'}",
+            remedy="add its levels to sweep, or name a field that is there",
+        )
+    others = [name for name in sweep if name not in (field, "seed")]
+    if others:
+        raise InputError(
+            "another field varies too, so that the drag is no function of one",
+            file=file,
+            field="sweep",
+            value=", ".join(others),
+            limit=f"{field} and seed",
+            remedy="give each field a study of its own, or leave out scaling",
+        )
+    levels = [_level(value, field, file) for value in sweep[field]]
+    low, high = scaling.fit_range or (min(levels), max(levels))
+    if sum(low <= level <= high for level in levels) < LEAST_LEVELS:
+        raise InputError(
+            f"too few levels from {low:g} to {high:g} for a power law",
+            file=file,
+            field=f"sweep.{field}",
+            value=sweep[field],
+            limit=f"{LEAST_LEVELS} levels or more",
+            remedy="add levels" + (", or widen scaling.fit_range" if scaling.fit_range else ""),
+        )
+
+
+def _level(value: Any, field: str, file: Path) -> float:
+    """A level of a scaling as a number."""
+    try:
+        level = math.nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError):
+        level = math.nan
+    if not (math.isfinite(level) and level > 0):
+        raise InputError(
+            "a power law needs numbers above 0",
+            file=file,
+            field=f"sweep.{field}",
+            value=value,
+            remedy="remove this level, or leave out scaling",
+        )
+    return level
+
+
+def settle_case(
+    file: Path,
+    data: Mapping[str, Any],
+    values: Mapping[str, Any],
+    shown: Mapping[str, Any] | None = None,
+    named_in: Path | None = None,
+) -> Case:
+    """A case from a study's plain data with some of its values replaced.
+
+    Parameters
+    ----------
+    file : Path
+        The study file.
+    data : mapping
+        Its content.
+    values : mapping
+        Dotted field: value.
+    shown : mapping, optional
+        The values that name the case, if not all of them.
+    named_in : Path, optional
+        The file that names the values, for error messages, if not `file`.
+
+    Raises
+    ------
+    InputError
+        A value leads nowhere or breaks the study; or a tolerance is asked that
+        nothing measured can resolve.
+    """
+    combined = copy.deepcopy(dict(data))
+    for field, value in values.items():
+        _set(combined, field, value, named_in or file)
+    study = validate(combined, named_in or file)
+    case = Case(file, values if shown is None else shown, study)
+    if not isinstance(study.fidelity, Tolerance):
+        return case
+    from dragdeck.advice.advise import resolve  # needs cases itself
+
+    return resolve(case, study.fidelity)
+
+
+def study_file(studies: Path, name: str) -> Path:
+    """The file of a study by name.
+
+    Raises
+    ------
+    InputError
+        No such study; lists those there are.
+    """
+    file = studies / name / STUDY_FILE
+    if not file.is_file():
+        known = sorted(found.parent.name for found in studies.glob(f"*/{STUDY_FILE}"))
+        raise InputError(
+            f"unknown study {name!r}",
+            file=studies,
+            limit=f"one of: {', '.join(known) or 'none here'}",
+            remedy=f"choose one of these, or make {file}",
+        )
+    return file
+
+
+def _combinations(sweep: Mapping[str, list[Any]], file: Path) -> Iterator[dict[str, Any]]:
+    for field, values in sweep.items():
+        if not values:
+            raise InputError("no values", file=file, field=f"sweep.{field}", remedy="give some")
+        if len({json.dumps(value, sort_keys=True) for value in values}) < len(values):
+            raise InputError(
+                "a value is given twice",
+                file=file,
+                field=f"sweep.{field}",
+                value=values,
+                remedy="remove one",
+            )
+    for combination in itertools.product(*sweep.values()):
+        yield dict(zip(sweep, combination, strict=True))
+
+
+def _set(data: dict[str, Any], field: str, value: Any, file: Path) -> None:
+    *parents, last = field.split(".")
+    place = data
+    for name in parents:
+        place = place.setdefault(name, {})
+        if not isinstance(place, dict):
+            raise InputError(
+                "leads through a value",
+                file=file,
+                field=field,
+                remedy="give the dotted name of one field",
+            )
+    place[last] = value

@@ -1,0 +1,190 @@
+"""The points of a trade: which settings are run on a study's scenes, and how often.
+
+A plan is a YAML file that fits any study: it names fields of the study file
+and the values each shall take, alone or together with others, and always holds
+the reference that errors are measured against.
+"""
+
+from __future__ import annotations
+
+import copy
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, ValidationError
+
+from dragdeck.cases.case import SAID_BY_NAME, Case
+from dragdeck.errors import InputError
+from dragdeck.scenes.drop_test import DROP_TEST
+from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.scene import SceneType
+from dragdeck.study.base import Model, Positive, Whole
+from dragdeck.study.model import Study
+from dragdeck.study.yaml import explained, read_yaml
+from dragdeck.sweep.cases import beside_each_other, settle_case
+
+Settings = Mapping[str, Any]
+
+PATH_LENGTH = ("motion.path.revolutions", "motion.path.length_m")
+
+
+class Block(Model):
+    """Points that belong together: every combination of the values that vary."""
+
+    vary: dict[str, list[Any]] = Field(description="dotted field: values")
+    one_by_one: dict[str, list[Any]] = Field(
+        default_factory=dict,
+        description="dotted field: values; each of them goes with every combination above, and "
+        "never two at once",
+    )
+    seeds: Annotated[Whole, Field(ge=1)] | None = Field(
+        default=None,
+        description="how many, from the study's or scene's own on; none: as the plan says",
+    )
+    arc: Positive | None = Field(
+        default=None, description="share of the study's path; none: as the plan says"
+    )
+
+
+class Plan(Model):
+    """What a trade runs."""
+
+    base: dict[str, Any] = Field(description="dotted field: its value where no point says other")
+    reference: Block = Field(description="what errors are measured against; one point")
+    arc: Positive = Field(default=1.0, description="share of the study's path that is dragged")
+    seeds: Annotated[Whole, Field(ge=1)] = Field(default=2, description="beds a point is run on")
+    points: list[Block] = Field(default_factory=list)
+    scenes: dict[str, dict[str, Any]] = Field(
+        default={"as it is": {}},
+        description="name: dotted fields and values that change the study, a seed to begin with "
+        "among them; every point is run in each of them",
+    )
+    cost_rounds: Annotated[Whole, Field(ge=0)] = Field(
+        default=3, description="rounds of timing what decks leave out; 0: not at all"
+    )
+    drop_test: dict[str, list[Any]] = Field(
+        default_factory=dict, description="dotted field: values, one after the other, in the drop"
+    )
+
+
+@dataclass(frozen=True)
+class Points:
+    """The cases of a plan.
+
+    Attributes
+    ----------
+    processes : list of Case
+        One for each process run.
+    drops : list of Case
+        One for each drop test.
+    cost_rounds : int
+        Rounds of timing what decks leave out.
+    """
+
+    processes: list[Case]
+    drops: list[Case]
+    cost_rounds: int
+
+    def of(self, scene: SceneType) -> list[Case]:
+        """The cases whose runs of a scene the plan needs."""
+        return self.drops if scene is DROP_TEST else self.processes
+
+
+def read_plan(file: Path) -> Plan:
+    """Read a plan.
+
+    Raises
+    ------
+    InputError
+        The file cannot be used; the message names field, value and limit.
+    """
+    data = read_yaml(file)
+    try:
+        return Plan.model_validate(data)
+    except ValidationError as error:
+        raise explained(error, file) from None
+
+
+def plan_points(plan: Plan, plan_file: Path, base: Case) -> Points:
+    """The cases that a plan makes of a study.
+
+    Parameters
+    ----------
+    plan : Plan
+    plan_file : Path
+        For error messages.
+    base : Case
+        A case of the study: its scene, its first seed and its path are kept.
+
+    Raises
+    ------
+    InputError
+        A point names no field of a study, or one beyond its limits.
+    """
+    if _size(plan.reference) != 1:
+        raise InputError("the reference is one point", file=plan_file, field="reference.vary")
+    blocks = [plan.reference, *plan.points]
+    found: dict[str, Case] = {}
+    for scene, block in itertools.product(plan.scenes.values(), blocks):
+        for settings in _settings(plan, block, base.study, scene.get("seed", base.study.seed)):
+            shown = {**scene, **_unnamed(settings)}
+            case = _case(base, {**plan.base, **scene, **settings}, shown, plan_file)
+            found.setdefault(PROCESS.run_id(case), case)
+    drops: dict[str, Case] = {}
+    for settings in [
+        {},
+        *({field: value} for field, all_ in plan.drop_test.items() for value in all_),
+    ]:
+        case = _case(base, {**plan.base, **settings}, settings, plan_file)
+        drops.setdefault(DROP_TEST.run_id(case), case)
+    return Points(beside_each_other(found.values()), list(drops.values()), plan.cost_rounds)
+
+
+def _size(block: Block) -> int:
+    return sum(1 for _ in _combinations(block))
+
+
+def _combinations(block: Block) -> Iterator[dict[str, Any]]:
+    single = [{field: value} for field, values in block.one_by_one.items() for value in values]
+    for values in itertools.product(*block.vary.values()):
+        for alone in single or [{}]:
+            yield {**dict(zip(block.vary, values, strict=True)), **alone}
+
+
+def _settings(plan: Plan, block: Block, study: Study, seed: int) -> Iterator[dict[str, Any]]:
+    """The fields that each point of a block sets, path and seed included."""
+    field, length = _path_length(study)
+    arc = {field: length * (block.arc or plan.arc)}
+    for values in _combinations(block):
+        for number in range(block.seeds or plan.seeds):
+            yield {**values, **arc, "seed": seed + number}
+
+
+def _unnamed(settings: Settings) -> dict[str, Any]:
+    """The fields to name a point by.
+
+    Not those that the name of a fidelity without a name says already, nor what is written.
+    """
+    said = {"fidelity", *(f"fidelity.{name}" for name in SAID_BY_NAME)}
+    return {
+        field: value
+        for field, value in settings.items()
+        if field not in said and not field.startswith("outputs.")
+    }
+
+
+def _path_length(study: Study) -> tuple[str, float]:
+    path = study.motion.path
+    if path.kind == "circle":
+        return PATH_LENGTH[0], path.revolutions
+    return PATH_LENGTH[1], path.length_m
+
+
+def _case(base: Case, values: Settings, shown: Settings, plan_file: Path) -> Case:
+    """The base case with other values; fields below ``fidelity`` replace its name."""
+    data = copy.deepcopy(base.study.model_dump(mode="json", exclude_unset=True))
+    data["fidelity"] = {}
+    return settle_case(base.file, data, values, shown, named_in=plan_file)

@@ -1,0 +1,187 @@
+# A run from its input script to its figures: a rule for each phase and folder of runs.
+# A point of a plan that fails is a finding, and its outcome says how; any other run that
+# fails is none, and leaves no run.json.
+
+RECORD = {place: "outcome.json" if place == POINTS else "run.json" for place in PLACES}
+
+
+for PLACE, SCENE in PLACES.items():
+
+    rule:
+        name:
+            f"render_{PLACE}"
+        input:
+            templates_of(SCENE.name),
+            packing=of_its_bed(PLACE, "tables/packing.json"),
+        output:
+            [
+                of_run(PLACE, file)
+                for file in ("in.liggghts", "case.json", "columns.json", *SCENE.inputs)
+            ],
+        log:
+            of_run(PLACE, "logs/render.log"),
+        benchmark:
+            of_run(PLACE, "benchmarks/render.tsv")
+        localrule: True
+        conda:
+            "../envs/python.yaml"
+        params:
+            case=digest_of(PLACE),
+            cases=cases_option(PLACE),
+            packing="--packing" if SCENE.needs_bed else "",
+            source=source_hash("dragdeck.decks.render", "dragdeck.scenes.registry"),
+            scene=SCENE.name,
+        shell:
+            "dragdeck step render {wildcards.study} {params.scene} {wildcards.run} {params.cases}"
+            " {params.packing} {input.packing} > {log} 2>&1"
+
+    rule:
+        name:
+            f"run_{PLACE}"
+        input:
+            [
+                of_run(PLACE, file)
+                for file in ("in.liggghts", "case.json", "columns.json", *SCENE.inputs)
+            ],
+            advice=asked_advice(PLACE),
+            filling=of_its_bed(PLACE, "run.json"),
+        output:
+            of_run(PLACE, RECORD[PLACE]),
+        log:
+            of_run(PLACE, "logs/run.log"),
+        benchmark:
+            of_run(PLACE, "benchmarks/run.tsv")
+        conda:
+            "../envs/python.yaml"
+        threads: ranks_of(PLACE)
+        params:
+            outcome="--outcome" if PLACE == POINTS else "",
+            file=of_run(PLACE, RECORD[PLACE]) if PLACE == POINTS else "",
+            source=source_hash("dragdeck.engine.run_folder"),
+        shell:
+            "dragdeck run $(dirname {output}) {params.outcome} {params.file} --every 60"
+            " 2>&1 | tee -i {log}"
+
+
+for PLACE, SCENE in SCENES.items():
+
+    rule:
+        name:
+            f"tabulate_{PLACE}"
+        input:
+            of_run(PLACE, "run.json"),
+        output:
+            tables_of(PLACE, SCENE.tables),
+        log:
+            of_run(PLACE, "logs/tables.log"),
+        benchmark:
+            of_run(PLACE, "benchmarks/tables.tsv")
+        conda:
+            "../envs/python.yaml"
+        params:
+            source=source_hash("dragchain.tables.write"),
+        shell:
+            "dragchain tables $(dirname {input}) > {log} 2>&1"
+
+    rule:
+        name:
+            f"draw_{PLACE}"
+        input:
+            tables_of(PLACE, [*SCENE.tables, *SCENE.network]),
+            run=of_run(PLACE, "run.json"),
+        output:
+            [
+                report(
+                    of_run(PLACE, f"figures/{name}.png"),
+                    caption=f"../report/{name}.rst",
+                    category=PLACE.replace("_", " ").capitalize(),
+                    labels={"run": "{run}", "figure": name},
+                )
+                for name in SCENE.figures
+            ],
+            of_run(PLACE, "tables/figures.json"),
+        log:
+            of_run(PLACE, "logs/figures.log"),
+        benchmark:
+            of_run(PLACE, "benchmarks/figures.tsv")
+        conda:
+            "../envs/python.yaml"
+        params:
+            source=source_hash("dragchain.report.run_figures"),
+        shell:
+            "dragchain figures $(dirname {input.run}) > {log} 2>&1"
+
+    if SCENE.network:
+
+        # The contact network and its chains.
+        rule:
+            name:
+                f"find_chains_of_{PLACE}"
+            input:
+                tables_of(PLACE, SCENE.tables),
+                run=of_run(PLACE, "run.json"),
+            output:
+                tables_of(PLACE, SCENE.network),
+            log:
+                of_run(PLACE, "logs/chains.log"),
+            benchmark:
+                of_run(PLACE, "benchmarks/chains.tsv")
+            conda:
+                "../envs/python.yaml"
+            params:
+                source=source_hash("dragchain.network.statistics", "dragchain.network.chains"),
+            shell:
+                "dragchain chains $(dirname {input.run}) > {log} 2>&1"
+
+
+# What is compared of a point: its tables, chains and numbers.
+rule measure_point:
+    input:
+        of_run(POINTS, "outcome.json"),
+        bed=of_its_bed(POINTS, "tables/packing.json"),
+    output:
+        of_run(POINTS, "measures.json"),
+    log:
+        of_run(POINTS, "logs/measures.log"),
+    benchmark:
+        of_run(POINTS, "benchmarks/measures.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        source=source_hash("dragchain.tradeoff.measures"),
+    shell:
+        "dragchain step measure $(dirname {output}) --packing {input.bed} > {log} 2>&1"
+
+
+for PLACE, SCENE in PLACES.items():
+    if SCENE.loading:
+
+        # Load, sliding and friction work on the workpiece, facet by facet.
+        rule:
+            name:
+                f"map_loading_of_{PLACE}"
+            input:
+                (
+                    of_run(PLACE, "measures.json")
+                    if PLACE == POINTS
+                    else tables_of(PLACE, SCENE.tables)
+                ),
+                record=of_run(PLACE, RECORD[PLACE]),
+            output:
+                tables_of(PLACE, SCENE.loading),
+                report(
+                    of_run(PLACE, "figures/workpiece.png"),
+                    caption="../report/workpiece.rst",
+                    category=PLACE.capitalize(),
+                    labels={"run": "{run}", "figure": "workpiece"},
+                ),
+            log:
+                of_run(PLACE, "logs/loading.log"),
+            benchmark:
+                of_run(PLACE, "benchmarks/loading.tsv")
+            conda:
+                "../envs/python.yaml"
+            params:
+                source=source_hash("dragchain.loading.summary", "dragchain.loading.figure"),
+            shell:
+                "dragchain loading $(dirname {input.record}) > {log} 2>&1"

@@ -1,0 +1,101 @@
+# The trade of speed against accuracy: costs, report and checks.
+
+
+def promises_option(wildcards):
+    """How to name the checks on other scenes on the command line, if they were made."""
+    file = of_study("tradeoff/promises", "promises.json")
+    return f"--promises {file}" if (PROJECT.root / file).is_file() else ""
+
+
+def every_drop_point(file):
+    """One file of every drop test of the trade."""
+    return [f"{run_path(STUDY, 'drop_test', run)}/{file}" for run in points_by_run("drop_test")]
+
+
+def safe_step(case):
+    """Largest step of a process over the Rayleigh time that is known to be safe."""
+    lowest = min(pair.restitution for pair in case.study.pairs.values())
+    return largest_fraction(SCENES["process"], lowest)
+
+
+# Processor times side by side: no other job may run meanwhile.
+rule measure_costs:
+    input:
+        templates_of("drop_test"),
+        templates_of("filling"),
+        templates_of("process"),
+    output:
+        of_tradeoff("costs.json"),
+    log:
+        of_tradeoff("logs/costs.log"),
+    benchmark:
+        of_tradeoff("benchmarks/costs.tsv")
+    conda:
+        "../envs/python.yaml"
+    threads: workflow.cores
+    params:
+        study=STUDY,
+        fidelity=fidelity_option,
+        rounds=lambda wildcards: points().cost_rounds,
+        case=SCENES["process"].digest(CASES[0]),
+        source=source_hash("dragdeck.campaigns.cost_timing"),
+    shell:
+        "dragdeck step costs {params.study} {params.fidelity} --rounds {params.rounds}"
+        " --out {output} 2>&1 | tee -i {log}"
+
+
+rule write_tradeoff:
+    input:
+        measures=lambda wildcards: every_point("measures.json"),
+        drops=lambda wildcards: every_drop_point("tables/impacts.parquet"),
+        costs=lambda wildcards: [of_tradeoff("costs.json")] if points().cost_rounds else [],
+        templates=page_templates("tradeoff/tradeoff.html.j2"),
+    output:
+        page=report(
+            of_tradeoff("report.html"),
+            caption="../report/tradeoff.rst",
+            category="Tradeoff",
+            labels={"run": "all", "figure": "report"},
+        ),
+        measured=of_tradeoff("tradeoff.json"),
+        runs=multiext(of_tradeoff(""), "runs.csv", "runs.parquet"),
+        errors=multiext(of_tradeoff(""), "errors.csv", "errors.parquet"),
+    log:
+        of_tradeoff("logs/report.log"),
+    benchmark:
+        of_tradeoff("benchmarks/report.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        reference=lambda wildcards: every_point("")[0],
+        drops=lambda wildcards: every_drop_point(""),
+        costs=lambda wildcards, input: f"--costs {input.costs}" if input.costs else "",
+        promises=promises_option,
+        plan=Path(PLAN).stem,
+        command=f"snakemake tradeoff --config study={STUDY} plan={PLAN}",
+        largest_step=lambda wildcards: safe_step(CASES[0]),
+        source=source_hash("dragchain.tradeoff.report"),
+    shell:
+        "dragchain step tradeoff --out $(dirname {output.page}) --plan {params.plan}"
+        " --command '{params.command}' --largest-step {params.largest_step}"
+        " --reference {params.reference} {params.costs} {params.promises} --drops {params.drops}"
+        " -- {input.measures} > {log} 2>&1"
+
+
+# What the advisor promised, in scenes that it was not measured on: plan=promises.
+rule write_promises:
+    input:
+        lambda wildcards: every_point("measures.json"),
+    output:
+        promises=of_tradeoff("promises.json"),
+        table=of_tradeoff("promises.csv"),
+    log:
+        of_tradeoff("logs/promises.log"),
+    benchmark:
+        of_tradeoff("benchmarks/promises.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        source=source_hash("dragchain.tradeoff.promises"),
+    shell:
+        "dragchain step promises --out $(dirname {output.promises}) {input} 2>&1 | tee -i {log}"
