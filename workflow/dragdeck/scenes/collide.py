@@ -16,7 +16,7 @@ from dragdeck.decks.deck import Deck, LeftOut, Materials, Scene, contact_law
 from dragdeck.documents import Part
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.contact_law import Pair
-from dragdeck.study.model import Material
+from dragdeck.study.material import Material
 
 FRAMES_TIMES_BODIES = 25_000
 """Rows of the largest output of a run: every step for two particles, fewer frames for a rack."""
