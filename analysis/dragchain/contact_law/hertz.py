@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TypeVar
 
 from dragchain.arrays import Floats
-from dragchain.documents import Part
 
 Number = TypeVar("Number", float, Floats)
 
 
-class Elastic(Part):
+@dataclass(frozen=True)
+class Elastic:
     """Elastic constants of a material: Young's modulus, Pa, and Poisson's ratio."""
 
     youngs_modulus_pa: float

@@ -111,11 +111,9 @@ def surfaces(case: Case) -> Surfaces:
     )
     if not isinstance(friction, int | float):
         raise TableError(f"case.json has no inputs.pairs.{particle}-{workpiece}.friction")
+    names = ("youngs_modulus_pa", "poissons_ratio")
     materials = [
-        Elastic(
-            youngs_modulus_pa=_number(case, f"materials.{material}.youngs_modulus_pa"),
-            poissons_ratio=_number(case, f"materials.{material}.poissons_ratio"),
-        )
+        Elastic(*(_number(case, f"materials.{material}.{name}") for name in names))
         for material in (particle, workpiece)
     ]
     modulus = case.fidelity.youngs_modulus_scale * effective_modulus(*materials)

@@ -65,7 +65,7 @@ class Recording:
     def contact(self, entry: Mapping[str, Any]) -> Contact:
         """The constants of a contact, from those of its two materials."""
         kinds = [self._type(entry["particle"]), self._type(entry["partner"])]
-        own, other = (Elastic.model_validate(self.case["types"][kind - 1]) for kind in kinds)
+        own, other = (self._elastic(kind) for kind in kinds)
         wall = isinstance(entry["partner"], str)
         pair = self._pair(sorted(kinds))
         return Contact(
@@ -77,6 +77,10 @@ class Recording:
             friction=float(pair["friction"]),
             limit_force=bool(self.case["limit_force"]),
         )
+
+    def _elastic(self, kind: int) -> Elastic:
+        material = self.case["types"][kind - 1]
+        return Elastic(material["youngs_modulus_pa"], material["poissons_ratio"])
 
     def _type(self, name: int | str) -> int:
         if isinstance(name, int):

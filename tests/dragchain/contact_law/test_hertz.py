@@ -16,7 +16,7 @@ from dragchain.contact_law.hertz import (
 )
 from dragchain.contact_law.impact import CONTACT_TIME, Contact, Particle, largest_overlap
 
-STEEL = Elastic(youngs_modulus_pa=2e11, poissons_ratio=0.3)
+STEEL = Elastic(2e11, 0.3)
 
 
 def test_moduli_of_two_equal_bodies() -> None:
