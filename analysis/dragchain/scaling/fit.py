@@ -20,6 +20,7 @@ from dragchain.errors import TableError
 from dragchain.figures.style import STYLE, png
 from dragchain.files import write_json
 from dragchain.run.case import Case, Circle, load_case
+from dragchain.run.completeness import RunRecord
 from dragchain.run.kinematics import needed
 from dragchain.scaling.figures import draw_scaling, draw_scalings
 from dragchain.scaling.words import interval, remarks
@@ -357,16 +358,16 @@ def write_scaling(
 def _record(run_dirs: Sequence[Path]) -> dict[str, Any]:
     """When the first run began, the engine's version, and its processor time over all runs."""
     records = [
-        json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        RunRecord.read(folder / "run.json")
         for folder in run_dirs
         if (folder / "run.json").is_file()
     ]
     if not records:
         return {"started": None, "engine": None, "cpu_time_s": None}
     return {
-        "started": min(record["started"] for record in records),
-        "engine": records[0]["engine_version"],
-        "cpu_time_s": sum(record.get("cpu_time_s") or 0.0 for record in records),
+        "started": min(record.started for record in records),
+        "engine": records[0].engine_version,
+        "cpu_time_s": sum(record.cpu_time_s for record in records),
     }
 
 

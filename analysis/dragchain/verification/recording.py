@@ -15,9 +15,9 @@ from dragchain.arrays import Floats
 from dragchain.contact_law.hertz import Elastic, effective_modulus, effective_shear
 from dragchain.contact_law.impact import Contact, Motion, Particle
 from dragchain.dumps.run_parts import iter_frames
-from dragchain.errors import DocumentError, RejectedRunError, TableError
+from dragchain.errors import DocumentError, TableError
 from dragchain.run.case import load_outputs
-from dragchain.run.completeness import refusal
+from dragchain.run.completeness import read_accepted
 
 _VECTORS = {
     "position_m": ("x_m", "y_m", "z_m"),
@@ -150,9 +150,7 @@ def read_recording(run_dir: Path) -> Recording:
     DocumentError, DumpError
         A file of it cannot be used.
     """
-    record = _json(run_dir / "run.json")
-    if (reason := refusal(record)) is not None:
-        raise RejectedRunError(f"{run_dir} is refused: {reason}")
+    read_accepted(run_dir)
     case = _json(run_dir / "case.json")
     if case.get("scene") != "collide":
         raise DocumentError(run_dir / "case.json", "scene", "is not 'collide'")
