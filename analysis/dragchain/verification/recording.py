@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.contact_law.hertz import effective_modulus
+from dragchain.contact_law.hertz import Elastic, effective_modulus, effective_shear
 from dragchain.contact_law.impact import Contact, Motion, Particle
 from dragchain.dumps.run_parts import iter_frames
 from dragchain.errors import DocumentError, TableError
@@ -65,7 +65,7 @@ class Recording:
     def contact(self, entry: Mapping[str, Any]) -> Contact:
         """The constants of a contact, from those of its two materials."""
         kinds = [self._type(entry["particle"]), self._type(entry["partner"])]
-        own, other = (self.case["types"][kind - 1] for kind in kinds)
+        own, other = (self._elastic(kind) for kind in kinds)
         wall = isinstance(entry["partner"], str)
         pair = self._pair(sorted(kinds))
         return Contact(
@@ -77,6 +77,10 @@ class Recording:
             friction=float(pair["friction"]),
             limit_force=bool(self.case["limit_force"]),
         )
+
+    def _elastic(self, kind: int) -> Elastic:
+        material = self.case["types"][kind - 1]
+        return Elastic(material["youngs_modulus_pa"], material["poissons_ratio"])
 
     def _type(self, name: int | str) -> int:
         if isinstance(name, int):
@@ -134,16 +138,6 @@ class Recording:
     def _crossing(self, overlap: Floats, at: int) -> float:
         fraction = overlap[at] / (overlap[at] - overlap[at + 1])
         return float(self.time_s[at] + fraction * (self.time_s[at + 1] - self.time_s[at]))
-
-
-def effective_shear(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
-    """Effective shear modulus 1/G* = sum (2 - nu)/G, Pa (Mindlin 1949)."""
-    compliance: float = sum(
-        2 * (2 - nu) * (1 + nu) / material["youngs_modulus_pa"]
-        for material in (first, second)
-        for nu in (material["poissons_ratio"],)
-    )
-    return 1 / compliance
 
 
 def read_recording(run_dir: Path) -> Recording:
