@@ -30,10 +30,9 @@ from dragchain.statistics.power_law import (
     Runs,
     estimate_scatter,
     fit_power_law,
-    fit_shifted,
-    fit_two_terms,
     solve,
 )
+from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
 
 __all__ = ["Expectation", "Run", "draw_scalings", "find", "read_runs", "read_scalings"]
 
