@@ -18,6 +18,7 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tiny_run_files import Raw
 
 from dragchain.dumps.any_dump import dump_files, layout_of, read_dump
 from dragchain.dumps.careful_reader import read_carefully
@@ -347,31 +348,39 @@ from dragchain.tables.convert import dump_to_parquet
 def peak():
     status = Path("/proc/self/status").read_text()
     return 1024 * int(re.search(r"VmHWM:\\s*(\\d+)", status).group(1))
-source, target, *columns = sys.argv[1:]
-small = source.replace("large", "small")
-dump_to_parquet(small, target, columns or None)
-before = peak()
-dump_to_parquet(source, target, columns or None)
-print(before, peak())
+names = sys.argv[1:]
+for size in ("small", "large"):
+    for kind in ("dump", "bin", "dump.gz"):
+        columns = names if kind == "bin" else None
+        dump_to_parquet(f"{size}.{kind}", f"{size}.{kind}.parquet", columns)
+        print(peak())
 """
+KINDS = ["dump", "bin", "dump.gz"]
+LARGE = 300
 
 
-@pytest.mark.parametrize("name", ["large.dump", "large.bin", "large.dump.gz"])
-def test_memory_does_not_grow_with_the_file(tmp_path: Path, raw, name) -> None:
-    """Twelve times the frames may not take more than a few row groups more."""
-    rows = np.random.default_rng(1).normal(size=(20_000, 3))
+@pytest.fixture(scope="module")
+def peaks(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
+    """Folder of tables of small and twelve times larger dumps; peaks of memory on the way, B."""
+    folder = tmp_path_factory.mktemp("dumps")
+    rows = np.random.default_rng(1).normal(size=(12_000, 3))
     rows[:, 0] = np.arange(len(rows))
-    columns = []
-    if name.endswith(".bin"):
-        frame, columns = raw.binary(5, rows.tolist(), 3), list(NAMES)
-    else:
-        frame = raw.text(5, rows.tolist(), NAMES, "custom")
-    frame = gzip.compress(frame, 1) if name.endswith(".gz") else frame
-    (tmp_path / name.replace("large", "small")).write_bytes(frame * 25)
-    (tmp_path / name).write_bytes(frame * 300)
-    command = [sys.executable, "-c", PEAK, tmp_path / name, tmp_path / "t.parquet", *columns]
-    before, after = map(int, subprocess.check_output(command, text=True).split())
-    assert pq.ParquetFile(tmp_path / "t.parquet").metadata.num_rows == 300 * len(rows)
-    print(before, after)
+    text = Raw.text(5, rows.tolist(), NAMES, "custom")
+    frames = text, Raw.binary(5, rows.tolist(), 3), gzip.compress(text, 1)
+    for kind, frame in zip(KINDS, frames, strict=True):
+        (folder / f"small.{kind}").write_bytes(frame * (LARGE // 12))
+        (folder / f"large.{kind}").write_bytes(frame * LARGE)
+    command = [sys.executable, "-c", PEAK, *NAMES]
+    found = subprocess.check_output(command, cwd=folder, text=True)
+    return folder, [int(line) for line in found.split()]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_memory_does_not_grow_with_the_file(peaks, kind) -> None:
+    """Twelve times the frames may not take more than a few row groups more."""
+    folder, found = peaks
+    before, after = found[len(KINDS) - 1], found[len(KINDS) + KINDS.index(kind)]
+    table = pq.ParquetFile(folder / f"large.{kind}.parquet")
+    assert table.metadata.num_rows == LARGE * 12_000
     assert after < 500e6
     assert after - before < 60e6
