@@ -11,13 +11,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
+from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
 from dragdeck.study.model import STUDY_FILE, Scaling, Tolerance
 from dragdeck.study.yaml import read_yaml, validate
 
 
-def load_cases(file: Path, fidelity: str | None = None) -> list[Case]:
+def load_cases(
+    file: Path, fidelity: str | None = None, tradeoff: Tradeoff | None = None
+) -> list[Case]:
     """All cases of a study file.
 
     Parameters
@@ -26,6 +30,8 @@ def load_cases(file: Path, fidelity: str | None = None) -> list[Case]:
         The study file.
     fidelity : str, optional
         Instead of the study's own.
+    tradeoff : Tradeoff, optional
+        Resolves a tolerance, instead of `measured_tradeoff`.
 
     Raises
     ------
@@ -42,7 +48,10 @@ def load_cases(file: Path, fidelity: str | None = None) -> list[Case]:
         _check_scaling(study.scaling, sweep, file)
     plain = {**data, "sweep": {}}
     return beside_each_other(
-        [settle_case(file, plain, settings) for settings in _combinations(sweep, file)]
+        [
+            settle_case(file, plain, settings, tradeoff=tradeoff)
+            for settings in _combinations(sweep, file)
+        ]
     )
 
 
@@ -121,6 +130,7 @@ def settle_case(
     values: Mapping[str, Any],
     shown: Mapping[str, Any] | None = None,
     named_in: Path | None = None,
+    tradeoff: Tradeoff | None = None,
 ) -> Case:
     """A case from a study's plain data with some of its values replaced.
 
@@ -136,6 +146,8 @@ def settle_case(
         The values that name the case, if not all of them.
     named_in : Path, optional
         The file that names the values, for error messages, if not `file`.
+    tradeoff : Tradeoff, optional
+        Resolves a tolerance, instead of `measured_tradeoff`.
 
     Raises
     ------
@@ -150,9 +162,7 @@ def settle_case(
     case = Case(file, values if shown is None else shown, study)
     if not isinstance(study.fidelity, Tolerance):
         return case
-    from dragdeck.advice.advise import resolve  # needs cases itself
-
-    return resolve(case, study.fidelity)
+    return resolve(case, study.fidelity, tradeoff or measured_tradeoff())
 
 
 def study_file(studies: Path, name: str) -> Path:
