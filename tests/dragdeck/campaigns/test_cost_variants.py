@@ -124,8 +124,8 @@ def test_every_variant_differs_from_its_base(base: Case, templates: jinja2.Envir
     for variant in chosen:
         deck, beside = (deck_of(base, name, templates) for name in (variant.name, variant.base))
         other_mesh = {
-            name: len(mesh.triangles) for name, mesh in deck.meshes.items()
-        } != {name: len(mesh.triangles) for name, mesh in beside.meshes.items()}  # fmt: skip
+            name: len(mesh.faces) for name, mesh in deck.meshes.items()
+        } != {name: len(mesh.faces) for name, mesh in beside.meshes.items()}  # fmt: skip
         other_text = lines(deck.whole) != lines(beside.whole)
         other_bed = variant_case(base, variant).study.media != base.study.media
         assert other_mesh or other_text or other_bed or deck.ranks != beside.ranks, variant.name

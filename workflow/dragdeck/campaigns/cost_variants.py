@@ -16,13 +16,13 @@ from typing import Any, Literal
 import jinja2
 import numpy as np
 from scipy import stats
+from trimesh import Trimesh
 
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import deck_text, number
 from dragdeck.errors import InputError
-from dragdeck.mesh import Mesh
 from dragdeck.outlook.measured import FidelityParameters
 from dragdeck.physics.contact_mechanics import particle_mass
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
@@ -461,7 +461,7 @@ class TimedDeck:
     ----------
     whole, start : str
         Deck texts.
-    meshes : mapping of str to Mesh
+    meshes : mapping of str to Trimesh
     files : mapping of str to str
         Other input files.
     ranks : int
@@ -470,7 +470,7 @@ class TimedDeck:
 
     whole: str
     start: str
-    meshes: Mapping[str, Mesh]
+    meshes: Mapping[str, Trimesh]
     files: Mapping[str, str]
     ranks: int
     timestep_s: float
