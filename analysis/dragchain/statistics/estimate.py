@@ -5,21 +5,39 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import BeforeValidator, Field, PlainSerializer
+
+from dragchain.documents import Part
 
 CONFIDENCE = 0.95
 """Level of every interval."""
+
+
+def finite(number: float) -> float | None:
+    """The number, or None where JSON has no way to write it."""
+    return float(number) if np.isfinite(number) else None
+
+
+Number = Annotated[
+    float,
+    Field(allow_inf_nan=True),
+    BeforeValidator(lambda number: math.nan if number is None else number),
+    PlainSerializer(finite),
+]
+"""A number of a document that may be unknown: NaN here, null in JSON."""
 
 
 @dataclass(frozen=True)
 class Estimate:
     """A number with its 95 % confidence interval, NaN where it is not known."""
 
-    value: float
-    ci95_low: float
-    ci95_high: float
+    value: Number
+    ci95_low: Number
+    ci95_high: Number
 
     def contains(self, value: float) -> bool:
         """Whether a value is within the interval."""
@@ -46,9 +64,18 @@ class Estimate:
         }
 
 
-def finite(number: float) -> float | None:
-    """The number, or None where JSON has no way to write it."""
-    return float(number) if np.isfinite(number) else None
+class EstimateColumns(Part):
+    """Estimates in a document, a column for each of their numbers."""
+
+    value: tuple[Number, ...]
+    ci95_low: tuple[Number, ...]
+    ci95_high: tuple[Number, ...]
+
+    @classmethod
+    def of(cls, estimates: Sequence[Estimate]) -> EstimateColumns:
+        """The columns of estimates."""
+        names = ("value", "ci95_low", "ci95_high")
+        return cls(**{name: tuple(getattr(one, name) for one in estimates) for name in names})
 
 
 def estimate_columns(estimates: Sequence[Estimate]) -> dict[str, list[float | None]]:

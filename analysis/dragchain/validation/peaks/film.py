@@ -21,11 +21,12 @@ from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
 from dragchain.errors import TableError
 from dragchain.figures import network_picture as scene
+from dragchain.figures.network_overlay import mark_chain, mark_motion
 from dragchain.figures.network_picture import Look, Scene, View
+from dragchain.figures.rendering import check_rendering
 from dragchain.figures.style import BLUE, CHAIN, RED, STYLE, png
 from dragchain.network.chains import dominant_path, widest_paths
 from dragchain.network.frame import NetworkFrame, read_frames
-from dragchain.report.run_figures import mark_chain, mark_motion
 from dragchain.run.case import Case, load_case
 from dragchain.run.kinematics import drag_start_s
 from dragchain.tables.by_step import read_table
@@ -109,7 +110,7 @@ def write_peak_pictures(run_dir: Path, out_dir: Path) -> list[Path]:
     RenderError
         If pictures cannot be rendered here.
     """
-    scene.check_rendering()
+    check_rendering()
     case = load_case(run_dir)
     moments = choose_moments(run_dir, case)
     pair = [scene.load_scene(run_dir, case, wanted) for wanted in (moments.peak_s, moments.quiet_s)]

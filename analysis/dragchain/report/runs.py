@@ -1,0 +1,82 @@
+"""The runs that a report is of, read once."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from dragchain.errors import RejectedRunError
+from dragchain.report.findings import (
+    FILE,
+    DropFindings,
+    FillingFindings,
+    Findings,
+    ProcessFindings,
+)
+from dragchain.run.case import Case, load_case
+from dragchain.run.completeness import refusal
+
+F = TypeVar("F", bound=Findings, covariant=True)
+
+
+@dataclass(frozen=True)
+class ReportedRun(Generic[F]):
+    """A run that counts: its folder, case, findings and ``run.json``."""
+
+    folder: Path
+    case: Case
+    findings: F
+    record: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class StudyRuns:
+    """A process run with the filling and the drop test it belongs to, None where it names none."""
+
+    process: ReportedRun[ProcessFindings]
+    filling: ReportedRun[FillingFindings] | None
+    drop_test: ReportedRun[DropFindings] | None
+
+    @property
+    def runs(self) -> list[ReportedRun[Findings]]:
+        """The runs that there are, the process first."""
+        runs: list[ReportedRun[Findings] | None] = [self.process, self.filling, self.drop_test]
+        return [run for run in runs if run is not None]
+
+
+def read_study(run_dir: Path) -> StudyRuns:
+    """Read a process run with its filling and drop test.
+
+    Raises
+    ------
+    RejectedRunError
+        If a run is not complete, or did not pass an acceptance check.
+    DocumentError
+        If a document of a run is missing or cannot be used.
+    """
+    process = _read(run_dir, ProcessFindings)
+    upstream, results = process.case.upstream, run_dir.resolve().parent.parent
+    return StudyRuns(
+        process,
+        _read(results / "filling" / upstream["filling"], FillingFindings)
+        if "filling" in upstream
+        else None,
+        _read(results / "drop_test" / upstream["drop_test"], DropFindings)
+        if "drop_test" in upstream
+        else None,
+    )
+
+
+def _read(run_dir: Path, findings: type[F]) -> ReportedRun[F]:
+    file = run_dir / "run.json"
+    if not file.is_file():
+        raise RejectedRunError(
+            f"{file}: there is no such file, so nothing says that the run is complete"
+        )
+    record: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    if (reason := refusal(record)) is not None:
+        raise RejectedRunError(f"{run_dir} is refused: {reason}")
+    return ReportedRun(run_dir, load_case(run_dir), findings.read(run_dir / FILE), record)
