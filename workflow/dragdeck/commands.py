@@ -14,7 +14,6 @@ from dragdeck.advice.advise import Advice, breaking_note, with_option
 from dragdeck.advice.advise import advise as advised_settings
 from dragdeck.advice.forecast import (
     AdviceFile,
-    Speed,
     advice_file,
     forecast,
     own_option,
@@ -22,6 +21,7 @@ from dragdeck.advice.forecast import (
     roles,
     tables,
 )
+from dragdeck.advice.speed import Speed
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import StudyScene
@@ -86,7 +86,9 @@ def explain(study: str, fidelity: str | None, scene: str | None) -> None:
     runs = ((kind, case) for kind in kinds for case in by_run(every, kind).values())
     built = ((kind, case, kind.build(case, None)) for kind, case in runs)
     show(
-        explanation(one, expected_cost(one, results / kind.name), _expectations(case, kind, one))
+        explanation(
+            one, expected_cost(kind, one, results / kind.name), _expectations(case, kind, one)
+        )
         for kind, case, one in built
     )
 

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.scenes.process import PROCESS
@@ -58,7 +59,7 @@ class Project:
         InputError
             No such study, or its file cannot be used.
         """
-        return load_cases(study_file(self.studies, study), fidelity)
+        return load_cases(study_file(self.studies, study), fidelity, resolve)
 
     def points(self, study: str, plan: str) -> Points:
         """The points of a plan for a study, both by name; a plan may be a path too.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 
 import numpy as np
@@ -12,7 +11,6 @@ from dragchain.arrays import Floats, Ints
 from dragchain.drag.around import ahead_behind, azimuth_profile, depth_profile, depth_slope
 from dragchain.drag.force import read_counted, summarise_forces
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
-from dragchain.errors import TableError
 from dragchain.report.findings import (
     FILE,
     AheadBehind,
@@ -36,6 +34,7 @@ from dragchain.run.reference import ReferenceDrag, reference_drags
 from dragchain.statistics.association import association, near_any
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, EstimateColumns
+from dragchain.tables.bed import Packing
 from dragchain.tables.impacts import effective_restitution
 
 
@@ -191,13 +190,12 @@ def _workpiece_contacts(run: RunData, samples: pd.DataFrame) -> tuple[Ints, int,
 
 
 def _filling(run: RunData) -> FillingFindings:
-    file = run.folder / "tables" / "packing.json"
-    if not file.is_file():
-        raise TableError(f"{file}: there is no such file; run `dragchain tables` first")
-    bed = json.loads(file.read_text(encoding="utf-8"))
-    settled = json.loads((run.folder / "case.json").read_text(encoding="utf-8")).get("settled")
+    bed = Packing.read(run.folder / "tables" / "packing.json")
+    settled = run.case.settled
     return FillingFindings(
-        run=run.case.run, bed=bed, rest_energy_ratio=settled["energy_ratio"] if settled else None
+        run=run.case.run,
+        bed=bed.model_dump(exclude={"version"}),
+        rest_energy_ratio=settled.energy_ratio if settled else None,
     )
 
 

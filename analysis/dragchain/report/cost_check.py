@@ -10,10 +10,13 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
+
+from pydantic import JsonValue
 
 from dragchain.documents import Document, Part
-from dragchain.run.case import Case
+from dragchain.run.case import AdvisedSettings, Case, changed_inputs
+from dragchain.run.completeness import RunRecord
 from dragchain.statistics.correlated import MeanEstimate
 
 INTERVALS = {"drag_mean": "drag_n", "vertical_mean": "vertical_n"}
@@ -33,7 +36,7 @@ class Option(Part):
     """Settings for a case, and what its runs are expected to take with them, by scene."""
 
     settings: Settings
-    inputs: Mapping[str, Any]
+    inputs: Mapping[str, JsonValue]
     steps: Mapping[str, int]
     steps_per_s: Mapping[str, float]
     wall_time_s: Mapping[str, float]
@@ -62,7 +65,9 @@ class CostRow:
     ----------
     scene : str
     steps, actual_steps : int
-    steps_per_s, actual_steps_per_s : float
+    steps_per_s : float
+    actual_steps_per_s : float or None
+        None for a run too short to measure it.
     wall_time_s, actual_wall_time_s : float
     """
 
@@ -70,7 +75,7 @@ class CostRow:
     steps: int
     actual_steps: int
     steps_per_s: float
-    actual_steps_per_s: float
+    actual_steps_per_s: float | None
     wall_time_s: float
     actual_wall_time_s: float
 
@@ -102,10 +107,10 @@ def prediction_for(case: Case, options: Sequence[Option]) -> Option | None:
 
 def _is_of(case: Case, option: Option) -> bool:
     same = all(math.isclose(value, getattr(case.fidelity, name)) for name, value in option.settings)
-    return same and option.inputs == dict(case.inputs)
+    return same and not changed_inputs(case.inputs, option.inputs)
 
 
-def cost_rows(option: Option, records: Mapping[str, Mapping[str, Any]]) -> Iterator[CostRow]:
+def cost_rows(option: Option, records: Mapping[str, RunRecord]) -> Iterator[CostRow]:
     """Predicted and actual cost of every run that the option says something of.
 
     Parameters
@@ -120,22 +125,22 @@ def cost_rows(option: Option, records: Mapping[str, Mapping[str, Any]]) -> Itera
             yield CostRow(
                 scene,
                 steps,
-                record["steps"],
+                record.steps,
                 option.steps_per_s[scene],
-                record["steps_per_s"],
+                record.steps_per_s,
                 option.wall_time_s[scene],
-                record["wall_time_s"],
+                record.wall_time_s,
             )
 
 
 def actual_interval(
-    asked: Mapping[str, Any] | None, forces: Mapping[str, MeanEstimate]
+    asked: AdvisedSettings | None, forces: Mapping[str, MeanEstimate]
 ) -> RunInterval | None:
     """Mean and 95 % interval of the quantity asked about.
 
     None where nothing was asked, or a single run has no interval of it.
     """
-    name = INTERVALS.get(asked["quantity"]) if asked else None
+    name = INTERVALS.get(asked.quantity) if asked else None
     if name is None or not forces[name].mean:
         return None
     force = forces[name]

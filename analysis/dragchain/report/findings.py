@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 from dragchain.documents import Document, Part
 from dragchain.statistics.correlated import MeanEstimate
-from dragchain.statistics.estimate import Estimate, EstimateColumns, Number, finite
+from dragchain.statistics.estimate import Estimate, EstimateColumns, Real, finite
 
 FILE = Path("tables") / "figures.json"
 
@@ -43,7 +43,7 @@ class Peaks(Part):
     count: int
     process_time_s: tuple[float, ...]
     drag_n: tuple[float, ...]
-    largest_n: Number
+    largest_n: Real
     separation_s: float
 
 
@@ -51,29 +51,29 @@ class Chains(Part):
     """Force chains and workpiece paths, means over the network frames."""
 
     peters_per_frame: float
-    peters_particles_mean: Number
+    peters_particles_mean: Real
     widest_paths_per_frame: float
     workpiece_contacts_without_path_per_frame: float
-    widest_paths_to_side_fraction: Number
+    widest_paths_to_side_fraction: Real
     dominant_frames: int
-    dominant_bottleneck_mean_n: Number
-    dominant_bottleneck_max_n: Number
-    dominant_particles_mean: Number
-    dominant_altitude_mean_m: Number
-    dominant_altitude_std_m: Number
-    dominant_azimuth_mean_rad: Number
-    dominant_azimuth_resultant: Number
+    dominant_bottleneck_mean_n: Real
+    dominant_bottleneck_max_n: Real
+    dominant_particles_mean: Real
+    dominant_altitude_mean_m: Real
+    dominant_altitude_std_m: Real
+    dominant_azimuth_mean_rad: Real
+    dominant_azimuth_resultant: Real
 
 
 class ChainsAgainstDrag(Part):
     """Spearman's correlation of resistance and dominant bottleneck over the network frames."""
 
-    rank_correlation: Number
-    p_value: Number
+    rank_correlation: Real
+    p_value: Real
     frames: int
     frames_at_peaks: int
-    bottleneck_at_peaks_mean_n: Number
-    bottleneck_elsewhere_mean_n: Number
+    bottleneck_at_peaks_mean_n: Real
+    bottleneck_elsewhere_mean_n: Real
 
 
 class AheadBehind(Part):
@@ -127,7 +127,7 @@ class ProcessFindings(Findings):
     forces: Mapping[str, MeanEstimate]
     comparison: tuple[Comparison, ...]
     peaks: Peaks
-    network: Mapping[str, int | Number]
+    network: Mapping[str, int | Real]
     chains: Chains
     association: ChainsAgainstDrag
     confidence: float

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
-from dragchain.errors import RejectedRunError
 from dragchain.report.findings import (
     FILE,
     DropFindings,
@@ -17,7 +14,7 @@ from dragchain.report.findings import (
     ProcessFindings,
 )
 from dragchain.run.case import Case, load_case
-from dragchain.run.completeness import refusal
+from dragchain.run.completeness import RunRecord, read_accepted
 
 F = TypeVar("F", bound=Findings, covariant=True)
 
@@ -29,7 +26,7 @@ class ReportedRun(Generic[F]):
     folder: Path
     case: Case
     findings: F
-    record: Mapping[str, Any]
+    record: RunRecord
 
 
 @dataclass(frozen=True)
@@ -71,12 +68,5 @@ def read_study(run_dir: Path) -> StudyRuns:
 
 
 def _read(run_dir: Path, findings: type[F]) -> ReportedRun[F]:
-    file = run_dir / "run.json"
-    if not file.is_file():
-        raise RejectedRunError(
-            f"{file}: there is no such file, so nothing says that the run is complete"
-        )
-    record: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    if (reason := refusal(record)) is not None:
-        raise RejectedRunError(f"{run_dir} is refused: {reason}")
+    record = read_accepted(run_dir)
     return ReportedRun(run_dir, load_case(run_dir), findings.read(run_dir / FILE), record)

@@ -9,9 +9,7 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BeforeValidator, Field, PlainSerializer
-
-from dragchain.documents import Part
+from pydantic import AllowInfNan, BeforeValidator
 
 CONFIDENCE = 0.95
 """Level of every interval."""
@@ -22,22 +20,41 @@ def finite(number: float) -> float | None:
     return float(number) if np.isfinite(number) else None
 
 
-Number = Annotated[
-    float,
-    Field(allow_inf_nan=True),
-    BeforeValidator(lambda number: math.nan if number is None else number),
-    PlainSerializer(finite),
-]
-"""A number of a document that may be unknown: NaN here, null in JSON."""
+def _nan_for_none(number: object) -> object:
+    return math.nan if number is None else number
+
+
+def _none_for_nan(number: object) -> object:
+    return None if isinstance(number, float) and not math.isfinite(number) else number
+
+
+Real = Annotated[float, AllowInfNan(True), BeforeValidator(_nan_for_none)]
+"""A number of a document that is NaN in Python and null in JSON where it is not known."""
+
+Known = Annotated[float | None, BeforeValidator(_none_for_nan)]
+"""A number of a document that is None where it is not known; NaN becomes None."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number with its 95 % confidence interval, NaN where it is not known."""
+    """A number with its 95 % confidence interval, NaN where it is not known.
 
-    value: Number
-    ci95_low: Number
-    ci95_high: Number
+    It may be a field of a document, whose JSON then has null for NaN.
+    """
+
+    value: Real
+    ci95_low: Real
+    ci95_high: Real
+
+    @classmethod
+    def around(cls, value: float, half_width: float) -> Estimate:
+        """The value with an interval that is symmetric about it."""
+        return cls(value, value - half_width, value + half_width)
+
+    @property
+    def known(self) -> bool:
+        """Whether the value and its interval are finite."""
+        return all(math.isfinite(number) for number in vars(self).values())
 
     def contains(self, value: float) -> bool:
         """Whether a value is within the interval."""
@@ -64,18 +81,19 @@ class Estimate:
         }
 
 
-class EstimateColumns(Part):
-    """Estimates in a document, a column for each of their numbers."""
+@dataclass(frozen=True)
+class EstimateColumns:
+    """Estimates of a document as columns, NaN in Python and null in JSON where not known."""
 
-    value: tuple[Number, ...]
-    ci95_low: tuple[Number, ...]
-    ci95_high: tuple[Number, ...]
+    value: tuple[Real, ...]
+    ci95_low: tuple[Real, ...]
+    ci95_high: tuple[Real, ...]
 
     @classmethod
     def of(cls, estimates: Sequence[Estimate]) -> EstimateColumns:
         """The columns of estimates."""
         names = ("value", "ci95_low", "ci95_high")
-        return cls(**{name: tuple(getattr(one, name) for one in estimates) for name in names})
+        return cls(*(tuple(getattr(one, name) for one in estimates) for name in names))
 
 
 def estimate_columns(estimates: Sequence[Estimate]) -> dict[str, list[float | None]]:
@@ -100,8 +118,7 @@ def normal_quantile(confidence: float = CONFIDENCE) -> float:
 
 def t_interval(value: float, se: float, degrees: float) -> Estimate:
     """The value with its interval, from its standard error and the degrees of freedom."""
-    half = student_quantile(degrees) * se
-    return Estimate(value, value - half, value + half)
+    return Estimate.around(value, student_quantile(degrees) * se)
 
 
 def mean_of(values: ArrayLike) -> Estimate:

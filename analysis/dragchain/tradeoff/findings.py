@@ -13,11 +13,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import JsonValue
 from scipy import stats
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.case import load_case
+from dragchain.run.case import changed_inputs, load_case
+from dragchain.run.completeness import RunRecord
 from dragchain.tables.by_step import read_table
 from dragchain.tradeoff.compare import (
     CONFIDENCE,
@@ -476,9 +478,9 @@ def _read_drop(folder: Path) -> dict[str, Any]:
     if case.scene != "drop_test":
         raise TableError(f"{folder}: this is a {case.scene}, not a drop")
     impacts = read_table(folder / "tables" / "impacts.parquet", ["restitution"])
-    record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    if record["state"] != "complete":
-        raise TableError(f"{folder}: its state is {record['state']!r}, not 'complete'")
+    record = RunRecord.read(folder / "run.json")
+    if not record.complete:
+        raise TableError(f"{folder}: its state is {record.state!r}, not 'complete'")
     fraction = case.timestep_s / case.rayleigh_time_s
     return {
         "fraction": float(f"{fraction:.4g}"),
@@ -488,13 +490,12 @@ def _read_drop(folder: Path) -> dict[str, Any]:
             if name not in ("seed", "drop_test.timestep_fraction")
         },
         "ratios": impacts["restitution"].to_numpy(),
-        "cost": record.get("cpu_time_s") or record["wall_time_s"] * record["ranks"],
+        "cost": record.processor_time_s,
     }
 
 
-def _difference(own: Mapping[str, object], standard: Mapping[str, object]) -> str:
-    names = sorted({*own, *standard})
-    return ", ".join(f"{n} {own.get(n)}" for n in names if own.get(n) != standard.get(n))
+def _difference(own: Mapping[str, JsonValue], standard: Mapping[str, JsonValue]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in changed_inputs(own, standard).items())
 
 
 def _worst_impact(ratios: Floats, reference: Floats) -> float:

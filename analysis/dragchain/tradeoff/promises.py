@@ -194,7 +194,11 @@ def failures(files: Sequence[Path]) -> list[dict[str, Any]]:
 
 def _scene(measures: Mapping[str, Any]) -> Scene:
     inputs = measures["inputs"].items()
-    return tuple(sorted((name, str(value)) for name, value in inputs if name not in SILENT))
+    return tuple(
+        sorted(
+            (name, str(value)) for name, value in inputs if name not in SILENT and value is not None
+        )
+    )
 
 
 def _check(pair: _Pair, scatter: float, degrees: int) -> Check:

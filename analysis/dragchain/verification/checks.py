@@ -22,10 +22,10 @@ from dragchain.contact_law.impact import (
     elastic_time,
     hertz_force,
     hertz_overlap,
-    integrated_impact,
     largest_overlap,
     sliding_impact,
 )
+from dragchain.contact_law.integrated_impact import integrated_impact
 from dragchain.verification.published import published
 from dragchain.verification.recording import Recording
 

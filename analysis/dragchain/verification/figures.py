@@ -12,11 +12,11 @@ from dragchain.contact_law.impact import (
     elastic_time,
     hertz_force,
     hertz_overlap,
-    integrated_impact,
     largest_overlap,
     limited_restitution,
     sliding_impact,
 )
+from dragchain.contact_law.integrated_impact import integrated_impact
 from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
 from dragchain.verification.checks import (
     QUANTITIES,

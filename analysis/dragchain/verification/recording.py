@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.contact_law.hertz import effective_modulus
+from dragchain.contact_law.hertz import Elastic, effective_modulus, effective_shear
 from dragchain.contact_law.impact import Contact, Motion, Particle
 from dragchain.dumps.run_parts import iter_frames
-from dragchain.errors import DocumentError, RejectedRunError, TableError
+from dragchain.errors import DocumentError, TableError
 from dragchain.run.case import load_outputs
-from dragchain.run.completeness import refusal
+from dragchain.run.completeness import read_accepted
 
 _VECTORS = {
     "position_m": ("x_m", "y_m", "z_m"),
@@ -65,7 +65,7 @@ class Recording:
     def contact(self, entry: Mapping[str, Any]) -> Contact:
         """The constants of a contact, from those of its two materials."""
         kinds = [self._type(entry["particle"]), self._type(entry["partner"])]
-        own, other = (self.case["types"][kind - 1] for kind in kinds)
+        own, other = (self._elastic(kind) for kind in kinds)
         wall = isinstance(entry["partner"], str)
         pair = self._pair(sorted(kinds))
         return Contact(
@@ -77,6 +77,10 @@ class Recording:
             friction=float(pair["friction"]),
             limit_force=bool(self.case["limit_force"]),
         )
+
+    def _elastic(self, kind: int) -> Elastic:
+        material = self.case["types"][kind - 1]
+        return Elastic(material["youngs_modulus_pa"], material["poissons_ratio"])
 
     def _type(self, name: int | str) -> int:
         if isinstance(name, int):
@@ -136,16 +140,6 @@ class Recording:
         return float(self.time_s[at] + fraction * (self.time_s[at + 1] - self.time_s[at]))
 
 
-def effective_shear(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
-    """Effective shear modulus 1/G* = sum (2 - nu)/G, Pa (Mindlin 1949)."""
-    compliance: float = sum(
-        2 * (2 - nu) * (1 + nu) / material["youngs_modulus_pa"]
-        for material in (first, second)
-        for nu in (material["poissons_ratio"],)
-    )
-    return 1 / compliance
-
-
 def read_recording(run_dir: Path) -> Recording:
     """Read a complete run.
 
@@ -156,9 +150,7 @@ def read_recording(run_dir: Path) -> Recording:
     DocumentError, DumpError
         A file of it cannot be used.
     """
-    record = _json(run_dir / "run.json")
-    if (reason := refusal(record)) is not None:
-        raise RejectedRunError(f"{run_dir} is refused: {reason}")
+    read_accepted(run_dir)
     case = _json(run_dir / "case.json")
     if case.get("scene") != "collide":
         raise DocumentError(run_dir / "case.json", "scene", "is not 'collide'")

@@ -302,7 +302,7 @@ def test_a_tolerance_about_restitution_sets_the_drop_alone(
 
 @pytest.fixture
 def asking(small: dict[str, Any], write_study: Write, tradeoff_here: Tradeoff) -> Case:
-    (found,) = load_cases(write_study(small | {"fidelity": {"tolerance": 0.05}}))
+    (found,) = load_cases(write_study(small | {"fidelity": {"tolerance": 0.05}}), resolve=resolve)
     return found
 
 
@@ -334,7 +334,7 @@ def test_tolerances_of_a_matrix_are_resolved_each(
 ) -> None:
     small["fidelity"] = {"tolerance": 0.05}
     small["sweep"] = {"fidelity.tolerance": [0.05, 0.02]}
-    found = load_cases(write_study(small))
+    found = load_cases(write_study(small), resolve=resolve)
     scales = [case.study.chosen_fidelity().youngs_modulus_scale for case in found]
     assert scales == [0.01, 0.1]
 
@@ -353,12 +353,12 @@ def test_without_a_measured_tradeoff_a_tolerance_is_refused_with_a_remedy(
     monkeypatch.setattr(measured.resources, "files", lambda name: tmp_path)
     file = write_study(small | {"fidelity": {"tolerance": 0.05}})
     with pytest.raises(InputError, match="no tolerance can be resolved") as caught:
-        load_cases(file)
+        load_cases(file, resolve=resolve)
     assert "snakemake tradeoff" in str(caught.value)
     (tmp_path / "data").mkdir()
     (tmp_path / "data" / "tradeoff.json").write_text('{"schema": 1}')
     with pytest.raises(InputError, match="another schema"):
-        load_cases(file)
+        load_cases(file, resolve=resolve)
 
 
 def test_entries_of_any_quantity_are_read(case: Case, tradeoff: Tradeoff) -> None:

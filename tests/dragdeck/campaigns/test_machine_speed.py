@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from dragdeck.advice.forecast import Speed, step_cost
+from dragdeck.advice.forecast import step_cost
+from dragdeck.advice.speed import Speed
 from dragdeck.campaigns.machine_speed import (
     DRAG_STEPS,
     last_loop,

@@ -250,13 +250,12 @@ def material_table(study: Study, names: Sequence[str], scale: float, case: Case)
     size = range(len(names))
     with_particle = [study.pair(names[0], name) for name in names]
     # pairs without a particle never touch: they repeat one with a particle
-    tables, model = contact_law([[with_particle[max(i, j)] for j in size] for i in size])
+    law = contact_law([[with_particle[max(i, j)] for j in size] for i in size])
     return Materials(
         names=names,
         youngs_moduli_pa=moduli,
         poissons_ratios=[material.poissons_ratio for material in materials],
-        pair_tables=tables,
-        contact_model=model,
+        law=law,
     )
 
 
