@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from dragchain.drag.around import AZIMUTH_BINS
 from dragchain.drag.azimuth import circumference, parts
-from dragchain.figures import network_picture as scene
+from dragchain.figures.rendering import check_rendering
 from dragchain.figures.style import BLUE, GREY, STYLE, WIDTH_IN, png
 from dragchain.loading.facets import as_polydata
 from dragchain.loading.samples import Sampled
@@ -77,7 +77,7 @@ def draw_workpiece(
     RenderError
         If pictures cannot be rendered here.
     """
-    scene.check_rendering()
+    check_rendering()
     cylinder = needed(case.workpiece, "workpiece").kind == "cylinder"
     names = ("front", "rear") if cylinder else tuple(VIEWS)
     scale = Normalize(0.0, _largest(facets))

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -20,11 +19,12 @@ from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
 from dragchain.errors import TableError
 from dragchain.figures import network_picture as scene
+from dragchain.figures.network_overlay import show_network
 from dragchain.figures.network_picture import Look, Scene, View
-from dragchain.figures.style import BLUE, CHAIN, RED, STYLE, WIDTH_IN, png
+from dragchain.figures.rendering import check_rendering
+from dragchain.figures.style import BLUE, CHAIN, RED, drawing, new_figure, png
 from dragchain.network.chains import dominant_path, widest_paths
 from dragchain.network.frame import read_frames
-from dragchain.report.run_figures import mark_chain, mark_motion
 from dragchain.run.case import Case, load_case
 from dragchain.run.kinematics import drag_start_s
 from dragchain.tables.by_step import read_table
@@ -121,12 +121,12 @@ def peak_pictures(run_dir: Path, pictures: int = PICTURES) -> tuple[dict[str, by
     RenderError
         If pictures cannot be rendered here.
     """
-    scene.check_rendering()
+    check_rendering()
     moments = peak_and_quiet(run_dir)
     wanted = (moments.peak_s, moments.quiet_s)
     pair = [scene.load_scene(run_dir, moments.case, time_s) for time_s in wanted]
     views: tuple[View, ...] = ("xy", "xz")
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         drawn = {
             f"peak_and_quiet_{view}": png(_side_by_side(moments, pair, view)) for view in views
         }
@@ -138,7 +138,7 @@ def peak_pictures(run_dir: Path, pictures: int = PICTURES) -> tuple[dict[str, by
 
 def _side_by_side(moments: PeakAndQuiet, pair: Sequence[Scene], view: View) -> Figure:
     look = Look(_PIXELS_PER_MM, _largest_force(pair))
-    figure = Figure(figsize=(WIDTH_IN, 5.5), layout="constrained")
+    figure = new_figure(5.5)
     grid = figure.add_gridspec(2, 2, height_ratios=(3.6, 1.3))
     axes = [figure.add_subplot(grid[0, column]) for column in (0, 1)]
     for name, place, shown in zip(("at the peak", "at the quiet moment"), axes, pair, strict=True):
@@ -158,11 +158,7 @@ def _network(
     axes: Axes, moments: PeakAndQuiet, shown: Scene, view: View, look: Look, name: str = ""
 ) -> None:
     image, extent = scene.render(moments.run_dir, moments.case, shown, view, look)
-    axes.imshow(image, extent=tuple(extent.tolist()), interpolation="antialiased")
-    axes.grid(False)
-    axes.set(xlabel="x (mm)", ylabel=f"{view[1]} (mm)", xlim=extent[:2], ylim=extent[2:])
-    mark_chain(axes, shown, [0, 1] if view == "xy" else [0, 2], width=1.2, halo=2.0)
-    mark_motion(axes, shown, view)
+    show_network(axes, shown, view, image, extent, width=1.2, halo=2.0)
     words = f"{name}process time {shown.process_time_s:.2f} s\n{_chain_words(shown)}"
     axes.set_title(words, fontsize=8.5)
 
