@@ -28,6 +28,7 @@ READERS = {
     "case.drop_test": ["dragchain.run.case:Case"],
     "case.filling": ["dragchain.run.case:Case"],
     "case.process": ["dragchain.run.case:Case"],
+    "case.collide": ["dragchain.verification.experiment:Experiment"],
     "case.column": ["dragchain.run.case:Case"],
     "case.impact": ["dragchain.run.case:Case"],
     "packing": ["dragdeck.scenes.scene:PackingFile"],
