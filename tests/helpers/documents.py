@@ -18,6 +18,7 @@ WRITERS = {
     "case.column": "dragdeck.scenes.column:ColumnCase",
     "case.impact": "dragdeck.scenes.impact:ImpactCase",
     "packing": "dragchain.tables.bed:Packing",
+    "stability": "dragchain.stability.document:StabilityFile",
     "scaling": "dragchain.scaling.document:ScalingFile",
 }
 """Name of the document: ``module:Class`` of the model that writes it."""
