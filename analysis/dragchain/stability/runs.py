@@ -31,7 +31,7 @@ from dragchain.stability.classes import CONFIDENCE_SCORES, REST_FLOOR, Error, Se
 from dragchain.statistics.correlated import estimate_mean
 from dragchain.tables.network_contacts import contact_rows
 from dragchain.tables.run_folder import Run
-from dragchain.tables.workpiece_contacts import WorkpieceFrame, iter_workpiece_frames
+from dragchain.tables.workpiece_contacts import WorkpieceFrame
 from dragchain.tables.write import workpiece_force_rows
 
 Numbers = dict[str, float]
@@ -547,7 +547,7 @@ def _drag_network(point: PointRun, run: Run) -> Numbers:
     every = steps[np.linspace(0, len(steps) - 1, min(len(steps), NETWORK_FRAMES)).astype(int)]
     some = set(every.tolist() if point.row["reference"] else every[:1].tolist())
     largest = frequency = 0.0
-    for workpiece in iter_workpiece_frames(run.folder, run.outputs):
+    for workpiece in run.workpiece_frames():
         if workpiece.step not in pairs:
             continue
         frame = _sorted(particles[workpiece.step])
