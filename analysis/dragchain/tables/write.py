@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 import numpy as np
+import pyarrow as pa
 
-from dragchain.arrays import Floats
+from dragchain.arrays import Floats, Ints
 from dragchain.dumps.frame import Columns
 from dragchain.errors import RejectedRunError, TableError
 from dragchain.run.case import Case, Scene
@@ -115,7 +116,7 @@ def workpiece_force_rows(rows: Columns, case: Case) -> Rows:
     """Add phase, workpiece frame and ``in_statistics`` to raw samples of the workpiece's force."""
     steps = np.asarray(rows["step"], dtype=np.int64)
     heading = directions(steps, np.column_stack([rows["ref_x_m"], rows["ref_y_m"]]), case)
-    force = np.column_stack([rows[name] for name in FORCES])
+    force = np.column_stack([rows[name] for name in FORCES]).astype(np.float64)
     drag, lateral, vertical = workpiece_frame(force, heading).T
     return {
         **rows,
@@ -128,7 +129,7 @@ def workpiece_force_rows(rows: Columns, case: Case) -> Rows:
     }
 
 
-def _phases(steps: np.ndarray[tuple[int], np.dtype[np.int64]], case: Case) -> object:
+def _phases(steps: Ints, case: Case) -> pa.Array:
     return category(phase_codes(steps, case.phases), tuple(phase.name for phase in case.phases))
 
 
