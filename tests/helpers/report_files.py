@@ -50,9 +50,14 @@ def run_json(**more: Any) -> dict[str, Any]:
     return {
         "schema": 2, "state": "complete", "engine_version": "Engine 3.8", "ranks": 2,
         "steps": 160000, "steps_per_s": 2100.0, "wall_time_s": 76.0,
-        "started": "2026-01-01T00:00:00", "parts": [1],
-        "checks": [{"name": "no particle lost", "passed": True, "seen": "1422", "limit": "1422"}],
+        "started": "2026-01-01T00:00:00", "parts": [{"part": 1, "from": None, "from_step": 0}],
+        "checks": [particles_kept(1422)],
     } | more  # fmt: skip
+
+
+def particles_kept(seen: int) -> dict[str, Any]:
+    return {"code": "particles_kept", "name": "every particle kept", "passed": seen == 1422,
+            "seen": str(seen), "limit": "1422"}  # fmt: skip
 
 
 def estimate(value: float | None) -> dict[str, float | None]:

@@ -16,7 +16,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.contact_law.hertz import contact_time, effective_modulus
+from dragchain.contact_law.hertz import Elastic, contact_time, effective_modulus
 from dragchain.errors import TableError
 from dragchain.run.case import Case
 from dragchain.run.kinematics import motion_of
@@ -113,7 +113,7 @@ def surfaces(case: Case) -> Surfaces:
         raise TableError(f"case.json has no inputs.pairs.{particle}-{workpiece}.friction")
     names = ("youngs_modulus_pa", "poissons_ratio")
     materials = [
-        {name: _number(case, f"materials.{material}.{name}") for name in names}
+        Elastic(*(_number(case, f"materials.{material}.{name}") for name in names))
         for material in (particle, workpiece)
     ]
     modulus = case.fidelity.youngs_modulus_scale * effective_modulus(*materials)

@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from dragchain.errors import TableError
-from dragchain.run.case import Case
+from dragchain.run.case import AdvisedSettings, Case, changed_inputs
+from dragchain.run.completeness import RunRecord
 
 SCHEMA = 2
 
@@ -32,7 +33,9 @@ class CostRow:
     ----------
     scene : str
     steps, actual_steps : int
-    steps_per_s, actual_steps_per_s : float
+    steps_per_s : float
+    actual_steps_per_s : float or None
+        None for a run too short to measure it.
     wall_time_s, actual_wall_time_s : float
     """
 
@@ -40,7 +43,7 @@ class CostRow:
     steps: int
     actual_steps: int
     steps_per_s: float
-    actual_steps_per_s: float
+    actual_steps_per_s: float | None
     wall_time_s: float
     actual_wall_time_s: float
 
@@ -77,10 +80,10 @@ def _is_of(case: Case, option: Entry) -> bool:
     settings, fidelity = option["settings"], case.fidelity
     names = ("youngs_modulus_scale", "timestep_fraction", "speed_factor", "ranks")
     same = all(math.isclose(settings[name], getattr(fidelity, name)) for name in names)
-    return same and option["inputs"] == dict(case.inputs)
+    return same and not changed_inputs(case.inputs, option["inputs"])
 
 
-def cost_rows(option: Entry, records: Mapping[str, Entry]) -> Iterator[CostRow]:
+def cost_rows(option: Entry, records: Mapping[str, RunRecord]) -> Iterator[CostRow]:
     """Predicted and actual cost of every run that the option says something of.
 
     Parameters
@@ -95,20 +98,20 @@ def cost_rows(option: Entry, records: Mapping[str, Entry]) -> Iterator[CostRow]:
             yield CostRow(
                 scene,
                 steps,
-                record["steps"],
+                record.steps,
                 option["steps_per_s"][scene],
-                record["steps_per_s"],
+                record.steps_per_s,
                 option["wall_time_s"][scene],
-                record["wall_time_s"],
+                record.wall_time_s,
             )
 
 
-def actual_interval(asked: Entry, forces: Entry) -> dict[str, float] | None:
+def actual_interval(asked: AdvisedSettings, forces: Entry) -> dict[str, float] | None:
     """Mean and 95 % interval of the quantity asked about, N, and its relative half-width.
 
     None where a single run has no interval of it.
     """
-    name = INTERVALS.get(asked["quantity"])
+    name = INTERVALS.get(asked.quantity)
     if name is None or not forces[name]["mean"]:
         return None
     mean, low, high = (float(forces[name][key]) for key in ("mean", "ci95_low", "ci95_high"))

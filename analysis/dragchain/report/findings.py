@@ -25,6 +25,7 @@ from dragchain.run.reference import ReferenceDrag, reference_drags
 from dragchain.statistics.association import association, near_any
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, estimate_columns, finite
+from dragchain.tables.bed import Packing
 from dragchain.tables.by_step import read_table
 from dragchain.tables.impacts import effective_restitution
 
@@ -237,13 +238,9 @@ def _frame_numbers(run_dir: Path, samples: pd.DataFrame, steps: Ints) -> tuple[I
 
 
 def _filling(run_dir: Path, case: Case) -> Findings:
-    file = run_dir / "tables" / "packing.json"
-    if not file.is_file():
-        raise TableError(f"{file}: there is no such file; run `dragchain tables` first")
-    bed: Findings = json.loads(file.read_text(encoding="utf-8"))
-    content: Findings = json.loads((run_dir / "case.json").read_text(encoding="utf-8"))
-    settled = content.get("settled")
-    return {"bed": bed, "rest_energy_ratio": settled["energy_ratio"] if settled else None}
+    bed = Packing.read(run_dir / "tables" / "packing.json").model_dump(exclude={"version"})
+    settled = case.settled
+    return {"bed": bed, "rest_energy_ratio": settled.energy_ratio if settled else None}
 
 
 def _drop(run_dir: Path, case: Case) -> Findings:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
-from dragchain.errors import RejectedRunError, TableError
+from dragchain.errors import TableError
 from dragchain.loading.write import FILE as REMOVAL
 from dragchain.loading.write import read_loading
 from dragchain.report.cost_check import (
@@ -23,7 +22,7 @@ from dragchain.report.cost_check import (
 from dragchain.report.findings import Findings, read_findings
 from dragchain.report.page import data_uri, file_uri, render_page
 from dragchain.run.case import Assumption, Case, Scene, load_case
-from dragchain.run.completeness import refusal
+from dragchain.run.completeness import RunRecord, read_accepted
 from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.tables.parquet import write_parquet
 
@@ -63,7 +62,7 @@ class Run:
     folder: Path
     case: Case
     findings: Findings
-    record: Mapping[str, Any]
+    record: RunRecord
 
 
 @dataclass(frozen=True)
@@ -141,14 +140,7 @@ def read_run(run_dir: Path) -> Run:
         If ``run.json`` is missing, or says that the run did not end or that an acceptance check
         failed.
     """
-    file = run_dir / "run.json"
-    if not file.is_file():
-        raise RejectedRunError(
-            f"{file}: there is no such file, so nothing says that the run is complete"
-        )
-    record: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    if (reason := refusal(record)) is not None:
-        raise RejectedRunError(f"{run_dir} is refused: {reason}")
+    record = read_accepted(run_dir)
     return Run(run_dir, load_case(run_dir), read_findings(run_dir), record)
 
 
@@ -165,10 +157,10 @@ def summary_row(study: Study) -> dict[str, object]:
         **{input_column(name): _plain(value) for name, value in case.inputs.items()},
         **{f"fidelity_{name}": value for name, value in vars(case.fidelity).items()},
         "timestep_s": case.timestep_s,
-        "ranks": record["ranks"],
-        "steps_per_s": record["steps_per_s"],
-        "wall_time_s": record["wall_time_s"],
-        "engine_version": record["engine_version"],
+        "ranks": record.ranks,
+        "steps_per_s": record.steps_per_s,
+        "wall_time_s": record.wall_time_s,
+        "engine_version": record.engine_version,
         **_force_columns(found["forces"]),
         **_comparison_columns(found["comparison"]),
         "peak_count": found["peaks"]["count"],

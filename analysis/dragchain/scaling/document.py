@@ -10,7 +10,7 @@ from pydantic import Field
 from dragchain.documents import Document, Part
 from dragchain.run.case import Fidelity
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
-from dragchain.statistics.power_law import TwoTerms
+from dragchain.statistics.power_law_forms import TwoTerms
 
 Verdict = Literal["agrees", "deviates", "no expectation"]
 

@@ -12,10 +12,10 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from dragchain.documents import Document
 from dragchain.figures.style import STYLE, png
 from dragchain.files import write_bytes, write_text
 from dragchain.report.page import page_environment
+from dragchain.run.completeness import RunRecord
 from dragchain.scaling.document import (
     BandPoint,
     CurvePoint,
@@ -34,10 +34,9 @@ from dragchain.statistics.power_law import (
     Runs,
     estimate_scatter,
     fit_power_law,
-    fit_shifted,
-    fit_two_terms,
     solve,
 )
+from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
 
 STORED = Path(__file__).parent / "data"
 """The scalings that were measured for the documentation."""
@@ -49,14 +48,6 @@ SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particl
 """Numbers of the scene that a scaling reports."""
 
 CURVE_POINTS = 41
-
-
-class _RunRecord(Document):
-    """What is read of ``run.json``."""
-
-    started: str
-    engine_version: str
-    cpu_time_s: float | None = None
 
 
 def find(
@@ -89,7 +80,7 @@ def find(
     power = expected.exponent or 0.0
     first = runs[0].case
     files = [folder / "run.json" for folder in run_dirs]
-    records = [_RunRecord.read(file) for file in files if file.is_file()]
+    records = [RunRecord.read(file) for file in files if file.is_file()]
     return ScalingFile(
         study=first.study,
         field=field,
@@ -112,7 +103,7 @@ def find(
         commands=tuple(commands),
         started=min((record.started for record in records), default=None),
         engine=records[0].engine_version if records else None,
-        cpu_time_s=sum(record.cpu_time_s or 0.0 for record in records) if records else None,
+        cpu_time_s=sum(record.cpu_time_s for record in records) if records else None,
     )
 
 

@@ -11,6 +11,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from dragchain.run.completeness import AcceptanceCheck, CheckCode
+
 STABLE, INACCURATE, ENERGY = "stable", "inaccurate", "energy gained"
 LOST, OVERLAP, REFUSED = "particles lost", "overlap too large", "engine refused"
 CLASSES = (STABLE, INACCURATE, OVERLAP, ENERGY, LOST, REFUSED)
@@ -83,8 +85,8 @@ class Seen:
         ``complete``, ``failed`` or ``refused``.
     steps : int
         Steps that the engine made.
-    failed : mapping of str to str
-        Names of the acceptance checks that did not hold, and what they saw.
+    failed : sequence of AcceptanceCheck
+        The acceptance checks that did not pass.
     refused : str, optional
         Why no deck could be written.
     energy_ratio, overlap_ratio : float, optional
@@ -95,11 +97,15 @@ class Seen:
     regime: str
     state: str
     steps: int = 0
-    failed: Mapping[str, str] = field(default_factory=dict)
+    failed: Sequence[AcceptanceCheck] = ()
     refused: str | None = None
     energy_ratio: float | None = None
     overlap_ratio: float | None = None
     errors: Mapping[str, Error] = field(default_factory=dict)
+
+    def failed_check(self, code: CheckCode) -> AcceptanceCheck | None:
+        """The check of this code, if it did not pass."""
+        return next((check for check in self.failed if check.code == code), None)
 
 
 def classify(seen: Seen) -> tuple[str, str]:
@@ -131,27 +137,28 @@ _OF_JUDGE = {
 def _refused(seen: Seen) -> str | None:
     if seen.refused is not None:
         return seen.refused.replace("\n", " ")
-    error = seen.failed.get("no engine error")
-    return error if error is not None and seen.steps == 0 and "ost atoms" not in error else None
+    error = seen.failed_check("no_engine_error")
+    refused = error is not None and seen.steps == 0 and error.reason != "lost_particles"
+    return error.seen if error is not None and refused else None
 
 
 def _lost(seen: Seen) -> str | None:
-    error = seen.failed.get("no engine error", "")
-    if "ost atoms" in error:
-        return error
-    limit = seen.failed.get("within its limits", "")
-    if " particles at step" in limit:
-        return f"stopped early: {limit}"
-    return seen.failed.get("every particle kept")
+    error, limit = seen.failed_check("no_engine_error"), seen.failed_check("within_limits")
+    if error is not None and error.reason == "lost_particles":
+        return error.seen
+    if limit is not None and limit.reason == "particles":
+        return f"stopped early: {limit.seen}"
+    kept = seen.failed_check("particles_kept")
+    return None if kept is None else kept.seen
 
 
 def _gained(seen: Seen) -> str | None:
-    if "within its limits" in seen.failed:
-        return f"stopped early: {seen.failed['within its limits']}"
-    if "finite numbers" in seen.failed:
+    if (past := seen.failed_check("within_limits")) is not None:
+        return f"stopped early: {past.seen}"
+    if seen.failed_check("finite_numbers") is not None:
         return "numbers that are not finite"
-    if "bed at rest" in seen.failed:
-        return f"the bed does not come to rest: {seen.failed['bed at rest']}"
+    if (restless := seen.failed_check("at_rest")) is not None:
+        return f"the bed does not come to rest: {restless.seen}"
     limit = ENERGY_LIMITS[seen.regime]
     if seen.energy_ratio is None or seen.energy_ratio <= limit:
         return None
@@ -166,7 +173,7 @@ def _overlapping(seen: Seen) -> str | None:
 
 def _inaccurate(seen: Seen) -> str | None:
     if seen.failed:
-        return "; ".join(f"{name}: {saw}" for name, saw in seen.failed.items())
+        return "; ".join(f"{check.name}: {check.seen}" for check in seen.failed)
     for name, error in seen.errors.items():
         if error.surely > TOLERANCE:
             return f"error of the {name} {error.value:+.3g} (tolerance {TOLERANCE:g})"

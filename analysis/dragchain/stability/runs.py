@@ -25,6 +25,7 @@ from dragchain.network.critical_timestep import (
     largest_frequency,
 )
 from dragchain.run.case import load_outputs
+from dragchain.run.completeness import RunRecord
 from dragchain.run.kinematics import drag_phase, needed
 from dragchain.stability.classes import CONFIDENCE_SCORES, REST_FLOOR, Error, Seen, classify
 from dragchain.statistics.correlated import estimate_mean
@@ -233,8 +234,10 @@ def measure(point: PointRun) -> Numbers | None:
     A run that only built its neighbour lists too late has numbers too: its energy counts.
     """
     state = _state(point)
-    failed = {check["name"] for check in state.get("checks", []) if not check["passed"]}
-    if state["state"] != "complete" and failed != {"no dangerous neighbour builds"}:
+    if state is None:
+        return None
+    failed = {check.code for check in state.failed_checks}
+    if not state.complete and failed != {"neighbour_builds"}:
         return None
     measured = {
         "impact": _measure_impact,
@@ -245,12 +248,13 @@ def measure(point: PointRun) -> Numbers | None:
     return measured
 
 
-def _state(point: PointRun) -> dict[str, Any]:
+def _state(point: PointRun) -> RunRecord | None:
+    """How the run ended; None of a point that no deck could be written for."""
     file = point.folder / "state.json"
     if not file.is_file():
-        return {"state": "refused"}
-    state = _json(file)
-    if state["state"] in ("running", "stopped"):
+        return None
+    state = RunRecord.read(file)
+    if state.state in ("running", "stopped"):
         raise TableError(
             f"{point.folder}: this run was interrupted; run `dragdeck stability` once more"
         )
@@ -260,16 +264,12 @@ def _state(point: PointRun) -> dict[str, Any]:
 def _seen(point: PointRun, numbers: Numbers | None, reference: Numbers | None) -> Seen:
     """What classifies a point."""
     state = _state(point)
-    failed = {
-        check["name"]: check["seen"] for check in state.get("checks", []) if not check["passed"]
-    }
-    parts = state.get("parts", [])
     energy = _energy_ratio(point.regime, numbers, reference) if numbers else None
     return Seen(
         regime=point.regime,
-        state=state["state"],
-        steps=int(parts[-1].get("to_step") or 0) if parts else 0,
-        failed=failed,
+        state=state.state if state else "refused",
+        steps=state.last_step if state else 0,
+        failed=state.failed_checks if state else (),
         refused=point.row["refused"],
         energy_ratio=energy,
         overlap_ratio=numbers.get("overlap_ratio") if numbers else None,

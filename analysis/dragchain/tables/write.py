@@ -311,7 +311,7 @@ def _write_filling(run: Run, file: Path) -> None:
     last = deque(run.frames("particles"), maxlen=1)
     if not last:
         raise TableError(f"{run.folder}: particles holds no frames")
-    write_json(file, describe_bed(last[0], run.case))
+    describe_bed(last[0], run.case).write(file)
 
 
 _Writer = Callable[[Run, Path], None]

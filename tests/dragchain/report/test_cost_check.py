@@ -13,7 +13,8 @@ from report_files import PICTURES, case_json, make_run, page_of, process_finding
 from dragchain.errors import TableError
 from dragchain.report.cost_check import actual_interval, cost_rows, prediction_for, read_advice
 from dragchain.report.study_report import write_report
-from dragchain.run.case import Case
+from dragchain.run.case import AdvisedSettings, Case
+from dragchain.run.completeness import RunRecord
 
 ASKED = {
     "tolerance": 0.05, "quantity": "drag_mean", "label": "mean drag", "held_to": 0.025,
@@ -21,6 +22,9 @@ ASKED = {
     "half_width": 0.03, "outside": ["depth over particle diameter 3 is outside of 6 to 8"],
     "fallback": None, "source": "measured 2026-01-02 on small, plan made",
 }  # fmt: skip
+
+
+RECORD = RunRecord.model_validate(run_json())
 
 
 def option(**more: Any) -> dict[str, Any]:
@@ -87,21 +91,22 @@ def test_a_prediction_of_other_settings_is_not_compared(run: Path, other: dict[s
 
 
 def test_only_scenes_that_were_run_and_predicted_have_a_row() -> None:
-    (row,) = cost_rows(option(), {"process": run_json(), "drop_test": run_json()})
+    (row,) = cost_rows(option(), {"process": RECORD, "drop_test": RECORD})
     assert (row.scene, row.steps, row.actual_steps) == ("process", 150_000, 160_000)
     assert row.ratio == pytest.approx(76 / 50)
 
 
 def test_the_interval_of_a_run_is_that_of_the_asked_force() -> None:
     forces = process_findings()["forces"]
-    found = actual_interval(ASKED, forces)
+    other = ASKED | {"quantity": "chain_count"}
+    found = actual_interval(AdvisedSettings(**ASKED), forces)
     assert found == {
         "mean": -2.5,
         "ci95_low": -2.6,
         "ci95_high": -2.4,
         "fraction": pytest.approx(0.04),
     }
-    assert actual_interval(ASKED | {"quantity": "chain_count"}, forces) is None
+    assert actual_interval(AdvisedSettings(**other), forces) is None
 
 
 def test_a_missing_or_foreign_advice_is_refused(tmp_path: Path) -> None:

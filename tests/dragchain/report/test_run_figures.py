@@ -285,9 +285,13 @@ def filling(tmp_path: Path) -> Path:
     content["settled"] = {"energy_ratio": 1e-5}
     (tmp_path / "case.json").write_text(json.dumps(content))
     bed = {
+        "schema": 2,
         "bed_height_m": 0.07,
+        "top_m": 0.075,
         "solid_fraction": 0.59,
         "n_particles": 3,
+        "radius_mean_m": 0.003,
+        "radius_std_m": 0.0,
         "kinetic_energy_ratio": 1e-7,
     }
     (tmp_path / "tables").mkdir()

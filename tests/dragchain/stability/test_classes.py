@@ -15,6 +15,7 @@ from pages import stands_alone
 from paths import DATA, ROOT
 
 from dragchain.cli import main as dragchain
+from dragchain.run.completeness import AcceptanceCheck, CheckCode, CheckReason
 from dragchain.stability.classes import (
     ENERGY,
     ENERGY_LIMITS,
@@ -41,11 +42,12 @@ def seen(**changes: Any) -> Seen:
     return Seen(**{"regime": "impact", "state": "complete", "steps": 1000, **changes})
 
 
-def failed(**checks: str) -> Seen:
-    names = {"error": "no engine error", "kept": "every particle kept",
-    "limits": "within its limits",
-             "rest": "bed at rest", "lists": "no dangerous neighbour builds"}  # fmt: skip
-    return seen(state="failed", failed={names[name]: saw for name, saw in checks.items()})
+def check(code: CheckCode, saw: str = "", reason: CheckReason | None = None) -> AcceptanceCheck:
+    return AcceptanceCheck(code=code, reason=reason, name=code, passed=False, seen=saw, limit="")
+
+
+def failed(*checks: AcceptanceCheck, **changes: Any) -> Seen:
+    return seen(state="failed", failed=checks, **changes)
 
 
 @pytest.mark.parametrize(
@@ -63,11 +65,13 @@ def failed(**checks: str) -> Seen:
         (seen(errors={"mean drag": Error(0.3, 0.06, 0.54)}), INACCURATE),
         (seen(errors={"mean drag": Error(0.3, -math.inf, math.inf)}), STABLE),
         (seen(state="refused", steps=0, refused="too soft"), REFUSED),
-        (failed(error="ERROR: Lost atoms: original 300 current 12", kept="12"), LOST),
-        (failed(limits="12 particles at step 40"), LOST),
-        (failed(limits="a mean kinetic energy of 9 J a particle at step 40"), ENERGY),
-        (failed(rest="NOT SETTLED: energy ratio 1e-3 after 3 s"), ENERGY),
-        (failed(lists="12"), INACCURATE),
+        (failed(check("no_engine_error", reason="lost_particles")), LOST),
+        (failed(check("no_engine_error", reason="lost_particles"), steps=0), LOST),
+        (failed(check("particles_kept", "12")), LOST),
+        (failed(check("within_limits", reason="particles")), LOST),
+        (failed(check("within_limits", reason="energy")), ENERGY),
+        (failed(check("at_rest")), ENERGY),
+        (failed(check("neighbour_builds")), INACCURATE),
     ],
 )
 def test_classes(point: Seen, kind: str) -> None:
@@ -76,9 +80,7 @@ def test_classes(point: Seen, kind: str) -> None:
 
 def test_an_error_before_the_first_step_is_a_refusal_with_its_text() -> None:
     text = "ERROR: 0.05 < coefficientRestitution <= 1 required"
-    point = seen(
-        state="failed", steps=0, failed={"no engine error": text, "every particle kept": "0"}
-    )
+    point = failed(check("no_engine_error", text, "other"), check("particles_kept", "0"), steps=0)
     assert classify(point) == (REFUSED, text)
 
 

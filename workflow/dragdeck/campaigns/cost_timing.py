@@ -436,6 +436,8 @@ def _cost(variant: Variant, rows: Sequence[Row], steps_s: Mapping[str, float]) -
         "what": variant.what,
         "against": BASES[variant.base].what,
         "unit": variant.unit,
+        "parameter": variant.parameter,
+        "level": variant.level,
         **_scaled(cpu, factor),
         "per_step": cpu.ratio,
         "per_second": cpu.ratio * steps_per_second,

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import jinja2
 
-from dragdeck.advice.forecast import SCALE, Speed
+from dragdeck.advice.speed import SCALE, Speed
 from dragdeck.campaigns.stability_map import tabulate
 from dragdeck.cases.bed import bed_rayleigh_time
 from dragdeck.cases.case import Case

@@ -12,7 +12,7 @@ from dragdeck.decks.outputs import Output
 from dragdeck.mesh import Mesh
 from dragdeck.physics.domain_split import ENGINE_CHOOSES
 from dragdeck.physics.engine_limits import ENGINE_HARD_PA
-from dragdeck.study.contact_law import Pair, contact_model, present
+from dragdeck.study.contact_law import Pair, contact_model, contact_settings, present
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,25 @@ class PairTable:
 
 
 @dataclass(frozen=True)
+class ContactLaw:
+    """The contact law of particles and walls alike, as LIGGGHTS writes it.
+
+    Attributes
+    ----------
+    tables : sequence of PairTable
+        The coefficients that some pair has.
+    model : str
+        Models and their names.
+    settings : sequence of str
+        Options that follow the models.
+    """
+
+    tables: Sequence[PairTable]
+    model: str
+    settings: Sequence[str]
+
+
+@dataclass(frozen=True)
 class Materials:
     """Material constants and the contact law, as LIGGGHTS wants them.
 
@@ -34,27 +53,23 @@ class Materials:
         The material of each type, in LIGGGHTS's order; the particles are first.
     youngs_moduli_pa, poissons_ratios : sequence of float
         One per type.
-    pair_tables : sequence of PairTable
-        The coefficients that some pair has.
-    contact_model : str
-        For particles and walls alike.
+    law : ContactLaw
     """
 
     names: Sequence[str]
     youngs_moduli_pa: Sequence[float]
     poissons_ratios: Sequence[float]
-    pair_tables: Sequence[PairTable]
-    contact_model: str
+    law: ContactLaw
 
 
-def contact_law(pairs: Sequence[Sequence[Pair]]) -> tuple[list[PairTable], str]:
-    """Pair tables and contact model of a square table of pairs."""
+def contact_law(pairs: Sequence[Sequence[Pair]]) -> ContactLaw:
+    """The contact law of a square table of pairs: a row and a column for each type."""
     every = [pair for row in pairs for pair in row]
     tables = [
         PairTable(name, row.engine, [getattr(pair, name) for pair in every])
         for name, row in present(every).items()
     ]
-    return tables, contact_model(every)
+    return ContactLaw(tables, contact_model(every), contact_settings(every))
 
 
 @dataclass(frozen=True, kw_only=True)
