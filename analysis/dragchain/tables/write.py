@@ -304,7 +304,8 @@ def _write_impacts(run: Run, file: Path) -> None:
         raise TableError(f"{run.folder}: impacts holds no samples")
     rows = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
     with TableWriter(file, IMPACTS) as table:
-        table.write(find_impacts(rows, run.case.timestep_s))
+        radius, gravity = run.case.media.radius_mean_m, run.case.gravity_m_s2
+        table.write(find_impacts(rows, run.case.timestep_s, radius, gravity))
 
 
 def _write_filling(run: Run, file: Path) -> None:
