@@ -22,6 +22,7 @@ from dragchain.errors import TableError
 from dragchain.files import write_json
 from dragchain.network.write import write_chains
 from dragchain.run.case import Case, load_case
+from dragchain.run.completeness import RunRecord
 from dragchain.run.kinematics import drag_phase
 from dragchain.tables.by_step import read_groups, read_table
 from dragchain.tables.write import write_tables
@@ -110,7 +111,7 @@ def write_measures(run_dir: Path, packing_table: Path) -> dict[str, Any]:
     file = run_dir / "outcome.json"
     if not file.is_file():
         raise TableError(f"{file} is not there: `dragdeck run --outcome` writes it")
-    outcome = json.loads(file.read_text(encoding="utf-8"))
+    outcome = RunRecord.read(file)
     case = load_case(run_dir)
     measures = {
         "schema": SCHEMA,
@@ -120,18 +121,18 @@ def write_measures(run_dir: Path, packing_table: Path) -> dict[str, Any]:
         "inputs": dict(case.inputs),
         "fidelity": vars(case.fidelity),
         "numbers": dict(case.numbers),
-        "asked": case.asked,
-        "complete": outcome["state"] == "complete",
+        "asked": case.asked and case.asked.model_dump(mode="json"),
+        "complete": outcome.complete,
         "cost": _cost(case, outcome),
-        "versions": {**case.versions, "engine": outcome["engine_version"]},
-        "started": outcome["started"],
+        "versions": {**case.versions, "engine": outcome.engine_version},
+        "started": outcome.started,
     }
     if measures["complete"]:
         write_tables(run_dir)
         write_chains(run_dir)
         measures |= measure(run_dir, case, json.loads(packing_table.read_text(encoding="utf-8")))
     else:
-        measures["failure"] = [check for check in outcome["checks"] if not check["passed"]]
+        measures["failure"] = [check.model_dump() for check in outcome.failed_checks]
     write_json(run_dir / FILE, measures)
     return measures
 
@@ -174,16 +175,15 @@ def _listed(values: Floats) -> list[float | None]:
     return [float(value) if math.isfinite(value) else None for value in values]
 
 
-def _cost(case: Case, outcome: Mapping[str, Any]) -> dict[str, Any]:
+def _cost(case: Case, outcome: RunRecord) -> dict[str, Any]:
     """What a run cost; a run without its processor time counts its wall time on every rank."""
-    wall, ranks = outcome["wall_time_s"], outcome["ranks"]
     motion = case.motion
     assert motion is not None
     return {
-        "steps": outcome["steps"],
-        "wall_time_s": wall,
-        "cpu_time_s": outcome.get("cpu_time_s") or wall * ranks,
-        "ranks": ranks,
+        "steps": outcome.steps,
+        "wall_time_s": outcome.wall_time_s,
+        "cpu_time_s": outcome.processor_time_s,
+        "ranks": outcome.ranks,
         "timestep_s": case.timestep_s,
         "axis_speed_m_s": motion.axis_speed_m_s,
         "steps_per_m": 1.0 / (motion.axis_speed_m_s * case.timestep_s),

@@ -111,10 +111,25 @@ def test_a_run_by_hand(tiny_run: Path) -> None:
 
 def test_a_failed_run_says_only_how_it_failed(tiny_run: Path) -> None:
     checks = [
-        {"name": "every particle kept", "passed": False, "seen": "3 particles", "limit": "4"},
-        {"name": "finite numbers", "passed": True, "seen": "all", "limit": "no NaN"},
+        {
+            "code": "particles_kept",
+            "reason": None,
+            "name": "every particle kept",
+            "passed": False,
+            "seen": "3 particles",
+            "limit": "4",
+        },
+        {
+            "code": "finite_numbers",
+            "reason": None,
+            "name": "finite numbers",
+            "passed": True,
+            "seen": "all",
+            "limit": "no NaN",
+        },
     ]
     outcome = {
+        "schema": 2,
         "state": "failed", "checks": checks, "steps": 50, "wall_time_s": 2.0, "ranks": 2,
         "engine_version": "3.8.0", "started": "2026-01-01T00:00:00+00:00",
     }  # fmt: skip

@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy import stats
 
-from dragdeck.campaigns.cost_variants import BASES, SceneName, Unit, Variant
+from dragdeck.campaigns.cost_variants import BASES, SceneName, Variant
 from dragdeck.documents import Document, Part
+from dragdeck.outlook.measured import MeasuredCost
 from dragdeck.study.model import Fidelity
 
 
@@ -75,23 +76,20 @@ class Ratio(Part):
         return Ratio(**values)
 
 
-class Cost(Ratio):
+class Cost(MeasuredCost):
     """The cost of a variant.
 
     Attributes
     ----------
     ratio, ci95_low, ci95_high, wall_ratio : float
         Count what `unit` says.
+    against : str
+        What it is compared with.
     per_step, per_second : float
         The same ratio in both units.
     """
 
-    name: str
-    scene: SceneName
-    what: str
     against: str
-    unit: Unit
-    per_step: float
     per_second: float
     wall_ratio: float
     rounds: int
@@ -175,6 +173,8 @@ def cost(variant: Variant, rows: Sequence[TimedVariant], steps_s: Mapping[str, f
         what=variant.what,
         against=BASES[variant.base].what,
         unit=variant.unit,
+        parameter=variant.parameter,
+        level=variant.level,
         per_step=cpu.ratio,
         per_second=cpu.ratio * steps_per_second,
         wall_ratio=wall.ratio * factor,

@@ -20,6 +20,7 @@ from dragdeck.campaigns.cost_decks import (
     without_frames,
 )
 from dragdeck.cases.case import Case
+from dragdeck.outlook.measured import FidelityParameters
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
 from dragdeck.scenes.process import ProcessDeck, process_scene
 from dragdeck.study.model import CylinderShape, Study
@@ -64,6 +65,18 @@ class Variant:
     def scene(self) -> SceneName:
         """Scene of its deck."""
         return SCENE_OF_BASE[self.base]
+
+    @property
+    def parameter(self) -> str | None:
+        """The fidelity parameter that is all its change, if it is one."""
+        changed = [name.removeprefix("fidelity.") for name in self.fields]
+        alone = len(changed) == 1 and self.change is unchanged
+        return changed[0] if alone and changed[0] in FidelityParameters.model_fields else None
+
+    @property
+    def level(self) -> float | None:
+        """The value of that parameter."""
+        return float(self.fields[f"fidelity.{self.parameter}"]) if self.parameter else None
 
 
 SCENE_OF_BASE: Mapping[str, SceneName] = {

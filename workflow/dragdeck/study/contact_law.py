@@ -65,6 +65,13 @@ class Pair(Model):
         Field(ge=0, le=10, description="Coulomb friction coefficient, dimensionless"),
         Coefficient("coefficientFriction", "friction"),
     ]
+    rolling_friction: Annotated[
+        Number,
+        Field(ge=0, le=10, description="rolling friction coefficient: largest rolling torque over "
+              "normal force and effective radius, dimensionless"),
+        Coefficient("coefficientRollingFriction", "rolling friction", "rolling_friction epsd2",
+                    "torsionTorque on"),
+    ] = 0.0  # fmt: skip
 
     def absent(self) -> set[str]:
         """Coefficients at their default."""
