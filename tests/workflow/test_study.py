@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -29,9 +30,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("project")
     for name in ("workflow", "analysis", "meshes", "profiles", "Snakefile"):
         (folder / name).symlink_to(ROOT / name)
-    (folder / "templates").mkdir()
-    for file in (ROOT / "templates").iterdir():
-        (folder / "templates" / file.name).write_bytes(file.read_bytes())
+    shutil.copytree(ROOT / "templates", folder / "templates")
     data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
     data["sweep"] = {"motion.immersion_depth_m": [0.012, 0.016]}
     (folder / "studies/small").mkdir(parents=True)

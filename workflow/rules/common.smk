@@ -11,7 +11,7 @@ from dragdeck.campaigns.stability_map import bed_names
 from dragdeck.campaigns.verification.suite import suite_of
 from dragdeck.decks.render import environment, template_files
 from dragdeck.errors import DragdeckError
-from dragdeck.outlook.timestep import largest_fraction
+from dragdeck.outlook.timestep import largest_of_case
 from dragdeck.project import PLACES, POINTS, Project, by_run, run_path, study_templates
 from dragdeck.scenes.registry import SCENES
 from dragdeck.source_hash import source_hash

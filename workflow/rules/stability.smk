@@ -10,10 +10,14 @@ def stability_templates():
     return [str(file.relative_to(PROJECT.root)) for file in files]
 
 
-STABILITY_BEDS = [
-    run_path("stability", "filling", bed)
-    for bed in explained(bed_names, PROJECT.root / STABILITY_MAP)
-]
+def stability_beds():
+    """Folders of the fillings that columns and drags start from; none without a map."""
+    file = PROJECT.root / STABILITY_MAP
+    names = explained(bed_names, file) if file.is_file() else []
+    return [run_path("stability", "filling", name) for name in names]
+
+
+STABILITY_BEDS = stability_beds()
 
 
 def beds_of_regime(wildcards):

@@ -12,12 +12,6 @@ def every_drop_point(file):
     return [f"{run_path(STUDY, 'drop_test', run)}/{file}" for run in points_by_run("drop_test")]
 
 
-def safe_step(case):
-    """Largest step of a process over the Rayleigh time that is known to be safe."""
-    lowest = min(pair.restitution for pair in case.study.pairs.values())
-    return largest_fraction(SCENES["process"], lowest)
-
-
 def packings_of_costs(wildcards):
     """The settled beds that the timing of the costs starts from."""
     beds = (run_path(STUDY, "filling", run) for run in fillings_of_costs())
@@ -81,7 +75,7 @@ rule write_tradeoff:
         promises=promises_option,
         plan=Path(PLAN).stem,
         command=f"snakemake tradeoff --config study={STUDY} plan={PLAN}",
-        largest_step=lambda wildcards: safe_step(CASES[0]),
+        largest_step=lambda wildcards: largest_of_case(CASES[0], SCENES["process"]),
         source=source_hash("dragchain.tradeoff.report"),
     shell:
         "dragchain step tradeoff --out $(dirname {output.page}) --plan {params.plan}"

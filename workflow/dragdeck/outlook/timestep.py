@@ -192,6 +192,12 @@ def largest_fraction(regime: Regime, lowest_restitution: float) -> float:
     return float(measured()["safety_factor"]) * _regime_fraction(regime, lowest_restitution)
 
 
+def largest_of_case(case: Case, kind: SceneType) -> float:
+    """`largest_fraction` of a case's run of a scene."""
+    lowest = min(pair.restitution for pair in case.study.pairs.values())
+    return largest_fraction(kind.regime, lowest)
+
+
 def notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:
     """What ``check`` and ``explain`` say of a scene's time step: a heading and a text each."""
     step = scene.deck.timestep_s
