@@ -60,6 +60,10 @@ class Estimate:
         """Whether a value is within the interval."""
         return self.ci95_low <= value <= self.ci95_high
 
+    def over(self, size: float) -> Estimate:
+        """The estimate divided by a positive number."""
+        return Estimate(self.value / size, self.ci95_low / size, self.ci95_high / size)
+
     def exp(self, factor: float = 1.0, minus: float = 0.0) -> Estimate:
         """The estimate of ``exp(factor * x) - minus``, for a positive factor."""
         low, value, high = (
