@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
 from dragchain.errors import TableError
 from dragchain.figures.style import drawing, png
+from dragchain.loading.document import Loading
 from dragchain.loading.write import FILE as LOADING
 from dragchain.loading.write import read_loading
 from dragchain.report.bundle import write_bundle
@@ -54,7 +54,7 @@ class Section:
     study: StudyRuns
     assumptions: list[Assumption]
     pictures: list[Picture]
-    loading: Mapping[str, Any] | None
+    loading: Loading | None
     interval: RunInterval | None
     costs: list[CostRow]
     cost_source: str | None

@@ -6,8 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
-from dragchain.documents import Document, Part
-from dragchain.loading.write import FILE
+from dragchain.documents import Part
+from dragchain.loading.contact_events import Thresholds
+from dragchain.loading.document import ContactType, Loading
+from dragchain.loading.write import read_loading
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.validation.runs_by_bed import Point, over_packings
@@ -21,56 +23,6 @@ PER_METRE = {
 """Amounts per metre of path, each with its unit."""
 
 SHARES = ("events", "normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
-
-
-class ContactType(Part):
-    """What is read of a type of contact event: its fractions of the amounts."""
-
-    fraction_of: Mapping[str, Estimate]
-
-
-class Limits(Part):
-    """What is read of the limits between the types: see `loading.contact_events.Thresholds`."""
-
-    impact_times: float
-    rest: float
-
-
-class Closure(Part):
-    """What is read of how the sums agree."""
-
-    facets_relative_error: float
-
-
-class Loading(Document):
-    """What a validation reads of a run's ``loading.json``."""
-
-    made_by = "dragchain loading"
-
-    sample_interval_s: float
-    limits: Limits
-    per_metre: Mapping[str, Estimate]
-    front_fraction: Mapping[str, Estimate]
-    friction_fraction_of_work: Estimate
-    load_while_sliding_fraction: Estimate
-    mean_contacts: Estimate
-    types: Mapping[str, ContactType]
-    closure: Closure
-
-    def numbers(self) -> dict[tuple[str, str], float]:
-        """The numbers that packings are compared by: name and unit to value."""
-        front = self.front_fraction
-        fractions = {
-            "friction_fraction_of_work": self.friction_fraction_of_work,
-            "front_fraction_normal_impulse": front["normal_impulse_n_s"],
-            "front_fraction_force_slide": front["force_slide_n_m"],
-            "load_while_sliding_fraction": self.load_while_sliding_fraction,
-        }
-        return {
-            ("mean_contacts", ""): self.mean_contacts.value,
-            **{(name, unit): self.per_metre[name].value for name, unit in PER_METRE.items()},
-            **{(name, "%"): 100.0 * one.value for name, one in fractions.items()},
-        }
 
 
 class LoadingRow(Part):
@@ -100,7 +52,7 @@ class LoadingOverPackings(Part):
     rows: tuple[LoadingRow, ...]
     types: Mapping[str, Mapping[str, Estimate]]
     closure: float
-    limits: Limits
+    limits: Thresholds
     sample_interval_s: float
 
 
@@ -112,8 +64,8 @@ def of_packings(packings: Sequence[Point]) -> LoadingOverPackings:
     DocumentError
         If a packing has no ``loading.json``.
     """
-    every = [Loading.read(point.folder / FILE) for point in packings]
-    first, numbers = every[0], [one.numbers() for one in every]
+    every = [read_loading(point.folder) for point in packings]
+    first, numbers = every[0], [_numbers(one) for one in every]
     return LoadingOverPackings(
         rows=tuple(
             LoadingRow(label=key[0], unit=key[1], **vars(over_packings([n[key] for n in numbers])))
@@ -124,6 +76,22 @@ def of_packings(packings: Sequence[Point]) -> LoadingOverPackings:
         limits=first.limits,
         sample_interval_s=first.sample_interval_s,
     )
+
+
+def _numbers(loading: Loading) -> dict[tuple[str, str], float]:
+    """The numbers that packings are compared by: name and unit to value."""
+    front = loading.front_fraction
+    fractions = {
+        "friction_fraction_of_work": loading.friction_fraction_of_work,
+        "front_fraction_normal_impulse": front["normal_impulse_n_s"],
+        "front_fraction_force_slide": front["force_slide_n_m"],
+        "load_while_sliding_fraction": loading.load_while_sliding_fraction,
+    }
+    return {
+        ("mean_contacts", ""): loading.mean_contacts.value,
+        **{(name, unit): loading.per_metre[name].value for name, unit in PER_METRE.items()},
+        **{(name, "%"): 100.0 * one.value for name, one in fractions.items()},
+    }
 
 
 def _shares(types: Sequence[ContactType]) -> dict[str, Estimate]:
