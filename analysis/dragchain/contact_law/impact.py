@@ -119,7 +119,7 @@ def largest_overlap(contact: Contact, speed_m_s: float) -> float:
     return float((energy / (16 * contact.modulus_pa * math.sqrt(contact.radius_m))) ** 0.4)
 
 
-def hertz_force(contact: Contact, overlap_m: Floats) -> Floats:
+def hertz_force(contact: Contact, overlap_m: Floats | float) -> Floats:
     """Elastic normal force, N (Johnson 1985, eq. 4.23)."""
     stiffness = 4 / 3 * contact.modulus_pa * np.sqrt(contact.radius_m)
     return np.asarray(stiffness * np.power(overlap_m, 1.5))
