@@ -9,7 +9,8 @@ rule write_validation:
             *(
                 f"validation/{name}.html.j2"
                 for name in ("validation", "peaks/peaks", "scaling", "load")
-            )
+            ),
+            "scaling/words.html.j2",
         ),
     output:
         page=report(

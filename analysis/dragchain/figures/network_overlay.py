@@ -35,7 +35,7 @@ def show_network(
     """
     axes.imshow(image, extent=tuple(extent.tolist()), interpolation="antialiased")
     axes.grid(False)
-    axes.set(xlabel="x in mm", ylabel=f"{view[1]} in mm", xlim=extent[:2], ylim=extent[2:])
+    axes.set(xlabel="x (mm)", ylabel=f"{view[1]} (mm)", xlim=extent[:2], ylim=extent[2:])
     mark_chain(axes, shown, [0, 1] if view == "xy" else [0, 2], width, halo)
     mark_motion(axes, shown, view)
 

@@ -28,9 +28,7 @@ from dragchain.run.workpiece import Surface
 
 COLOURS = "magma_r"
 QUANTITY = "force_slide_pa"
-LABEL = (
-    "normal force times sliding distance, per area of the workpiece\nand metre of its way, in N/m²"
-)
+LABEL = "normal force times sliding distance, per area of the workpiece\nand path length (N/m²)"
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,7 @@ def draw_workpiece(
         if cylinder:
             _unrolled(panels[2], sampled, scale, case)
         _profile(panels[-1], loading.profiles["depth"])
-        panels[0].set_ylabel("depth in mm")
+        panels[0].set_ylabel("depth (mm)")
         panels[0].set_ylim(_depths(case)[::-1])
         bar = figure.colorbar(
             ScalarMappable(scale, COLOURS), ax=panels.tolist(), location="bottom", extend="max",
@@ -131,14 +129,14 @@ def _depths(case: Case) -> tuple[float, float]:
 
 
 def _view(axes: Axes, mesh: Any, eye: Eye, scale: Normalize, case: Case) -> None:
-    """Set a rendered side of the workpiece on axes of width and depth in mm."""
+    """Set a rendered side of the workpiece on axes of width and depth (mm)."""
     image, half = _render(mesh, eye, scale, case), 1e3 * _half_width(case)
     high, low = _depths(case)
     axes.imshow(image, extent=(-half, half, low, high), interpolation="antialiased")
     axes.set_aspect("equal", adjustable="datalim")
     axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle="--")
     axes.grid(False)
-    axes.set(xlabel="width in mm")
+    axes.set(xlabel="width (mm)")
     axes.xaxis.set_major_locator(MaxNLocator(2, integer=True))
     when = eye.motion if _keeps_direction(case) else "(at the start)"
     axes.set_title(f"{eye.label}\n{when}", fontsize=8.5)
@@ -189,7 +187,7 @@ def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> Non
 def _profile(axes: Axes, profile: Profile) -> None:
     """Draw force times sliding distance against depth with its interval."""
     depth_bars(axes, profile.edges, bars_of(profile.force_slide, 1e-3), BLUE)
-    axes.set(xlabel="force times sliding\nin N m per m of way\nand mm of depth", xlim=(0.0, None))
+    axes.set(xlabel="force times sliding per path\nand depth (N m/(m mm))", xlim=(0.0, None))
     axes.set_title("by depth, end included\n(bars: 95 % interval)", fontsize=8.5)
 
 

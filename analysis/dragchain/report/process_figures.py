@@ -41,7 +41,7 @@ def forces(run: RunData, found: ProcessFindings) -> Figure:
     for row, colour in zip(found.comparison, cycle(REFERENCES), strict=False):
         label = f"{row.label} mean {row.mean_n:.2f} N" + _spread(row)
         axes.plot([start, end], [row.mean_n] * 2, linestyle="--", color=colour, label=label)
-    axes.set(xlabel="process time in s", ylabel="force on the workpiece in N", xlim=(0, time_s[-1]))
+    axes.set(xlabel="process time (s)", ylabel="force on the workpiece (N)", xlim=(0, time_s[-1]))
     axes.set_title(_reliability(ours))
     legend_below(figure, axes)
     return figure
@@ -97,13 +97,13 @@ def force_depth(run: RunData, found: ProcessFindings) -> Figure:
     figure = new_figure(3.9)
     left, right = figure.subplots(1, 2, sharey=True)
     depth_bars(left, depth.edges_m, bars_of(depth.contact_n), BLUE)
-    left.set(xlabel="mean normal force of a contact in N", ylabel="depth below the surface in mm")
+    left.set(xlabel="mean normal force per contact (N)", ylabel="depth below the surface (mm)")
     left.set_title(
         f"slope {slope.value * 1e-3:.4f} N/mm\n"
         f"(95 %: {slope.ci95_low * 1e-3:.4f} to {slope.ci95_high * 1e-3:.4f})"
     )
     depth_bars(right, depth.edges_m, bars_of(depth.line_load_n_per_m, 1e-3), GREEN)
-    right.set(xlabel="normal force of all contacts in N per mm of depth")
+    right.set(xlabel="normal force of all contacts per depth (N/mm)")
     right.set_title("the deepest bin holds the contacts\nof the workpiece's edge and end")
     left.invert_yaxis()
     return figure
@@ -117,14 +117,14 @@ def chains_peaks(run: RunData, found: ProcessFindings) -> Figure:
     shown = trace.process_time_s[trace.counted], -trace.drag_n[trace.counted]
     upper.plot(*shown, color=BLUE, linewidth=0.8)
     upper.plot(peaks.process_time_s, [-force for force in peaks.drag_n], "v", color=RED)
-    upper.set(ylabel="resistance (minus\nthe drag) in N")
+    upper.set(ylabel="drag force\n(magnitude, N)")
     upper.set_title(f"{peaks.count} peaks (marked), at least {peaks.separation_s:.2f} s apart")
     frame_s = run.network["time_s"].to_numpy(np.float64) - drag_start_s(run.case)
     lower.plot(frame_s, run.bottlenecks_n, ".-", color=GREEN, markersize=4)
     for moment in peaks.process_time_s:
         lower.axvline(moment, color=RED, linewidth=0.7, linestyle=":")
         upper.axvline(moment, color=RED, linewidth=0.7, linestyle=":")
-    lower.set(xlabel="process time in s", ylabel="bottleneck of the\ndominant workpiece path in N")
+    lower.set(xlabel="process time (s)", ylabel="bottleneck force of the\ndominant path (N)")
     lower.set_ylim(bottom=0)
     lower.set_title(_link(found.association))
     return figure
@@ -159,7 +159,7 @@ def _network(run: RunData, view: network_picture.View, side: str) -> Figure:
     largest = float(shown.frame.normal_force.max(initial=0.0))
     scale = ScalarMappable(Normalize(0.0, largest), network_picture.colour_map())
     bar = figure.colorbar(scale, ax=axes, shrink=0.8, pad=0.02)
-    bar.set_label("normal force of a contact in N; cylinder radius in proportion")
+    bar.set_label("normal force of a contact (N); cylinder radius in proportion")
     cut = network_picture.cut_words(run.case, view)
     axes.set_title(
         f"contact network {side}, process time {shown.process_time_s:.2f} s; "
@@ -202,7 +202,7 @@ def drag_of_cases(
     for (label, value), colour in zip(references, cycle(REFERENCES), strict=False):
         axes.axvline(value, color=colour, linestyle="--", label=f"{label} {value:.2f} N")
     axes.set_yticks(place, names)
-    axes.set(xlabel="mean drag in N with its 95 % interval", ylim=(len(names) - 0.5, -0.5))
+    axes.set(xlabel="mean drag (N), 95 % confidence interval", ylim=(len(names) - 0.5, -0.5))
     if references:
         legend_below(figure, axes)
     return figure

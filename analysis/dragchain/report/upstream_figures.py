@@ -46,7 +46,7 @@ def filling(run: RunData, found: FillingFindings) -> Figure | None:
     if rest is not None:
         axes.axhline(rest, color=RED, linestyle="--", label=f"at rest below {rest:g}")
         axes.legend(loc="upper right")
-    axes.set(xlabel="simulated time in s", ylabel="mean kinetic energy of a particle\nover m g d")
+    axes.set(xlabel="simulated time (s)", ylabel="mean kinetic energy of a particle\n/ (m g d)")
     axes.set_title(
         f"{bed['n_particles']} particles, height {bed['bed_height_m'] * 1e3:.1f} mm, "
         f"solid fraction {bed['solid_fraction']:.3f}"
@@ -71,12 +71,12 @@ def drop_test(run: RunData, found: DropFindings) -> Figure:
         time_us = (time_s[near] - start) * 1e6
         axes.plot(time_us, force_n[near], color=BLUE)
         axes.set_title(_impact_words(number, impacts), fontsize=8)
-        axes.set_xlabel("time in µs")
+        axes.set_xlabel("time (µs)")
         right = _speed_axes(axes, limit)
         right.plot(time_us, speed_m_s[near], color=RED, linewidth=1.0)
         right.tick_params(labelright=number == len(panels) - 1, colors=RED)
-    right.set_ylabel("speed upwards in m/s", color=RED)
-    panels[0].set_ylabel("force on the particle in N", color=BLUE)
+    right.set_ylabel("speed upwards (m/s)", color=RED)
+    panels[0].set_ylabel("force on the particle (N)", color=BLUE)
     head(
         figure,
         f"restitution {ratio.mean:.3f} ({ratio.lowest:.3f} to {ratio.highest:.3f}) "

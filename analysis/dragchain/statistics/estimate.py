@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -24,15 +24,8 @@ def _nan_for_none(number: object) -> object:
     return math.nan if number is None else number
 
 
-def _none_for_nan(number: object) -> object:
-    return None if isinstance(number, float) and not math.isfinite(number) else number
-
-
 Real = Annotated[float, AllowInfNan(True), BeforeValidator(_nan_for_none)]
 """A number of a document that is NaN in Python and null in JSON where it is not known."""
-
-Known = Annotated[float | None, BeforeValidator(_none_for_nan)]
-"""A number of a document that is None where it is not known; NaN becomes None."""
 
 
 @dataclass(frozen=True)
@@ -60,25 +53,16 @@ class Estimate:
         """Whether a value is within the interval."""
         return self.ci95_low <= value <= self.ci95_high
 
+    def over(self, size: float) -> Estimate:
+        """The estimate divided by a positive number."""
+        return Estimate(self.value / size, self.ci95_low / size, self.ci95_high / size)
+
     def exp(self, factor: float = 1.0, minus: float = 0.0) -> Estimate:
         """The estimate of ``exp(factor * x) - minus``, for a positive factor."""
         low, value, high = (
             np.exp(factor * np.array([self.ci95_low, self.value, self.ci95_high])) - minus
         )
         return Estimate(float(value), float(low), float(high))
-
-    def as_json(self) -> dict[str, float | None]:
-        """The numbers by name, None where one is not finite."""
-        return {name: finite(number) for name, number in vars(self).items()}
-
-    def as_columns(self, name: str, unit: str = "") -> dict[str, float]:
-        """The numbers as columns: ``<name>_mean_<unit>``, ``<name>_ci95_low_<unit>`` and so on."""
-        end = f"_{unit}" if unit else ""
-        return {
-            f"{name}_mean{end}": self.value,
-            f"{name}_ci95_low{end}": self.ci95_low,
-            f"{name}_ci95_high{end}": self.ci95_high,
-        }
 
 
 @dataclass(frozen=True)
@@ -96,24 +80,11 @@ class EstimateColumns:
         return cls(*(tuple(getattr(one, name) for one in estimates) for name in names))
 
 
-def estimate_columns(estimates: Sequence[Estimate]) -> dict[str, list[float | None]]:
-    """Estimates as columns ``value``, ``ci95_low`` and ``ci95_high``."""
-    rows = [estimate.as_json() for estimate in estimates]
-    return {name: [row[name] for row in rows] for name in ("value", "ci95_low", "ci95_high")}
-
-
 def student_quantile(degrees: float, confidence: float = CONFIDENCE) -> float:
     """Half-width of a two-sided interval of Student's t, in standard errors."""
     from scipy.stats import t
 
     return float(t.ppf(0.5 + 0.5 * confidence, degrees))
-
-
-def normal_quantile(confidence: float = CONFIDENCE) -> float:
-    """Half-width of a two-sided interval of the normal distribution, in standard deviations."""
-    from statistics import NormalDist
-
-    return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
 
 
 def t_interval(value: float, se: float, degrees: float) -> Estimate:
@@ -128,9 +99,3 @@ def mean_of(values: ArrayLike) -> Estimate:
     if known.size < 2:
         return Estimate(mean, math.nan, math.nan)
     return t_interval(mean, float(known.std(ddof=1)) / math.sqrt(known.size), known.size - 1)
-
-
-def estimate_from(numbers: Mapping[str, float | None]) -> Estimate:
-    """An estimate from its JSON; NaN for a number that is not known."""
-    value, low, high = (numbers[name] for name in ("value", "ci95_low", "ci95_high"))
-    return Estimate(*(math.nan if number is None else number for number in (value, low, high)))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dragchain.arrays import Floats
-from dragchain.statistics.estimate import Estimate, student_quantile
+from dragchain.statistics.estimate import Estimate, student_quantile, t_interval
 
 
 def same(labels: Sequence[Hashable]) -> Floats:
@@ -119,5 +119,4 @@ class Effects:
 
     def estimate(self, weights: ArrayLike) -> Estimate:
         """A combination of the effects, weights (P,), with its interval."""
-        value, error = self.contrast(weights)
-        return Estimate.around(value, self.quantile * error)
+        return t_interval(*self.contrast(weights), self.degrees)

@@ -2,89 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Literal
 
-HOLDS, FAILS, OPEN = "holds", "does not hold", "not resolved"
+import pandas as pd
+
+from dragchain.documents import Part
+from dragchain.statistics.estimate import Estimate
+from dragchain.validation.around_workpiece import Statements
+
+Verdict = Literal["holds", "does not hold", "not resolved"]
 
 
-@dataclass(frozen=True)
-class Claim:
+class Claim(Part):
     """A statement and the number that tests it.
 
     Attributes
     ----------
-    statement : str
-        In our words.
-    number : str
-        What the number is.
-    estimate : mapping or None
-        ``value``, ``low`` and ``high`` over fills; None where it cannot be told.
+    statement, number : str
+        What is said, and of what; the page has the words.
     null : float
         The value of no effect; the statement says that the number is above it.
     unit : str
+    verdict : str
+        See `verdict`.
+    estimate : Estimate
+        The number over the packings.
     """
 
     statement: str
     number: str
-    estimate: Mapping[str, float | None] | None
     null: float
-    unit: str = ""
-
-    @property
-    def verdict(self) -> str:
-        """It holds if the whole interval lies above the null, does not if it lies below."""
-        if self.estimate is None or None in self.estimate.values():
-            return OPEN
-        low, high = self.estimate["ci95_low"], self.estimate["ci95_high"]
-        assert low is not None and high is not None
-        if low > self.null:
-            return HOLDS
-        return FAILS if high < self.null else OPEN
+    unit: str
+    verdict: Verdict
+    estimate: Estimate
 
 
-def claims(found: Mapping[str, Any]) -> list[Claim]:
-    """The statements of Uhlmann et al. (2015) that `dragchain.validation.statements` measures."""
-    network = found["network"]
-    depth = "contact forces grow with depth"
-    rows = [
+def verdict(estimate: Estimate, null: float) -> Verdict:
+    """A claim holds if the whole interval lies above the null, does not if it lies below."""
+    if not estimate.known:
+        return "not resolved"
+    if estimate.ci95_low > null:
+        return "holds"
+    return "does not hold" if estimate.ci95_high < null else "not resolved"
+
+
+def claims(found: Statements) -> tuple[Claim, ...]:
+    """The statements of Uhlmann et al. (2015) that have a number here."""
+    network = found.network
+    rows = (
+        ("ahead_above_behind", "ahead_behind", found.ahead_behind, 1.0, ""),
+        ("network_ahead_above_behind", "network_ratio", network.ratio, 1.0, ""),
+        ("active_zone_reaches_far", "network_at_wall", network.at_wall, 1.0, ""),
+        ("forces_grow_with_depth", "depth_slope_n_per_m", found.depth_slope_n_per_m, 0.0, "N/m"),
+        ("forces_grow_with_depth", "deep_over_shallow", found.deep_over_shallow, 1.0, ""),
+        ("most_intense_at_front", "front_over_flank", found.front_over_flank, 1.0, ""),
+        ("outer_surfaces_hit_hardest", "outer_over_inner", found.outer_over_inner, 1.0, ""),
+    )
+    return tuple(
         Claim(
-            "forces ahead of the workpiece are far above those behind it",
-            "normal force on the workpiece, ahead over behind",
-            found["ahead_behind"],
-            1.0,
-        ),
-        Claim(
-            "the same in the network of the particles",
-            "mean contact force in the corridor ahead over that behind",
-            network["ratio"],
-            1.0,
-        ),
-        Claim(
-            "the active zone reaches far ahead",
-            "mean contact force at the bowl's wall ahead over that far from the workpiece",
-            network["at_wall"],
-            1.0,
-        ),
-        Claim(depth, "slope of a contact's normal force", found["depth_slope_n_per_m"], 0.0, "N/m"),
-        Claim(
-            depth,
-            "mean contact force in the deepest third over the shallowest",
-            found["deep_over_shallow"],
-            1.0,
-        ),
-        Claim(
-            "contacts are most intense at the front",
-            "normal force on the front quarter over the two eighths beside it",
-            found["front_over_flank"],
-            1.0,
-        ),
-        Claim(
-            "surfaces that point to the bowl's boundary are hit hardest",
-            "normal force on the outer half of the workpiece over the inner half",
-            found["outer_over_inner"],
-            1.0,
-        ),
-    ]
-    return [row for row in rows if row.estimate is not None]
+            statement=statement,
+            number=number,
+            null=null,
+            unit=unit,
+            verdict=verdict(estimate, null),
+            estimate=estimate,
+        )
+        for statement, number, estimate, null, unit in rows
+        if estimate is not None
+    )
+
+
+def claim_table(rows: tuple[Claim, ...]) -> pd.DataFrame:
+    """The claims as a table, one row per number."""
+    known = [dict(row) | vars(row.estimate) for row in rows]
+    return pd.DataFrame(known).drop(columns="estimate")

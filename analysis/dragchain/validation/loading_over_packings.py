@@ -1,107 +1,108 @@
-"""Load, sliding and friction on the workpiece over several fills."""
+"""Load, sliding and friction on the workpiece over several packings."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
-from dragchain.loading.document import Loading
+from dragchain.documents import Part
+from dragchain.loading.contact_events import Thresholds
+from dragchain.loading.document import ContactType, Loading
 from dragchain.loading.write import read_loading
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.validation.runs_by_bed import Point, over_packings
 
-Found = dict[str, Any]
+PER_METRE = {
+    "normal_impulse_n_s": "N s/m",
+    "sliding_m": "m/m",
+    "force_slide_n_m": "N m/m",
+    "friction_work_j": "J/m",
+}
+"""Amounts per metre of path, each with its unit."""
+
+SHARES = ("events", "normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
 
 
-def of_packings(packings: Sequence[Point]) -> Found:
-    """What `dragchain.removal` says of every fill, and of all of them together.
+class LoadingRow(Part):
+    """A number over the packings; the page has its name in words."""
 
-    Parameters
+    label: str
+    unit: str
+    value: float
+    ci95_low: float
+    ci95_high: float
+
+
+class LoadingOverPackings(Part):
+    """The loading over the packings.
+
+    Attributes
     ----------
-    fills : sequence of Point
-        Each with the files of `dragchain.removal.write_loading` in its folder.
+    rows : sequence of LoadingRow
+    types : mapping
+        Type of contact event to its percentages of all events and of amounts.
+    closure : float
+        Largest relative error of the sums over facets against the force on the workpiece.
+    limits, sample_interval_s
+        Of the first packing.
+    """
 
-    Returns
-    -------
-    dict
-        ``rows`` (``label``, ``unit``, ``value``, ``low``, ``high`` over fills), ``types``
-        (type of stay to its shares in %), ``closure`` (largest relative error of the sums over
-        facets against the force on the workpiece), ``first`` (``loading.json`` of the first fill).
+    rows: tuple[LoadingRow, ...]
+    types: Mapping[str, Mapping[str, Estimate]]
+    closure: float
+    limits: Thresholds
+    sample_interval_s: float
+
+
+def of_packings(packings: Sequence[Point]) -> LoadingOverPackings:
+    """Average what `dragchain loading` found in every packing.
 
     Raises
     ------
-    TableError
-        If a fill has no such files.
+    DocumentError
+        If a packing has no ``loading.json``.
     """
-    found = [read_loading(point.folder) for point in packings]
-    rows = [
-        {"label": label, "unit": unit, **over_packings([of(one) for one in found]).as_json()}
-        for label, unit, of in _ROWS
-    ]
+    every = [read_loading(point.folder) for point in packings]
+    first, numbers = every[0], [_numbers(one) for one in every]
+    return LoadingOverPackings(
+        rows=tuple(
+            LoadingRow(label=key[0], unit=key[1], **vars(over_packings([n[key] for n in numbers])))
+            for key in numbers[0]
+        ),
+        types={kind: _shares([one.types[kind] for one in every]) for kind in first.types},
+        closure=max(one.closure.facets_relative_error for one in every),
+        limits=first.limits,
+        sample_interval_s=first.sample_interval_s,
+    )
+
+
+def _numbers(loading: Loading) -> dict[tuple[str, str], float]:
+    """The numbers that packings are compared by: name and unit to value."""
+    front = loading.front_fraction
+    fractions = {
+        "friction_fraction_of_work": loading.friction_fraction_of_work,
+        "front_fraction_normal_impulse": front["normal_impulse_n_s"],
+        "front_fraction_force_slide": front["force_slide_n_m"],
+        "load_while_sliding_fraction": loading.load_while_sliding_fraction,
+    }
     return {
-        "rows": rows,
-        "types": _types(found),
-        "closure": max(one.closure.facets_relative_error for one in found),
-        "first": found[0],
+        ("mean_contacts", ""): loading.mean_contacts.value,
+        **{(name, unit): loading.per_metre[name].value for name, unit in PER_METRE.items()},
+        **{(name, "%"): 100.0 * one.value for name, one in fractions.items()},
     }
 
 
-def _per_metre(name: str) -> Callable[[Loading], float]:
-    return lambda one: one.per_metre[name].value
-
-
-def _percent(of: Callable[[Loading], Estimate]) -> Callable[[Loading], float]:
-    return lambda one: 100.0 * of(one).value
-
-
-_ROWS: list[tuple[str, str, Callable[[Loading], float]]] = [
-    ("contacts that press on the workpiece at once", "", lambda one: one.mean_contacts.value),
-    ("normal impulse", "N s a metre of way", _per_metre("normal_impulse_n_s")),
-    ("sliding distance of all contacts", "m a metre", _per_metre("sliding_m")),
-    ("normal force times sliding distance", "N m a metre", _per_metre("force_slide_n_m")),
-    ("friction work", "J a metre", _per_metre("friction_work_j")),
-    (
-        "friction work, share of the work of the workpiece",
-        "%",
-        _percent(lambda one: one.friction_fraction_of_work),
-    ),
-    (
-        "front half, share of the normal impulse",
-        "%",
-        _percent(lambda one: one.front_fraction["normal_impulse_n_s"]),
-    ),
-    (
-        "front half, share of force times sliding",
-        "%",
-        _percent(lambda one: one.front_fraction["force_slide_n_m"]),
-    ),
-    (
-        "normal impulse carried while sliding",
-        "%",
-        _percent(lambda one: one.load_while_sliding_fraction),
-    ),
-]
-
-
-def _types(found: Sequence[Loading]) -> dict[str, Found]:
-    """Shares of every type of stay in %, over fills."""
-    quantities = ("events", "normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
+def _shares(types: Sequence[ContactType]) -> dict[str, Estimate]:
     return {
-        kind: {
-            name: over_packings(
-                [100.0 * one.types[kind].fraction_of[name].value for one in found]
-            ).as_json()
-            for name in quantities
-        }
-        for kind in found[0].types
+        name: over_packings([100.0 * one.fraction_of[name].value for one in types])
+        for name in SHARES
     }
 
 
 def facets(packings: Sequence[Point]) -> pd.DataFrame:
-    """The facets of every fill, a row a facet and fill."""
+    """The facets of every packing, one row per facet and packing."""
     tables = [
         read_table(point.folder / "tables" / "facets.parquet").assign(packing=point.seed)
         for point in packings

@@ -4,30 +4,49 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import pandas as pd
-from matplotlib.figure import Figure
 
-from dragchain.figures.style import STYLE, png
-from dragchain.files import write_json
-from dragchain.report.page import file_uri, render_page
+from dragchain.documents import Document
+from dragchain.figures.style import drawing, png
+from dragchain.report.bundle import write_bundle
+from dragchain.report.page import data_uri, render_page
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.figures import draw_scalings
 from dragchain.scaling.fit import read_scalings
-from dragchain.tables.parquet import write_parquet
-from dragchain.validation import around_workpiece as statements
-from dragchain.validation import figures, force
-from dragchain.validation import loading_over_packings as load
-from dragchain.validation.claims import claims
-from dragchain.validation.peaks.report import report_peaks
-from dragchain.validation.runs_by_bed import Point, Points, read_points
+from dragchain.statistics.estimate import EstimateColumns
+from dragchain.validation import figures
+from dragchain.validation import loading_over_packings as loading
+from dragchain.validation.around_workpiece import Profile, Statements, of_packings
+from dragchain.validation.claims import Claim, claim_table, claims
+from dragchain.validation.effects import Effect, effect_table, effects
+from dragchain.validation.force import Compared, Force, compare
+from dragchain.validation.force import of_packings as force_of
+from dragchain.validation.peaks.report import PeaksReport, report_peaks
+from dragchain.validation.runs_by_bed import Points, read_points
 
-SCHEMA = 2
+SAME_SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particles")
+"""Numbers that a scene shares with the sweeps that are shown beside it."""
+
+
+class Validation(Document):
+    """The content of ``validation.json``."""
+
+    study: str
+    command: str
+    measured: str
+    versions: Mapping[str, str]
+    engine_hours: float
+    force: Force
+    comparison: tuple[Compared, ...]
+    load: loading.LoadingOverPackings
+    statements: Statements
+    scalings: tuple[ScalingFile, ...]
+    claims: tuple[Claim, ...]
+    effects: tuple[Effect, ...]
 
 
 def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> None:
@@ -44,58 +63,46 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
 
     Raises
     ------
+    DocumentError
+        A run has no measures.
     TableError
-        A run has no measures, or fewer than two fills are complete.
+        Fewer than two packings are complete.
     SeriesError
         There are too few runs to compare settings.
     """
     points = read_points(run_dirs)
-    found = find(points, command)
-    effects = force.effects(points)
-    out_dir.mkdir(parents=True, exist_ok=True)
-    for name, table in tables(points, found, effects).items():
-        write_parquet(table, out_dir / f"{name}.parquet")
-        table.to_csv(out_dir / f"{name}.csv", index=False, lineterminator="\n")
-    folder = out_dir / "figures"
-    folder.mkdir(exist_ok=True)
-    for name, picture in draw(points, found, effects).items():
-        (folder / f"{name}.png").write_bytes(picture)
-    shutil.copyfile(
-        points.packings[0].folder / "figures" / "workpiece.png", folder / "workpiece.png"
-    )
-    scalings = [one.model_dump(mode="json", by_alias=True) for one in found["scalings"]]
-    document = {**found, "scalings": scalings, "effects": _records(effects)}
-    write_json(out_dir / "validation.json", document)
+    found = validate(points, command)
     peaks = report_peaks([point.folder for point in points.packings])
+    pictures = draw(points, found)
+    page = render(points, found, peaks, pictures)
     peaks.write(out_dir)
-    page = render(points, found, effects, json.loads(peaks.findings.as_text()), folder)
-    (out_dir / "report.html").write_text(page, encoding="utf-8")
+    write_bundle(
+        out_dir,
+        tables=tables(points, found),
+        figures=pictures,
+        documents={"validation": found},
+        pages={"report": page},
+    )
 
 
-def find(points: Points, command: str) -> dict[str, Any]:
-    """All numbers of the page but those of other settings."""
-    found_force = force.of_packings(points)
-    together = found_force["together"]["drag_n"]
-    case = points.packings[0].case
-    found_statements = statements.of_packings(points.packings)
-    return {
-        "schema": SCHEMA,
-        "study": case.study,
-        "command": command,
-        "measured": max(str(point.measures["started"]) for point in points.all)[:10],
-        "versions": dict(points.packings[0].measures["versions"]),
-        "engine_hours": sum(_cpu_s(point) for point in points.all) / 3600.0,
-        "force": found_force,
-        "comparison": force.compare(together["mean"], together["std"], case),
-        "load": load.of_packings(points.packings),
-        "statements": found_statements,
-        "scalings": scalings_of(points.packings[0].measures["numbers"]),
-        "claims": [{**vars(claim), "verdict": claim.verdict} for claim in claims(found_statements)],
-    }
-
-
-SAME_SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particles")
-"""Numbers that a scene shares with the sweeps that are shown beside it."""
+def validate(points: Points, command: str) -> Validation:
+    """All numbers of the page but those of peaks and chains."""
+    first = points.packings[0]
+    force, statements = force_of(points.packings), of_packings(points.packings)
+    return Validation(
+        study=first.case.study,
+        command=command,
+        measured=max(point.measures.started for point in points.all)[:10],
+        versions=first.measures.versions,
+        engine_hours=sum(point.measures.cost.cpu_time_s for point in points.all) / 3600.0,
+        force=force,
+        comparison=compare(force.together["drag_n"], first.case),
+        load=loading.of_packings(points.packings),
+        statements=statements,
+        scalings=tuple(scalings_of(first.measures.numbers)),
+        claims=claims(statements),
+        effects=tuple(effects(points)),
+    )
 
 
 def scalings_of(numbers: Mapping[str, float]) -> list[ScalingFile]:
@@ -107,90 +114,85 @@ def scalings_of(numbers: Mapping[str, float]) -> list[ScalingFile]:
     ]
 
 
-def _cpu_s(point: Point) -> float:
-    return float(point.measures["cost"]["cpu_time_s"])
-
-
-def tables(
-    points: Points, found: Mapping[str, Any], effects: pd.DataFrame
-) -> dict[str, pd.DataFrame]:
+def tables(points: Points, found: Validation) -> dict[str, pd.DataFrame]:
     """The numbers of the page as tables, by name."""
-    network = found["statements"]["network"]
-    edges = network["edges_diameters"]
-    profile = {
-        f"{side}_{name}_n": network[f"{side}_n"][name]
-        for side in ("ahead", "behind")
-        for name in ("value", "ci95_low", "ci95_high")
-    }
-    density = found["force"]["spectrum"]["density"]
-    estimates = [
-        {**{k: v for k, v in claim.items() if k != "estimate"}, **claim["estimate"]}
-        for claim in found["claims"]
-    ]
+    force, statements = found.force, found.statements
+    network, spectrum = statements.network, force.spectrum
     return {
-        "packings": pd.json_normalize(found["force"]["packings"], sep="_"),
-        "effects": effects,
-        "load": pd.DataFrame(found["load"]["rows"]),
-        "facets": load.facets(points.packings),
-        "comparison": pd.json_normalize(found["comparison"], sep="_"),
-        "statements": pd.DataFrame(estimates),
+        "packings": pd.json_normalize([row.model_dump() for row in force.packings], sep="_"),
+        "effects": effect_table(found.effects),
+        "load": pd.DataFrame([dict(row) for row in found.load.rows]),
+        "facets": loading.facets(points.packings),
+        "comparison": pd.json_normalize([_flat(row) for row in found.comparison], sep="_"),
+        "statements": claim_table(found.claims),
         "corridor": pd.DataFrame(
-            {"from_diameters": edges[:-1], "to_diameters": edges[1:], **profile}
+            {
+                **_bins(network.edges_diameters, "diameters"),
+                **_side("ahead", network.ahead_n),
+                **_side("behind", network.behind_n),
+            }
         ),
-        "around": _profile(found["statements"]["azimuth"], "rad"),
-        "depth": _profile(found["statements"]["depth"], "m"),
+        "around": _profile(statements.azimuth, "rad"),
+        "depth": _profile(statements.depth, "m"),
         "spectrum": pd.DataFrame(
-            {"waves_per_diameter": found["force"]["spectrum"]["waves_per_diameter"], **density}
+            {"waves_per_diameter": spectrum.waves_per_diameter, **dict(spectrum.density)}
         ),
     }
 
 
-def _profile(columns: Mapping[str, Any], unit: str) -> pd.DataFrame:
-    edges = columns["edges"]
-    values = {name: columns[name] for name in ("value", "ci95_low", "ci95_high")}
-    return pd.DataFrame({f"from_{unit}": edges[:-1], f"to_{unit}": edges[1:], **values})
+def _flat(row: Compared) -> dict[str, Any]:
+    return row.model_dump(exclude={"std_ratio"} if row.std_ratio is None else None)
 
 
-def draw(points: Points, found: Mapping[str, Any], effects: pd.DataFrame) -> dict[str, bytes]:
+def _bins(edges: Sequence[float], unit: str) -> dict[str, Sequence[float]]:
+    return {f"from_{unit}": edges[:-1], f"to_{unit}": edges[1:]}
+
+
+def _side(side: str, columns: EstimateColumns) -> dict[str, Sequence[float]]:
+    return {f"{side}_{name}_n": values for name, values in vars(columns).items()}
+
+
+def _profile(profile: Profile, unit: str) -> pd.DataFrame:
+    values = profile.model_dump(exclude={"edges"})
+    return pd.DataFrame({**_bins(profile.edges, unit), **values})
+
+
+def draw(points: Points, found: Validation) -> dict[str, bytes]:
     """The figures of the page as PNG, by name."""
-    with matplotlib.rc_context(STYLE):
-        drawn: dict[str, Figure] = {
-            "comparison": figures.comparison(found["force"], found["comparison"], effects),
-            "traces": figures.traces(points.packings, found["comparison"]),
-            "spectrum": figures.spectrum(found["force"]["spectrum"]),
-            "around": figures.around(found["statements"]),
-            "corridor": figures.corridor(found["statements"]["network"]),
+    with drawing():
+        drawn = {
+            "comparison": figures.comparison(found.force, found.comparison, found.effects),
+            "traces": figures.traces(points.packings, found.comparison),
+            "spectrum": figures.spectrum(found.force.spectrum),
+            "around": figures.around(found.statements),
+            "corridor": figures.corridor(found.statements.network),
         }
-        if (effects["field"] != "").any():
-            drawn["assumed"] = figures.assumed(effects)
-        if found["scalings"]:
-            drawn["scaling"] = draw_scalings(found["scalings"])
-        return {name: png(figure) for name, figure in drawn.items()}
+        if any(row.field for row in found.effects):
+            drawn["assumed"] = figures.assumed(found.effects)
+        if found.scalings:
+            drawn["scaling"] = draw_scalings(found.scalings)
+        pictures = {name: png(figure) for name, figure in drawn.items()}
+    workpiece = points.packings[0].folder / "figures" / "workpiece.png"
+    return pictures | {"workpiece": workpiece.read_bytes()}
 
 
 def render(
-    points: Points,
-    found: Mapping[str, Any],
-    effects: pd.DataFrame,
-    peaks: Mapping[str, Any],
-    folder: Path,
+    points: Points, found: Validation, peaks: PeaksReport, pictures: Mapping[str, bytes]
 ) -> str:
-    """The page: HTML that needs no other file and no network; its figures are in `folder`."""
-    assumptions = points.packings[0].case.assumptions
+    """The page: HTML that needs no other file and no network."""
+    files = {f"{name}.png": png for name, png in {**pictures, **peaks.pictures}.items()}
+    files["peak_film.gif"] = peaks.film
+
+    def picture(name: str) -> str | None:
+        return data_uri(files[name], Path(name).suffix[1:]) if name in files else None
+
     return render_page(
         "validation/validation.html.j2",
-        {"setting": figures.setting_name},
-        found=found,
-        effects=_records(effects),
-        assumptions=assumptions,
-        varied=set(effects["field"]),
+        found=json.loads(found.as_text()),
+        scalings=found.scalings,
+        peaks=json.loads(peaks.findings.as_text()),
+        assumptions=points.packings[0].case.assumptions,
+        varied={row.field for row in found.effects},
         points=points,
-        peaks=peaks,
-        picture=lambda name: file_uri(folder / name),
+        picture=picture,
     )
-
-
-def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """The rows of a table, None where there is no number."""
-    known = table.astype(object).where(table.notna(), None)
-    return [{str(name): value for name, value in row.items()} for row in known.to_dict("records")]

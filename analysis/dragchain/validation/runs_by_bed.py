@@ -1,4 +1,4 @@
-"""The runs of a validation, and what several fills say together."""
+"""The runs of a validation, and what several packings say together."""
 
 from __future__ import annotations
 
@@ -7,21 +7,65 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from scipy import stats
+from pydantic import JsonValue
 
+from dragchain.documents import Document, Part
 from dragchain.errors import SeriesError, TableError
-from dragchain.run.case import Case, load_case
-from dragchain.statistics.estimate import CONFIDENCE, Estimate
-from dragchain.tradeoff.compare import PARAMETERS, changed_inputs, read_measures
+from dragchain.run.case import Case, Fidelity, load_case
+from dragchain.statistics.estimate import Estimate, Real, mean_of
+from dragchain.tradeoff.compare import PARAMETERS, SILENT
 from dragchain.tradeoff.measures import FILE
 
 FEWEST = 2
-"""Fills below which nothing is known of the differences between them."""
+"""Packings below which nothing is known of the differences between them."""
 
-Parameters = tuple[float, ...]
+
+class Cost(Part):
+    """Steps and processor time of a run."""
+
+    steps: int
+    cpu_time_s: float
+
+
+class Measures(Document):
+    """What a validation reads of a run's ``measures.json``; a failed run has no `arc_m`.
+
+    Attributes
+    ----------
+    numbers : mapping
+        Dimensionless numbers of the scene.
+    arc_m : float
+        Counted path.
+    single : mapping
+        Quantities of the bed, ``bed_height`` among them.
+    """
+
+    made_by = "dragchain step measure"
+
+    inputs: Mapping[str, JsonValue]
+    fidelity: Fidelity
+    numbers: Mapping[str, float] = {}
+    complete: bool
+    cost: Cost
+    versions: Mapping[str, str]
+    started: str
+    arc_m: float = math.nan
+    single: Mapping[str, Real] = {}
+
+    @property
+    def compared_inputs(self) -> dict[str, JsonValue]:
+        """Inputs by dotted name, without those that make no other setting."""
+        silent = {*SILENT, "fidelity.name", *(f"fidelity.{name}" for name in PARAMETERS)}
+        inputs = {**self.inputs, **{f"fidelity.{name}": value for name, value in self.fidelity}}
+        return {name: value for name, value in inputs.items() if name not in silent}
+
+    def changed_from(self, other: Measures) -> dict[str, JsonValue]:
+        """Inputs, by dotted name, that differ from another run's, with this run's values."""
+        own, others = self.compared_inputs, other.compared_inputs
+        names = sorted({*own, *others})
+        return {name: own.get(name) for name in names if own.get(name) != others.get(name)}
 
 
 @dataclass(frozen=True)
@@ -32,26 +76,28 @@ class Point:
     ----------
     folder : Path
     case : Case
-    measures : mapping
-        Content of its ``measures.json``.
+    measures : Measures
     changed : mapping
         Dotted names and values of the inputs that differ from the reference's.
     """
 
     folder: Path
     case: Case
-    measures: Mapping[str, Any]
-    changed: Mapping[str, Any]
+    measures: Measures
+    changed: Mapping[str, JsonValue]
 
     @property
-    def parameters(self) -> Parameters:
+    def parameters(self) -> tuple[float, float, float]:
         """Modulus scale, time step over the Rayleigh time, and speed factor."""
-        return tuple(float(self.measures["fidelity"][name]) for name in PARAMETERS)
+        own = self.measures.fidelity
+        return own.youngs_modulus_scale, own.timestep_fraction, own.speed_factor
 
     @property
     def seed(self) -> int:
         """Seed of its bed."""
-        return int(self.measures["inputs"]["seed"])
+        seed = self.measures.inputs["seed"]
+        assert isinstance(seed, int)
+        return seed
 
     @property
     def setting(self) -> tuple[object, ...]:
@@ -65,8 +111,8 @@ class Points:
 
     Attributes
     ----------
-    fills : list of Point
-        At the reference's settings, one a bed, by seed.
+    packings : list of Point
+        At the reference's settings, one per bed, by seed.
     others : list of Point
         At other settings, in the order given.
     """
@@ -76,7 +122,7 @@ class Points:
 
     @property
     def all(self) -> list[Point]:
-        """The fills first."""
+        """The packings first."""
         return [*self.packings, *self.others]
 
 
@@ -90,40 +136,35 @@ def read_points(folders: Sequence[Path]) -> Points:
 
     Raises
     ------
+    DocumentError
+        A run has no measures.
     TableError
-        A run has no measures, or fewer than two fills are complete.
+        Fewer than two packings are complete.
     """
-    measures = {folder: read_measures(folder / FILE) for folder in folders if _measured(folder)}
+    measures = {folder: Measures.read(folder / FILE) for folder in folders}
     standard = measures[folders[0]]
-    points = [
-        Point(folder, load_case(folder), own, changed_inputs(own, standard))
-        for folder, own in measures.items()
-        if own["complete"]
-    ]
-    first = next((point for point in points if point.folder == folders[0]), None)
-    if first is None:
+    if not standard.complete:
         raise TableError(f"{folders[0]}: the reference run is not complete, so nothing is known")
-    packings = [point for point in points if point.setting == first.setting]
+    first, *points = (
+        Point(folder, load_case(folder), own, own.changed_from(standard))
+        for folder, own in measures.items()
+        if own.complete
+    )
+    packings = [first, *(point for point in points if point.setting == first.setting)]
     if len(packings) < FEWEST:
         raise TableError(
             f"{len(packings)} complete run at the reference's settings: the differences between "
-            f"fills need {FEWEST} at least; give the plan's reference more seeds"
+            f"packings need {FEWEST} at least; give the plan's reference more seeds"
         )
     others = [point for point in points if point.setting != first.setting]
     return Points(sorted(packings, key=lambda point: point.seed), others)
 
 
-def _measured(folder: Path) -> bool:
-    if (folder / FILE).is_file():
-        return True
-    raise TableError(f"{folder / FILE} is not there: `dragchain measure` writes it")
-
-
 def over_packings(values: Sequence[float], *, ratio: bool = False) -> Estimate:
-    """The mean of one number a fill, with the interval that the fills' differences give.
+    """The mean of one number per packing, with the interval that their differences give.
 
-    Student's t with one degree of freedom less than there are fills: nothing is
-    assumed of how well a single fill knows its own number.
+    Student's t with one degree of freedom less than there are packings: nothing is
+    assumed of how well a single packing knows its own number.
 
     Parameters
     ----------
@@ -139,16 +180,13 @@ def over_packings(values: Sequence[float], *, ratio: bool = False) -> Estimate:
     Raises
     ------
     SeriesError
-        If there are fewer than two fills.
+        If there are fewer than two packings.
     """
     if len(values) < FEWEST:
-        raise SeriesError(f"an interval over fills needs {FEWEST} of them, not {len(values)}")
+        raise SeriesError(f"an interval over packings needs {FEWEST} of them, not {len(values)}")
     with np.errstate(divide="ignore", invalid="ignore"):
         numbers = np.log(values) if ratio else np.asarray(values, dtype=np.float64)
     if not np.isfinite(numbers).all():
         return Estimate(math.nan, math.nan, math.nan)
-    count = len(numbers)
-    mean, error = float(numbers.mean()), float(numbers.std(ddof=1)) / math.sqrt(count)
-    reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, count - 1)) * error
-    found = (mean, mean - reach, mean + reach)
-    return Estimate(*(math.exp(number) for number in found)) if ratio else Estimate(*found)
+    mean = mean_of(numbers)
+    return Estimate(*(math.exp(edge) for edge in vars(mean).values())) if ratio else mean

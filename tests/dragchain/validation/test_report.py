@@ -13,12 +13,22 @@ import pytest
 from changed import changed
 from scipy import stats
 
-from dragchain.errors import SeriesError, TableError
+from dragchain.errors import DocumentError, SeriesError
 from dragchain.run.case import PublishedDrag, Reference, load_case
-from dragchain.validation import around_workpiece as statements
+from dragchain.statistics.estimate import Estimate
 from dragchain.validation import force
-from dragchain.validation.claims import FAILS, HOLDS, OPEN, Claim
-from dragchain.validation.runs_by_bed import Point, Points, over_packings
+from dragchain.validation.around_workpiece import contacts_of
+from dragchain.validation.claims import verdict
+from dragchain.validation.corridor import Corridor, relative_places
+from dragchain.validation.effects import effect_table, effects
+from dragchain.validation.runs_by_bed import (
+    Cost,
+    Measures,
+    Point,
+    Points,
+    over_packings,
+    read_points,
+)
 
 RATE_HZ = 1000.0
 DIAMETER_M = 2 * 8.76e-3
@@ -48,19 +58,19 @@ def made_point(
             simulation=PublishedDrag(drag_mean_n=-2.0),
         ),
     )
-    measures = {
-        "inputs": {"seed": seed, "bowl.radius_m": 0.04, **(varied or {})},
-        "fidelity": {
-            "youngs_modulus_scale": parameters[0], "timestep_fraction": parameters[1],
-            "speed_factor": 1.0,
-        },
-        "bed": f"bed-{seed}-{parameters[0]}-{varied}",
-        "single": {"bed_height": 0.07},
-        "arc_m": 20 * DIAMETER_M,
-        "cost": {"steps": 1000, "cpu_time_s": 60.0},
-        "started": "2026-01-01T00:00:00+00:00",
-        "complete": True,
-    }  # fmt: skip
+    modulus, step = parameters
+    measures = Measures(
+        inputs={"seed": seed, "bowl.radius_m": 0.04, **(varied or {})},
+        fidelity=changed(
+            case.fidelity, youngs_modulus_scale=modulus, timestep_fraction=step, speed_factor=1.0
+        ),
+        single={"bed_height": 0.07},
+        arc_m=20 * DIAMETER_M,
+        cost=Cost(steps=1000, cpu_time_s=60.0),
+        versions={"dragdeck": "1"},
+        started="2026-01-01T00:00:00+00:00",
+        complete=True,
+    )
     return Point(folder, case, measures, varied or {})
 
 
@@ -113,15 +123,13 @@ def test_one_filling_has_no_interval() -> None:
 
 
 def test_the_mean_over_packings_is_that_of_the_drag(points: Points) -> None:
-    found = force.of_packings(points)
-    drag = found["together"]["drag_n"]
-    assert drag["mean"]["ci95_low"] < -2.5 < drag["mean"]["ci95_high"]
-    assert drag["mean"]["value"] == pytest.approx(-2.5, abs=0.15)  # 4 s.e. of 4 fills
-    assert drag["std"]["value"] == pytest.approx(0.5, rel=0.1)
-    assert found["together"]["lateral_n"]["mean"]["value"] == pytest.approx(
-        0.1 * drag["mean"]["value"]
-    )
-    assert found["alike"]["p_value"] > 0.01
+    found = force.of_packings(points.packings)
+    drag, lateral = found.together["drag_n"], found.together["lateral_n"]
+    assert drag.mean.contains(-2.5)
+    assert drag.mean.value == pytest.approx(-2.5, abs=0.15)  # 4 s.e. of 4 packings
+    assert drag.std.value == pytest.approx(0.5, rel=0.1)
+    assert lateral.mean.value == pytest.approx(0.1 * drag.mean.value)
+    assert found.alike.p_value > 0.01
 
 
 def test_packings_that_differ_are_seen(tiny_run: Path, tmp_path: Path) -> None:
@@ -130,7 +138,7 @@ def test_packings_that_differ_are_seen(tiny_run: Path, tmp_path: Path) -> None:
         made_point(tiny_run, tmp_path / f"far-{seed}", seed, series(-2.5 - seed, rng))
         for seed in (1, 2, 3)
     ]
-    assert force.of_packings(Points(packings, []))["alike"]["p_value"] < 1e-6
+    assert force.of_packings(packings).alike.p_value < 1e-6
 
 
 def test_half_of_a_sine_of_variance_lies_at_its_wave(tiny_run: Path, tmp_path: Path) -> None:
@@ -141,25 +149,22 @@ def test_half_of_a_sine_of_variance_lies_at_its_wave(tiny_run: Path, tmp_path: P
         for seed in (1, 2)
     ]
     found = force.spectrum(packings)
-    assert found["half_wave"]["value"] == pytest.approx(2.0, rel=0.1)
-    peak = int(np.argmax(found["density"]["mean"]))
-    assert found["waves_per_diameter"][peak] == pytest.approx(0.5)
+    assert found.half_wave.value == pytest.approx(2.0, rel=0.1)
+    peak = int(np.argmax(found.density.mean))
+    assert found.waves_per_diameter[peak] == pytest.approx(0.5)
 
 
 def test_the_comparison_has_the_sign_of_more_drag(points: Points) -> None:
-    mean, std = ({"value": v, "ci95_low": lo, "ci95_high": hi} for v, lo, hi in
-                ((-2.75, -3.0, -2.5), (0.6, 0.5, 0.7)))  # fmt: skip
-    measured, published = force.compare(mean, std, points.packings[0].case)
-    assert measured["difference"] == pytest.approx(
-        {"value": 0.1, "ci95_low": 0.0, "ci95_high": 0.2}
-    )
-    assert measured["std_ratio"] == pytest.approx({"value": 1.2, "ci95_low": 1.0, "ci95_high": 1.4})
-    assert published["difference"]["value"] == pytest.approx(0.375)
-    assert "std_ratio" not in published
+    drag = force.Together(mean=Estimate(-2.75, -3.0, -2.5), std=Estimate(0.6, 0.5, 0.7))
+    measured, published = force.compare(drag, points.packings[0].case)
+    assert vars(measured.difference) == pytest.approx(vars(Estimate(0.1, 0.0, 0.2)))
+    assert measured.std_ratio is not None and published.std_ratio is None
+    assert vars(measured.std_ratio) == pytest.approx(vars(Estimate(1.2, 1.0, 1.4)))
+    assert published.difference.value == pytest.approx(0.375)
 
 
 def test_effects_are_found_against_what_they_change(points: Points) -> None:
-    table = force.effects(points)
+    table = effect_table(effects(points))
     mean = table[table["quantity"] == "drag_mean"]
     control, soft, wide = (mean.iloc[i] for i in range(3))
     assert (control.timestep_fraction, control.field, control.runs) == (0.2, "", 1)
@@ -175,27 +180,27 @@ def test_effects_are_found_against_what_they_change(points: Points) -> None:
 def test_a_shorter_run_counts_less(points: Points) -> None:
     def half_width(arc_m: float) -> float:
         control, *others = points.others
-        shorter = dataclasses.replace(control, measures={**control.measures, "arc_m": arc_m})
-        row = force.effects(Points(points.packings, [shorter, *others])).iloc[0]
-        return float(row.ci95_high - row.ci95_low)
+        shorter = dataclasses.replace(control, measures=changed(control.measures, arc_m=arc_m))
+        row = effects(Points(points.packings, [shorter, *others]))[0]
+        return row.ci95_high - row.ci95_low
 
-    whole = points.packings[0].measures["arc_m"]
+    whole = points.packings[0].measures.arc_m
     assert half_width(whole / 4.0) > 1.4 * half_width(whole)
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "verdict"), [(1.1, 1.5, HOLDS), (0.5, 0.9, FAILS), (0.9, 1.5, OPEN)]
+    ("low", "high", "expected"),
+    [
+        (1.1, 1.5, "holds"),
+        (0.5, 0.9, "does not hold"),
+        (0.9, 1.5, "not resolved"),
+        (math.nan, math.nan, "not resolved"),
+    ],
 )
-def test_a_verdict_is_the_interval_against_no_effect(low: float, high: float, verdict: str) -> None:
-    estimate = {"value": (low + high) / 2, "ci95_low": low, "ci95_high": high}
-    assert Claim("it grows", "ratio", estimate, 1.0).verdict == verdict
-
-
-def test_a_number_without_interval_is_not_resolved() -> None:
-    assert (
-        Claim("it grows", "ratio", {"value": 2.0, "ci95_low": None, "ci95_high": None}, 1.0).verdict
-        == OPEN
-    )
+def test_a_verdict_is_the_interval_against_no_effect(
+    low: float, high: float, expected: str
+) -> None:
+    assert verdict(Estimate((low + high) / 2, low, high), 1.0) == expected
 
 
 # --- statements --------------------------------------------------------------------------------
@@ -223,22 +228,23 @@ def with_contacts(points: Points, seed: int = 0) -> list[Point]:
 
 
 def test_contacts_around_the_workpiece(points: Points) -> None:
-    rows = [statements._around_workpiece(point) for point in with_contacts(points)]
-    assert [row["ratio"] for row in rows] == pytest.approx([3.0] * 4, rel=0.01)
-    assert [row["slope"] for row in rows] == pytest.approx([1.0] * 4)
-    assert sum(rows[0]["azimuth"]["value"]) == pytest.approx(1.0)
-    assert rows[0]["front_fraction"] == pytest.approx(0.375, abs=0.03)
-    assert rows[0]["front_over_flank"] == pytest.approx(1.0, abs=0.1)
+    rows = [contacts_of(point) for point in with_contacts(points)]
+    assert [row.ahead_behind for row in rows] == pytest.approx([3.0] * 4, rel=0.01)
+    assert [row.depth_slope_n_per_m for row in rows] == pytest.approx([1.0] * 4)
+    assert rows[0].azimuth.sum() == pytest.approx(1.0)
+    assert rows[0].front_fraction == pytest.approx(0.375, abs=0.03)
+    assert rows[0].front_over_flank == pytest.approx(1.0, abs=0.1)
 
 
 def test_silent_contacts_do_not_count(points: Points) -> None:
     (point, *_) = with_contacts(points)
     file = point.folder / "tables" / "workpiece_contacts.parquet"
-    before = statements._around_workpiece(point)
+    before = contacts_of(point)
     table = pd.read_parquet(file)
     silent = table.assign(normal_force_n=0.0, azimuth_rad=0.0)
     pd.concat([table, silent]).to_parquet(file)
-    assert statements._around_workpiece(point) == before
+    after = vars(contacts_of(point))
+    assert all(np.array_equal(after[name], value) for name, value in vars(before).items())
 
 
 def test_the_corridor_is_along_the_motion(tmp_path: Path) -> None:
@@ -251,27 +257,25 @@ def test_the_corridor_is_along_the_motion(tmp_path: Path) -> None:
             "direction_rad": np.pi / 2,
         }
     )
-    along, across, turned = statements._relative(contacts)
+    along, across, turned = relative_places(contacts)
     assert along == pytest.approx([0.01, -0.04, -0.02])
     assert across == pytest.approx([0.0, 0.0, -0.03])
     assert np.abs(turned) == pytest.approx([0.0, np.pi, np.pi / 2])
 
 
 def test_the_reach_lies_where_half_of_the_excess_is_left() -> None:
-    corridor = statements._Corridor(
+    corridor = Corridor(
         edges=np.arange(0.0, 3.0, 0.5),
         ahead=np.array([3.0, 2.5, 1.5, 1.0, 1.0]),
         behind=np.ones(5),
         far=1.0,
         wall=2.5,
     )
-    assert statements._half_reach(corridor) == pytest.approx(1.0)  # 2 N is half of the excess
+    assert corridor.half_reach == pytest.approx(1.0)  # 2 N is half of the excess
     flat = dataclasses.replace(corridor, ahead=np.full(5, 3.0))
-    assert statements._half_reach(flat) is None
+    assert flat.half_reach is None
 
 
 def test_a_reference_that_is_not_measured_is_named(tmp_path: Path) -> None:
-    from dragchain.validation.runs_by_bed import read_points
-
-    with pytest.raises(TableError, match=r"measures.json is not there"):
+    with pytest.raises(DocumentError, match=r"measures.json: there is no such file"):
         read_points([tmp_path])

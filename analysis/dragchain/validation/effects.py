@@ -1,0 +1,152 @@
+"""What every other setting of a validation does to the drag."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from pydantic import JsonValue
+
+from dragchain.arrays import Floats
+from dragchain.documents import Part
+from dragchain.drag.force import read_counted
+from dragchain.statistics.bed_effects import Fit, fit_effects
+from dragchain.statistics.estimate import Estimate
+from dragchain.validation.runs_by_bed import Point, Points
+
+
+class Effect(Part):
+    """The effect of a setting on a quantity.
+
+    Attributes
+    ----------
+    quantity : str
+        ``drag_mean`` or ``drag_std``.
+    youngs_modulus_scale, timestep_fraction, speed_factor : float
+        The fidelity.
+    runs : int
+    field, value, reference_value
+        The input that it changes (empty if none), to what, and what it is at the same fidelity
+        without the change.
+    change, ci95_low, ci95_high : float
+        Relative change, against the same fidelity without the changed input, or against the
+        packings if it changes the fidelity alone.
+    exponent, exponent_low, exponent_high : float or None
+        Of the change over that of the input.
+    """
+
+    quantity: str
+    youngs_modulus_scale: float
+    timestep_fraction: float
+    speed_factor: float
+    runs: int
+    field: str
+    value: JsonValue
+    reference_value: JsonValue
+    change: float
+    ci95_low: float
+    ci95_high: float
+    exponent: float | None
+    exponent_low: float | None
+    exponent_high: float | None
+
+
+def effects(points: Points) -> list[Effect]:
+    """The effect of every other setting on the mean drag and on its standard deviation.
+
+    All runs are fitted together (`bed_effects`): one mean per setting, one variance for all, in
+    inverse proportion to the path. What runs from one bed have in common is not made use of: it
+    was measured to be little (docs/tradeoff.md), and these are too few runs to tell.
+
+    Raises
+    ------
+    SeriesError
+        If there are too few runs.
+    """
+    drags = [
+        read_counted(point.folder, ("drag_n",))["drag_n"].to_numpy(np.float64)
+        for point in points.all
+    ]
+    sizes = {
+        "drag_mean": [abs(float(drag.mean())) for drag in drags],
+        "drag_std": [float(drag.std(ddof=1)) for drag in drags],
+    }
+    return [row for name, values in sizes.items() for row in _of_quantity(points, name, values)]
+
+
+def effect_table(rows: Sequence[Effect]) -> pd.DataFrame:
+    """The effects as a table, one row per quantity and setting."""
+    return pd.DataFrame([dict(row) for row in rows], columns=list(Effect.model_fields))
+
+
+@dataclass(frozen=True)
+class _Design:
+    """The runs, with a mean of its own for every setting."""
+
+    points: list[Point]
+
+    @property
+    def settings(self) -> list[tuple[object, ...]]:
+        return list(dict.fromkeys(point.setting for point in self.points))
+
+    def indicator(self, point: Point) -> Floats:
+        return np.array([float(point.setting == other) for other in self.settings])
+
+    def fit(self, sizes: Sequence[float]) -> Fit:
+        """Fit the logarithms of a quantity."""
+        design = np.array([self.indicator(point) for point in self.points])
+        weights = np.sqrt([point.measures.arc_m for point in self.points])
+        weights /= weights.max()
+        runs = range(len(self.points))
+        return fit_effects(weights[:, None] * design, weights * np.log(sizes), runs)
+
+    def base(self, point: Point) -> Point:
+        """What a point is to be compared with."""
+        alike = (
+            one for one in self.points if one.parameters == point.parameters and not one.changed
+        )
+        return next(alike, self.points[0]) if point.changed else self.points[0]
+
+
+def _of_quantity(points: Points, quantity: str, sizes: Sequence[float]) -> Iterator[Effect]:
+    design = _Design(points.all)
+    fit = design.fit(sizes)
+    for setting in design.settings[1:]:
+        own = [point for point in points.all if point.setting == setting]
+        point, base = own[0], design.base(own[0])
+        field, value = next(iter(point.changed.items()), ("", None))
+        before = base.measures.inputs.get(field)
+        logarithm = fit.estimate(design.indicator(point) - design.indicator(base))
+        change = Estimate(*(math.expm1(edge) for edge in vars(logarithm).values()))
+        exponent = _exponent(logarithm, value, before) if len(point.changed) == 1 else None
+        modulus, step, speed = point.parameters
+        yield Effect(
+            quantity=quantity,
+            youngs_modulus_scale=modulus,
+            timestep_fraction=step,
+            speed_factor=speed,
+            runs=len(own),
+            field=field,
+            value=value,
+            reference_value=before,
+            change=change.value,
+            ci95_low=change.ci95_low,
+            ci95_high=change.ci95_high,
+            exponent=exponent and exponent.value,
+            exponent_low=exponent and exponent.ci95_low,
+            exponent_high=exponent and exponent.ci95_high,
+        )
+
+
+def _exponent(change: Estimate, new: JsonValue, old: JsonValue) -> Estimate | None:
+    """Exponent of a change, in logarithms, over that of its input; None without a ratio of both."""
+    if not (isinstance(new, int | float) and isinstance(old, int | float)):
+        return None
+    if new <= 0 or old <= 0:
+        return None
+    scale = math.log(new / old)
+    low, high = sorted((change.ci95_low / scale, change.ci95_high / scale))
+    return Estimate(change.value / scale, low, high)
