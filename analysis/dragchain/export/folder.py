@@ -76,7 +76,8 @@ def fresh_folder(target: Path, *, replace: bool) -> Iterator[Path]:
 
 def files_in(folder: Path) -> list[Path]:
     """All files of a folder and its folders, relative to it, in the order of their names."""
-    return sorted(file.relative_to(folder) for file in folder.rglob("*") if file.is_file())
+    files = (file.relative_to(folder) for file in folder.rglob("*") if file.is_file())
+    return sorted(files, key=str)
 
 
 def _old_files(target: Path, replace: bool) -> set[str]:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from dragchain.arrays import Floats
-from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED, WIDTH_IN
+from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED, legend_below, new_figure
 from dragchain.validation.peaks.averages import Lifetimes
 from dragchain.validation.peaks.findings import Study
 from dragchain.validation.peaks.lags import LagCurves
@@ -47,7 +47,7 @@ def draw(study: Study) -> dict[str, Figure]:
 
 def _around_peaks(lags: LagCurves) -> Figure:
     """Event-triggered averages with the band that chance keeps."""
-    figure = Figure(figsize=(WIDTH_IN, 5.0), layout="constrained")
+    figure = new_figure(5.0)
     grid = figure.subplots(len(LAGGED), len(FAMILIES), sharex=True, sharey=True)
     for row, (name, label) in zip(grid, LAGGED.items(), strict=True):
         for axes, (family, definitions) in zip(row, FAMILIES.items(), strict=True):
@@ -87,7 +87,7 @@ def _effects(tests: Sequence[PeakTest]) -> Figure:
         for test in tests
         if test.peaks == "all"
     }
-    figure = Figure(figsize=(WIDTH_IN, 6.4), layout="constrained")
+    figure = new_figure(6.4)
     grid = figure.subplots(1, len(FOREST), sharey=True)
     for axes, descriptor in zip(grid, FOREST, strict=True):
         for place, setting in enumerate(SETTINGS):
@@ -110,8 +110,7 @@ def _effects(tests: Sequence[PeakTest]) -> Figure:
         "bars: 95 % CI over the packings; *: default thresholds",
         fontsize=8.5, x=0.02, ha="left",
     )  # fmt: skip
-    handles, labels = grid[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=3)
+    legend_below(figure, grid[0], columns=3)
     return figure
 
 
@@ -133,7 +132,7 @@ def _effect(axes: Axes, height: float, test: PeakTest) -> None:
 
 def _geometry(runs: Sequence[RunSeries], lifetimes: Mapping[Definition, Lifetimes]) -> Figure:
     """Azimuth, altitude and lifetime of the dominant chains, at peaks and at all times."""
-    figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained")
+    figure = new_figure(6.0)
     shown: tuple[Definition, ...] = ("widest_path", "peters")
     for row, name in enumerate(shown):
         rose: Any = figure.add_subplot(2, 3, 3 * row + 1, projection="polar")
@@ -142,8 +141,7 @@ def _geometry(runs: Sequence[RunSeries], lifetimes: Mapping[Definition, Lifetime
         heights, lives = (figure.add_subplot(2, 3, 3 * row + place) for place in (2, 3))
         _altitude(heights, runs, DEFAULTS[name])
         _survival(lives, lifetimes[name])
-    handles, labels = heights.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=2)
+    legend_below(figure, heights)
     return figure
 
 

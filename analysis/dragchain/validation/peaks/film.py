@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -23,7 +22,7 @@ from dragchain.figures import network_picture as scene
 from dragchain.figures.network_overlay import show_network
 from dragchain.figures.network_picture import Look, Scene, View
 from dragchain.figures.rendering import check_rendering
-from dragchain.figures.style import BLUE, CHAIN, RED, STYLE, WIDTH_IN, png
+from dragchain.figures.style import BLUE, CHAIN, RED, drawing, new_figure, png
 from dragchain.network.chains import dominant_path, widest_paths
 from dragchain.network.frame import read_frames
 from dragchain.run.case import Case, load_case
@@ -127,7 +126,7 @@ def peak_pictures(run_dir: Path, pictures: int = PICTURES) -> tuple[dict[str, by
     wanted = (moments.peak_s, moments.quiet_s)
     pair = [scene.load_scene(run_dir, moments.case, time_s) for time_s in wanted]
     views: tuple[View, ...] = ("xy", "xz")
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         drawn = {
             f"peak_and_quiet_{view}": png(_side_by_side(moments, pair, view)) for view in views
         }
@@ -139,7 +138,7 @@ def peak_pictures(run_dir: Path, pictures: int = PICTURES) -> tuple[dict[str, by
 
 def _side_by_side(moments: PeakAndQuiet, pair: Sequence[Scene], view: View) -> Figure:
     look = Look(_PIXELS_PER_MM, _largest_force(pair))
-    figure = Figure(figsize=(WIDTH_IN, 5.5), layout="constrained")
+    figure = new_figure(5.5)
     grid = figure.add_gridspec(2, 2, height_ratios=(3.6, 1.3))
     axes = [figure.add_subplot(grid[0, column]) for column in (0, 1)]
     for name, place, shown in zip(("at the peak", "at the quiet moment"), axes, pair, strict=True):

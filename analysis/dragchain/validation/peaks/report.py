@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib
 import pandas as pd
 
-from dragchain.figures.style import STYLE, png
+from dragchain.figures.style import drawing, png
 from dragchain.files import write_bytes
 from dragchain.report.bundle import write_bundle
 from dragchain.tables.parquet import write_parquet
@@ -71,7 +70,7 @@ def report_peaks(run_dirs: Sequence[Path], pictures: int = PICTURES) -> PeaksRep
         Pictures cannot be rendered here.
     """
     made = study(run_dirs)
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         figures = {name: png(figure) for name, figure in draw(made).items()}
     moments, film = peak_pictures(run_dirs[0], pictures)
     tests = test_table(made.findings.tests)
