@@ -29,7 +29,7 @@ from statistics import median
 import numpy as np
 import pandas as pd
 
-from dragchain.export.frames import Moment, Moments, Selection
+from dragchain.export.frames import FrameData, FrameSeries, Selection
 from dragchain.export.write import folder_size, write_export
 from dragchain.tables.run_folder import Run
 
@@ -44,30 +44,30 @@ FORCE = ["force_x_n", "force_y_n", "force_z_n"]
 # --- the readers: each checks every frame against the tables ------------------------------
 
 
-def ovito_paraview(folder: Path, expected: Iterator[Moment]) -> None:
+def ovito_paraview(folder: Path, expected: Iterator[FrameData]) -> None:
     """Open ``run.pvd`` with OVITO: particles, lines and a mesh."""
-    for moment, data in _both(expected, _ovito(folder / "run.pvd")):
-        same("time", data.attributes["Time"], moment.time_s)
-        _ovito_particles(data.particles, moment.particles)
-        if moment.network is not None:
-            same("coordination", data.particles["coordination_number"][...], _contacts_of(moment))
-        if moment.contacts is not None:
-            _ovito_contacts(next(iter(data.lines.values())), moment.contacts)
-        if moment.workpiece is not None and not data.surfaces:
+    for frame, data in _both(expected, _ovito(folder / "run.pvd")):
+        same("time", data.attributes["Time"], frame.time_s)
+        _ovito_particles(data.particles, frame.particles)
+        if frame.network is not None:
+            same("coordination", data.particles["coordination_number"][...], _contacts_of(frame))
+        if frame.contacts is not None:
+            _ovito_contacts(next(iter(data.lines.values())), frame.contacts)
+        if frame.workpiece is not None and not data.surfaces:
             sys.exit("OVITO finds no workpiece")
 
 
-def ovito_xyz(folder: Path, expected: Iterator[Moment]) -> None:
+def ovito_xyz(folder: Path, expected: Iterator[FrameData]) -> None:
     """Open ``run.xyz`` with OVITO."""
-    for moment, data in _both(expected, _ovito(folder / "run.xyz")):
-        same("time", data.attributes["Time"], moment.time_s, parsed=True)
-        same("step", data.attributes["Timestep"], moment.step)
-        _ovito_particles(data.particles, moment.particles, parsed=True)
-        if moment.network is not None:
-            same("coordination", data.particles["Coordination"][...], _contacts_of(moment))
+    for frame, data in _both(expected, _ovito(folder / "run.xyz")):
+        same("time", data.attributes["Time"], frame.time_s, parsed=True)
+        same("step", data.attributes["Timestep"], frame.step)
+        _ovito_particles(data.particles, frame.particles, parsed=True)
+        if frame.network is not None:
+            same("coordination", data.particles["Coordination"][...], _contacts_of(frame))
 
 
-def vtk_paraview(folder: Path, expected: Iterator[Moment]) -> None:
+def vtk_paraview(folder: Path, expected: Iterator[FrameData]) -> None:
     """Open ``run.pvd`` with VTK's readers."""
     import pyvista as pv
 
@@ -78,17 +78,17 @@ def vtk_paraview(folder: Path, expected: Iterator[Moment]) -> None:
             reader.set_active_time_value(time_s)
             yield time_s, reader.read()[0]
 
-    for moment, (time_s, blocks) in _both(expected, frames()):
-        same("time", time_s, moment.time_s)
+    for frame, (time_s, blocks) in _both(expected, frames()):
+        same("time", time_s, frame.time_s)
         particles = blocks["particles"]
-        same("id", particles["id"], moment.particles["particle_id"])
-        same("radius", particles["radius"], moment.particles["radius_m"])
+        same("id", particles["id"], frame.particles["particle_id"])
+        same("radius", particles["radius"], frame.particles["radius_m"])
         for name, values in zip(
             VECTORS, (particles.points, particles["v"], particles["omega"]), strict=True
         ):
-            same(name, values, moment.particles[VECTORS[name]])
-        if moment.contacts is not None:
-            same("force", blocks["contacts"]["force_n"], moment.contacts[FORCE])
+            same(name, values, frame.particles[VECTORS[name]])
+        if frame.contacts is not None:
+            same("force", blocks["contacts"]["force_n"], frame.contacts[FORCE])
 
 
 def _ovito(file: Path) -> Iterator[object]:
@@ -113,13 +113,13 @@ def _ovito_contacts(lines: object, contacts: pd.DataFrame) -> None:
     same("id 1", lines["Particle Identifier 1"][::2], contacts["a_id"])
 
 
-def _contacts_of(moment: Moment) -> np.ndarray:
+def _contacts_of(frame: FrameData) -> np.ndarray:
     from dragchain.network.statistics import contact_counts
 
-    return contact_counts(moment.network)
+    return contact_counts(frame.network)
 
 
-def _both(expected: Iterator[Moment], found: Iterator) -> Iterator:
+def _both(expected: Iterator[FrameData], found: Iterator) -> Iterator:
     for one, other in zip_longest(expected, found):
         if one is None or other is None:
             sys.exit("the reader finds another number of frames than were written")
@@ -135,7 +135,7 @@ def same(what: str, found: object, expected: object, *, parsed: bool = False) ->
         sys.exit(f"{what} is not what the table holds:\n{found}\n{expected}")
 
 
-READERS: dict[str, tuple[str, Callable[[Path, Iterator[Moment]], None]]] = {
+READERS: dict[str, tuple[str, Callable[[Path, Iterator[FrameData]], None]]] = {
     "OVITO, run.pvd": ("paraview", ovito_paraview),
     "VTK (ParaView's readers), run.pvd": ("paraview", vtk_paraview),
     "OVITO, run.xyz": ("xyz", ovito_xyz),
@@ -169,7 +169,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     options = parser.parse_args()
     selection = Selection(every=options.every)
-    moments = Moments.of(Run.open(options.run_dir), selection)
+    series = FrameSeries.of(Run.open(options.run_dir), selection)
     lines = ["| | frames/s a core | MB/s a core | MB/s |", "| --- | ---: | ---: | ---: |"]
     with tempfile.TemporaryDirectory() as name:
         sizes = {}
@@ -180,21 +180,21 @@ def main() -> None:
                 for _ in range(options.rounds)
             ]
             sizes[to] = folder_size(folder)
-            lines.append(row(f"write {to}", times, len(moments), sizes[to]))
-        known = list(moments)
+            lines.append(row(f"write {to}", times, len(series), sizes[to]))
+        known = list(series)
         for reader, (to, check) in READERS.items():
             times = [
                 timed(lambda c=check, t=to: c(Path(name) / t, iter(known)))
                 for _ in range(options.rounds)
             ]
-            lines.append(row(f"read and check {reader}", times, len(moments), sizes[to]))
+            lines.append(row(f"read and check {reader}", times, len(series), sizes[to]))
     shown = ", ".join(f"{name} {version(name)}" for name in ("ovito", "vtk", "pyvista", "pyarrow"))
     load = " ".join(f"{value:.1f}" for value in os.getloadavg())
     particles = len(known[0].particles)
     held = ", ".join(f"{size / 1e6:.1f} MB {to}" for to, size in sizes.items())
     print(
         f"{len(os.sched_getaffinity(0))} cores, load {load}; Python {platform.python_version()},"
-        f" {shown}.\n{len(moments)} frames of {particles} particles, {options.rounds} "
+        f" {shown}.\n{len(series)} frames of {particles} particles, {options.rounds} "
         f"rounds; {held}."
         " Every number read is the table's (OVITO's from text: to two epsilons).\n"
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny_run_files import Raw, case_json, outputs_json, raw_files
+from tiny_run_files import Raw, write_tiny_run
 
 
 @pytest.fixture
@@ -30,13 +30,7 @@ def tiny_run(tmp_path: Path) -> Path:
     step 0; the forces in ``workpiece_contacts`` are 5 % above the applied ones.
     Samples count from step 40 on.
     """
-    folder = tmp_path / "tiny"
-    folder.mkdir()
-    (folder / "case.json").write_text(json.dumps(case_json()))
-    (folder / "columns.json").write_text(json.dumps(outputs_json()))
-    for name, content in raw_files().items():
-        (folder / name).write_bytes(content)
-    return folder
+    return write_tiny_run(tmp_path / "tiny")
 
 
 @pytest.fixture

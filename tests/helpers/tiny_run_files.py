@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -252,3 +254,13 @@ def raw_files() -> Mapping[str, bytes]:
             Raw.text(s, _contacts(s), engine["contacts"], "local") for s in steps["contacts"]
         ),
     }
+
+
+def write_tiny_run(folder: Path) -> Path:
+    """Write the run into a new folder, without its tables."""
+    folder.mkdir()
+    (folder / "case.json").write_text(json.dumps(case_json()))
+    (folder / "columns.json").write_text(json.dumps(outputs_json()))
+    for name, content in raw_files().items():
+        (folder / name).write_bytes(content)
+    return folder

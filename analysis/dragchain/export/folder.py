@@ -2,20 +2,46 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
+from pathlib import Path, PurePath
+from typing import ClassVar
 
-from dragchain.errors import ExportError
-from dragchain.files import write_json
+from pydantic import field_validator
+
+from dragchain.documents import Document
+from dragchain.errors import DocumentError, ExportError
 
 LIST = "export.json"
-"""What an export is of, and all the files that it wrote."""
 
 _ELSEWHERE = "name another folder with --out, or move this one away"
+
+
+class ExportFile(Document):
+    """What an export is of, and all the files that it wrote: ``export.json``."""
+
+    made_by: ClassVar[str] = "dragchain export"
+
+    format: str
+    study: str
+    scene: str
+    run: str
+    frames: int
+    first_time_s: float
+    last_time_s: float
+    bytes: int
+    files: tuple[str, ...]
+
+    @field_validator("files")
+    @classmethod
+    def _below_its_folder(cls, files: tuple[str, ...]) -> tuple[str, ...]:
+        paths = [PurePath(name) for name in files]
+        assert not any(path.is_absolute() or ".." in path.parts for path in paths), (
+            "it names files of other folders"
+        )
+        return files
 
 
 @contextmanager
@@ -48,10 +74,10 @@ def fresh_folder(target: Path, *, replace: bool) -> Iterator[Path]:
         shutil.rmtree(draft, ignore_errors=True)
 
 
-def write_list(folder: Path, content: Mapping[str, object]) -> None:
-    """Write what an export is of, with all files of its folder."""
-    files = sorted(str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file())
-    write_json(folder / LIST, {"schema": 2, **content, "files": files})
+def files_in(folder: Path) -> list[Path]:
+    """All files of a folder and its folders, relative to it, in the order of their names."""
+    files = (file.relative_to(folder) for file in folder.rglob("*") if file.is_file())
+    return sorted(files, key=str)
 
 
 def _old_files(target: Path, replace: bool) -> set[str]:
@@ -70,24 +96,15 @@ def _old_files(target: Path, replace: bool) -> set[str]:
             f"{target} holds an export already\n  remedy: {_ELSEWHERE}, or replace it with"
             " --replace"
         )
-    return {LIST, *_listed(listed)}
-
-
-def _listed(file: Path) -> set[str]:
-    """Read the names of an earlier export's files, all of them below its folder."""
     try:
-        names = set(json.loads(file.read_text(encoding="utf-8"))["files"])
-        paths = [Path(name) for name in names]
-    except (ValueError, KeyError, TypeError) as error:
-        raise ExportError(f"{file} does not list an export\n  remedy: {_ELSEWHERE}") from error
-    if any(path.is_absolute() or ".." in path.parts for path in paths):
-        raise ExportError(f"{file} names files of other folders\n  remedy: {_ELSEWHERE}")
-    return names
+        return {LIST, *ExportFile.read(listed).files}
+    except DocumentError as error:
+        raise ExportError(f"{error}\n  or:     {_ELSEWHERE}") from None
 
 
 def _move(draft: Path, target: Path, old: set[str]) -> None:
     """Put new files in the place of old ones."""
-    new = sorted(file.relative_to(draft) for file in draft.rglob("*") if file.is_file())
+    new = files_in(draft)
     for file in new:
         if str(file) not in old and (target / file).exists():
             raise ExportError(

@@ -44,7 +44,7 @@ class Selection:
 
 
 @dataclass(frozen=True)
-class Moment:
+class FrameData:
     """One frame: what there is of particles, contacts, chains and the workpiece.
 
     Attributes
@@ -74,7 +74,7 @@ class Moment:
 
 
 @dataclass(frozen=True)
-class Moments:
+class FrameSeries:
     """The wanted frames of a run.
 
     Attributes
@@ -90,7 +90,7 @@ class Moments:
     times_s: Floats
 
     @classmethod
-    def of(cls, run: Run, selection: Selection) -> Moments:
+    def of(cls, run: Run, selection: Selection) -> FrameSeries:
         """Find the frames of a selection.
 
         Raises
@@ -130,7 +130,7 @@ class Moments:
         tables = ("network.parquet", "chains.parquet")
         return self.has_contacts and all(self.run.table(name).is_file() for name in tables)
 
-    def __iter__(self) -> Iterator[Moment]:
+    def __iter__(self) -> Iterator[FrameData]:
         """Yield the frames in the order of their steps.
 
         Raises
@@ -156,7 +156,7 @@ class Moments:
             if chains is not None and network is not None and step in searched:
                 membership = chain_membership(network, chains.at(step))
             workpiece = None if track is None else track.at(step)
-            yield Moment(step, time_s, of_particles, of_contacts, network, membership, workpiece)
+            yield FrameData(step, time_s, of_particles, of_contacts, network, membership, workpiece)
         for rows in (particles, contacts, chains):
             if rows is not None:
                 rows.finish()

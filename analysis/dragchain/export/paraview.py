@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from dragchain.export.frames import Moment, Moments
+from dragchain.export.frames import FrameData, FrameSeries
 from dragchain.figures.network_picture import segments
 from dragchain.network.chains import major_stress, particle_stress
 from dragchain.network.frame import PARTICLE
@@ -33,39 +33,39 @@ class ParaviewWriter:
     ----------
     folder : Path
         An empty folder.
-    moments : Moments
+    series : FrameSeries
         The frames that will be written.
     """
 
-    def __init__(self, folder: Path, moments: Moments) -> None:
+    def __init__(self, folder: Path, series: FrameSeries) -> None:
         self._folder = folder
-        self._with_chains = moments.has_chains
-        self._width = len(str(moments.steps[-1]))
-        case = moments.run.case
+        self._with_chains = series.has_chains
+        self._width = len(str(series.steps[-1]))
+        case = series.run.case
         self._workpiece = (
-            None if case.workpiece is None else workpiece_mesh(moments.run.folder, case)
+            None if case.workpiece is None else workpiece_mesh(series.run.folder, case)
         )
         self._series: dict[str, list[tuple[float, str]]] = {}
         (folder / _FRAMES).mkdir()
 
-    def add(self, moment: Moment) -> None:
+    def add(self, frame_data: FrameData) -> None:
         """Write the files of one frame."""
         import pyvista as pv
 
-        parts = {"particles": particles_mesh(moment, with_chains=self._with_chains)}
-        if moment.network is not None:
-            parts["contacts"] = contacts_mesh(moment, with_chains=self._with_chains)
-        if self._workpiece is not None and moment.workpiece is not None:
-            parts["workpiece"] = placed(self._workpiece, *moment.workpiece)
-        name = f"{moment.step:0{self._width}d}"
+        parts = {"particles": particles_mesh(frame_data, with_chains=self._with_chains)}
+        if frame_data.network is not None:
+            parts["contacts"] = contacts_mesh(frame_data, with_chains=self._with_chains)
+        if self._workpiece is not None and frame_data.workpiece is not None:
+            parts["workpiece"] = placed(self._workpiece, *frame_data.workpiece)
+        name = f"{frame_data.step:0{self._width}d}"
         frames = self._folder / _FRAMES
         pv.MultiBlock(parts).save(frames / f"{name}.vtm", compression=None)
-        self._list("run", moment.time_s, f"{name}.vtm")
+        self._list("run", frame_data.time_s, f"{name}.vtm")
         for number, (part_name, part) in enumerate(parts.items()):
             file = f"{name}/{name}_{number}.vtp"  # as VTK's writer of VTM files names it
             if not (frames / file).exists():  # it leaves out a part that is empty
                 part.save(frames / file, compression=None)
-            self._list(part_name, moment.time_s, file)
+            self._list(part_name, frame_data.time_s, file)
 
     def _list(self, series: str, time_s: float, file: str) -> None:
         self._series.setdefault(series, []).append((time_s, f"{_FRAMES}/{file}"))
@@ -89,7 +89,7 @@ def pvd(files: list[tuple[float, str]]) -> str:
     )
 
 
-def particles_mesh(moment: Moment, *, with_chains: bool) -> Any:
+def particles_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     """The particles as points with what is known of each.
 
     ``id``, ``radius`` (m), ``v`` (m/s) and ``omega`` (rad/s); with contacts
@@ -98,22 +98,22 @@ def particles_mesh(moment: Moment, *, with_chains: bool) -> Any:
     """
     import pyvista as pv
 
-    particles = moment.particles
+    particles = frame_data.particles
     mesh = pv.PolyData(particles[["x_m", "y_m", "z_m"]].to_numpy(np.float64))
     data = mesh.point_data
     data["id"] = particles["particle_id"].to_numpy(np.int64)
     data["radius"] = particles["radius_m"].to_numpy(np.float64)
     data["v"] = particles[["vx_m_s", "vy_m_s", "vz_m_s"]].to_numpy(np.float64)
     data["omega"] = particles[["wx_rad_s", "wy_rad_s", "wz_rad_s"]].to_numpy(np.float64)
-    if moment.network is not None:
-        data["coordination_number"] = contact_counts(moment.network).astype(np.int32)
-        data["major_stress_pa"] = major_stress(particle_stress(moment.network))[0]
+    if frame_data.network is not None:
+        data["coordination_number"] = contact_counts(frame_data.network).astype(np.int32)
+        data["major_stress_pa"] = major_stress(particle_stress(frame_data.network))[0]
     if with_chains:
-        _chains(data, moment, "particle", len(particles))
+        _chains(data, frame_data, "particle", len(particles))
     return mesh
 
 
-def contacts_mesh(moment: Moment, *, with_chains: bool) -> Any:
+def contacts_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     """The contacts as lines from centre to centre, or from centre to contact point.
 
     Each has ``kind`` (0 between particles, 1 with the workpiece, 2 the floor, 3 the side), ``id1``
@@ -124,7 +124,7 @@ def contacts_mesh(moment: Moment, *, with_chains: bool) -> Any:
     """
     import pyvista as pv
 
-    contacts, frame = moment.contacts, moment.network
+    contacts, frame = frame_data.contacts, frame_data.network
     assert contacts is not None and frame is not None
     if contacts.empty:
         return pv.PolyData()
@@ -139,16 +139,16 @@ def contacts_mesh(moment: Moment, *, with_chains: bool) -> Any:
     for name in ("normal_force_n", "tangential_force_n", "overlap_m"):
         data[name] = contacts[name].to_numpy(np.float64)
     if with_chains:
-        _chains(data, moment, "contact", len(contacts))
+        _chains(data, frame_data, "contact", len(contacts))
     return mesh
 
 
-def _chains(data: Any, moment: Moment, what: str, size: int) -> None:
+def _chains(data: Any, frame_data: FrameData, what: str, size: int) -> None:
     """Add number of the chain, number of workpiece paths, and dominance.
 
     0 none, -1 not searched.
     """
-    found = moment.membership
+    found = frame_data.membership
     for name, field in _CHAIN_ARRAYS.items():
         values = np.full(size, -1) if found is None else getattr(found, f"{what}_{field}")
         data[name] = values.astype(np.int32)

@@ -10,8 +10,8 @@ from typing import Protocol
 
 from dragchain.errors import ExportError
 from dragchain.export import paraview, xyz
-from dragchain.export.folder import fresh_folder, write_list
-from dragchain.export.frames import Moment, Moments, Selection
+from dragchain.export.folder import LIST, ExportFile, files_in, fresh_folder
+from dragchain.export.frames import FrameData, FrameSeries, Selection
 from dragchain.tables.run_folder import Run
 
 Report = Callable[[str], object]
@@ -20,14 +20,14 @@ Report = Callable[[str], object]
 class Writer(Protocol):
     """Writes the frames of one export."""
 
-    def add(self, moment: Moment) -> None:
+    def add(self, frame_data: FrameData) -> None:
         """Write one frame."""
 
     def close(self) -> None:
         """Write what comes after the last one."""
 
 
-FORMATS: dict[str, tuple[str, Callable[[Path, Moments], Writer]]] = {
+FORMATS: dict[str, tuple[str, Callable[[Path, FrameSeries], Writer]]] = {
     "paraview": (paraview.MAIN, paraview.ParaviewWriter),
     "xyz": (xyz.MAIN, xyz.XyzWriter),
 }
@@ -88,27 +88,27 @@ def write_export(
         raise ExportError(f"the format is {to!r}, not one of {', '.join(FORMATS)}")
     main, writer_of = FORMATS[to]
     run = Run.open(run_dir)
-    moments = Moments.of(run, Selection() if selection is None else selection)
+    series = FrameSeries.of(run, Selection() if selection is None else selection)
     target = run.folder / "export" / to if out is None else out
     with fresh_folder(target, replace=replace) as folder:
-        _write(folder, writer_of, moments, report)
+        _write(folder, writer_of, series, report)
         size = folder_size(folder)
-        write_list(folder, _content(to, moments, size))
-    return Exported(target / main, len(moments), size)
+        _list(folder, to, series, size).write(folder / LIST)
+    return Exported(target / main, len(series), size)
 
 
 def _write(
     folder: Path,
-    writer_of: Callable[[Path, Moments], Writer],
-    moments: Moments,
+    writer_of: Callable[[Path, FrameSeries], Writer],
+    series: FrameSeries,
     report: Report,
 ) -> None:
-    writer = writer_of(folder, moments)
+    writer = writer_of(folder, series)
     try:
-        for number, moment in enumerate(moments):
-            writer.add(moment)
+        for number, frame_data in enumerate(series):
+            writer.add(frame_data)
             if number == 0:
-                _foresee(folder, len(moments), report)
+                _foresee(folder, len(series), report)
     finally:
         writer.close()
 
@@ -129,21 +129,22 @@ def _foresee(folder: Path, frames: int, report: Report) -> None:
 
 def folder_size(folder: Path) -> int:
     """The size of all files of a folder, in bytes."""
-    return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+    return sum((folder / file).stat().st_size for file in files_in(folder))
 
 
-def _content(to: str, moments: Moments, size: int) -> dict[str, object]:
-    case = moments.run.case
-    return {
-        "format": to,
-        "study": case.study,
-        "scene": case.scene,
-        "run": case.run,
-        "frames": len(moments),
-        "first_time_s": float(moments.times_s[0]),
-        "last_time_s": float(moments.times_s[-1]),
-        "bytes": size,
-    }
+def _list(folder: Path, to: str, series: FrameSeries, size: int) -> ExportFile:
+    case = series.run.case
+    return ExportFile(
+        format=to,
+        study=case.study,
+        scene=case.scene,
+        run=case.run,
+        frames=len(series),
+        first_time_s=float(series.times_s[0]),
+        last_time_s=float(series.times_s[-1]),
+        bytes=size,
+        files=tuple(map(str, files_in(folder))),
+    )
 
 
 def export_command(

@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 
-from dragchain.export.frames import Moment, Moments
+from dragchain.export.frames import FrameData, FrameSeries
 from dragchain.network.statistics import contact_counts
 
 MAIN = "run.xyz"
@@ -41,21 +41,21 @@ class XyzWriter:
     ----------
     folder : Path
         An empty folder.
-    moments : Moments
+    series : FrameSeries
         The frames that will be written.
     """
 
-    def __init__(self, folder: Path, moments: Moments) -> None:
+    def __init__(self, folder: Path, series: FrameSeries) -> None:
         self._file = (folder / MAIN).open("wb")
 
-    def add(self, moment: Moment) -> None:
+    def add(self, frame_data: FrameData) -> None:
         """Append one frame; numbers are written so that they read back to the last bit."""
-        columns: dict[str, pa.Array] = {"species": pa.repeat(SPECIES, len(moment.particles))}
+        columns: dict[str, pa.Array] = {"species": pa.repeat(SPECIES, len(frame_data.particles))}
         for name in (name for names in COLUMNS.values() for name in names):
-            columns[name] = pa.array(moment.particles[name].to_numpy())
-        if moment.network is not None:
-            columns["coordination"] = pa.array(contact_counts(moment.network))
-        self._file.write(header(moment).encode())
+            columns[name] = pa.array(frame_data.particles[name].to_numpy())
+        if frame_data.network is not None:
+            columns["coordination"] = pa.array(contact_counts(frame_data.network))
+        self._file.write(header(frame_data).encode())
         pyarrow.csv.write_csv(pa.table(columns), self._file, _PLAIN)
         self._file.flush()
 
@@ -64,19 +64,19 @@ class XyzWriter:
         self._file.close()
 
 
-def header(moment: Moment) -> str:
+def header(frame_data: FrameData) -> str:
     """The two lines before the particles of a frame."""
     kinds = [f"{name}:{'I' if name == 'id' else 'R'}:{len(of)}" for name, of in COLUMNS.items()]
-    if moment.network is not None:
+    if frame_data.network is not None:
         kinds.append("Coordination:I:1")
     words = [
         f"Properties=species:S:1:{':'.join(kinds)}",
-        f"Time={moment.time_s!r}",
-        f"Timestep={moment.step}",
+        f"Time={frame_data.time_s!r}",
+        f"Timestep={frame_data.step}",
         'pbc="F F F"',
     ]
-    if moment.workpiece is not None:
+    if frame_data.workpiece is not None:
         words.append(
-            f'workpiece_m="{" ".join(map(repr, np.asarray(moment.workpiece[0]).tolist()))}"'
+            f'workpiece_m="{" ".join(map(repr, np.asarray(frame_data.workpiece[0]).tolist()))}"'
         )
-    return f"{len(moment.particles)}\n{' '.join(words)}\n"
+    return f"{len(frame_data.particles)}\n{' '.join(words)}\n"

@@ -157,19 +157,16 @@ def find_events(rows: pd.DataFrame, frames: int, interval_s: float) -> tuple[pd.
     """
     order = np.lexsort((-rows["normal_force_n"], rows["frame"], rows["particle_id"]))
     particle, frame = (rows[name].to_numpy(np.int64)[order] for name in ("particle_id", "frame"))
-    leaves = np.r_[True, (np.diff(particle) != 0) | (np.diff(frame) > 1)][: len(rows)]
-    chosen = np.r_[True, (np.diff(particle) != 0) | (np.diff(frame) != 0)][: len(rows)]
-    found = np.cumsum(leaves) - 1
-    first = order[leaves]
-    rank = np.lexsort((rows["particle_id"].to_numpy()[first], rows["frame"].to_numpy()[first]))
-    place = np.empty_like(rank)
-    place[rank] = np.arange(len(rank))
-    event = np.empty(len(rows), dtype=np.int64)
-    event[order] = place[found]
-    strongest = order[chosen]
-    touch = np.empty(len(rows), dtype=np.int64)
+    other = np.diff(particle) != 0
+    leaves = np.r_[True, other | (np.diff(frame) > 1)][: len(rows)]
+    chosen = np.r_[True, other | (np.diff(frame) != 0)][: len(rows)]
+    rank = np.lexsort((particle[leaves], frame[leaves]))
+    event, touch = np.empty((2, len(rows)), dtype=np.int64)
+    event[order] = np.argsort(rank)[np.cumsum(leaves) - 1]
     touch[order] = np.cumsum(chosen) - 1
-    events = _sums(rows, event, strongest, touch, frames, interval_s)
+    strongest = order[chosen]
+    heads = rows.iloc[order[leaves][rank]]
+    events = _sums(rows, heads, event, event[strongest], touch, frames, interval_s)
     moves = rows[[*POINT, *SLIP]].iloc[strongest]
     for name, path in _paths(moves, event[strongest], interval_s).items():
         events[name] = np.bincount(path[0], path[1], len(events))
@@ -181,27 +178,23 @@ def find_events(rows: pd.DataFrame, frames: int, interval_s: float) -> tuple[pd.
 
 def _sums(
     rows: pd.DataFrame,
+    heads: pd.DataFrame,
     event: Ints,
-    strongest: Ints,
+    of_touch: Ints,
     touch: Ints,
     frames: int,
     interval_s: float,
 ) -> pd.DataFrame:
     """The columns of the events that need no paths.
 
-    `touch` is the particle-and-frame of each row, as an index into `strongest`.
+    `heads` are the first rows of the events, the strongest if there are several; `touch` is the
+    particle-and-frame of each row, and `of_touch` the event of each of those.
     """
-    count = int(event.max(initial=-1)) + 1
-    force = np.bincount(touch, rows["normal_force_n"], len(strongest))
-    of_touch = event[strongest]
+    count = len(heads)
+    begins = heads["frame"].to_numpy()
     samples = np.bincount(of_touch, minlength=count)
-    begins = np.full(count, frames)
-    np.minimum.at(begins, event, rows["frame"])
-    ends = np.zeros(count, dtype=np.int64)
-    np.maximum.at(ends, event, rows["frame"])
     peak = np.zeros(count)
-    np.maximum.at(peak, of_touch, force)
-    heads = rows.iloc[_heads(event, rows)]
+    np.maximum.at(peak, of_touch, np.bincount(touch, rows["normal_force_n"], len(of_touch)))
     sums = {name: np.bincount(event, rows[name], count) for name in AMOUNTS}
     loaded = np.bincount(event, rows["normal_impulse_n_s"] * rows["mobilised"], count)
     impulse = sums["normal_impulse_n_s"]
@@ -217,7 +210,7 @@ def _sums(
             "start_s": heads["time_s"].to_numpy(),
             "samples": samples,
             "duration_s": samples * interval_s,
-            "whole": (begins > 0) & (ends < frames - 1),
+            "whole": (begins > 0) & (begins + samples < frames),
             "azimuth_rad": heads["azimuth_rad"].to_numpy(),
             "depth_m": heads["depth_m"].to_numpy(),
             "peak_normal_force_n": peak,
@@ -227,12 +220,6 @@ def _sums(
             "mobilised_fraction": fraction,
         }
     )
-
-
-def _heads(event: Ints, rows: pd.DataFrame) -> Ints:
-    """The first row of each event, the strongest if there are several."""
-    order = np.lexsort((-rows["normal_force_n"], rows["frame"], event))
-    return np.asarray(order[np.r_[True, np.diff(event[order]) > 0][: len(order)]])
 
 
 def _paths(rows: pd.DataFrame, event: Ints, interval_s: float) -> dict[str, tuple[Ints, Floats]]:

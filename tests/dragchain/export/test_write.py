@@ -17,13 +17,20 @@ import pyarrow.parquet as pq
 import pytest
 import pyvista as pv
 from paths import ROOT
-from tiny_run_files import CHAIN_Z_M, LAST, RADIUS_M, TIMESTEP_S, workpiece_x_m
+from tiny_run_files import (
+    CHAIN_Z_M,
+    LAST,
+    RADIUS_M,
+    TIMESTEP_S,
+    workpiece_x_m,
+    write_tiny_run,
+)
 
 from dragchain.cli import main
 from dragchain.errors import ExportError, TableError
 from dragchain.export.chain_membership import Membership, chain_membership
 from dragchain.export.folder import fresh_folder
-from dragchain.export.frames import Moments, Selection
+from dragchain.export.frames import FrameSeries, Selection
 from dragchain.export.write import write_export
 from dragchain.network.chains import (
     WidestPath,
@@ -46,14 +53,21 @@ SPIN = ["wx_rad_s", "wy_rad_s", "wz_rad_s"]
 FORCE = ["force_x_n", "force_y_n", "force_z_n"]
 
 
-@pytest.fixture
-def run(tiny_run: Path) -> Path:
-    """Return the tiny run with its tables, chains and a mesh of the workpiece."""
-    write_tables(tiny_run)
-    write_chains(tiny_run)
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The tiny run with its tables, chains and a mesh of the workpiece; not to be changed."""
+    folder = write_tiny_run(tmp_path_factory.mktemp("made") / "tiny")
+    write_tables(folder)
+    write_chains(folder)
     workpiece = pv.Cylinder(center=(0, 0, 0.03), direction=(0, 0, 1), radius=0.005, height=0.06)
-    workpiece.triangulate().save(tiny_run / "workpiece.stl")
-    return tiny_run
+    workpiece.triangulate().save(folder / "workpiece.stl")
+    return folder
+
+
+@pytest.fixture
+def run(made: Path, tmp_path: Path) -> Path:
+    """A copy of that run."""
+    return Path(shutil.copytree(made, tmp_path / "tiny"))
 
 
 def table(run_dir: Path, name: str) -> pd.DataFrame:
@@ -367,7 +381,7 @@ def test_row_groups_without_a_wanted_frame_are_not_read(run: Path, monkeypatch) 
     table(run, "particles").to_parquet(run / "tables/particles.parquet", row_group_size=4)
     for name in ("contacts", "workpiece_force"):
         table(run, name).to_parquet(run / f"tables/{name}.parquet")
-    moments = Moments.of(Run.open(run), Selection(first_s=0.02, every=4))
+    moments = FrameSeries.of(Run.open(run), Selection(first_s=0.02, every=4))
     assert moments.steps.tolist() == [20, 100]
     read: list[int] = []
     plain = pq.ParquetFile.read_row_group
@@ -481,12 +495,17 @@ def test_a_file_of_the_user_is_never_written_over(run: Path) -> None:
     assert len(series(folder / "run.pvd")) == 1
 
 
+LISTED = """{"schema": 2, "format": "xyz", "study": "s", "scene": "process", "run": "r",
+ "frames": 1, "first_time_s": 0.0, "last_time_s": 0.0, "bytes": 1, "files": ["run.xyz"]}"""
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{}", "does not list an export"),
-        ("run.xyz", "does not list an export"),
-        ('{"files": ["../mine.txt"]}', "names files of other folders"),
+        ("{}", "schema: is None"),
+        ("run.xyz", "is not a JSON object"),
+        (LISTED.replace("run.xyz", "../mine.txt"), "names files of other folders"),
+        (LISTED.replace('"run.xyz"', "7"), r"files\[0\]: is 7"),
     ],
 )
 def test_a_list_that_is_none_removes_nothing(run: Path, text: str, message: str) -> None:
@@ -554,44 +573,49 @@ def test_the_pages_lines_run(run: Path, monkeypatch) -> None:
 PEAK = """
 import re, sys
 from pathlib import Path
-from dragchain.export import frames
 from dragchain.export.write import write_export
-import pyvista
+from dragchain.tables import by_step
 
 def peak():
     status = Path("/proc/self/status").read_text()
     return 1024 * int(re.search(r"VmHWM:\\s*(\\d+)", status).group(1))
 
-frames._BATCH_ROWS = 8192  # which the short run fills too
+by_step.PIECE_ROWS = 8192  # which the short run fills too
 short, long, to = sys.argv[1:]
 write_export(short, to)
 before = peak()
-assert write_export(long, to).frames == 240
+assert write_export(long, to).frames == 120
 print(before, peak())
 """
 
 
+@pytest.fixture(scope="module")
+def lengths(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with two runs without chains, one twelve times as long as the other."""
+    folder = tmp_path_factory.mktemp("lengths")
+    for name, frames in (("short", 10), ("long", 120)):
+        without = shutil.ignore_patterns("chains.parquet", "network.parquet")
+        shutil.copytree(made, folder / name, ignore=without)
+        make_long(made, folder / name, frames)
+    return folder
+
+
 @pytest.mark.parametrize("to", ["paraview", "xyz"])
-def test_memory_does_not_grow_with_the_run(run: Path, tmp_path: Path, to: str) -> None:
+def test_memory_does_not_grow_with_the_run(lengths: Path, to: str) -> None:
     """Twelve times the frames take no more than a few batches of rows more."""
-    for name, frames in (("short", 20), ("long", 240)):
-        shutil.copytree(run, tmp_path / name)
-        for drop in ("chains", "network"):
-            (tmp_path / name / f"tables/{drop}.parquet").unlink()
-        make_long(run, tmp_path / name, frames)
-    command = [sys.executable, "-c", PEAK, tmp_path / "short", tmp_path / "long", to]
+    command = [sys.executable, "-c", PEAK, lengths / "short", lengths / "long", to]
     before, after = map(int, subprocess.check_output(command, text=True).split())
     print(before, after)
     assert after - before < 20e6
 
 
 def make_long(run: Path, folder: Path, frames: int) -> None:
-    """Repeat the last frame with 300 times its particles and contacts."""
+    """Repeat the last frame with 600 times its particles and contacts."""
     last = {name: table(run, name).query(f"step == {LAST}") for name in ("particles", "contacts")}
     for name, ids in (("particles", ["particle_id"]), ("contacts", ["a_id", "b_id"])):
-        many = pd.concat([last[name]] * 300, ignore_index=True)
+        many = pd.concat([last[name]] * 600, ignore_index=True)
         for column in ids:
-            shift = 4 * np.repeat(np.arange(300), len(last[name]))
+            shift = 4 * np.repeat(np.arange(600), len(last[name]))
             many[column] += np.where(many[column] > 0, shift, 0)
         parts = [many.assign(step=20 * n, time_s=0.02 * n) for n in range(frames)]
         file = folder / f"tables/{name}.parquet"
@@ -603,5 +627,5 @@ def make_long(run: Path, folder: Path, frames: int) -> None:
 
 
 def test_moments_are_as_many_as_they_say(run: Path) -> None:
-    moments = Moments.of(Run.open(run), Selection(every=2))
+    moments = FrameSeries.of(Run.open(run), Selection(every=2))
     assert len(moments) == 3 == len(list(moments))

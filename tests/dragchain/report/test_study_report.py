@@ -25,6 +25,7 @@ from report_files import (
 
 from dragchain.errors import DocumentError, RejectedRunError, TableError
 from dragchain.loading.write import write_loading
+from dragchain.report.run_figures import FIGURES
 from dragchain.report.study_report import write_report
 from dragchain.report.summary import input_column
 from dragchain.run.completeness import RunRecord, refusal
@@ -186,3 +187,10 @@ def test_missing_findings_name_the_command(process: Path, tmp_path: Path) -> Non
 
 def test_input_columns_are_names() -> None:
     assert input_column("motion.speed_m_s") == "input_motion_speed_m_s"
+
+
+def test_every_figure_of_a_run_has_a_caption(process: Path, tmp_path: Path) -> None:
+    write_report(tmp_path, [process])
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    shown = re.findall(r'<img src="[^"]*" alt="(\w+)"><figcaption>[A-Z]', html)
+    assert set(FIGURES["process"]) | set(FIGURES["drop_test"]) <= set(shown)
