@@ -13,7 +13,7 @@ from dragchain.errors import TableError
 from dragchain.run.completeness import RunRecord
 from dragchain.tables.run_folder import Run
 
-Regime = Literal["impact", "settle", "column", "drag"]
+_Regime = Literal["impact", "settle", "column", "drag"]
 
 
 class Settings(Part):
@@ -66,7 +66,7 @@ class Point(Part):
         Why no deck could be written.
     """
 
-    regime: Regime
+    regime: _Regime
     axis: str
     condition: str
     settings: Settings
