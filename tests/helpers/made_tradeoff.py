@@ -5,43 +5,51 @@ from __future__ import annotations
 from typing import Any
 
 from dragdeck.cases.case import Case
+from dragdeck.outlook.measured import MeasuredCost, MeasuredError, MeasuredSetting, Tradeoff
 from dragdeck.scenes.dimensionless import describe
 
 
-def entry(error: float, bound: float) -> dict[str, Any]:
+def error(value: float, bound: float) -> MeasuredError:
     """A measured error whose interval is half as wide as its bound to either side."""
-    return {
-        "error": error, "se": bound / 4, "ci95_low": error - bound / 2,
-        "ci95_high": error + bound / 2, "bound": bound, "alone": abs(error), "resolved": False,
-    }  # fmt: skip
+    return MeasuredError(
+        value=value, se=bound / 4, ci95_low=value - bound / 2, ci95_high=value + bound / 2,
+        bound=bound, single_parameter_error=abs(value),
+    )  # fmt: skip
 
 
 def setting(
     scale: float, fraction: float, factor: float, cost: float, bound: float | None, **more: Any
-) -> dict[str, Any]:
+) -> MeasuredSetting:
     """A setting with an error of the mean drag."""
-    errors = {"drag_mean": None if bound is None else entry(bound / 2, bound)}
-    return {
+    content = {
         "youngs_modulus_scale": scale, "timestep_fraction": fraction, "speed_factor": factor,
-        "seeds": 4, "runs": 4, "failed": 0, "breaks": False, "arc_m": 0.4,
-        "relative_cost": cost, "errors": errors,
-    } | more  # fmt: skip
+        "runs": 4, "failed": 0, "breaks": False, "relative_cost": cost,
+        "errors": {} if bound is None else {"drag_mean": error(bound / 2, bound)},
+    }  # fmt: skip
+    return MeasuredSetting.model_validate(content | more)
 
 
-def made_tradeoff(case: Case, **more: Any) -> dict[str, Any]:
+def cost(name: str, ratio: float = 1.0, **more: Any) -> MeasuredCost:
+    """A cost of the process without an interval."""
+    content = {"name": name, "scene": "process", "what": name, "ratio": ratio}
+    return MeasuredCost.model_validate(content | {"ci95_low": None, "ci95_high": None} | more)
+
+
+def made_tradeoff(case: Case, **more: Any) -> Tradeoff:
     """A trade whose measured scene is that of a case."""
-    return {
-        "schema": 2, "measured": "2026-01-02", "plan": "made", "study": case.study_name,
+    content = {
+        "measured": "2026-01-02", "plan": "made", "study": case.study_name,
+        "versions": {"engine": "3.8.0"},
         "scene": describe(case),
         "reference": {"youngs_modulus_scale": 1.0, "timestep_fraction": 0.2, "speed_factor": 1.0},
         "quantities": {
             "drag_mean": {
-                "label": "mean drag", "unit": "N", "reference": -2.5, "se": 0.02,
-                "run_std": 0.04, "arc_m": 0.05,
+                "label": "mean drag", "reference": -2.5, "se": 0.02, "run_std": 0.04,
+                "arc_m": 0.05,
             },
             "drag_std": {
-                "label": "spread of the drag", "unit": "N", "reference": 0.5,
-                "se": 0.05, "run_std": 0.1, "arc_m": 0.05,
+                "label": "spread of the drag", "reference": 0.5, "se": 0.05, "run_std": 0.1,
+                "arc_m": 0.05,
             },
         },
         "settings": [
@@ -54,5 +62,11 @@ def made_tradeoff(case: Case, **more: Any) -> dict[str, Any]:
             {"timestep_fraction": 0.02, "restitution_error": -1e-4, "relative_cost": 1.0},
             {"timestep_fraction": 0.1, "restitution_error": 4e-3, "relative_cost": 0.2},
         ],
-        "costs": [], "checks": [],
-    } | more  # fmt: skip
+        "costs": [], "promises": [],
+    }  # fmt: skip
+    return Tradeoff.model_validate(content | more)
+
+
+def with_settings(tradeoff: Tradeoff, *more: MeasuredSetting) -> Tradeoff:
+    """The same with further settings."""
+    return tradeoff.model_copy(update={"settings": [*tradeoff.settings, *more]})

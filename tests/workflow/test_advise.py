@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import subprocess
@@ -31,7 +30,7 @@ def folder(tmp_path: Path) -> Path:
     study.write_text(SMALL_STUDY.read_text())
     (case,) = load_cases(study)
     tradeoff = tmp_path / "workflow/dragdeck/data/tradeoff.json"
-    tradeoff.write_text(json.dumps(made_tradeoff(case)))
+    made_tradeoff(case).write(tradeoff)
     return tmp_path
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import ValidationError
 from rich.table import Table
 
-from dragdeck.advice.advise import Advice, breaking_note, with_option
+from dragdeck.advice.advise import Advice, breaking_note
 from dragdeck.advice.advise import advise as advised_settings
 from dragdeck.advice.forecast import (
     AdviceFile,
@@ -21,6 +21,7 @@ from dragdeck.advice.forecast import (
     roles,
     tables,
 )
+from dragdeck.advice.options import with_option
 from dragdeck.advice.speed import Speed
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
@@ -33,7 +34,7 @@ from dragdeck.errors import InputError
 from dragdeck.outlook import bed as bed_outlook
 from dragdeck.outlook import timestep as timestep_outlook
 from dragdeck.outlook.explain import expected_cost, explanation, show
-from dragdeck.outlook.measured import measured_tradeoff
+from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_measured
 from dragdeck.project import Project, by_run, find_project, study_templates
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import Bed, SceneType, read_bed
@@ -87,7 +88,10 @@ def explain(study: str, fidelity: str | None, scene: str | None) -> None:
     built = ((kind, case, kind.build(case, None)) for kind, case in runs)
     show(
         explanation(
-            one, expected_cost(kind, one, results / kind.name), _expectations(case, kind, one)
+            one,
+            expected_cost(kind, one, results / kind.name),
+            _expectations(case, kind, one),
+            tradeoff_if_measured(),
         )
         for kind, case, one in built
     )
@@ -97,7 +101,7 @@ def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[
     """What is known of a scene's time step and bed before it is run."""
     notes = timestep_outlook.notes(case, kind, scene)
     if kind.needs_bed:
-        notes += breaking_note(case)
+        notes += breaking_note(case, tradeoff_if_measured())
     return [*notes, *([] if kind.single_particle else bed_outlook.notes(case))]
 
 
@@ -112,23 +116,34 @@ def cases(study: str, fidelity: str | None, plan: str | None) -> None:
 
 
 def advise(
-    study: str, fidelity: str | None, tolerance: float | None, quantity: str | None, quick: bool
+    study: str,
+    fidelity: str | None,
+    tolerance: float | None,
+    quantity: str | None,
+    quick: bool,
+    tradeoff: Tradeoff | None = None,
 ) -> None:
-    """Show the settings for a tolerance, with their error and cost, and keep them."""
+    """Show the settings for a tolerance, with their error and cost, and keep them.
+
+    They are chosen from the measured trade-off unless another one is given.
+    """
     project = find_project(Path.cwd())
-    every = list(by_run(project.cases(study, fidelity), SCENES["process"]).values())
-    results, tradeoff = project.results(study), measured_tradeoff()
+    tradeoff = tradeoff or measured_tradeoff()
+    every = list(by_run(project.cases(study, fidelity, tradeoff), SCENES["process"]).values())
+    results = project.results(study)
     try:
         asked = [question(case, tolerance, quantity) for case in every]
     except ValidationError as error:
         raise explained(error, "command line") from None
-    advices = [advised_settings(case, wanted) for case, wanted in zip(every, asked, strict=True)]
+    advices = [
+        advised_settings(case, wanted, tradeoff) for case, wanted in zip(every, asked, strict=True)
+    ]
     untimed = quick or all(wanted.quantity == "restitution" for wanted in asked)
     speed = None if untimed else _machine_speed(project, every[0], advices[0])
     rows = []
     for case, advice in zip(every, advices, strict=True):
         own = own_option(case, advice.asked, tradeoff)
-        options = [forecast(case, *row, speed, results) for row in roles(advice, own)]
+        options = [forecast(case, *row, speed, results, tradeoff) for row in roles(advice, own)]
         rows.append((advice, options))
         show(tables(case, advice, options, own))
     _keep(results / "advice.json", advice_file(every[0], rows, speed))

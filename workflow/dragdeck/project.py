@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
+from dragdeck.outlook.measured import Tradeoff
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import SceneType
@@ -51,7 +53,9 @@ class Project:
         """The plans: which points are run."""
         return self.root / "workflow" / "plans"
 
-    def cases(self, study: str, fidelity: str | None = None) -> list[Case]:
+    def cases(
+        self, study: str, fidelity: str | None = None, tradeoff: Tradeoff | None = None
+    ) -> list[Case]:
         """The cases of a study, by its name.
 
         Raises
@@ -59,7 +63,9 @@ class Project:
         InputError
             No such study, or its file cannot be used.
         """
-        return load_cases(study_file(self.studies, study), fidelity, resolve)
+        return load_cases(
+            study_file(self.studies, study), fidelity, partial(resolve, tradeoff=tradeoff)
+        )
 
     def points(self, study: str, plan: str) -> Points:
         """The points of a plan for a study, both by name; a plan may be a path too.

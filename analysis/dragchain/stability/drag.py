@@ -29,7 +29,7 @@ from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.network_contacts import KINDS, contact_rows
 from dragchain.tables.run_folder import Run
-from dragchain.tables.workpiece_contacts import WorkpieceFrame, iter_workpiece_frames
+from dragchain.tables.workpiece_contacts import WorkpieceFrame
 from dragchain.tables.write import workpiece_force_rows
 
 NETWORK_FRAMES = 8
@@ -115,7 +115,7 @@ def _contacts(point: PointRun, run: Run) -> tuple[float, float]:
     every = steps[np.linspace(0, len(steps) - 1, min(len(steps), NETWORK_FRAMES)).astype(int)]
     some = set(every.tolist() if point.point.reference else every[:1].tolist())
     largest = frequency = 0.0
-    for workpiece in iter_workpiece_frames(run.folder, run.outputs):
+    for workpiece in run.workpiece_frames():
         if workpiece.step not in pairs:
             continue
         frame = in_id_order(particles[workpiece.step])

@@ -59,7 +59,7 @@ def _choice_cell(found: Findings, choice: Choice) -> dict[str, str]:
         }
     if choice.nearest is None:
         return {"text": "none", "detail": "no setting has two complete runs", "kind": "none"}
-    inside = all(abs(error.error) <= choice.tolerance for error in choice.errors)
+    inside = all(abs(error.value) <= choice.tolerance for error in choice.errors)
     more = "; its error is smaller: more runs may certify it" if inside else ""
     return {
         "text": "none",
@@ -149,11 +149,11 @@ def plain_note(found: Findings) -> str:
     entry = found.costs.plain_entry
     if entry is None:
         return ""
-    standard, what = found.costs.standard or hub(found.tradeoff), entry["what"]
+    standard, what = found.costs.standard or hub(found.tradeoff), entry.what
     taken = "" if found.costs.standard else ", taken to be the one the file of costs means"
     return (
-        f"{what[:1].upper()}{what[1:]}: it takes {number(float(entry['ratio']))} times "
-        f"({number(float(entry['ci95_low']))} to {number(float(entry['ci95_high']))}) the time of the "
+        f"{what[:1].upper()}{what[1:]}: it takes {number(entry.ratio)} times "
+        f"({number(entry.ci95_low)} to {number(entry.ci95_high)}) the time of the "
         f"standard deck ({standard}{taken}); what it costs against other settings is that times "
         "the measured ratio of their costs."
     )

@@ -150,21 +150,26 @@ class Error:
 
     Attributes
     ----------
-    error, se : float
-    low, high : float
-        Limits of the interval of `CONFIDENCE`.
+    value, se : float
+    ci95_low, ci95_high : float
+        Interval of `CONFIDENCE`.
     bound : float
         The true error is smaller than this, in either direction, with that confidence.
-    resolved : bool
+    significant : bool
         Zero lies outside of the interval.
     """
 
-    error: float
+    value: float
     se: float
     ci95_low: float
     ci95_high: float
     bound: float
-    resolved: bool
+    significant: bool
+
+    def columns(self) -> dict[str, float]:
+        """The numbers as columns of a table."""
+        names = {"value": "error", "significant": "resolved"}
+        return {names.get(name, name): number for name, number in vars(self).items()}
 
 
 @dataclass(frozen=True)
@@ -218,7 +223,7 @@ class Comparison:
             for one in ({**levels, name: own[name]} for name in levels)
             if self.factors.tells(one)
         ]
-        return max(abs(error.error) for error in errors)
+        return max(abs(error.value) for error in errors)
 
     def between(self, setting: Setting, base: Setting) -> Error | None:
         """Difference of one setting to another; None if the runs cannot tell it."""
@@ -541,12 +546,12 @@ def relative_error(
     low, high = relative(difference - shift), relative(difference + shift)
     ends = (relative(difference - one_sided), relative(difference + one_sided))
     return Error(
-        error=relative(difference),
+        value=relative(difference),
         se=uncertainty * (1.0 if signed else math.exp(difference)),
         ci95_low=low,
         ci95_high=high,
         bound=max(abs(end) for end in ends),
-        resolved=bool(low > 0.0 or high < 0.0),
+        significant=bool(low > 0.0 or high < 0.0),
     )
 
 
@@ -569,7 +574,7 @@ def breaks(tradeoff: Tradeoff, setting: Setting) -> bool:
         return False
     best = max(shorter, key=lambda one: len(tradeoff.of(one)))
     change = comparison.between(setting, best)
-    return change is not None and change.resolved and abs(change.error) > BROKEN
+    return change is not None and change.significant and abs(change.value) > BROKEN
 
 
 def candidates(tradeoff: Tradeoff, quantities: Sequence[str]) -> list[Setting]:
@@ -721,7 +726,7 @@ def error_table(tradeoff: Tradeoff) -> pd.DataFrame:
             **vars(setting),
             "runs": sum(run.complete for run in tradeoff.of(setting)),
             "relative_cost": tradeoff.cost(setting),
-            **vars(error),
+            **error.columns(),
         }
         for name, comparison in tradeoff.comparisons.items()
         for setting, error in comparison.errors.items()

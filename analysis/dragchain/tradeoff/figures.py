@@ -127,10 +127,10 @@ def _pareto_panel(
         axes.plot([cost, cost], [low, high], color=colour, lw=1.1, alpha=0.75)
         axes.plot(
             cost,
-            max(abs(error.error), FLOOR),
+            max(abs(error.value), FLOOR),
             markers[setting.timestep_fraction],
             color=colour,
-            markerfacecolor=colour if error.resolved else "white",
+            markerfacecolor=colour if error.significant else "white",
             markersize=5.5,
         )
         axes.plot(cost, max(error.bound, FLOOR), "_", color=INK, markersize=7)
@@ -169,7 +169,7 @@ def _shared_limits(
 def _sizes(error: Error) -> tuple[float, float]:
     """The interval of the error's size, not below `FLOOR`."""
     high = max(abs(error.ci95_low), abs(error.ci95_high), FLOOR)
-    low = min(abs(error.ci95_low), abs(error.ci95_high)) if error.resolved else FLOOR
+    low = min(abs(error.ci95_low), abs(error.ci95_high)) if error.significant else FLOOR
     return max(low, FLOOR), high
 
 

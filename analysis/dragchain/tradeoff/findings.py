@@ -5,18 +5,18 @@ Numbers only; `tradeoff_words`, `tradeoff_choices` and `tradeoff_rows` put them 
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import JsonValue
 from scipy import stats
 
 from dragchain.arrays import Floats
+from dragchain.documents import Document, Part
 from dragchain.errors import TableError
 from dragchain.run.case import changed_inputs, load_case
 from dragchain.run.completeness import RunRecord
@@ -50,7 +50,6 @@ TOGETHER = ("contact_force_mean", "contact_force_p90")
 
 PLAIN = ("plain_full", "plain")
 """Names of the cost of the plain deck, that at full stiffness first."""
-"""Name of the plain hand-written deck among the costs."""
 
 
 def differing(setting: Setting, base: Setting) -> list[str]:
@@ -160,7 +159,7 @@ class Softness:
     @property
     def verdict(self) -> str:
         """``ruined``, ``kept`` or ``open``."""
-        if self.error.resolved and abs(self.error.error) > RUINED:
+        if self.error.significant and abs(self.error.value) > RUINED:
             return "ruined"
         return "kept" if self.error.bound <= RUINED else "open"
 
@@ -409,7 +408,9 @@ def coverage(tradeoff: Tradeoff, name: str, trials: int = TRIALS) -> float | Non
         errors = compare_quantity(
             replace(own.quantity, signed=False), again, tradeoff.reference
         ).errors
-        held += [not error.resolved for one, error in errors.items() if one != tradeoff.reference]
+        held += [
+            not error.significant for one, error in errors.items() if one != tradeoff.reference
+        ]
     return float(np.mean(held))
 
 
@@ -516,25 +517,66 @@ def choose_drop(drops: Sequence[Drop], tolerance: float) -> Drop | None:
 # --- costs ---------------------------------------------------------------------------------------
 
 
+class CostEntry(Part):
+    """Processor time with one thing changed over that without, as timed side by side.
+
+    ``ratio`` counts what ``unit`` says. ``parameter`` and ``level`` are those of a variant
+    that changes one setting of the fidelity alone.
+    """
+
+    name: str
+    scene: str
+    what: str
+    against: str | None = None
+    unit: Literal["per_step", "per_second"] = "per_second"
+    parameter: str | None = None
+    level: float | None = None
+    ratio: float
+    ci95_low: float | None
+    ci95_high: float | None
+    per_step: float | None = None
+    per_second: float | None = None
+    wall_ratio: float | None = None
+    rounds: int | None = None
+    steps: int | None = None
+    timestep_s: float | None = None
+
+
+class StandardFidelity(Part):
+    """Settings of the deck that the process entries were compared with."""
+
+    youngs_modulus_scale: float
+    timestep_fraction: float
+    speed_factor: float = 1.0
+
+
+class CostsFile(Document):
+    """What is read of ``costs.json``."""
+
+    made_by = "dragdeck step costs"
+
+    fidelity: StandardFidelity | None = None
+    costs: tuple[CostEntry, ...]
+
+
 @dataclass(frozen=True)
 class Costs:
     """What things that a deck leaves out would cost.
 
     Attributes
     ----------
-    entries : list of dict
-        ``name scene what ratio low high``, as measured side by side.
+    entries : sequence of CostEntry
     standard : Setting or None
         Setting of the deck that the process entries were compared with, if the file says so.
     """
 
-    entries: list[dict[str, Any]]
-    standard: Setting | None
+    entries: Sequence[CostEntry] = ()
+    standard: Setting | None = None
 
     @property
-    def plain_entry(self) -> dict[str, Any] | None:
+    def plain_entry(self) -> CostEntry | None:
         """The cost of the plain deck, at full stiffness if that was timed."""
-        by_name = {row["name"]: row for row in self.entries}
+        by_name = {entry.name: entry for entry in self.entries}
         return next((by_name[name] for name in PLAIN if name in by_name), None)
 
     def plain(self, tradeoff: Tradeoff, setting: Setting) -> float:
@@ -548,7 +590,7 @@ class Costs:
         standard = self.standard or hub(tradeoff)
         if entry is None or not tradeoff.of(standard):
             return math.nan
-        return float(entry["ratio"] * tradeoff.cost(standard) / tradeoff.cost(setting))
+        return entry.ratio * tradeoff.cost(standard) / tradeoff.cost(setting)
 
 
 def step_costs(costs: Costs) -> StepCosts | None:
@@ -556,42 +598,23 @@ def step_costs(costs: Costs) -> StepCosts | None:
     if costs.standard is None:
         return None
     levels: dict[str, dict[float, float]] = {}
-    for row in costs.entries:
-        kind, _, level = str(row["name"]).partition("_")
-        if kind in STEP_COSTS and "per_step" in row:
-            parameter = STEP_COSTS[kind]
-            own = levels.setdefault(parameter, {float(getattr(costs.standard, parameter)): 1.0})
-            own[float(level)] = float(row["per_step"])
+    for entry in costs.entries:
+        if entry.parameter and entry.level is not None and entry.per_step is not None:
+            base = {float(getattr(costs.standard, entry.parameter)): 1.0}
+            levels.setdefault(entry.parameter, base)[entry.level] = entry.per_step
     return StepCosts(levels) if levels else None
 
 
-STEP_COSTS = {
-    "modulus": "youngs_modulus_scale",
-    "step": "timestep_fraction",
-    "speed": "speed_factor",
-}
-"""First word of a cost's name, whose second is a level, and the parameter it is about."""
-
-
 def read_costs(file: Path | None) -> Costs:
-    """Read costs: a list of entries, or an object with them under ``costs``.
+    """Read ``costs.json``; nothing without a file.
 
     Raises
     ------
-    TableError
-        If an entry lacks a key.
+    DocumentError
+        It is not that document, or an entry lacks a key.
     """
     if file is None:
-        return Costs([], None)
-    content = json.loads(file.read_text(encoding="utf-8"))
-    entries = content if isinstance(content, list) else content.get("costs")
-    needed = ("name", "scene", "what", "ratio", "ci95_low", "ci95_high")
-    if not isinstance(entries, list) or any(key not in row for row in entries for key in needed):
-        raise TableError(f"{file}: this is no list of costs with {', '.join(needed)}")
-    fidelity = content.get("fidelity") if isinstance(content, dict) else None
-    standard = fidelity and Setting(
-        float(fidelity["youngs_modulus_scale"]),
-        float(fidelity["timestep_fraction"]),
-        float(fidelity.get("speed_factor", 1.0)),
-    )
-    return Costs(entries, standard or None)
+        return Costs()
+    content = CostsFile.read(file)
+    standard = content.fidelity and Setting(**content.fidelity.model_dump())
+    return Costs(content.costs, standard)

@@ -17,8 +17,9 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats
+from dragchain.documents import Document, Part
 from dragchain.errors import TableError
-from dragchain.files import write_json
+from dragchain.files import write_text
 from dragchain.tradeoff.compare import (
     PARAMETERS,
     SILENT,
@@ -34,8 +35,18 @@ Verdict = Literal["kept", "broken", "open"]
 Scene = tuple[tuple[str, str], ...]
 
 
-@dataclass(frozen=True)
-class Check:
+class PromiseError(Part):
+    """The error of a promise; `significant`: zero is outside of its interval."""
+
+    value: float
+    se: float
+    ci95_low: float
+    ci95_high: float
+    bound: float
+    significant: bool
+
+
+class Promise(Part):
     """One promise in one scene.
 
     Attributes
@@ -49,11 +60,13 @@ class Check:
     held_to : float
         The error that the settings were chosen for: less than the tolerance
         where the scene is unlike those that were measured.
-    setting : Setting
+    youngs_modulus_scale, timestep_fraction, speed_factor : float
         What the advisor chose.
     runs, failed, reference_runs : int
-    error : Error
+    error : PromiseError
     verdict : str
+    met : bool
+        Whether no run failed and the error is within what the settings were chosen for.
     """
 
     scene: Mapping[str, str]
@@ -61,17 +74,46 @@ class Check:
     quantity: str
     tolerance: float
     held_to: float
-    setting: Setting
+    youngs_modulus_scale: float
+    timestep_fraction: float
+    speed_factor: float
     runs: int
     failed: int
     reference_runs: int
-    error: Error
+    error: PromiseError
     verdict: Verdict
+    met: bool
 
     @property
-    def met(self) -> bool:
-        """Whether no run failed and the error is within what the settings were chosen for."""
-        return not self.failed and verdict(self.error, self.held_to) == "kept"
+    def setting(self) -> Setting:
+        """What the advisor chose."""
+        return Setting(self.youngs_modulus_scale, self.timestep_fraction, self.speed_factor)
+
+    @property
+    def place(self) -> str:
+        """The scene as text."""
+        return ", ".join(f"{name} {value}" for name, value in self.scene.items()) or "other beds"
+
+
+class FailedRun(Part):
+    """A run that failed: scene, settings and the first acceptance check that did not pass."""
+
+    scene: Mapping[str, str]
+    asked: bool
+    youngs_modulus_scale: float
+    timestep_fraction: float
+    speed_factor: float
+    check: str
+    seen: str
+
+
+class PromisesFile(Document):
+    """The content of ``promises.json``."""
+
+    made_by = "snakemake tradeoff --config plan=promises"
+
+    promises: tuple[Promise, ...]
+    failed: tuple[FailedRun, ...] = ()
 
 
 def verdict(error: Error, tolerance: float) -> Verdict:
@@ -107,7 +149,7 @@ class _Pair:
         return own, references
 
 
-def check_promises(files: Sequence[Path]) -> list[Check]:
+def check_promises(files: Sequence[Path]) -> list[Promise]:
     """Compare every promise among the runs of a plan with the full stiffness of its scene.
 
     A scene whose runs at full stiffness all failed has nothing to compare with;
@@ -133,7 +175,7 @@ def check_promises(files: Sequence[Path]) -> list[Check]:
     if degrees < 1:
         raise TableError("one run of each setting says nothing of their scatter: run more seeds")
     scatter = math.sqrt(sum(float(((g - g.mean()) ** 2).sum()) for g in groups) / degrees)
-    return [_check(pair, scatter, degrees) for pair in pairs]
+    return [_promise_of(pair, scatter, degrees) for pair in pairs]
 
 
 def _pairs(runs: Sequence[Mapping[str, Any]]) -> Iterator[_Pair]:
@@ -176,16 +218,16 @@ def _by_scene(
         yield dict(item for item in key if item not in common), own
 
 
-def failures(files: Sequence[Path]) -> list[dict[str, Any]]:
-    """The runs that failed: scene, settings and the first acceptance check that did not hold."""
+def failures(files: Sequence[Path]) -> list[FailedRun]:
+    """The runs that failed."""
     return [
-        {
-            "scene": scene,
-            "asked": bool(run.get("asked")),
+        FailedRun(
+            scene=scene,
+            asked=bool(run.get("asked")),
             **{name: run["fidelity"][name] for name in PARAMETERS},
-            "check": run["failure"][0]["name"],
-            "seen": run["failure"][0]["seen"],
-        }
+            check=run["failure"][0]["name"],
+            seen=run["failure"][0]["seen"],
+        )
         for scene, runs in _by_scene([read_measures(file) for file in files])
         for run in runs
         if not run["complete"]
@@ -201,63 +243,54 @@ def _scene(measures: Mapping[str, Any]) -> Scene:
     )
 
 
-def _check(pair: _Pair, scatter: float, degrees: int) -> Check:
+def _promise_of(pair: _Pair, scatter: float, degrees: int) -> Promise:
     own, references = pair.logarithms()
     difference = float(own.mean() - references.mean())
     uncertainty = scatter * math.sqrt(1 / len(own) + 1 / len(references))
-    modulus, step, speed = (float(pair.own[0]["fidelity"][name]) for name in PARAMETERS)
     error = relative_error(difference, uncertainty, degrees)
-    return Check(
+    tolerance = float(pair.asked["tolerance"])
+    held_to = float(pair.asked.get("held_to", tolerance))
+    return Promise(
         scene=pair.scene,
         numbers=pair.own[0]["numbers"],
         quantity=pair.quantity.name,
-        tolerance=float(pair.asked["tolerance"]),
-        held_to=float(pair.asked.get("held_to", pair.asked["tolerance"])),
-        setting=Setting(modulus, step, speed),
+        tolerance=tolerance,
+        held_to=held_to,
+        **{name: float(pair.own[0]["fidelity"][name]) for name in PARAMETERS},
         runs=len(own),
         failed=pair.failed,
         reference_runs=len(references),
-        error=error,
-        verdict=verdict(error, float(pair.asked["tolerance"])),
+        error=PromiseError(**vars(error)),
+        verdict=verdict(error, tolerance),
+        met=not pair.failed and verdict(error, held_to) == "kept",
     )
 
 
-def write_checks(out_dir: Path, files: Sequence[Path]) -> list[Check]:
+def write_promises(out_dir: Path, files: Sequence[Path]) -> list[Promise]:
     """Write ``promises.json`` and ``promises.csv`` and return what they hold."""
-    checks = check_promises(files)
-    out_dir.mkdir(parents=True, exist_ok=True)
-    rows = [
-        {
-            "scene": dict(check.scene),
-            "numbers": dict(check.numbers),
-            "quantity": check.quantity,
-            "tolerance": check.tolerance,
-            "held_to": check.held_to,
-            **{name: getattr(check.setting, name) for name in PARAMETERS},
-            "runs": check.runs,
-            "failed": check.failed,
-            "reference_runs": check.reference_runs,
-            **vars(check.error),
-            "verdict": check.verdict,
-            "met": check.met,
-        }
-        for check in checks
-    ]
-    content = {"schema": 2, "checks": rows, "failed": failures(files)}
-    write_json(out_dir / "promises.json", content)
-    pd.DataFrame(rows).drop(columns="numbers").to_csv(out_dir / "promises.csv", index=False)
-    return checks
+    promises = check_promises(files)
+    failed = tuple(failures(files))
+    PromisesFile(promises=tuple(promises), failed=failed).write(out_dir / "promises.json")
+    table = pd.DataFrame([_columns(promise) for promise in promises])
+    write_text(out_dir / "promises.csv", table.to_csv(index=False))
+    return promises
+
+
+def _columns(promise: Promise) -> dict[str, object]:
+    """A promise as a row of ``promises.csv``."""
+    row = promise.model_dump(exclude={"numbers", "error", "verdict", "met"})
+    error = Error(**promise.error.model_dump())
+    return {**row, **error.columns(), "verdict": promise.verdict, "met": promise.met}
 
 
 def promises_command(out_dir: Path, measures: Sequence[Path]) -> str:
     """Check promises as the command line asks for; a line per promise."""
     lines = []
-    for check in write_checks(out_dir, measures):
-        scene = ", ".join(f"{name} {value}" for name, value in check.scene.items())
-        error = check.error
+    for promise in write_promises(out_dir, measures):
+        error = promise.error
         lines.append(
-            f"{scene or 'other beds'}: {check.quantity} within {check.tolerance:g} by"
-            f" {check.setting}: {error.error:+.3f} ({error.ci95_low:+.3f} to"
-            f" {error.ci95_high:+.3f}), {check.verdict}"
+            f"{promise.place}: {promise.quantity} within {promise.tolerance:g} by"
+            f" {promise.setting}: {error.value:+.3f} ({error.ci95_low:+.3f} to"
+            f" {error.ci95_high:+.3f}), {promise.verdict}"
         )
     return "\n".join(lines)

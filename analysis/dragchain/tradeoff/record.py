@@ -1,22 +1,139 @@
-"""The record of a trade, ``tradeoff.json``, which the advisor reads."""
+"""The record of a trade-off, ``tradeoff.json``, which the advisor reads."""
 
 from __future__ import annotations
 
 import math
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import BeforeValidator, PlainSerializer
 
-from dragchain.tradeoff.compare import PARAMETERS, Comparison, Setting, Tradeoff, breaks
-from dragchain.tradeoff.findings import Costs, Drop
+from dragchain.documents import Document, Part
+from dragchain.tradeoff.compare import PARAMETERS, Comparison, Error, Setting, Tradeoff, breaks
+from dragchain.tradeoff.findings import CostEntry, Costs, Drop
+from dragchain.tradeoff.promises import Promise
 from dragchain.tradeoff.words import long_label
 
-TRADEOFF_SCHEMA = 2
+
+def _finite(value: object) -> object:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _six_digits(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.6g}")
+
+
+Number = Annotated[
+    float | None, BeforeValidator(_finite), PlainSerializer(_six_digits, when_used="json")
+]
+"""A number that is written with six digits; None where there is none."""
+
+
+class Machine(Part):
+    """Where the runs were made."""
+
+    cores: int | None
+    processor: str
+
+
+class FidelityParameters(Part):
+    """The settings of a run that trade accuracy for speed."""
+
+    youngs_modulus_scale: Number
+    timestep_fraction: Number
+    speed_factor: Number
+
+
+class ErrorEntry(Part):
+    """An error relative to the reference; `significant`: zero is outside of its interval."""
+
+    value: Number
+    se: Number
+    ci95_low: Number
+    ci95_high: Number
+    bound: Number
+    significant: bool
+    single_parameter_error: Number
+
+
+class QuantityEntry(Part):
+    """A quantity at the reference, and the scatter of a run over the compared path."""
+
+    label: str
+    unit: str
+    signed: bool
+    reference: Number
+    se: Number
+    run_std: Number
+    arc_m: Number
+
+
+class SettingEntry(FidelityParameters):
+    """What was run at a setting; `arc_m`: the compared path of all its complete runs together."""
+
+    seeds: int
+    runs: int
+    failed: int
+    arc_m: Number
+    breaks: bool
+    relative_cost: Number
+    errors: Mapping[str, ErrorEntry]
+
+
+class DropEntry(Part):
+    """A time step of the drop test; the error is that of the worst impact."""
+
+    timestep_fraction: Number
+    restitution_error: Number
+    relative_cost: Number
+
+
+class CostRecord(CostEntry):
+    """A cost as it was timed side by side."""
+
+    ratio: Number
+    ci95_low: Number
+    ci95_high: Number
+    per_step: Number = None
+    per_second: Number = None
+    wall_ratio: Number = None
+    timestep_s: Number = None
+    level: Number = None
+
+
+class PromiseEntry(Part):
+    """A scene in which the advisor was tested: its numbers, and whether the error was met."""
+
+    numbers: Mapping[str, Number]
+    met: bool
+
+
+class TradeoffRecord(Document):
+    """The content of ``tradeoff.json``; a null is a number there is none of.
+
+    ``scene`` are the dimensionless numbers of the measured scene.
+    """
+
+    measured: str
+    commands: tuple[str, ...]
+    plan: str
+    study: str
+    versions: Mapping[str, str]
+    machine: Machine
+    runs: int
+    engine_hours: Number
+    scene: Mapping[str, Number]
+    reference: FidelityParameters
+    quantities: Mapping[str, QuantityEntry]
+    settings: tuple[SettingEntry, ...]
+    drop_test: tuple[DropEntry, ...]
+    costs: tuple[CostRecord, ...]
+    promises: tuple[PromiseEntry, ...]
 
 
 @dataclass(frozen=True)
@@ -25,43 +142,70 @@ class Findings:
 
     Attributes
     ----------
-    trade : Trade
+    tradeoff : Tradeoff
     drops : list of Drop
     costs : Costs
-    checks : list of dict
-        What `dragchain.checks` wrote.
-    provenance : dict
-        Head of ``tradeoff.json``.
+    promises : sequence of Promise
+    record : TradeoffRecord
     """
 
     tradeoff: Tradeoff
     drops: list[Drop]
     costs: Costs
-    checks: list[dict[str, Any]]
-    provenance: dict[str, Any]
+    promises: Sequence[Promise]
+    record: TradeoffRecord
 
 
-def provenance(tradeoff: Tradeoff, plan: str, commands: Sequence[str]) -> dict[str, Any]:
-    """When, with what and on what a trade was measured."""
+def record_of(
+    tradeoff: Tradeoff,
+    drops: Iterable[Drop],
+    costs: Costs,
+    promises: Iterable[Promise],
+    plan: str,
+    commands: Sequence[str],
+) -> TradeoffRecord:
+    """The content of ``tradeoff.json``: when, with what and on what was measured, and what."""
     measures = [run.measures for run in tradeoff.runs]
-    return {
-        "schema": TRADEOFF_SCHEMA,
-        "measured": max(one["started"] for one in measures)[:10],
-        "commands": list(commands),
-        "plan": plan,
-        "study": ", ".join(sorted({one["study"] for one in measures})),
-        "versions": {
+    return TradeoffRecord(
+        measured=max(one["started"] for one in measures)[:10],
+        commands=tuple(commands),
+        plan=plan,
+        study=_joined(one["study"] for one in measures),
+        versions={
             **{
-                name: ", ".join(sorted({str(one["versions"][name]) for one in measures}))
+                name: _joined(one["versions"][name] for one in measures)
                 for name in ("dragdeck", "engine")
             },
             "python": platform.python_version(),
             "numpy": np.__version__,
         },
-        "machine": {"cores": os.cpu_count(), "processor": _processor()},
-        "runs": len(measures),
-        "engine_hours": sum(one["cost"]["cpu_time_s"] for one in measures) / 3600.0,
-    }
+        machine=Machine(cores=os.cpu_count(), processor=_processor()),
+        runs=len(measures),
+        engine_hours=sum(one["cost"]["cpu_time_s"] for one in measures) / 3600.0,
+        scene=scene_numbers(tradeoff),
+        reference=FidelityParameters(**_parameters(tradeoff.reference)),
+        quantities={
+            name: _quantity_entry(own, tradeoff.arc_m) for name, own in tradeoff.comparisons.items()
+        },
+        settings=tuple(
+            _setting_entry(tradeoff, one) for one in tradeoff.settings() if not one.other
+        ),
+        drop_test=tuple(
+            DropEntry(
+                timestep_fraction=drop.timestep_fraction,
+                restitution_error=drop.bound,
+                relative_cost=drop.relative_cost,
+            )
+            for drop in drops
+            if not drop.other
+        ),
+        costs=tuple(CostRecord(**entry.model_dump()) for entry in costs.entries),
+        promises=tuple(PromiseEntry(numbers=one.numbers, met=one.met) for one in promises),
+    )
+
+
+def _joined(names: Iterable[object]) -> str:
+    return ", ".join(sorted(set(map(str, names))))
 
 
 def _processor() -> str:
@@ -71,84 +215,46 @@ def _processor() -> str:
     return names[0] if names else platform.processor()
 
 
-def summarise(found: Findings) -> dict[str, Any]:
-    """The content of ``tradeoff.json``, which the advisor reads; a null is a number there is none of.
-
-    An ``arc_m`` of a setting is the compared path of all its complete runs together;
-    a ``restitution_error`` is that of the worst impact.
-    """
-    tradeoff = found.tradeoff
-    content = {
-        **found.provenance,
-        "scene": scene_numbers(tradeoff),
-        "reference": {name: getattr(tradeoff.reference, name) for name in PARAMETERS},
-        "quantities": {
-            name: _quantity_entry(own, tradeoff.arc_m) for name, own in tradeoff.comparisons.items()
-        },
-        "settings": [_setting_entry(tradeoff, one) for one in tradeoff.settings() if not one.other],
-        "drop_test": [
-            {
-                "timestep_fraction": drop.timestep_fraction,
-                "restitution_error": drop.bound,
-                "relative_cost": drop.relative_cost,
-            }
-            for drop in found.drops
-            if not drop.other
-        ],
-        "costs": found.costs.entries,
-        "checks": [
-            {**check, "scene": check["numbers"], "met": check["met"]} for check in found.checks
-        ],
-    }
-    return {name: _finite(value) for name, value in content.items()}
-
-
 def scene_numbers(tradeoff: Tradeoff) -> Mapping[str, Any]:
     """Dimensionless numbers of the scene, as the runs at the reference have them."""
     numbers = [run.measures.get("numbers") for run in tradeoff.of(tradeoff.reference)]
     return next((own for own in numbers if own), {})
 
 
-def _quantity_entry(comparison: Comparison, arc_m: float) -> dict[str, Any]:
-    return {
-        "label": long_label(comparison.quantity),
-        "unit": comparison.quantity.unit,
-        "signed": comparison.quantity.signed,
-        "reference": comparison.reference,
-        "se": comparison.se,
-        "run_std": comparison.run_std,
-        "arc_m": arc_m,
-    }
+def _parameters(setting: Setting) -> dict[str, float]:
+    return {name: getattr(setting, name) for name in PARAMETERS}
 
 
-def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> dict[str, Any]:
+def _quantity_entry(comparison: Comparison, arc_m: float) -> QuantityEntry:
+    return QuantityEntry(
+        label=long_label(comparison.quantity),
+        unit=comparison.quantity.unit,
+        signed=comparison.quantity.signed,
+        reference=comparison.reference,
+        se=comparison.se,
+        run_std=comparison.run_std,
+        arc_m=arc_m,
+    )
+
+
+def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:
     runs = tradeoff.of(setting)
-    complete = [run for run in runs if run.complete]
-    return {
-        **{name: getattr(setting, name) for name in PARAMETERS},
-        "seeds": len({run.measures["inputs"]["seed"] for run in runs}),
-        "runs": len(runs),
-        "failed": len(runs) - len(complete),
-        "arc_m": tradeoff.arc_m * len(complete),
-        "breaks": breaks(tradeoff, setting),
-        "relative_cost": tradeoff.cost(setting),
-        "errors": {
-            name: {
-                **vars(own.errors[setting]),
-                "alone": own.alone(setting, tradeoff.reference),
-            }
+    complete = sum(run.complete for run in runs)
+    return SettingEntry(
+        **_parameters(setting),
+        seeds=len({run.measures["inputs"]["seed"] for run in runs}),
+        runs=len(runs),
+        failed=len(runs) - complete,
+        arc_m=tradeoff.arc_m * complete,
+        breaks=breaks(tradeoff, setting),
+        relative_cost=tradeoff.cost(setting),
+        errors={
+            name: _error_entry(own.errors[setting], own.alone(setting, tradeoff.reference))
             for name, own in tradeoff.comparisons.items()
             if setting in own.errors
         },
-    }
+    )
 
 
-def _finite(value: Any) -> Any:
-    """The same with None for every number that is not finite."""
-    if isinstance(value, float):
-        return float(f"{value:.6g}") if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _finite(own) for key, own in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(own) for own in value]
-    return value
+def _error_entry(error: Error, single_parameter_error: float) -> ErrorEntry:
+    return ErrorEntry(**vars(error), single_parameter_error=single_parameter_error)

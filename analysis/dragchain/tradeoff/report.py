@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
 
 from dragchain.figures.style import STYLE, png
-from dragchain.files import write_json
 from dragchain.report.notation import DASH, number
 from dragchain.report.page import data_uri, render_page
 from dragchain.tables.parquet import write_parquet
@@ -37,10 +34,10 @@ from dragchain.tradeoff.findings import (
     step_costs,
 )
 from dragchain.tradeoff.measures import LONG_WAVE, SHORT_WAVE
-from dragchain.tradeoff.record import Findings, provenance, summarise
+from dragchain.tradeoff.promises import PromisesFile
+from dragchain.tradeoff.record import Findings, record_of
 from dragchain.tradeoff.rows import (
     chance_note,
-    check_row,
     combination_rows,
     failure_rows,
     gain_rows,
@@ -99,13 +96,11 @@ def write_tradeoff(
     """
     priced = read_costs(costs)
     tradeoff = compare(*read_runs(measures, reference_run), step_costs(priced), largest_step)
-    found = Findings(
-        tradeoff,
-        read_drops(drops),
-        priced,
-        _read_checks(promises),
-        provenance(tradeoff, plan, [command] if command else []),
-    )
+    dropped = read_drops(drops)
+    kept = PromisesFile.read(promises).promises if promises else ()
+    commands = [command] if command else []
+    record = record_of(tradeoff, dropped, priced, kept, plan, commands)
+    found = Findings(tradeoff, dropped, priced, kept, record)
     out_dir.mkdir(parents=True, exist_ok=True)
     for name, table in (("runs", run_table(tradeoff)), ("errors", error_table(tradeoff))):
         write_parquet(table, out_dir / f"{name}.parquet")
@@ -117,15 +112,8 @@ def write_tradeoff(
     folder.mkdir(exist_ok=True)
     for name, picture in pictures.items():
         (folder / f"{name}.png").write_bytes(picture)
-    write_json(out_dir / "tradeoff.json", summarise(found))
+    record.write(out_dir / "tradeoff.json")
     (out_dir / "report.html").write_text(render(found, pictures), encoding="utf-8")
-
-
-def _read_checks(file: Path | None) -> list[dict[str, Any]]:
-    if file is None:
-        return []
-    found: list[dict[str, Any]] = json.loads(file.read_text(encoding="utf-8"))["checks"]
-    return found
 
 
 # --- page ----------------------------------------------------------------------------------------
@@ -175,7 +163,6 @@ def render(found: Findings, pictures: Mapping[str, bytes]) -> str:
         failures=failure_rows(tradeoff),
         drops=found.drops,
         costs=found.costs.entries,
-        checks=[check_row(check) for check in found.checks],
         statistics=statistic_rows(tradeoff),
         points=point_rows(tradeoff),
         chance=chance_note(tradeoff),
@@ -200,12 +187,12 @@ def what_was_run(found: Findings) -> list[tuple[str, str]]:
     own = tradeoff.of(tradeoff.reference)
     failed = sum(not run.complete for run in tradeoff.runs)
     cpu = float(np.median([run.cpu_per_m for run in own]))
-    provenance = found.provenance
-    machine, versions = provenance["machine"], provenance["versions"]
+    record = found.record
+    versions = record.versions
     return [
         (
             "Study",
-            provenance["study"] + (f", plan {provenance['plan']}" if provenance["plan"] else ""),
+            record.study + (f", plan {record.plan}" if record.plan else ""),
         ),
         ("Reference", f"{tradeoff.reference}; {_count(len(own), 'run')}"),
         (
@@ -223,13 +210,13 @@ def what_was_run(found: Findings) -> list[tuple[str, str]]:
         (
             "Cost",
             f"processor time for a metre of path; the reference takes {number(cpu / 3600.0, 2)} h "
-            f"for it. {number(provenance['engine_hours'], 2)} h of engine time in all",
+            f"for it. {number(record.engine_hours, 2)} h of engine time in all",
         ),
         (
             "Measured",
-            f"{provenance['measured']} with LIGGGHTS {versions['engine']} and dragdeck "
-            f"{versions['dragdeck']} on {machine['cores']} cores"
-            + (f" ({machine['processor']})" if machine["processor"] else ""),
+            f"{record.measured} with LIGGGHTS {versions['engine']} and dragdeck "
+            f"{versions['dragdeck']} on {record.machine.cores} cores"
+            + (f" ({record.machine.processor})" if record.machine.processor else ""),
         ),
     ]
 

@@ -10,7 +10,6 @@ from dragchain.report.notation import DASH, MINUS, number
 from dragchain.tradeoff.compare import (
     CONFIDENCE,
     OTHER,
-    PARAMETERS,
     TOLERANCES,
     Comparison,
     Run,
@@ -306,7 +305,7 @@ def chance_note(tradeoff: Tradeoff) -> str:
         for setting, error in comparison.errors.items()
         if setting != tradeoff.reference
     ]
-    resolved = sum(error.resolved for error in errors)
+    resolved = sum(error.significant for error in errors)
     note = (
         f"{len(errors)} differences are tested here and {resolved} are resolved; if none existed, "
         f"chance alone would show about {round((1.0 - CONFIDENCE) * len(errors))}."
@@ -340,10 +339,3 @@ def _point_row(tradeoff: Tradeoff, setting: Setting, runs: Sequence[Run]) -> dic
             if name in tradeoff.comparisons
         ],
     }
-
-
-def check_row(check: Mapping[str, Any]) -> dict[str, Any]:
-    """A promise of the advisor on another scene, the scene and the setting in words."""
-    scene = ", ".join(f"{name} {value}" for name, value in check["scene"].items())
-    modulus, step, speed = (float(check[name]) for name in PARAMETERS)
-    return {**check, "scene": scene or "other beds", "setting": Setting(modulus, step, speed)}

@@ -38,7 +38,7 @@ def plainly(fraction: float) -> str:
 
 def interval(error: Error) -> str:
     """The interval of an error, in per cent; that of a large one in multiples."""
-    if error.error >= FOLD:
+    if error.value >= FOLD:
         return f"{number(1.0 + error.ci95_low, 2)} to {number(1.0 + error.ci95_high, 2)}"
     return f"{percent(error.ci95_low)} to {percent(error.ci95_high)} %"
 
@@ -66,12 +66,12 @@ def cell(error: Error | None) -> dict[str, str]:
     """An error as a cell of a table: text, interval and class."""
     if error is None:
         return {"text": DASH, "detail": "", "kind": ""}
-    if not error.resolved:
+    if not error.significant:
         return {"text": NOT_RESOLVED, "detail": interval(error), "kind": "open"}
-    size = abs(error.error)
+    size = abs(error.value)
     kind = "bad" if size > RUINED else "middling" if size > RUINED / 2.0 else "good"
-    large = error.error >= FOLD
-    text = f"{number(1.0 + error.error, 2)}-fold" if large else f"{percent(error.error)} %"
+    large = error.value >= FOLD
+    text = f"{number(1.0 + error.value, 2)}-fold" if large else f"{percent(error.value)} %"
     return {"text": text, "detail": interval(error), "kind": kind}
 
 

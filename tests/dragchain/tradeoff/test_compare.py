@@ -52,8 +52,8 @@ WITHIN = 0.03
 
 def test_a_known_effect_is_found_and_resolved(tradeoff: Tradeoff) -> None:
     error = tradeoff.comparisons["drag_mean"].errors[Setting(*SOFT)]
-    assert error.error == pytest.approx(0.1, abs=WITHIN) and error.resolved
-    assert error.ci95_low < error.error < error.ci95_high < error.ci95_low + 2.0 * WITHIN
+    assert error.value == pytest.approx(0.1, abs=WITHIN) and error.significant
+    assert error.ci95_low < error.value < error.ci95_high < error.ci95_low + 2.0 * WITHIN
     assert tradeoff.comparisons["drag_mean"].reference == pytest.approx(
         VALUES["drag_mean"], rel=0.03
     )
@@ -62,19 +62,19 @@ def test_a_known_effect_is_found_and_resolved(tradeoff: Tradeoff) -> None:
 
 def test_no_effect_is_not_resolved_and_its_bound_holds_the_interval(tradeoff: Tradeoff) -> None:
     error = tradeoff.comparisons["workpiece_contacts"].errors[Setting(*SOFT)]
-    assert not error.resolved and error.ci95_low < 0.0 < error.ci95_high
-    assert abs(error.error) < error.bound <= max(-error.ci95_low, error.ci95_high)
+    assert not error.significant and error.ci95_low < 0.0 < error.ci95_high
+    assert abs(error.value) < error.bound <= max(-error.ci95_low, error.ci95_high)
 
 
 def test_the_reference_has_no_error(tradeoff: Tradeoff) -> None:
     error = tradeoff.comparisons["drag_mean"].errors[tradeoff.reference]
-    assert (error.error, error.bound, error.resolved) == (0.0, 0.0, False)
+    assert (error.value, error.bound, error.significant) == (0.0, 0.0, False)
 
 
 def test_a_signed_quantity_counts_in_mean_drags(tradeoff: Tradeoff) -> None:
     own = tradeoff.comparisons["lateral_mean"]
     error = own.errors[Setting(*SOFT)]
-    assert error.error == pytest.approx(SOFTNESS["lateral_mean"], abs=WITHIN) and error.resolved
+    assert error.value == pytest.approx(SOFTNESS["lateral_mean"], abs=WITHIN) and error.significant
     assert own.reference == pytest.approx(VALUES["lateral_mean"], abs=0.05 * 2.6)
 
 
@@ -90,7 +90,7 @@ def test_costs_and_the_certified_choice(tradeoff: Tradeoff) -> None:
 
 def test_a_tolerance_is_compared_with_the_bound(tradeoff: Tradeoff) -> None:
     bound = largest_bound(tradeoff, ["drag_mean"], Setting(*COARSE))
-    error = tradeoff.comparisons["drag_mean"].errors[Setting(*COARSE)].error
+    error = tradeoff.comparisons["drag_mean"].errors[Setting(*COARSE)].value
     between = 0.5 * (abs(error) + bound)
     assert recommend(tradeoff, "drag_mean", between) is None
     assert recommend(tradeoff, "drag_mean", bound) == Setting(*COARSE)
@@ -158,15 +158,15 @@ def test_a_combination_that_breaks_additivity_gets_an_error_of_its_own(tmp_path:
             ]
     own = made(tmp_path, found).comparisons["workpiece_contacts"]
     assert own.additive and own.additivity < 0.05 and own.apart == [Setting(*BOTH)]
-    assert own.errors[Setting(*BOTH)].error == pytest.approx(1.0, abs=2.0 * WITHIN)
-    assert abs(own.errors[Setting(*SOFT)].error) < 0.1
+    assert own.errors[Setting(*BOTH)].value == pytest.approx(1.0, abs=2.0 * WITHIN)
+    assert abs(own.errors[Setting(*SOFT)].value) < 0.1
 
 
 def test_parameters_that_were_never_turned_alone_are_not_told_apart(tmp_path: Path) -> None:
     mixed = [one for one in contents() if _point(one) in (REFERENCE, BOTH)]
     own = made(tmp_path, mixed).comparisons["drag_mean"]
     assert not own.additive and math.isnan(own.additivity)
-    assert own.errors[Setting(*BOTH)].error == pytest.approx(0.1, abs=WITHIN)
+    assert own.errors[Setting(*BOTH)].value == pytest.approx(0.1, abs=WITHIN)
 
 
 def test_a_step_that_changes_the_drag_breaks(tmp_path: Path) -> None:
@@ -190,7 +190,7 @@ def test_softness_alone_and_mixed_with_a_step(tmp_path: Path) -> None:
     tradeoff = made(tmp_path / "few", confounded)
     mixed = softness(tradeoff, tradeoff.comparisons["contact_force_mean"], 0.01)
     assert mixed is not None and mixed.mixed == str(Setting(*BOTH))
-    assert mixed.error.error == pytest.approx(-0.3, abs=WITHIN)
+    assert mixed.error.value == pytest.approx(-0.3, abs=WITHIN)
 
 
 def _point(content: dict[str, Any]) -> tuple[float, ...]:
@@ -219,7 +219,7 @@ def test_what_is_no_parameter_is_held_against_the_same_without_it(tmp_path: Path
     tradeoff = made(tmp_path, contents() + faceted)
     (gain,) = (one for one in gains(tradeoff) if one.factors == ["other"])
     assert gain.base == Setting(*COARSE) and gain.setting.other == "bowl.facet_size_m 0.005"
-    assert gain.errors["contact_force_mean"].error == pytest.approx(-0.3, abs=WITHIN)
+    assert gain.errors["contact_force_mean"].value == pytest.approx(-0.3, abs=WITHIN)
     assert gain.speed_up.ratio == pytest.approx(40.0 / 60.0)
 
 

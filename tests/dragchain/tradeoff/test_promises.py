@@ -12,7 +12,7 @@ from tradeoff_files import measures, write
 
 from dragchain.errors import TableError
 from dragchain.tradeoff.compare import Error
-from dragchain.tradeoff.promises import check_promises, failures, verdict, write_checks
+from dragchain.tradeoff.promises import check_promises, failures, verdict, write_promises
 
 FULL, SOFT = (1.0, 0.64, 1.0), (0.01, 0.64, 1.0)
 ASKED = {"tolerance": 0.1, "quantity": "drag_mean"}
@@ -72,7 +72,7 @@ def test_a_failed_run_does_not_count(tmp_path: Path) -> None:
     (check,) = check_promises(files)
     assert (check.runs, check.failed, check.verdict) == (6, 1, "kept") and not check.met
     (lost,) = failures(files)
-    assert lost["asked"] and lost["seen"] == "1 particle"
+    assert lost.asked and lost.seen == "1 particle"
 
 
 def test_without_full_stiffness_there_is_nothing_to_compare_with(tmp_path: Path) -> None:
@@ -84,8 +84,8 @@ def test_without_full_stiffness_there_is_nothing_to_compare_with(tmp_path: Path)
 
 def test_what_is_written_can_be_read(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
-    write_checks(tmp_path / "out", write(tmp_path, scene(0.05, 1.0, rng)))
-    (row,) = json.loads((tmp_path / "out" / "promises.json").read_text())["checks"]
+    write_promises(tmp_path / "out", write(tmp_path, scene(0.05, 1.0, rng)))
+    (row,) = json.loads((tmp_path / "out" / "promises.json").read_text())["promises"]
     assert row["verdict"] == "kept" and row["numbers"]["particles"] == 1422
     assert (tmp_path / "out" / "promises.csv").read_text().startswith("scene,")
 

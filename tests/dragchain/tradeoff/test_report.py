@@ -16,7 +16,7 @@ from tradeoff_files import measures, write, write_drop
 from tradeoff_runs import BOTH, FAILURE, contents
 
 from dragchain.cli import main as dragchain
-from dragchain.errors import TableError
+from dragchain.errors import DocumentError
 from dragchain.tradeoff.compare import compare, read_runs
 from dragchain.tradeoff.findings import choose_drop, read_costs, read_drops
 from dragchain.tradeoff.rows import verdicts
@@ -48,7 +48,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ]
     files = write(folder / "runs", found)
     costs = folder / "costs.json"
-    costs.write_text(json.dumps(COSTS))
+    costs.write_text(json.dumps({"schema": 2, "costs": COSTS}))
     arguments = ["step", "tradeoff", "--out", folder / "out", "--reference", files[0].parent]
     arguments += ["--costs", costs, "--plan", "long", "--drops", *drops(folder / "drops"), "--"]
     assert dragchain([str(one) for one in [*arguments, *files]]) == 0
@@ -115,13 +115,14 @@ def test_the_file_for_the_advisor(summary: dict[str, Any]) -> None:
     assert set(summary) == {
         "schema", "measured", "commands", "plan", "study", "versions", "machine", "runs",
         "engine_hours", "scene", "reference", "quantities", "settings", "drop_test", "costs",
-        "checks",
+        "promises",
     }  # fmt: skip
     assert summary["schema"] == 2 and summary["plan"] == "long" and summary["runs"] == 16
     assert summary["measured"] == "2026-01-04"
     assert set(summary["versions"]) == {"dragdeck", "engine", "python", "numpy"}
     assert summary["scene"] == {"inertial_number": 0.004, "particles": 1422}
-    assert summary["costs"] == COSTS and summary["checks"] == []
+    (cost,) = summary["costs"]
+    assert COSTS[0].items() <= cost.items() and summary["promises"] == []
     parameters = {"youngs_modulus_scale": 1.0, "timestep_fraction": 0.2, "speed_factor": 1.0}
     assert summary["reference"] == parameters
     wall = 4 * 100 + 3 * (10 + 40 + 5) + 3 + 20 + 100
@@ -139,7 +140,7 @@ def test_settings_for_the_advisor_change_the_fidelity_alone(summary: dict[str, A
     assert (own["seeds"], own["runs"], own["failed"]) == (3, 3, 0)
     assert own["relative_cost"] == pytest.approx(0.05)
     assert set(own["errors"]["drag_mean"]) == {
-        "error", "se", "ci95_low", "ci95_high", "bound", "resolved", "alone"
+        "value", "se", "ci95_low", "ci95_high", "bound", "significant", "single_parameter_error"
     }  # fmt: skip
     failed = settings[0.01, 0.8, 1.0]
     assert (failed["failed"], failed["errors"]) == (1, {})
@@ -185,8 +186,8 @@ def test_a_page_of_a_single_setting(tmp_path: Path) -> None:
 
 def test_costs_without_a_key_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "costs.json"
-    file.write_text(json.dumps({"costs": [{"name": "plain"}]}))
-    with pytest.raises(TableError, match="no list of costs"):
+    file.write_text(json.dumps({"schema": 2, "costs": [{"name": "plain"}]}))
+    with pytest.raises(DocumentError, match=r"costs\[0\]\.scene: is missing"):
         read_costs(file)
 
 

@@ -6,23 +6,22 @@ import copy
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from made_tradeoff import entry, made_tradeoff, setting
+from made_tradeoff import error, made_tradeoff, setting, with_settings
 
-from dragdeck.advice import advise as advice_module
+from dragdeck import commands
 from dragdeck.advice.advise import advise, breaking_note, resolve
 from dragdeck.advice.forecast import question, remarks
 from dragdeck.cases.case import Case
-from dragdeck.cli import main
 from dragdeck.errors import InputError
-from dragdeck.outlook import measured
 from dragdeck.outlook import timestep as stability
-from dragdeck.outlook.measured import measured_tradeoff
+from dragdeck.outlook.measured import MeasuredSetting, Prediction, Tradeoff, measured_tradeoff
 from dragdeck.project import Project
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.drop_test import drop_scene
@@ -32,21 +31,12 @@ from dragdeck.scenes.registry import SCENES
 from dragdeck.study.model import Fidelity, Tolerance
 from dragdeck.sweep.cases import load_cases
 
-Tradeoff = dict[str, Any]
 Write = Callable[..., Path]
 
 
 @pytest.fixture
 def tradeoff(case: Case) -> Tradeoff:
     return made_tradeoff(case)
-
-
-@pytest.fixture
-def tradeoff_here(tradeoff: Tradeoff, monkeypatch: pytest.MonkeyPatch) -> Tradeoff:
-    """The made-up trade in the place of the measured one."""
-    monkeypatch.setattr(advice_module, "measured_tradeoff", lambda: tradeoff)
-    monkeypatch.setattr(measured, "measured_tradeoff", lambda: tradeoff)
-    return tradeoff
 
 
 def asked(tolerance: float, **more: Any) -> Tolerance:
@@ -105,20 +95,24 @@ ROWS = st.lists(
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(ROWS, st.floats(1e-3, 0.6), st.floats(1e-3, 0.6), st.floats(0.2, 5.0))
 def test_no_setting_beyond_its_tolerance_and_less_accuracy_is_never_dearer(
-    case: Case, tradeoff: Tradeoff, rows: list[Tradeoff], one: float, other: float, stiffer: float
+    case: Case,
+    tradeoff: Tradeoff,
+    rows: list[MeasuredSetting],
+    one: float,
+    other: float,
+    stiffer: float,
 ) -> None:
-    there = tradeoff["scene"]
-    elsewhere = there | {"stiffness_number": there["stiffness_number"] / stiffer}
-    made = tradeoff | {"settings": rows, "scene": elsewhere}
+    there = tradeoff.scene
+    elsewhere = {**there, "stiffness_number": there["stiffness_number"] / stiffer}
+    made = tradeoff.model_copy(update={"settings": rows, "scene": elsewhere})
     tight, loose = sorted((one, other))
     strict, easy = (advise(case, asked(tolerance), made) for tolerance in (tight, loose))
     assert easy.chosen.relative_cost <= strict.chosen.relative_cost <= 1
     believed = [
-        row["errors"]["drag_mean"]["bound"]
+        row.errors["drag_mean"].bound
         for row in rows
-        if row["errors"]["drag_mean"] and not row["failed"] and row["runs"] >= 2
-        and row["timestep_fraction"] <= 0.64
-    ]  # fmt: skip
+        if row.errors and not row.failed and row.runs >= 2 and row.timestep_fraction <= 0.64
+    ]
     for found in (strict, easy):
         if found.fallback is None:
             assert found.chosen.error is not None
@@ -137,14 +131,15 @@ def test_no_setting_beyond_its_tolerance_and_less_accuracy_is_never_dearer(
         setting(1e-3, 0.6, 1.0, 0.001, 0.001, runs=1),
         setting(1e-3, 0.6, 1.0, 0.001, None),
         setting(1e-3, 0.65, 1.0, 0.001, 0.001),
-        setting(1e-3, 0.6, 1.0, 0.001, 0.001, errors={}),
         setting(1.0, 0.1, 1.0, 2.0, 0.001),
     ],
-    ids=["failed", "one run", "no error", "unstable step", "no entry", "dearer than the reference"],
+    ids=["failed", "one run", "no error", "unstable step", "dearer than the reference"],
 )
-def test_what_is_not_believed_is_not_chosen(case: Case, tradeoff: Tradeoff, row: Tradeoff) -> None:
-    tradeoff["settings"].append(row)
-    assert level(advise(case, asked(0.05), tradeoff).chosen.fidelity) == (1e-2, 0.5, 1.0)
+def test_what_is_not_believed_is_not_chosen(
+    case: Case, tradeoff: Tradeoff, row: MeasuredSetting
+) -> None:
+    found = advise(case, asked(0.05), with_settings(tradeoff, row))
+    assert level(found.chosen.fidelity) == (1e-2, 0.5, 1.0)
 
 
 def test_neighbours_of_the_choice(case: Case, tradeoff: Tradeoff) -> None:
@@ -187,8 +182,8 @@ def test_strong_damping_shortens_the_steps(
     assert found.chosen.relative_cost == pytest.approx(0.012 * 0.5 / 0.32)
 
 
-def test_the_advised_step_is_what_check_calls_safe(case: Case, tradeoff_here: Tradeoff) -> None:
-    found = resolve(case, asked(0.2))
+def test_the_advised_step_is_what_check_calls_safe(case: Case, tradeoff: Tradeoff) -> None:
+    found = resolve(case, asked(0.2), tradeoff)
     scene = process_scene(found)
     said = dict(stability.notes(found, PROCESS, scene))
     assert "within" in said["safe step"]
@@ -229,7 +224,8 @@ def test_a_checked_scene_widens_the_range_if_it_was_met(
 ) -> None:
     other = changed(small, write_study, "bowl.radius_m", 0.03)
     for met, outside in ((True, 0), (False, 1)):
-        made = tradeoff | {"checks": [{"scene": describe(other), "met": met}]}
+        promise = Prediction(numbers=describe(other), met=met)
+        made = tradeoff.model_copy(update={"promises": [promise]})
         assert len(advise(other, asked(0.05), made).outside) == outside
 
 
@@ -262,13 +258,13 @@ def test_numbers_beyond_all_measured_ones_are_said(
 
 
 def test_chance_of_one_run_falls_with_the_root_of_its_path(case: Case, tradeoff: Tradeoff) -> None:
-    quantity = tradeoff["quantities"]["drag_mean"]
     found = advise(case, asked(0.2), tradeoff).spread
     assert found is not None
     assert found.counted_m == pytest.approx(2 * 3.141592653589793 * 0.010 * 0.1 - 0.001)
     assert found.half_width == pytest.approx(1.96 * 0.04 * (0.05 / found.counted_m) ** 0.5)
-    quantity["arc_m"] = found.counted_m
-    same = advise(case, asked(1.96 * 0.04), tradeoff).spread
+    own = tradeoff.quantities["drag_mean"].model_copy(update={"arc_m": found.counted_m})
+    longer = tradeoff.model_copy(update={"quantities": {"drag_mean": own}})
+    same = advise(case, asked(1.96 * 0.04), longer).spread
     assert same is not None and same.needed_m == pytest.approx(same.counted_m)
 
 
@@ -284,16 +280,14 @@ def test_too_much_chance_is_said_with_what_would_help(case: Case, tradeoff: Trad
 # --- the drop test -------------------------------------------------------------------------------
 
 
-def test_a_tolerance_about_restitution_sets_the_drop_alone(
-    case: Case, tradeoff_here: Tradeoff
-) -> None:
-    found = resolve(case, asked(0.005, quantity="restitution"))
+def test_a_tolerance_about_restitution_sets_the_drop_alone(case: Case, tradeoff: Tradeoff) -> None:
+    found = resolve(case, asked(0.005, quantity="restitution"), tradeoff)
     assert found.study.drop_test.timestep_fraction == 0.1
     assert found.study.fidelity == "standard"
     assert found.fidelity_name == "tolerance-0.005-restitution"
-    strict = resolve(case, asked(1e-3, quantity="restitution"))
+    strict = resolve(case, asked(1e-3, quantity="restitution"), tradeoff)
     assert strict.study.drop_test.timestep_fraction == 0.02
-    beyond = advise(case, asked(1e-5, quantity="restitution"))
+    beyond = advise(case, asked(1e-5, quantity="restitution"), tradeoff)
     assert beyond.fallback is not None and beyond.chosen.drop_timestep_fraction == 0.02
 
 
@@ -301,8 +295,11 @@ def test_a_tolerance_about_restitution_sets_the_drop_alone(
 
 
 @pytest.fixture
-def asking(small: dict[str, Any], write_study: Write, tradeoff_here: Tradeoff) -> Case:
-    (found,) = load_cases(write_study(small | {"fidelity": {"tolerance": 0.05}}), resolve=resolve)
+def asking(small: dict[str, Any], write_study: Write, tradeoff: Tradeoff) -> Case:
+    (found,) = load_cases(
+        write_study(small | {"fidelity": {"tolerance": 0.05}}),
+        resolve=partial(resolve, tradeoff=tradeoff),
+    )
     return found
 
 
@@ -330,11 +327,11 @@ def test_the_question_is_part_of_the_process_alone(asking: Case) -> None:
 
 
 def test_tolerances_of_a_matrix_are_resolved_each(
-    small: dict[str, Any], write_study: Write, tradeoff_here: Tradeoff
+    small: dict[str, Any], write_study: Write, tradeoff: Tradeoff
 ) -> None:
     small["fidelity"] = {"tolerance": 0.05}
     small["sweep"] = {"fidelity.tolerance": [0.05, 0.02]}
-    found = load_cases(write_study(small), resolve=resolve)
+    found = load_cases(write_study(small), resolve=partial(resolve, tradeoff=tradeoff))
     scales = [case.study.chosen_fidelity().youngs_modulus_scale for case in found]
     assert scales == [0.01, 0.1]
 
@@ -346,24 +343,30 @@ def test_a_quantity_that_was_not_measured_is_refused(case: Case, tradeoff: Trade
     assert found.fallback is not None and found.chosen == found.reference
 
 
-def test_without_a_measured_tradeoff_a_tolerance_is_refused_with_a_remedy(
-    small: dict[str, Any], write_study: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(advice_module, "measured_tradeoff", measured_tradeoff.__wrapped__)
-    monkeypatch.setattr(measured.resources, "files", lambda name: tmp_path)
-    file = write_study(small | {"fidelity": {"tolerance": 0.05}})
-    with pytest.raises(InputError, match="no tolerance can be resolved") as caught:
-        load_cases(file, resolve=resolve)
+def test_without_a_measured_tradeoff_there_is_a_remedy(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file") as caught:
+        measured_tradeoff(tmp_path / "tradeoff.json")
+    assert "name a fidelity instead" in str(caught.value)
     assert "snakemake tradeoff" in str(caught.value)
-    (tmp_path / "data").mkdir()
-    (tmp_path / "data" / "tradeoff.json").write_text('{"schema": 1}')
+    (tmp_path / "old.json").write_text('{"schema": 1}')
     with pytest.raises(InputError, match="another schema"):
-        load_cases(file, resolve=resolve)
+        measured_tradeoff(tmp_path / "old.json")
+
+
+def test_the_packages_own_tradeoff_can_be_read_and_resolves_tolerances(
+    small: dict[str, Any], write_study: Write
+) -> None:
+    tradeoff = measured_tradeoff()
+    assert tradeoff.study == "uhlmann2015" and len(tradeoff.promises) == 5
+    (found,) = load_cases(write_study(small | {"fidelity": {"tolerance": 0.4}}), resolve=resolve)
+    assert found.advised is not None and found.advised.source.startswith(
+        f"measured {tradeoff.measured}"
+    )
 
 
 def test_entries_of_any_quantity_are_read(case: Case, tradeoff: Tradeoff) -> None:
-    tradeoff["settings"][1]["errors"]["drag_std"] = entry(0.1, 0.2)
-    found = advise(case, asked(0.3, quantity="drag_std"), tradeoff)
+    both = setting(1e-2, 0.5, 1.0, 0.03, None, errors={"drag_std": error(0.1, 0.2)})
+    found = advise(case, asked(0.3, quantity="drag_std"), with_settings(tradeoff, both))
     assert level(found.chosen.fidelity) == (1e-2, 0.5, 1.0) and found.label == "spread of the drag"
 
 
@@ -373,12 +376,12 @@ def test_entries_of_any_quantity_are_read(case: Case, tradeoff: Tradeoff) -> Non
 def test_advise_prints_and_keeps_what_it_says(
     case: Case,
     project: Project,
-    tradeoff_here: Tradeoff,
+    tradeoff: Tradeoff,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(project.root)
-    assert main(["advise", "small", "--quick"]) == 0
+    commands.advise("small", None, None, None, quick=True, tradeoff=tradeoff)
     said = " ".join(capsys.readouterr().out.split())
     for words in ("mean drag within 5 %", "advised", "cheaper", "dearer", "reference", "+2.2 %",
                   "asks for no tolerance", "wall time", "made"):  # fmt: skip
@@ -396,10 +399,10 @@ def test_advise_prints_and_keeps_what_it_says(
 
 
 def test_the_kept_advice_names_the_run_of_a_study_that_asks(
-    asking: Case, project: Project, monkeypatch: pytest.MonkeyPatch
+    asking: Case, tradeoff: Tradeoff, project: Project, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(project.root)
-    assert main(["advise", "small", "--quick"]) == 0
+    commands.advise("small", None, None, None, quick=True, tradeoff=tradeoff)
     kept = json.loads((project.root / "results/small/advice.json").read_text())
     assert kept["cases"][0]["run"] == PROCESS.run_id(asking)
     assert kept["cases"][0]["options"][0]["inputs"] == process_scene(asking).case.inputs
@@ -409,7 +412,7 @@ def test_the_studys_own_measured_fidelity_is_shown_too(
     small: dict[str, Any],
     write_study: Write,
     project: Project,
-    tradeoff_here: Tradeoff,
+    tradeoff: Tradeoff,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -417,7 +420,7 @@ def test_the_studys_own_measured_fidelity_is_shown_too(
     write_study(small | {"fidelity": own})
     monkeypatch.chdir(project.root)
     (project.root / "results").write_text("a file where the folder should be")
-    assert main(["advise", "small", "--quick", "--tolerance", "0.02"]) == 0
+    commands.advise("small", None, 0.02, None, quick=True, tradeoff=tradeoff)
     shown = capsys.readouterr()
     said = " ".join(shown.out.split())
     assert "│ own │ E x 0.01, 50 % of the" in said
@@ -431,18 +434,18 @@ def test_the_command_line_goes_before_the_study(case: Case, asking: Case) -> Non
     assert question(asking, None, "drag_std") == asked(0.05, quantity="drag_std")
 
 
-@pytest.mark.parametrize("words", [["--tolerance", "2"], ["--quantity", "colour"]])
+@pytest.mark.parametrize(("tolerance", "quantity"), [(2.0, None), (None, "colour")])
 def test_a_wrong_question_is_explained(
     case: Case,
     project: Project,
-    tradeoff_here: Tradeoff,
+    tradeoff: Tradeoff,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    words: list[str],
+    tolerance: float | None,
+    quantity: str | None,
 ) -> None:
     monkeypatch.chdir(project.root)
-    assert main(["advise", "small", "--quick", *words]) == 1
-    assert "command line: " in capsys.readouterr().err
+    with pytest.raises(InputError, match="command line: "):
+        commands.advise("small", None, tolerance, quantity, quick=True, tradeoff=tradeoff)
 
 
 @pytest.mark.parametrize(
@@ -465,19 +468,19 @@ def test_the_step_at_which_soft_particles_broke_is_told(
     ]
     fidelity = Fidelity(youngs_modulus_scale=scale, timestep_fraction=fraction)
     own = replace(case, study=case.study.model_copy(update={"fidelity": fidelity}))
-    ((what, text),) = breaking_note(own, {**tradeoff, "settings": [*tradeoff["settings"], *broken]})
+    ((what, text),) = breaking_note(own, with_settings(tradeoff, *broken))
     assert what == "breaking step" and words in text
 
 
 def test_nothing_is_told_of_particles_softer_than_measured(case: Case, tradeoff: Tradeoff) -> None:
     fidelity = Fidelity(youngs_modulus_scale=1e-4)
     own = replace(case, study=case.study.model_copy(update={"fidelity": fidelity}))
-    assert breaking_note(own, tradeoff) == []
+    assert breaking_note(own, tradeoff) == [] and breaking_note(own, None) == []
 
 
 def test_a_broken_step_is_no_candidate(case: Case, tradeoff: Tradeoff) -> None:
     cheap = setting(1e-3, 0.6, 1.0, 0.001, 0.001)
-    with_it = {**tradeoff, "settings": [*tradeoff["settings"], cheap]}
-    without = {**tradeoff, "settings": [*tradeoff["settings"], {**cheap, "breaks": True}]}
+    with_it = with_settings(tradeoff, cheap)
+    without = with_settings(tradeoff, cheap.model_copy(update={"breaks": True}))
     assert advise(case, asked(0.05), with_it).chosen.relative_cost == pytest.approx(0.001)
     assert advise(case, asked(0.05), without).chosen.relative_cost > 0.001

@@ -10,6 +10,7 @@ from typing import Any
 
 import jinja2
 import pytest
+from made_tradeoff import cost, made_tradeoff
 
 from dragdeck.campaigns.cost_timing import BLOCK, blocks, costs, measure
 from dragdeck.campaigns.cost_variants import (
@@ -123,8 +124,8 @@ def test_every_variant_differs_from_its_base(base: Case, templates: jinja2.Envir
     for variant in chosen:
         deck, beside = (deck_of(base, name, templates) for name in (variant.name, variant.base))
         other_mesh = {
-            name: len(mesh.triangles) for name, mesh in deck.meshes.items()
-        } != {name: len(mesh.triangles) for name, mesh in beside.meshes.items()}  # fmt: skip
+            name: len(mesh.faces) for name, mesh in deck.meshes.items()
+        } != {name: len(mesh.faces) for name, mesh in beside.meshes.items()}  # fmt: skip
         other_text = lines(deck.whole) != lines(beside.whole)
         other_bed = variant_case(base, variant).study.media != base.study.media
         assert other_mesh or other_text or other_bed or deck.ranks != beside.ranks, variant.name
@@ -205,14 +206,22 @@ def test_what_is_left_out_names_variants_that_there_are(base: Case) -> None:
     assert len(named) >= 6 and named <= known
 
 
-def test_a_price_is_quoted_with_engine_and_date() -> None:
-    cost = {"name": "bowl_facets", "ratio": 1.9, "ci95_low": 1.85, "ci95_high": 1.951}
-    tradeoff = {"versions": {"engine": "3.8.0"}, "measured": "2026-11-21", "costs": [cost]}
-    said = "putting it back costs 1.9x (1.85 to 1.95), LIGGGHTS 3.8.0, 2026-11-21"
+def test_a_variant_of_one_fidelity_parameter_says_which_and_its_level(base: Case) -> None:
+    known = {one.name: (one.parameter, one.level) for one in variants(base)}
+    assert known["modulus_0.1"] == ("youngs_modulus_scale", 0.1)
+    assert known["step_0.2"] == ("timestep_fraction", 0.2)
+    assert known["speed_5"] == ("speed_factor", 5.0)
+    assert known["skin_0.2"] == known["bowl_facets"] == known["full"] == (None, None)
+
+
+def test_a_price_is_quoted_with_engine_and_date(base: Case) -> None:
+    costs = [cost("bowl_facets", 1.9, ci95_low=1.85, ci95_high=1.951), cost("bowl_fine", 1.9)]
+    tradeoff = made_tradeoff(base, costs=costs)
+    said = "putting it back costs 1.9x (1.85 to 1.95), LIGGGHTS 3.8.0, 2026-01-02"
     assert price_of("bowl_facets", tradeoff) == said
-    assert "not measured" in price_of("bowl_facets", {})
-    single = {**tradeoff, "costs": [{**cost, "ci95_low": None, "ci95_high": None}]}
-    assert price_of("bowl_facets", single).startswith("putting it back costs 1.9x, LIGGGHTS")
+    assert price_of("bowl_fine", tradeoff).startswith("putting it back costs 1.9x, LIGGGHTS")
+    assert "not measured" in price_of("two_ranks", tradeoff)
+    assert "not measured" in price_of("bowl_facets", None)
 
 
 @pytest.mark.parametrize(
@@ -224,11 +233,9 @@ def test_a_price_is_quoted_with_engine_and_date() -> None:
 def test_explain_names_what_is_surely_cheaper(
     base: Case, high: float | None, unit: str, scene: str, shown: bool
 ) -> None:
-    cost = {
-        "name": "workpiece_wide_facets", "what": "wide facets", "scene": scene, "unit": unit,
-        "ratio": 0.9, "ci95_low": None if high is None else 0.85, "ci95_high": high,
-    }  # fmt: skip
-    tradeoff = {"versions": {"engine": "3.8.0"}, "measured": "2026-11-21", "costs": [cost]}
+    low = None if high is None else 0.85
+    wide = cost("wide facets", 0.9, scene=scene, unit=unit, ci95_low=low, ci95_high=high)
+    tradeoff = made_tradeoff(base, costs=[wide])
     table = explanation(process_scene(base), Cost(1, 1.0, ""), (), tradeoff)
     assert ("wide facets" in list(table.columns[1].cells)) == shown
     assert any("not measured" in str(cell) for cell in table.columns[2].cells)
@@ -302,6 +309,6 @@ def test_two_variants_on_the_engine(
     assert step["per_second"] == pytest.approx(
         step["per_step"] * found["bases"][0]["timestep_s"] / step["timestep_s"]
     )
-    for cost in found["costs"]:
-        assert cost["ci95_low"] < cost["ratio"] < cost["ci95_high"] and cost["rounds"] == 2
+    for entry in found["costs"]:
+        assert entry["ci95_low"] < entry["ratio"] < entry["ci95_high"] and entry["rounds"] == 2
     assert first["costs"][0]["ci95_low"] is None

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from make_record import synthetic_record
 from scipy.integrate import solve_ivp
 
-from dragchain.calibration.fit import calibrate, prepare
-from dragchain.calibration.force_record import measure, read_record
+from dragchain.calibration.fit import calibrate_file
 from dragchain.calibration.report import write_report
-from dragchain.calibration.results import (
-    confirmed,
-    write_calibration,
-    write_synthetic,
-    write_trials,
-)
+from dragchain.calibration.results import confirmed, write_calibration
 from dragchain.calibration.simulated_drops import read_drops
-from dragchain.calibration.synthetic_record import Sensor
+from dragchain.calibration.sweep import prepare
+from dragchain.calibration.trials import Sensor, write_trials
 from dragdeck.campaigns.restitution_drops import (
     Drop,
     confirmation,
@@ -179,24 +174,25 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
         for k, (value, height) in enumerate([(0.68, 0.01008), (0.86, 0.00995)])
     ]
     made = run(known, "trials")
-    ready, drops = prepare(read_drops(listed)), read_drops(made)
+    swept, drops = read_drops(listed), read_drops(made)
+    production_model = prepare(swept).production
     for drop, truth in zip(known, drops.runs, strict=True):
         record = folder / f"{drop.name}.csv"
-        write_synthetic(made, drop.name, Sensor(500e3, 0.1, 3.0, 0.5, 0.01), 7, record)
-        got = calibrate(measure(read_record(record), fall_time_s=ready.known["fall_time_s"]), ready)
-        assert got.fit_reference.low < drop.restitution < got.fit_reference.high
-        low, high = (ready.production.rebound(e) for e in (got.fit.low, got.fit.high))
-        assert low < truth.rebound.mean() < high
+        record.write_text(synthetic_record(truth, Sensor(500e3, 0.1, 3.0, 0.5, 0.01), 7))
+        got = calibrate_file(record, swept)
+        assert got.fit_reference.interval.contains(drop.restitution)
+        low, high = (production_model.rebound(e) for e in (got.fit.ci95_low, got.fit.ci95_high))
+        assert low < truth.effective < high
         assert got.fit_reference.height_m == pytest.approx(drop.height_m, abs=2e-5)
 
-    result = json.loads(write_calibration(folder / "trial-0.csv", listed, folder).read_text())
-    values = (result["fit"]["restitution"], result["fit_full"]["restitution"])
+    result = write_calibration(folder / "trial-0.csv", listed, folder)
+    values = (result.fit.restitution, result.fit_full.restitution)
     checked = confirmed(read_drops(run(list(confirmation(case.study, *values))[::2], "confirm")))
-    spread = 4 * checked["std"]
-    assert checked["effective"] == pytest.approx(result["measured"]["value"], abs=spread)
+    assert checked.effective == pytest.approx(result.measured.value, abs=4 * checked.std)
     write_trials(listed, made, 1, 1, folder / "trials.json")
-    page = write_report(folder / "trial-0.csv", folder).read_text()
-    assert f"restitution: {result['put']['value']:.4g}" in page
+    write_report(folder / "trial-0.csv", folder)
+    page = (folder / "report.html").read_text()
+    assert f"restitution: {result.put.value:.4g}" in page
     assert page.count("data:image/") == 4
     assert "http" not in page
 
@@ -239,7 +235,8 @@ def test_limit_force_changes_the_rebound_as_the_law_says(
         measured_case, drops, project.root / "two", environment(project.templates), print
     )
     for run in read_drops(out).runs:
-        wanted = truncated_rebound(run.restitution) if run.limit_force else run.restitution
+        deck = run.drop.restitution
+        wanted = truncated_rebound(deck) if run.drop.limit_force else deck
         # gravity acts during the contact too, the more the slower: a few 1e-4
-        assert run.rebound.mean() == pytest.approx(wanted, abs=1e-3)
+        assert run.effective == pytest.approx(wanted, abs=1e-3)
     assert truncated_rebound(0.5) - 0.5 > 0.04  # far more than what is allowed above

@@ -7,28 +7,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rich.table import Table
 
 from dragdeck import __version__
-from dragdeck.advice.advise import (
-    Advice,
-    Error,
-    Option,
-    Spread,
-    percent,
-    process_options,
-    with_option,
-)
+from dragdeck.advice.advise import RESTITUTION, Advice, Spread, percent, signed
+from dragdeck.advice.options import Option, process_options, with_option
 from dragdeck.advice.speed import SCALE, Speed
 from dragdeck.cases.case import Case
 from dragdeck.decks.case_file import AdvisedSettings
 from dragdeck.decks.deck import StudyScene
 from dragdeck.documents import Document, Part
 from dragdeck.outlook.explain import Cost, expected_cost
-from dragdeck.outlook.measured import measured_tradeoff
+from dragdeck.outlook.measured import MeasuredError, Tradeoff
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, process_scene
@@ -96,7 +88,7 @@ class OptionEntry(Part):
     role: str
     settings: Fidelity
     drop_timestep_fraction: float | None
-    error: Error | None
+    error: MeasuredError | None
     relative_cost: float
     inputs: Json
     steps: Mapping[str, int]
@@ -138,9 +130,9 @@ def question(case: Case, tolerance: float | None, quantity: str | None) -> Toler
     return Tolerance.model_validate({**base.model_dump(), **given})
 
 
-def own_option(case: Case, asked: Tolerance, tradeoff: Mapping[str, Any]) -> Option | None:
+def own_option(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Option | None:
     """The measured option that a study without a tolerance has chosen itself, if it has."""
-    if case.asked is not None or asked.quantity == "restitution":
+    if case.asked is not None or asked.quantity == RESTITUTION:
         return None
     fidelity = case.study.chosen_fidelity()
     for option in process_options(case, tradeoff, asked):
@@ -165,7 +157,14 @@ def roles(advice: Advice, own: Option | None) -> Iterator[tuple[str, Option]]:
             yield role, option
 
 
-def forecast(case: Case, role: str, option: Option, speed: Speed | None, results: Path) -> Forecast:
+def forecast(
+    case: Case,
+    role: str,
+    option: Option,
+    speed: Speed | None,
+    results: Path,
+    tradeoff: Tradeoff,
+) -> Forecast:
     """Steps and wall time of an option.
 
     Parameters
@@ -178,12 +177,16 @@ def forecast(case: Case, role: str, option: Option, speed: Speed | None, results
         Of this machine; None: what earlier runs took, or an assumption.
     results : Path
         The study's results.
+    tradeoff : Tradeoff
+        What steps of soft particles cost.
     """
     chosen = replace(case, study=with_option(case.study, option))
     process = process_scene(chosen)
     about_drop = option.drop_timestep_fraction is not None
     kinds = [DROP_TEST] if about_drop else [FILLING, PROCESS]
-    costs = {kind.name: _cost(kind, kind.build(chosen, None), speed, results) for kind in kinds}
+    costs = {
+        kind.name: _cost(kind, kind.build(chosen, None), speed, results, tradeoff) for kind in kinds
+    }
     return Forecast(
         role=role,
         option=option,
@@ -195,7 +198,9 @@ def forecast(case: Case, role: str, option: Option, speed: Speed | None, results
     )
 
 
-def _cost(kind: SceneType, scene: StudyScene, speed: Speed | None, results: Path) -> Cost:
+def _cost(
+    kind: SceneType, scene: StudyScene, speed: Speed | None, results: Path, tradeoff: Tradeoff
+) -> Cost:
     """Steps and wall time of a scene, by the speed of this machine if it was measured."""
     if speed is None or kind.single_particle:
         return expected_cost(kind, scene, results / kind.name)
@@ -203,12 +208,12 @@ def _cost(kind: SceneType, scene: StudyScene, speed: Speed | None, results: Path
     rate = here.filling_steps_per_s
     if kind is PROCESS:
         modulus = scene.case.fidelity.youngs_modulus_scale
-        rate = here.drag_steps_per_s * step_cost(SCALE) / step_cost(modulus)
+        rate = here.drag_steps_per_s * step_cost(SCALE, tradeoff) / step_cost(modulus, tradeoff)
     ranks = f"{speed.ranks} rank{'s' if speed.ranks > 1 else ''}"
     return Cost(scene.steps, scene.steps / rate, f"a short run of this study, {ranks}")
 
 
-def step_cost(scale: float, tradeoff: Mapping[str, Any] | None = None) -> float:
+def step_cost(scale: float, tradeoff: Tradeoff) -> float:
     """Time of a step of the drag at a modulus scale, over that at the others that were timed.
 
     Soft particles have more contacts, and their steps cost more. Interpolated over
@@ -218,19 +223,16 @@ def step_cost(scale: float, tradeoff: Mapping[str, Any] | None = None) -> float:
     ----------
     scale : float
         Factor on every Young's modulus.
-    trade : mapping, optional
-        Instead of `measured_tradeoff`.
+    tradeoff : Tradeoff
     """
-    costs = (measured_tradeoff() if tradeoff is None else tradeoff)["costs"]
-    timed = {
-        float(cost["name"].removeprefix("modulus_")): float(cost["per_step"])
-        for cost in costs
-        if cost["name"].startswith("modulus_")
-    }
+    timed = sorted(
+        (cost.level, cost.per_step)
+        for cost in tradeoff.costs
+        if cost.parameter == "youngs_modulus_scale" and cost.level and cost.per_step
+    )
     if not timed:
         return 1.0
-    levels = sorted(timed)
-    logs = [math.log(timed[level]) for level in levels]
+    levels, logs = zip(*((level, math.log(time)) for level, time in timed), strict=True)
     return math.exp(np.interp(math.log(scale), np.log(levels), logs))
 
 
@@ -266,7 +268,7 @@ def tables(
         table.add_column(name)
     for row in rows:
         option = row.option
-        error = "errors are against it" if option.error is None else str(option.error)
+        error = "errors are against it" if option.error is None else error_text(option.error)
         bound = "" if option.error is None else percent(option.error.bound)
         style = "bold" if row.role == "advised" else None
         cost, steps = f"{option.relative_cost:.3g}", f"{sum(row.steps.values()):,}"
@@ -301,8 +303,8 @@ def _of_own(case: Case, advice: Advice, own: Option | None) -> str:
     if own is None or own.error is None:
         return f"{name} is none of the measured settings that may be used here"
     return (
-        f"{name}: error of {advice.label} {own.error}, bound {percent(own.error.bound)}, "
-        f"cost {own.relative_cost:.3g}"
+        f"{name}: error of {advice.label} {error_text(own.error)}, "
+        f"bound {percent(own.error.bound)}, cost {own.relative_cost:.3g}"
     )
 
 
@@ -342,6 +344,11 @@ def _of_chance(advice: Advice, spread: Spread, study: Study) -> str:
         whole = f"{length / (2 * math.pi * path.radius_m):.3g} revolutions"
     seeds = math.ceil(spread.needed_m / spread.counted_m)
     return f"{text}: more than the tolerance, which takes {whole}, or the mean over {seeds} seeds"
+
+
+def error_text(error: MeasuredError) -> str:
+    """An error with its interval."""
+    return f"{signed(error.value)} ({signed(error.ci95_low)} to {signed(error.ci95_high)})"
 
 
 def clock(seconds: float) -> str:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+from trimesh import Trimesh
 
 from dragdeck import __version__
 from dragdeck.campaigns.cost_variants import (
@@ -40,7 +41,7 @@ from dragdeck.engine.process import Engine, command, execute, find_engine
 from dragdeck.engine.run_folder import fingerprint, run
 from dragdeck.errors import EngineError, InputError
 from dragdeck.files import replace_text
-from dragdeck.mesh import Mesh, write_stl
+from dragdeck.mesh import write_stl
 from dragdeck.project import find_project, study_templates
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import process_scene
@@ -240,7 +241,7 @@ def _stiffness_and_facets(case: Case) -> Mapping[str, Any]:
     }
 
 
-def _write(folder: Path, texts: Mapping[str, str], meshes: Mapping[str, Mesh]) -> None:
+def _write(folder: Path, texts: Mapping[str, str], meshes: Mapping[str, Trimesh]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         replace_text(folder / name, text)
@@ -436,6 +437,8 @@ def _cost(variant: Variant, rows: Sequence[Row], steps_s: Mapping[str, float]) -
         "what": variant.what,
         "against": BASES[variant.base].what,
         "unit": variant.unit,
+        "parameter": variant.parameter,
+        "level": variant.level,
         **_scaled(cpu, factor),
         "per_step": cpu.ratio,
         "per_second": cpu.ratio * steps_per_second,

@@ -16,13 +16,14 @@ from typing import Any, Literal
 import jinja2
 import numpy as np
 from scipy import stats
+from trimesh import Trimesh
 
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import deck_text, number
 from dragdeck.errors import InputError
-from dragdeck.mesh import Mesh
+from dragdeck.outlook.measured import FidelityParameters
 from dragdeck.physics.contact_mechanics import particle_mass
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
 from dragdeck.physics.rounding import timestep
@@ -127,6 +128,18 @@ class Variant:
     def scene(self) -> str:
         """AnyScene of its deck."""
         return SCENE_OF_BASE[self.base]
+
+    @property
+    def parameter(self) -> str | None:
+        """The fidelity parameter that is all its change, if it is one."""
+        changed = [name.removeprefix("fidelity.") for name in self.fields]
+        alone = len(changed) == 1 and not self.edits
+        return changed[0] if alone and changed[0] in FidelityParameters.model_fields else None
+
+    @property
+    def level(self) -> float | None:
+        """The value of that parameter."""
+        return float(self.fields[f"fidelity.{self.parameter}"]) if self.parameter else None
 
 
 SCENE_OF_BASE: Mapping[str, str] = {
@@ -448,7 +461,7 @@ class TimedDeck:
     ----------
     whole, start : str
         Deck texts.
-    meshes : mapping of str to Mesh
+    meshes : mapping of str to Trimesh
     files : mapping of str to str
         Other input files.
     ranks : int
@@ -457,7 +470,7 @@ class TimedDeck:
 
     whole: str
     start: str
-    meshes: Mapping[str, Mesh]
+    meshes: Mapping[str, Trimesh]
     files: Mapping[str, str]
     ranks: int
     timestep_s: float

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from dragdeck.decks.deck import StudyScene
-from dragdeck.outlook.measured import tradeoff_if_measured
+from dragdeck.outlook.measured import MeasuredCost, Tradeoff
 from dragdeck.scenes.scene import SceneType
 
 
@@ -58,44 +57,42 @@ def _measured(results: Path) -> Iterable[tuple[int, float]]:
             yield int(media["count"]), float(speed)
 
 
-def price_of(name: str, tradeoff: Mapping[str, Any]) -> str:
+def price_of(name: str, tradeoff: Tradeoff | None) -> str:
     """What putting a thing back costs, as measured.
 
     Parameters
     ----------
     name : str
-        A variant of `dragdeck.costs`.
-    trade : mapping
-        Its ``costs`` give for each variant the ratio of processor times, with a
+        A variant of `dragdeck.campaigns.cost_variants`.
+    tradeoff : Tradeoff or None
+        Its costs give for each variant the ratio of processor times, with a
         95 % interval if there were rounds enough for one.
     """
-    found = next((cost for cost in tradeoff.get("costs", ()) if cost["name"] == name), None)
-    if found is None:
+    cost = tradeoff.cost(name) if tradeoff else None
+    if tradeoff is None or cost is None:
         return "cost of putting it back: not measured"
-    return f"putting it back costs {_ratio(found, tradeoff)}"
+    return f"putting it back costs {_ratio(cost, tradeoff)}"
 
 
-def cheaper_choices(scene: str, tradeoff: Mapping[str, Any]) -> Iterable[tuple[str, str]]:
+def cheaper_choices(scene: str, tradeoff: Tradeoff) -> Iterable[tuple[str, str]]:
     """What was measured to make a scene cheaper, beyond doubt, by a simulated second."""
-    for cost in tradeoff.get("costs", ()):
-        sure = cost["ci95_high"] is not None and cost["ci95_high"] < 1
-        if sure and cost["scene"] == scene and cost.get("unit", "per_second") == "per_second":
-            yield cost["what"], f"{_ratio(cost, tradeoff)}; what it does to the results is not said"
+    for cost in tradeoff.costs:
+        sure = cost.ci95_high is not None and cost.ci95_high < 1
+        if sure and cost.scene == scene and cost.unit == "per_second":
+            yield cost.what, f"{_ratio(cost, tradeoff)}; what it does to the results is not said"
 
 
-def _ratio(cost: Mapping[str, Any], tradeoff: Mapping[str, Any]) -> str:
-    interval = (
-        "" if cost["ci95_low"] is None else f" ({cost['ci95_low']:.3g} to {cost['ci95_high']:.3g})"
-    )
-    engine, date = tradeoff["versions"]["engine"], tradeoff["measured"]
-    return f"{cost['ratio']:.3g}x{interval}, LIGGGHTS {engine}, {date}"
+def _ratio(cost: MeasuredCost, tradeoff: Tradeoff) -> str:
+    interval = "" if cost.ci95_low is None else f" ({cost.ci95_low:.3g} to {cost.ci95_high:.3g})"
+    engine, date = tradeoff.versions.engine, tradeoff.measured
+    return f"{cost.ratio:.3g}x{interval}, LIGGGHTS {engine}, {date}"
 
 
 def explanation(
     scene: StudyScene,
     cost: Cost,
-    notes: Iterable[tuple[str, str]] = (),
-    tradeoff: Mapping[str, Any] | None = None,
+    notes: Iterable[tuple[str, str]],
+    tradeoff: Tradeoff | None,
 ) -> Table:
     """The table of one scene.
 
@@ -105,10 +102,9 @@ def explanation(
     cost : Cost
     notes : iterable of (str, str)
         What its time step means for each pair of bodies.
-    trade : mapping, optional
-        Measured costs, if not those of `tradeoff_if_measured`.
+    tradeoff : Tradeoff or None
+        Measured costs, if there are any.
     """
-    tradeoff = tradeoff_if_measured() if tradeoff is None else tradeoff
     deck = scene.deck
     table = Table(title=f"{deck.study}: {deck.scene} {deck.run}", title_justify="left")
     table.add_column("")
@@ -129,7 +125,7 @@ def explanation(
     table.add_row("", "steps", f"about {cost.steps:,}")
     minutes, seconds = divmod(round(cost.wall_time_s), 60)
     table.add_row("", "wall time", f"about {minutes} min {seconds:02d} s ({cost.source})")
-    for what, text in cheaper_choices(deck.scene, tradeoff):
+    for what, text in cheaper_choices(deck.scene, tradeoff) if tradeoff else ():
         table.add_row("cheaper", what, text)
     table.add_section()
     for what, text in notes:
