@@ -32,6 +32,7 @@ READERS = {
     "case.collide": ["dragchain.verification.experiment:Experiment"],
     "case.column": ["dragchain.run.case:Case"],
     "case.impact": ["dragchain.run.case:Case"],
+    "stability": ["dragdeck.outlook.measured:StabilityMap"],
     "packing": ["dragdeck.scenes.scene:PackingFile"],
 }
 """Models of the other package, which name what they read of a document."""
