@@ -120,7 +120,9 @@ class PointRun:
             return None
         record = RunRecord.read(file)
         if record.state in ("running", "stopped"):
-            raise TableError(f"{self.folder}: this run was interrupted; run the map once more")
+            raise TableError(
+                f"{self.folder}: this run was interrupted; `snakemake stability` goes on with it"
+            )
         return record
 
     @property
