@@ -23,26 +23,21 @@ pytestmark = [pytest.mark.engine, pytest.mark.slow]
 @pytest.fixture(scope="module")
 def coarse(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The coarse map, run on the engine and classified."""
-    from dragdeck.campaigns.stability_map import run_batch
+    from dragdeck.campaigns.stability_map import bed_names, map_runs
 
     root = tmp_path_factory.mktemp("map")
     study = root / "studies" / "stability"
     study.mkdir(parents=True)
     shutil.copy(ROOT / "studies" / "stability" / "study.yaml", study)
     results = root / "results" / "stability"
-    lists = []
-    for regime in ("impact", "settle", "beds", "column", "drag"):
-        lists.append(
-            run_batch(
-                study / "study.yaml",
-                DATA / "coarse_map.yaml",
-                regime,
-                results,
-                ROOT / "templates",
-                lambda line: None,
-            )
-        )
-    kept = [str(file) for file in lists if file.stem != "beds"]
+    runs = map_runs(study / "study.yaml", results, ROOT / "templates", lambda line: None)
+    points = DATA / "coarse_map.yaml"
+    runs.settle_beds(points)
+    for bed in bed_names(points):
+        assert dragchain(["tables", str(results / "filling" / bed)]) == 0
+    kept = [
+        str(runs.run_points(points, regime)) for regime in ("impact", "settle", "column", "drag")
+    ]
     assert dragchain(["step", "stability", "--out", str(results), *kept]) == 0
     return results
 
@@ -102,12 +97,12 @@ def test_the_report_stands_alone(coarse: Path) -> None:
 
 
 def test_points_that_were_run_are_not_run_again(coarse: Path) -> None:
-    from dragdeck.campaigns.stability_map import run_batch
+    from dragdeck.campaigns.stability_map import map_runs
 
     before = {file: file.stat().st_mtime_ns for file in coarse.glob("impact/*/state.json")}
     study = coarse.parent.parent / "studies" / "stability" / "study.yaml"
     tests = DATA / "coarse_map.yaml"
-    run_batch(study, tests, "impact", coarse, ROOT / "templates", lambda line: None)
+    map_runs(study, coarse, ROOT / "templates", lambda line: None).run_points(tests, "impact")
     after = {file: file.stat().st_mtime_ns for file in coarse.glob("impact/*/state.json")}
     failed_too = any(json.loads(file.read_text())["state"] == "failed" for file in after)
     assert failed_too

@@ -151,6 +151,8 @@ class Scene(Generic[K]):
         What it leaves out.
     warnings : sequence of str
         What the user should know before the run.
+    override : str, optional
+        The template, if it is not the scene's own.
     """
 
     deck: Deck
@@ -161,6 +163,12 @@ class Scene(Generic[K]):
     models: Mapping[str, str] = field(default_factory=dict)
     leaves_out: Mapping[str, LeftOut] = field(default_factory=dict)
     warnings: Sequence[str] = ()
+    override: str | None = None
+
+    @property
+    def template(self) -> str:
+        """The template of the input script: the scene's own unless another overrides it."""
+        return self.override or f"{self.deck.scene}.in.j2"
 
 
 StudyScene = Scene[CaseOfStudy]
