@@ -33,6 +33,7 @@ READERS = {
     "case.collide": ["dragchain.verification.experiment:Experiment"],
     "case.column": ["dragchain.run.case:Case"],
     "case.impact": ["dragchain.run.case:Case"],
+    "stability": ["dragdeck.outlook.measured:StabilityMap"],
     "packing": ["dragdeck.scenes.scene:PackingFile"],
     "calibration": ["dragdeck.campaigns.restitution_drops:FitFile"],
 }

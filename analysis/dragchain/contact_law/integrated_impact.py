@@ -19,15 +19,15 @@ from scipy.integrate import solve_ivp
 from dragchain.arrays import Floats
 from dragchain.contact_law.impact import Contact, Motion, elastic_time, largest_overlap
 
-START = 1e-6
+_START = 1e-6
 """Overlap at which integration begins and ends, over the largest one."""
 
-LEAST_OVERLAP_M = 1e-20
+_LEAST_OVERLAP_M = 1e-20
 """Stands in for zero where the law divides by the overlap."""
 
-MOST_SWITCHES = 100
-RELATIVE_ERROR = 1e-8
-LEAST_STEPS = 60
+_MOST_SWITCHES = 100
+_RELATIVE_ERROR = 1e-8
+_LEAST_STEPS = 60
 
 
 @dataclass(frozen=True)
@@ -93,12 +93,12 @@ class HertzLaw:
 
     def spring_limit(self, state: Floats) -> float:
         """Tangential displacement at which friction gives way, m."""
-        stiffness = self.tangential * math.sqrt(max(state[0], LEAST_OVERLAP_M))
+        stiffness = self.tangential * math.sqrt(max(state[0], _LEAST_OVERLAP_M))
         return self.contact.friction * abs(self.normal_force(state)) / stiffness
 
     def spring_limit_rate(self, state: Floats) -> float:
         """Rate of `spring_limit`, m/s."""
-        overlap, rate = max(state[0], LEAST_OVERLAP_M), state[1]
+        overlap, rate = max(state[0], _LEAST_OVERLAP_M), state[1]
         force = self.whole_force(state)
         elastic, damped = self.normal / self.tangential, self.normal_damping / self.tangential
         change = (
@@ -158,18 +158,18 @@ def integrated_impact(contact: Contact, before: Motion) -> Impact:
     state, way = _begin(law, before, unit)
     speeds = max(before.normal_m_s, abs(before.patch_m_s(contact)))
     tolerance = 1e-10 * np.array([unit, speeds, unit, speeds, *[speeds / contact.radius_m] * 2])
-    time, overlap, force = START * unit / before.normal_m_s, 0.0, 0.0
+    time, overlap, force = _START * unit / before.normal_m_s, 0.0, 0.0
     repels = law.normal_damping > 0
-    for _ in range(MOST_SWITCHES):
-        events = _events(law, way, START * unit, repels)
+    for _ in range(_MOST_SWITCHES):
+        events = _events(law, way, _START * unit, repels)
         solved = solve_ivp(
             partial(law.rates, way),
             (time, time + 20 * period),
             state,
             events=list(events.values()),
-            rtol=RELATIVE_ERROR,
+            rtol=_RELATIVE_ERROR,
             atol=tolerance,
-            max_step=period / LEAST_STEPS,
+            max_step=period / _LEAST_STEPS,
         )
         if solved.status != 1:
             raise ArithmeticError(f"the impact did not end: {solved.message}")
@@ -186,16 +186,16 @@ def integrated_impact(contact: Contact, before: Motion) -> Impact:
             state, way = _attracted(law, state)
         else:
             state, way = _switched(law, state, way)
-    raise ArithmeticError(f"sticking and sliding took turns {MOST_SWITCHES} times")
+    raise ArithmeticError(f"sticking and sliding took turns {_MOST_SWITCHES} times")
 
 
 def _begin(law: HertzLaw, before: Motion, unit_m: float) -> tuple[Floats, int]:
     """State just after touching, and whether it slides at once."""
     spins = before.spin_rad_s, before.partner_spin_rad_s
     state = np.array(
-        [START * unit_m, before.normal_m_s, 0.0, before.tangential_m_s, *spins], dtype=np.float64
+        [_START * unit_m, before.normal_m_s, 0.0, before.tangential_m_s, *spins], dtype=np.float64
     )
-    moved = law.patch(state) * START * unit_m / before.normal_m_s
+    moved = law.patch(state) * _START * unit_m / before.normal_m_s
     limit = law.spring_limit(state)
     if law.contact.friction == 0.0:
         return state, 1

@@ -68,14 +68,8 @@ class Seen:
         self, code: CheckCode, reason: CheckReason | None = None
     ) -> AcceptanceCheck | None:
         """The check of this code, if it did not pass for this reason; any reason if None."""
-        return next(
-            (
-                check
-                for check in self.failed
-                if check.code == code and reason in (None, check.reason)
-            ),
-            None,
-        )
+        found = (check for check in self.failed if check.code == code)
+        return next((check for check in found if reason in (None, check.reason)), None)
 
 
 class Verdict(NamedTuple):

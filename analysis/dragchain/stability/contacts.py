@@ -52,8 +52,7 @@ class Contacts:
 
 def in_id_order(frame: Frame) -> Frame:
     """A frame with its rows in the order of the particles' ids."""
-    order = np.argsort(frame.columns["particle_id"])
-    return Frame(frame.step, {name: column[order] for name, column in frame.columns.items()})
+    return frame.take(np.argsort(frame.columns["particle_id"]))
 
 
 def centres(frame: Frame) -> Floats:

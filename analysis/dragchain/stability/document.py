@@ -23,6 +23,9 @@ def _to_digits(digits: int) -> BeforeValidator:
 Step = Annotated[float | None, _to_digits(4)]
 """A step over another, to four digits; NaN becomes None."""
 
+KnownStep = Annotated[float, _to_digits(4)]
+"""The same of a step that is always known."""
+
 Rounded = Annotated[float, _to_digits(3)]
 """A number to three digits."""
 
@@ -54,9 +57,9 @@ class SafeSteps(Part):
     usable: int
     base_fraction: Step
     base_critical: Step
-    safe_fraction: Step
-    recommended_fraction: Step
-    over_rule: Step
+    safe_fraction: KnownStep
+    recommended_fraction: KnownStep
+    over_rule: KnownStep
     stable_fraction: Step
     safe_critical: Step
     recommended_critical: Step

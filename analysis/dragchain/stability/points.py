@@ -13,7 +13,7 @@ from dragchain.errors import TableError
 from dragchain.run.completeness import RunRecord
 from dragchain.tables.run_folder import Run
 
-Regime = Literal["impact", "settle", "column", "drag"]
+_Regime = Literal["impact", "settle", "column", "drag"]
 
 
 class Settings(Part):
@@ -66,7 +66,7 @@ class Point(Part):
         Why no deck could be written.
     """
 
-    regime: Regime
+    regime: _Regime
     axis: str
     condition: str
     settings: Settings
@@ -120,7 +120,9 @@ class PointRun:
             return None
         record = RunRecord.read(file)
         if record.state in ("running", "stopped"):
-            raise TableError(f"{self.folder}: this run was interrupted; run the map once more")
+            raise TableError(
+                f"{self.folder}: this run was interrupted; `snakemake stability` goes on with it"
+            )
         return record
 
     @property

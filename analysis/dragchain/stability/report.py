@@ -76,7 +76,7 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
     points = point_table(classified)
     by_condition = conditions(points)
     document = summarise(points, by_condition, runs)
-    sizes = run_sizes(runs)
+    sizes = _run_sizes(runs)
     with matplotlib.rc_context(STYLE):
         drawn = draw(points, by_condition, document.restitution_error, sizes)
         pictures = {name: png(figure) for name, figure in drawn.items()}
@@ -110,7 +110,7 @@ def summarise(
     )
 
 
-def run_sizes(runs: Sequence[PointRun]) -> dict[str, int]:
+def _run_sizes(runs: Sequence[PointRun]) -> dict[str, int]:
     """Impacts, or particles, of a run, by regime; of the base point where it was run."""
     sizes: dict[str, int] = {}
     for run in sorted(runs, key=lambda run: run.point.axis != "base"):

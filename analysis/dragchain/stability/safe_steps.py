@@ -23,10 +23,10 @@ ORDINARY_RESTITUTION = 0.5
 RULE = 0.2
 """The common rule: a fifth of the Rayleigh time."""
 
-ERROR_BINS_PER_DECADE = 6
+_ERROR_BINS_PER_DECADE = 6
 """Resolution of the table of errors against steps per contact."""
 
-NOT_SAFE = (INACCURATE, *UNSTABLE, REFUSED)
+_NOT_SAFE = (INACCURATE, *UNSTABLE, REFUSED)
 """A large overlap comes from load and stiffness, not from the step: it limits no step."""
 
 
@@ -57,7 +57,7 @@ def conditions(points: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         ``regime condition axis label usable`` (whether its reference is stable, so that a safe
-        step can be asked for), ``safe_fraction`` (no class of `NOT_SAFE` up to it),
+        step can be asked for), ``safe_fraction`` (no class of ``NOT_SAFE`` up to it),
         ``stable_fraction`` (no energy gained and no particles lost up to it), both over the
         Rayleigh time, the same over the critical step (``..._critical``), ``grid_end`` (whether
         the largest step of the grid is the safe one, so the limit lies above), ``restitution``.
@@ -69,7 +69,7 @@ def conditions(points: pd.DataFrame) -> pd.DataFrame:
 def _condition(points: pd.DataFrame) -> dict[str, object]:
     reference = points[points["reference"]].iloc[0]
     usable = reference["class"] == STABLE
-    safe = safe_fraction(points, NOT_SAFE) if usable else math.nan
+    safe = safe_fraction(points, _NOT_SAFE) if usable else math.nan
     stable = safe_fraction(points, (*UNSTABLE, REFUSED))
     per_rayleigh = reference["rayleigh_time_s"] / reference["critical_step_s"]
     return {
@@ -152,7 +152,7 @@ def error_table(points: pd.DataFrame) -> RestitutionErrors:
     impacts = head_on_impacts(points)
     impacts = impacts[impacts["state"] == "complete"]
     steps = impacts["steps_per_contact"].to_numpy()
-    bins = np.floor(np.log10(steps) * ERROR_BINS_PER_DECADE).astype(int)
+    bins = np.floor(np.log10(steps) * _ERROR_BINS_PER_DECADE).astype(int)
     ordinary = (impacts["setting_restitution"] >= ORDINARY_RESTITUTION).to_numpy()
     groups = [bins == number for number in np.unique(bins)]
     errors = impacts["restitution_error"].abs().to_numpy()

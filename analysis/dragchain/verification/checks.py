@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from dragchain.contact_law.impact import elastic_time, hertz_force, hertz_overlap, largest_overlap
+from dragchain.errors import TableError
 from dragchain.run.kinematics import needed
 from dragchain.verification.published import published
 from dragchain.verification.quantities import (
@@ -129,7 +130,9 @@ def compare(
 ) -> list[Check]:
     """Compare a quantity over a series; the scale is its largest reference unless given."""
     size = scale or max((abs(reference) for _, reference, _ in values), default=0.0) or 1.0
-    good, bad = _VERDICTS[against in JUDGED]
+    verdicts: tuple[Verdict, Verdict] = ("agrees", "differs")
+    if against in JUDGED:
+        verdicts = ("pass", "fail")
     checks = []
     for x, reference, engine in values:
         error = abs(engine - reference) / size
@@ -147,22 +150,25 @@ def compare(
                 scale=size,
                 error=error,
                 tolerance=tolerance,
-                verdict=good if error <= tolerance else bad,
+                verdict=verdicts[0] if error <= tolerance else verdicts[1],
             )
         )
     return checks
 
 
-_VERDICTS: Mapping[bool, tuple[Verdict, Verdict]] = {
-    True: ("pass", "fail"),
-    False: ("agrees", "differs"),
-}
-
-
 def judge(runs: Sequence[Recording]) -> list[Check]:
-    """All checks of all runs, in the order of the tests."""
-    checks = [check for run in runs for check in _CHECKS[run.case.test](run)]
-    checks += order_of_convergence([run for run in runs if run.case.test == "time_step"])
+    """All checks of all runs, in the order of the tests.
+
+    Raises
+    ------
+    TableError
+        A run is of a test that the suite does not have.
+    """
+    for run in runs:
+        if run.case.test not in CHECKS:
+            raise TableError(f"{run.case.run}: the suite has no test {run.case.test!r}")
+    checks = [check for run in runs for check in CHECKS[run.case.test](run)]
+    checks += _order_of_convergence([run for run in runs if run.case.test == "time_step"])
     return sorted(checks, key=lambda check: check.number)
 
 
@@ -238,7 +244,7 @@ def _time_step(run: Recording) -> Iterator[Check]:
     yield from compare(run, "rebound_over_approach", EXACT, [row], tolerance, 1.0)
 
 
-def order_of_convergence(runs: Sequence[Recording]) -> list[Check]:
+def _order_of_convergence(runs: Sequence[Recording]) -> list[Check]:
     """The order at which the rebound with limited force approaches its exact value."""
     limited = [run for run in runs if run.case.limit_force]
     if len(limited) < 3:
@@ -299,7 +305,7 @@ def _incline(run: Recording) -> Iterator[Check]:
     yield from compare(run, "normal_force_n", EXACT, weights, FITTED)
 
 
-_CHECKS: Mapping[str, Callable[[Recording], Iterator[Check]]] = {
+CHECKS: Mapping[str, Callable[[Recording], Iterator[Check]]] = {
     "elastic_pair": _elastic,
     "elastic_plane": _elastic,
     "restitution": _restitution,
@@ -310,3 +316,4 @@ _CHECKS: Mapping[str, Callable[[Recording], Iterator[Check]]] = {
     "column": _column,
     "incline": _incline,
 }
+"""How each test is judged, in the order of the page."""

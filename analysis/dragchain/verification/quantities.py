@@ -15,7 +15,7 @@ from dragchain.verification.recording import RecordedContact, Recording
 Derived = Callable[[Contact, Motion, Motion], float]
 """A quantity of an impact, from its contact and the motions before and after it."""
 
-BY_SERIES_AND_LIMIT: tuple[str, ...] = ("restitution", "oblique_study", "spin_plane", "time_step")
+_BY_SERIES_AND_LIMIT: tuple[str, ...] = ("restitution", "oblique_study", "spin_plane", "time_step")
 """Tests that are run with and without the limit on attraction."""
 
 
@@ -24,7 +24,7 @@ def series_name(run: Recording) -> str:
     case = run.case
     limit = "limitForce on" if case.limit_force else "limitForce off"
     series = case.series.replace("_", " ")
-    name = f"{series}, {limit}" if case.test in BY_SERIES_AND_LIMIT else series
+    name = f"{series}, {limit}" if case.test in _BY_SERIES_AND_LIMIT else series
     steps = case.test in ("time_step", "bounce")
     return f"{name}, {case.steps_per_contact} steps a contact" if steps else name
 

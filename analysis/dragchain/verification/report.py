@@ -19,8 +19,8 @@ from dragchain.figures.style import STYLE, png
 from dragchain.report.bundle import write_bundle
 from dragchain.report.page import data_uri, render_page
 from dragchain.tables.by_step import read_table
-from dragchain.verification.checks import JUDGED, Check, Verdict, judge
-from dragchain.verification.experiment import TESTS, Experiment
+from dragchain.verification.checks import CHECKS, JUDGED, Check, Verdict, judge
+from dragchain.verification.experiment import Experiment
 from dragchain.verification.figures import draw
 from dragchain.verification.published import published
 from dragchain.verification.recording import Recording, read_recording
@@ -140,7 +140,8 @@ def verdict(report_dir: Path) -> str:
 
 def render(runs: Sequence[Recording], summary: pd.DataFrame) -> str:
     """The page: HTML that needs no other file and no network."""
-    ordered = sorted(runs, key=lambda run: (run.case.number, TESTS.index(run.case.test)))
+    order = list(CHECKS)
+    ordered = sorted(runs, key=lambda run: (run.case.number, order.index(run.case.test)))
     by_test = {test: list(group) for test, group in groupby(ordered, key=lambda run: run.case.test)}
     return render_page(
         "verification/verification.html.j2",
@@ -171,7 +172,7 @@ def _section(test: str, runs: Sequence[Recording], summary: pd.DataFrame) -> Sec
     )
 
 
-SPIN_AT = 4.0
+_SPIN_AT = 4.0
 """Scaled patch velocity at which the published spins of two tests are compared."""
 
 
@@ -187,11 +188,11 @@ def published_spins(
         return None
     impact = angle[0].contacts[0]
     contact, before = impact.constants, impact.before
-    inclined = math.atan(SPIN_AT * contact.friction)
+    inclined = math.atan(_SPIN_AT * contact.friction)
     normal = math.hypot(before.normal_m_s, before.tangential_m_s) * math.cos(inclined)
     spin = published("oblique_angle", angle[0].case.series, "spin_rad_s").at(math.degrees(inclined))
-    own = published("oblique_tangential", tangential[0].case.series, "scaled_spin").at(SPIN_AT)
-    return TwoSpins(SPIN_AT, own, contact.particle.radius_m * spin / (contact.friction * normal))
+    own = published("oblique_tangential", tangential[0].case.series, "scaled_spin").at(_SPIN_AT)
+    return TwoSpins(_SPIN_AT, own, contact.particle.radius_m * spin / (contact.friction * normal))
 
 
 _UNITS = {

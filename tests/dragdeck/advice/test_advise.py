@@ -168,9 +168,10 @@ def test_a_tolerance_beyond_all_falls_back_and_says_what_is_known(
 def test_strong_damping_shortens_the_steps(
     small: dict[str, Any], write_study: Write, tradeoff: Tradeoff, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    known = copy.deepcopy(stability.measured())
-    known["regimes"]["drag"]["safe_fraction"] = 0.4
-    monkeypatch.setattr(stability, "measured", lambda: known)
+    known = stability.stability_map()
+    drag = known.regimes["drag"].model_copy(update={"safe_fraction": 0.4})
+    shorter = known.model_copy(update={"regimes": {**known.regimes, "drag": drag}})
+    monkeypatch.setattr(stability, "stability_map", lambda: shorter)
     for pair in small["pairs"].values():
         pair["restitution"] = 0.3
     (damped,) = load_cases(write_study(small))

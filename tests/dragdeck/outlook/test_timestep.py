@@ -15,7 +15,8 @@ from dragdeck.cases.bed import particle_material, smallest_radius
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
 from dragdeck.errors import InputError
-from dragdeck.outlook.timestep import expected_error, measured, outlook, safe_fraction
+from dragdeck.outlook.measured import RestitutionErrors, stability_map
+from dragdeck.outlook.timestep import expected_error, outlook, safe_fraction
 from dragdeck.physics.contact_mechanics import effective_modulus, rayleigh_time
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING, filling_scene
@@ -25,11 +26,9 @@ from dragdeck.scenes.workpiece import workpiece_radius
 from dragdeck.sweep.cases import load_cases
 
 MAP = ROOT / "studies" / "stability" / "map.yaml"
-TABLE = {
-    "steps_per_contact": [5.0, 50.0],
-    "worst": [3e-1, 3e-3],
-    "ordinary_worst": [1e-1, 1e-3],
-}
+TABLE = RestitutionErrors(
+    steps_per_contact=[5.0, 50.0], worst=[3e-1, 3e-3], ordinary_worst=[1e-1, 1e-3]
+)
 
 
 @pytest.mark.parametrize(
@@ -47,12 +46,14 @@ def test_errors_are_interpolated_on_logarithmic_scales(
 
 
 def test_the_measured_table_is_of_a_real_map() -> None:
-    known = measured()
-    steps = known["restitution_error"]["steps_per_contact"]
-    assert steps == sorted(steps) and len(steps) == len(known["restitution_error"]["worst"])
-    assert known["engine_versions"] and known["measured"] and known["commands"]
-    for row in known["regimes"].values():
-        assert 0 < row["recommended_fraction"] < row["safe_fraction"] <= row["ordinary_fraction"]
+    known = stability_map()
+    steps = known.restitution_error.steps_per_contact
+    assert list(steps) == sorted(steps) and len(steps) == len(known.restitution_error.worst)
+    assert known.engine_versions and known.measured
+    for row in known.regimes.values():
+        assert row.ordinary_fraction is not None
+        assert 0 < row.safe_fraction <= row.ordinary_fraction
+    assert 0 < known.safety_factor < 1
 
 
 def test_unlike_bodies_are_looked_at_too(case: Case) -> None:

@@ -1,4 +1,4 @@
-"""The measured trade-off of speed against accuracy: ``data/tradeoff.json``, as it is read."""
+"""What was measured on the engine: ``data/tradeoff.json`` and ``data/stability.json``, as read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import Literal
 from dragdeck.documents import Document, Part
 from dragdeck.errors import InputError
 
-TRADEOFF_FILE = Path(str(resources.files("dragdeck"))) / "data" / "tradeoff.json"
+_DATA = Path(str(resources.files("dragdeck"))) / "data"
+TRADEOFF_FILE = _DATA / "tradeoff.json"
 """The trade-off that was measured with this version."""
 
 
@@ -195,3 +196,58 @@ def tradeoff_if_measured(file: Path = TRADEOFF_FILE) -> Tradeoff | None:
         return measured_tradeoff(file)
     except InputError:
         return None
+
+
+class RegimeSteps(Part):
+    """Safe time steps of a regime of the stability map, over the Rayleigh time.
+
+    Attributes
+    ----------
+    safe_fraction : float
+        Of all conditions.
+    ordinary_fraction : float or None
+        Of those without strong damping; None where there were none.
+    """
+
+    safe_fraction: float
+    ordinary_fraction: float | None
+
+
+class RestitutionErrors(Part):
+    """Errors of the restitution by steps per contact, which rise.
+
+    Attributes
+    ----------
+    steps_per_contact, worst, ordinary_worst : (N,) sequence of float
+        Steps, and the largest errors of any impacts and of those without strong damping.
+    """
+
+    steps_per_contact: Sequence[float]
+    worst: Sequence[float]
+    ordinary_worst: Sequence[float]
+
+
+class StabilityMap(Document):
+    """What is read of the stability map.
+
+    Attributes
+    ----------
+    measured : str
+        Date of its last run.
+    safety_factor : float
+        Recommended over safe step.
+    """
+
+    remedy = "measure it: snakemake stability; then copy its stability.json here"
+
+    engine_versions: Sequence[str]
+    measured: str
+    safety_factor: float
+    regimes: Mapping[str, RegimeSteps]
+    restitution_error: RestitutionErrors
+
+
+@cache
+def stability_map() -> StabilityMap:
+    """The map that was measured with this version."""
+    return StabilityMap.read(_DATA / "stability.json")

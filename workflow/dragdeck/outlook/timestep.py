@@ -6,17 +6,13 @@ The errors and the safe steps were measured on the engine by the stability map;
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from importlib import resources
-from typing import Any
 
 from dragdeck.cases.bed import particle_material, smallest_radius
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import StudyScene
+from dragdeck.outlook.measured import RestitutionErrors, stability_map
 from dragdeck.physics.contact_mechanics import (
     effective_modulus,
     hertz_contact_time,
@@ -81,17 +77,7 @@ class PairOutlook:
         )
 
 
-@lru_cache(maxsize=1)
-def measured() -> dict[str, Any]:
-    """The measured map: ``data/stability.json`` of this package."""
-    file = resources.files("dragdeck").joinpath("data").joinpath("stability.json")
-    found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    return found
-
-
-def expected_error(
-    steps: float, restitution: float, table: Mapping[str, Sequence[float]]
-) -> Expected:
+def expected_error(steps: float, restitution: float, table: RestitutionErrors) -> Expected:
     """Error of the restitution at a number of steps per contact.
 
     Parameters
@@ -99,13 +85,11 @@ def expected_error(
     steps : float
     restitution : float
         From `ORDINARY_RESTITUTION` on, the errors of such impacts count.
-    table : mapping
-        ``steps_per_contact``, rising, and the errors seen there, ``worst`` and
-        ``ordinary_worst``. Between them the error is interpolated on
-        logarithmic scales.
+    table : RestitutionErrors
+        Between its entries the error is interpolated on logarithmic scales.
     """
     ordinary = restitution >= ORDINARY_RESTITUTION
-    known, errors = table["steps_per_contact"], table["ordinary_worst" if ordinary else "worst"]
+    known, errors = table.steps_per_contact, table.ordinary_worst if ordinary else table.worst
     if steps <= known[0] or steps >= known[-1]:
         end = 0 if steps <= known[0] else -1
         return Expected(errors[end], steps == known[end])
@@ -163,7 +147,7 @@ def _pair(
         rayleigh_fraction=timestep_s / times[limiting],
         speed_m_s=speed,
         steps_per_contact=steps,
-        error=expected_error(steps, pair.restitution, measured()["restitution_error"]),
+        error=expected_error(steps, pair.restitution, stability_map().restitution_error),
     )
 
 
@@ -172,24 +156,26 @@ def safe_fraction(case: Case, scene: SceneType) -> tuple[float, str]:
 
     Strongly damped particles have a limit of their own. The safety factor is not in it.
     """
-    known = measured()
+    known = stability_map()
     lowest = min(pair.restitution for pair in case.study.pairs.values())
     strong = lowest < ORDINARY_RESTITUTION
     damping = "any restitution" if strong else f"restitution of {ORDINARY_RESTITUTION:g} or more"
-    engine = ", ".join(known["engine_versions"])
-    source = f"{scene.regime}, {damping}; LIGGGHTS {engine}, {known['measured']}"
+    engine = ", ".join(known.engine_versions)
+    source = f"{scene.regime}, {damping}; LIGGGHTS {engine}, {known.measured}"
     return _regime_fraction(scene.regime, lowest), source
 
 
 def _regime_fraction(regime: Regime, lowest_restitution: float) -> float:
-    row = measured()["regimes"][regime]
+    row = stability_map().regimes[regime]
     strong = lowest_restitution < ORDINARY_RESTITUTION
-    return float(row["safe_fraction"] if strong else row["ordinary_fraction"])
+    if strong or row.ordinary_fraction is None:
+        return row.safe_fraction
+    return row.ordinary_fraction
 
 
 def largest_fraction(regime: Regime, lowest_restitution: float) -> float:
     """Largest step of a regime over the Rayleigh time that keeps the safety factor."""
-    return float(measured()["safety_factor"]) * _regime_fraction(regime, lowest_restitution)
+    return stability_map().safety_factor * _regime_fraction(regime, lowest_restitution)
 
 
 def largest_of_case(case: Case, kind: SceneType) -> float:
@@ -203,7 +189,7 @@ def notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str
     step = scene.deck.timestep_s
     found = [(pair.bodies, str(pair)) for pair in outlook(case, kind, step)]
     fraction, source = safe_fraction(case, kind)
-    factor = float(measured()["safety_factor"])
+    factor = stability_map().safety_factor
     own = step / scene.case.rayleigh_time_s
     verdict = "within" if own <= factor * fraction * (1 + 1e-9) else "ABOVE"
     text = (
