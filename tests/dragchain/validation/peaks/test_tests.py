@@ -26,7 +26,8 @@ from scipy.stats import binom, false_discovery_control
 from dragchain.drag.peaks import find_drag_peaks
 from dragchain.errors import TableError
 from dragchain.figures.network_picture import cylinder_radii
-from dragchain.network.chains import chain_table, dominant_path, peters_chains, widest_paths
+from dragchain.network.chain_table import chain_table
+from dragchain.network.chains import dominant_path, peters_chains, widest_paths
 from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame
 from dragchain.network.write import write_chains
 from dragchain.report.page import page_environment
