@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -61,16 +60,14 @@ def _peters_table(frame: NetworkFrame, alpha_rad: float, stress_factor: float) -
     rows = peters_rows(frame, alpha_rad, stress_factor, major)
     on_bowl = np.zeros(frame.particle_id.size, dtype=bool)
     on_bowl[frame.a[(frame.other == FLOOR) | (frame.other == SIDE)]] = True
-    lines = _Lines.of(frame, frame.centre[rows.particles], rows.particle_starts)
     return _table(
         frame,
         rows,
-        lines,
+        _shape(frame, frame.centre[rows.particles], rows.particle_starts),
         definition="peters",
         stress_pa=_of_each(rows.particle_starts, major[0][rows.particles], _mean),
         reaches=_of_each(rows.particle_starts, on_bowl[rows.particles], _any).astype(bool),
         ends=["none"] * len(rows),
-        whole=np.ones(len(rows), dtype=bool),
     )
 
 
@@ -85,55 +82,51 @@ def _path_table(frame: NetworkFrame, threshold: float) -> pd.DataFrame:
     inner[starts[:-1]] = inner[starts[1:] - 1] = False
     points[inner] = frame.centre[rows.particles]
     points[starts[:-1]], points[starts[1:] - 1] = frame.point[first], frame.point[last]
+    kinds = zip(frame.other[last].tolist(), whole, strict=True)
     table = _table(
         frame,
         rows,
-        _Lines.of(frame, points, starts),
+        _shape(frame, points, starts),
         definition="widest_path",
         stress_pa=np.full(len(rows), np.nan),
         reaches=whole,
-        ends=[
-            KINDS[kind] if there else "none"
-            for kind, there in zip(frame.other[last].tolist(), whole, strict=True)
-        ],
-        whole=whole,
+        ends=[KINDS[kind] if there else "none" for kind, there in kinds],
     )
+    table.loc[~whole, _OF_WHOLE_PATHS] = np.nan
     order = np.lexsort((-table["mean_force_n"], -table["bottleneck_n"]))
     dominant = np.zeros(len(rows), dtype=bool)
     dominant[order[:1]] = whole[order[:1]]
     return table.assign(dominant=dominant)
 
 
+_OF_WHOLE_PATHS = ["bottleneck_n", "mean_force_n", "length_m", "azimuth_rad", "inclination_rad"]
+
+
 def _table(
     frame: NetworkFrame,
     rows: ChainRows,
-    lines: _Lines,
+    shape: Mapping[str, Floats],
     *,
     definition: str,
     stress_pa: Floats,
     reaches: NDArray[np.bool_],
     ends: list[str],
-    whole: NDArray[np.bool_],
 ) -> pd.DataFrame:
-    """The rows of chains of one definition; what only a `whole` chain has is NaN elsewhere."""
+    """The rows of chains of one definition, none of them dominant."""
     forces, count = frame.normal_force[rows.contacts], len(rows)
+    ids = split(frame.particle_id[rows.particles], rows.particle_starts)
+    height = frame.centre[rows.particles, 2]
     return pd.DataFrame(
         {
             "step": np.full(count, frame.step),
             "time_s": np.full(count, frame.time_s),
             "definition": pd.array([definition] * count, dtype="str"),
             "n_particles": np.diff(rows.particle_starts),
-            "particle_ids": pd.Series(
-                split(frame.particle_id[rows.particles], rows.particle_starts), dtype=object
-            ),
-            "bottleneck_n": np.where(
-                whole, _of_each(rows.contact_starts, forces, lambda x: x.min(axis=1)), np.nan
-            ),
-            "mean_force_n": np.where(whole, _of_each(rows.contact_starts, forces, _mean), np.nan),
-            "length_m": np.where(whole, lines.length_m, np.nan),
-            "azimuth_rad": np.where(whole, lines.azimuth_rad, np.nan),
-            "inclination_rad": np.where(whole, lines.inclination_rad, np.nan),
-            "altitude_m": _of_each(rows.particle_starts, frame.centre[rows.particles, 2], _mean),
+            "particle_ids": pd.Series(ids, dtype=object),
+            "bottleneck_n": _of_each(rows.contact_starts, forces, lambda x: x.min(axis=1)),
+            "mean_force_n": _of_each(rows.contact_starts, forces, _mean),
+            **shape,
+            "altitude_m": _of_each(rows.particle_starts, height, _mean),
             "major_stress_mean_pa": stress_pa,
             "reaches_bowl": reaches,
             "end_kind": pd.array(ends, dtype="str"),
@@ -142,24 +135,15 @@ def _table(
     )
 
 
-@dataclass(frozen=True)
-class _Lines:
-    """Length of polylines, and the direction from their first to their last points, (C,) each."""
-
-    length_m: Floats
-    azimuth_rad: Floats
-    inclination_rad: Floats
-
-    @classmethod
-    def of(cls, frame: NetworkFrame, points: Floats, starts: Ints) -> _Lines:
-        """Measure polylines, one after another."""
-        line = points[starts[1:] - 1] - points[starts[:-1]]
-        x, y, z = np.ascontiguousarray(line.T)
-        return cls(
-            _of_each(starts, points, _length),
-            wrap_angle(np.arctan2(y, x) - frame.direction_rad),
-            np.arctan2(z, np.hypot(x, y)),
-        )
+def _shape(frame: NetworkFrame, points: Floats, starts: Ints) -> dict[str, Floats]:
+    """Length of polylines, one after another, and direction from their first to last points."""
+    line = points[starts[1:] - 1] - points[starts[:-1]]
+    x, y, z = np.ascontiguousarray(line.T)
+    return {
+        "length_m": _of_each(starts, points, _length),
+        "azimuth_rad": wrap_angle(np.arctan2(y, x) - frame.direction_rad),
+        "inclination_rad": np.arctan2(z, np.hypot(x, y)),
+    }
 
 
 def _of_each(starts: Ints, values: NDArray[Any], measure: Callable[[Any], NDArray[Any]]) -> Floats:
