@@ -116,9 +116,9 @@ def process_findings(drag: float = -2.5) -> dict[str, Any]:
         "forces": {name: force for name in ("drag_n", "lateral_n", "vertical_n")},
         "comparison": [against], "peaks": {"count": 4, "largest_n": -3.9},
         "network": network | {"frames": 31}, "chains": chains,
-        "association": {"rank_correlation": 0.4,
-        "p_value": 0.2},
-        "ahead_behind": sides | {"ratio": estimate(None)}, "depth": {"slope_n_per_m": estimate(5.0)},
+        "association": {"rank_correlation": 0.4, "p_value": 0.2},
+        "ahead_behind": sides | {"ratio": estimate(None)},
+        "depth": {"slope_n_per_m": estimate(5.0)},
     }  # fmt: skip
 
 
