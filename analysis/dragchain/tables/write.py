@@ -270,7 +270,8 @@ def _write_particles(run: Run, file: Path) -> None:
     with table_writer(file, ("step", "time_s", *KINEMATICS)) as table:
         for frame in run.frames("particles"):
             steps = np.full(frame.rows, frame.step)
-            rows = frame.take(np.argsort(frame.columns["particle_id"])).columns
+            order = np.argsort(frame.columns["particle_id"])
+            rows = {name: frame.columns[name][order] for name in KINEMATICS}
             table.write({"step": steps, "time_s": steps * run.case.timestep_s, **rows})
 
 
