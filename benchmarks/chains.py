@@ -133,6 +133,7 @@ def measure(kind: str, frame: Path, size: int, rounds: int, largest: int) -> dic
     import plain_chains as plain
 
     from dragchain.network import chains, clusters
+    from dragchain.network.chain_table import chain_table
     from dragchain.network.frame import frame_of
 
     contacts, particles = tiled(frame, size) if kind == "tiled" else bed(size)
@@ -152,7 +153,7 @@ def measure(kind: str, frame: Path, size: int, rounds: int, largest: int) -> dic
         ),
         "Peters chains": (lambda: chains.peters_rows(net), lambda: plain.plain_peters(net)),
         "workpiece paths": (lambda: chains.path_rows(net), lambda: plain.plain_paths(net)),
-        "chain table": (lambda: chains.chain_table(net), lambda: plain.plain_table(net)),
+        "chain table": (lambda: chain_table(net), lambda: plain.plain_table(net)),
     }
     count = len(contacts)
     found: dict[str, Any] = {"contacts": count, "particles": len(particles)}

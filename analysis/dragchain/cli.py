@@ -5,18 +5,25 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dragchain.errors import DragchainError
 
 
-def _argument(*names: str, **options: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
+@dataclass(frozen=True)
+class Argument:
     """An argument as argparse takes it; its name is that of the function's parameter."""
-    return names, options
+
+    names: tuple[str, ...]
+    options: Mapping[str, Any]
+
+
+def _argument(*names: str, **options: Any) -> Argument:
+    return Argument(names, options)
 
 
 RUN_DIR = _argument("run_dir", type=Path, metavar="RUN_DIR", help="folder of one run")
@@ -42,9 +49,9 @@ class Command:
     name: str
     help: str
     function: str
-    arguments: tuple[tuple[tuple[str, ...], dict[str, Any]], ...]
+    arguments: tuple[Argument, ...]
 
-    def run(self, options: dict[str, Any]) -> None:
+    def run(self, options: Mapping[str, object]) -> None:
         """Import the function and call it."""
         module, _, name = self.function.partition(":")
         said = getattr(import_module(f"dragchain.{module}"), name)(**options)
@@ -158,6 +165,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+if TYPE_CHECKING:
+    Parsers = argparse._SubParsersAction[argparse.ArgumentParser]
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="dragchain", description="Tables, figures and reports of what LIGGGHTS wrote."
@@ -169,11 +180,11 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add(parsers: Any, commands: Sequence[Command]) -> None:
+def _add(parsers: Parsers, commands: Sequence[Command]) -> None:
     for command in commands:
         parser = parsers.add_parser(command.name, help=command.help, description=command.help)
-        for names, options in command.arguments:
-            parser.add_argument(*names, **options)
+        for argument in command.arguments:
+            parser.add_argument(*argument.names, **argument.options)
         parser.set_defaults(_command=command)
 
 

@@ -48,67 +48,46 @@ _UNSURE = np.uint64(2**9 - 1)
 _HIDDEN = np.uint64(2**52)
 
 
-@intrinsic
-def _word(_context, at):
-    """Load the eight bytes at an address, which need not be aligned, as a uint64."""
+def _instruction(result, argument, emit):
+    """An operation on one number that numba has no function for."""
 
-    def load(_context, builder, _signature, arguments):
-        place = builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
-        word = builder.load(place)
-        word.align = 1
-        return word
+    @intrinsic
+    def operation(_context, _number):
+        def code(_context, builder, _signature, arguments):
+            return emit(builder, arguments[0])
 
-    return types.uint64(types.uint64), load
+        return result(argument), code
 
-
-@intrinsic
-def _byte(_context, at):
-    """Load the byte at an address."""
-
-    def load(_context, builder, _signature, arguments):
-        return builder.load(builder.inttoptr(arguments[0], ir.IntType(8).as_pointer()))
-
-    return types.uint8(types.uint64), load
+    return operation
 
 
-@intrinsic
-def _bits_of(_context, value):
-    """Take the bits of a double as a uint64."""
+def _load(bits):
+    """Emit a load from an address, which need not be aligned."""
 
-    def cast(_context, builder, _signature, arguments):
-        return builder.bitcast(arguments[0], ir.IntType(64))
+    def emit(builder, address):
+        loaded = builder.load(builder.inttoptr(address, ir.IntType(bits).as_pointer()))
+        loaded.align = 1
+        return loaded
 
-    return types.uint64(types.float64), cast
-
-
-@intrinsic
-def _double_of(_context, bits):
-    """Take a uint64 for the bits of a double."""
-
-    def cast(_context, builder, _signature, arguments):
-        return builder.bitcast(arguments[0], ir.DoubleType())
-
-    return types.float64(types.uint64), cast
+    return emit
 
 
-@intrinsic
-def _trailing_zeros(_context, word):
-    """Count the zero bits below the lowest one of a uint64, 64 if there is none."""
+_DEFINED_AT_ZERO = ir.Constant(ir.IntType(1), 0)
 
-    def count(_context, builder, _signature, arguments):
-        return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 0))
-
-    return types.uint64(types.uint64), count
-
-
-@intrinsic
-def _leading_zeros(_context, word):
-    """Count the zero bits above the highest one of a uint64, 64 if there is none."""
-
-    def count(_context, builder, _signature, arguments):
-        return builder.ctlz(arguments[0], ir.Constant(ir.IntType(1), 0))
-
-    return types.uint64(types.uint64), count
+_word = _instruction(types.uint64, types.uint64, _load(64))
+_byte = _instruction(types.uint8, types.uint64, _load(8))
+_bits_of = _instruction(
+    types.uint64, types.float64, lambda builder, value: builder.bitcast(value, ir.IntType(64))
+)
+_double_of = _instruction(
+    types.float64, types.uint64, lambda builder, bits: builder.bitcast(bits, ir.DoubleType())
+)
+_trailing_zeros = _instruction(
+    types.uint64, types.uint64, lambda builder, word: builder.cttz(word, _DEFINED_AT_ZERO)
+)
+_leading_zeros = _instruction(
+    types.uint64, types.uint64, lambda builder, word: builder.ctlz(word, _DEFINED_AT_ZERO)
+)
 
 
 @njit(nogil=True, cache=True, inline="always")
@@ -192,10 +171,8 @@ def read_number(at):
 
     Parameters
     ----------
-    data : (L,) ndarray of uint8
-        Text that goes on for at least 8 bytes after the number.
     at : uint64
-        Where the number begins.
+        Address at which the number begins; the text goes on for at least 8 bytes after it.
 
     Returns
     -------

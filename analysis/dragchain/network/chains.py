@@ -14,19 +14,16 @@ first in the frame, which in ``contacts.parquet`` is the one with the lower ids.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.network import graph_kernels as kernels
-from dragchain.network.frame import FLOOR, KINDS, SIDE, WORKPIECE, NetworkFrame
-from dragchain.run.kinematics import wrap_angle
+from dragchain.network.frame import WORKPIECE, NetworkFrame
 
 ALPHA_RAD = np.pi / 4
 """Largest angle between a particle's principal direction and the line to the next particle of a
@@ -84,10 +81,11 @@ class ChainRows:
 
     def particle_lists(self) -> list[list[int]]:
         """The rows of each chain's particles."""
-        return _split(self.particles, self.particle_starts)
+        return split(self.particles, self.particle_starts)
 
 
-def _split(values: Ints, starts: Ints) -> list[list[int]]:
+def split(values: Ints, starts: Ints) -> list[list[int]]:
+    """Values from each start to the next."""
     flat, at = values.tolist(), starts.tolist()
     return [flat[begin:end] for begin, end in pairwise(at)]
 
@@ -171,8 +169,7 @@ def _candidates(
     return inner[aligned], cosine[:, aligned] > 0
 
 
-# --- paths from the workpiece to the bowl
-# ----------------------------------------------------------
+# --- paths from the workpiece to the bowl ----------------------------------------------------
 
 
 def widest_paths(
@@ -194,7 +191,7 @@ def widest_paths(
     the contacts behind that particle.
     """
     rows = path_rows(frame, threshold, with_workpiece=with_workpiece)
-    pairs = zip(rows.particle_lists(), _split(rows.contacts, rows.contact_starts), strict=True)
+    pairs = zip(rows.particle_lists(), split(rows.contacts, rows.contact_starts), strict=True)
     return [
         WidestPath(tuple(particles), tuple(links), _end(frame, links)) for particles, links in pairs
     ]
@@ -240,71 +237,6 @@ def _starts(parts: list[Ints]) -> Ints:
     return np.cumsum([0, *map(len, parts)])
 
 
-# --- measures --------------------------------------------------------------------------------
-_COLUMNS: dict[str, str] = {
-    "step": "int64",
-    "time_s": "float64",
-    "definition": "str",
-    "n_particles": "int64",
-    "particle_ids": "object",
-    "bottleneck_n": "float64",
-    "mean_force_n": "float64",
-    "length_m": "float64",
-    "azimuth_rad": "float64",
-    "inclination_rad": "float64",
-    "altitude_m": "float64",
-    "major_stress_mean_pa": "float64",
-    "reaches_bowl": "bool",
-    "end_kind": "str",
-    "dominant": "bool",
-}
-
-
-def chain_table(
-    frame: NetworkFrame,
-    *,
-    alpha_rad: float = ALPHA_RAD,
-    stress_factor: float = STRESS_FACTOR,
-    threshold: float = THRESHOLD,
-) -> pd.DataFrame:
-    """The chains of a frame by both definitions, a row each.
-
-    Returns
-    -------
-    DataFrame
-        ``definition`` (`peters` or `widest_path`), ``n_particles``, ``particle_ids`` (list, in
-        order), ``bottleneck_n`` and ``mean_force_n`` (smallest and mean normal force of the
-        chain's contacts), ``length_m`` (polyline through the centres; a workpiece path's begins at
-        the workpiece contact and ends at the bowl contact), ``azimuth_rad`` (direction from first
-        to last point in the xy plane, counter-clockwise from the workpiece's heading, in (-pi,
-        pi]), ``inclination_rad`` (the same line's angle above the horizontal), ``altitude_m``
-        (mean height of the centres above the floor), ``major_stress_mean_pa`` (peters only),
-        ``reaches_bowl``, ``end_kind`` (`floor`, `side` or `none`) and ``dominant``: the workpiece
-        path of the frame with the largest bottleneck, by mean force where two are equal. A
-        workpiece contact without a path to the bowl has a row with ``reaches_bowl`` false, the
-        particle on the workpiece only, and NaN for bottleneck, mean force, length and angles. A
-        chain by Peters et al. has no direction: it is listed from its higher end, and reaches the
-        bowl if one of its particles touches it; ``end_kind`` is then `none` all the same.
-    """
-    tables = [_peters_table(frame, alpha_rad, stress_factor), _path_table(frame, threshold)]
-    count = sum(len(table["particle_ids"]) for table in tables)
-    moment = {"step": np.full(count, frame.step), "time_s": np.full(count, frame.time_s)}
-    return pd.DataFrame(
-        {
-            name: _column(kind, [moment[name]] if name in moment else [t[name] for t in tables])
-            for name, kind in _COLUMNS.items()
-        }
-    )
-
-
-def _column(kind: str, parts: Sequence[Any]) -> Any:
-    """A column of a table made of its parts."""
-    if kind in ("str", "object"):
-        values = [value for part in parts for value in part]
-        return pd.array(values, dtype="str") if kind == "str" else values
-    return np.concatenate(parts).astype(kind)
-
-
 def dominant_path(
     frame: NetworkFrame, paths: Iterable[WidestPath], *, with_workpiece: bool = True
 ) -> WidestPath | None:
@@ -319,98 +251,3 @@ def dominant_path(
 
     whole = [path for path in paths if path.end is not None]
     return max(whole, key=strength) if whole else None
-
-
-def _peters_table(frame: NetworkFrame, alpha_rad: float, stress_factor: float) -> dict[str, Any]:
-    major = major_stress(particle_stress(frame))
-    rows = peters_rows(frame, alpha_rad, stress_factor, major)
-    on_bowl = np.zeros(frame.particle_id.size, dtype=bool)
-    on_bowl[frame.a[(frame.other == FLOOR) | (frame.other == SIDE)]] = True
-    return {
-        **_measures(frame, rows),
-        **_shape(frame, frame.centre[rows.particles], rows.particle_starts),
-        "particle_ids": _ids(frame, rows),
-        "definition": ["peters"] * len(rows),
-        "major_stress_mean_pa": _of_each(rows.particle_starts, major[0][rows.particles], _mean),
-        "reaches_bowl": _of_each(rows.particle_starts, on_bowl[rows.particles], _any),
-        "end_kind": ["none"] * len(rows),
-        "dominant": np.zeros(len(rows), dtype=bool),
-    }
-
-
-def _path_table(frame: NetworkFrame, threshold: float) -> dict[str, Any]:
-    rows = path_rows(frame, threshold)
-    whole = np.diff(rows.contact_starts) > 1
-    first = rows.contacts[rows.contact_starts[:-1]]
-    last = rows.contacts[rows.contact_starts[1:] - 1]
-    starts = rows.particle_starts + 2 * np.arange(len(rows) + 1)
-    points = np.empty((starts[-1], 3))
-    inner = np.ones(len(points), dtype=bool)
-    inner[starts[:-1]] = inner[starts[1:] - 1] = False
-    points[inner] = frame.centre[rows.particles]
-    points[starts[:-1]], points[starts[1:] - 1] = frame.point[first], frame.point[last]
-    found = _measures(frame, rows) | _shape(frame, points, starts)
-    for name in ("bottleneck_n", "mean_force_n", "length_m", "azimuth_rad", "inclination_rad"):
-        found[name] = np.where(whole, found[name], np.nan)
-    order = np.lexsort((-found["mean_force_n"], -found["bottleneck_n"]))
-    dominant = np.zeros(len(rows), dtype=bool)
-    dominant[order[:1]] = whole[order[:1]]
-    kinds = frame.other[last].tolist()
-    return {
-        **found,
-        "particle_ids": _ids(frame, rows),
-        "definition": ["widest_path"] * len(rows),
-        "major_stress_mean_pa": np.full(len(rows), np.nan),
-        "reaches_bowl": whole,
-        "end_kind": [
-            KINDS[kind] if there else "none" for kind, there in zip(kinds, whole, strict=True)
-        ],
-        "dominant": dominant,
-    }
-
-
-def _ids(frame: NetworkFrame, rows: ChainRows) -> list[list[int]]:
-    return _split(frame.particle_id[rows.particles], rows.particle_starts)
-
-
-def _measures(frame: NetworkFrame, rows: ChainRows) -> dict[str, NDArray[Any]]:
-    forces = frame.normal_force[rows.contacts]
-    return {
-        "n_particles": np.diff(rows.particle_starts),
-        "bottleneck_n": _of_each(rows.contact_starts, forces, lambda x: x.min(axis=1)),
-        "mean_force_n": _of_each(rows.contact_starts, forces, _mean),
-        "altitude_m": _of_each(rows.particle_starts, frame.centre[rows.particles, 2], _mean),
-    }
-
-
-def _shape(frame: NetworkFrame, points: Floats, starts: Ints) -> dict[str, Floats]:
-    """Return length and direction of polylines, one after another."""
-    line = points[starts[1:] - 1] - points[starts[:-1]]
-    x, y, z = np.ascontiguousarray(line.T)
-    return {
-        "length_m": _of_each(starts, points, _length),
-        "azimuth_rad": wrap_angle(np.arctan2(y, x) - frame.direction_rad),
-        "inclination_rad": np.arctan2(z, np.hypot(x, y)),
-    }
-
-
-def _of_each(starts: Ints, values: NDArray[Any], measure: Callable[[Any], NDArray[Any]]) -> Floats:
-    """Measure each chain's values: all chains of one length at once, (n, length, ...)."""
-    found = np.empty(len(starts) - 1)
-    lengths = np.diff(starts)
-    for length in np.unique(lengths):
-        which = np.flatnonzero(lengths == length)
-        found[which] = measure(values[starts[which][:, None] + np.arange(length)])
-    return found
-
-
-def _mean(values: NDArray[Any]) -> Floats:
-    return np.asarray(values.mean(axis=1))
-
-
-def _any(values: NDArray[Any]) -> NDArray[np.bool_]:
-    return np.asarray(values.any(axis=1))
-
-
-def _length(points: Floats) -> Floats:
-    return np.asarray(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1))

@@ -13,17 +13,15 @@ from numpy.typing import NDArray
 from dragchain.arrays import Columns, Floats, Ints, places
 from dragchain.errors import TableError
 from dragchain.tables.by_step import RisingSteps, read_steps, read_table
+from dragchain.tables.columns import CENTRE, FORCES, POINT
 
 PARTICLE, WORKPIECE, FLOOR, SIDE = 1, 0, -1, -2
 """The other body of a contact; the last three are the ``b_id`` of the contacts table."""
 
 KINDS = {PARTICLE: "particle", WORKPIECE: "workpiece", FLOOR: "floor", SIDE: "side"}
 
-_POINT = ["point_x_m", "point_y_m", "point_z_m"]
-_FORCE = ["force_x_n", "force_y_n", "force_z_n"]
-_CENTRE = ["x_m", "y_m", "z_m"]
-_CONTACTS = ["step", "a_id", "b_id", *_POINT, *_FORCE, "normal_force_n"]
-_PARTICLES = ["step", "time_s", "particle_id", *_CENTRE, "radius_m"]
+_CONTACTS = ["step", "a_id", "b_id", *POINT, *FORCES, "normal_force_n"]
+_PARTICLES = ["step", "time_s", "particle_id", *CENTRE, "radius_m"]
 
 
 @dataclass(frozen=True)
@@ -90,7 +88,7 @@ def frame_of(
         If a contact names a particle that the frame does not have, or a particle has two rows.
     """
     particle_id = np.array(particles["particle_id"], dtype=np.int64)
-    centre, radius = _vectors(particles, _CENTRE), np.array(particles["radius_m"], dtype=np.float64)
+    centre, radius = _vectors(particles, CENTRE), np.array(particles["radius_m"], dtype=np.float64)
     if (np.diff(particle_id) <= 0).any():
         order = np.argsort(particle_id)
         particle_id, centre, radius = particle_id[order], centre.T[:, order].T, radius[order]
@@ -112,8 +110,8 @@ def frame_of(
         a=_rows_of(np.asarray(contacts["a_id"], dtype=np.int64), particle_id, step),
         b=b,
         other=np.where(b_id > 0, PARTICLE, b_id),
-        point=_vectors(contacts, _POINT),
-        force=_vectors(contacts, _FORCE),
+        point=_vectors(contacts, POINT),
+        force=_vectors(contacts, FORCES),
         normal_force=np.array(contacts["normal_force_n"], dtype=np.float64),
     )
 

@@ -34,7 +34,7 @@ def coordination_number(counts: NDArray[np.integer[Any]]) -> float:
     Without walls that is 2 M / N for M contacts (Thornton 2000, Geotechnique 50, 43-53); a contact
     with workpiece or bowl counts once, for the particle.
     """
-    return float(counts.mean()) if counts.size else float("nan")
+    return _mean(counts)
 
 
 def mechanical_coordination_number(
@@ -57,7 +57,7 @@ def frame_statistics(frame: NetworkFrame, clusters: Clusters | None = None) -> d
     clusters = clusters or frame_clusters(frame)
     counts = contact_counts(frame)
     normal = frame.normal_force
-    mean = float(normal.mean()) if normal.size else float("nan")
+    mean = _mean(normal)
     of_kind = {
         f"n_particle_{name}_contacts": int((frame.other == kind).sum())
         for kind, name in KINDS.items()
@@ -70,11 +70,13 @@ def frame_statistics(frame: NetworkFrame, clusters: Clusters | None = None) -> d
         **of_kind,
         "coordination_number": coordination_number(counts),
         "mechanical_coordination_number": mechanical_coordination_number(counts),
-        "rattler_fraction": float((counts < LEAST_CONTACTS).mean())
-        if counts.size
-        else float("nan"),
+        "rattler_fraction": _mean(counts < LEAST_CONTACTS),
         "normal_force_mean_n": mean,
-        "normal_force_max_n": float(normal.max()) if normal.size else float("nan"),
-        "above_mean_fraction": float((normal > mean).mean()) if normal.size else float("nan"),
+        "normal_force_max_n": float(normal.max()) if normal.size else mean,
+        "above_mean_fraction": _mean(normal > mean),
         **{f"{name}_n": force for name, force in clusters.percolation_n.items()},
     }
+
+
+def _mean(values: NDArray[Any]) -> float:
+    return float(values.mean()) if values.size else float("nan")

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.errors import TableError
-from dragchain.network.chains import chain_table
+from dragchain.network.chain_table import chain_table
 from dragchain.network.clusters import cluster_rows, frame_clusters
 from dragchain.network.frame import read_frames
 from dragchain.network.statistics import frame_statistics

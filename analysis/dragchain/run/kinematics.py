@@ -97,12 +97,13 @@ def needed(value: T | None, name: str) -> T:
 
 def motion_of(case: Case) -> Circle | Line:
     """The motion of the workpiece in the drag."""
-    motion: Circle | Line = needed(case.motion, "motion")
-    return motion
+    if case.motion is None:
+        raise TableError("case.json has no motion, which these tables need")
+    return case.motion
 
 
 @dataclass(frozen=True)
-class Path(ABC):
+class WorkpiecePath(ABC):
     """How the workpiece is driven in the drag.
 
     Attributes
@@ -131,7 +132,7 @@ class Path(ABC):
 
 
 @dataclass(frozen=True)
-class LinePath(Path):
+class LinePath(WorkpiecePath):
     """A straight line, along which the workpiece moves without turning."""
 
     @classmethod
@@ -145,7 +146,7 @@ class LinePath(Path):
 
 
 @dataclass(frozen=True)
-class CirclePath(Path):
+class CirclePath(WorkpiecePath):
     """A circle about the bowl's axis, with a workpiece that is moved without turning.
 
     Attributes
@@ -190,11 +191,11 @@ class TurningCirclePath(CirclePath):
         return direction_rad
 
 
-PATHS: Mapping[str, Callable[[Any], Path]] = {"circle": CirclePath.of, "line": LinePath.of}
+PATHS: Mapping[str, Callable[[Any], WorkpiecePath]] = {"circle": CirclePath.of, "line": LinePath.of}
 """The path of each kind of motion."""
 
 
-def path_of(case: Case) -> Path:
+def path_of(case: Case) -> WorkpiecePath:
     """How the workpiece is driven in the drag."""
     motion = motion_of(case)
     return PATHS[motion.kind](motion)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -41,7 +41,7 @@ from dragchain.tables.impacts import find_impacts
 from dragchain.tables.network_contacts import KINDS, ContactRows, contact_rows
 from dragchain.tables.parquet import Rows, category, table_writer
 from dragchain.tables.run_folder import Run
-from dragchain.tables.workpiece_contacts import WallContacts, WorkpieceFrame
+from dragchain.tables.workpiece_contacts import WallContacts
 
 
 @dataclass(frozen=True)
@@ -135,9 +135,17 @@ def _phases(steps: Ints, case: Case) -> pa.Array:
 
 @dataclass(frozen=True)
 class WorkpieceSample:
-    """Force on the workpiece, (3,) in N, and horizontal place of its reference point, (2,) in m."""
+    """The workpiece at a step.
 
-    force_n: Floats
+    Attributes
+    ----------
+    force_n : (3,) ndarray or None
+        The force on it; None if it was not written.
+    ref_xy_m : (2,) ndarray
+        Horizontal place of its reference point.
+    """
+
+    force_n: Floats | None
     ref_xy_m: Floats
 
 
@@ -172,19 +180,15 @@ class WorkpieceSamples:
         )
         return WorkpieceSample(force, place)
 
-    def reference(self, step: int) -> Floats:
-        """Horizontal place of the workpiece's reference point, shape (2,), m.
-
-        Before the first sample it is that of the first sample.
-        """
+    def from_start(self, step: int) -> WorkpieceSample:
+        """Sample at a step; before the first one its place, and a force that nobody wrote."""
         sample = self.at(max(step, self.first_step))
         if sample is None:
             raise TableError(
-                f"workpiece_particles has step {step} but workpiece_force does not: the "
-                f"period of workpiece_force"
-                " must divide that of workpiece_particles"
+                f"workpiece_particles has step {step} but workpiece_force does not: the period of"
+                " workpiece_force must divide that of workpiece_particles"
             )
-        return sample.ref_xy_m
+        return sample if step >= self.first_step else replace(sample, force_n=None)
 
 
 # --- contacts on the workpiece ---------------------------------------------------------------
@@ -196,24 +200,18 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
     samples = WorkpieceSamples(run.prints("workpiece_force"))
     with table_writer(file, WORKPIECE_CONTACTS) as table:
         for frame in run.workpiece_frames():
-            reference = samples.reference(frame.step)
-            applied = _close(closure, frame, samples, run.case)
-            rows = workpiece_contact_rows(frame.step, frame.workpiece, reference, run.case)
-            table.write(
-                rows if applied else {**rows, "in_statistics": np.full(len(frame.workpiece), False)}
-            )
+            at = samples.from_start(frame.step)
+            rows = workpiece_contact_rows(frame.step, frame.workpiece, at.ref_xy_m, run.case)
+            counted = bool(counted_mask(np.array([frame.step]), run.case)[0])
+            if not closure.add(frame, at.force_n, counted=counted):
+                rows = {**rows, "in_statistics": np.full(len(frame.workpiece), False)}
+            table.write(rows)
         closure.record().write(run.table("closure.json"))
         if (problem := closure.problem()) is not None:
             raise RejectedRunError(
                 f"{run.folder}: the force closure acceptance check does not pass: {problem};"
                 " workpiece_contacts.parquet was not written, closure.json has the figures"
             )
-
-
-def _close(closure: Closure, frame: WorkpieceFrame, samples: WorkpieceSamples, case: Case) -> bool:
-    sample = samples.at(frame.step) if frame.step >= samples.first_step else None
-    counted = bool(counted_mask(np.array([frame.step]), case)[0])
-    return closure.add(frame, sample.force_n if sample else None, counted=counted)
 
 
 def workpiece_contact_rows(step: int, contacts: WallContacts, ref_xy_m: Floats, case: Case) -> Rows:
@@ -272,7 +270,8 @@ def _write_particles(run: Run, file: Path) -> None:
     with table_writer(file, ("step", "time_s", *KINEMATICS)) as table:
         for frame in run.frames("particles"):
             steps = np.full(frame.rows, frame.step)
-            rows = frame.take(np.argsort(frame.columns["particle_id"])).columns
+            order = np.argsort(frame.columns["particle_id"])
+            rows = {name: frame.columns[name][order] for name in KINEMATICS}
             table.write({"step": steps, "time_s": steps * run.case.timestep_s, **rows})
 
 

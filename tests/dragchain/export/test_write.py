@@ -32,9 +32,9 @@ from dragchain.export.chain_membership import Membership, chain_membership
 from dragchain.export.folder import fresh_folder
 from dragchain.export.frames import FrameSeries, Selection
 from dragchain.export.write import write_export
+from dragchain.network.chain_table import chain_table
 from dragchain.network.chains import (
     WidestPath,
-    chain_table,
     dominant_path,
     peters_chains,
     widest_paths,

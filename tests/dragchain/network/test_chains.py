@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from networks import R, make_frame, row
 
+from dragchain.network.chain_table import chain_table
 from dragchain.network.chains import (
-    chain_table,
     dominant_path,
     major_stress,
     particle_stress,

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from networks import random_frame, real_frame
 from plain_chains import plain_paths, plain_peters, plain_stress, plain_table
 
+from dragchain.network.chain_table import chain_table
 from dragchain.network.chains import (
-    chain_table,
     dominant_path,
     particle_stress,
     peters_chains,

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from dragchain import DocumentError, load_case, load_outputs
-from dragchain.run.case import Circle, Line, Statistics
+from dragchain.run.case import Circle, Line, Statistics, changed_inputs
 
 
 def test_reads_a_process(tiny_run: Path) -> None:
@@ -141,3 +141,9 @@ def test_an_error_names_file_and_remedy(tiny_run: Path) -> None:
         load_outputs(tiny_run)
     assert (caught.value.file, caught.value.field) == (file, "outputs")
     assert "remedy:" in str(caught.value)
+
+
+def test_an_input_that_is_left_out_is_one_that_is_none() -> None:
+    own = {"seed": 1, "bowl.radius_m": None, "media.count": 4}
+    assert changed_inputs(own, {"seed": 1, "media.count": 4}) == {}
+    assert changed_inputs({"seed": 1}, own) == {"media.count": None}

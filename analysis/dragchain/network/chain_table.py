@@ -1,0 +1,168 @@
+"""The force chains of a network frame as a table, by both definitions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from dragchain.arrays import Floats, Ints
+from dragchain.network.chains import (
+    ALPHA_RAD,
+    STRESS_FACTOR,
+    THRESHOLD,
+    ChainRows,
+    major_stress,
+    particle_stress,
+    path_rows,
+    peters_rows,
+    split,
+)
+from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame
+from dragchain.run.kinematics import wrap_angle
+
+
+def chain_table(
+    frame: NetworkFrame,
+    *,
+    alpha_rad: float = ALPHA_RAD,
+    stress_factor: float = STRESS_FACTOR,
+    threshold: float = THRESHOLD,
+) -> pd.DataFrame:
+    """The chains of a frame by both definitions, one row per chain.
+
+    Returns
+    -------
+    DataFrame
+        ``definition`` (`peters` or `widest_path`), ``n_particles``, ``particle_ids`` (list, in
+        order), ``bottleneck_n`` and ``mean_force_n`` (smallest and mean normal force of the
+        chain's contacts), ``length_m`` (polyline through the centres; a workpiece path's begins at
+        the workpiece contact and ends at the bowl contact), ``azimuth_rad`` (direction from first
+        to last point in the xy plane, counter-clockwise from the workpiece's heading, in (-pi,
+        pi]), ``inclination_rad`` (the same line's angle above the horizontal), ``altitude_m``
+        (mean height of the centres above the floor), ``major_stress_mean_pa`` (peters only),
+        ``reaches_bowl``, ``end_kind`` (`floor`, `side` or `none`) and ``dominant``: the workpiece
+        path of the frame with the largest bottleneck, by mean force where two are equal. A
+        workpiece contact without a path to the bowl has a row with ``reaches_bowl`` false, the
+        particle on the workpiece only, and NaN for bottleneck, mean force, length and angles. A
+        chain by Peters et al. has no direction: it is listed from its higher end, and reaches the
+        bowl if one of its particles touches it; ``end_kind`` is then `none` all the same.
+    """
+    tables = [_peters_table(frame, alpha_rad, stress_factor), _path_table(frame, threshold)]
+    return pd.concat(tables, ignore_index=True)
+
+
+def _peters_table(frame: NetworkFrame, alpha_rad: float, stress_factor: float) -> pd.DataFrame:
+    major = major_stress(particle_stress(frame))
+    rows = peters_rows(frame, alpha_rad, stress_factor, major)
+    on_bowl = np.zeros(frame.particle_id.size, dtype=bool)
+    on_bowl[frame.a[(frame.other == FLOOR) | (frame.other == SIDE)]] = True
+    return _table(
+        frame,
+        rows,
+        _shape(frame, frame.centre[rows.particles], rows.particle_starts),
+        definition="peters",
+        stress_pa=_of_each(rows.particle_starts, major[0][rows.particles], _mean),
+        reaches=_of_each(rows.particle_starts, on_bowl[rows.particles], _any).astype(bool),
+        ends=["none"] * len(rows),
+    )
+
+
+def _path_table(frame: NetworkFrame, threshold: float) -> pd.DataFrame:
+    rows = path_rows(frame, threshold)
+    whole = np.diff(rows.contact_starts) > 1
+    first = rows.contacts[rows.contact_starts[:-1]]
+    last = rows.contacts[rows.contact_starts[1:] - 1]
+    starts = rows.particle_starts + 2 * np.arange(len(rows) + 1)
+    points = np.empty((starts[-1], 3))
+    inner = np.ones(len(points), dtype=bool)
+    inner[starts[:-1]] = inner[starts[1:] - 1] = False
+    points[inner] = frame.centre[rows.particles]
+    points[starts[:-1]], points[starts[1:] - 1] = frame.point[first], frame.point[last]
+    kinds = zip(frame.other[last].tolist(), whole, strict=True)
+    table = _table(
+        frame,
+        rows,
+        _shape(frame, points, starts),
+        definition="widest_path",
+        stress_pa=np.full(len(rows), np.nan),
+        reaches=whole,
+        ends=[KINDS[kind] if there else "none" for kind, there in kinds],
+    )
+    table.loc[~whole, _OF_WHOLE_PATHS] = np.nan
+    order = np.lexsort((-table["mean_force_n"], -table["bottleneck_n"]))
+    dominant = np.zeros(len(rows), dtype=bool)
+    dominant[order[:1]] = whole[order[:1]]
+    return table.assign(dominant=dominant)
+
+
+_OF_WHOLE_PATHS = ["bottleneck_n", "mean_force_n", "length_m", "azimuth_rad", "inclination_rad"]
+
+
+def _table(
+    frame: NetworkFrame,
+    rows: ChainRows,
+    shape: Mapping[str, Floats],
+    *,
+    definition: str,
+    stress_pa: Floats,
+    reaches: NDArray[np.bool_],
+    ends: list[str],
+) -> pd.DataFrame:
+    """The rows of chains of one definition, none of them dominant."""
+    forces, count = frame.normal_force[rows.contacts], len(rows)
+    ids = split(frame.particle_id[rows.particles], rows.particle_starts)
+    height = frame.centre[rows.particles, 2]
+    return pd.DataFrame(
+        {
+            "step": np.full(count, frame.step),
+            "time_s": np.full(count, frame.time_s),
+            "definition": pd.array([definition] * count, dtype="str"),
+            "n_particles": np.diff(rows.particle_starts),
+            "particle_ids": pd.Series(ids, dtype=object),
+            "bottleneck_n": _of_each(rows.contact_starts, forces, lambda x: x.min(axis=1)),
+            "mean_force_n": _of_each(rows.contact_starts, forces, _mean),
+            **shape,
+            "altitude_m": _of_each(rows.particle_starts, height, _mean),
+            "major_stress_mean_pa": stress_pa,
+            "reaches_bowl": reaches,
+            "end_kind": pd.array(ends, dtype="str"),
+            "dominant": np.zeros(count, dtype=bool),
+        }
+    )
+
+
+def _shape(frame: NetworkFrame, points: Floats, starts: Ints) -> dict[str, Floats]:
+    """Length of polylines, one after another, and direction from their first to last points."""
+    line = points[starts[1:] - 1] - points[starts[:-1]]
+    x, y, z = np.ascontiguousarray(line.T)
+    return {
+        "length_m": _of_each(starts, points, _length),
+        "azimuth_rad": wrap_angle(np.arctan2(y, x) - frame.direction_rad),
+        "inclination_rad": np.arctan2(z, np.hypot(x, y)),
+    }
+
+
+def _of_each(starts: Ints, values: NDArray[Any], measure: Callable[[Any], NDArray[Any]]) -> Floats:
+    """Measure each chain's values: all chains of one length at once, (n, length, ...)."""
+    found = np.empty(len(starts) - 1)
+    lengths = np.diff(starts)
+    for length in np.unique(lengths):
+        which = np.flatnonzero(lengths == length)
+        found[which] = measure(values[starts[which][:, None] + np.arange(length)])
+    return found
+
+
+def _mean(values: NDArray[Any]) -> Floats:
+    return np.asarray(values.mean(axis=1))
+
+
+def _any(values: NDArray[Any]) -> NDArray[np.bool_]:
+    return np.asarray(values.any(axis=1))
+
+
+def _length(points: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1))
