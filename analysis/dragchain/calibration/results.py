@@ -127,7 +127,7 @@ def write_calibration(record: Path, drops_file: Path, out: Path) -> CalibrationF
     found = calibrate_file(record, drops)
     content = result(found, drops)
     write_csv(out / "bias.csv", bias_table(drops))
-    write_csv(out / "impacts.csv", impact_table(found))
+    write_csv(out / "impacts.csv", _impact_table(found))
     content.write(out / "result.json")
     return content
 
@@ -237,7 +237,7 @@ def bias_table(drops: Drops) -> pd.DataFrame:
     return table.reset_index().sort_values(setting, ascending=[True, False, True])
 
 
-def impact_table(found: Calibration) -> pd.DataFrame:
+def _impact_table(found: Calibration) -> pd.DataFrame:
     """Measured and simulated impacts, one row each."""
     observed, samplings = found.observed, found.samplings
     model, reference = found.sweep.production, found.sweep.reference

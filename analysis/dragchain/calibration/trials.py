@@ -157,7 +157,7 @@ def record_of(run: DropRun, sensor: Sensor, random: np.random.Generator) -> Reco
     return check_samples(since, force)
 
 
-def some_sensor(peak_n: float, random: np.random.Generator) -> Sensor:
+def _some_sensor(peak_n: float, random: np.random.Generator) -> Sensor:
     """A sensor drawn for a trial, fit for a first peak of `peak_n`."""
     return Sensor(
         rate_hz=float(random.choice(RATES_HZ)),
@@ -190,7 +190,7 @@ def run_trials(runs: Sequence[DropRun], sweep: Sweep, seed: int, sensors: int = 
 
 def _trial(number: int, run: DropRun, sweep: Sweep, random: np.random.Generator) -> Trial:
     peak = run.impacts[0].peak_n
-    sensor = some_sensor(peak, random)
+    sensor = _some_sensor(peak, random)
     trial = Trial(
         drop_test=number,
         height_m=run.drop.height_m,
@@ -226,7 +226,7 @@ def coverage(held: Sequence[bool]) -> Coverage:
     return Coverage(held=test.k, of=test.n, fraction=test.statistic, ci95_low=low, ci95_high=high)
 
 
-def table(trials: Sequence[Trial]) -> pd.DataFrame:
+def _table(trials: Sequence[Trial]) -> pd.DataFrame:
     """Trials as a table, one row each: intervals as ``<name>``, ``<name>_low``, ``<name>_high``."""
     rows = []
     for trial in trials:
@@ -246,7 +246,7 @@ def write_trials(drops_file: Path, trials_file: Path, seed: int, records: int, o
     """Recover known values from records of simulated drops; write ``trials.csv`` and ``.json``."""
     runs = read_drops(trials_file).select("trial")
     trials = run_trials(runs, prepare(read_drops(drops_file)), seed, records)
-    write_csv(out.with_suffix(".csv"), table(trials))
+    write_csv(out.with_suffix(".csv"), _table(trials))
     TrialsFile(
         seed=seed,
         drops=len(runs),
