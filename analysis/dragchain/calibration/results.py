@@ -139,13 +139,7 @@ def write_csv(file: Path, table: pd.DataFrame) -> None:
 
 def result(found: Calibration, drops: Drops) -> CalibrationFile:
     """Content of ``result.json``."""
-    ends = found.fit_reference.interval
-    measured = Estimate(
-        *(
-            float(found.sweep.reference.rebound(value))
-            for value in (ends.value, ends.ci95_low, ends.ci95_high)
-        )
-    )
+    measured = found.fit_reference.interval.mapped(found.sweep.reference.rebound)
     deck, known = found.fit.restitution, drops.known
     return CalibrationFile(
         known=known,

@@ -20,7 +20,7 @@ from dragchain.calibration.simulated_drops import DropRun, read_drops
 from dragchain.calibration.sweep import Sweep, prepare
 from dragchain.documents import Document, Part
 from dragchain.errors import RecordError
-from dragchain.statistics.estimate import CONFIDENCE, Estimate
+from dragchain.statistics.estimate import CONFIDENCE, Estimate, flattened
 
 LEAD_S = 0.02
 """What a record shows before the first impact, s."""
@@ -205,12 +205,11 @@ def _trial(number: int, run: DropRun, sweep: Sweep, random: np.random.Generator)
     except RecordError as error:
         return replace(trial, refused=error.reason)
     deck, put = found.fit_reference, found.fit.interval
-    rebound = sweep.production.rebound
     return replace(
         trial,
         deck=deck.interval,
         put=put,
-        effective=Estimate(*(float(rebound(e)) for e in (put.value, put.ci95_low, put.ci95_high))),
+        effective=put.mapped(sweep.production.rebound),
         chi2=deck.chi2,
         degrees=deck.degrees,
     )
@@ -230,12 +229,7 @@ def _table(trials: Sequence[Trial]) -> pd.DataFrame:
     """Trials as a table, one row each: intervals as ``<name>``, ``<name>_low``, ``<name>_high``."""
     rows = []
     for trial in trials:
-        row: dict[str, object] = {}
-        for name, value in vars(trial).items():
-            row[name] = value
-            if isinstance(value, Estimate):
-                ends = {f"{name}_low": value.ci95_low, f"{name}_high": value.ci95_high}
-                row |= {name: value.value, **ends}
+        row = flattened(vars(trial), "low", "high")
         row |= {"deck_held": trial.deck_held, "effective_held": trial.effective_held}
         row["refused"] = row.pop("refused")
         rows.append(row)

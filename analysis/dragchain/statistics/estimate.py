@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -67,6 +67,10 @@ class Estimate:
         )
         return Estimate(float(value), float(low), float(high))
 
+    def mapped(self, function: Callable[[float], float]) -> Estimate:
+        """The estimate of a rising function of the number."""
+        return Estimate(*(float(function(number)) for number in vars(self).values()))
+
     def as_json(self) -> dict[str, float | None]:
         """The numbers by name, None where one is not finite."""
         return {name: finite(number) for name, number in vars(self).items()}
@@ -85,6 +89,19 @@ def estimate_columns(estimates: Sequence[Estimate]) -> dict[str, list[float | No
     """Estimates as columns ``value``, ``ci95_low`` and ``ci95_high``."""
     rows = [estimate.as_json() for estimate in estimates]
     return {name: [row[name] for row in rows] for name in ("value", "ci95_low", "ci95_high")}
+
+
+def flattened(
+    row: Mapping[str, object], low: str = "ci95_low", high: str = "ci95_high"
+) -> dict[str, object]:
+    """A row of a table: an estimate as ``<name>``, ``<name>_<low>`` and ``<name>_<high>``."""
+    flat: dict[str, object] = {}
+    for name, value in row.items():
+        flat[name] = value
+        if isinstance(value, Estimate):
+            ends = {f"{name}_{low}": value.ci95_low, f"{name}_{high}": value.ci95_high}
+            flat |= {name: value.value, **ends}
+    return flat
 
 
 def student_quantile(degrees: float, confidence: float = CONFIDENCE) -> float:
