@@ -13,7 +13,7 @@ from dragchain.scaling.fit import read_scalings, said
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DropDeck
 from dragdeck.scenes.filling import FillingDeck
-from dragdeck.scenes.process import ProcessDeck
+from dragdeck.scenes.process import PROCESS, ProcessDeck
 from dragdeck.study.field_page import page
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
@@ -56,8 +56,7 @@ def test_the_scalings_are_those_of_the_studies_and_on_the_page(found: ScalingFil
     assert (scaling.field, scaling.expected_exponent, scaling.source) == (
         *(found.field, found.expected.exponent, found.expected.source),
     )
-    made = {(run.level, run.seed) for run in found.runs}
-    assert made == {(case.settings[found.field], case.settings["seed"]) for case in cases}
+    assert {run.run for run in found.runs} == {PROCESS.run_id(case) for case in cases}
 
 
 def test_every_block_is_on_the_page() -> None:

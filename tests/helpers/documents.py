@@ -18,8 +18,10 @@ WRITERS = {
     "case.column": "dragdeck.scenes.column:ColumnCase",
     "case.impact": "dragdeck.scenes.impact:ImpactCase",
     "packing": "dragchain.tables.bed:Packing",
+    "stability": "dragchain.stability.document:StabilityFile",
     "scaling": "dragchain.scaling.document:ScalingFile",
     "calibration": "dragchain.calibration.results:CalibrationFile",
+    "drops": "dragdeck.campaigns.restitution_drops:DropsFile",
 }
 """Name of the document: ``module:Class`` of the model that writes it."""
 
@@ -29,10 +31,12 @@ READERS = {
     "case.drop_test": ["dragchain.run.case:Case"],
     "case.filling": ["dragchain.run.case:Case"],
     "case.process": ["dragchain.run.case:Case"],
+    "case.collide": ["dragchain.verification.experiment:Experiment"],
     "case.column": ["dragchain.run.case:Case"],
     "case.impact": ["dragchain.run.case:Case"],
     "packing": ["dragdeck.scenes.scene:PackingFile"],
     "calibration": ["dragdeck.campaigns.restitution_drops:FitFile"],
+    "drops": ["dragchain.calibration.simulated_drops:DropsFile"],
 }
 """Models of the other package, which name what they read of a document."""
 

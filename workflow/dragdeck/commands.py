@@ -23,6 +23,7 @@ from dragdeck.advice.forecast import (
 )
 from dragdeck.advice.options import with_option
 from dragdeck.advice.speed import Speed
+from dragdeck.campaigns.cost_timing import cost_fillings
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import StudyScene
@@ -174,14 +175,20 @@ def run(folder: Path, outcome: Path | None, again: bool, every_s: float) -> None
 
 
 def render(
-    study: str, fidelity: str | None, plan: str | None, scene: str, run: str, packing: Path | None
+    study: str,
+    fidelity: str | None,
+    plan: str | None,
+    costs: bool,
+    scene: str,
+    run: str,
+    packing: Path | None,
 ) -> None:
     """Write the input files of one run."""
     project = find_project(Path.cwd())
     kind = scene_type(scene)
     points = project.points(study, plan) if plan else None
     every = points.of(kind) if points else project.cases(study, fidelity)
-    runs = by_run(every, kind)
+    runs = cost_fillings(every[0]) if costs else by_run(every, kind)
     if run not in runs:
         raise InputError(
             f"no {scene} run of this name",

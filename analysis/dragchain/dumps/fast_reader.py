@@ -147,7 +147,8 @@ class _Parsed:
         columns: Columns = {}
         for name, place in zip(output.columns, block.form.order, strict=True):
             cells = self.cells[place, :rows]
-            columns[name] = cells.view(np.int64 if is_integer_column(name) else np.float64)
+            whole = is_integer_column(name)
+            columns[name] = cells.view(np.int64) if whole else cells.view(np.float64)
         return Batch(first, steps, counts, columns)
 
 

@@ -9,7 +9,7 @@ ends it. What happens between two samples is not seen.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -68,10 +68,6 @@ class Thresholds:
             for name in names
             for factor in (0.5, 2.0)
         }
-
-    def as_json(self) -> dict[str, float]:
-        """The limits by name."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)

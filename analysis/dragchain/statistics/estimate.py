@@ -85,6 +85,21 @@ class Estimate:
         }
 
 
+@dataclass(frozen=True)
+class EstimateColumns:
+    """Estimates of a document as columns, NaN in Python and null in JSON where not known."""
+
+    value: tuple[Real, ...]
+    ci95_low: tuple[Real, ...]
+    ci95_high: tuple[Real, ...]
+
+    @classmethod
+    def of(cls, estimates: Sequence[Estimate]) -> EstimateColumns:
+        """The columns of estimates."""
+        names = ("value", "ci95_low", "ci95_high")
+        return cls(*(tuple(getattr(one, name) for one in estimates) for name in names))
+
+
 def estimate_columns(estimates: Sequence[Estimate]) -> dict[str, list[float | None]]:
     """Estimates as columns ``value``, ``ci95_low`` and ``ci95_high``."""
     rows = [estimate.as_json() for estimate in estimates]

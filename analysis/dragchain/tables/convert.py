@@ -8,7 +8,7 @@ from pathlib import Path
 from dragchain.dumps.any_dump import dump_files, layout_of
 from dragchain.dumps.fast_reader import read_batches
 from dragchain.errors import DumpError
-from dragchain.tables.parquet import TableWriter
+from dragchain.tables.parquet import table_writer
 
 
 def dump_to_parquet(
@@ -36,7 +36,7 @@ def dump_to_parquet(
     files = dump_files(source)
     output = layout_of(files[0], columns)
     frames, broken = 0, None
-    with TableWriter(Path(target), ("step", *output.columns)) as table:
+    with table_writer(Path(target), ("step", *output.columns)) as table:
         try:
             for batch in read_batches(files, output):
                 table.write({"step": batch.steps_of_rows(), **batch.columns})

@@ -8,16 +8,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dragchain.arrays import Floats
+from dragchain.arrays import Floats, Ints
 from dragchain.dumps.frame import Columns
 from dragchain.errors import TableError
 from dragchain.tables.by_step import read_table
-
-IMPACTS = (
-    *("impact", "start_time_s", "duration_s", "peak_force_n"),
-    *("speed_in_m_s", "speed_out_m_s", "restitution", "time_since_first_s"),
-)
-"""Columns of ``impacts.parquet``."""
+from dragchain.tables.parquet import Rows
 
 
 def speed_at_plate(speed_m_s: Floats, gap_m: Floats, gravity_m_s2: float) -> Floats:
@@ -37,7 +32,7 @@ def speed_at_plate(speed_m_s: Floats, gap_m: Floats, gravity_m_s2: float) -> Flo
 
 def find_impacts(
     rows: Columns, timestep_s: float, radius_m: float, gravity_m_s2: float
-) -> dict[str, NDArray[np.generic]]:
+) -> Rows:
     """Measure every impact in the samples around them.
 
     The samples are split where steps are missing. In each stretch an impact is
@@ -94,9 +89,7 @@ def find_impacts(
     }
 
 
-def _check_stretches(
-    steps: NDArray[np.int64], stretch: NDArray[np.int64], touching: NDArray[np.bool_]
-) -> None:
+def _check_stretches(steps: Ints, stretch: Ints, touching: NDArray[np.bool_]) -> None:
     if not touching.any():
         raise TableError("impacts holds no sample with a force: the particle never met the plate")
     begins = np.flatnonzero(np.diff(stretch, prepend=stretch[0] - 1))
@@ -109,7 +102,7 @@ def _check_stretches(
             raise TableError(f"{where}: they begin or end inside an impact; widen the window")
 
 
-def _runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _runs(mask: NDArray[np.bool_]) -> tuple[Ints, Ints]:
     """First and last index of each run of true values."""
     edges = np.diff(mask.astype(np.int8), prepend=0, append=0)
     return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1

@@ -5,7 +5,6 @@ Numbers only; `tradeoff_words`, `tradeoff_choices` and `tradeoff_rows` put them 
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

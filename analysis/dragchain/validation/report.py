@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import shutil
 from collections.abc import Mapping, Sequence
@@ -23,7 +24,7 @@ from dragchain.validation import around_workpiece as statements
 from dragchain.validation import figures, force
 from dragchain.validation import loading_over_packings as load
 from dragchain.validation.claims import claims
-from dragchain.validation.peaks.report import write_peaks
+from dragchain.validation.peaks.report import report_peaks
 from dragchain.validation.runs_by_bed import Point, Points, read_points
 
 SCHEMA = 2
@@ -65,8 +66,9 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     scalings = [one.model_dump(mode="json", by_alias=True) for one in found["scalings"]]
     document = {**found, "scalings": scalings, "effects": _records(effects)}
     write_json(out_dir / "validation.json", document)
-    peaks = write_peaks(out_dir, [point.folder for point in points.packings])
-    page = render(points, found, effects, peaks, folder)
+    peaks = report_peaks([point.folder for point in points.packings])
+    peaks.write(out_dir)
+    page = render(points, found, effects, json.loads(peaks.findings.as_text()), folder)
     (out_dir / "report.html").write_text(page, encoding="utf-8")
 
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from dragchain.contact_law.impact import elastic_time, hertz_force, hertz_overlap, largest_overlap
 from dragchain.run.kinematics import needed
-from dragchain.verification.experiment import Test
 from dragchain.verification.published import published
 from dragchain.verification.quantities import (
     QUANTITIES,
@@ -300,7 +299,7 @@ def _incline(run: Recording) -> Iterator[Check]:
     yield from compare(run, "normal_force_n", EXACT, weights, FITTED)
 
 
-_CHECKS: Mapping[Test, Callable[[Recording], Iterator[Check]]] = {
+_CHECKS: Mapping[str, Callable[[Recording], Iterator[Check]]] = {
     "elastic_pair": _elastic,
     "elastic_plane": _elastic,
     "restitution": _restitution,

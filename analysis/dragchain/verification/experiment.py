@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import PositiveFloat, PositiveInt
+from pydantic import AfterValidator, PositiveFloat, PositiveInt
 
 from dragchain.contact_law.hertz import Elastic
 from dragchain.documents import Document, Part
 
-Test = Literal[
+TESTS = (
     "elastic_pair",
     "elastic_plane",
     "restitution",
@@ -25,8 +25,13 @@ Test = Literal[
     "momentum",
     "column",
     "incline",
-]
+)
 """The tests of the suite in the order of the page."""
+
+
+def _known(test: str) -> str:
+    assert test in TESTS, f"no test of the suite; it has {', '.join(TESTS)}"
+    return test
 
 
 class Material(Part):
@@ -91,7 +96,7 @@ class Experiment(Document):
 
     scene: Literal["collide"]
     run: str
-    test: Test
+    test: Annotated[str, AfterValidator(_known)]
     number: int
     heading: str
     series: str

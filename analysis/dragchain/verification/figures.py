@@ -17,7 +17,6 @@ from dragchain.contact_law.impact import (
     limited_restitution,
 )
 from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
-from dragchain.verification.experiment import Test
 from dragchain.verification.published import published
 from dragchain.verification.quantities import (
     QUANTITIES,
@@ -57,14 +56,14 @@ _ABSCISSAE = {
     "spin_pair_same": "spin before in rad/s",
 }
 _REFERENCES = ("line: the law integrated by scipy", "Coulomb sliding of rigid bodies")
-_OTHERS: Mapping[Test, tuple[str, ...]] = {
+_OTHERS: Mapping[str, tuple[str, ...]] = {
     "oblique_angle": ("experiment (Kharaz et al. 2001)",),
     "oblique_tangential": ("finite elements (Wu)",),
 }
 """Series that the paper draws and nobody here models."""
 
 
-def draw(test: Test, runs: Sequence[Recording]) -> Figure:
+def draw(test: str, runs: Sequence[Recording]) -> Figure:
     """The figure of a test from all its runs."""
     return _DRAW[test](runs)
 
@@ -158,7 +157,7 @@ def _curves(run: Recording, quantity: str) -> Floats:
     return np.array(sorted(rows), dtype=np.float64).T
 
 
-def _published(axes: Axes, test: Test, runs: Sequence[Recording], quantity: str) -> None:
+def _published(axes: Axes, test: str, runs: Sequence[Recording], quantity: str) -> None:
     others = _OTHERS.get(test, ())
     series = dict.fromkeys(run.case.series for run in runs)
     for name, marker in zip((*series, *others), "xx+", strict=False):
@@ -245,7 +244,7 @@ def _incline(runs: Sequence[Recording]) -> Figure:
     return _legend(figure, left)
 
 
-_DRAW: Mapping[Test, Callable[[Sequence[Recording]], Figure]] = {
+_DRAW: Mapping[str, Callable[[Sequence[Recording]], Figure]] = {
     "elastic_pair": _elastic,
     "elastic_plane": _elastic,
     "restitution": _restitution,

@@ -10,13 +10,12 @@ import numpy as np
 from dragchain.arrays import Floats, Ints
 from dragchain.contact_law.impact import SLIDING, SPHERE, Contact, Motion
 from dragchain.run.kinematics import needed
-from dragchain.verification.experiment import Test
 from dragchain.verification.recording import RecordedContact, Recording
 
 Derived = Callable[[Contact, Motion, Motion], float]
 """A quantity of an impact, from its contact and the motions before and after it."""
 
-BY_SERIES_AND_LIMIT: tuple[Test, ...] = ("restitution", "oblique_study", "spin_plane", "time_step")
+BY_SERIES_AND_LIMIT: tuple[str, ...] = ("restitution", "oblique_study", "spin_plane", "time_step")
 """Tests that are run with and without the limit on attraction."""
 
 
@@ -71,7 +70,7 @@ _OBLIQUE: Mapping[str, Derived] = {
 _SPUN: Mapping[str, Derived] = {"patch_restitution": _patch_ratio, "recoil_tangent": _recoil}
 _SPUN_PAIR: Mapping[str, Derived] = {"tangential_m_s": _tangential, "spin_rad_s": _spin}
 
-QUANTITIES: Mapping[Test, Mapping[str, Derived]] = {
+QUANTITIES: Mapping[str, Mapping[str, Derived]] = {
     "oblique_angle": _OBLIQUE,
     "oblique_study": _OBLIQUE,
     "oblique_tangential": {"scaled_patch": _scaled_patch, "scaled_spin": _scaled_spin},

@@ -20,7 +20,7 @@ from dragchain.report.bundle import write_bundle
 from dragchain.report.page import data_uri, render_page
 from dragchain.tables.by_step import read_table
 from dragchain.verification.checks import JUDGED, Check, Verdict, judge
-from dragchain.verification.experiment import Experiment, Test
+from dragchain.verification.experiment import TESTS, Experiment
 from dragchain.verification.figures import draw
 from dragchain.verification.published import published
 from dragchain.verification.recording import Recording, read_recording
@@ -140,8 +140,7 @@ def verdict(report_dir: Path) -> str:
 
 def render(runs: Sequence[Recording], summary: pd.DataFrame) -> str:
     """The page: HTML that needs no other file and no network."""
-    order = get_args(Test)
-    ordered = sorted(runs, key=lambda run: (run.case.number, order.index(run.case.test)))
+    ordered = sorted(runs, key=lambda run: (run.case.number, TESTS.index(run.case.test)))
     by_test = {test: list(group) for test, group in groupby(ordered, key=lambda run: run.case.test)}
     return render_page(
         "verification/verification.html.j2",
@@ -158,7 +157,7 @@ def render(runs: Sequence[Recording], summary: pd.DataFrame) -> str:
     )
 
 
-def _section(test: Test, runs: Sequence[Recording], summary: pd.DataFrame) -> Section:
+def _section(test: str, runs: Sequence[Recording], summary: pd.DataFrame) -> Section:
     rows = summary[summary["test"] == test]
     judged = rows["against"].isin(JUDGED)
     with matplotlib.rc_context(STYLE):

@@ -11,6 +11,8 @@ import pytest
 from loading_files import made_contacts, write_run
 from pages import stands_alone
 from report_files import (
+    DROP,
+    FILLING,
     PICTURES,
     PNG,
     case_json,
@@ -21,13 +23,11 @@ from report_files import (
     run_json,
 )
 
-from dragchain.errors import RejectedRunError, TableError
+from dragchain.errors import DocumentError, RejectedRunError, TableError
 from dragchain.loading.write import write_loading
-from dragchain.report.study_report import input_column, write_report
+from dragchain.report.study_report import write_report
+from dragchain.report.summary import input_column
 from dragchain.run.completeness import RunRecord, refusal
-
-FILLING = {"bed": {"bed_height_m": 0.0703, "solid_fraction": 0.592}}
-DROP = {"restitution": {"mean": 0.71, "lowest": 0.7, "highest": 0.72, "input": 0.68}}
 
 
 @pytest.fixture
@@ -180,7 +180,7 @@ def test_a_missing_picture_names_the_command(process: Path, tmp_path: Path) -> N
 
 def test_missing_findings_name_the_command(process: Path, tmp_path: Path) -> None:
     (process / "tables" / "figures.json").unlink()
-    with pytest.raises(TableError, match=r"figures\.json.*dragchain figures"):
+    with pytest.raises(DocumentError, match=r"(?s)figures\.json.*dragchain figures"):
         write_report(tmp_path / "report", [process])
 
 

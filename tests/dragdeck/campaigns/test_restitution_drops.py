@@ -32,6 +32,7 @@ from dragdeck.campaigns.restitution_drops import (
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
 from dragdeck.decks.render import environment
+from dragdeck.engine.batch import Batch, silent
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import hertz_contact_time, rayleigh_time
 from dragdeck.project import Project
@@ -56,8 +57,8 @@ def measured_case(small: dict[str, Any], write_study: WriteStudy) -> Case:
 def test_the_default_drop_is_at_full_modulus_and_the_studys_step(case: Case) -> None:
     scene = drop_scene(case)
     assert scene.deck == drop_scene(case, DropFidelity()).deck
-    assert scene.case["youngs_modulus_scale"] == 1.0
-    ratio = scene.deck.timestep_s / scene.case["rayleigh_time_s"]
+    assert scene.case.youngs_modulus_scale == 1.0
+    ratio = scene.deck.timestep_s / scene.case.rayleigh_time_s
     assert ratio == pytest.approx(case.study.drop_test.timestep_fraction, rel=1e-3)
 
 
@@ -68,9 +69,9 @@ def test_a_drop_can_run_as_the_process_does(measured_case: Case) -> None:
     assert scene.deck.materials.youngs_moduli_pa[0] == pytest.approx(77e9 * 0.01)
     assert scene.deck.timestep_s == coarse.timestep_s
     # of the mean particle, a little larger than the smallest, which sets the step
-    assert scene.deck.timestep_s < chosen.timestep_fraction * scene.case["rayleigh_time_s"]
+    assert scene.deck.timestep_s < chosen.timestep_fraction * scene.case.rayleigh_time_s
     particle = measured_case.study.materials["ceramic"]
-    assert scene.case["rayleigh_time_s"] == pytest.approx(10 * rayleigh_time(particle, 3.27e-3))
+    assert scene.case.rayleigh_time_s == pytest.approx(10 * rayleigh_time(particle, 3.27e-3))
 
 
 def test_softer_particles_touch_for_longer(measured_case: Case) -> None:
@@ -130,7 +131,7 @@ def test_confirm_asks_for_the_fit(
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     monkeypatch.chdir(project.root)
-    assert main(["drops", "small", "confirm", "--out", "anywhere"]) == 1
+    assert main(["step", "drops", "small", "confirm", "--out", "anywhere"]) == 1
     assert "--fit" in capsys.readouterr().err
 
 
@@ -166,7 +167,7 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
     templates = environment(project.templates)
 
     def run(drops: list[Drop], name: str) -> Path:
-        return run_drops(case, drops, folder / name, templates, lambda line: None)
+        return run_drops(case, drops, Batch(folder / name, templates), silent)
 
     listed = run(short_sweep(case), "sweep")
     known = [
@@ -231,9 +232,8 @@ def test_limit_force_changes_the_rebound_as_the_law_says(
     drops = [
         Drop(f"{o}-{e}", "reference", e, o, 0.010, fine) for o in (True, False) for e in (0.5, 0.8)
     ]
-    out = run_drops(
-        measured_case, drops, project.root / "two", environment(project.templates), print
-    )
+    batch = Batch(project.root / "two", environment(project.templates))
+    out = run_drops(measured_case, drops, batch, print)
     for run in read_drops(out).runs:
         deck = run.drop.restitution
         wanted = truncated_rebound(deck) if run.drop.limit_force else deck

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
+from trimesh import Trimesh
+
 from dragdeck import __version__
 from dragdeck.decks.case_file import CaseFile, CaseOfStudy
 from dragdeck.decks.outputs import Output
-from dragdeck.mesh import Mesh
 from dragdeck.physics.domain_split import ENGINE_CHOOSES
 from dragdeck.physics.engine_limits import ENGINE_HARD_PA
 from dragdeck.study.contact_law import Pair, contact_model, contact_settings, present
@@ -142,7 +143,7 @@ class Scene(Generic[K]):
         Steps expected; an estimate where the engine decides.
     files : mapping of str to str
         Other input files: name to content.
-    meshes : mapping of str to Mesh
+    meshes : mapping of str to Trimesh
         Mesh files, by name.
     models : mapping of str to str
         What the deck models, and why.
@@ -150,16 +151,24 @@ class Scene(Generic[K]):
         What it leaves out.
     warnings : sequence of str
         What the user should know before the run.
+    override : str, optional
+        The template, if it is not the scene's own.
     """
 
     deck: Deck
     case: K
     steps: int
     files: Mapping[str, str] = field(default_factory=dict)
-    meshes: Mapping[str, Mesh] = field(default_factory=dict)
+    meshes: Mapping[str, Trimesh] = field(default_factory=dict)
     models: Mapping[str, str] = field(default_factory=dict)
     leaves_out: Mapping[str, LeftOut] = field(default_factory=dict)
     warnings: Sequence[str] = ()
+    override: str | None = None
+
+    @property
+    def template(self) -> str:
+        """The template of the input script: the scene's own unless another overrides it."""
+        return self.override or f"{self.deck.scene}.in.j2"
 
 
 StudyScene = Scene[CaseOfStudy]
