@@ -21,6 +21,7 @@ WRITERS = {
     "stability": "dragchain.stability.document:StabilityFile",
     "scaling": "dragchain.scaling.document:ScalingFile",
     "calibration": "dragchain.calibration.results:CalibrationFile",
+    "drops": "dragdeck.campaigns.restitution_drops:DropsFile",
 }
 """Name of the document: ``module:Class`` of the model that writes it."""
 
@@ -36,6 +37,7 @@ READERS = {
     "stability": ["dragdeck.outlook.measured:StabilityMap"],
     "packing": ["dragdeck.scenes.scene:PackingFile"],
     "calibration": ["dragdeck.campaigns.restitution_drops:FitFile"],
+    "drops": ["dragchain.calibration.simulated_drops:DropsFile"],
 }
 """Models of the other package, which name what they read of a document."""
 

@@ -202,8 +202,6 @@ class Calibration:
     measured : Measured
     samplings : tuple of Sampling
     observed : Observed
-    with_peaks : bool
-        Whether the peaks are compared.
     width_ratio : float
         Width of the first impact over that of the simulated one, sampled alike.
     sweep : Sweep
@@ -216,12 +214,16 @@ class Calibration:
     measured: Measured
     samplings: tuple[Sampling, ...]
     observed: Observed
-    with_peaks: bool
     width_ratio: float
     sweep: Sweep
     fit: Fit
     fit_reference: Fit
     misfit: Misfit
+
+    @property
+    def with_peaks(self) -> bool:
+        """Whether the peaks are compared."""
+        return len(self.observed.log_peaks) > 0
 
 
 def calibrate_file(record: Path, drops: Drops) -> Calibration:
@@ -257,7 +259,6 @@ def calibrate(measured: Measured, sweep: Sweep) -> Calibration:
         measured=measured,
         samplings=samplings,
         observed=observed,
-        with_peaks=with_peaks,
         width_ratio=ratio,
         sweep=sweep,
         fit=fit(misfit),

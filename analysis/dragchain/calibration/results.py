@@ -14,7 +14,7 @@ import pandas as pd
 from dragchain.calibration.fit import Calibration, Fit, calibrate_file
 from dragchain.calibration.force_record import read_record
 from dragchain.calibration.measured_impacts import Measured, measure
-from dragchain.calibration.simulated_drops import DropRun, Drops, DropTest, read_drops
+from dragchain.calibration.simulated_drops import Drops, DropTest, Settings, read_drops
 from dragchain.calibration.sweep import Emulator, emulator_of
 from dragchain.documents import Document, Part
 from dragchain.errors import TableError
@@ -56,14 +56,6 @@ class PutFor(Part):
     value: float | None
     ci95_low: float | None
     ci95_high: float | None
-
-
-class Settings(Part):
-    """Modulus and step of drops."""
-
-    youngs_modulus_scale: float
-    timestep_s: float
-    timestep_fraction: float
 
 
 class CalibrationFile(Document):
@@ -135,7 +127,7 @@ def write_calibration(record: Path, drops_file: Path, out: Path) -> CalibrationF
     found = calibrate_file(record, drops)
     content = result(found, drops)
     write_csv(out / "bias.csv", bias_table(drops))
-    write_csv(out / "impacts.csv", impact_table(found))
+    write_csv(out / "impacts.csv", _impact_table(found))
     content.write(out / "result.json")
     return content
 
@@ -147,13 +139,7 @@ def write_csv(file: Path, table: pd.DataFrame) -> None:
 
 def result(found: Calibration, drops: Drops) -> CalibrationFile:
     """Content of ``result.json``."""
-    ends = found.fit_reference.interval
-    measured = Estimate(
-        *(
-            float(found.sweep.reference.rebound(value))
-            for value in (ends.value, ends.ci95_low, ends.ci95_high)
-        )
-    )
+    measured = found.fit_reference.interval.mapped(found.sweep.reference.rebound)
     deck, known = found.fit.restitution, drops.known
     return CalibrationFile(
         known=known,
@@ -172,13 +158,9 @@ def result(found: Calibration, drops: Drops) -> CalibrationFile:
             for option in (True, False)
         ),
         scatter_of_one_drop=found.sweep.production.scatter,
-        settings={purpose: _settings(drops.select(purpose)[0]) for purpose in PURPOSES},
+        settings={purpose: drops.select(purpose)[0].drop for purpose in PURPOSES},
         record=found.measured,
     )
-
-
-def _settings(run: DropRun) -> Settings:
-    return Settings(**{name: getattr(run.drop, name) for name in Settings.model_fields})
 
 
 def _rounded(fit: Fit) -> float:
@@ -216,14 +198,12 @@ def _put_for(
     drops: Drops, measured: Estimate, fit: Fit, purpose: SweepPurpose, limit_force: bool
 ) -> PutFor:
     """The fit for the setting of the study, a reading off the curve for another."""
-    value: float | None
-    low: float | None
-    high: float | None
     used = purpose == "production" and limit_force == drops.known.limit_force
-    if used:
-        value, low, high = fit.restitution, fit.ci95_low, fit.ci95_high
-    else:
-        value, low, high = read_off(emulator_of(drops, purpose, limit_force), measured)
+    value, low, high = (
+        (fit.restitution, fit.ci95_low, fit.ci95_high)
+        if used
+        else read_off(emulator_of(drops, purpose, limit_force), measured)
+    )
     return PutFor(
         purpose=purpose,
         limit_force=limit_force,
@@ -251,7 +231,7 @@ def bias_table(drops: Drops) -> pd.DataFrame:
     return table.reset_index().sort_values(setting, ascending=[True, False, True])
 
 
-def impact_table(found: Calibration) -> pd.DataFrame:
+def _impact_table(found: Calibration) -> pd.DataFrame:
     """Measured and simulated impacts, one row each."""
     observed, samplings = found.observed, found.samplings
     model, reference = found.sweep.production, found.sweep.reference

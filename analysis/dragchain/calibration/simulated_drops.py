@@ -63,7 +63,15 @@ class DropTest(Document):
     contact_time_s: float
 
 
-class Drop(Part):
+class Settings(Part):
+    """Modulus and step of a drop; the fraction is that of this particle's Rayleigh time."""
+
+    youngs_modulus_scale: PositiveFloat
+    timestep_s: PositiveFloat
+    timestep_fraction: PositiveFloat
+
+
+class Drop(Settings):
     """A drop that ``drops.json`` lists.
 
     Attributes
@@ -74,8 +82,6 @@ class Drop(Part):
         ``production``, ``reference``, ``confirm`` or ``trial``.
     restitution : float
         In the deck.
-    timestep_fraction : float
-        The step over the Rayleigh time of this particle at this modulus.
     """
 
     folder: str
@@ -83,9 +89,6 @@ class Drop(Part):
     restitution: PositiveFloat
     limit_force: bool
     height_m: PositiveFloat
-    youngs_modulus_scale: PositiveFloat
-    timestep_s: PositiveFloat
-    timestep_fraction: PositiveFloat
 
 
 class DropsFile(DropTest):

@@ -20,7 +20,7 @@ from dragchain.calibration.simulated_drops import DropRun, read_drops
 from dragchain.calibration.sweep import Sweep, prepare
 from dragchain.documents import Document, Part
 from dragchain.errors import RecordError
-from dragchain.statistics.estimate import CONFIDENCE, Estimate
+from dragchain.statistics.estimate import CONFIDENCE, Estimate, flattened
 
 LEAD_S = 0.02
 """What a record shows before the first impact, s."""
@@ -157,7 +157,7 @@ def record_of(run: DropRun, sensor: Sensor, random: np.random.Generator) -> Reco
     return check_samples(since, force)
 
 
-def some_sensor(peak_n: float, random: np.random.Generator) -> Sensor:
+def _some_sensor(peak_n: float, random: np.random.Generator) -> Sensor:
     """A sensor drawn for a trial, fit for a first peak of `peak_n`."""
     return Sensor(
         rate_hz=float(random.choice(RATES_HZ)),
@@ -190,7 +190,7 @@ def run_trials(runs: Sequence[DropRun], sweep: Sweep, seed: int, sensors: int = 
 
 def _trial(number: int, run: DropRun, sweep: Sweep, random: np.random.Generator) -> Trial:
     peak = run.impacts[0].peak_n
-    sensor = some_sensor(peak, random)
+    sensor = _some_sensor(peak, random)
     trial = Trial(
         drop_test=number,
         height_m=run.drop.height_m,
@@ -205,12 +205,11 @@ def _trial(number: int, run: DropRun, sweep: Sweep, random: np.random.Generator)
     except RecordError as error:
         return replace(trial, refused=error.reason)
     deck, put = found.fit_reference, found.fit.interval
-    rebound = sweep.production.rebound
     return replace(
         trial,
         deck=deck.interval,
         put=put,
-        effective=Estimate(*(float(rebound(e)) for e in (put.value, put.ci95_low, put.ci95_high))),
+        effective=put.mapped(sweep.production.rebound),
         chi2=deck.chi2,
         degrees=deck.degrees,
     )
@@ -226,16 +225,11 @@ def coverage(held: Sequence[bool]) -> Coverage:
     return Coverage(held=test.k, of=test.n, fraction=test.statistic, ci95_low=low, ci95_high=high)
 
 
-def table(trials: Sequence[Trial]) -> pd.DataFrame:
+def _table(trials: Sequence[Trial]) -> pd.DataFrame:
     """Trials as a table, one row each: intervals as ``<name>``, ``<name>_low``, ``<name>_high``."""
     rows = []
     for trial in trials:
-        row: dict[str, object] = {}
-        for name, value in vars(trial).items():
-            row[name] = value
-            if isinstance(value, Estimate):
-                ends = {f"{name}_low": value.ci95_low, f"{name}_high": value.ci95_high}
-                row |= {name: value.value, **ends}
+        row = flattened(vars(trial), "low", "high")
         row |= {"deck_held": trial.deck_held, "effective_held": trial.effective_held}
         row["refused"] = row.pop("refused")
         rows.append(row)
@@ -246,7 +240,7 @@ def write_trials(drops_file: Path, trials_file: Path, seed: int, records: int, o
     """Recover known values from records of simulated drops; write ``trials.csv`` and ``.json``."""
     runs = read_drops(trials_file).select("trial")
     trials = run_trials(runs, prepare(read_drops(drops_file)), seed, records)
-    write_csv(out.with_suffix(".csv"), table(trials))
+    write_csv(out.with_suffix(".csv"), _table(trials))
     TrialsFile(
         seed=seed,
         drops=len(runs),

@@ -10,8 +10,9 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator, StrMethodFormatter
 
+from dragchain.arrays import Floats
 from dragchain.figures.style import BLUE, GREEN, ORANGE, STYLE, WIDTH_IN
 from dragchain.report.notation import MINUS
 from dragchain.scaling.document import CurvePoint, ScaledRun, ScalingFile
@@ -76,34 +77,27 @@ def _title(found: ScalingFile) -> str:
 
 
 def _law(axes: Axes, found: ScalingFile, factor: float) -> None:
-    judged, whole = found.judged, found.fit.curve
-    x = factor * np.array([point.x for point in judged.curve])
+    judged = found.judged
+    x, values = _line(judged.curve, factor)
     low, high = ([getattr(p, end) for p in judged.curve] for end in ("ci95_low", "ci95_high"))
     axes.fill_between(x, low, high, color=BLUE, alpha=0.15, lw=0, label="95 % band of the law")
-    _curve(axes, judged.curve, factor, "-", BLUE, 1.8, "fitted power law")
+    axes.plot(x, values, color=BLUE, lw=1.8, label="fitted power law")
     if found.fit_within:
-        _curve(axes, whole, factor, ":", BLUE, 1.2, "power law over all levels")
+        whole = _line(found.fit.curve, factor)
+        axes.plot(*whole, ":", color=BLUE, lw=1.2, label="power law over all levels")
     if found.expected.exponent is not None:
-        middle = judged.drag_at_centre_n.value
-        every = np.array([point.x for point in whole])
-        slope = middle * (every / judged.centre) ** found.expected.exponent
+        every, _ = _line(found.fit.curve)
+        slope = (every / judged.centre) ** found.expected.exponent
+        slope = judged.drag_at_centre_n.value * slope
         axes.plot(factor * every, slope, "--", color=ORANGE, lw=1.4, label="expected slope")
     if found.shifted:
-        words = "expected power of level + offset"
-        _curve(axes, found.shifted.curve, factor, "-.", GREEN, 1.2, words)
+        label = "expected power of level + offset"
+        axes.plot(*_line(found.shifted.curve, factor), "-.", color=GREEN, lw=1.2, label=label)
 
 
-def _curve(
-    axes: Axes,
-    curve: Sequence[CurvePoint],
-    factor: float,
-    line: str,
-    colour: str,
-    width: float,
-    label: str,
-) -> None:
-    x = factor * np.array([point.x for point in curve])
-    axes.plot(x, [point.value for point in curve], line, color=colour, lw=width, label=label)
+def _line(curve: Sequence[CurvePoint], factor: float = 1.0) -> tuple[Floats, list[float]]:
+    """Levels in the unit of the axis, and drag."""
+    return factor * np.array([point.x for point in curve]), [point.value for point in curve]
 
 
 def _points(axes: Axes, found: ScalingFile, factor: float) -> None:
@@ -144,7 +138,7 @@ def _ticks(axes: Axes, found: ScalingFile, factor: float) -> None:
     levels = [factor * level.x for level in found.levels]
     axes.set_xlim(levels[0] / PAD, levels[-1] * PAD)
     axes.xaxis.set_major_locator(FixedLocator(levels))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.xaxis.set_minor_locator(NullLocator())
     low, high = axes.get_ylim()
     stretch = max(1.0, math.sqrt(LEAST_SPAN * low / high))
@@ -154,6 +148,6 @@ def _ticks(axes: Axes, found: ScalingFile, factor: float) -> None:
     wide = high > 12.0 * low
     steps = (1.0, 2.0, 5.0) if wide else TICKS
     axes.yaxis.set_major_locator(FixedLocator([s * 10.0**d for d in decades for s in steps]))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
     axes.yaxis.set_minor_locator(NullLocator())

@@ -28,7 +28,7 @@ from dragchain.scaling.document import (
 )
 from dragchain.scaling.figures import draw_scaling
 from dragchain.scaling.runs import Run, read_runs
-from dragchain.statistics.estimate import Estimate
+from dragchain.statistics.estimate import Estimate, flattened
 from dragchain.statistics.power_law import (
     PowerLaw,
     Runs,
@@ -203,16 +203,11 @@ def write_scaling(
 
 def table(found: ScalingFile) -> pd.DataFrame:
     """The levels of a scaling, one row each, intervals as ``*_ci95_low`` and ``*_ci95_high``."""
-    rows = []
-    for level, local in zip(found.levels, (*found.local_exponents, None), strict=True):
-        row: dict[str, float | None] = {}
-        for name, value in (*level, ("local_exponent", local)):
-            if isinstance(value, Estimate):
-                low, high = value.ci95_low, value.ci95_high
-                row |= {name: value.value, f"{name}_ci95_low": low, f"{name}_ci95_high": high}
-            else:
-                row[name] = value
-        rows.append(row)
+    exponents = (*found.local_exponents, None)
+    rows = [
+        flattened({**dict(level), "local_exponent": local})
+        for level, local in zip(found.levels, exponents, strict=True)
+    ]
     return pd.DataFrame(rows).rename(columns={"x": found.field})
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -64,6 +64,10 @@ class Estimate:
         )
         return Estimate(float(value), float(low), float(high))
 
+    def mapped(self, function: Callable[[float], float]) -> Estimate:
+        """The estimate of a rising function of the number."""
+        return Estimate(*(float(function(number)) for number in vars(self).values()))
+
 
 @dataclass(frozen=True)
 class EstimateColumns:
@@ -78,6 +82,19 @@ class EstimateColumns:
         """The columns of estimates."""
         names = ("value", "ci95_low", "ci95_high")
         return cls(*(tuple(getattr(one, name) for one in estimates) for name in names))
+
+
+def flattened(
+    row: Mapping[str, object], low: str = "ci95_low", high: str = "ci95_high"
+) -> dict[str, object]:
+    """A row of a table: an estimate as ``<name>``, ``<name>_<low>`` and ``<name>_<high>``."""
+    flat: dict[str, object] = {}
+    for name, value in row.items():
+        flat[name] = value
+        if isinstance(value, Estimate):
+            ends = {f"{name}_{low}": value.ci95_low, f"{name}_{high}": value.ci95_high}
+            flat |= {name: value.value, **ends}
+    return flat
 
 
 def student_quantile(degrees: float, confidence: float = CONFIDENCE) -> float:
