@@ -100,7 +100,7 @@ class Lab:
         return contact_time(materials[0], radius_m, None, None, materials[1], speed)
 
 
-def contacts(rows: Iterable[tuple[int, int | str, float]]) -> list[ContactFacts]:
+def _contacts(rows: Iterable[tuple[int, int | str, float]]) -> list[ContactFacts]:
     """Contacts of an experiment: particle, partner and the value that is varied."""
     return [ContactFacts(particle=one, partner=two, value=value) for one, two, value in rows]
 
@@ -127,7 +127,7 @@ def facts(
     steps : int
         Per contact.
     rows : iterable of (int, int or str, float)
-        As `contacts` takes them.
+        Particle, partner and the value that is varied.
     """
     return ExperimentFacts(
         test=name,
@@ -136,7 +136,7 @@ def facts(
         series=series,
         vary=vary,
         steps_per_contact=steps,
-        contacts=contacts(rows),
+        contacts=_contacts(rows),
     )
 
 
