@@ -20,6 +20,7 @@ WRITERS = {
     "packing": "dragchain.tables.bed:Packing",
     "stability": "dragchain.stability.document:StabilityFile",
     "scaling": "dragchain.scaling.document:ScalingFile",
+    "calibration": "dragchain.calibration.results:CalibrationFile",
 }
 """Name of the document: ``module:Class`` of the model that writes it."""
 
@@ -33,6 +34,7 @@ READERS = {
     "case.column": ["dragchain.run.case:Case"],
     "case.impact": ["dragchain.run.case:Case"],
     "packing": ["dragdeck.scenes.scene:PackingFile"],
+    "calibration": ["dragdeck.campaigns.restitution_drops:FitFile"],
 }
 """Models of the other package, which name what they read of a document."""
 

@@ -9,6 +9,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
+from pydantic.json_schema import SkipJsonSchema
 
 from dragchain.arrays import Floats
 from dragchain.calibration.force_record import Note, Record
@@ -108,7 +109,7 @@ class Measured(Document):
     threshold_n: float
     notes: tuple[Note, ...] = ()
     impacts: tuple[Impact, ...]
-    first_pulse: Floats = Field(default=np.empty((0, 2)), exclude=True, repr=False)
+    first_pulse: SkipJsonSchema[Floats] = Field(default=np.empty((0, 2)), exclude=True, repr=False)
 
     def baseline(self, time_s: Floats, start_s: float) -> Floats:
         """Baseline at times, for a record that starts at `start_s`, N."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from dragchain.documents import Document, Part
 from dragchain.dumps.run_parts import iter_prints
 from dragchain.errors import TableError
 from dragchain.run.case import load_case, load_outputs
+from dragchain.tables.impacts import speed_at_plate
 
 Purpose = Literal["production", "reference", "confirm", "trial"]
 
@@ -202,8 +202,8 @@ def waveform(
 ) -> tuple[Waveform, float, float]:
     """One impact, and the speeds at the plate's surface before and after it.
 
-    The speeds are those of the samples next to the contact, moved to the
-    surface by v^2 + 2 g (z - R), exact in free flight.
+    The speeds are those of the samples next to the contact, moved to the surface
+    (`dragchain.tables.impacts.speed_at_plate`).
 
     Parameters
     ----------
@@ -222,19 +222,20 @@ def waveform(
     if not len(inside) or inside[0] == 0 or inside[-1] == len(gap) - 1:
         raise TableError("an impact of a drop is not whole in its window; widen the window")
     before, after = inside[0] - 1, inside[-1] + 1
-    fast = [math.sqrt(speed[k] ** 2 + 2 * gravity_m_s2 * gap[k]) for k in (before, after)]
+    near = [before, after]
+    down, up = speed_at_plate(speed[near], gap[near], gravity_m_s2).tolist()
     top = int(np.argmax(force))
     return (
         Waveform(
             time_s=time[before : after + 1],
             force_n=force[before : after + 1],
-            down_s=float(time[before] + (fast[0] + speed[before]) / gravity_m_s2),
-            up_s=float(time[after] - (fast[1] - speed[after]) / gravity_m_s2),
+            down_s=float(time[before] + (down + speed[before]) / gravity_m_s2),
+            up_s=float(time[after] - (up - speed[after]) / gravity_m_s2),
             centroid_s=float(np.sum(force * time) / np.sum(force)),
             peak_n=_parabola_top(force[top - 1 : top + 2]),
         ),
-        fast[0],
-        fast[1],
+        down,
+        up,
     )
 
 

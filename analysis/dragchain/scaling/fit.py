@@ -12,10 +12,10 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
-from dragchain.documents import Document
 from dragchain.figures.style import STYLE, png
 from dragchain.files import write_bytes, write_text
 from dragchain.report.page import page_environment
+from dragchain.run.completeness import RunRecord
 from dragchain.scaling.document import (
     BandPoint,
     CurvePoint,
@@ -50,14 +50,6 @@ SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particl
 CURVE_POINTS = 41
 
 
-class _RunRecord(Document):
-    """What is read of ``run.json``."""
-
-    started: str
-    engine_version: str
-    cpu_time_s: float | None = None
-
-
 def find(
     run_dirs: Sequence[Path], field: str, expected: Expectation, commands: Sequence[str] = ()
 ) -> ScalingFile:
@@ -88,7 +80,7 @@ def find(
     power = expected.exponent or 0.0
     first = runs[0].case
     files = [folder / "run.json" for folder in run_dirs]
-    records = [_RunRecord.read(file) for file in files if file.is_file()]
+    records = [RunRecord.read(file) for file in files if file.is_file()]
     return ScalingFile(
         study=first.study,
         field=field,
@@ -111,7 +103,7 @@ def find(
         commands=tuple(commands),
         started=min((record.started for record in records), default=None),
         engine=records[0].engine_version if records else None,
-        cpu_time_s=sum(record.cpu_time_s or 0.0 for record in records) if records else None,
+        cpu_time_s=sum(record.cpu_time_s for record in records) if records else None,
     )
 
 

@@ -8,22 +8,38 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dragchain.arrays import Ints
+from dragchain.arrays import Floats, Ints
 from dragchain.dumps.frame import Columns
 from dragchain.errors import TableError
 from dragchain.tables.by_step import read_table
 from dragchain.tables.parquet import Rows
 
 
-def find_impacts(rows: Columns, timestep_s: float) -> Rows:
+def speed_at_plate(speed_m_s: Floats, gap_m: Floats, gravity_m_s2: float) -> Floats:
+    """Speed with which a particle in free flight passes the plate's surface, m/s.
+
+    ``sqrt(v^2 + 2 g gap)``, exact without drag. The restitution of an impact is the ratio
+    of two such speeds: gravity between the surface and a sample is not in it.
+
+    Parameters
+    ----------
+    speed_m_s, gap_m : (N,) ndarray
+        Speed and height of the particle's lowest point above the surface, m/s and m.
+    gravity_m_s2 : float
+    """
+    return np.asarray(np.sqrt(np.square(speed_m_s) + 2 * gravity_m_s2 * np.asarray(gap_m)))
+
+
+def find_impacts(
+    rows: Columns, timestep_s: float, radius_m: float, gravity_m_s2: float
+) -> Rows:
     """Measure every impact in the samples around them.
 
     The samples are split where steps are missing. In each stretch an impact is
     an unbroken run of samples with a force, the short pull at the end included
     that an unlimited damper gives; it starts with the first of them and lasts
-    as many steps as there are. The speeds are those of the sample
-    before and of the sample after it, both in free flight, so one step of
-    gravity off at the most.
+    as many steps as there are. The speeds are those at the plate's surface, from the
+    sample before and the sample after it, both in free flight (`speed_at_plate`).
 
     Parameters
     ----------
@@ -31,6 +47,9 @@ def find_impacts(rows: Columns, timestep_s: float) -> Rows:
         ``step time_s z_m vz_m_s force_n``, steps increasing.
     timestep_s : float
         The time step, s.
+    radius_m : float
+        Of the particle; the plate's surface is at z = 0.
+    gravity_m_s2 : float
 
     Returns
     -------
@@ -50,9 +69,12 @@ def find_impacts(rows: Columns, timestep_s: float) -> Rows:
     _check_stretches(steps, stretch, touching)
     first, last = _runs(touching)
     speed = np.asarray(rows["vz_m_s"], dtype=np.float64)
-    speed_in, speed_out = -speed[first - 1], speed[last + 1]
-    if not ((speed_in > 0.0) & (speed_out > 0.0)).all():
+    if not ((speed[first - 1] < 0.0) & (speed[last + 1] > 0.0)).all():
         raise TableError("a particle does not come down before, or go up after, one of its impacts")
+    gap = np.asarray(rows["z_m"], dtype=np.float64) - radius_m
+    speed_in, speed_out = (
+        speed_at_plate(speed[near], gap[near], gravity_m_s2) for near in (first - 1, last + 1)
+    )
     start = np.asarray(rows["time_s"], dtype=np.float64)[first]
     force = np.asarray(rows["force_n"], dtype=np.float64)
     return {

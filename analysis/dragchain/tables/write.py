@@ -330,7 +330,8 @@ def _write_impacts(run: Run, file: Path) -> None:
     if not blocks:
         raise TableError(f"{run.folder}: impacts holds no samples")
     rows = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
-    _write_all(file, IMPACTS, [find_impacts(rows, run.case.timestep_s)])
+    radius, gravity = run.case.media.radius_mean_m, run.case.gravity_m_s2
+    _write_all(file, IMPACTS, [find_impacts(rows, run.case.timestep_s, radius, gravity)])
 
 
 def _write_packing(run: Run, file: Path) -> None:

@@ -315,6 +315,7 @@ def test_any_rate_and_noise_recovers_the_rebound(
     assert abs(got.restitution - e) < 2 * half
 
 
+@pytest.mark.slow
 def test_intervals_hold_what_they_say() -> None:
     """160 records of one drop, against a sweep without any error of its own.
 

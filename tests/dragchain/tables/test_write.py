@@ -298,8 +298,12 @@ def test_a_drop_gives_impacts(tiny_run: Path, edit_json, raw) -> None:
     impacts |= {"columns": columns, "engine_columns": None}
     impacts |= {"period_steps": 1, "first_step": 0, "last_step": None}
     to_scene(tiny_run, edit_json, "drop_test", {"impacts": impacts})
-    first = raw.prints([[10, 0.01, 0, -4, 0], [11, 0.011, 0, 0, 9], [12, 0.012, 0, 3, 0]], columns)
-    second = raw.prints([[30, 0.03, 0, -3, 0], [31, 0.031, 0, 0, 5], [32, 0.032, 0, 2, 0]], columns)
+    first = raw.prints(
+        [[10, 0.01, RADIUS_M, -4, 0], [11, 0.011, 0, 0, 9], [12, 0.012, RADIUS_M, 3, 0]], columns
+    )
+    second = raw.prints(
+        [[30, 0.03, RADIUS_M, -3, 0], [31, 0.031, 0, 0, 5], [32, 0.032, RADIUS_M, 2, 0]], columns
+    )
     (tiny_run / "impacts.1.txt").write_bytes(first + second)
     (made,) = write_tables(tiny_run)
     table = pd.read_parquet(made)
