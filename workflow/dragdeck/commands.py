@@ -23,7 +23,7 @@ from dragdeck.advice.forecast import (
 )
 from dragdeck.advice.options import with_option
 from dragdeck.advice.speed import Speed
-from dragdeck.campaigns.cost_timing import cost_fillings
+from dragdeck.campaigns.cost_variants import cost_fillings
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import StudyScene

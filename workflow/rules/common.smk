@@ -5,7 +5,7 @@ from shlex import quote
 
 from snakemake.exceptions import WorkflowError
 
-from dragdeck.campaigns.cost_timing import cost_fillings
+from dragdeck.campaigns.cost_variants import cost_fillings
 from dragdeck.campaigns.restitution_drops import record_file
 from dragdeck.campaigns.stability_map import bed_names
 from dragdeck.campaigns.verification.suite import suite_of

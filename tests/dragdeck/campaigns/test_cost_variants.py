@@ -17,16 +17,18 @@ from dragchain.cli import main as dragchain
 from dragdeck.campaigns.cost_decks import (
     CONTACT_WIDTH,
     at_rest,
+    changed,
     timed_drag,
     timed_drop,
     timed_filling,
     workpiece_in,
 )
 from dragdeck.campaigns.cost_file import TimedVariant, Timing, cost, geometric
-from dragdeck.campaigns.cost_timing import BLOCK, blocks, cost_fillings, measure
+from dragdeck.campaigns.cost_timing import BLOCK, blocks, measure
 from dragdeck.campaigns.cost_variants import (
     BASES,
     Variant,
+    cost_fillings,
     standard_case,
     variant_case,
     variants,
@@ -62,11 +64,12 @@ def scene_of(base: Case, name: str, start: bool = False) -> AnyScene:
     """The scene of a variant, as it is timed."""
     variant = {variant.name: variant for variant in [*BASES.values(), *variants(base)]}[name]
     case = variant_case(base, variant)
-    if variant.scene == "drop_test":
-        return variant.change(timed_drop(case, start))
-    if variant.scene == "filling":
-        return variant.change(timed_filling(case, STEPS, "packing.restart", start))
-    return variant.change(timed_drag(case, STEPS, BED, "bed.restart", start))
+    timed = {
+        "drop_test": lambda: timed_drop(case, start),
+        "filling": lambda: timed_filling(case, STEPS, "packing.restart", start),
+        "process": lambda: timed_drag(case, STEPS, BED, "bed.restart", start),
+    }
+    return changed(timed[variant.scene](), variant.change)
 
 
 def text_of(base: Case, name: str, templates: jinja2.Environment, start: bool = False) -> str:

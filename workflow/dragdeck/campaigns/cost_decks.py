@@ -7,9 +7,10 @@ decks here.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
+from dragdeck.campaigns.cost_variants import Change
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
@@ -21,8 +22,6 @@ from dragdeck.scenes.filling import FillingDeck, filling_scene
 from dragdeck.scenes.process import ProcessDeck, process_scene
 from dragdeck.scenes.scene import Bed
 from dragdeck.study.model import Study
-
-Change = Callable[[AnyScene], AnyScene]
 
 DAMPED_S, DAMPING_TIME_S, FREE_S = 0.005, 0.001, 0.05
 """How a bed comes to rest with another modulus or other facets: damped for the
@@ -75,17 +74,16 @@ class TimedFillingDeck(FillingDeck):
     frame_steps: int
 
 
-def unchanged(scene: AnyScene) -> AnyScene:
-    """The scene as it is."""
-    return scene
+def changed(scene: AnyScene, change: Change) -> AnyScene:
+    """The scene of a variant with what no study field can say."""
+    if change == "none":
+        return scene
+    if change in _IN_DECK:
+        return _IN_DECK[change](scene)
+    return replace(scene, override=f"costs/{change}.in.j2")
 
 
-def overridden(template: str) -> Change:
-    """Change the template of a scene to one of ``templates/costs/``."""
-    return lambda scene: replace(scene, override=f"costs/{template}.in.j2")
-
-
-def without_frames(scene: AnyScene) -> AnyScene:
+def _early_outputs(scene: AnyScene) -> AnyScene:
     """A process that writes only what it writes before the drag."""
     early = [
         output for output in scene.deck.outputs if output.name in ("thermo", "workpiece_force")
@@ -93,12 +91,12 @@ def without_frames(scene: AnyScene) -> AnyScene:
     return replace(scene, deck=replace(scene.deck, outputs=early))
 
 
-def with_restart_points(scene: AnyScene) -> AnyScene:
+def _restart_points(scene: AnyScene) -> AnyScene:
     """A process with a restart point at every frame of the network."""
     return replace(scene, deck=replace(scene.deck, checkpoint_steps=scene.deck.thermo_steps))
 
 
-def with_all_columns(scene: AnyScene) -> AnyScene:
+def _with_all_columns(scene: AnyScene) -> AnyScene:
     """A process that writes every column of a contact instead of those that are read."""
     wide = [
         replace(output, columns=_all_columns(CONTACT_COMPUTES[output.name]))
@@ -113,6 +111,14 @@ def with_all_columns(scene: AnyScene) -> AnyScene:
 
 def _all_columns(compute: str) -> tuple[Column, ...]:
     return tuple(Column(f"column{at}", f"c_{compute}[{at}]") for at in range(1, CONTACT_WIDTH + 1))
+
+
+_IN_DECK: Mapping[Change, Callable[[AnyScene], AnyScene]] = {
+    "early_outputs": _early_outputs,
+    "restart_points": _restart_points,
+    "all_columns": _with_all_columns,
+}
+"""Changes of the deck's values; the others are templates of that name."""
 
 
 def timed_drop(case: Case, start: bool) -> AnyScene:

@@ -17,6 +17,7 @@ from pathlib import Path
 from dragdeck import __version__
 from dragdeck.campaigns.cost_decks import (
     at_rest,
+    changed,
     timed_drag,
     timed_drop,
     timed_filling,
@@ -50,7 +51,7 @@ from dragdeck.engine.watch import Report
 from dragdeck.errors import EngineError, InputError
 from dragdeck.files import replace_text
 from dragdeck.mesh import write_stl
-from dragdeck.project import by_run, find_project, study_templates
+from dragdeck.project import find_project, study_templates
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.scene import Bed, read_bed
@@ -68,18 +69,6 @@ QUIET = 0.3
 START_FILE = "start.liggghts"
 BED_FILE = "bed.restart"
 ROUNDS_FILE = "rounds.json"
-
-
-def cost_fillings(case: Case) -> dict[str, Case]:
-    """A case for each filling that the variants of a study start from, by its run id."""
-    base = standard_case(case)
-    owners = (bed_case(base, variant) for variant in variants(base) if "media" in _tops(variant))
-    return by_run([base, *owners], FILLING)
-
-
-def _tops(variant: Variant) -> set[str]:
-    """Sections of the study that a variant changes."""
-    return {field.partition(".")[0] for field in variant.fields}
 
 
 def measure(
@@ -195,7 +184,7 @@ class _Beds:
 
     def _seen(self, file: Path) -> str:
         """Path of a file as a deck sees it, from a folder two below that of the costs."""
-        return os.path.relpath(file.resolve(), (self.batch.folder / "any").resolve())
+        return os.path.relpath(file.resolve(), self.batch.folder.resolve().parent / "any" / "any")
 
     def with_workpiece(self, case: Case, owner: Case) -> str:
         """Restart file of the bed with the workpiece in it, for a case's modulus and facets."""
@@ -294,7 +283,7 @@ class _Bench:
     def _deck(self, variant: Variant) -> _Deck:
         case = variant_case(self.base, variant)
         timed = self._timed(variant, case)
-        whole, start = (variant.change(timed(cut)) for cut in (False, True))
+        whole, start = (changed(timed(cut), variant.change) for cut in (False, True))
         return _Deck(whole, start, case.ranks if variant.scene == "process" else 1)
 
     def _timed(self, variant: Variant, case: Case) -> Callable[[bool], AnyScene]:

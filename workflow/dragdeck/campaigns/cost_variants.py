@@ -11,17 +11,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from dragdeck.campaigns.cost_decks import (
-    Change,
-    overridden,
-    unchanged,
-    with_all_columns,
-    with_restart_points,
-    without_frames,
-)
 from dragdeck.cases.case import Case
 from dragdeck.outlook.measured import FidelityParameters
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
+from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import ProcessDeck, process_scene
 from dragdeck.study.model import CylinderShape, Study
 from dragdeck.sweep.cases import settle_case
@@ -29,6 +22,16 @@ from dragdeck.sweep.cases import settle_case
 SceneName = Literal["process", "drop_test", "filling"]
 Unit = Literal["per_step", "per_second"]
 Settings = Mapping[str, Any]
+Change = Literal[
+    "none",
+    "early_outputs",
+    "restart_points",
+    "all_columns",
+    "drop_contacts",
+    "drop_every_step",
+    "filling_contacts",
+]
+"""What no study field can say; `cost_decks` makes the change."""
 
 LONGEST_STEP = 0.64
 """Fraction of the Rayleigh time at which full stiffness is timed against the plain
@@ -46,8 +49,8 @@ class Variant:
         What is different, in words.
     fields : mapping
         Dotted study field: value.
-    change : callable
-        What no field can say, as a change of the scene.
+    change : str
+        What no field can say.
     base : str
         Name of the base it is compared with, one of `BASES`.
     unit : str
@@ -57,7 +60,7 @@ class Variant:
     name: str
     what: str
     fields: Settings = field(default_factory=dict)
-    change: Change = unchanged
+    change: Change = "none"
     base: str = "standard"
     unit: Unit = "per_second"
 
@@ -67,10 +70,15 @@ class Variant:
         return SCENE_OF_BASE[self.base]
 
     @property
+    def own_particles(self) -> bool:
+        """Whether its bed is one of other particles."""
+        return any(name.startswith("media.") for name in self.fields)
+
+    @property
     def parameter(self) -> str | None:
         """The fidelity parameter that is all its change, if it is one."""
         changed = [name.removeprefix("fidelity.") for name in self.fields]
-        alone = len(changed) == 1 and self.change is unchanged
+        alone = len(changed) == 1 and self.change == "none"
         return changed[0] if alone and changed[0] in FidelityParameters.model_fields else None
 
     @property
@@ -93,7 +101,7 @@ BASES: Mapping[str, Variant] = {
         Variant(
             "before_drag",
             "the drag with the outputs of plunge and approach",
-            change=without_frames,
+            change="early_outputs",
         ),
         Variant("drop_test", "the drop test to its first impact", base="drop_test"),
         Variant("filling", "the fill once its bed is at rest", base="filling"),
@@ -127,8 +135,14 @@ def variant_case(base: Case, variant: Variant) -> Case:
 
 def bed_case(base: Case, variant: Variant) -> Case:
     """The case whose settled bed a variant is dragged through: other particles, other bed."""
-    case = variant_case(base, variant)
-    return case if case.study.media != base.study.media else base
+    return variant_case(base, variant) if variant.own_particles else base
+
+
+def cost_fillings(case: Case) -> dict[str, Case]:
+    """A case for each filling that the variants of a study start from, by its run id."""
+    base = standard_case(case)
+    owners = (bed_case(base, variant) for variant in variants(base) if variant.own_particles)
+    return {FILLING.run_id(owner): owner for owner in (base, *owners)}
 
 
 def variants(base: Case) -> list[Variant]:
@@ -147,7 +161,7 @@ def variants(base: Case) -> list[Variant]:
 
 def _is_standard(base: Case, variant: Variant) -> bool:
     """Whether the fields only repeat what the standard case has."""
-    if variant.change is not unchanged or not variant.fields:
+    if variant.change != "none" or not variant.fields:
         return False
     return variant_case(base, variant).study == base.study
 
@@ -171,7 +185,7 @@ def _outputs(base: Case) -> Iterator[Variant]:
     rates = base.study.outputs
     contacts, network = f"{rates.workpiece_contacts_hz:g} Hz", f"{rates.network_hz:g} Hz"
     what = "all contact columns: positions, velocities, torques, history, area"
-    yield Variant("contact_columns", what, change=with_all_columns)
+    yield Variant("contact_columns", what, change="all_columns")
     what = f"network and particles at the rate of the workpiece's contacts, {contacts}"
     yield Variant("network_rate", what, {"outputs.network_hz": rates.workpiece_contacts_hz})
     what = f"contacts on the workpiece at the rate of its force, {rates.workpiece_force_hz:g} Hz"
@@ -189,7 +203,7 @@ def _outputs(base: Case) -> Iterator[Variant]:
         f"a restart point every {period:.2g} s; "
         f"50 over the run would be one every {whole / 51:.2g} s"
     )
-    yield Variant("restart_points", what, change=with_restart_points)
+    yield Variant("restart_points", what, change="restart_points")
 
 
 def _neighbours(study: Study) -> Iterator[Variant]:
@@ -230,7 +244,7 @@ def _plain(study: Study) -> Iterator[Variant]:
     }
     what = "the plain deck: bowl as facets of 5 mm, 20 % of Rayleigh, 1 mm skin, one rank"
     yield Variant("plain", what, fields)
-    yield Variant("plain_columns", f"{what}, all contact columns", fields, with_all_columns)
+    yield Variant("plain_columns", f"{what}, all contact columns", fields, "all_columns")
     shape = study.workpiece.shape
     if isinstance(shape, CylinderShape):
         wide = shape.facet_size_m
@@ -245,11 +259,11 @@ def _plain(study: Study) -> Iterator[Variant]:
 
 def _other_scenes(study: Study) -> Iterator[Variant]:
     what = "contacts between particles, of which there are none, at every written step"
-    yield Variant("drop_contacts", what, change=overridden("drop_contacts"), base="drop_test")
+    yield Variant("drop_contacts", what, change="drop_contacts", base="drop_test")
     what = "every step written, not only those near an impact"
-    yield Variant("drop_every_step", what, change=overridden("drop_every_step"), base="drop_test")
+    yield Variant("drop_every_step", what, change="drop_every_step", base="drop_test")
     what = (
         f"contacts between particles during the fill, {study.outputs.network_hz:g} Hz, "
         "with the bed at rest, which has the most of them"
     )
-    yield Variant("filling_contacts", what, change=overridden("filling_contacts"), base="filling")
+    yield Variant("filling_contacts", what, change="filling_contacts", base="filling")

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal
 
 import jinja2
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, computed_field, model_validator
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
@@ -92,8 +92,7 @@ class _Plan(Model):
             yield "more", {**self.base, **changes}
 
 
-@dataclass(frozen=True)
-class Point:
+class Point(Part):
     """One run of the map.
 
     Attributes
@@ -117,6 +116,7 @@ class Point:
     fraction: float
     reference: bool
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def condition(self) -> str:
         """Name of all but the step: 8 hex digits."""
@@ -142,20 +142,14 @@ def _digest(content: Mapping[str, str | float]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
-class PointOfMap(Part):
+class PointOfMap(Point):
     """A point that was run: its folder in the results, and how it ended.
 
     A point is refused if its deck cannot be made, and failed if an acceptance check did not pass.
     """
 
-    regime: Regime
-    axis: str
-    condition: str
-    settings: Settings
-    fraction: float
-    reference: bool
     folder: str
-    refused: str | None
+    refused: str | None = None
     state: Literal["refused", "failed", "complete"]
 
 
@@ -207,7 +201,13 @@ def _points(plan: _Plan, regime: Regime) -> Iterator[Point]:
     seen: set[str] = set()
     for axis, settings in plan.conditions():
         for fraction, reference in fractions:
-            point = Point(regime, axis, settings, fraction, reference)
+            point = Point(
+                regime=regime,
+                axis=axis,
+                settings=settings,
+                fraction=fraction,
+                reference=reference,
+            )
             if point.name not in seen and (axis == "base" or settings != plan.base):
                 seen.add(point.name)
                 yield point
@@ -353,12 +353,13 @@ class MapRuns:
 
     def _run(self, batch: Batch, point: Point) -> PointOfMap:
         bed = self._settled(point) if point.regime == "drag" else None
+        own = {**dict(point), "folder": f"{point.regime}/{point.name}"}
         try:
             scene = self._scene(point, bed)
         except InputError as error:
-            return _row(point, "refused", str(error))
-        record = batch.run(point.name, scene)
-        return _row(point, "complete" if record.state == "complete" else "failed")
+            return PointOfMap(**own, state="refused", refused=str(error))
+        passed = batch.run(point.name, scene).state == "complete"
+        return PointOfMap(**own, state="complete" if passed else "failed")
 
     def _settled(self, point: Point) -> Bed:
         """The bed that a drag starts from; one that is missing is no finding."""
@@ -380,22 +381,6 @@ class MapRuns:
         scene = process_scene(case, settled)
         source = f"../../filling/{bed}/packing.restart"
         return replace(scene, deck=replace(scene.deck, source=source))
-
-
-def _row(
-    point: Point, state: Literal["refused", "failed", "complete"], refused: str | None = None
-) -> PointOfMap:
-    return PointOfMap(
-        regime=point.regime,
-        axis=point.axis,
-        condition=point.condition,
-        settings=point.settings,
-        fraction=point.fraction,
-        reference=point.reference,
-        folder=f"{point.regime}/{point.name}",
-        refused=refused,
-        state=state,
-    )
 
 
 def map_runs(study_file: Path, results: Path, templates: Path, report: Report) -> MapRuns:

@@ -10,16 +10,13 @@ from pydantic import Field, model_validator
 
 from dragdeck.campaigns.verification.lab import (
     APPROACH_STEPS,
-    GROUP,
     LONGEST_CONTACTS,
     RIGID,
     Lab,
     Test,
     contact_time,
-    facts,
-    named,
+    experiment,
 )
-from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.rounding import round_to
 from dragdeck.scenes.collide import Body, Experiment, Wall
 from dragdeck.study.base import Model, Number, Positive, Whole
@@ -110,9 +107,15 @@ class Impacts(Test):
         ]
         words = lab.series(series.material, partner_name)
         option = "limited" if limit_force else "unlimited"
-        experiment = Experiment(
-            group=GROUP,
-            run="",
+        of_steps = [f"{steps}-steps"] if self.steps_per_contact else []
+        return experiment(
+            name,
+            self,
+            [series.material, partner_name, option, *of_steps],
+            series=words,
+            vary=self.kind,
+            steps_per_contact=steps,
+            contacts=rows,
             title=f"{self.title}: {words}",
             types=types,
             pairs={(at, at if same else last): pair for at, pair in enumerate(distinct, start=1)},
@@ -120,12 +123,8 @@ class Impacts(Test):
             walls=[Wall("plane", last, "zplane 0.0")] if self.partner == "plane" else [],
             limit_force=limit_force,
             timestep_s=dt,
-            rayleigh_time_s=rayleigh_time(particle, self.radius_m),
             steps=math.ceil(LONGEST_CONTACTS * max(times) / dt + 4 * APPROACH_STEPS),
-            facts=facts(name, self, self.kind, words, steps, rows),
         )
-        of_steps = [f"{steps}-steps"] if self.steps_per_contact else []
-        return named(experiment, [series.material, partner_name, option, *of_steps])
 
     def partner_of(self, series: Series, lab: Lab) -> tuple[str, Material]:
         """Name and material of the partner of a series."""

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 from dragdeck.cases.case import digest
 from dragdeck.physics.contact_mechanics import (
     effective_modulus,
     hertz_contact_time,
     particle_mass,
+    rayleigh_time,
 )
-from dragdeck.scenes.collide import ContactFacts, Experiment, ExperimentFacts, collide_scene
+from dragdeck.scenes.collide import Body, ContactFacts, Experiment, ExperimentFacts, collide_scene
 from dragdeck.study.base import Model, Whole
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.material import Material
@@ -93,60 +95,82 @@ class Lab:
         """Name of a series: the study's materials by their own names."""
         return f"{self._own.get(first, first)} on {self._own.get(second, second)}"
 
-    def step_at_rest(self, particle: str, wall: str, radius_m: float) -> float:
+    def time_at_rest(self, particle: str, wall: str, radius_m: float) -> float:
         """Contact time at the speed of falling a radius: the scale of a particle at rest, s."""
         speed = math.sqrt(2 * self.study.gravity_m_s2 * radius_m)
         materials = self.material(particle), self.material(wall)
         return contact_time(materials[0], radius_m, None, None, materials[1], speed)
 
 
-def contacts(rows: Iterable[tuple[int, int | str, float]]) -> list[ContactFacts]:
-    """Contacts of an experiment: particle, partner and the value that is varied."""
-    return [ContactFacts(particle=one, partner=two, value=value) for one, two, value in rows]
+Rows = Sequence[tuple[int, int | str, float]]
+"""Contacts of an experiment: particle, partner and the value that is varied."""
 
 
-def facts(
+def experiment(
     name: str,
     test: Test,
-    vary: str,
+    slug: Sequence[str],
+    *,
     series: str,
+    vary: str,
+    steps_per_contact: int,
+    contacts: Rows,
+    timestep_s: float,
     steps: int,
-    rows: Iterable[tuple[int, int | str, float]],
-) -> ExperimentFacts:
-    """What an experiment tests.
+    types: Sequence[tuple[str, Material]],
+    bodies: Sequence[Body],
+    pairs: Mapping[tuple[int, int], Pair],
+    **more: Any,
+) -> Experiment:
+    """An experiment with its run id: a slug and 8 hex digits of all it depends on.
 
     Parameters
     ----------
     name : str
         Of the test.
     test : Test
-    vary : str
-        What differs from contact to contact.
+    slug : sequence of str
+        The readable part of the run id, after the name.
     series : str
         The materials that meet, for readers.
+    vary : str
+        What differs from contact to contact.
+    steps_per_contact : int
+    contacts : sequence of (int, int or str, float)
+        Particle, partner and the value that is varied.
+    timestep_s : float
     steps : int
-        Per contact.
-    rows : iterable of (int, int or str, float)
-        As `contacts` takes them.
+    types, bodies, pairs
+        As `Experiment` has them; the first body sets the Rayleigh time.
+    **more
+        Further fields of `Experiment`, and ``impacts`` or ``angle_deg`` of `ExperimentFacts`.
     """
-    return ExperimentFacts(
+    facts = ExperimentFacts(
         test=name,
         number=test.number,
         heading=test.title,
         series=series,
         vary=vary,
-        steps_per_contact=steps,
-        contacts=contacts(rows),
+        steps_per_contact=steps_per_contact,
+        contacts=[ContactFacts(particle=a, partner=b, value=v) for a, b, v in contacts],
+        **{key: more.pop(key) for key in ("impacts", "angle_deg") if key in more},
     )
-
-
-def named(experiment: Experiment, slug: Sequence[str]) -> Experiment:
-    """An experiment with its run id: a slug and 8 hex digits of all it depends on."""
-    unnamed = collide_scene(experiment).case.model_dump(
-        mode="json", by_alias=True, exclude={"title", "heading", "versions"}
+    unnamed = Experiment(
+        **{"title": test.title, "limit_force": True, "walls": (), **more},
+        group=GROUP,
+        run="",
+        types=types,
+        bodies=bodies,
+        pairs=pairs,
+        timestep_s=timestep_s,
+        rayleigh_time_s=rayleigh_time(types[0][1], bodies[0].radius_m),
+        steps=steps,
+        facts=facts,
     )
-    content = digest({**unnamed, "steps": experiment.steps})
-    return replace(experiment, run="-".join([experiment.facts.test, *slug, content]))
+    case = collide_scene(unnamed).case
+    content = case.model_dump(mode="json", by_alias=True, exclude={"title", "heading", "versions"})
+    run = "-".join([name, *slug, digest({**content, "steps": unnamed.steps})])
+    return replace(unnamed, run=run)
 
 
 def contact_time(

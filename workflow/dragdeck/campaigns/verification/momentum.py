@@ -7,16 +7,13 @@ from collections.abc import Iterator
 
 from dragdeck.campaigns.verification.lab import (
     APPROACH_STEPS,
-    GROUP,
     LONGEST_CONTACTS,
     Lab,
     Test,
     contact_time,
-    facts,
-    named,
+    experiment,
 )
 from dragdeck.decks.data_file import Vector
-from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.rounding import round_to
 from dragdeck.scenes.collide import Body, Experiment
 from dragdeck.study.base import Model, Number, Positive
@@ -58,12 +55,14 @@ class Momentum(Test):
             for collision in self.collisions
         ]
         dt = round_to(min(times) / lab.steps_per_contact, 4)
-        words = lab.series(self.material, self.material)
-        rows = [(2 * at - 1, 2 * at, at) for at in range(1, len(self.collisions) + 1)]
-        experiment = Experiment(
-            group=GROUP,
-            run="",
-            title=self.title,
+        yield experiment(
+            name,
+            self,
+            [self.material],
+            series=lab.series(self.material, self.material),
+            vary="collision",
+            steps_per_contact=lab.steps_per_contact,
+            contacts=[(2 * at - 1, 2 * at, at) for at in range(1, len(self.collisions) + 1)],
             types=[(self.material, particle)],
             pairs={(1, 1): lab.pair(self.material, self.material)},
             bodies=[
@@ -71,14 +70,9 @@ class Momentum(Test):
                 for at, collision in enumerate(self.collisions)
                 for body in self._bodies(at, collision, dt)
             ],
-            walls=[],
-            limit_force=True,
             timestep_s=dt,
-            rayleigh_time_s=rayleigh_time(particle, first),
             steps=math.ceil(LONGEST_CONTACTS * max(times) / dt),
-            facts=facts(name, self, "collision", words, lab.steps_per_contact, rows),
         )
-        yield named(experiment, [self.material])
 
     def _bodies(self, at: int, collision: Collision, timestep_s: float) -> Iterator[Body]:
         first, second = self.radii_m

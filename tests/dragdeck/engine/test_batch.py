@@ -1,0 +1,42 @@
+"""Runs side by side: each in a folder of its name, rejected ones with a record."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from dragdeck.cases.case import Case
+from dragdeck.decks.render import environment
+from dragdeck.engine.batch import Batch
+from dragdeck.errors import RejectedRunError
+from dragdeck.project import Project
+from dragdeck.scenes.drop_test import drop_scene
+
+pytestmark = pytest.mark.engine
+
+
+@pytest.fixture
+def batch(project: Project, tmp_path: Path) -> Batch:
+    return Batch(tmp_path / "runs", environment(project.templates))
+
+
+def test_a_run_has_the_name_of_its_folder_and_is_not_repeated(case: Case, batch: Batch) -> None:
+    first, again = (batch.run("one", drop_scene(case)) for _ in range(2))
+    assert first == again and first.state == "complete"
+    assert json.loads((batch.folder / "one" / "case.json").read_text())["run"] == "one"
+    assert "run one\n" in (batch.folder / "one" / "in.liggghts").read_text()
+
+
+def test_a_rejected_run_has_a_record_but_is_no_result(case: Case, batch: Batch) -> None:
+    scene = drop_scene(case)
+    many = scene.case.model_copy(update={"fidelity": scene.case.fidelity.model_copy(
+        update={"ranks": 2})})  # fmt: skip
+    wrong = replace(scene, case=many, deck=replace(scene.deck, processors="1 1 1"))
+    record = batch.run("two", wrong)
+    assert record.state == "failed"
+    with pytest.raises(RejectedRunError):
+        batch.result("two", wrong)
+    assert not (batch.folder / "two" / "run.json").exists()
