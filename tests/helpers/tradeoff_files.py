@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from dragchain.tradeoff.measures import FORCE_BINS, QUANTITIES, SCHEMA
+from dragchain.documents import SCHEMA
+from dragchain.tradeoff.path_blocks import FORCE_BINS
+from dragchain.tradeoff.quantities import QUANTITIES
 
 BLOCK_M = 0.0065
 VALUES = {
@@ -112,7 +114,13 @@ def write_drop(folder: Path, fraction: float, ratios: Sequence[float], cpu_time_
     case |= {"timestep_s": fraction * 1e-5, "rayleigh_time_s": 1e-5}
     case["inputs"] = {**case["inputs"], "drop_test.timestep_fraction": fraction}
     (folder / "case.json").write_text(json.dumps(case))
-    record = {"state": "complete", "cpu_time_s": cpu_time_s, "wall_time_s": 1.0, "ranks": 1}
+    record = {
+        "schema": 2,
+        "state": "complete",
+        "cpu_time_s": cpu_time_s,
+        "wall_time_s": 1.0,
+        "ranks": 1,
+    }
     (folder / "run.json").write_text(json.dumps(record))
     pd.DataFrame({"restitution": ratios}).to_parquet(folder / "tables" / "impacts.parquet")
     return folder

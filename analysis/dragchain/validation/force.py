@@ -62,14 +62,14 @@ def of_packings(points: Points) -> Found:
 
 def _packing_row(point: Point) -> Found:
     samples = read_counted(point.folder, tuple(COMPONENTS))
-    cost = point.measures["cost"]
+    cost = point.measures.cost
     return {
         "run": point.case.run,
         "seed": point.seed,
-        "bed_height_m": point.measures["single"]["bed_height"],
-        "arc_m": point.measures["arc_m"],
-        "steps": cost["steps"],
-        "cpu_time_s": cost["cpu_time_s"],
+        "bed_height_m": point.measures.single["bed_height"],
+        "arc_m": point.measures.arc_m,
+        "steps": cost.steps,
+        "cpu_time_s": cost.cpu_time_s,
         **{name: mean_numbers(estimate_mean(samples[name].to_numpy())) for name in COMPONENTS},
     }
 
@@ -106,7 +106,7 @@ def _peaks(packings: Sequence[Point]) -> Found:
                 min_separation_s=peak_separation_s(point.case),
                 min_prominence_n=factor * float(np.std(drag, ddof=1)),
             )
-            counts[factor].append(len(peaks.index) / point.measures["arc_m"])
+            counts[factor].append(len(peaks.index) / point.measures.arc_m)
             if factor == 1.0:
                 times.append((peaks.time_s - drag_start_s(point.case)).tolist())
                 largest.append(float(peaks.drag_n.min(initial=math.inf)))
@@ -136,7 +136,7 @@ def spectrum(packings: Sequence[Point]) -> Found:
     grid = np.empty(0)
     for point in packings:
         drag = read_counted(point.folder, ("drag_n",))["drag_n"].to_numpy(np.float64)
-        spacing = point.measures["arc_m"] / len(drag) / (2.0 * point.case.media.radius_mean_m)
+        spacing = point.measures.arc_m / len(drag) / (2.0 * point.case.media.radius_mean_m)
         length = min(len(drag), round(SEGMENT / spacing))
         waves, density = (half[1:] for half in signal.welch(drag, 1.0 / spacing, nperseg=length))
         grid = grid if grid.size else waves
@@ -237,7 +237,7 @@ class _Fitted:
         self.settings = list(dict.fromkeys(point.setting for point in self.points))
         values = np.log(sizes)
         design = np.array([self._indicator(point.setting) for point in self.points])
-        weights = np.sqrt([float(point.measures["arc_m"]) for point in self.points])
+        weights = np.sqrt([float(point.measures.arc_m) for point in self.points])
         weights /= weights.max()
         runs = range(len(self.points))
         self.fit: Fit = fit_effects(weights[:, None] * design, weights * values, runs)
@@ -276,7 +276,7 @@ class _Fitted:
 
 def _input(base: Point, point: Point) -> object:
     field = next(iter(point.changed), None)
-    return None if field is None else base.measures["inputs"].get(field)
+    return None if field is None else base.measures.inputs.get(field)
 
 
 def _exponent(value: float, reach: float, base: Point, point: Point) -> Found:

@@ -76,14 +76,14 @@ def find(points: Points, command: str) -> dict[str, Any]:
         "schema": SCHEMA,
         "study": case.study,
         "command": command,
-        "measured": max(str(point.measures["started"]) for point in points.all)[:10],
-        "versions": dict(points.packings[0].measures["versions"]),
+        "measured": max(str(point.measures.started) for point in points.all)[:10],
+        "versions": dict(points.packings[0].measures.versions),
         "engine_hours": sum(_cpu_s(point) for point in points.all) / 3600.0,
         "force": found_force,
         "comparison": force.compare(together["mean"], together["std"], case),
         "load": load.of_packings(points.packings),
         "statements": found_statements,
-        "scalings": scalings_of(points.packings[0].measures["numbers"]),
+        "scalings": scalings_of(points.packings[0].measures.numbers),
         "claims": [{**vars(claim), "verdict": claim.verdict} for claim in claims(found_statements)],
     }
 
@@ -102,7 +102,7 @@ def scalings_of(numbers: Mapping[str, float]) -> list[dict[str, Any]]:
 
 
 def _cpu_s(point: Point) -> float:
-    return float(point.measures["cost"]["cpu_time_s"])
+    return float(point.measures.cost.cpu_time_s)
 
 
 def tables(

@@ -15,8 +15,8 @@ from scipy import stats
 from dragchain.errors import SeriesError, TableError
 from dragchain.run.case import Case, load_case
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
-from dragchain.tradeoff.compare import PARAMETERS, changed_inputs, read_measures
-from dragchain.tradeoff.measures import FILE
+from dragchain.tradeoff.measures import FILE, Measures
+from dragchain.tradeoff.runs import PARAMETERS, changed_inputs
 
 FEWEST = 2
 """Fills below which nothing is known of the differences between them."""
@@ -32,26 +32,25 @@ class Point:
     ----------
     folder : Path
     case : Case
-    measures : mapping
-        Content of its ``measures.json``.
+    measures : Measures
     changed : mapping
         Dotted names and values of the inputs that differ from the reference's.
     """
 
     folder: Path
     case: Case
-    measures: Mapping[str, Any]
+    measures: Measures
     changed: Mapping[str, Any]
 
     @property
     def parameters(self) -> Parameters:
         """Modulus scale, time step over the Rayleigh time, and speed factor."""
-        return tuple(float(self.measures["fidelity"][name]) for name in PARAMETERS)
+        return tuple(float(getattr(self.measures.fidelity, name)) for name in PARAMETERS)
 
     @property
     def seed(self) -> int:
         """Seed of its bed."""
-        return int(self.measures["inputs"]["seed"])
+        return int(self.measures.inputs["seed"])
 
     @property
     def setting(self) -> tuple[object, ...]:
@@ -93,12 +92,12 @@ def read_points(folders: Sequence[Path]) -> Points:
     TableError
         A run has no measures, or fewer than two fills are complete.
     """
-    measures = {folder: read_measures(folder / FILE) for folder in folders if _measured(folder)}
+    measures = {folder: Measures.read(folder / FILE) for folder in folders if _measured(folder)}
     standard = measures[folders[0]]
     points = [
         Point(folder, load_case(folder), own, changed_inputs(own, standard))
         for folder, own in measures.items()
-        if own["complete"]
+        if own.complete
     ]
     first = next((point for point in points if point.folder == folders[0]), None)
     if first is None:

@@ -15,6 +15,7 @@ from scipy import stats
 
 from dragchain.errors import SeriesError, TableError
 from dragchain.run.case import PublishedDrag, Reference, load_case
+from dragchain.tradeoff.measures import Measures, RunCost
 from dragchain.validation import around_workpiece as statements
 from dragchain.validation import force
 from dragchain.validation.claims import FAILS, HOLDS, OPEN, Claim
@@ -48,19 +49,27 @@ def made_point(
             simulation=PublishedDrag(drag_mean_n=-2.0),
         ),
     )
-    measures = {
-        "inputs": {"seed": seed, "bowl.radius_m": 0.04, **(varied or {})},
-        "fidelity": {
-            "youngs_modulus_scale": parameters[0], "timestep_fraction": parameters[1],
-            "speed_factor": 1.0,
-        },
-        "bed": f"bed-{seed}-{parameters[0]}-{varied}",
-        "single": {"bed_height": 0.07},
-        "arc_m": 20 * DIAMETER_M,
-        "cost": {"steps": 1000, "cpu_time_s": 60.0},
-        "started": "2026-01-01T00:00:00+00:00",
-        "complete": True,
-    }  # fmt: skip
+    modulus, step = parameters
+    measures = Measures(
+        study="small",
+        run=folder.name,
+        bed=f"bed-{seed}-{modulus}-{varied}",
+        inputs={"seed": seed, "bowl.radius_m": 0.04, **(varied or {})},
+        fidelity=case.fidelity.model_copy(
+            update={
+                "youngs_modulus_scale": modulus, "timestep_fraction": step, "speed_factor": 1.0
+            }
+        ),
+        complete=True,
+        cost=RunCost(
+            steps=1000, wall_time_s=60.0, cpu_time_s=60.0, ranks=1, timestep_s=1e-5,
+            axis_speed_m_s=0.01, steps_per_m=1e7,
+        ),
+        versions={},
+        started="2026-01-01T00:00:00+00:00",
+        arc_m=20 * DIAMETER_M,
+        single={"bed_height": 0.07},
+    )  # fmt: skip
     return Point(folder, case, measures, varied or {})
 
 
@@ -175,11 +184,13 @@ def test_effects_are_found_against_what_they_change(points: Points) -> None:
 def test_a_shorter_run_counts_less(points: Points) -> None:
     def half_width(arc_m: float) -> float:
         control, *others = points.others
-        shorter = dataclasses.replace(control, measures={**control.measures, "arc_m": arc_m})
+        shorter = dataclasses.replace(
+            control, measures=control.measures.model_copy(update={"arc_m": arc_m})
+        )
         row = force.effects(Points(points.packings, [shorter, *others])).iloc[0]
         return float(row.ci95_high - row.ci95_low)
 
-    whole = points.packings[0].measures["arc_m"]
+    whole = points.packings[0].measures.arc_m
     assert half_width(whole / 4.0) > 1.4 * half_width(whole)
 
 
