@@ -25,7 +25,16 @@ if os.environ.get("CI"):
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--update", action="store_true", help="write the golden decks anew")
+    parser.addoption("--update", action="store_true", help="write golden decks and schemas anew")
+    parser.addoption("--slurm", action="store_true", help="run the tests that start a Slurm too")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--slurm"):
+        return
+    for item in items:
+        if item.get_closest_marker("slurm"):
+            item.add_marker(pytest.mark.skip(reason="starts a Slurm: give --slurm"))
 
 
 @pytest.fixture

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from typing import Any
 
 import pytest
 from paths import ROOT
 
-from dragchain.scaling.fit import read_scalings
-from dragchain.scaling.words import interval
+from dragchain.report.notation import MINUS
+from dragchain.scaling.document import ScalingFile
+from dragchain.scaling.fit import read_scalings, said
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DropDeck
 from dragdeck.scenes.filling import FillingDeck
@@ -45,17 +45,18 @@ def test_every_link_leads_somewhere(file) -> None:
     assert not missing
 
 
-@pytest.mark.parametrize("found", read_scalings(), ids=lambda found: found["study"])
-def test_the_scalings_are_those_of_the_studies_and_on_the_page(found: dict[str, Any]) -> None:
+@pytest.mark.parametrize("found", read_scalings(), ids=lambda found: found.study)
+def test_the_scalings_are_those_of_the_studies_and_on_the_page(found: ScalingFile) -> None:
     text = (ROOT / "docs/scaling.md").read_text()
-    assert interval(found["fit"]["exponent"]) in text and found["statement"] in text
-    cases = Project(ROOT).cases(found["study"])
+    statement = said(found).splitlines()[0].removeprefix(f"{found.field}: ")
+    assert statement.replace(MINUS, "-") in text
+    cases = Project(ROOT).cases(found.study)
     scaling = cases[0].study.scaling
     assert scaling is not None and scaling.fit_range is None
     assert (scaling.field, scaling.expected_exponent, scaling.source) == (
-        *(found["field"], found["expected"]["exponent"], found["expected"]["source"]),
+        *(found.field, found.expected.exponent, found.expected.source),
     )
-    assert {run["run"] for run in found["runs"]} == {PROCESS.run_id(case) for case in cases}
+    assert {run.run for run in found.runs} == {PROCESS.run_id(case) for case in cases}
 
 
 def test_every_block_is_on_the_page() -> None:

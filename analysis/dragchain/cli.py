@@ -119,7 +119,7 @@ STEPS = (
     Command("calibrate", "restitution from a measured drop test",
             "calibration.results:calibrate_command", (RECORD, DROPS, OUT_DIR)),
     Command("trials", "known restitutions recovered from synthetic records",
-            "calibration.results:write_trials", (
+            "calibration.trials:write_trials", (
                 DROPS,
                 _argument("--trials", type=Path, required=True, dest="trials_file",
                           help="drops.json of the trials"),

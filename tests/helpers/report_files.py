@@ -4,10 +4,30 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 from pathlib import Path
 from typing import Any
 
 from pages import Page
+
+from dragchain.report.findings import (
+    FILE,
+    AheadBehind,
+    AzimuthProfile,
+    Chains,
+    ChainsAgainstDrag,
+    Comparison,
+    DepthProfile,
+    DropFindings,
+    DropImpacts,
+    DropRestitution,
+    FillingFindings,
+    Findings,
+    Peaks,
+    ProcessFindings,
+)
+from dragchain.statistics.correlated import MeanEstimate
+from dragchain.statistics.estimate import Estimate, EstimateColumns
 
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
@@ -50,82 +70,71 @@ def run_json(**more: Any) -> dict[str, Any]:
     return {
         "schema": 2, "state": "complete", "engine_version": "Engine 3.8", "ranks": 2,
         "steps": 160000, "steps_per_s": 2100.0, "wall_time_s": 76.0,
-        "started": "2026-01-01T00:00:00", "parts": [1],
-        "checks": [{"name": "no particle lost", "passed": True, "seen": "1422", "limit": "1422"}],
+        "started": "2026-01-01T00:00:00", "parts": [{"part": 1, "from": None, "from_step": 0}],
+        "checks": [particles_kept(1422)],
     } | more  # fmt: skip
 
 
-def estimate(value: float | None) -> dict[str, float | None]:
-    return {"value": value, "ci95_low": value, "ci95_high": value}
+def particles_kept(seen: int) -> dict[str, Any]:
+    return {"code": "particles_kept", "name": "every particle kept", "passed": seen == 1422,
+            "seen": str(seen), "limit": "1422"}  # fmt: skip
 
 
-def process_findings(drag: float = -2.5) -> dict[str, Any]:
-    force = {
-        "mean": drag,
-        "std": 0.5,
-        "samples": 1000.0,
-        "autocorrelation_samples": 5.0,
-        "effective_samples": 100.0,
-        "se": 0.05,
-        "ci95_low": drag - 0.1,
-        "ci95_high": drag + 0.1,
-        "confidence": 0.95,
-        "reliable": True,
-    }
-    against = {
-        "label": "measured",
-        "mean_n": -2.59,
-        "std_n": 0.66,
-        "difference_percent": -3.47,
-        "ci95_low": -7.3,
-        "ci95_high": 0.4,
-        "source": "a paper",
-    }
-    network = dict.fromkeys(
-        [
-            "coordination_number",
-            "mechanical_coordination_number",
-            "rattler_fraction",
-            "normal_force_mean_n",
-            "n_particle_workpiece_contacts",
-        ],
-        4.5,
-    )
-    chains = dict.fromkeys(
-        [
-            "peters_per_frame",
-            "peters_particles_mean",
-            "widest_paths_per_frame",
-            "widest_paths_to_side_fraction",
-            "dominant_bottleneck_mean_n",
-            "dominant_bottleneck_max_n",
-            "dominant_particles_mean",
-            "dominant_altitude_mean_m",
-            "dominant_azimuth_mean_rad",
-        ],
-        0.25,
-    )
-    sides = dict.fromkeys(["ahead_n", "behind_n", "fraction_ahead"], estimate(1.0))
-    return {
-        "schema": 2, "scene": "process",
-        "forces": {name: force for name in ("drag_n", "lateral_n", "vertical_n")},
-        "comparison": [against], "peaks": {"count": 4, "largest_n": -3.9},
-        "network": network | {"frames": 31}, "chains": chains,
-        "association": {"rank_correlation": 0.4,
-        "p_value": 0.2},
-        "ahead_behind": sides | {"ratio": estimate(None)}, "depth": {"slope_n_per_m": estimate(5.0)},
-    }  # fmt: skip
+def known(value: float) -> Estimate:
+    return Estimate(value, value, value)
 
 
-def make_run(
-    results: Path, case: dict[str, Any], findings: dict[str, Any], names: list[str]
-) -> Path:
+def force(mean: float) -> MeanEstimate:
+    return MeanEstimate(
+        mean=mean, std=0.5, samples=1000, autocorrelation_samples=5.0, effective_samples=100.0,
+        se=0.05, ci95_low=mean - 0.1, ci95_high=mean + 0.1, confidence=0.95, reliable=True,
+    )  # fmt: skip
+
+
+def process_findings(drag: float = -2.5) -> ProcessFindings:
+    network = ("coordination_number", "mechanical_coordination_number", "rattler_fraction",
+               "normal_force_mean_n", "n_particle_workpiece_contacts")  # fmt: skip
+    numbers = dict.fromkeys(Chains.model_fields, 0.25) | {"dominant_frames": 31}
+    no_columns = EstimateColumns.of([])
+    return ProcessFindings(
+        run="workpiece-1", process_time_zero_s=0.1, confidence=0.95, workpiece_frames=31,
+        forces=dict.fromkeys(("drag_n", "lateral_n", "vertical_n"), force(drag)),
+        comparison=(Comparison(
+            label="measured", mean_n=-2.59, std_n=0.66, difference_percent=-3.47,
+            ci95_low=-7.3, ci95_high=0.4, source="a paper"),),
+        peaks=Peaks(count=4, process_time_s=(), drag_n=(), largest_n=-3.9, separation_s=0.1),
+        network=dict.fromkeys(network, 4.5) | {"frames": 31},
+        chains=Chains.model_validate(numbers),
+        association=ChainsAgainstDrag(
+            rank_correlation=0.4, p_value=0.2, frames=31, frames_at_peaks=4,
+            bottleneck_at_peaks_mean_n=1.0, bottleneck_elsewhere_mean_n=1.0),
+        ahead_behind=AheadBehind(
+            ahead_n=known(1.0), behind_n=known(1.0), ratio=known(math.nan),
+            fraction_ahead=known(1.0)),
+        azimuth=AzimuthProfile(edges_rad=(), force_n=no_columns),
+        depth=DepthProfile(
+            edges_m=(), contact_n=no_columns, line_load_n_per_m=no_columns,
+            slope_n_per_m=known(5.0)),
+    )  # fmt: skip
+
+
+FILLING = FillingFindings(
+    run="filling-1", bed={"bed_height_m": 0.0703, "solid_fraction": 0.592}, rest_energy_ratio=None
+)
+DROP = DropFindings(
+    run="drop-1",
+    restitution=DropRestitution(mean=0.71, lowest=0.7, highest=0.72, impacts=3, input=0.68),
+    impacts=DropImpacts.model_validate(dict.fromkeys(DropImpacts.model_fields, ())),
+)
+
+
+def make_run(results: Path, case: dict[str, Any], findings: Findings, names: list[str]) -> Path:
     folder = results / "small" / case["scene"] / case["run"]
     (folder / "tables").mkdir(parents=True)
     (folder / "figures").mkdir()
     (folder / "case.json").write_text(json.dumps(case))
     (folder / "run.json").write_text(json.dumps(run_json()))
-    (folder / "tables" / "figures.json").write_text(json.dumps(findings))
+    findings.write(folder / FILE)
     for name in names:
         (folder / "figures" / f"{name}.png").write_bytes(PNG)
     return folder

@@ -107,20 +107,14 @@ def write(folder: Path, contents: Sequence[Mapping[str, Any]]) -> list[Path]:
 def write_drop(folder: Path, fraction: float, ratios: Sequence[float], cpu_time_s: float) -> Path:
     """A drop test with its table of impacts."""
     import pandas as pd
-    from report_files import case_json
+    from report_files import case_json, run_json
 
     (folder / "tables").mkdir(parents=True)
     case = case_json("drop_test", folder.name, restitution=0.9)
     case |= {"timestep_s": fraction * 1e-5, "rayleigh_time_s": 1e-5}
     case["inputs"] = {**case["inputs"], "drop_test.timestep_fraction": fraction}
     (folder / "case.json").write_text(json.dumps(case))
-    record = {
-        "schema": 2,
-        "state": "complete",
-        "cpu_time_s": cpu_time_s,
-        "wall_time_s": 1.0,
-        "ranks": 1,
-    }
+    record = run_json(cpu_time_s=cpu_time_s, wall_time_s=1.0, ranks=1)
     (folder / "run.json").write_text(json.dumps(record))
     pd.DataFrame({"restitution": ratios}).to_parquet(folder / "tables" / "impacts.parquet")
     return folder

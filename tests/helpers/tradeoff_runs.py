@@ -17,6 +17,7 @@ SOFTNESS = {"drag_mean": 1.1, "lateral_mean": 0.2, "contact_force_mean": 0.7}
 FAILURE = [
     {
         "code": "particles_kept",
+        "passed": False,
         "name": "every particle kept",
         "seen": "12 particles",
         "limit": "1422",

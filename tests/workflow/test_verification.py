@@ -10,7 +10,7 @@ import pytest
 from pages import stands_alone
 
 from dragchain.cli import main
-from dragdeck.campaigns.verification import suite_of
+from dragdeck.campaigns.verification.suite import suite_of
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import environment, write_run
 from dragdeck.engine.run_folder import run

@@ -66,12 +66,14 @@ COMMANDS = (
 STEPS = (
     Command("render", "write the input script of one run", "commands:render", (
         STUDY, FIDELITY, PLAN,
+        _argument("--costs", action="store_true",
+                  help="a filling that the timing of the costs starts from"),
         _argument("scene", help="drop_test, filling or process"),
         _argument("run", help="run id, as `dragdeck cases` lists it"),
         _argument("--packing", type=Path, help="packing.json of the settled bed (process)"))),
     Command("fields", "the fields of a study file as a page", "study.field_page:show", ()),
     Command("verify", "write the input scripts of the verification suite",
-            "campaigns.verification:render_suite", (STUDY, FIDELITY)),
+            "campaigns.verification.suite:render_suite", (STUDY, FIDELITY)),
     Command("drops", "run the drop tests that a calibration needs",
             "campaigns.restitution_drops:drops_command", (
                 STUDY, FIDELITY, OUT_DIR,

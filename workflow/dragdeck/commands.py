@@ -14,7 +14,6 @@ from dragdeck.advice.advise import Advice, breaking_note
 from dragdeck.advice.advise import advise as advised_settings
 from dragdeck.advice.forecast import (
     AdviceFile,
-    Speed,
     advice_file,
     forecast,
     own_option,
@@ -23,6 +22,8 @@ from dragdeck.advice.forecast import (
     tables,
 )
 from dragdeck.advice.options import with_option
+from dragdeck.advice.speed import Speed
+from dragdeck.campaigns.cost_timing import cost_fillings
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import StudyScene
@@ -89,7 +90,7 @@ def explain(study: str, fidelity: str | None, scene: str | None) -> None:
     show(
         explanation(
             one,
-            expected_cost(one, results / kind.name),
+            expected_cost(kind, one, results / kind.name),
             _expectations(case, kind, one),
             tradeoff_if_measured(),
         )
@@ -174,14 +175,20 @@ def run(folder: Path, outcome: Path | None, again: bool, every_s: float) -> None
 
 
 def render(
-    study: str, fidelity: str | None, plan: str | None, scene: str, run: str, packing: Path | None
+    study: str,
+    fidelity: str | None,
+    plan: str | None,
+    costs: bool,
+    scene: str,
+    run: str,
+    packing: Path | None,
 ) -> None:
     """Write the input files of one run."""
     project = find_project(Path.cwd())
     kind = scene_type(scene)
     points = project.points(study, plan) if plan else None
     every = points.of(kind) if points else project.cases(study, fidelity)
-    runs = by_run(every, kind)
+    runs = cost_fillings(every[0]) if costs else by_run(every, kind)
     if run not in runs:
         raise InputError(
             f"no {scene} run of this name",

@@ -9,5 +9,8 @@ from pathlib import Path
 def replace_text(file: Path, text: str) -> None:
     """Write a text file in one step: readers see the old version or the new one."""
     waiting = file.with_name(f".{file.name}.{os.getpid()}")
-    waiting.write_text(text, encoding="utf-8")
-    waiting.replace(file)
+    try:
+        waiting.write_text(text, encoding="utf-8")
+        waiting.replace(file)
+    finally:
+        waiting.unlink(missing_ok=True)

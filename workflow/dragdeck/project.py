@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.outlook.measured import Tradeoff
@@ -61,7 +63,9 @@ class Project:
         InputError
             No such study, or its file cannot be used.
         """
-        return load_cases(study_file(self.studies, study), fidelity, tradeoff)
+        return load_cases(
+            study_file(self.studies, study), fidelity, partial(resolve, tradeoff=tradeoff)
+        )
 
     def points(self, study: str, plan: str) -> Points:
         """The points of a plan for a study, both by name; a plan may be a path too.

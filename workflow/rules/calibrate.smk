@@ -31,7 +31,7 @@ rule read_drop_record:
         "../envs/python.yaml"
     params:
         fall_time=fall_time,
-        source=source_hash("dragchain.calibration.force_record"),
+        source=source_hash("dragchain.calibration.measured_impacts"),
     shell:
         "dragchain step record {input} --fall-time {params.fall_time} --out {output} 2>&1 | tee -i {log}"
 
@@ -134,7 +134,7 @@ rule recover_trials:
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragchain.calibration.results"),
+        source=source_hash("dragchain.calibration.trials"),
     shell:
         "dragchain step trials --drops {input.sweep} --trials {input.trials}"
         " --seed 1 --out {output.summary} 2>&1 | tee -i {log}"

@@ -5,8 +5,10 @@ from shlex import quote
 
 from snakemake.exceptions import WorkflowError
 
+from dragdeck.campaigns.cost_timing import cost_fillings
 from dragdeck.campaigns.restitution_drops import record_file
-from dragdeck.campaigns.verification import suite_of
+from dragdeck.campaigns.stability_map import bed_names
+from dragdeck.campaigns.verification.suite import suite_of
 from dragdeck.decks.render import environment, template_files
 from dragdeck.errors import DragdeckError
 from dragdeck.outlook.timestep import largest_fraction
@@ -102,16 +104,32 @@ def points_by_run(scene, plan=PLAN):
     return by_run(points(plan).of(SCENES[scene]), SCENES[scene])
 
 
-def plan_of(scene, run):
-    """The plan that a run belongs to."""
-    return PLAN if run in points_by_run(scene) else VALIDATION
+@cache
+def fillings_of_costs():
+    """A case for each filling that the timing of the costs starts from."""
+    return explained(cost_fillings, CASES[0])
+
+
+def origins(place):
+    """Where cases of a folder's runs come from: how to name them on the command line, and by run."""
+    scene, fidelity = PLACES[place], fidelity_option()
+    if place != POINTS:
+        yield fidelity, by_run(CASES, scene)
+    yield f"--plan {PLAN}", points_by_run(scene.name)
+    if place == "filling":
+        yield f"--costs {fidelity}", fillings_of_costs()
+    yield f"--plan {VALIDATION}", points_by_run(scene.name, VALIDATION)
+
+
+def origin_of(place, run):
+    """How to name the cases among which a run is, and its case: a study's before a plan's."""
+    return next((option, runs[run]) for option, runs in origins(place) if run in runs)
 
 
 def case_of(place, run):
-    """A case that a run belongs to: one of the study's, or else one of a plan's points."""
-    scene = PLACES[place]
-    own = {} if place == POINTS else by_run(CASES, scene)
-    return own.get(run) or points_by_run(scene.name, plan_of(scene.name, run))[run]
+    """A case that a run belongs to."""
+    _, case = origin_of(place, run)
+    return case
 
 
 def every_point(file, plan=PLAN):
@@ -148,17 +166,10 @@ def ranks_of(place):
 
 def cases_option(place):
     """How to name the cases among which a run is on the command line."""
-
-    def option(wildcards):
-        scene = PLACES[place]
-        if place != POINTS and wildcards.run in by_run(CASES, scene):
-            return fidelity_option(wildcards)
-        return f"--plan {plan_of(scene.name, wildcards.run)}"
-
-    return option
+    return lambda wildcards: origin_of(place, wildcards.run)[0]
 
 
-def fidelity_option(wildcards):
+def fidelity_option(wildcards=None):
     """How to name the fidelity on the command line."""
     return f"--fidelity {FIDELITY}" if FIDELITY else ""
 

@@ -10,13 +10,23 @@ def stability_templates():
     return [str(file.relative_to(PROJECT.root)) for file in files]
 
 
+STABILITY_BEDS = [
+    run_path("stability", "filling", bed)
+    for bed in explained(bed_names, PROJECT.root / STABILITY_MAP)
+]
+
+
 def beds_of_regime(wildcards):
     """Columns and drags start from settled beds."""
     wanted = wildcards.regime in ("column", "drag")
-    return ["results/stability/points/beds.json"] if wanted else []
+    return [f"{bed}/tables/packing.json" for bed in STABILITY_BEDS] if wanted else []
 
 
-# Beds that columns and drags start from.
+# These fillings are no cases of the study: they differ in their materials.
+ruleorder: settle_beds > run_filling
+
+
+# Beds that columns and drags start from; tabulated as every filling.
 rule settle_beds:
     input:
         points=STABILITY_MAP,
@@ -24,6 +34,7 @@ rule settle_beds:
         templates=stability_templates(),
     output:
         "results/stability/points/beds.json",
+        [f"{bed}/run.json" for bed in STABILITY_BEDS],
     log:
         "results/stability/logs/beds.log",
     benchmark:

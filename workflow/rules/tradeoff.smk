@@ -18,12 +18,20 @@ def safe_step(case):
     return largest_fraction(SCENES["process"], lowest)
 
 
+def packings_of_costs(wildcards):
+    """The settled beds that the timing of the costs starts from."""
+    beds = (run_path(STUDY, "filling", run) for run in fillings_of_costs())
+    return [f"{bed}/tables/packing.json" for bed in beds]
+
+
 # Processor times side by side: no other job may run meanwhile.
 rule measure_costs:
     input:
         templates_of("drop_test"),
         templates_of("filling"),
         templates_of("process"),
+        overrides=sorted(str(relative(file)) for file in PROJECT.templates.glob("costs/*.j2")),
+        packings=packings_of_costs,
     output:
         of_tradeoff("costs.json"),
     log:

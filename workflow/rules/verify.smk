@@ -11,7 +11,7 @@ def of_experiment(run, file):
 rule render_verification:
     input:
         templates_of("collide"),
-        suite="workflow/dragdeck/campaigns/verification.yaml",
+        suite="workflow/dragdeck/campaigns/verification/suite.yaml",
     output:
         [
             of_experiment(run, file)
@@ -27,7 +27,7 @@ rule render_verification:
     params:
         study=STUDY,
         fidelity=fidelity_option,
-        source=source_hash("dragdeck.campaigns.verification", "dragdeck.decks.render"),
+        source=source_hash("dragdeck.campaigns.verification.suite", "dragdeck.decks.render"),
     shell:
         "dragdeck step verify {params.study} {params.fidelity} > {log} 2>&1"
 
@@ -55,7 +55,9 @@ rule run_verification:
 rule judge_verification:
     input:
         [of_experiment(run, "run.json") for run in VERIFICATION_RUNS],
-        templates=page_templates("verification/verification.html.j2"),
+        templates=page_templates(
+            "verification/verification.html.j2", "verification/tests.html.j2"
+        ),
         published="analysis/dragchain/verification/published.csv",
     output:
         multiext(

@@ -1,16 +1,15 @@
-"""A measured drop test: force over time, and the impacts in it."""
+"""A measured drop test as a CSV: force over time."""
 
 from __future__ import annotations
 
 import io
-import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from dragchain.arrays import Floats
 from dragchain.errors import RecordError
@@ -19,37 +18,12 @@ TIME_COLUMNS = {"time_s": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
 FORCE_COLUMNS = {"force_n": 1.0, "force_mn": 1e-3, "force_kn": 1e3}
 """Accepted column names and their units in SI; ``force_mn`` is millinewton."""
 
-IMPACTS = 3
-"""Impacts compared at the most (Uhlmann et al. 2015, section 4)."""
-
 LEAST_SAMPLES = 100
-QUIET_SAMPLES = 20
-"""Samples needed before the first impact, to know baseline and noise."""
-
-THRESHOLD_STDS = 6.0
-"""An impact stands out of the noise by so many standard deviations: white noise
-does so once in 5e8 samples."""
-
-SIGNAL_TO_NOISE = 10.0
-"""The first peak is at least so many standard deviations high."""
-
 JITTER = 0.25
 """A time may be off an even grid by this share of the interval (rounded stamps)."""
 
-DEAD_FRACTION = 0.05
-"""What follows an impact within this share of the fall time belongs to it: a
-sensor rings, and a particle with restitution 0.05 flies for twice as long."""
-
-MAD_TO_STD = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation."""
-
-CENTROID_FRACTION = 0.2
-"""Force over peak that counts nothing for the time of an impact: a slow sensor's
-tail would be cut by the noise at another share of each impact."""
-
-FLAT_TOP = 0.4
-"""Share of a pulse's samples above half its height that may lie within 1 % of its
-top; 0.13 for an elastic Hertz impact, whose force is nearly (sin)^1.5."""
+Note = Literal["sign_turned", "two_impacts"]
+"""What was done to a record, and what its reader should know; the page has the words."""
 
 
 @dataclass(frozen=True)
@@ -71,78 +45,7 @@ class Record:
     time_s: Floats
     force_n: Floats
     interval_s: float
-    notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Impact:
-    """One impact as the sensor shows it.
-
-    Attributes
-    ----------
-    start_s : float
-        Time of the first sample above the threshold, s.
-    peak_time_s : float
-        Time of the largest sample, s.
-    centroid_s : float
-        Mean time of the pulse, weighted with what its force has above a fifth
-        of its peak, s: the same share of a large and of a small impact.
-    peak_n : float
-        Largest sample above the baseline, N.
-    width_s : float
-        Width at half of the largest sample, between samples interpolated, s.
-    impulse_n_s : float
-        Sum of force over time, N s.
-    samples : int
-        Samples above the threshold.
-    """
-
-    start_s: float
-    peak_time_s: float
-    centroid_s: float
-    peak_n: float
-    width_s: float
-    impulse_n_s: float
-    samples: int
-
-
-@dataclass(frozen=True)
-class Measured:
-    """What a record says.
-
-    Attributes
-    ----------
-    interval_s : float
-        Sampling interval, s.
-    offset_n, drift_n_per_s : float
-        Baseline at the record's start, N, and its slope, N/s.
-    noise_n : float
-        Standard deviation of the noise about the baseline, N.
-    threshold_n : float
-        Least force of an impact above the baseline, N.
-    impacts : tuple of Impact
-        The first two or three.
-    shape : (M, 2) ndarray
-        Times, s, and forces above the baseline, N, of the first impact.
-    notes : tuple of str
-        What was done, and what the user should know.
-    """
-
-    interval_s: float
-    offset_n: float
-    drift_n_per_s: float
-    noise_n: float
-    threshold_n: float
-    impacts: tuple[Impact, ...]
-    shape: Floats = field(compare=False, repr=False)
-    notes: tuple[str, ...] = ()
-
-    def baseline(self, time_s: Floats, start_s: float) -> Floats:
-        """Baseline at times, for a record that starts at `start_s`, N."""
-        return self.offset_n + self.drift_n_per_s * (time_s - start_s)
-
-
-# --- reading ---------------------------------------------------------------------------------
+    notes: tuple[Note, ...] = ()
 
 
 def read_record(file: Path) -> Record:
@@ -191,7 +94,7 @@ def parse_record(text: str) -> tuple[Floats, Floats]:
     return time * TIME_COLUMNS[time_name], force * FORCE_COLUMNS[force_name]
 
 
-def _column(names: list[str], known: dict[str, float]) -> str:
+def _column(names: Sequence[str], known: dict[str, float]) -> str:
     found = [name for name in names if name in known]
     if len(found) != 1:
         raise RecordError(
@@ -247,268 +150,6 @@ def check_samples(time_s: Floats, force_n: Floats) -> Record:
             remedy="export every sample at the sensor's own rate",
         )
     centre = float(np.median(force_n))
-    notes: tuple[str, ...] = ()
     if centre - float(force_n.min()) > float(force_n.max()) - centre:
-        force_n = -force_n
-        notes = ("the largest force is negative: the sign was turned, compression is positive",)
-    return Record(even, force_n, interval, notes)
-
-
-# --- impacts ---------------------------------------------------------------------------------
-
-
-def measure(record: Record, *, fall_time_s: float) -> Measured:
-    """Find baseline, noise and the first impacts of a record.
-
-    Parameters
-    ----------
-    record : Record
-    fall_time_s : float
-        Time of the free fall before the first impact, s. What follows an
-        impact within 0.05 of it counts as its ringing.
-
-    Raises
-    ------
-    RecordError
-        ``baseline``, ``impacts``, ``coarse``, ``clipped`` or ``order``.
-    """
-    dead = max(1, round(DEAD_FRACTION * fall_time_s / record.interval_s))
-    time = record.time_s - record.time_s[0]
-    offset, drift, noise = _baseline(time, record.force_n, dead)
-    force = record.force_n - offset - drift * time
-    threshold = THRESHOLD_STDS * noise
-    pulses = _pulses(force, threshold, dead)
-    _check_count(pulses, force, noise)
-    # at most three, the last of them whole
-    whole = [(a, b) for a, b in pulses if b + 2 < len(force)][:IMPACTS]
-    if len(whole) < 2:
-        raise _too_few(len(whole))
-    impacts = tuple(pulse(record.time_s, force, a, b, record.interval_s) for a, b in whole)
-    tops = [force[a : b + 1] for a, b in whole]
-    _check_tops(tops, [record.force_n[a : b + 1] for a, b in whole], noise, record)
-    notes = list(record.notes)
-    _check_order(impacts)
-    if len(impacts) < IMPACTS:
-        notes.append(f"only {len(impacts)} impacts could be used: no test of the fit is possible")
-    first = slice(max(whole[0][0] - 1, 0), whole[0][1] + 2)
-    shape = np.column_stack([record.time_s[first], force[first]])
-    return Measured(
-        record.interval_s, offset, drift, noise, threshold, impacts, shape, tuple(notes)
-    )
-
-
-def _baseline(time: Floats, force: Floats, dead: int) -> tuple[float, float, float]:
-    """Offset, drift and noise of the quiet samples.
-
-    A line through them, begun with the median and fitted again without what
-    stands out, until that changes nothing. What stands out is told by the
-    median absolute deviation, which the impacts do not touch, or by the
-    sensor's resolution where that is coarser. The noise is the standard
-    deviation of what is left.
-    """
-    coarse = _quantum(force) / 2.0
-    line = np.array([0.0, float(np.median(force))])
-    spread = MAD_TO_STD * float(np.median(np.abs(force - line[1])))
-    out = np.zeros(len(force), dtype=bool)
-    for _ in range(20):
-        before = out
-        rest = force - np.polyval(line, time)
-        out = _widened(np.abs(rest) > THRESHOLD_STDS * max(spread, coarse), dead)
-        if len(out) - out.sum() < QUIET_SAMPLES or np.array_equal(out, before):
-            break
-        line = np.polyfit(time[~out], force[~out], 1)
-        spread = MAD_TO_STD * float(np.median(np.abs((force - np.polyval(line, time))[~out])))
-    quiet = (force - np.polyval(line, time))[~out]
-    noise = float(quiet.std()) if len(quiet) >= QUIET_SAMPLES else spread
-    return float(line[1]), float(line[0]), max(noise, coarse / math.sqrt(3.0))
-
-
-def _widened(mask: NDArray[np.bool_], after: int) -> NDArray[np.bool_]:
-    """True also for `after` samples after each true one, and two before it."""
-    counts = np.zeros(len(mask) + 1, dtype=np.int64)
-    where = np.flatnonzero(mask)
-    np.add.at(counts, np.maximum(where - 2, 0), 1)
-    np.add.at(counts, np.minimum(where + after + 1, len(mask)), -1)
-    return np.cumsum(counts[:-1]) > 0
-
-
-def _quantum(force: Floats) -> float:
-    """Smallest difference between two values: the sensor's resolution, N."""
-    steps = np.diff(np.unique(force))
-    return float(steps.min()) if len(steps) else 0.0
-
-
-def _pulses(force: Floats, threshold: float, dead: int) -> list[tuple[int, int]]:
-    """First and last sample of each pulse above the threshold.
-
-    What follows its first sample within `dead` samples belongs to a pulse: its
-    unbroken run about the largest of these counts, so that neither noise at its
-    foot nor the sensor's ringing makes another one.
-    """
-    above = force > threshold
-    below = np.flatnonzero(~above)
-    found: list[tuple[int, int]] = []
-    place = 0
-    for begin in np.flatnonzero(above & ~np.roll(above, 1)).tolist():
-        if begin < place:
-            continue
-        place = begin + dead + 1
-        top = begin + int(np.argmax(force[begin:place]))
-        at = int(np.searchsorted(below, top))
-        first = int(below[at - 1]) + 1 if at > 0 else 0
-        last = int(below[at]) - 1 if at < len(below) else len(force) - 1
-        found.append((first, last))
-    return found
-
-
-def _too_few(count: int) -> RecordError:
-    return RecordError(
-        "impacts",
-        "fewer than two whole impacts",
-        value=str(count),
-        limit="at least 2, better 3",
-        remedy="record for longer, from before the first impact on",
-    )
-
-
-def _check_count(pulses: list[tuple[int, int]], force: Floats, noise: float) -> None:
-    if not pulses:
-        raise _too_few(0)
-    first = pulses[0][0]
-    if first < QUIET_SAMPLES:
-        raise RecordError(
-            "baseline",
-            "no quiet baseline before the first impact",
-            value=f"{first} samples",
-            limit=f"at least {QUIET_SAMPLES}",
-            remedy="trigger earlier, so that the record begins before the particle lands",
-        )
-    if float(force.max()) < SIGNAL_TO_NOISE * noise:
-        raise RecordError(
-            "baseline",
-            "no quiet baseline: the impacts hardly stand out of the noise",
-            value=f"largest force {force.max():.3g} N, noise {noise:.3g} N (standard deviation)",
-            limit=f"a ratio of at least {SIGNAL_TO_NOISE:g}",
-            remedy="drop from higher, or use a more sensitive range",
-        )
-
-
-def pulse(time: Floats, force: Floats, first: int, last: int, interval: float) -> Impact:
-    """Measure one impact.
-
-    Parameters
-    ----------
-    time, force : (N,) ndarray
-        Times, s, and forces above the baseline, N.
-    first, last : int
-        First and last sample above the threshold.
-    interval : float
-        Sampling interval, s.
-
-    Raises
-    ------
-    RecordError
-        ``coarse``: there is one sample only.
-    """
-    if last - first < 1:
-        raise RecordError(
-            "coarse",
-            "sampled too coarsely to see an impact",
-            value=f"one sample at {time[first]:.6g} s, interval {interval:.3g} s",
-            limit="at least 2 samples an impact",
-            remedy="record at a higher rate",
-        )
-    top = first + int(np.argmax(force[first : last + 1]))
-    near = slice(max(first - 1, 0), last + 2)
-    weight = np.maximum(force[near] - CENTROID_FRACTION * force[top], 0.0)
-    return Impact(
-        start_s=float(time[first]),
-        peak_time_s=float(time[top]),
-        centroid_s=float(np.sum(weight * time[near]) / np.sum(weight)),
-        peak_n=float(force[top]),
-        width_s=_width(force, top, first, last) * interval,
-        impulse_n_s=float(np.sum(force[near])) * interval,
-        samples=last - first + 1,
-    )
-
-
-def _width(force: Floats, top: int, first: int, last: int) -> float:
-    """Width at half height in samples, interpolated linearly; never below one."""
-    half = 0.5 * force[top]
-    left, right = top, top
-    while left > max(first - 1, 0) and force[left - 1] >= half:
-        left -= 1
-    while right < min(last + 1, len(force) - 1) and force[right + 1] >= half:
-        right += 1
-    before = _crossing(force[left - 1], force[left], half) if left > 0 else 0.0
-    after = _crossing(force[right + 1], force[right], half) if right + 1 < len(force) else 0.0
-    return max(1.0, right - left + before + after)
-
-
-def _crossing(outside: float, inside: float, half: float) -> float:
-    """How far outside the sample above it a level is crossed, in samples."""
-    return float(np.clip((inside - half) / (inside - outside), 0.0, 1.0))
-
-
-def _check_tops(tops: list[Floats], raw: list[Floats], noise: float, record: Record) -> None:
-    """Refuse clipped peaks.
-
-    Three signs, each enough: four equal samples in a row at the top, though
-    the noise is four times the resolution; a top too flat for an impact; the
-    same largest value in two impacts, which a rebound cannot have.
-    """
-    quantum = _quantum(record.force_n)
-    largest = [float(samples.max()) for samples in raw]
-    for number, (top, samples) in enumerate(zip(tops, raw, strict=True), start=1):
-        high = samples[samples >= samples.max() - 0.5 * top.max()]
-        flat = int(np.sum(high >= samples.max() - 0.01 * top.max()))
-        equal = _longest_run(samples == samples.max())
-        if (equal >= 4 and noise > 4 * quantum) or (flat >= 4 and flat > FLAT_TOP * len(high)):
-            raise _clipped(f"impact {number} has {max(flat, equal)} samples at its top", largest)
-    if len(largest) > 1 and len(set(largest[:2])) == 1:
-        raise _clipped("impacts 1 and 2 have the same largest value", largest)
-
-
-def _clipped(problem: str, largest: list[float]) -> RecordError:
-    return RecordError(
-        "clipped",
-        f"{problem}: the sensor or its amplifier was at its limit",
-        value=", ".join(f"{value:.6g} N" for value in largest),
-        remedy="choose a wider range, or drop from lower",
-    )
-
-
-def _longest_run(mask: NDArray[np.bool_]) -> int:
-    edges = np.diff(mask.astype(np.int8), prepend=0, append=0)
-    runs = np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1)
-    return int(runs.max(initial=0))
-
-
-def _check_order(impacts: tuple[Impact, ...]) -> None:
-    """Refuse impacts that cannot be one particle's: a flight longer than the one before."""
-    flights = np.diff([impact.centroid_s for impact in impacts])
-    if len(flights) > 1 and flights[1] > flights[0] * (1.0 + 1e-3):
-        raise RecordError(
-            "order",
-            "the second flight is longer than the first, which no rebound is",
-            value=f"{flights[0] * 1e3:.3g} ms, then {flights[1] * 1e3:.3g} ms",
-            remedy="cut what was recorded before the first impact, and after the "
-            "particle was caught",
-        )
-
-
-def as_json(measured: Measured) -> dict[str, Any]:
-    """For ``record.json``."""
-    return {
-        "schema": 2,
-        "interval_s": measured.interval_s,
-        "offset_n": measured.offset_n,
-        "drift_n_per_s": measured.drift_n_per_s,
-        "noise_n": measured.noise_n,
-        "threshold_n": measured.threshold_n,
-        "notes": list(measured.notes),
-        "impacts": [
-            {"impact": number, **vars(impact)}
-            for number, impact in enumerate(measured.impacts, start=1)
-        ],
-    }
+        return Record(even, -force_n, interval, ("sign_turned",))
+    return Record(even, force_n, interval)

@@ -2,25 +2,96 @@
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+import pandas as pd
+from pydantic import PositiveFloat
 
 from dragchain.arrays import Floats
+from dragchain.calibration.measured_impacts import IMPACTS
+from dragchain.documents import Document, Part
 from dragchain.dumps.run_parts import iter_prints
 from dragchain.errors import TableError
 from dragchain.run.case import load_case, load_outputs
+from dragchain.tables.impacts import speed_at_plate
 
 Purpose = Literal["production", "reference", "confirm", "trial"]
 
-IMPACTS = 3
-"""Impacts that a calibration needs."""
+SAMPLES = ("step", "time_s", "z_m", "vz_m_s", "force_n")
+"""Columns of a drop's output around its impacts."""
+
+
+class DropTest(Document):
+    """What ``drops.json`` says of the study.
+
+    Attributes
+    ----------
+    pair : str
+        Particle and plate, as the study names their pair.
+    record : str
+        The CSV of the measured drop test.
+    height_m, height_std_m : float
+        Free height below the particle and its standard uncertainty.
+    peaks : str
+        Whether to compare peak forces.
+    limit_force : bool
+        The study's contact option.
+    restitution_now : float
+        What the study puts into the deck.
+    fall_time_s, contact_time_s : float
+        Of the particle before its first impact, and in an elastic one.
+    """
+
+    made_by: ClassVar[str] = "snakemake calibrate"
+
+    study: str
+    title: str
+    pair: str
+    fidelity: str
+    record: str
+    height_m: PositiveFloat
+    height_std_m: PositiveFloat
+    peaks: Literal["auto", "yes", "no"]
+    gravity_m_s2: PositiveFloat
+    limit_force: bool
+    restitution_now: float
+    fall_time_s: PositiveFloat
+    contact_time_s: float
+
+
+class Drop(Part):
+    """A drop that ``drops.json`` lists.
+
+    Attributes
+    ----------
+    folder : str
+        Beside the list.
+    purpose : str
+        ``production``, ``reference``, ``confirm`` or ``trial``.
+    restitution : float
+        In the deck.
+    timestep_fraction : float
+        The step over the Rayleigh time of this particle at this modulus.
+    """
+
+    folder: str
+    purpose: Purpose
+    restitution: PositiveFloat
+    limit_force: bool
+    height_m: PositiveFloat
+    youngs_modulus_scale: PositiveFloat
+    timestep_s: PositiveFloat
+    timestep_fraction: PositiveFloat
+
+
+class DropsFile(DropTest):
+    """The content of ``drops.json``."""
+
+    drops: tuple[Drop, ...]
 
 
 @dataclass(frozen=True)
@@ -53,40 +124,34 @@ class DropRun:
 
     Attributes
     ----------
-    purpose : str
-        ``production``, ``reference``, ``confirm`` or ``trial``.
-    restitution : float
-        In the deck.
-    limit_force : bool
-    height_m, youngs_modulus_scale, timestep_s, timestep_fraction : float
-        The last is the step over the Rayleigh time of this particle at this modulus.
+    drop : Drop
+        As it is listed.
     speeds_m_s : (K + 1,) ndarray
         Speed at the plate's surface before the first impact and after each.
     impacts : tuple of Waveform
         K of them.
     """
 
-    purpose: Purpose
-    restitution: float
-    limit_force: bool
-    height_m: float
-    youngs_modulus_scale: float
-    timestep_s: float
-    timestep_fraction: float
+    drop: Drop
     speeds_m_s: Floats
     impacts: tuple[Waveform, ...]
 
     @property
     def rebound(self) -> Floats:
-        """Speed after over speed before, of each impact."""
-        return np.asarray(self.speeds_m_s[1:] / self.speeds_m_s[:-1])
+        """Speed after over speed before, of each of the impacts that are compared."""
+        return np.asarray(self.speeds_m_s[1:] / self.speeds_m_s[:-1])[:IMPACTS]
+
+    @property
+    def effective(self) -> float:
+        """Mean of `rebound`: the restitution that the drop shows."""
+        return float(self.rebound.mean())
 
 
 @dataclass(frozen=True)
 class Drops:
     """The drops of a folder and what ``drops.json`` says of the study."""
 
-    known: Mapping[str, Any]
+    known: DropTest
     runs: tuple[DropRun, ...]
 
     def select(self, purpose: Purpose, limit_force: bool | None = None) -> list[DropRun]:
@@ -94,7 +159,7 @@ class Drops:
         return [
             run
             for run in self.runs
-            if run.purpose == purpose and limit_force in (None, run.limit_force)
+            if run.drop.purpose == purpose and limit_force in (None, run.drop.limit_force)
         ]
 
 
@@ -104,49 +169,32 @@ def read_drops(file: Path) -> Drops:
     Raises
     ------
     TableError
-        There is no such file, a drop is not complete, or has too few impacts.
+        A drop is not complete, or has too few impacts.
     DocumentError, DumpError
-        As from the readers of a run.
+        The list cannot be used, or as from the readers of a run.
     """
-    if not file.is_file():
-        raise TableError(f"{file}: there is no such file; run `dragdeck drops` first")
-    listed = json.loads(file.read_text(encoding="utf-8"))
-    runs = tuple(_read_drop(file.parent / row["folder"], row) for row in listed.pop("drops"))
-    return Drops(listed, runs)
-
-
-def _read_drop(folder: Path, row: Mapping[str, Any]) -> DropRun:
-    if not (folder / "run.json").is_file():
-        raise TableError(f"{folder}: this drop is not complete; run `dragdeck drops` again")
-    case = load_case(folder)
-    blocks = list(iter_prints(folder, load_outputs(folder)["impacts"]))
-    names = ("step", "time_s", "z_m", "vz_m_s", "force_n")
-    columns = {
-        name: np.concatenate([np.asarray(b[name], np.float64) for b in blocks]) for name in names
-    }
-    split = np.flatnonzero(np.diff(columns["step"]) != 1) + 1
-    windows = [dict(zip(names, part, strict=True)) for part in _split(columns, names, split)]
-    if len(windows) < IMPACTS:
-        raise TableError(f"{folder}: {len(windows)} impacts, a calibration needs {IMPACTS}")
-    radius, gravity = case.media.radius_mean_m, case.gravity_m_s2
-    pieces = [waveform(window, radius, gravity) for window in windows]
-    return DropRun(
-        purpose=row["purpose"],
-        restitution=row["restitution"],
-        limit_force=row["limit_force"],
-        height_m=row["height_m"],
-        youngs_modulus_scale=row["youngs_modulus_scale"],
-        timestep_s=row["timestep_s"],
-        timestep_fraction=row["timestep_fraction"],
-        speeds_m_s=np.array([pieces[0][1], *(piece[2] for piece in pieces)]),
-        impacts=tuple(piece[0] for piece in pieces),
+    listed = DropsFile.read(file)
+    return Drops(
+        listed, tuple(_read_drop(file.parent / drop.folder, drop) for drop in listed.drops)
     )
 
 
-def _split(
-    columns: Mapping[str, Floats], names: Sequence[str], where: NDArray[np.intp]
-) -> Iterable[tuple[Floats, ...]]:
-    return zip(*(np.split(columns[name], where) for name in names), strict=True)
+def _read_drop(folder: Path, drop: Drop) -> DropRun:
+    if not (folder / "run.json").is_file():
+        raise TableError(f"{folder}: this drop is not complete; run `snakemake calibrate` again")
+    case = load_case(folder)
+    blocks = iter_prints(folder, load_outputs(folder)["impacts"])
+    rows = pd.concat([pd.DataFrame({name: block[name] for name in SAMPLES}) for block in blocks])
+    windows = [window for _, window in rows.groupby((rows["step"].diff() != 1).cumsum())]
+    if len(windows) < IMPACTS:
+        raise TableError(f"{folder}: {len(windows)} impacts, a calibration needs {IMPACTS}")
+    radius, gravity = case.media.radius_mean_m, case.gravity_m_s2
+    pieces = [
+        waveform({name: window[name].to_numpy(np.float64) for name in SAMPLES}, radius, gravity)
+        for window in windows
+    ]
+    speeds = np.array([pieces[0][1], *(piece[2] for piece in pieces)])
+    return DropRun(drop, speeds, tuple(piece[0] for piece in pieces))
 
 
 def waveform(
@@ -154,8 +202,8 @@ def waveform(
 ) -> tuple[Waveform, float, float]:
     """One impact, and the speeds at the plate's surface before and after it.
 
-    The speeds are those of the samples next to the contact, moved to the
-    surface by v^2 + 2 g (z - R), exact in free flight.
+    The speeds are those of the samples next to the contact, moved to the surface
+    (`dragchain.tables.impacts.speed_at_plate`).
 
     Parameters
     ----------
@@ -174,19 +222,20 @@ def waveform(
     if not len(inside) or inside[0] == 0 or inside[-1] == len(gap) - 1:
         raise TableError("an impact of a drop is not whole in its window; widen the window")
     before, after = inside[0] - 1, inside[-1] + 1
-    fast = [math.sqrt(speed[k] ** 2 + 2 * gravity_m_s2 * gap[k]) for k in (before, after)]
+    near = [before, after]
+    down, up = speed_at_plate(speed[near], gap[near], gravity_m_s2).tolist()
     top = int(np.argmax(force))
     return (
         Waveform(
             time_s=time[before : after + 1],
             force_n=force[before : after + 1],
-            down_s=float(time[before] + (fast[0] + speed[before]) / gravity_m_s2),
-            up_s=float(time[after] - (fast[1] - speed[after]) / gravity_m_s2),
+            down_s=float(time[before] + (down + speed[before]) / gravity_m_s2),
+            up_s=float(time[after] - (up - speed[after]) / gravity_m_s2),
             centroid_s=float(np.sum(force * time) / np.sum(force)),
             peak_n=_parabola_top(force[top - 1 : top + 2]),
         ),
-        fast[0],
-        fast[1],
+        down,
+        up,
     )
 
 

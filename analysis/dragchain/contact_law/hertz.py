@@ -1,18 +1,39 @@
-"""The elastic contact of Hertz: what modulus two bodies have together, how long they touch."""
+"""The elastic contact of Hertz: the moduli that two bodies have together, how long they touch."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+import math
+from dataclasses import dataclass
+from typing import TypeVar
+
+from dragchain.arrays import Floats
+
+Number = TypeVar("Number", float, Floats)
 
 
-def effective_modulus(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
+@dataclass(frozen=True)
+class Elastic:
+    """Elastic constants of a material: Young's modulus, Pa, and Poisson's ratio."""
+
+    youngs_modulus_pa: float
+    poissons_ratio: float
+
+
+def effective_modulus(first: Elastic, second: Elastic) -> float:
     """Effective Young's modulus, Pa (Johnson 1985, eq. 4.21 ff.)."""
-    compliance: float = sum(
-        (1 - material["poissons_ratio"] ** 2) / material["youngs_modulus_pa"]
+    return 1 / sum(
+        (1 - material.poissons_ratio**2) / material.youngs_modulus_pa
         for material in (first, second)
     )
-    return 1 / compliance
+
+
+def effective_shear(first: Elastic, second: Elastic) -> float:
+    """Effective shear modulus 1/G* = sum (2 - nu)/G, Pa (Mindlin 1949)."""
+    return 1 / sum(
+        2 * (2 - nu) * (1 + nu) / material.youngs_modulus_pa
+        for material in (first, second)
+        for nu in (material.poissons_ratio,)
+    )
 
 
 def contact_time(mass_kg: float, radius_m: float, modulus_pa: float, speed_m_s: float) -> float:
@@ -22,3 +43,17 @@ def contact_time(mass_kg: float, radius_m: float, modulus_pa: float, speed_m_s: 
     """
     scale: float = (mass_kg**2 / (radius_m * modulus_pa**2 * speed_m_s)) ** 0.2
     return 2.87 * scale
+
+
+def sphere_mass(radius_m: Number, density_kg_m3: float) -> Number:
+    """Mass of solid spheres, kg."""
+    return 4 / 3 * math.pi * radius_m**3 * density_kg_m3
+
+
+def tangential_damping_ratio(poissons_ratio: float) -> float:
+    """Tangential damping constant over the normal one, for two bodies of one material.
+
+    The engine's law takes both from the stiffnesses, ``sqrt(k_t / k_n)`` with
+    ``k_n = 2 E* sqrt(R* d)`` and ``k_t = 8 G* sqrt(R* d)``.
+    """
+    return math.sqrt(2 * (1 - poissons_ratio) / (2 - poissons_ratio))

@@ -1,25 +1,19 @@
-"""Any dump of the engine as frames or as a Parquet table, without a run folder.
-
-`read_dump` gives the frames, `dump_to_parquet` writes them; both stream, and neither
-needs a ``columns.json``.
-"""
+"""The frames of any dump of LIGGGHTS, without a run folder and its ``columns.json``."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from dragchain.dumps.decompress import CODECS, Content
-from dragchain.dumps.fast_reader import Batch, read_batches
+from dragchain.dumps.fast_reader import read_frames
 from dragchain.dumps.frame import Frame
 from dragchain.errors import DumpError
-from dragchain.run.case import Output, OutputKind
 
 _HEAD_BYTES = 1 << 16
-_KINDS: dict[bytes, OutputKind] = {b"ENTRIES": "local", b"ATOMS": "custom"}
+_KINDS = {b"ENTRIES": "local", b"ATOMS": "custom"}
 
 
 def read_dump(source: Path | str, columns: Sequence[str] | None = None) -> Iterator[Frame]:
@@ -51,13 +45,7 @@ def read_dump(source: Path | str, columns: Sequence[str] | None = None) -> Itera
         Either error names file, frame and byte; the frames before have come by then.
     """
     files = dump_files(source)
-    for batch in read_batches(files, output_of(files[0], columns)):
-        yield from batch.frames()
-
-
-def steps_of_rows(batch: Batch) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Step of each row of a batch, (N,)."""
-    return np.repeat(batch.steps, batch.counts)
+    yield from read_frames(files, layout_of(files[0], columns))
 
 
 def dump_files(source: Path | str) -> list[Path]:
@@ -81,39 +69,43 @@ def dump_files(source: Path | str) -> list[Path]:
     return files
 
 
-def output_of(file: Path, columns: Sequence[str] | None) -> Output:
-    """What a file holds, by its name and its first lines."""
+@dataclass(frozen=True)
+class DumpLayout:
+    """What a single dump says of itself; see `dragchain.dumps.frame.Layout`."""
+
+    kind: str
+    columns: tuple[str, ...]
+    binary: bool = False
+
+    @property
+    def header(self) -> tuple[str, ...]:
+        """The columns, which have the names that LIGGGHTS gives them."""
+        return self.columns
+
+
+def layout_of(file: Path, columns: Sequence[str] | None) -> DumpLayout:
+    """What a file holds, by its name and its first lines.
+
+    Raises
+    ------
+    DumpError
+        If it is no dump, or columns of a binary one are not given, or one comes twice.
+    """
     name = file.with_suffix("") if file.suffix in CODECS else file
-    if name.suffix == ".bin":
-        if columns is None:
-            raise DumpError(
-                file,
-                "a binary dump does not say what its columns are",
-                remedy="give their names in the order of the deck's dump command",
-            )
-        return _output(file, "custom", columns, binary=True)
-    kind, names = _header(file)
-    return _output(file, kind, columns or names)
+    kind, names = ("custom", []) if name.suffix == ".bin" else _header(file)
+    wanted = tuple(columns or names)
+    if not wanted:
+        raise DumpError(
+            file,
+            "a binary dump does not say what its columns are",
+            remedy="give their names in the order of the deck's dump command",
+        )
+    if len(set(wanted)) < len(wanted):
+        raise DumpError(file, f"the columns {' '.join(wanted)} name one twice")
+    return DumpLayout(kind, wanted, binary=name.suffix == ".bin")
 
 
-def _output(
-    file: Path, kind: OutputKind, columns: Sequence[str], *, binary: bool = False
-) -> Output:
-    """A dump of unknown steps, of which the file says all."""
-    return Output(
-        name=file.name,
-        kind=kind,
-        binary=binary,
-        pattern="{part}",
-        columns=tuple(columns),
-        engine_columns=None,
-        period_steps=1,
-        first_step=0,
-        last_step=None,
-    )
-
-
-def _header(file: Path) -> tuple[OutputKind, list[str]]:
+def _header(file: Path) -> tuple[str, list[str]]:
     """Kind of a text dump, and the names of its columns."""
     with Content(file) as content:
         head = bytearray(_HEAD_BYTES)

@@ -1,6 +1,7 @@
-"""Readers of single output files: one frame, or one block of rows, at a time.
+"""Single output files, read line by line: slow for dumps, and exact about what is wrong.
 
-`dragchain.dumps` merges the parts of an output; everything here sees one file.
+`fast_reader` reads the frames that are as LIGGGHTS writes them, `run_parts` merges the parts of
+an output.
 """
 
 from __future__ import annotations
@@ -18,9 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragchain.dumps.decompress import Content
-from dragchain.dumps.frame import Columns, Frame, is_integer_column
+from dragchain.dumps.frame import Columns, Frame, Layout, is_integer_column
 from dragchain.errors import DumpError, TruncatedDumpError
-from dragchain.run.case import Output
 
 BLOCK_ROWS = 20_000
 """Rows of a ``fix print`` file that are read at once."""
@@ -36,16 +36,19 @@ _COUNT = struct.Struct("<i")
 _ROW_BEGINS = [bytes([byte]) for byte in b"0123456789+-. "]
 
 
-def read_dump_file(file: Path, output: Output) -> Iterator[Frame]:
+def read_carefully(
+    file: Path, output: Layout, *, frame: int = 0, offset: int = 0
+) -> Iterator[Frame]:
     """Frames of one file of a ``dump custom`` or ``dump local``.
 
     Parameters
     ----------
     file : Path
-        The file, compressed if its name ends in one of `dragchain.content.CODECS`.
-    output : Output
-        What ``columns.json`` says about it. A text dump may have its columns in any
-        order, as its header says.
+        The file, compressed if its name ends in one of `dragchain.dumps.decompress.CODECS`.
+    output : Layout
+        What it holds. A text dump may have its columns in any order, as its header says.
+    frame, offset : int
+        The frame to begin with, and the byte of the content at which it starts.
 
     Yields
     ------
@@ -59,24 +62,6 @@ def read_dump_file(file: Path, output: Output) -> Iterator[Frame]:
     DumpError
         If the file is not such a dump, has other columns, or holds something
         that is not a finite number. The frames before have come by then.
-    """
-    from dragchain.dumps.fast_reader import read_batches
-
-    for batch in read_batches([file], output):
-        yield from batch.frames()
-
-
-def read_carefully(
-    file: Path, output: Output, *, frame: int = 0, offset: int = 0
-) -> Iterator[Frame]:
-    """Do as `read_dump_file` does, but line by line: slow, and exact about what is wrong.
-
-    Parameters
-    ----------
-    file, output
-        As in `read_dump_file`.
-    frame, offset : int
-        The frame to begin with, and the byte of the content at which it starts.
     """
     read_one = _read_binary_frame if output.binary else _read_text_frame
     with Content(file) as content:
@@ -96,7 +81,7 @@ class _Cursor:
     file: Path
     stream: io.BufferedReader[Any]
     content: Content
-    output: Output
+    output: Layout
     frame: int
     offset: int
 
@@ -283,7 +268,7 @@ def _integers(column: NDArray[np.float64], name: str, at: _Cursor) -> NDArray[np
 
 
 def read_print_file(
-    file: Path, output: Output, *, block_rows: int = BLOCK_ROWS
+    file: Path, output: Layout, *, block_rows: int = BLOCK_ROWS
 ) -> Iterator[Columns]:
     """Blocks of rows of one ``fix print`` file.
 
@@ -292,7 +277,7 @@ def read_print_file(
     file : Path
         The file. Its header line may come again between the rows, as it does
         when the engine opens the file once more.
-    output : Output
+    output : Layout
         What ``columns.json`` says about it.
     block_rows : int
         Rows to read at once.

@@ -1,13 +1,34 @@
-"""A frame of a dump."""
+"""A frame of a dump, and how an output is laid out."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 Columns = dict[str, NDArray[np.float64] | NDArray[np.int64]]
+
+
+class Layout(Protocol):
+    """What a reader must know of an output file."""
+
+    @property
+    def kind(self) -> str:
+        """``print``, ``custom`` or ``local``: the LIGGGHTS command that writes it."""
+
+    @property
+    def binary(self) -> bool:
+        """Whether it is a binary dump."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Our name of each column."""
+
+    @property
+    def header(self) -> tuple[str, ...]:
+        """What LIGGGHTS writes for each of them in the header of a text file."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +61,16 @@ class Frame:
         """Columns side by side, shape (N, len(names)), float64."""
         return np.column_stack([self.columns[name] for name in names]).astype(np.float64)
 
+    def ids(self, name: str) -> NDArray[np.int64]:
+        """A column of ids, shape (N,)."""
+        return np.asarray(self.columns[name], dtype=np.int64)
+
+    def take(self, order: NDArray[np.int64]) -> Frame:
+        """The rows `order` in that order."""
+        columns: Columns = {name: values[order] for name, values in self.columns.items()}
+        return Frame(self.step, columns, self.opening)
+
 
 def is_integer_column(name: str) -> bool:
     """Whether a column counts or names things, which makes it int64 in tables."""
-    return name in ("step", "particles", "id", "type") or name.endswith("_id")
+    return name in ("step", "n_particles", "id", "type") or name.endswith("_id")

@@ -14,12 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from dragchain.dumps.careful_reader import read_dump_file, read_print_file
+from dragchain.dumps.careful_reader import read_print_file
+from dragchain.dumps.fast_reader import read_frames
 from dragchain.dumps.frame import Columns, Frame
 from dragchain.errors import DumpError, TruncatedDumpError
 from dragchain.run.case import Output
-
-__all__ = ["Columns", "Frame", "iter_frames", "iter_prints", "part_files"]
 
 
 def part_files(run_dir: Path | str, output: Output) -> list[Path]:
@@ -80,7 +79,7 @@ def iter_frames(run_dir: Path | str, output: Output) -> Iterator[Frame]:
     """
 
     def read(file: Path) -> Iterator[_Piece]:
-        for frame in read_dump_file(file, output):
+        for frame in read_frames([file], output):
             yield _Piece(frame.step, frame.step, frame.columns, frame.opening)
 
     pieces = _merged(run_dir, output, read)

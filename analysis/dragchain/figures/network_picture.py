@@ -4,17 +4,10 @@ One cylinder a contact: from centre to centre of two particles, or from a partic
 contact point with workpiece or bowl. Its colour runs from green (no force) to red (the frame's
 largest normal force), its radius is proportional to the normal force and reaches the mean particle
 radius at the largest.
-
-The pictures are rendered off screen by VTK. On a machine without a display that needs EGL with a
-software driver: on Debian and Ubuntu the packages ``libegl1`` and ``libgl1-mesa-dri``.
 """
 
 from __future__ import annotations
 
-import os
-import re
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -23,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.errors import DragchainError, TableError
+from dragchain.errors import TableError
+from dragchain.figures.rendering import Camera, Image, new_plotter, photograph
 from dragchain.network.chains import WidestPath, dominant_path, widest_paths
 from dragchain.network.frame import NetworkFrame, read_frames
 from dragchain.run.case import Case
@@ -52,10 +46,6 @@ side."""
 
 _MOST_PIXELS = 1400
 """Most pixels along an edge of a picture: a bowl of 100 mm at full resolution."""
-
-
-class RenderError(DragchainError):
-    """Off-screen rendering does not work on this machine."""
 
 
 @dataclass(frozen=True)
@@ -150,32 +140,6 @@ def load_scene(run_dir: Path, case: Case, wanted_s: float = PICTURE_TIME_S) -> S
     )
 
 
-def check_rendering() -> None:
-    """Render one empty picture in a process of its own, for VTK ends the process where it cannot.
-
-    Raises
-    ------
-    RenderError
-        If that process fails.
-    """
-    _prefer_egl()
-    code = "import pyvista; pyvista.Plotter(off_screen=True, window_size=(8, 8)).screenshot()"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        said = re.sub(r"\x1b\[[0-9;]*m", "", done.stderr).strip().splitlines()
-        raise RenderError(
-            f"off-screen rendering ended with status {done.returncode}: "
-            f"{said[-1] if said else 'no message'}\n  remedy: install EGL with a software driver "
-            "(Debian, Ubuntu: libegl1 and libgl1-mesa-dri)"
-        )
-
-
-def _prefer_egl() -> None:
-    """Spare VTK the search for an X server where there is none."""
-    if sys.platform == "linux" and not os.environ.get("DISPLAY"):
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-
-
 @dataclass(frozen=True)
 class Window:
     """The part of the bowl that a picture shows.
@@ -257,7 +221,7 @@ class Look:
 
 def render(
     run_dir: Path, case: Case, scene: Scene, view: View, look: Look | None = None
-) -> tuple[NDArray[np.uint8], Floats]:
+) -> tuple[Image, Floats]:
     """Render one view in parallel projection.
 
     Returns
@@ -267,37 +231,26 @@ def render(
     extent : (4,) array
         Its left, right, lower and upper edge in mm along the axes of `view`.
     """
-    _prefer_egl()
-    import pyvista as pv
-
     look = Look() if look is None else look
     part = window(case, scene, view)
     low, high = part.low, part.high
     pixels_per_mm = min(look.pixels_per_mm, _MOST_PIXELS / float((high - low).max() * 1e3))
     size = np.ceil((high - low) * 1e3 * pixels_per_mm).astype(int)
-    plotter: Any = pv.Plotter(off_screen=True, window_size=size.tolist(), lighting="light kit")
-    plotter.set_background("white")
-    plotter.enable_anti_aliasing("ssaa")
+    plotter = new_plotter(*size.tolist())
     plotter.enable_depth_peeling(number_of_peels=8)
     _add_bowl(plotter, case, view)
-    _add_workpiece(plotter, run_dir, case, scene)
+    plotter.add_mesh(_workpiece(run_dir, case, scene), color="#59636e", opacity=0.45)
     _add_contacts(plotter, scene.frame, case.media.radius_mean_m, look, part.contacts)
-    away = max(1.0, 2.0 * needed(case.bowl, "bowl").radius_m)
-    _aim(plotter, (low + high) / 2, float(high[1] - low[1]), view, away)
-    image: NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
-    plotter.close()
+    image = photograph(plotter, _camera((low + high) / 2, view, case), float(high[1] - low[1]))
     return image, np.array([low[0], high[0], low[1], high[1]]) * 1e3
 
 
-def _aim(plotter: Any, middle: Floats, height: float, view: View, away_m: float) -> None:
+def _camera(middle: Floats, view: View, case: Case) -> Camera:
+    away = max(1.0, 2.0 * needed(case.bowl, "bowl").radius_m)
     x, other = middle
-    camera = plotter.camera
-    camera.focal_point = (x, other, 0.0) if view == "xy" else (x, 0.0, other)
-    camera.position = (x, other, away_m) if view == "xy" else (x, -away_m, other)
-    camera.up = (0.0, 1.0, 0.0) if view == "xy" else (0.0, 0.0, 1.0)
-    camera.parallel_projection = True
-    camera.parallel_scale = height / 2
-    plotter.renderer.reset_camera_clipping_range()
+    if view == "xy":
+        return Camera((x, other, away), (x, other, 0.0), (0.0, 1.0, 0.0))
+    return Camera((x, -away, other), (x, 0.0, other))
 
 
 def _add_bowl(plotter: Any, case: Case, view: View) -> None:
@@ -320,9 +273,8 @@ def _add_bowl(plotter: Any, case: Case, view: View) -> None:
     plotter.add_mesh(ring, color="#4a5561")
 
 
-def _add_workpiece(plotter: Any, run_dir: Path, case: Case, scene: Scene) -> None:
-    workpiece = placed(workpiece_mesh(run_dir, case), scene.workpiece_m, scene.workpiece_turn_rad)
-    plotter.add_mesh(workpiece, color="#59636e", opacity=0.45)
+def _workpiece(run_dir: Path, case: Case, scene: Scene) -> Any:
+    return placed(workpiece_mesh(run_dir, case), scene.workpiece_m, scene.workpiece_turn_rad)
 
 
 def _add_contacts(

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from io import BytesIO
+from pathlib import Path
 from typing import Any
 
+import matplotlib
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.typing import RcKeyType
 from PIL import Image
+
+from dragchain.files import write_bytes
 
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#6b7480"
 """After Okabe and Ito (2008): told apart with any kind of colour vision."""
@@ -32,6 +38,27 @@ WIDTH_IN = 7.6
 DPI = 150
 
 
+def drawing() -> AbstractContextManager[None]:
+    """A block in which figures are drawn and saved in the style of all figures."""
+    return matplotlib.rc_context(STYLE)
+
+
+def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
+    """A figure without a window: Agg draws it wherever it is saved."""
+    return Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+def legend_below(figure: Figure, axes: Axes, columns: int = 2) -> None:
+    """Put the legend of the axes below the figure."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower left", ncols=columns)
+
+
+def head(figure: Figure, text: str, size: float = 9.5) -> None:
+    """Write the heading of a figure with several axes, at its left edge."""
+    figure.suptitle(text, fontsize=size, x=0.02, ha="left")
+
+
 def png(figure: Figure) -> bytes:
     """A figure as PNG without transparency."""
     drawn, small = BytesIO(), BytesIO()
@@ -39,3 +66,9 @@ def png(figure: Figure) -> bytes:
     with Image.open(drawn) as picture:
         picture.convert("RGB").save(small, format="png", optimize=True)
     return small.getvalue()
+
+
+def save(figure: Figure, file: Path) -> Path:
+    """Write a figure as PNG; it appears under its name only once it is whole."""
+    write_bytes(file, png(figure))
+    return file

@@ -9,14 +9,14 @@ ends it. What happens between two samples is not seen.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.contact_law.hertz import contact_time, effective_modulus
+from dragchain.contact_law.hertz import Elastic, contact_time, effective_modulus
 from dragchain.errors import TableError
 from dragchain.run.case import Case
 from dragchain.run.kinematics import motion_of
@@ -69,10 +69,6 @@ class Thresholds:
             for factor in (0.5, 2.0)
         }
 
-    def as_json(self) -> dict[str, float]:
-        """The limits by name."""
-        return asdict(self)
-
 
 @dataclass(frozen=True)
 class Surfaces:
@@ -113,7 +109,7 @@ def surfaces(case: Case) -> Surfaces:
         raise TableError(f"case.json has no inputs.pairs.{particle}-{workpiece}.friction")
     names = ("youngs_modulus_pa", "poissons_ratio")
     materials = [
-        {name: _number(case, f"materials.{material}.{name}") for name in names}
+        Elastic(*(_number(case, f"materials.{material}.{name}") for name in names))
         for material in (particle, workpiece)
     ]
     modulus = case.fidelity.youngs_modulus_scale * effective_modulus(*materials)

@@ -10,6 +10,7 @@ import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
+from dragchain.files import draft_of
 from dragchain.loading.contact_events import AMOUNTS, POINT
 from dragchain.loading.samples import WORKPIECE, Sampled
 from dragchain.run.case import Case
@@ -90,8 +91,8 @@ def _standard_error(sampled: Sampled, name: str, count: int) -> Floats:
     series (`block_length`); the batches' spread gives the error.
     """
     rows = sampled.rows
-    series = np.bincount(rows["frame"], rows[name], sampled.frames)
-    batches = max(2, sampled.frames // block_length(series[:, None].astype(np.float64)))
+    series = sampled.per_frame(rows[name])
+    batches = max(2, sampled.frames // block_length(series[:, None]))
     batch = rows["frame"].to_numpy() * batches // sampled.frames
     at = batch * count + rows["facet_id"].to_numpy()
     sums = np.bincount(at, rows[name], batches * count).reshape(batches, count)
@@ -107,9 +108,8 @@ def write_vtp(surface: Surface, facets: pd.DataFrame, file: Path) -> None:
     mesh = as_polydata(surface)
     for name in facets:
         mesh.cell_data[name] = facets[name].to_numpy()
-    draft = file.with_name(f".{file.stem}.part.vtp")
-    mesh.save(draft)
-    draft.replace(file)
+    with draft_of(file) as draft:
+        mesh.save(draft)
 
 
 def as_polydata(surface: Surface) -> Any:

@@ -6,20 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from dragchain.drag.around import AZIMUTH_BINS
 from dragchain.drag.azimuth import circumference, parts
-from dragchain.figures import network_picture as scene
-from dragchain.figures.style import BLUE, GREY, STYLE, WIDTH_IN, png
+from dragchain.figures.bars import bars_of, depth_bars
+from dragchain.figures.rendering import Camera, Image, check_rendering, new_plotter, photograph
+from dragchain.figures.style import BLUE, GREY, WIDTH_IN, drawing, head, new_figure, save
+from dragchain.loading.document import Loading, Profile
 from dragchain.loading.facets import as_polydata
 from dragchain.loading.samples import Sampled
 from dragchain.loading.summary import DEPTH_BINS
@@ -65,7 +64,7 @@ def draw_workpiece(
     sampled: Sampled,
     surface: Surface,
     facets: pd.DataFrame,
-    found: dict[str, Any],
+    loading: Loading,
 ) -> Path:
     """Draw ``figures/workpiece.png``: facets of the workpiece by force times sliding distance.
 
@@ -77,34 +76,30 @@ def draw_workpiece(
     RenderError
         If pictures cannot be rendered here.
     """
-    scene.check_rendering()
+    check_rendering()
     cylinder = needed(case.workpiece, "workpiece").kind == "cylinder"
     names = ("front", "rear") if cylinder else tuple(VIEWS)
+    widths = [1.0, 1.0, 2.8, 2.4] if cylinder else [1.0] * 4 + [1.4]
     scale = Normalize(0.0, _largest(facets))
-    with matplotlib.rc_context(STYLE):
-        widths = [1.0, 1.0, 2.8, 2.4] if cylinder else [1.0] * 4 + [1.4]
-        height = _height_in(case, widths[0] / sum(widths))
-        figure = Figure(figsize=(WIDTH_IN, height), layout="constrained")
+    mesh = as_polydata(surface)
+    mesh.cell_data[QUANTITY] = facets[QUANTITY].to_numpy()
+    with drawing():
+        figure = new_figure(_height_in(case, widths[0] / sum(widths)))
         panels = figure.subplots(1, len(widths), sharey=True, width_ratios=widths)
-        mesh = _coloured(surface, facets)
         for axes, name in zip(panels, names, strict=False):
-            _view(axes, mesh, name, scale, case)
+            _view(axes, mesh, VIEWS[name], scale, case)
         if cylinder:
             _unrolled(panels[2], sampled, scale, case)
-        _profile(panels[-1], found)
+        _profile(panels[-1], loading.profiles["depth"])
         panels[0].set_ylabel("depth in mm")
         panels[0].set_ylim(_depths(case)[::-1])
         bar = figure.colorbar(
-            ScalarMappable(scale, COLOURS),
-            ax=panels.tolist(),
-            location="bottom",
-            extend="max",
-            shrink=0.6,
-            aspect=40,
-        )
+            ScalarMappable(scale, COLOURS), ax=panels.tolist(), location="bottom", extend="max",
+            shrink=0.6, aspect=40,
+        )  # fmt: skip
         bar.set_label(LABEL)
-        figure.suptitle(_title(found, case), fontsize=9.5, x=0.02, ha="left")
-        return _save(run_dir / "figures" / "workpiece.png", png(figure))
+        head(figure, _title(loading, case))
+        return save(figure, run_dir / "figures" / "workpiece.png")
 
 
 def _height_in(case: Case, fraction: float) -> float:
@@ -120,15 +115,6 @@ def _half_width(case: Case) -> float:
     return 1.15 * needed(case.workpiece, "workpiece").radius_m
 
 
-def _save(file: Path, picture: bytes) -> Path:
-    """Write a picture to a temporary file and then put it in its place."""
-    file.parent.mkdir(exist_ok=True)
-    draft = file.with_name(f".{file.name}.tmp")
-    draft.write_bytes(picture)
-    draft.replace(file)
-    return file
-
-
 def _largest(facets: pd.DataFrame) -> float:
     """The top of the colour scale: what 99 % of the loaded area stays below."""
     loaded = facets[facets[QUANTITY] > 0.0].sort_values(QUANTITY)
@@ -138,74 +124,43 @@ def _largest(facets: pd.DataFrame) -> float:
     return float(loaded[QUANTITY].to_numpy()[np.searchsorted(fraction, 0.99)])
 
 
-def _coloured(surface: Surface, facets: pd.DataFrame) -> Any:
-    mesh = as_polydata(surface)
-    mesh.cell_data[QUANTITY] = facets[QUANTITY].to_numpy()
-    return mesh
-
-
 def _depths(case: Case) -> tuple[float, float]:
     """The shallowest and the deepest depth that is shown, mm."""
     deepest = needed(case.workpiece, "workpiece").immersion_depth_m * 1e3
     return -0.25 * deepest, 1.06 * deepest
 
 
-def _view(axes: Axes, mesh: Any, name: str, scale: Normalize, case: Case) -> None:
+def _view(axes: Axes, mesh: Any, eye: Eye, scale: Normalize, case: Case) -> None:
     """Set a rendered side of the workpiece on axes of width and depth in mm."""
-    image, half = _render(mesh, name, scale, case), 1e3 * _half_width(case)
+    image, half = _render(mesh, eye, scale, case), 1e3 * _half_width(case)
     high, low = _depths(case)
     axes.imshow(image, extent=(-half, half, low, high), interpolation="antialiased")
     axes.set_aspect("equal", adjustable="datalim")
     axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle="--")
     axes.grid(False)
     axes.set(xlabel="width in mm")
-    eye = VIEWS[name]
     axes.xaxis.set_major_locator(MaxNLocator(2, integer=True))
-    when = eye.motion if _keeps_heading(case) else "(at the start)"
+    when = eye.motion if _keeps_direction(case) else "(at the start)"
     axes.set_title(f"{eye.label}\n{when}", fontsize=8.5)
 
 
-def _keeps_heading(case: Case) -> bool:
+def _keeps_direction(case: Case) -> bool:
     """Whether the workpiece's motion has one direction in its own frame."""
     motion = case.motion
     return not isinstance(motion, Circle) or motion.orientation == "follow_path"
 
 
-def _render(mesh: Any, name: str, scale: Normalize, case: Case) -> NDArray[np.uint8]:
+def _render(mesh: Any, eye: Eye, scale: Normalize, case: Case) -> Image:
     """A side of the workpiece in parallel projection."""
-    import pyvista as pv
-
     high, low = _depths(case)
     height = (low - high) * 1e-3
-    tip = needed(case.workpiece, "workpiece").immersion_depth_m
-    half = _half_width(case)
-    size = (max(8, round(_PIXELS * 2 * half / height)), _PIXELS)
-    plotter: Any = pv.Plotter(off_screen=True, window_size=list(size))
-    plotter.set_background("white")
-    plotter.enable_anti_aliasing("ssaa")
+    plotter = new_plotter(max(8, round(_PIXELS * 2 * _half_width(case) / height)), _PIXELS)
     plotter.add_mesh(
-        mesh,
-        scalars=QUANTITY,
-        cmap=COLOURS,
-        clim=(scale.vmin, scale.vmax),
-        lighting=False,
-        show_edges=True,
-        edge_color="#c9ced6",
-        line_width=0.5,
-        show_scalar_bar=False,
-    )
-    middle = (0.0, 0.0, tip - 0.5e-3 * (high + low))
-    eye = VIEWS[name]
-    camera = plotter.camera
-    camera.focal_point = middle
-    camera.position = (eye.x, eye.y, middle[2])
-    camera.up = (0.0, 0.0, 1.0)
-    camera.parallel_projection = True
-    camera.parallel_scale = height / 2
-    plotter.renderer.reset_camera_clipping_range()
-    image: NDArray[np.uint8] = np.asarray(plotter.screenshot(return_img=True))
-    plotter.close()
-    return image
+        mesh, scalars=QUANTITY, cmap=COLOURS, clim=(scale.vmin, scale.vmax), lighting=False,
+        show_edges=True, edge_color="#c9ced6", line_width=0.5, show_scalar_bar=False,
+    )  # fmt: skip
+    middle = needed(case.workpiece, "workpiece").immersion_depth_m - 0.5e-3 * (high + low)
+    return photograph(plotter, Camera((eye.x, eye.y, middle), (0.0, 0.0, middle)), height)
 
 
 def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> None:
@@ -231,38 +186,23 @@ def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> Non
     axes.set_title("mantle, unrolled\n(dashed: surface at rest)", fontsize=8.5)
 
 
-def _profile(axes: Axes, found: dict[str, Any]) -> None:
+def _profile(axes: Axes, profile: Profile) -> None:
     """Draw force times sliding distance against depth with its interval."""
-    profile = found["profiles"]["depth"]
-    edges = np.asarray(profile["edges"]) * 1e3
-    value, low, high = (
-        1e-3 * np.array(profile["force_slide"][key], dtype=np.float64)
-        for key in ("value", "ci95_low", "ci95_high")
-    )
-    middle = (edges[:-1] + edges[1:]) / 2
-    axes.barh(middle, value, height=0.9 * np.diff(edges), color=BLUE, alpha=0.75)
-    error = np.abs([value - np.minimum(low, value), np.maximum(high, value) - value])
-    axes.errorbar(value, middle, xerr=error, fmt="none", ecolor="black", elinewidth=0.9)
+    depth_bars(axes, profile.edges, bars_of(profile.force_slide, 1e-3), BLUE)
     axes.set(xlabel="force times sliding\nin N m per m of way\nand mm of depth", xlim=(0.0, None))
     axes.set_title("by depth, end included\n(bars: 95 % interval)", fontsize=8.5)
 
 
-def _title(found: dict[str, Any], case: Case) -> str:
-    """Say what the picture is of; shares are unknown where nothing slides."""
-    work, fraction, front = (
-        {key: np.nan if number is None else number for key, number in estimate.items()}
-        for estimate in (
-            found["per_metre"]["friction_work_j"],
-            found["friction_fraction_of_work"],
-            found["front_fraction"]["force_slide_n_m"],
-        )
-    )
+def _title(loading: Loading, case: Case) -> str:
+    """Say what the picture is of; fractions are unknown where nothing slides."""
+    work = loading.per_metre["friction_work_j"]
+    front = loading.front_fraction["force_slide_n_m"]
+    fraction = loading.friction_fraction_of_work.value
     return (
         f"{case.case or case.run}: sliding of particles on the workpiece, "
-        f"{found['path_m'] * 1e3:.0f} mm of"
-        f" its way in {found['time_s']:.1f} s\n"
-        f"friction work {work['value']:.3g} J a metre ({work['ci95_low']:.3g} to {work['ci95_high']:.3g}),"
-        f" {100 * fraction['value']:.1f} % of all work of the workpiece\n"
-        f"front half: {100 * front['value']:.0f} % of force times sliding"
-        f" ({100 * front['ci95_low']:.0f} to {100 * front['ci95_high']:.0f})"
+        f"{loading.path_m * 1e3:.0f} mm of its way in {loading.time_s:.1f} s\n"
+        f"friction work {work.value:.3g} J a metre ({work.ci95_low:.3g} to {work.ci95_high:.3g}),"
+        f" {100 * fraction:.1f} % of all work of the workpiece\n"
+        f"front half: {100 * front.value:.0f} % of force times sliding"
+        f" ({100 * front.ci95_low:.0f} to {100 * front.ci95_high:.0f})"
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
@@ -76,6 +77,11 @@ class Sampled:
     interval_s: float
     path_m: float
     workpiece_impulse_n_s: Floats
+
+    def per_frame(self, weights: ArrayLike | None = None) -> Floats:
+        """Sums of a weight of each row by frame, (frames,); numbers of rows if None."""
+        sums = np.bincount(self.rows["frame"], weights, self.frames)
+        return np.asarray(sums, dtype=np.float64)
 
 
 # --- reading ---------------------------------------------------------------------------------

@@ -2,23 +2,48 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+
+import pandas as pd
 
 from dragchain.errors import TableError
-from dragchain.files import write_json
 from dragchain.loading.contact_events import Thresholds, event_types, find_events
+from dragchain.loading.document import Loading
 from dragchain.loading.facets import check_facets, facet_table, write_vtp
-from dragchain.loading.samples import DRAWN, sample
-from dragchain.loading.summary import findings
-from dragchain.run.case import load_case
-from dragchain.run.workpiece import read_surface
+from dragchain.loading.figure import draw_workpiece
+from dragchain.loading.samples import DRAWN, Sampled, sample
+from dragchain.loading.summary import summarise
+from dragchain.run.case import Case, load_case
+from dragchain.run.workpiece import Surface, read_surface
 from dragchain.tables.parquet import write_parquet
 
 FILE = Path("tables") / "loading.json"
-WRITTEN = ("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp")
+
+
+@dataclass(frozen=True)
+class WorkpieceLoading:
+    """What is computed of a run's loading.
+
+    Attributes
+    ----------
+    case : Case
+    surface : Surface
+        The workpiece.
+    sampled : Sampled
+        All contacts with what the picture shows of them.
+    facets, events : DataFrame
+        Content of ``facets.parquet`` and ``contact_events.parquet``.
+    summary : Loading
+        Content of ``loading.json``.
+    """
+
+    case: Case
+    surface: Surface
+    sampled: Sampled
+    facets: pd.DataFrame
+    events: pd.DataFrame
+    summary: Loading
 
 
 def write_loading(run_dir: Path, limits: Thresholds | None = None) -> list[Path]:
@@ -35,7 +60,7 @@ def write_loading(run_dir: Path, limits: Thresholds | None = None) -> list[Path]
     Returns
     -------
     list of Path
-        `WRITTEN` in ``tables/``, and ``figures/workpiece.png``.
+        Four files in ``tables/``, and ``figures/workpiece.png``.
 
     Raises
     ------
@@ -45,9 +70,22 @@ def write_loading(run_dir: Path, limits: Thresholds | None = None) -> list[Path]
     SeriesError
         If the run is too short for its statistics.
     """
-    from dragchain.loading.figure import draw_workpiece
+    found = compute_loading(run_dir, limits or Thresholds())
+    tables = run_dir / "tables"
+    names = ("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp")
+    facets, events, summary, mesh = files = [tables / name for name in names]
+    write_parquet(found.facets, facets)
+    write_parquet(found.events, events)
+    found.summary.write(summary)
+    write_vtp(found.surface, found.facets, mesh)
+    picture = draw_workpiece(
+        run_dir, found.case, found.sampled, found.surface, found.facets, found.summary
+    )
+    return [*files, picture]
 
-    limits = limits or Thresholds()
+
+def compute_loading(run_dir: Path, limits: Thresholds) -> WorkpieceLoading:
+    """Compute what `write_loading` writes; it raises the same errors."""
     case = load_case(run_dir)
     if case.scene != "process":
         raise TableError(
@@ -55,32 +93,15 @@ def write_loading(run_dir: Path, limits: Thresholds | None = None) -> list[Path]
         )
     sampled = sample(run_dir, case, limits)
     surface = read_surface(run_dir, case)
-    off = check_facets(sampled, surface, case)
+    off_m = check_facets(sampled, surface, case)
     events, event = find_events(sampled.rows, sampled.frames, sampled.interval_s)
     events["type"] = event_types(events, case, sampled.interval_s, limits)
     facets = facet_table(sampled, surface, events)
-    found = findings(sampled, facets, events, event, case, limits)
-    found["closure"]["point_off_facet_max_m"] = off
-    files = [run_dir / "tables" / name for name in WRITTEN]
-    write_parquet(facets, files[0])
-    write_parquet(events.drop(columns="frame"), files[1])
-    write_json(files[2], found)
-    write_vtp(surface, facets, files[3])
-    sampled = replace(sampled, rows=sampled.rows[DRAWN].copy())
-    del event
-    return [*files, draw_workpiece(run_dir, case, sampled, surface, facets, found)]
+    summary = summarise(sampled, facets, events, event, case, limits, off_m)
+    drawn = replace(sampled, rows=sampled.rows[DRAWN].copy())
+    return WorkpieceLoading(case, surface, drawn, facets, events.drop(columns="frame"), summary)
 
 
-def read_loading(run_dir: Path) -> dict[str, Any]:
-    """Read the ``loading.json`` that `write_loading` wrote.
-
-    Raises
-    ------
-    TableError
-        If it is not there.
-    """
-    file = run_dir / FILE
-    if not file.is_file():
-        raise TableError(f"{file}: there is no such file; run `dragchain loading {run_dir}` first")
-    found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    return found
+def read_loading(run_dir: Path) -> Loading:
+    """Read the ``loading.json`` that `write_loading` wrote."""
+    return Loading.read(run_dir / FILE)

@@ -14,7 +14,7 @@ from dragchain.network.chains import chain_table
 from dragchain.network.clusters import cluster_rows, frame_clusters
 from dragchain.network.frame import read_frames
 from dragchain.network.statistics import frame_statistics
-from dragchain.tables.parquet import TableParts, write_parquet
+from dragchain.tables.parquet import table_writer, write_parquet
 
 
 def write_chains(run_dir: Path) -> None:
@@ -31,7 +31,7 @@ def write_chains(run_dir: Path) -> None:
     network: list[dict[str, float]] = []
     grown: list[dict[str, NDArray[Any]]] = []
     tables = run_dir / "tables"
-    with TableParts(tables / "chains.parquet") as found:
+    with table_writer(tables / "chains.parquet") as found:
         for frame in read_frames(run_dir):
             clusters = frame_clusters(frame)
             network.append(frame_statistics(frame, clusters))

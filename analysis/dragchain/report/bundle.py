@@ -1,4 +1,4 @@
-"""A report's files: all are made before the first is written, and each is either whole or not there."""
+"""A report's files: all are made before the first is written, and each appears only whole."""
 
 from __future__ import annotations
 

@@ -6,22 +6,55 @@ describes it.
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import ClassVar
 
-from dragchain.errors import TableError
-from dragchain.run.case import Case
+from pydantic import JsonValue
 
-SCHEMA = 2
+from dragchain.documents import Document, Part
+from dragchain.run.case import AdvisedSettings, Case, changed_inputs
+from dragchain.run.completeness import RunRecord
+from dragchain.statistics.correlated import MeanEstimate
 
 INTERVALS = {"drag_mean": "drag_n", "vertical_mean": "vertical_n"}
 """Quantities of a tolerance of which a run knows an interval, and the force each is a mean of."""
 
-Entry = Mapping[str, Any]
+
+class Settings(Part):
+    """The settings of an option."""
+
+    youngs_modulus_scale: float
+    timestep_fraction: float
+    speed_factor: float
+    ranks: int
+
+
+class Option(Part):
+    """Settings for a case, and what its runs are expected to take with them, by scene."""
+
+    settings: Settings
+    inputs: Mapping[str, JsonValue]
+    steps: Mapping[str, int]
+    steps_per_s: Mapping[str, float]
+    wall_time_s: Mapping[str, float]
+    source: str
+
+
+class AdvisedCase(Part):
+    """A case of ``advice.json``."""
+
+    options: tuple[Option, ...]
+
+
+class Advice(Document):
+    """The content of ``advice.json`` that is set beside the runs."""
+
+    made_by: ClassVar[str] = "dragdeck advise"
+
+    cases: tuple[AdvisedCase, ...]
 
 
 @dataclass(frozen=True)
@@ -32,7 +65,9 @@ class CostRow:
     ----------
     scene : str
     steps, actual_steps : int
-    steps_per_s, actual_steps_per_s : float
+    steps_per_s : float
+    actual_steps_per_s : float or None
+        None for a run too short to measure it.
     wall_time_s, actual_wall_time_s : float
     """
 
@@ -40,7 +75,7 @@ class CostRow:
     steps: int
     actual_steps: int
     steps_per_s: float
-    actual_steps_per_s: float
+    actual_steps_per_s: float | None
     wall_time_s: float
     actual_wall_time_s: float
 
@@ -50,71 +85,64 @@ class CostRow:
         return self.actual_wall_time_s / self.wall_time_s
 
 
-def read_advice(file: Path) -> list[Entry]:
-    """The options of all cases of an ``advice.json``.
+@dataclass(frozen=True)
+class RunInterval:
+    """Mean of one run with its 95 % interval, N, and the relative half-width of that."""
 
-    Raises
-    ------
-    TableError
-        It is not there, or another dragdeck wrote it.
-    """
-    if not file.is_file():
-        raise TableError(f"{file}: there is no such file; run `dragdeck advise` first")
-    known = json.loads(file.read_text(encoding="utf-8"))
-    if known.get("schema") != SCHEMA:
-        raise TableError(
-            f"{file}: its schema is {known.get('schema')!r}, this dragchain reads {SCHEMA}"
-        )
-    return [option for case in known["cases"] for option in case["options"]]
+    mean: float
+    ci95_low: float
+    ci95_high: float
+    fraction: float
 
 
-def prediction_for(case: Case, options: list[Entry]) -> Entry | None:
+def read_advice(file: Path) -> list[Option]:
+    """The options of all cases of an ``advice.json``."""
+    return [option for case in Advice.read(file).cases for option in case.options]
+
+
+def prediction_for(case: Case, options: Sequence[Option]) -> Option | None:
     """The option that a process run is: same settings, same inputs; None where there is none."""
     return next((option for option in options if _is_of(case, option)), None)
 
 
-def _is_of(case: Case, option: Entry) -> bool:
-    settings, fidelity = option["settings"], case.fidelity
-    names = ("youngs_modulus_scale", "timestep_fraction", "speed_factor", "ranks")
-    same = all(math.isclose(settings[name], getattr(fidelity, name)) for name in names)
-    return same and option["inputs"] == dict(case.inputs)
+def _is_of(case: Case, option: Option) -> bool:
+    same = all(math.isclose(value, getattr(case.fidelity, name)) for name, value in option.settings)
+    return same and not changed_inputs(case.inputs, option.inputs)
 
 
-def cost_rows(option: Entry, records: Mapping[str, Entry]) -> Iterator[CostRow]:
+def cost_rows(option: Option, records: Mapping[str, RunRecord]) -> Iterator[CostRow]:
     """Predicted and actual cost of every run that the option says something of.
 
     Parameters
     ----------
-    option : mapping
+    option : Option
     records : mapping
         ``run.json`` by scene.
     """
-    for scene, steps in option["steps"].items():
+    for scene, steps in option.steps.items():
         if scene in records:
             record = records[scene]
             yield CostRow(
                 scene,
                 steps,
-                record["steps"],
-                option["steps_per_s"][scene],
-                record["steps_per_s"],
-                option["wall_time_s"][scene],
-                record["wall_time_s"],
+                record.steps,
+                option.steps_per_s[scene],
+                record.steps_per_s,
+                option.wall_time_s[scene],
+                record.wall_time_s,
             )
 
 
-def actual_interval(asked: Entry, forces: Entry) -> dict[str, float] | None:
-    """Mean and 95 % interval of the quantity asked about, N, and its relative half-width.
+def actual_interval(
+    asked: AdvisedSettings | None, forces: Mapping[str, MeanEstimate]
+) -> RunInterval | None:
+    """Mean and 95 % interval of the quantity asked about.
 
-    None where a single run has no interval of it.
+    None where nothing was asked, or a single run has no interval of it.
     """
-    name = INTERVALS.get(asked["quantity"])
-    if name is None or not forces[name]["mean"]:
+    name = INTERVALS.get(asked.quantity) if asked else None
+    if name is None or not forces[name].mean:
         return None
-    mean, low, high = (float(forces[name][key]) for key in ("mean", "ci95_low", "ci95_high"))
-    return {
-        "mean": mean,
-        "ci95_low": low,
-        "ci95_high": high,
-        "fraction": abs((high - low) / (2 * mean)),
-    }
+    force = forces[name]
+    half_width = abs((force.ci95_high - force.ci95_low) / (2 * force.mean))
+    return RunInterval(force.mean, force.ci95_low, force.ci95_high, half_width)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field, PositiveFloat, PositiveInt, model_validator
+from pydantic import Field, JsonValue, PositiveFloat, PositiveInt, model_validator
 
 from dragchain.documents import Document, Part
 
-Scene = Literal["drop_test", "filling", "process"]
+Scene = Literal["drop_test", "filling", "process", "impact", "column"]
 OutputKind = Literal["print", "custom", "local"]
 
 
@@ -94,8 +94,63 @@ class Assumption(Part):
     """A value that the study's source does not give."""
 
     field: str
-    value: Any
+    value: JsonValue
     why: str
+
+
+class ContactModuli(Part):
+    """Effective moduli E* and G* of the contact of two bodies, softened as the run is, Pa."""
+
+    modulus_pa: PositiveFloat
+    shear_pa: PositiveFloat
+
+
+class SettlingCriterion(Part):
+    """When a bed rests: mean kinetic energy of a particle over m g d."""
+
+    energy_ratio: PositiveFloat
+
+
+class Impacts(Part):
+    """How the bodies of a scene of single impacts meet; the contact time is Hertz's."""
+
+    speed_m_s: PositiveFloat
+    normal_speed_m_s: PositiveFloat
+    size_ratio: float
+    effective_radius_m: PositiveFloat
+    effective_mass_kg: PositiveFloat
+    effective_modulus_pa: PositiveFloat
+    contact_time_s: PositiveFloat
+
+
+class LoadedPacking(Part):
+    """Particles at rest under gravity times a factor."""
+
+    packing: Literal["stack", "bed"]
+    load_factor: PositiveFloat
+
+
+class AdvisedSettings(Part):
+    """The tolerance that a run's settings were chosen for, and what is expected of them.
+
+    ``held_to`` is the tolerance that the settings meet: the asked one, or less outside of the
+    measured range. ``error``, its interval and the ``bound`` of its size are None for the
+    reference; ``half_width`` is that of the relative 95 % interval of one run's value.
+    """
+
+    tolerance: float
+    quantity: str
+    label: str
+    held_to: float
+    error: float | None
+    ci95_low: float | None
+    ci95_high: float | None
+    bound: float | None
+    relative_cost: float
+    half_width: float | None
+    outside: tuple[str, ...]
+    fallback: str | None
+    source: str
 
 
 class Statistics(Part):
@@ -120,13 +175,17 @@ class Reference(Part):
 
 
 class Case(Document):
-    """The content of ``case.json``.
+    """The content of ``case.json`` of a run of a study.
 
-    ``bowl`` is None in a drop test; ``case``, ``workpiece``, ``motion``, ``surface_m``
-    and ``statistics`` are None outside a process; ``restitution`` is None outside a
-    drop test. ``numbers`` are the dimensionless numbers of a process; ``asked`` is
-    the tolerance that its settings were chosen for, if any.
+    ``case``, ``workpiece``, ``motion``, ``surface_m`` and ``statistics`` are None outside a
+    process; ``restitution`` is None outside a drop test, ``settled`` outside a filling,
+    ``impact`` outside single impacts and ``column`` outside particles at rest under load.
+    ``contact_moduli`` are those of a particle with a ``particle``, the ``bowl`` and the
+    ``workpiece``; ``numbers`` are the dimensionless numbers of a process; ``asked`` is the
+    tolerance that its settings were chosen for, if any.
     """
+
+    made_by: ClassVar[str] = "dragdeck step render"
 
     study: str
     scene: Scene
@@ -137,7 +196,8 @@ class Case(Document):
     rayleigh_time_s: PositiveFloat
     gravity_m_s2: float
     fidelity: Fidelity
-    inputs: Mapping[str, Any]
+    inputs: Mapping[str, JsonValue]
+    contact_moduli: Mapping[str, ContactModuli] = {}
     numbers: Mapping[str, float] = {}
     media: Media
     bowl: Bowl | None = None
@@ -147,10 +207,13 @@ class Case(Document):
     phases: tuple[Phase, ...]
     statistics: Statistics | None = None
     restitution: float | None = None
+    settled: SettlingCriterion | None = None
+    impact: Impacts | None = None
+    column: LoadedPacking | None = None
     assumptions: tuple[Assumption, ...]
     reference: Reference | None = None
     versions: Mapping[str, str]
-    asked: Mapping[str, Any] | None = None
+    asked: AdvisedSettings | None = None
 
     @model_validator(mode="after")
     def _of_its_scene(self) -> Self:
@@ -158,6 +221,8 @@ class Case(Document):
             "drop_test": ("restitution",),
             "filling": ("bowl",),
             "process": ("bowl", "case", "workpiece", "motion", "surface_m", "statistics"),
+            "impact": ("impact",),
+            "column": ("bowl", "column"),
         }
         for name in needed[self.scene]:
             assert getattr(self, name) is not None, f"{name} is missing, which a {self.scene} has"
@@ -166,6 +231,17 @@ class Case(Document):
                 f"phases: {after.name} does not start where {before.name} ends"
             )
         return self
+
+
+def changed_inputs(
+    own: Mapping[str, JsonValue], other: Mapping[str, JsonValue]
+) -> dict[str, JsonValue]:
+    """Inputs of a run that differ from another's, by dotted name, with the run's own values.
+
+    A study without an optional value may leave its name out or write null: both are None here.
+    """
+    names = sorted({*own, *other})
+    return {name: own.get(name) for name in names if own.get(name) != other.get(name)}
 
 
 class Output(Part):
@@ -209,6 +285,8 @@ class Output(Part):
 
 class Columns(Document):
     """The content of ``columns.json``."""
+
+    made_by: ClassVar[str] = "dragdeck step render"
 
     outputs: Mapping[str, Output]
 

@@ -1,14 +1,16 @@
-"""The force on the workpiece: phases, workpiece frame, counted samples, peaks."""
+"""How the workpiece moves: phases of a run, paths, the workpiece's frame, counted samples."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TypeVar
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dragchain.arrays import Floats
+from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.run.case import Case, Circle, Line, Phase
 
@@ -21,7 +23,7 @@ def drag_start_s(case: Case) -> float:
 T = TypeVar("T")
 
 
-def phase_codes(steps: NDArray[np.int64], phases: Sequence[Phase]) -> NDArray[np.int8]:
+def phase_codes(steps: Ints, phases: Sequence[Phase]) -> NDArray[np.int8]:
     """Phase of each step, as an index into `phases`.
 
     A phase owns the steps after its start up to and including its end: the
@@ -56,7 +58,7 @@ def phase_codes(steps: NDArray[np.int64], phases: Sequence[Phase]) -> NDArray[np
     return np.searchsorted(ends, steps, side="left").astype(np.int8)
 
 
-def counted_mask(steps: NDArray[np.int64], case: Case) -> NDArray[np.bool_]:
+def counted_mask(steps: Ints, case: Case) -> NDArray[np.bool_]:
     """Mark the samples that statistics use: those of the drag, after the transient.
 
     Parameters
@@ -95,17 +97,113 @@ def needed(value: T | None, name: str) -> T:
 
 def motion_of(case: Case) -> Circle | Line:
     """The motion of the workpiece in the drag."""
-    if case.motion is None:
-        raise TableError("case.json has no motion, which these tables need")
-    return case.motion
+    motion: Circle | Line = needed(case.motion, "motion")
+    return motion
 
 
-def directions(steps: NDArray[np.int64], ref_xy_m: Floats, case: Case) -> Floats:
+@dataclass(frozen=True)
+class Path(ABC):
+    """How the workpiece is driven in the drag.
+
+    Attributes
+    ----------
+    axis_speed_m_s : float
+        Speed of the workpiece's axis.
+    start_direction_rad : float
+        Direction of motion when the drag begins, from x towards y.
+    """
+
+    axis_speed_m_s: float
+    start_direction_rad: float
+
+    @abstractmethod
+    def directions(self, ref_xy_m: Floats) -> Floats:
+        """Direction of motion, (N,), where the reference point is at (N, 2) places, m."""
+
+    def velocity(self, point_m: Floats, direction_rad: Floats) -> Floats:
+        """Horizontal velocity, (N, 2) in m/s, of (N, 3) points that are fixed to the workpiece."""
+        across = np.column_stack([np.cos(direction_rad), np.sin(direction_rad)])
+        return self.axis_speed_m_s * across
+
+    def turn(self, direction_rad: Floats) -> Floats:
+        """Angle of the workpiece's own frame about the vertical at (N,) directions of motion."""
+        return direction_rad
+
+
+@dataclass(frozen=True)
+class LinePath(Path):
+    """A straight line, along which the workpiece moves without turning."""
+
+    @classmethod
+    def of(cls, motion: Line) -> LinePath:
+        """The path of a motion."""
+        return cls(motion.axis_speed_m_s, motion.direction_rad)
+
+    def directions(self, ref_xy_m: Floats) -> Floats:
+        """The line's direction everywhere."""
+        return np.full(len(ref_xy_m), wrap_angle(self.start_direction_rad))
+
+
+@dataclass(frozen=True)
+class CirclePath(Path):
+    """A circle about the bowl's axis, with a workpiece that is moved without turning.
+
+    Attributes
+    ----------
+    sign : int
+        1 for a counter-clockwise path, -1 for a clockwise one.
+    radius_m : float
+        Of the axis' path.
+    """
+
+    sign: int
+    radius_m: float
+
+    @classmethod
+    def of(cls, motion: Circle) -> CirclePath:
+        """The path of a motion."""
+        kind = CirclePath if motion.orientation == "fixed" else TurningCirclePath
+        speed, start = motion.axis_speed_m_s, motion.start_direction_rad
+        return kind(speed, start, motion.sign, motion.radius_m)
+
+    def directions(self, ref_xy_m: Floats) -> Floats:
+        """``sign * z x r`` with r the unit vector from the bowl's axis to the reference point."""
+        radial = np.arctan2(ref_xy_m[:, 1], ref_xy_m[:, 0])
+        return wrap_angle(radial + self.sign * np.pi / 2.0)
+
+    def turn(self, direction_rad: Floats) -> Floats:
+        """The first direction, which the workpiece keeps."""
+        return np.full_like(direction_rad, self.start_direction_rad)
+
+
+@dataclass(frozen=True)
+class TurningCirclePath(CirclePath):
+    """A circle whose workpiece turns with it: ``w x r`` with ``w = sign speed / radius``."""
+
+    def velocity(self, point_m: Floats, direction_rad: Floats) -> Floats:
+        """Velocity of a rotation about the bowl's axis."""
+        turning = self.sign * self.axis_speed_m_s / self.radius_m
+        return turning * np.column_stack([-point_m[:, 1], point_m[:, 0]])
+
+    def turn(self, direction_rad: Floats) -> Floats:
+        """The direction of motion."""
+        return direction_rad
+
+
+PATHS: Mapping[str, Callable[[Any], Path]] = {"circle": CirclePath.of, "line": LinePath.of}
+"""The path of each kind of motion."""
+
+
+def path_of(case: Case) -> Path:
+    """How the workpiece is driven in the drag."""
+    motion = motion_of(case)
+    return PATHS[motion.kind](motion)
+
+
+def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:
     """Direction of the workpiece's motion in the horizontal plane.
 
-    On a circle that is ``sense * z x r`` with r the unit vector from the
-    bowl's axis to the reference point, in the drag; before it, the direction
-    with which the drag starts. On a line it is the line's direction.
+    In the drag that of its path; before it, the direction with which the drag starts.
 
     Parameters
     ----------
@@ -121,23 +219,13 @@ def directions(steps: NDArray[np.int64], ref_xy_m: Floats, case: Case) -> Floats
     (N,) ndarray
         Angles from x towards y, rad, in (-pi, pi].
     """
-    motion = motion_of(case)
-    if not isinstance(motion, Circle):
-        return np.full(len(steps), wrap_angle(motion.direction_rad))
-    radial = np.arctan2(ref_xy_m[:, 1], ref_xy_m[:, 0])
-    tangential = wrap_angle(radial + motion.sign * np.pi / 2.0)
-    start = wrap_angle(motion.start_direction_rad)
-    return np.where(steps > drag_phase(case).start_step, tangential, start)
+    path = path_of(case)
+    start = wrap_angle(path.start_direction_rad)
+    return np.where(steps > drag_phase(case).start_step, path.directions(ref_xy_m), start)
 
 
-def workpiece_velocity(
-    steps: NDArray[np.int64], point_m: Floats, ref_xy_m: Floats, case: Case
-) -> Floats:
+def workpiece_velocity(steps: Ints, point_m: Floats, ref_xy_m: Floats, case: Case) -> Floats:
     """Velocity of points that are fixed to the workpiece, in the drag.
-
-    A workpiece that turns with its circle rotates about the bowl's axis, w x r with
-    w = sense speed / radius; every other workpiece is moved without turning, along
-    its heading.
 
     Parameters
     ----------
@@ -156,15 +244,9 @@ def workpiece_velocity(
         Velocities, m/s; NaN outside of the drag, of which alone ``case.json``
         gives the motion.
     """
-    motion = motion_of(case)
     drag = drag_phase(case)
-    if isinstance(motion, Circle) and motion.orientation == "follow_path":
-        turning = motion.sign * motion.axis_speed_m_s / motion.radius_m
-        along = turning * np.column_stack([-point_m[:, 1], point_m[:, 0]])
-    else:
-        heading = directions(steps, ref_xy_m, case)
-        along = motion.axis_speed_m_s * np.column_stack([np.cos(heading), np.sin(heading)])
-    velocity = np.column_stack([along, np.zeros(len(steps))])
+    across = path_of(case).velocity(point_m, directions(steps, ref_xy_m, case))
+    velocity = np.column_stack([across, np.zeros(len(steps))])
     dragged = (steps > drag.start_step) & (steps <= drag.end_step)
     return np.where(dragged[:, None], velocity, np.nan)
 

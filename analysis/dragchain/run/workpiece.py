@@ -10,8 +10,8 @@ import numpy as np
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.case import Case, Circle
-from dragchain.run.kinematics import motion_of, needed
+from dragchain.run.case import Case
+from dragchain.run.kinematics import needed, path_of
 
 
 def workpiece_mesh(run_dir: Path, case: Case) -> Any:
@@ -24,10 +24,14 @@ def workpiece_mesh(run_dir: Path, case: Case) -> Any:
     """
     import pyvista as pv
 
-    path = run_dir / needed(case.workpiece, "workpiece").mesh
-    if not path.is_file():
-        raise TableError(f"{path} is not there, though case.json names it as the workpiece's mesh")
-    return pv.read(path)
+    return pv.read(_mesh_file(run_dir, case))
+
+
+def _mesh_file(run_dir: Path, case: Case) -> Path:
+    file = run_dir / needed(case.workpiece, "workpiece").mesh
+    if not file.is_file():
+        raise TableError(f"{file} is not there, though case.json names it as the workpiece's mesh")
+    return file
 
 
 def placed(workpiece: Any, workpiece_m: Floats, turn_rad: float) -> Any:
@@ -74,10 +78,7 @@ class Surface:
 
 def workpiece_turn(direction_rad: Floats, case: Case) -> Floats:
     """Angle of the workpiece's own frame about the vertical at these directions, rad."""
-    motion = motion_of(case)
-    if isinstance(motion, Circle) and motion.orientation == "fixed":
-        return np.full_like(direction_rad, motion.start_direction_rad)
-    return direction_rad
+    return path_of(case).turn(direction_rad)
 
 
 def turned(vectors: Floats, angle_rad: Floats | float) -> Floats:
@@ -100,17 +101,11 @@ def read_surface(run_dir: Path, case: Case) -> Surface:
     """
     import meshio
 
-    workpiece = needed(case.workpiece, "workpiece")
-    file = run_dir / workpiece.mesh
-    if not file.is_file():
-        raise TableError(f"{file} is not there, though case.json names it as the workpiece's mesh")
     with np.errstate(over="ignore"):
-        mesh = meshio.read(file)
+        mesh = meshio.read(_mesh_file(run_dir, case))
     corners = np.asarray(mesh.points[mesh.cells_dict["triangle"]], dtype=np.float64)
-    motion = motion_of(case)
-    if workpiece.kind == "cylinder":
-        start = motion.start_direction_rad if isinstance(motion, Circle) else motion.direction_rad
-        corners = turned(corners, -start)
+    if needed(case.workpiece, "workpiece").kind == "cylinder":
+        corners = turned(corners, -path_of(case).start_direction_rad)
     return Surface(corners)
 
 

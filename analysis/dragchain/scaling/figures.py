@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
 from dragchain.figures.style import BLUE, GREEN, ORANGE, STYLE, WIDTH_IN
+from dragchain.report.notation import MINUS
+from dragchain.scaling.document import CurvePoint, ScaledRun, ScalingFile
 
 INK = "#1d2733"
 LEAST_SPAN = 2.5
@@ -24,31 +26,9 @@ SIDEWAYS = 0.015
 
 TICKS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 
-NAMES: Mapping[str, tuple[str, str, float]] = {
-    "motion.immersion_depth_m": ("depth of the tip", "mm", 1e3),
-    "workpiece.shape.radius_m": ("radius of the workpiece", "mm", 1e3),
-    "motion.speed_m_s": ("speed of the workpiece", "mm/s", 1e3),
-}
-"""Label, unit and factor to that unit of fields that have a plain name."""
 
-
-def axis_name(field: str) -> tuple[str, str, float]:
-    """Label, unit and factor of a field: its own name if it has no plainer one."""
-    if field in NAMES:
-        return NAMES[field]
-    if field.startswith("pairs.") and field.endswith(".friction"):
-        return f"friction coefficient, {field.split('.')[1].replace('-', ' on ')}", "", 1.0
-    return field, "", 1.0
-
-
-def draw_scaling(found: Mapping[str, Any]) -> Figure:
-    """One scaling: runs, means of the levels, the law with its band, the expected slope.
-
-    Parameters
-    ----------
-    found : mapping
-        Content of ``scaling.json``.
-    """
+def draw_scaling(found: ScalingFile) -> Figure:
+    """One scaling: runs, means of the levels, the law with its band, the expected slope."""
     figure = Figure(figsize=(0.72 * WIDTH_IN, 3.9), layout="constrained")
     axes = figure.subplots()
     _panel(axes, found)
@@ -56,35 +36,26 @@ def draw_scaling(found: Mapping[str, Any]) -> Figure:
     return figure
 
 
-def draw_scalings(scalings: Sequence[Mapping[str, Any]]) -> Figure:
-    """Draw several scalings, two side by side.
-
-    Parameters
-    ----------
-    scalings : sequence of mapping
-        Content of each ``scaling.json``.
-    """
+def draw_scalings(scalings: Sequence[ScalingFile]) -> Figure:
+    """Draw several scalings, two side by side."""
     with matplotlib.rc_context(STYLE):
         columns = min(2, len(scalings))
         rows = math.ceil(len(scalings) / 2)
         figure = Figure(figsize=(1.2 * WIDTH_IN, 3.35 * rows + 0.5), layout="constrained")
-        panels = figure.subplots(rows, columns, squeeze=False)
-        for axes, found in zip(panels.flat, scalings, strict=False):
+        panels = figure.subplots(rows, columns, squeeze=False).flat
+        named: dict[str, Artist] = {}
+        for axes, found in zip(panels, scalings, strict=False):
             _panel(axes, found)
-        for axes in panels.flat[len(scalings) :]:
+            handles, labels = axes.get_legend_handles_labels()
+            named |= dict(zip(labels, handles, strict=True))
+        for axes in panels[len(scalings) :]:
             axes.set_visible(False)
-        named: dict[str, Any] = {}
-        for axes in panels.flat[: len(scalings)]:
-            named |= {
-                label: handle
-                for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-            }
         figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=4)
         return figure
 
 
-def _panel(axes: Axes, found: Mapping[str, Any]) -> None:
-    label, unit, factor = axis_name(found["field"])
+def _panel(axes: Axes, found: ScalingFile) -> None:
+    label, unit, factor = found.axis
     axes.set(xscale="log", yscale="log")
     _law(axes, found, factor)
     _points(axes, found, factor)
@@ -94,70 +65,63 @@ def _panel(axes: Axes, found: Mapping[str, Any]) -> None:
     _ticks(axes, found, factor)
 
 
-def _title(found: Mapping[str, Any]) -> str:
-    judged = found["fit_within"] or found["fit"]
-    exponent = judged["exponent"]
-    words = f"exponent {_signed(exponent['value'])}"
-    words += f" ({_signed(exponent['ci95_low'])} to {_signed(exponent['ci95_high'])})"
-    expected = found["expected"]["exponent"]
-    return words if expected is None else f"{words}, expected {expected:g}: {found['verdict']}"
-
-
-def _signed(value: float) -> str:
-    return f"{round(value, 2) + 0.0:.2f}".replace("-", "\N{MINUS SIGN}")
-
-
-def _law(axes: Axes, found: Mapping[str, Any], factor: float) -> None:
-    judged = found["fit_within"] or found["fit"]
-    curve = judged["curve"]
-    x = factor * np.array([point["x"] for point in curve])
-    low, value, high = (
-        np.array([point[name] for point in curve]) for name in ("ci95_low", "value", "ci95_high")
+def _title(found: ScalingFile) -> str:
+    exponent, expected = found.judged.exponent, found.expected.exponent
+    value, low, high = (
+        f"{round(number, 2) + 0.0:.2f}".replace("-", MINUS)
+        for number in (exponent.value, exponent.ci95_low, exponent.ci95_high)
     )
+    words = f"exponent {value} ({low} to {high})"
+    return words if expected is None else f"{words}, expected {expected:g}: {found.verdict}"
+
+
+def _law(axes: Axes, found: ScalingFile, factor: float) -> None:
+    judged, whole = found.judged, found.fit.curve
+    x = factor * np.array([point.x for point in judged.curve])
+    low, high = ([getattr(p, end) for p in judged.curve] for end in ("ci95_low", "ci95_high"))
     axes.fill_between(x, low, high, color=BLUE, alpha=0.15, lw=0, label="95 % band of the law")
-    axes.plot(x, value, color=BLUE, lw=1.8, label="fitted power law")
-    if found["fit_within"]:
-        _whole(axes, found["fit"]["curve"], factor)
-    expected = found["expected"]["exponent"]
-    if expected is not None:
-        centre = judged["centre"]
-        middle = judged["drag_at_centre_n"]["value"]
-        every = np.array([point["x"] for point in found["fit"]["curve"]])
-        slope = middle * (every / centre) ** expected
+    _curve(axes, judged.curve, factor, "-", BLUE, 1.8, "fitted power law")
+    if found.fit_within:
+        _curve(axes, whole, factor, ":", BLUE, 1.2, "power law over all levels")
+    if found.expected.exponent is not None:
+        middle = judged.drag_at_centre_n.value
+        every = np.array([point.x for point in whole])
+        slope = middle * (every / judged.centre) ** found.expected.exponent
         axes.plot(factor * every, slope, "--", color=ORANGE, lw=1.4, label="expected slope")
-
-    if found["shifted"]:
-        _shifted(axes, found["shifted"]["curve"], factor)
-
-
-def _shifted(axes: Axes, curve: Sequence[Mapping[str, float]], factor: float) -> None:
-    x = factor * np.array([point["x"] for point in curve])
-    values = [point["value"] for point in curve]
-    axes.plot(x, values, "-.", color=GREEN, lw=1.2, label="expected power of level + offset")
+    if found.shifted:
+        words = "expected power of level + offset"
+        _curve(axes, found.shifted.curve, factor, "-.", GREEN, 1.2, words)
 
 
-def _whole(axes: Axes, curve: Sequence[Mapping[str, float]], factor: float) -> None:
-    x = factor * np.array([point["x"] for point in curve])
-    values = [point["value"] for point in curve]
-    axes.plot(x, values, ":", color=BLUE, lw=1.2, label="power law over all levels")
+def _curve(
+    axes: Axes,
+    curve: Sequence[CurvePoint],
+    factor: float,
+    line: str,
+    colour: str,
+    width: float,
+    label: str,
+) -> None:
+    x = factor * np.array([point.x for point in curve])
+    axes.plot(x, [point.value for point in curve], line, color=colour, lw=width, label=label)
 
 
-def _points(axes: Axes, found: Mapping[str, Any], factor: float) -> None:
-    levels = [level for level in found["levels"] if level["runs"] > 1]
+def _points(axes: Axes, found: ScalingFile, factor: float) -> None:
+    levels = [level for level in found.levels if level.runs > 1]
     axes.plot(
-        [factor * level["x"] for level in levels],
-        [level["drag_n"]["value"] for level in levels],
+        [factor * level.x for level in levels],
+        [level.drag_n.value for level in levels],
         "_",
         ms=17,
         mew=2.0,
         color=INK,
         label="mean of a level",
     )
-    runs = found["runs"]
+    runs = found.runs
     axes.errorbar(
-        [factor * run["level"] * beside for run, beside in zip(runs, _beside(runs), strict=True)],
-        [run["drag_n"] for run in runs],
-        yerr=[run["standard_error_n"] for run in runs],
+        [factor * run.level * beside for run, beside in zip(runs, _beside(runs), strict=True)],
+        [run.drag_n for run in runs],
+        yerr=[run.standard_error_n for run in runs],
         fmt="o",
         ms=4.0,
         mfc="white",
@@ -168,16 +132,16 @@ def _points(axes: Axes, found: Mapping[str, Any], factor: float) -> None:
     )
 
 
-def _beside(runs: Sequence[Mapping[str, Any]]) -> list[float]:
+def _beside(runs: Sequence[ScaledRun]) -> list[float]:
     """Factors on the levels of runs that put beds side by side."""
-    beds = sorted({run["bed"] for run in runs})
+    beds = sorted({run.bed for run in runs})
     middle = 0.5 * (len(beds) - 1)
-    return [1.0 + SIDEWAYS * (beds.index(run["bed"]) - middle) for run in runs]
+    return [1.0 + SIDEWAYS * (beds.index(run.bed) - middle) for run in runs]
 
 
-def _ticks(axes: Axes, found: Mapping[str, Any], factor: float) -> None:
+def _ticks(axes: Axes, found: ScalingFile, factor: float) -> None:
     """Every level on the horizontal axis, round numbers on the vertical."""
-    levels = [factor * level["x"] for level in found["levels"]]
+    levels = [factor * level.x for level in found.levels]
     axes.set_xlim(levels[0] / PAD, levels[-1] * PAD)
     axes.xaxis.set_major_locator(FixedLocator(levels))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
-from dragchain.statistics.shared_bed import Whitened, alike, same
+from dragchain.statistics.shared_bed import Effects, Whitened, alike, same
 
 Combination = tuple[tuple[str, Hashable], ...]
 """Factors and their levels, those of the reference left out."""
@@ -28,34 +28,22 @@ LARGEST_FRACTION = 0.98
 
 
 @dataclass(frozen=True)
-class Fit:
-    """Effects with their covariance.
+class Fit(Effects):
+    """Effects of settings.
 
     Attributes
     ----------
-    effects : (P,) ndarray
-    covariance : (P, P) ndarray
     residual_std : float
         Standard deviation of one run about its settings' effects, bed included.
     bed_fraction : float
         The part of that variance which runs from the same bed have in common.
-    degrees : int
-        Degrees of freedom.
     residuals : (N,) ndarray
-        Whitened: independent and of equal variance if the model holds.
+        Whitened: independent and of equal variance if the model is right.
     """
 
-    effects: Floats
-    covariance: Floats
     residual_std: float
     bed_fraction: float
-    degrees: int
     residuals: Floats
-
-    def contrast(self, weights: Floats) -> tuple[float, float]:
-        """A combination of the effects, (P,), and its standard error."""
-        variance = float(weights @ self.covariance @ weights)
-        return float(weights @ self.effects), float(np.sqrt(max(variance, 0.0)))
 
 
 def fit_effects(
@@ -94,7 +82,7 @@ def fit_effects(
     variance = float(model.residuals @ model.residuals) / model.degrees
     covariance = np.asarray(variance * model.covariance)
     std = float(np.sqrt(variance))
-    return Fit(model.effects, covariance, std, bed_fraction, model.degrees, model.residuals)
+    return Fit(model.effects, covariance, model.degrees, std, bed_fraction, model.residuals)
 
 
 def _best_fraction(design: Floats, values: Floats, same_bed: Floats) -> float:

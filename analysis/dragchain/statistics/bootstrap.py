@@ -1,8 +1,7 @@
-"""The numbers that figures and report show, each computed in one place.
+"""Intervals of statistics of frames in a row, by a circular block bootstrap.
 
-Everything that follows a counted stretch of the drag in time is autocorrelated, so intervals come
-from a circular block bootstrap over frames (Politis and Romano 1992) and associations from
-circular shifts; neither takes neighbouring frames for independent.
+Whatever is sampled along the path is autocorrelated; resampling blocks of frames (Politis and
+Romano 1992) does not take neighbouring frames for independent.
 """
 
 from __future__ import annotations
@@ -18,9 +17,6 @@ from dragchain.statistics.estimate import CONFIDENCE, Estimate
 
 RESAMPLES = 2000
 SEED = 20150101
-
-
-# --- block bootstrap -------------------------------------------------------------------------
 
 
 def block_length(sums: Floats) -> int:

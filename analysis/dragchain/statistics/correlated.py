@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy import stats as distributions
+from numpy.typing import ArrayLike
 
+from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
+from dragchain.statistics.estimate import CONFIDENCE, student_quantile
 
 MIN_SAMPLES = 8
 """Fewer samples carry no autocorrelation worth estimating."""
@@ -26,7 +27,7 @@ class MeanEstimate:
 
     Attributes
     ----------
-    mean, sd : float
+    mean, std : float
         Mean and standard deviation (divisor N - 1), in the unit of the series.
     samples : int
         N.
@@ -57,10 +58,10 @@ class MeanEstimate:
     reliable: bool
 
 
-def estimate_mean(series: ArrayLike, *, confidence: float = 0.95) -> MeanEstimate:
+def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanEstimate:
     """Mean of a correlated series, with an interval that allows for the correlation.
 
-    The standard error is ``sd / sqrt(n)`` with ``n = N / (2 tau)`` (Sokal 1997,
+    The standard error is ``std / sqrt(n)`` with ``n = N / (2 tau)`` (Sokal 1997,
     section 2), the interval Student's t with n - 1 degrees of freedom (1 at
     the least).
 
@@ -90,7 +91,7 @@ def estimate_mean(series: ArrayLike, *, confidence: float = 0.95) -> MeanEstimat
     tau = autocorrelation_time(samples)
     effective = count / (2.0 * tau)
     error = std / np.sqrt(effective)
-    quantile = distributions.t.ppf(0.5 + 0.5 * confidence, max(effective - 1.0, 1.0))
+    quantile = student_quantile(max(effective - 1.0, 1.0), confidence)
     return MeanEstimate(
         mean=mean,
         std=std,
@@ -146,7 +147,7 @@ def autocorrelation_time(series: ArrayLike) -> float:
     return max(0.5, float(sums[window]) * unbiased)
 
 
-def autocovariance(series: ArrayLike) -> NDArray[np.float64]:
+def autocovariance(series: ArrayLike) -> Floats:
     """Autocovariance of a series about its mean, by fast Fourier transform.
 
     Parameters
@@ -166,7 +167,7 @@ def autocovariance(series: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(products / np.arange(count, 0, -1))
 
 
-def _checked(series: ArrayLike) -> NDArray[np.float64]:
+def _checked(series: ArrayLike) -> Floats:
     samples = np.asarray(series, dtype=np.float64)
     if samples.ndim != 1 or len(samples) < MIN_SAMPLES:
         raise SeriesError(

@@ -5,21 +5,56 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import AllowInfNan, BeforeValidator
 
 CONFIDENCE = 0.95
 """Level of every interval."""
 
 
+def finite(number: float) -> float | None:
+    """The number, or None where JSON has no way to write it."""
+    return float(number) if np.isfinite(number) else None
+
+
+def _nan_for_none(number: object) -> object:
+    return math.nan if number is None else number
+
+
+def _none_for_nan(number: object) -> object:
+    return None if isinstance(number, float) and not math.isfinite(number) else number
+
+
+Real = Annotated[float, AllowInfNan(True), BeforeValidator(_nan_for_none)]
+"""A number of a document that is NaN in Python and null in JSON where it is not known."""
+
+Known = Annotated[float | None, BeforeValidator(_none_for_nan)]
+"""A number of a document that is None where it is not known; NaN becomes None."""
+
+
 @dataclass(frozen=True)
 class Estimate:
-    """A number with its 95 % confidence interval, NaN where it is not known."""
+    """A number with its 95 % confidence interval, NaN where it is not known.
 
-    value: float
-    ci95_low: float
-    ci95_high: float
+    It may be a field of a document, whose JSON then has null for NaN.
+    """
+
+    value: Real
+    ci95_low: Real
+    ci95_high: Real
+
+    @classmethod
+    def around(cls, value: float, half_width: float) -> Estimate:
+        """The value with an interval that is symmetric about it."""
+        return cls(value, value - half_width, value + half_width)
+
+    @property
+    def known(self) -> bool:
+        """Whether the value and its interval are finite."""
+        return all(math.isfinite(number) for number in vars(self).values())
 
     def contains(self, value: float) -> bool:
         """Whether a value is within the interval."""
@@ -46,9 +81,19 @@ class Estimate:
         }
 
 
-def finite(number: float) -> float | None:
-    """The number, or None where JSON has no way to write it."""
-    return float(number) if np.isfinite(number) else None
+@dataclass(frozen=True)
+class EstimateColumns:
+    """Estimates of a document as columns, NaN in Python and null in JSON where not known."""
+
+    value: tuple[Real, ...]
+    ci95_low: tuple[Real, ...]
+    ci95_high: tuple[Real, ...]
+
+    @classmethod
+    def of(cls, estimates: Sequence[Estimate]) -> EstimateColumns:
+        """The columns of estimates."""
+        names = ("value", "ci95_low", "ci95_high")
+        return cls(*(tuple(getattr(one, name) for one in estimates) for name in names))
 
 
 def estimate_columns(estimates: Sequence[Estimate]) -> dict[str, list[float | None]]:
@@ -73,8 +118,7 @@ def normal_quantile(confidence: float = CONFIDENCE) -> float:
 
 def t_interval(value: float, se: float, degrees: float) -> Estimate:
     """The value with its interval, from its standard error and the degrees of freedom."""
-    half = student_quantile(degrees) * se
-    return Estimate(value, value - half, value + half)
+    return Estimate.around(value, student_quantile(degrees) * se)
 
 
 def mean_of(values: ArrayLike) -> Estimate:

@@ -1,8 +1,8 @@
 """Generalised least squares of runs, some of which start from the same bed.
 
 How much those have in common is estimated by the restricted likelihood (Patterson and Thompson
-1971, Biometrika 58, 545), which differs with what else is known: `dragchain.effects` estimates
-one variance of all runs, `dragchain.powerlaw` what comes on top of each run's known error.
+1971, Biometrika 58, 545), which differs with what else is known: `bed_effects` estimates one
+variance of all runs, `power_law` what comes on top of each run's known error.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dragchain.arrays import Floats
+from dragchain.statistics.estimate import Estimate, student_quantile
 
 
 def same(labels: Sequence[Hashable]) -> Floats:
@@ -86,3 +88,36 @@ class Whitened:
         """
         _, triangle = np.linalg.qr(self.design)
         return float(np.log(np.diag(self.root)).sum() + np.log(np.abs(np.diag(triangle))).sum())
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Effects of a linear model with their covariance.
+
+    Attributes
+    ----------
+    effects : (P,) ndarray
+    covariance : (P, P) ndarray
+    degrees : int
+        Degrees of freedom of an interval.
+    """
+
+    effects: Floats
+    covariance: Floats
+    degrees: int
+
+    @property
+    def quantile(self) -> float:
+        """Half-width of a 95 % interval in standard errors, of Student's t."""
+        return student_quantile(self.degrees)
+
+    def contrast(self, weights: ArrayLike) -> tuple[float, float]:
+        """A combination of the effects, weights (P,), and its standard error."""
+        row = np.asarray(weights, dtype=np.float64)
+        variance = float(row @ self.covariance @ row)
+        return float(row @ self.effects), float(np.sqrt(max(variance, 0.0)))
+
+    def estimate(self, weights: ArrayLike) -> Estimate:
+        """A combination of the effects, weights (P,), with its interval."""
+        value, error = self.contrast(weights)
+        return Estimate.around(value, self.quantile * error)

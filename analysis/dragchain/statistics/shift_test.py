@@ -2,7 +2,7 @@
 
 A shift moves all events of a run by the same number of frames, round the end to the beginning. It
 keeps the autocorrelation of the series and the spacing of the events and breaks only what ties the
-one to the other (as the associations of `dragchain.findings` do). Runs are shifted independently
+one to the other. Runs are shifted independently
 of each other, so their joint null distribution is that of the mean over runs of one shift each.
 """
 
@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import t as student
 
 from dragchain.arrays import Floats, Ints
+from dragchain.statistics.estimate import CONFIDENCE, Estimate, student_quantile
 
 SHIFTS = 19_999
 """Random shifts of the joint null distribution: the smallest p-value is 1 in 20,000."""
@@ -33,29 +33,22 @@ class Window:
 
 
 @dataclass(frozen=True)
-class ShiftTest:
+class ShiftTest(Estimate):
     """A statistic at the events against its null distribution.
+
+    Its value is the mean over the runs, NaN if no run has one; its interval comes from the spread
+    over the runs (`mean_over_runs`).
 
     Attributes
     ----------
-    value : float
-        Mean over the runs; NaN if no run has a value.
-    low, high : float
-        95 % interval from the spread over the runs (Student's t); NaN for fewer than two.
     p_greater, p_less, p_two_sided : float
         Share of shifts, the true position included, whose statistic is at least as large, as
         small, or as far from the mean of the null distribution.
-    by_run : sequence of float
-        The statistic of every run.
     """
 
-    value: float
-    ci95_low: float
-    ci95_high: float
     p_greater: float
     p_less: float
     p_two_sided: float
-    by_run: tuple[float, ...]
 
 
 def shifted_means(series: Floats, events: Ints, window: Window) -> Floats:
@@ -116,9 +109,7 @@ def joint(by_shift: Sequence[Floats], shifts: Ints) -> Floats:
     shifts : (S, R) ndarray of int
         A shift for each run, modulo its number of frames.
     """
-    drawn = np.stack(
-        [run[shifts[:, at] % len(run)] for at, run in enumerate(by_shift)], axis=0
-    )  # fmt: skip
+    drawn = np.stack([run[shifts[:, at] % len(run)] for at, run in enumerate(by_shift)])
     there = np.isfinite(drawn)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(there, drawn, 0.0).sum(axis=0) / there.sum(axis=0))
@@ -144,18 +135,18 @@ def shift_test(
     zero = np.zeros((1, len(by_shift)), dtype=np.int64)
     value = float(reduce(joint(by_shift, zero))[0])
     null = reduce(joint(by_shift, shifts))
-    runs = tuple(float(reduce(run[:1])[0]) for run in by_shift)
     if not np.isfinite(value):
-        return ShiftTest(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, runs)
+        return ShiftTest(*[np.nan] * 6)
+    over_runs = mean_over_runs([float(reduce(run[:1])[0]) for run in by_shift])
     null = null[np.isfinite(null)]
     middle = null.mean()
     return ShiftTest(
         value,
-        *interval(runs),
+        over_runs.ci95_low,
+        over_runs.ci95_high,
         _p_value(null >= value - _ROUNDING),
         _p_value(null <= value + _ROUNDING),
         _p_value(np.abs(null - middle) >= abs(value - middle) - _ROUNDING),
-        runs,
     )
 
 
@@ -163,15 +154,19 @@ def _p_value(reached: np.typing.NDArray[np.bool_]) -> float:
     return float((1 + reached.sum()) / (1 + len(reached)))
 
 
-def interval(values: ArrayLike, confidence: float = 0.95) -> tuple[float, float]:
-    """Return Student's t interval of the mean of independent values, NaN for fewer than two."""
-    known = np.asarray(values, dtype=np.float64)
-    known = known[np.isfinite(known)]
-    if len(known) < 2:
-        return float("nan"), float("nan")
-    reach = student.ppf(0.5 + confidence / 2, len(known) - 1) * known.std(ddof=1)
-    reach /= np.sqrt(len(known))
-    return float(known.mean() - reach), float(known.mean() + reach)
+def mean_over_runs(values: ArrayLike) -> Estimate:
+    """The mean of one number per run with Student's t interval; runs without a number are left out.
+
+    The interval is NaN for fewer than two runs, the mean for none.
+    """
+    numbers = np.asarray(values, dtype=np.float64)
+    numbers = numbers[np.isfinite(numbers)]
+    count = numbers.size
+    mean = float(numbers.mean()) if count else np.nan
+    if count < 2:
+        return Estimate(mean, np.nan, np.nan)
+    half = student_quantile(count - 1) * numbers.std(ddof=1) / np.sqrt(count)
+    return Estimate.around(mean, float(half))
 
 
 def band(by_shift: Sequence[Floats], shifts: Ints, lags: Ints) -> float:
@@ -195,7 +190,7 @@ def band(by_shift: Sequence[Floats], shifts: Ints, lags: Ints) -> float:
     for lag in lags:
         curve = joint(by_shift, shifts + lag)
         np.maximum(largest, np.abs(np.nan_to_num(curve)), out=largest)
-    return float(np.quantile(largest, 0.95))
+    return float(np.quantile(largest, CONFIDENCE))
 
 
 def holm(p_values: ArrayLike) -> Floats:

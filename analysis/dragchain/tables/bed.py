@@ -2,16 +2,48 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from dragchain.arrays import Floats
+from dragchain.documents import Document
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
 
 
-def describe_bed(particles: Frame, case: Case) -> dict[str, object]:
+class Packing(Document):
+    """A settled bed: ``packing.json``.
+
+    Attributes
+    ----------
+    bed_height_m : float
+        See `bed_height`.
+    top_m : float
+        The highest point of any particle.
+    solid_fraction : float
+        Volume of the particles over that of the bowl up to the bed's height.
+    radius_std_m : float
+        Divisor N, as the study states it.
+    kinetic_energy_ratio : float
+        Mean translational kinetic energy of a particle over what the mean particle gains in a
+        fall through its own diameter, ``mean(m v^2 / 2) / (mean(m) g d)``.
+    """
+
+    made_by: ClassVar[str] = "dragchain tables"
+
+    bed_height_m: float
+    top_m: float
+    solid_fraction: float
+    n_particles: int
+    radius_mean_m: float
+    radius_std_m: float
+    kinetic_energy_ratio: float
+
+
+def describe_bed(particles: Frame, case: Case) -> Packing:
     """Describe a settled bed.
 
     Parameters
@@ -20,17 +52,6 @@ def describe_bed(particles: Frame, case: Case) -> dict[str, object]:
         The last frame of ``particles``, N particles.
     case : Case
         The case of the fill.
-
-    Returns
-    -------
-    dict
-        The content of ``packing.json``: ``bed_height_m`` (see `bed_height`),
-        ``top_m`` (the highest point of any particle), ``solid_fraction`` (volume of
-        the particles over that of the bowl up to the fill height), ``particles``,
-        ``radius_mean_m``, ``radius_std_m`` (divisor N, as the study states it)
-        and ``kinetic_energy_ratio``, the mean translational kinetic energy of a
-        particle over what the mean particle gains in a fall through its own diameter,
-        ``mean(m v^2 / 2) / (mean(m) g d)``.
 
     Raises
     ------
@@ -48,15 +69,15 @@ def describe_bed(particles: Frame, case: Case) -> dict[str, object]:
     mass = volume * case.media.density_kg_m3
     energy = 0.5 * mass * (particles.vectors("vx_m_s", "vy_m_s", "vz_m_s") ** 2).sum(axis=1)
     scale = mass.mean() * case.gravity_m_s2 * 2.0 * radius.mean()
-    return {
-        "bed_height_m": height,
-        "top_m": float((particles.columns["z_m"] + radius).max()),
-        "solid_fraction": float(volume.sum() / (np.pi * bowl_radius**2 * height)),
-        "n_particles": particles.rows,
-        "radius_mean_m": float(radius.mean()),
-        "radius_std_m": float(radius.std()),
-        "kinetic_energy_ratio": float(energy.mean() / scale),
-    }
+    return Packing(
+        bed_height_m=height,
+        top_m=float((particles.columns["z_m"] + radius).max()),
+        solid_fraction=float(volume.sum() / (np.pi * bowl_radius**2 * height)),
+        n_particles=particles.rows,
+        radius_mean_m=float(radius.mean()),
+        radius_std_m=float(radius.std()),
+        kinetic_energy_ratio=float(energy.mean() / scale),
+    )
 
 
 def bed_height(centre_m: Floats, radius_m: Floats, bowl_radius_m: float) -> float:

@@ -1,15 +1,14 @@
-"""The force closure acceptance check.
-
-The forces on the particles must add up to the force on the workpiece.
-"""
+"""Whether the contacts on the workpiece add up to the force on the workpiece."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from dragchain.arrays import Floats
+from dragchain.documents import Document
 from dragchain.tables.workpiece_contacts import WorkpieceFrame
 
 LIMIT = 1e-6
@@ -21,6 +20,59 @@ particle that touches both has one force, which is shared out by estimate."""
 
 FLOOR_N = 1e-3
 """Smaller forces on the workpiece do not serve as the scale of the error."""
+
+
+class ClosureRecord(Document):
+    """``closure.json``: whether the forces on the workpiece close, and what else was seen.
+
+    Attributes
+    ----------
+    frames, worst_step, max_relative, max_n
+        Frames that were checked, and the worst of them: its step, its error relative to the
+        force and in N.
+    opening_frames, opening_max_relative
+        The same of frames that open a file (see `Frame`).
+    unplaced_forces, unplaced_max_n
+        Forces on particles without a contact.
+    silent_contacts, silent_evaluated_max_n
+        Contacts that carry no force, and the largest force that LIGGGHTS evaluated for one.
+    evaluated_max_n, evaluated_counted_max_relative, evaluated_counted_mean_relative
+        Error of the forces that LIGGGHTS evaluated for output; relative in the frames that
+        statistics use, None without any.
+    """
+
+    made_by: ClassVar[str] = "dragchain tables"
+
+    verdict: Literal["pass", "fail"]
+    problem: str | None
+    limit: float
+    force_floor_n: float
+    frames: int
+    worst_step: int | None
+    max_relative: float
+    max_n: float
+    opening_frames: int
+    opening_max_relative: float
+    contacts: int
+    unplaced_forces: int
+    unplaced_max_n: float
+    silent_contacts: int
+    silent_evaluated_max_n: float
+    evaluated_max_n: float
+    evaluated_counted_max_relative: float | None
+    evaluated_counted_mean_relative: float | None
+
+
+@dataclass(frozen=True)
+class _Error:
+    """How far the forces of one step miss the force on the workpiece."""
+
+    step: int
+    gap_n: float
+    relative: float
+    evaluated_n: float
+    evaluated_relative: float
+    counted: bool
 
 
 @dataclass
@@ -39,19 +91,13 @@ class Closure:
     """
 
     limit: float = LIMIT
-    frames: int = 0
     contacts: int = 0
-    opening: int = 0
-    opening_worst: float = 0.0
     silent: int = 0
-    unplaced: int = 0
-    worst_step: int | None = None
-    worst: float = 0.0
-    worst_n: float = 0.0
-    unplaced_max_n: float = 0.0
     silent_max_n: float = 0.0
-    evaluated_max_n: float = 0.0
-    _evaluated: list[float] = field(default_factory=list)
+    unplaced: int = 0
+    unplaced_max_n: float = 0.0
+    _errors: list[_Error] = field(default_factory=list)
+    _opening: list[_Error] = field(default_factory=list)
 
     def add(
         self, frame: WorkpieceFrame, workpiece_force_n: Floats | None, *, counted: bool
@@ -60,7 +106,7 @@ class Closure:
 
         Parameters
         ----------
-        frame : RodFrame
+        frame : WorkpieceFrame
             The contacts.
         workpiece_force_n : (3,) ndarray or None
             Force on the workpiece at this step; None if it was not written.
@@ -73,49 +119,31 @@ class Closure:
             False for a frame that opens a file and whose forces are not the
             applied ones.
         """
-        self._add_contacts(frame)
-        if workpiece_force_n is None:
-            return True
-        scale = max(float(np.linalg.norm(workpiece_force_n)), FLOOR_N)
-        applied = frame.workpiece.force_n.sum(axis=0) + frame.unplaced_n.sum(axis=0)
-        gap_n = float(np.linalg.norm(applied + workpiece_force_n))
-        if frame.opening:
-            self.opening += 1
-            self.opening_worst = max(self.opening_worst, gap_n / scale)
-            return gap_n / scale <= self.limit
-        self.frames += 1
-        if self.worst_step is None or gap_n / scale > self.worst:
-            self.worst_step, self.worst, self.worst_n = frame.step, gap_n / scale, gap_n
-        evaluated_n = float(
-            np.linalg.norm(frame.workpiece.evaluated_n.sum(axis=0) + workpiece_force_n)
-        )
-        self.evaluated_max_n = max(self.evaluated_max_n, evaluated_n)
-        if counted:
-            self._evaluated.append(evaluated_n / scale)
-        return True
-
-    def _add_contacts(self, frame: WorkpieceFrame) -> None:
-        workpiece = frame.workpiece
-        self.contacts += len(workpiece)
-        self.silent += int(workpiece.silent.sum())
-        self.silent_max_n = max(
-            self.silent_max_n, _largest(workpiece.evaluated_n[workpiece.silent])
-        )
+        contacts = frame.workpiece
+        silent_n = contacts.evaluated_n[contacts.silent]
+        self.contacts += len(contacts)
+        self.silent += len(silent_n)
+        self.silent_max_n = max(self.silent_max_n, _largest(silent_n))
         self.unplaced += len(frame.unplaced_n)
         self.unplaced_max_n = max(self.unplaced_max_n, _largest(frame.unplaced_n))
+        if workpiece_force_n is None:
+            return True
+        error = _error(frame, workpiece_force_n, counted)
+        (self._opening if frame.opening else self._errors).append(error)
+        return not frame.opening or error.relative <= self.limit
 
     def problem(self) -> str | None:
-        """What is wrong, or None if the acceptance check holds."""
-        if self.frames == 0:
+        """What is wrong, or None if the acceptance check passes."""
+        if not self._errors:
             return (
                 "no step has both workpiece_force and workpiece_particles, so closure "
                 "cannot be tested"
             )
-        if self.worst > self.limit:
+        worst = _worst(self._errors)
+        if worst.relative > self.limit:
             return (
-                f"at step {self.worst_step} the forces on the particles miss the force on "
-                f"the workpiece"
-                f" by {self.worst_n:.3g} N, {self.worst:.3g} of it (limit {self.limit:g})"
+                f"at step {worst.step} the forces on the particles miss the force on the workpiece"
+                f" by {worst.gap_n:.3g} N, {worst.relative:.3g} of it (limit {self.limit:g})"
             )
         if self.unplaced_max_n > FLOOR_N:
             return (
@@ -124,30 +152,43 @@ class Closure:
             )
         return None
 
-    def content(self) -> dict[str, object]:
-        """What ``closure.json`` holds."""
-        problem = self.problem()
-        relative = np.array(self._evaluated)
-        return {
-            "verdict": "pass" if problem is None else "fail",
-            "problem": problem,
-            "limit": self.limit,
-            "force_floor_n": FLOOR_N,
-            "frames": self.frames,
-            "worst_step": self.worst_step,
-            "max_relative": self.worst,
-            "max_n": self.worst_n,
-            "opening_frames": self.opening,
-            "opening_max_relative": self.opening_worst,
-            "contacts": self.contacts,
-            "unplaced_forces": self.unplaced,
-            "unplaced_max_n": self.unplaced_max_n,
-            "silent_contacts": self.silent,
-            "silent_evaluated_max_n": self.silent_max_n,
-            "evaluated_max_n": self.evaluated_max_n,
-            "evaluated_counted_max_relative": float(relative.max()) if relative.size else None,
-            "evaluated_counted_mean_relative": float(relative.mean()) if relative.size else None,
-        }
+    def record(self) -> ClosureRecord:
+        """The content of ``closure.json``."""
+        problem, worst = self.problem(), _worst(self._errors) if self._errors else None
+        evaluated = np.array([one.evaluated_relative for one in self._errors if one.counted])
+        return ClosureRecord(
+            verdict="pass" if problem is None else "fail",
+            problem=problem,
+            limit=self.limit,
+            force_floor_n=FLOOR_N,
+            frames=len(self._errors),
+            worst_step=worst.step if worst else None,
+            max_relative=worst.relative if worst else 0.0,
+            max_n=worst.gap_n if worst else 0.0,
+            opening_frames=len(self._opening),
+            opening_max_relative=max((one.relative for one in self._opening), default=0.0),
+            contacts=self.contacts,
+            unplaced_forces=self.unplaced,
+            unplaced_max_n=self.unplaced_max_n,
+            silent_contacts=self.silent,
+            silent_evaluated_max_n=self.silent_max_n,
+            evaluated_max_n=max((one.evaluated_n for one in self._errors), default=0.0),
+            evaluated_counted_max_relative=float(evaluated.max()) if evaluated.size else None,
+            evaluated_counted_mean_relative=float(evaluated.mean()) if evaluated.size else None,
+        )
+
+
+def _error(frame: WorkpieceFrame, workpiece_force_n: Floats, counted: bool) -> _Error:
+    scale = max(float(np.linalg.norm(workpiece_force_n)), FLOOR_N)
+    applied = frame.workpiece.force_n.sum(axis=0) + frame.unplaced_n.sum(axis=0)
+    gap = float(np.linalg.norm(applied + workpiece_force_n))
+    evaluated = frame.workpiece.evaluated_n.sum(axis=0)
+    evaluated_gap = float(np.linalg.norm(evaluated + workpiece_force_n))
+    return _Error(frame.step, gap, gap / scale, evaluated_gap, evaluated_gap / scale, counted)
+
+
+def _worst(errors: list[_Error]) -> _Error:
+    return max(errors, key=lambda error: error.relative)
 
 
 def _largest(vectors: Floats) -> float:

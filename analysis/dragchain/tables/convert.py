@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from dragchain.dumps.any_dump import dump_files, output_of, steps_of_rows
+from dragchain.dumps.any_dump import dump_files, layout_of
 from dragchain.dumps.fast_reader import read_batches
 from dragchain.errors import DumpError
+from dragchain.tables.parquet import table_writer
 
 
 def dump_to_parquet(
@@ -32,15 +33,13 @@ def dump_to_parquet(
     TruncatedDumpError, DumpError
         As in `read_dump`. The table then holds the frames before, as the error says.
     """
-    from dragchain.tables.parquet import TableWriter
-
     files = dump_files(source)
-    output = output_of(files[0], columns)
+    output = layout_of(files[0], columns)
     frames, broken = 0, None
-    with TableWriter(Path(target), ("step", *output.columns)) as table:
+    with table_writer(Path(target), ("step", *output.columns)) as table:
         try:
             for batch in read_batches(files, output):
-                table.write({"step": steps_of_rows(batch), **batch.columns})
+                table.write({"step": batch.steps_of_rows(), **batch.columns})
                 frames += len(batch.steps)
         except DumpError as error:
             broken = error

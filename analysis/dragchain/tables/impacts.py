@@ -8,26 +8,38 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from dragchain.arrays import Floats, Ints
 from dragchain.dumps.frame import Columns
 from dragchain.errors import TableError
 from dragchain.tables.by_step import read_table
-
-IMPACTS = (
-    *("impact", "start_time_s", "duration_s", "peak_force_n"),
-    *("speed_in_m_s", "speed_out_m_s", "restitution", "time_since_first_s"),
-)
-"""Columns of ``impacts.parquet``."""
+from dragchain.tables.parquet import Rows
 
 
-def find_impacts(rows: Columns, timestep_s: float) -> dict[str, NDArray[np.generic]]:
+def speed_at_plate(speed_m_s: Floats, gap_m: Floats, gravity_m_s2: float) -> Floats:
+    """Speed with which a particle in free flight passes the plate's surface, m/s.
+
+    ``sqrt(v^2 + 2 g gap)``, exact without drag. The restitution of an impact is the ratio
+    of two such speeds: gravity between the surface and a sample is not in it.
+
+    Parameters
+    ----------
+    speed_m_s, gap_m : (N,) ndarray
+        Speed and height of the particle's lowest point above the surface, m/s and m.
+    gravity_m_s2 : float
+    """
+    return np.asarray(np.sqrt(np.square(speed_m_s) + 2 * gravity_m_s2 * np.asarray(gap_m)))
+
+
+def find_impacts(
+    rows: Columns, timestep_s: float, radius_m: float, gravity_m_s2: float
+) -> Rows:
     """Measure every impact in the samples around them.
 
     The samples are split where steps are missing. In each stretch an impact is
     an unbroken run of samples with a force, the short pull at the end included
     that an unlimited damper gives; it starts with the first of them and lasts
-    as many steps as there are. The speeds are those of the sample
-    before and of the sample after it, both in free flight, so one step of
-    gravity off at the most.
+    as many steps as there are. The speeds are those at the plate's surface, from the
+    sample before and the sample after it, both in free flight (`speed_at_plate`).
 
     Parameters
     ----------
@@ -35,6 +47,9 @@ def find_impacts(rows: Columns, timestep_s: float) -> dict[str, NDArray[np.gener
         ``step time_s z_m vz_m_s force_n``, steps increasing.
     timestep_s : float
         The time step, s.
+    radius_m : float
+        Of the particle; the plate's surface is at z = 0.
+    gravity_m_s2 : float
 
     Returns
     -------
@@ -54,9 +69,12 @@ def find_impacts(rows: Columns, timestep_s: float) -> dict[str, NDArray[np.gener
     _check_stretches(steps, stretch, touching)
     first, last = _runs(touching)
     speed = np.asarray(rows["vz_m_s"], dtype=np.float64)
-    speed_in, speed_out = -speed[first - 1], speed[last + 1]
-    if not ((speed_in > 0.0) & (speed_out > 0.0)).all():
+    if not ((speed[first - 1] < 0.0) & (speed[last + 1] > 0.0)).all():
         raise TableError("a particle does not come down before, or go up after, one of its impacts")
+    gap = np.asarray(rows["z_m"], dtype=np.float64) - radius_m
+    speed_in, speed_out = (
+        speed_at_plate(speed[near], gap[near], gravity_m_s2) for near in (first - 1, last + 1)
+    )
     start = np.asarray(rows["time_s"], dtype=np.float64)[first]
     force = np.asarray(rows["force_n"], dtype=np.float64)
     return {
@@ -71,9 +89,7 @@ def find_impacts(rows: Columns, timestep_s: float) -> dict[str, NDArray[np.gener
     }
 
 
-def _check_stretches(
-    steps: NDArray[np.int64], stretch: NDArray[np.int64], touching: NDArray[np.bool_]
-) -> None:
+def _check_stretches(steps: Ints, stretch: Ints, touching: NDArray[np.bool_]) -> None:
     if not touching.any():
         raise TableError("impacts holds no sample with a force: the particle never met the plate")
     begins = np.flatnonzero(np.diff(stretch, prepend=stretch[0] - 1))
@@ -86,7 +102,7 @@ def _check_stretches(
             raise TableError(f"{where}: they begin or end inside an impact; widen the window")
 
 
-def _runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _runs(mask: NDArray[np.bool_]) -> tuple[Ints, Ints]:
     """First and last index of each run of true values."""
     edges = np.diff(mask.astype(np.int8), prepend=0, append=0)
     return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1

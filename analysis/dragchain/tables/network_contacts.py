@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dragchain.arrays import Floats, Ints, places
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
+from dragchain.tables.columns import CENTRE, FLOOR_FORCES, FORCES, SIDE_FORCES
 from dragchain.tables.workpiece_contacts import WallContacts, tangential_force
 
 KINDS = ("particle-particle", "particle-workpiece", "particle-floor", "particle-side")
@@ -17,11 +18,6 @@ KINDS = ("particle-particle", "particle-workpiece", "particle-floor", "particle-
 
 BODY = {"particle-workpiece": 0, "particle-floor": -1, "particle-side": -2}
 """``b_id`` of the bodies that are not particles."""
-
-_CENTRE = ("x_m", "y_m", "z_m")
-_FORCE = ("force_x_n", "force_y_n", "force_z_n")
-_FLOOR = ("floor_force_x_n", "floor_force_y_n", "floor_force_z_n")
-_SIDE = ("side_force_x_n", "side_force_y_n", "side_force_z_n")
 
 
 @dataclass(frozen=True)
@@ -108,35 +104,33 @@ def contact_rows(
         raise TableError(
             f"contacts has step {contacts.step} where particles has step {particles.step}"
         )
-    order = np.argsort(particles.columns["particle_id"])
+    particles = particles.take(np.argsort(particles.ids("particle_id")))
     known = _Particles(
         particles.step,
-        np.asarray(particles.columns["particle_id"][order], dtype=np.int64),
-        particles.vectors(*_CENTRE)[order],
-        np.asarray(particles.columns["radius_m"][order], dtype=np.float64),
+        particles.ids("particle_id"),
+        particles.vectors(*CENTRE),
+        np.asarray(particles.columns["radius_m"], dtype=np.float64),
     )
     twice = np.flatnonzero(np.diff(known.ids) == 0)
     if twice.size:
         raise TableError(
             f"step {particles.step}: particles has particle {int(known.ids[twice[0]])} twice"
         )
-    smallest = float(known.radii.min(initial=np.inf))
     groups = [
         _particle_particle(known, contacts),
         _mesh(workpiece.select(~workpiece.silent), "particle-workpiece"),
-        *_meshed_bowl(bowl.select(~bowl.silent), smallest),
+        *_meshed_bowl(bowl.select(~bowl.silent), float(known.radii.min(initial=np.inf))),
     ]
-    if _FLOOR[0] in particles.columns:
-        groups.append(_floor(known, particles.vectors(*_FLOOR)[order]))
-    if _SIDE[0] in particles.columns:
-        groups.append(_side(known, particles.vectors(*_SIDE)[order], bowl_radius_m))
+    if FLOOR_FORCES[0] in particles.columns:
+        groups.append(_floor(known, particles.vectors(*FLOOR_FORCES)))
+    if SIDE_FORCES[0] in particles.columns:
+        groups.append(_side(known, particles.vectors(*SIDE_FORCES), bowl_radius_m))
     return _joined(groups)
 
 
 def _particle_particle(particles: _Particles, contacts: Frame) -> ContactRows:
     """Contact point: centre 1 + (R1 - overlap / 2) n, with n from particle 1 to particle 2."""
-    first = np.asarray(contacts.columns["particle1_id"], dtype=np.int64)
-    second = np.asarray(contacts.columns["particle2_id"], dtype=np.int64)
+    first, second = contacts.ids("particle1_id"), contacts.ids("particle2_id")
     at_first, at_second = particles.rows_of(first), particles.rows_of(second)
     centre = particles.centres[at_first]
     between = particles.centres[at_second] - centre
@@ -144,7 +138,7 @@ def _particle_particle(particles: _Particles, contacts: Frame) -> ContactRows:
     overlap = np.asarray(contacts.columns["overlap_m"], dtype=np.float64)
     point = centre + (particles.radii[at_first] - 0.5 * overlap)[:, None] * away
     return _rows(
-        "particle-particle", first, second, point, contacts.vectors(*_FORCE), -away, overlap
+        "particle-particle", first, second, point, contacts.vectors(*FORCES), -away, overlap
     )
 
 

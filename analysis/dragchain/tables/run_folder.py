@@ -4,11 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 from dragchain.dumps.frame import Columns, Frame
 from dragchain.dumps.run_parts import iter_frames, iter_prints
+from dragchain.errors import TableError
 from dragchain.run.case import Case, Output, load_case, load_outputs
+from dragchain.tables.workpiece_contacts import WorkpieceFrame, join_workpiece_frame
+
+
+@dataclass(frozen=True)
+class WorkpiecePair:
+    """``workpiece_particles`` and ``workpiece_contacts`` of one step, not joined yet."""
+
+    particles: Frame
+    contacts: Frame
+
+    @property
+    def step(self) -> int:
+        """The step."""
+        return self.particles.step
+
+    def join(self) -> WorkpieceFrame:
+        """Give every contact the force that its particle received; see `join_workpiece_frame`."""
+        return join_workpiece_frame(self.particles, self.contacts)
 
 
 @dataclass(frozen=True)
@@ -49,3 +69,25 @@ class Run:
     def prints(self, name: str) -> Iterator[Columns]:
         """Blocks of rows of a ``fix print`` output."""
         return iter_prints(self.folder, self.outputs[name])
+
+    def workpiece_pairs(self) -> Iterator[WorkpiecePair]:
+        """What `workpiece_frames` joins, for those who need some steps only."""
+        pairs = zip_longest(self.frames("workpiece_particles"), self.frames("workpiece_contacts"))
+        for particles, contacts in pairs:
+            if particles is None or contacts is None:
+                raise TableError(
+                    "one of workpiece_particles and workpiece_contacts ends before the other"
+                )
+            yield WorkpiecePair(particles, contacts)
+
+    def workpiece_frames(self) -> Iterator[WorkpieceFrame]:
+        """Contacts on the workpiece, step by step.
+
+        Raises
+        ------
+        TableError
+            If the two outputs have different steps, or a particle comes twice.
+        DumpError
+            If one of them cannot be read.
+        """
+        return (pair.join() for pair in self.workpiece_pairs())

@@ -2,33 +2,23 @@
 
 ``workpiece_contacts`` says where the particles touch the workpiece, but its forces are
 evaluated a second time for output; ``workpiece_particles`` says what force each particle
-received. One `RodFrame` joins the two for one step.
+received. One `WorkpieceFrame` joins the two for one step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import zip_longest
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.dumps.frame import Frame
-from dragchain.dumps.run_parts import iter_frames
 from dragchain.errors import TableError
-from dragchain.run.case import Output
+from dragchain.tables.columns import CENTRE, FORCES, POINT, SPIN, VELOCITY
 
 BOWL_MESH = 1
 """``mesh_id`` of a contact when the bowl is a mesh too."""
-
-_POINT = ("point_x_m", "point_y_m", "point_z_m")
-_CENTRE = ("x_m", "y_m", "z_m")
-_FORCE = ("force_x_n", "force_y_n", "force_z_n")
-_VELOCITY = ("vx_m_s", "vy_m_s", "vz_m_s")
-_SPIN = ("wx_rad_s", "wy_rad_s", "wz_rad_s")
 
 
 @dataclass(frozen=True)
@@ -113,60 +103,6 @@ def tangential_force(force_n: Floats, normal: Floats) -> Floats:
     return np.asarray(np.linalg.norm(force_n - along, axis=1))
 
 
-@dataclass(frozen=True)
-class WorkpiecePair:
-    """``workpiece_particles`` and ``workpiece_contacts`` of one step, not joined yet."""
-
-    particles: Frame
-    contacts: Frame
-
-    @property
-    def step(self) -> int:
-        """The step."""
-        return self.particles.step
-
-    def join(self) -> WorkpieceFrame:
-        """Give every contact the force that its particle received; see `join_workpiece_frame`."""
-        return join_workpiece_frame(self.particles, self.contacts)
-
-
-def iter_workpiece_pairs(run_dir: Path, outputs: Mapping[str, Output]) -> Iterator[WorkpiecePair]:
-    """What `iter_workpiece_frames` joins, for those who need some steps only."""
-    particles = iter_frames(run_dir, outputs["workpiece_particles"])
-    contacts = iter_frames(run_dir, outputs["workpiece_contacts"])
-    for particle_frame, contact_frame in zip_longest(particles, contacts):
-        if particle_frame is None or contact_frame is None:
-            raise TableError(
-                "one of workpiece_particles and workpiece_contacts ends before the other"
-            )
-        yield WorkpiecePair(particle_frame, contact_frame)
-
-
-def iter_workpiece_frames(run_dir: Path, outputs: Mapping[str, Output]) -> Iterator[WorkpieceFrame]:
-    """Contacts on the workpiece, step by step.
-
-    Parameters
-    ----------
-    run_dir : Path
-        The run folder.
-    outputs : mapping of str to Output
-        Must hold ``workpiece_particles`` and ``workpiece_contacts``.
-
-    Yields
-    ------
-    RodFrame
-        One for each step of the two outputs.
-
-    Raises
-    ------
-    TableError
-        If the two outputs hold different steps, or a particle comes twice.
-    DumpError
-        If one of them cannot be read.
-    """
-    return (pair.join() for pair in iter_workpiece_pairs(run_dir, outputs))
-
-
 def join_workpiece_frame(particles: Frame, contacts: Frame) -> WorkpieceFrame:
     """Give every contact the force that its particle received.
 
@@ -182,7 +118,7 @@ def join_workpiece_frame(particles: Frame, contacts: Frame) -> WorkpieceFrame:
 
     Returns
     -------
-    RodFrame
+    WorkpieceFrame
         The contacts, sorted by particle and facet.
 
     Raises
@@ -196,19 +132,15 @@ def join_workpiece_frame(particles: Frame, contacts: Frame) -> WorkpieceFrame:
             f"step {contacts.step};"
             " both must be written with one period"
         )
-    particle_ids = np.asarray(particles.columns["particle_id"], dtype=np.int64)
-    order = np.argsort(particle_ids)
-    order = order[(particles.vectors(*_FORCE)[order] != 0.0).any(axis=1)]
-    known = particle_ids[order]
+    order = np.argsort(particles.ids("particle_id"))
+    pushed = particles.take(order[(particles.vectors(*FORCES)[order] != 0.0).any(axis=1)])
+    known = pushed.ids("particle_id")
     if (np.diff(known) == 0).any():
         raise TableError(
             f"step {particles.step}: workpiece_particles holds a particle more than once"
         )
-    applied = particles.vectors(*_FORCE)[order]
-    centres = particles.vectors(*_CENTRE)[order]
-    motion = _motion(particles, order)
-    contacts = _sorted(contacts)
-    all_contacts = _place(contacts, known, applied, centres, motion)
+    contacts = contacts.take(np.lexsort((contacts.ids("facet_id"), contacts.ids("particle_id"))))
+    all_contacts = _place(contacts, pushed)
     unplaced = np.ones(len(known), dtype=np.bool_)
     unplaced[np.searchsorted(known, all_contacts.particle_id[~all_contacts.silent])] = False
     on_bowl = contacts.columns.get("mesh_id", np.zeros(contacts.rows)) == BOWL_MESH
@@ -216,52 +148,30 @@ def join_workpiece_frame(particles: Frame, contacts: Frame) -> WorkpieceFrame:
         particles.step,
         all_contacts.select(~on_bowl),
         all_contacts.select(on_bowl),
-        applied[unplaced],
+        pushed.vectors(*FORCES)[unplaced],
         particles.opening,
     )
 
 
-def _sorted(contacts: Frame) -> Frame:
-    order = np.lexsort((contacts.columns["facet_id"], contacts.columns["particle_id"]))
-    return Frame(contacts.step, {name: col[order] for name, col in contacts.columns.items()})
-
-
-def _motion(particles: Frame, order: Ints) -> tuple[Floats, Floats]:
-    """Velocity and spin of the particles in `order`, (K, 3) each.
-
-    NaN if the run did not write them.
-    """
-    if not {*_VELOCITY, *_SPIN} <= particles.columns.keys():
-        unknown = np.full((len(order), 3), np.nan)
-        return unknown, unknown
-    return particles.vectors(*_VELOCITY)[order], particles.vectors(*_SPIN)[order]
-
-
-def _place(
-    contacts: Frame,
-    known: Ints,
-    applied: Floats,
-    centres: Floats,
-    motion: tuple[Floats, Floats],
-) -> WallContacts:
-    """Join contacts with the particles `known`, of which all else is given in that order."""
-    ids = np.asarray(contacts.columns["particle_id"], dtype=np.int64)
+def _place(contacts: Frame, particles: Frame) -> WallContacts:
+    """Join contacts with the particles that received a force, sorted by their ids."""
+    known, ids = particles.ids("particle_id"), contacts.ids("particle_id")
     at = np.searchsorted(known, ids)
     silent = np.append(known, 0)[at] != ids
-    at[silent] = 0
-    evaluated = contacts.vectors(*_FORCE)
-    force = np.zeros_like(evaluated)
-    normal = np.zeros_like(evaluated)
-    surface = np.full_like(evaluated, np.nan)
-    points = contacts.vectors(*_POINT)
     loud = ~silent
-    force[loud] = _fraction(evaluated[loud], at[loud], applied)
-    normal[loud] = _unit(centres[at[loud]] - points[loud])
-    velocity, spin = (values[at[loud]] for values in motion)
-    surface[loud] = velocity + np.cross(spin, points[loud] - centres[at[loud]])
+    at = at[loud]
+    evaluated, points = contacts.vectors(*FORCES), contacts.vectors(*POINT)
+    force, normal = np.zeros_like(evaluated), np.zeros_like(evaluated)
+    surface = np.full_like(evaluated, np.nan)
+    centre = particles.vectors(*CENTRE)[at]
+    force[loud] = _fraction(evaluated[loud], at, particles.vectors(*FORCES))
+    normal[loud] = _unit(centre - points[loud])
+    if {*VELOCITY, *SPIN} <= particles.columns.keys():
+        turning = np.cross(particles.vectors(*SPIN)[at], points[loud] - centre)
+        surface[loud] = particles.vectors(*VELOCITY)[at] + turning
     return WallContacts(
         particle_id=ids,
-        facet_id=np.asarray(contacts.columns["facet_id"], dtype=np.int64),
+        facet_id=contacts.ids("facet_id"),
         point_m=points,
         force_n=force,
         evaluated_n=evaluated,

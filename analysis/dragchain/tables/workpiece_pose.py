@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats
-from dragchain.run.case import Case, Circle
+from dragchain.run.case import Case
+from dragchain.run.kinematics import path_of
 from dragchain.tables.by_step import read_table
 
 WorkpiecePlaces = Callable[[int], tuple[Floats, float]]
@@ -54,9 +55,6 @@ def _reference_point(workpiece: pd.DataFrame, step: int) -> Floats:
 
 
 def _workpiece_turn(workpiece: pd.DataFrame, step: int, case: Case) -> float:
-    """The workpiece's angle at a step: its heading, or the first one if it keeps that."""
-    motion = case.motion
-    if isinstance(motion, Circle) and motion.orientation == "fixed":
-        return motion.start_direction_rad
-    nearest = int(np.abs(workpiece["step"].to_numpy(np.int64) - step).argmin())
-    return float(workpiece["direction_rad"].iloc[nearest])
+    """The workpiece's angle at the sample nearest to a step."""
+    nearest = [int(np.abs(workpiece["step"].to_numpy(np.int64) - step).argmin())]
+    return float(path_of(case).turn(workpiece["direction_rad"].to_numpy(np.float64)[nearest])[0])

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+import pyarrow as pa
 
+from dragchain.arrays import Floats, Ints
 from dragchain.dumps.frame import Columns
 from dragchain.errors import RejectedRunError, TableError
-from dragchain.files import write_json
-from dragchain.run.case import Case
+from dragchain.run.case import Case, Scene
 from dragchain.run.kinematics import (
     counted_mask,
     directions,
@@ -28,22 +29,38 @@ from dragchain.tables.closure import LIMIT, SHARED_LIMIT, Closure
 from dragchain.tables.columns import (
     CONTACTS,
     FORCES,
+    IMPACTS,
     KINEMATICS,
     POINT,
+    REFERENCE,
     SLIP,
     WORKPIECE_CONTACTS,
     WORKPIECE_FORCE,
 )
-from dragchain.tables.impacts import IMPACTS, find_impacts
+from dragchain.tables.impacts import find_impacts
 from dragchain.tables.network_contacts import KINDS, ContactRows, contact_rows
-from dragchain.tables.parquet import TableWriter, category
+from dragchain.tables.parquet import Rows, category, table_writer
 from dragchain.tables.run_folder import Run
-from dragchain.tables.workpiece_contacts import (
-    WallContacts,
-    WorkpieceFrame,
-    iter_workpiece_frames,
-    iter_workpiece_pairs,
-)
+from dragchain.tables.workpiece_contacts import WallContacts, WorkpieceFrame
+
+
+@dataclass(frozen=True)
+class Table:
+    """A file that is made of a run.
+
+    Attributes
+    ----------
+    name : str
+        Of the file in ``tables/``.
+    needs : tuple of str
+        The raw outputs that it is made of.
+    write : callable
+        Writes it, given the run and the file.
+    """
+
+    name: str
+    needs: tuple[str, ...]
+    write: Callable[[Run, Path], None]
 
 
 def write_tables(run_dir: Path | str) -> list[Path]:
@@ -71,34 +88,39 @@ def write_tables(run_dir: Path | str) -> list[Path]:
         If the outputs contradict each other.
     """
     run = Run.open(run_dir)
-    return [
-        run.table(name)
-        for name, (needs, write) in _SCENES[run.case.scene].items()
-        if run.wrote(*needs) and write(run, run.table(name)) is None
-    ]
+    tables = [table for table in TABLES[run.case.scene] if run.wrote(*table.needs)]
+    for table in tables:
+        table.write(run, run.table(table.name))
+    return [run.table(table.name) for table in tables]
 
 
 def _write_thermo(run: Run, file: Path) -> None:
-    with TableWriter(file, run.outputs["thermo"].columns) as table:
-        for rows in run.prints("thermo"):
-            table.write(rows)
+    _write_all(file, run.outputs["thermo"].columns, run.prints("thermo"))
+
+
+def _write_all(file: Path, columns: Sequence[str], parts: Iterable[Rows]) -> None:
+    with table_writer(file, columns) as table:
+        for part in parts:
+            table.write(part)
+
+
+# --- the force on the workpiece --------------------------------------------------------------
 
 
 def _write_workpiece_force(run: Run, file: Path) -> None:
-    with TableWriter(file, WORKPIECE_FORCE) as table:
-        for rows in run.prints("workpiece_force"):
-            table.write(workpiece_force_rows(rows, run.case))
+    rows = (workpiece_force_rows(rows, run.case) for rows in run.prints("workpiece_force"))
+    _write_all(file, WORKPIECE_FORCE, rows)
 
 
-def workpiece_force_rows(rows: Mapping[str, NDArray[np.generic]], case: Case) -> dict[str, object]:
-    """Add phase, workpiece frame and ``counted`` to raw samples of the force on the workpiece."""
+def workpiece_force_rows(rows: Columns, case: Case) -> Rows:
+    """Add phase, workpiece frame and ``in_statistics`` to raw samples of the workpiece's force."""
     steps = np.asarray(rows["step"], dtype=np.int64)
     heading = directions(steps, np.column_stack([rows["ref_x_m"], rows["ref_y_m"]]), case)
-    force = np.column_stack([rows[name] for name in FORCES])
+    force = np.column_stack([rows[name] for name in FORCES]).astype(np.float64)
     drag, lateral, vertical = workpiece_frame(force, heading).T
     return {
         **rows,
-        "phase": category(phase_codes(steps, case.phases), _phase_names(case)),
+        "phase": _phases(steps, case),
         "direction_rad": heading,
         "drag_n": drag,
         "lateral_n": lateral,
@@ -107,8 +129,16 @@ def workpiece_force_rows(rows: Mapping[str, NDArray[np.generic]], case: Case) ->
     }
 
 
-def _phase_names(case: Case) -> tuple[str, ...]:
-    return tuple(phase.name for phase in case.phases)
+def _phases(steps: Ints, case: Case) -> pa.Array:
+    return category(phase_codes(steps, case.phases), tuple(phase.name for phase in case.phases))
+
+
+@dataclass(frozen=True)
+class WorkpieceSample:
+    """Force on the workpiece, (3,) in N, and horizontal place of its reference point, (2,) in m."""
+
+    force_n: Floats
+    ref_xy_m: Floats
 
 
 class WorkpieceSamples:
@@ -127,62 +157,66 @@ class WorkpieceSamples:
             raise TableError("workpiece_force holds no samples")
         self.first_step = int(self._block["step"][0])
 
-    def row(self, step: int) -> dict[str, float] | None:
+    def at(self, step: int) -> WorkpieceSample | None:
         """Sample at a step not below the last one asked for; None if there is none."""
         while self._block is not None and self._block["step"][-1] < step:
             self._block = next(self._blocks, None)
         if self._block is None:
             return None
-        at = int(np.searchsorted(self._block["step"], step))
-        if self._block["step"][at] != step:
+        row = int(np.searchsorted(self._block["step"], step))
+        if self._block["step"][row] != step:
             return None
-        return {name: float(values[at]) for name, values in self._block.items()}
+        force, place = (
+            np.array([self._block[name][row] for name in names], dtype=np.float64)
+            for names in (FORCES, REFERENCE[:2])
+        )
+        return WorkpieceSample(force, place)
 
-    def reference(self, step: int) -> NDArray[np.float64]:
+    def reference(self, step: int) -> Floats:
         """Horizontal place of the workpiece's reference point, shape (2,), m.
 
         Before the first sample it is that of the first sample.
         """
-        sample = self.row(max(step, self.first_step))
+        sample = self.at(max(step, self.first_step))
         if sample is None:
             raise TableError(
                 f"workpiece_particles has step {step} but workpiece_force does not: the "
                 f"period of workpiece_force"
                 " must divide that of workpiece_particles"
             )
-        return np.array([sample["ref_x_m"], sample["ref_y_m"]])
+        return sample.ref_xy_m
+
+
+# --- contacts on the workpiece ---------------------------------------------------------------
 
 
 def _write_workpiece_contacts(run: Run, file: Path) -> None:
     shared = "mesh_id" in run.outputs["workpiece_contacts"].columns
     closure = Closure(limit=SHARED_LIMIT if shared else LIMIT)
     samples = WorkpieceSamples(run.prints("workpiece_force"))
-    with TableWriter(file, WORKPIECE_CONTACTS) as table:
-        for frame in iter_workpiece_frames(run.folder, run.outputs):
+    with table_writer(file, WORKPIECE_CONTACTS) as table:
+        for frame in run.workpiece_frames():
             reference = samples.reference(frame.step)
             applied = _close(closure, frame, samples, run.case)
             rows = workpiece_contact_rows(frame.step, frame.workpiece, reference, run.case)
             table.write(
                 rows if applied else {**rows, "in_statistics": np.full(len(frame.workpiece), False)}
             )
-        write_json(run.table("closure.json"), closure.content())
+        closure.record().write(run.table("closure.json"))
         if (problem := closure.problem()) is not None:
             raise RejectedRunError(
-                f"{run.folder}: the force closure acceptance check does not hold: {problem};"
-                " workpiece_contacts.parquet was not written, closure.json holds the figures"
+                f"{run.folder}: the force closure acceptance check does not pass: {problem};"
+                " workpiece_contacts.parquet was not written, closure.json has the figures"
             )
 
 
 def _close(closure: Closure, frame: WorkpieceFrame, samples: WorkpieceSamples, case: Case) -> bool:
-    sample = samples.row(frame.step) if frame.step >= samples.first_step else None
-    force = None if sample is None else np.array([sample[name] for name in FORCES])
+    sample = samples.at(frame.step) if frame.step >= samples.first_step else None
     counted = bool(counted_mask(np.array([frame.step]), case)[0])
-    return closure.add(frame, force, counted=counted)
+    return closure.add(frame, sample.force_n if sample else None, counted=counted)
 
 
-def workpiece_contact_rows(
-    step: int, contacts: WallContacts, ref_xy_m: NDArray[np.float64], case: Case
-) -> dict[str, object]:
+def workpiece_contact_rows(step: int, contacts: WallContacts, ref_xy_m: Floats, case: Case) -> Rows:
     """Rows of ``workpiece_contacts.parquet`` for one step.
 
     Parameters
@@ -198,7 +232,7 @@ def workpiece_contact_rows(
 
     Returns
     -------
-    dict of str to (N,) array
+    mapping of str to (N,) array
         The columns; forces are on the workpiece, velocities those of the particle's
         surface against the workpiece's.
     """
@@ -211,7 +245,7 @@ def workpiece_contact_rows(
     return {
         "step": steps,
         "time_s": steps * case.timestep_s,
-        "phase": category(phase_codes(steps, case.phases), _phase_names(case)),
+        "phase": _phases(steps, case),
         "particle_id": contacts.particle_id,
         "facet_id": contacts.facet_id,
         **_named(POINT, contacts.point_m),
@@ -227,30 +261,29 @@ def workpiece_contact_rows(
     }
 
 
-def _named(names: tuple[str, ...], vectors: NDArray[np.float64]) -> dict[str, object]:
+def _named(names: tuple[str, ...], vectors: Floats) -> dict[str, Floats]:
     return dict(zip(names, vectors.T, strict=True))
 
 
+# --- the contact network ---------------------------------------------------------------------
+
+
 def _write_particles(run: Run, file: Path) -> None:
-    with TableWriter(file, ("step", "time_s", *KINEMATICS)) as table:
+    with table_writer(file, ("step", "time_s", *KINEMATICS)) as table:
         for frame in run.frames("particles"):
-            order = np.argsort(frame.columns["particle_id"])
             steps = np.full(frame.rows, frame.step)
-            rows = {name: frame.columns[name][order] for name in KINEMATICS}
+            rows = frame.take(np.argsort(frame.columns["particle_id"])).columns
             table.write({"step": steps, "time_s": steps * run.case.timestep_s, **rows})
 
 
 def _write_contacts(run: Run, file: Path) -> None:
     bowl_radius = needed(run.case.bowl, "bowl").radius_m
-    particles = _Follower("particles", run.frames("particles"))
-    workpieces = _Follower("workpiece_contacts", iter_workpiece_pairs(run.folder, run.outputs))
-    with TableWriter(file, CONTACTS) as table:
+    particles, pairs = run.frames("particles"), run.workpiece_pairs()
+    with table_writer(file, CONTACTS) as table:
         for frame in run.frames("contacts"):
-            workpiece = workpieces.at(frame.step).join()
-            particle_frame = particles.at(frame.step)
-            rows = contact_rows(
-                particle_frame, frame, workpiece.workpiece, workpiece.bowl, bowl_radius
-            )
+            workpiece = _frame_at(pairs, frame.step, "workpiece_contacts").join()
+            beside = _frame_at(particles, frame.step, "particles")
+            rows = contact_rows(beside, frame, workpiece.workpiece, workpiece.bowl, bowl_radius)
             table.write(_contact_columns(frame.step, rows, run.case))
 
 
@@ -262,27 +295,18 @@ class _Stepped(Protocol):
 F = TypeVar("F", bound=_Stepped)
 
 
-class _Follower(Generic[F]):
-    """Finds the frame of one output that belongs to a step of another."""
-
-    def __init__(self, name: str, frames: Iterator[F]) -> None:
-        self.name = name
-        self.frames = frames
-
-    def at(self, step: int) -> F:
-        """Frame of a step above the last one asked for."""
-        for frame in self.frames:
-            if frame.step == step:
-                return frame
-            if frame.step > step:
-                break
+def _frame_at(frames: Iterator[F], step: int, name: str) -> F:
+    """The frame of a step above those asked for before, from frames whose steps rise."""
+    frame = next((frame for frame in frames if frame.step >= step), None)
+    if frame is None or frame.step > step:
         raise TableError(
-            f"contacts has step {step} but {self.name} does not: the period of {self.name}"
+            f"contacts has step {step} but {name} does not: the period of {name}"
             " must divide that of contacts"
         )
+    return frame
 
 
-def _contact_columns(step: int, rows: ContactRows, case: Case) -> dict[str, object]:
+def _contact_columns(step: int, rows: ContactRows, case: Case) -> Rows:
     steps = np.full(len(rows.kind), step)
     return {
         "step": steps,
@@ -298,40 +322,44 @@ def _contact_columns(step: int, rows: ContactRows, case: Case) -> dict[str, obje
     }
 
 
+# --- drop test and filling -------------------------------------------------------------------
+
+
 def _write_impacts(run: Run, file: Path) -> None:
     blocks = list(run.prints("impacts"))
     if not blocks:
         raise TableError(f"{run.folder}: impacts holds no samples")
     rows = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
-    with TableWriter(file, IMPACTS) as table:
-        table.write(find_impacts(rows, run.case.timestep_s))
+    radius, gravity = run.case.media.radius_mean_m, run.case.gravity_m_s2
+    _write_all(file, IMPACTS, [find_impacts(rows, run.case.timestep_s, radius, gravity)])
 
 
-def _write_filling(run: Run, file: Path) -> None:
+def _write_packing(run: Run, file: Path) -> None:
     last = deque(run.frames("particles"), maxlen=1)
     if not last:
         raise TableError(f"{run.folder}: particles holds no frames")
-    write_json(file, describe_bed(last[0], run.case))
+    describe_bed(last[0], run.case).write(file)
 
 
-_Writer = Callable[[Run, Path], None]
-_Tables = dict[str, tuple[tuple[str, ...], _Writer]]
+_THERMO = Table("thermo.parquet", ("thermo",), _write_thermo)
+_PARTICLES = Table("particles.parquet", ("particles",), _write_particles)
+_ON_WORKPIECE = ("workpiece_particles", "workpiece_contacts")
 
-_THERMO: _Tables = {"thermo.parquet": (("thermo",), _write_thermo)}
-_WORKPIECE = ("workpiece_force", "workpiece_particles", "workpiece_contacts")
-_SCENES: dict[str, _Tables] = {
-    "drop_test": {**_THERMO, "impacts.parquet": (("impacts",), _write_impacts)},
-    "filling": {
-        **_THERMO,
-        "particles.parquet": (("particles",), _write_particles),
-        "packing.json": (("particles",), _write_filling),
-    },
-    "process": {
-        **_THERMO,
-        "workpiece_force.parquet": (("workpiece_force",), _write_workpiece_force),
-        "workpiece_contacts.parquet": (_WORKPIECE, _write_workpiece_contacts),
-        "particles.parquet": (("particles",), _write_particles),
-        "contacts.parquet": (("contacts", "particles", *_WORKPIECE[1:]), _write_contacts),
-    },
+TABLES: Mapping[Scene, tuple[Table, ...]] = {
+    "drop_test": (_THERMO, Table("impacts.parquet", ("impacts",), _write_impacts)),
+    "filling": (_THERMO, _PARTICLES, Table("packing.json", ("particles",), _write_packing)),
+    "process": (
+        _THERMO,
+        Table("workpiece_force.parquet", ("workpiece_force",), _write_workpiece_force),
+        Table(
+            "workpiece_contacts.parquet",
+            ("workpiece_force", *_ON_WORKPIECE),
+            _write_workpiece_contacts,
+        ),
+        _PARTICLES,
+        Table("contacts.parquet", ("contacts", "particles", *_ON_WORKPIECE), _write_contacts),
+    ),
+    "impact": (_THERMO,),
+    "column": (_THERMO,),
 }
-"""What is made for each scene: the outputs that a table needs, and how it is made."""
+"""What is made of a run of each scene, in this order."""

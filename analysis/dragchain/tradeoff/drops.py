@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from pydantic import JsonValue
 
 from dragchain.arrays import Floats
-from dragchain.documents import Document
 from dragchain.errors import TableError
-from dragchain.run.case import load_case
+from dragchain.run.case import changed_inputs, load_case
+from dragchain.run.completeness import RunRecord
 from dragchain.tables.by_step import read_table
 
 
@@ -42,23 +43,12 @@ class Drop:
     relative_cost: float
 
 
-class DropRecord(Document):
-    """What is read of the ``run.json`` of a drop test."""
-
-    made_by = "dragdeck run"
-
-    state: str
-    cpu_time_s: float | None = None
-    wall_time_s: float
-    ranks: int
-
-
 @dataclass(frozen=True)
 class _DropRun:
     """A complete drop test: step over the Rayleigh time, inputs, ratios of its impacts, cost."""
 
     fraction: float
-    inputs: Mapping[str, object]
+    inputs: Mapping[str, JsonValue]
     ratios: Floats
     cost_s: float
 
@@ -95,21 +85,20 @@ def _read_drop(folder: Path) -> _DropRun:
     if case.scene != "drop_test":
         raise TableError(f"{folder}: this is a {case.scene}, not a drop")
     impacts = read_table(folder / "tables" / "impacts.parquet", ["restitution"])
-    record = DropRecord.read(folder / "run.json")
-    if record.state != "complete":
+    record = RunRecord.read(folder / "run.json")
+    if not record.complete:
         raise TableError(f"{folder}: its state is {record.state!r}, not 'complete'")
     own_step = ("seed", "drop_test.timestep_fraction")
     return _DropRun(
         fraction=float(f"{case.timestep_s / case.rayleigh_time_s:.4g}"),
         inputs={name: value for name, value in case.inputs.items() if name not in own_step},
         ratios=impacts["restitution"].to_numpy(),
-        cost_s=record.cpu_time_s or record.wall_time_s * record.ranks,
+        cost_s=record.processor_time_s,
     )
 
 
-def _difference(own: Mapping[str, object], standard: Mapping[str, object]) -> str:
-    names = sorted({*own, *standard})
-    return ", ".join(f"{n} {own.get(n)}" for n in names if own.get(n) != standard.get(n))
+def _difference(own: Mapping[str, JsonValue], standard: Mapping[str, JsonValue]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in changed_inputs(own, standard).items())
 
 
 def _worst_impact(ratios: Floats, reference: Floats) -> float:

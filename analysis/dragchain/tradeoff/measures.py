@@ -9,15 +9,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from pydantic import JsonValue
 
 from dragchain.arrays import Floats
 from dragchain.documents import Document, Part
+from dragchain.errors import TableError
 from dragchain.network.write import write_chains
 from dragchain.run.case import Case, Fidelity, load_case
+from dragchain.run.completeness import AcceptanceCheck, RunRecord
 from dragchain.statistics.estimate import finite
+from dragchain.tables.bed import Packing
 from dragchain.tables.write import write_tables
 from dragchain.tradeoff.path_blocks import quantities_along
 
@@ -56,49 +59,12 @@ class Asked(Part):
         return (self.quantity, self.tolerance) == (other.quantity, other.tolerance)
 
 
-class FailedCheck(Part):
-    """An acceptance check that did not pass: its code, and name, value and limit as text."""
-
-    code: str
-    name: str
-    seen: str
-    limit: str
-
-
-class AcceptanceCheck(FailedCheck):
-    """An acceptance check of ``outcome.json``."""
-
-    passed: bool
-
-
-class Outcome(Document):
-    """What is read of ``outcome.json``."""
-
-    made_by = "dragdeck run --outcome"
-
-    state: str
-    checks: tuple[AcceptanceCheck, ...]
-    steps: int
-    wall_time_s: float
-    cpu_time_s: float | None = None
-    ranks: int
-    engine_version: str
-    started: str
-
-
-class Packing(Part):
-    """What is read of ``packing.json``."""
-
-    bed_height_m: float
-    solid_fraction: float
-
-
 class Measures(Document):
     """The content of ``measures.json``.
 
     Attributes
     ----------
-    failure : sequence of FailedCheck
+    failure : sequence of AcceptanceCheck
         Why the run is not `complete`; it has none of what follows then.
     arc_m : float
         Counted path, m.
@@ -117,7 +83,7 @@ class Measures(Document):
     study: str
     run: str
     bed: str | None
-    inputs: Mapping[str, Any]
+    inputs: Mapping[str, JsonValue]
     fidelity: Fidelity
     numbers: Mapping[str, float] = {}
     asked: Asked | None = None
@@ -125,7 +91,7 @@ class Measures(Document):
     cost: RunCost
     versions: Mapping[str, str]
     started: str
-    failure: tuple[FailedCheck, ...] = ()
+    failure: tuple[AcceptanceCheck, ...] = ()
     arc_m: float = 0.0
     block_m: float = 0.0
     blocks: Mapping[str, tuple[float | None, ...]] = {}
@@ -133,7 +99,7 @@ class Measures(Document):
     force_histogram: tuple[int, ...] = ()
 
     @property
-    def telling_failure(self) -> FailedCheck | None:
+    def telling_failure(self) -> AcceptanceCheck | None:
         """The acceptance check that says most about why the run failed, None if it did not."""
         by_code = {check.code: check for check in self.failure}
         first = self.failure[0] if self.failure else None
@@ -159,12 +125,13 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
 
     Raises
     ------
-    DocumentError
-        If the run has no outcome.
     TableError
-        If the raw outputs cannot be read.
+        If the run has no outcome, or its raw outputs cannot be read.
     """
-    outcome, case = Outcome.read(run_dir / "outcome.json"), load_case(run_dir)
+    file = run_dir / "outcome.json"
+    if not file.is_file():
+        raise TableError(f"{file} is not there: `dragdeck run --outcome` writes it")
+    outcome, case = RunRecord.read(file), load_case(run_dir)
     measures = Measures(
         study=case.study,
         run=case.run,
@@ -172,8 +139,8 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
         inputs=case.inputs,
         fidelity=case.fidelity,
         numbers=case.numbers,
-        asked=case.asked and Asked(**case.asked),
-        complete=outcome.state == "complete",
+        asked=case.asked and Asked.model_validate(case.asked.model_dump()),
+        complete=outcome.complete,
         cost=_cost(case, outcome),
         versions={**case.versions, "engine": outcome.engine_version},
         started=outcome.started,
@@ -181,16 +148,9 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
     if measures.complete:
         write_tables(run_dir)
         write_chains(run_dir)
-        measures = measured(
-            measures, run_dir, case, Packing.model_validate_json(packing_table.read_bytes())
-        )
+        measures = measured(measures, run_dir, case, Packing.read(packing_table))
     else:
-        failed = tuple(
-            FailedCheck(**check.model_dump(exclude={"passed"}))
-            for check in outcome.checks
-            if not check.passed
-        )
-        measures = measures.model_copy(update={"failure": failed})
+        measures = measures.model_copy(update={"failure": outcome.failed_checks})
     measures.write(run_dir / FILE)
     return measures
 
@@ -213,14 +173,14 @@ def _listed(values: Floats) -> tuple[float | None, ...]:
     return tuple(map(finite, values))
 
 
-def _cost(case: Case, outcome: Outcome) -> RunCost:
+def _cost(case: Case, outcome: RunRecord) -> RunCost:
     """What a run cost; a run without its processor time counts its wall time on every rank."""
     assert case.motion is not None
     speed = case.motion.axis_speed_m_s
     return RunCost(
         steps=outcome.steps,
         wall_time_s=outcome.wall_time_s,
-        cpu_time_s=outcome.cpu_time_s or outcome.wall_time_s * outcome.ranks,
+        cpu_time_s=outcome.processor_time_s,
         ranks=outcome.ranks,
         timestep_s=case.timestep_s,
         axis_speed_m_s=speed,

@@ -217,8 +217,13 @@ def failures(runs: Sequence[Measures]) -> list[FailedRun]:
 
 
 def _scene(measures: Measures) -> Scene:
-    inputs = measures.inputs.items()
-    return tuple(sorted((name, str(value)) for name, value in inputs if name not in SILENT))
+    return tuple(
+        sorted(
+            (name, str(value))
+            for name, value in measures.inputs.items()
+            if name not in SILENT and value is not None
+        )
+    )
 
 
 def _promise_of(pair: _Pair, scatter: float, degrees: int) -> Promise:

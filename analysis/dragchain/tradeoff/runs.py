@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from pydantic import JsonValue
 
 from dragchain.errors import TableError
+from dragchain.run.case import changed_inputs
 from dragchain.tradeoff.measures import FILE, Measures
 from dragchain.tradeoff.quantities import QUANTITIES
 
@@ -137,25 +138,23 @@ def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Se
     return runs, _setting(standard, standard), arc
 
 
-def _inputs(measures: Measures) -> dict[str, Any]:
+def _inputs(measures: Measures) -> dict[str, JsonValue]:
     fidelity = {f"fidelity.{name}": value for name, value in measures.fidelity}
     silent = {*SILENT, "fidelity.name", *(f"fidelity.{name}" for name in PARAMETERS)}
     inputs = {**measures.inputs, **fidelity}
     return {name: value for name, value in inputs.items() if name not in silent}
 
 
-def changed_inputs(measures: Measures, standard: Measures) -> dict[str, Hashable]:
-    """Inputs of a run, by dotted name, that differ from those of another.
+def changed_settings(measures: Measures, standard: Measures) -> dict[str, JsonValue]:
+    """Inputs and settings of a run, by dotted name, that differ from those of another.
 
     No parameter is among them.
     """
-    own, other = _inputs(measures), _inputs(standard)
-    names = sorted({*own, *other})
-    return {name: own.get(name) for name in names if own.get(name) != other.get(name)}
+    return changed_inputs(_inputs(measures), _inputs(standard))
 
 
 def _setting(measures: Measures, standard: Measures) -> Setting:
-    changed = changed_inputs(measures, standard)
+    changed = changed_settings(measures, standard)
     other = [f"{name} {_shown(value)}" for name, value in changed.items()]
     return Setting.of(measures.fidelity, ", ".join(other))
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import pandas as pd
 
+from dragchain.loading.document import Loading
 from dragchain.loading.write import read_loading
+from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.validation.runs_by_bed import Point, over_packings
 
@@ -42,26 +44,21 @@ def of_packings(packings: Sequence[Point]) -> Found:
     return {
         "rows": rows,
         "types": _types(found),
-        "closure": max(one["closure"]["facets_relative_error"] for one in found),
+        "closure": max(one.closure.facets_relative_error for one in found),
         "first": found[0],
     }
 
 
-def _per_metre(name: str) -> Callable[[Mapping[str, Any]], float]:
-    return lambda one: float(one["per_metre"][name]["value"])
+def _per_metre(name: str) -> Callable[[Loading], float]:
+    return lambda one: one.per_metre[name].value
 
 
-def _percent(*names: str) -> Callable[[Mapping[str, Any]], float]:
-    def of(one: Mapping[str, Any]) -> float:
-        for name in names:
-            one = one[name]
-        return 100.0 * float(one["value"])
-
-    return of
+def _percent(of: Callable[[Loading], Estimate]) -> Callable[[Loading], float]:
+    return lambda one: 100.0 * of(one).value
 
 
-_ROWS: list[tuple[str, str, Callable[[Mapping[str, Any]], float]]] = [
-    ("contacts that press on the workpiece at once", "", lambda one: one["mean_contacts"]["value"]),
+_ROWS: list[tuple[str, str, Callable[[Loading], float]]] = [
+    ("contacts that press on the workpiece at once", "", lambda one: one.mean_contacts.value),
     ("normal impulse", "N s a metre of way", _per_metre("normal_impulse_n_s")),
     ("sliding distance of all contacts", "m a metre", _per_metre("sliding_m")),
     ("normal force times sliding distance", "N m a metre", _per_metre("force_slide_n_m")),
@@ -69,33 +66,37 @@ _ROWS: list[tuple[str, str, Callable[[Mapping[str, Any]], float]]] = [
     (
         "friction work, share of the work of the workpiece",
         "%",
-        _percent("friction_fraction_of_work"),
+        _percent(lambda one: one.friction_fraction_of_work),
     ),
     (
         "front half, share of the normal impulse",
         "%",
-        _percent("front_fraction", "normal_impulse_n_s"),
+        _percent(lambda one: one.front_fraction["normal_impulse_n_s"]),
     ),
     (
         "front half, share of force times sliding",
         "%",
-        _percent("front_fraction", "force_slide_n_m"),
+        _percent(lambda one: one.front_fraction["force_slide_n_m"]),
     ),
-    ("normal impulse carried while sliding", "%", _percent("load_while_sliding_fraction")),
+    (
+        "normal impulse carried while sliding",
+        "%",
+        _percent(lambda one: one.load_while_sliding_fraction),
+    ),
 ]
 
 
-def _types(found: Sequence[Mapping[str, Any]]) -> dict[str, Found]:
+def _types(found: Sequence[Loading]) -> dict[str, Found]:
     """Shares of every type of stay in %, over fills."""
     quantities = ("events", "normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
     return {
         kind: {
             name: over_packings(
-                [100.0 * one["types"][kind]["fraction_of"][name]["value"] for one in found]
+                [100.0 * one.types[kind].fraction_of[name].value for one in found]
             ).as_json()
             for name in quantities
         }
-        for kind in found[0]["types"]
+        for kind in found[0].types
     }
 
 

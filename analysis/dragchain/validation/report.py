@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import shutil
 from collections.abc import Mapping, Sequence
@@ -15,13 +16,15 @@ from matplotlib.figure import Figure
 from dragchain.figures.style import STYLE, png
 from dragchain.files import write_json
 from dragchain.report.page import file_uri, render_page
-from dragchain.scaling.fit import draw_scalings, read_scalings
+from dragchain.scaling.document import ScalingFile
+from dragchain.scaling.figures import draw_scalings
+from dragchain.scaling.fit import read_scalings
 from dragchain.tables.parquet import write_parquet
 from dragchain.validation import around_workpiece as statements
 from dragchain.validation import figures, force
 from dragchain.validation import loading_over_packings as load
 from dragchain.validation.claims import claims
-from dragchain.validation.peaks.report import write_peaks
+from dragchain.validation.peaks.report import report_peaks
 from dragchain.validation.runs_by_bed import Point, Points, read_points
 
 SCHEMA = 2
@@ -60,9 +63,12 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     shutil.copyfile(
         points.packings[0].folder / "figures" / "workpiece.png", folder / "workpiece.png"
     )
-    write_json(out_dir / "validation.json", {**found, "effects": _records(effects)})
-    peaks = write_peaks(out_dir, [point.folder for point in points.packings])
-    page = render(points, found, effects, peaks, folder)
+    scalings = [one.model_dump(mode="json", by_alias=True) for one in found["scalings"]]
+    document = {**found, "scalings": scalings, "effects": _records(effects)}
+    write_json(out_dir / "validation.json", document)
+    peaks = report_peaks([point.folder for point in points.packings])
+    peaks.write(out_dir)
+    page = render(points, found, effects, json.loads(peaks.findings.as_text()), folder)
     (out_dir / "report.html").write_text(page, encoding="utf-8")
 
 
@@ -92,12 +98,12 @@ SAME_SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "pa
 """Numbers that a scene shares with the sweeps that are shown beside it."""
 
 
-def scalings_of(numbers: Mapping[str, float]) -> list[dict[str, Any]]:
+def scalings_of(numbers: Mapping[str, float]) -> list[ScalingFile]:
     """The packaged sweeps that were made in a scene with these numbers."""
     return [
         found
         for found in read_scalings()
-        if all(math.isclose(found["scene"][k], numbers[k], rel_tol=0.01) for k in SAME_SCENE)
+        if all(math.isclose(found.scene[k], numbers[k], rel_tol=0.01) for k in SAME_SCENE)
     ]
 
 

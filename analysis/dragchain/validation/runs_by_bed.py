@@ -16,7 +16,7 @@ from dragchain.errors import SeriesError, TableError
 from dragchain.run.case import Case, load_case
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
 from dragchain.tradeoff.measures import FILE, Measures
-from dragchain.tradeoff.runs import PARAMETERS, changed_inputs
+from dragchain.tradeoff.runs import PARAMETERS, changed_settings
 
 FEWEST = 2
 """Fills below which nothing is known of the differences between them."""
@@ -95,7 +95,7 @@ def read_points(folders: Sequence[Path]) -> Points:
     measures = {folder: Measures.read(folder / FILE) for folder in folders if _measured(folder)}
     standard = measures[folders[0]]
     points = [
-        Point(folder, load_case(folder), own, changed_inputs(own, standard))
+        Point(folder, load_case(folder), own, changed_settings(own, standard))
         for folder, own in measures.items()
         if own.complete
     ]

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from dragchain.arrays import Floats
 from dragchain.contact_law.impact import (
     elastic_time,
     hertz_force,
     hertz_overlap,
-    integrated_impact,
     largest_overlap,
     limited_restitution,
-    sliding_impact,
 )
 from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
-from dragchain.verification.checks import (
+from dragchain.verification.published import published
+from dragchain.verification.quantities import (
     QUANTITIES,
     abscissa,
     column_loads,
@@ -27,16 +27,15 @@ from dragchain.verification.checks import (
     flight_energy,
     incline_reference,
     incline_slopes,
-    momenta,
+    momentum_changes,
     series_name,
 )
-from dragchain.verification.published import published
 from dragchain.verification.recording import Recording
 
-COLOURS = (BLUE, ORANGE, GREEN, RED, "#7a4fa3", "#5b8a99")
-MARKERS = "os^vDP"
+_COLOURS = (BLUE, ORANGE, GREEN, RED, "#7a4fa3", "#5b8a99")
+_MARKERS = "os^vDP"
 
-LABELS = {
+_LABELS = {
     "angle_deg": "angle of incidence from the normal in degrees",
     "tangential_restitution": "tangential velocity out over in",
     "spin_rad_s": "spin after in rad/s",
@@ -47,9 +46,9 @@ LABELS = {
     "recoil_tangent": "tangent of the recoil angle",
     "tangential_m_s": "relative tangential velocity\nof the centres after in m/s",
 }
-ABSCISSAE = {
-    "oblique_angle": LABELS["angle_deg"],
-    "oblique_study": LABELS["angle_deg"],
+_ABSCISSAE = {
+    "oblique_angle": _LABELS["angle_deg"],
+    "oblique_study": _LABELS["angle_deg"],
     "oblique_tangential": "patch velocity in / (friction x normal speed in)",
     "patch_restitution": "7/2 friction (1 + e) x normal speed\n/ patch velocity in",
     "recoil_tangent": "tangent of the angle of incidence",
@@ -57,7 +56,7 @@ ABSCISSAE = {
     "spin_pair_same": "spin before in rad/s",
 }
 _REFERENCES = ("line: the law integrated by scipy", "Coulomb sliding of rigid bodies")
-OTHERS = {
+_OTHERS: Mapping[str, tuple[str, ...]] = {
     "oblique_angle": ("experiment (Kharaz et al. 2001)",),
     "oblique_tangential": ("finite elements (Wu)",),
 }
@@ -82,20 +81,18 @@ def _legend(figure: Figure, axes: Axes, columns: int = 2) -> Figure:
 
 def _elastic(runs: Sequence[Recording]) -> Figure:
     figure, (left, right) = _figure(2)
-    for run, colour in zip(runs, COLOURS, strict=False):
-        (entry,) = run.case["contacts"]
-        contact, (before, _) = run.contact(entry), run.impact(entry)
-        overlap = run.overlap_m(entry)
-        force = np.abs(run.force_n[:, entry["particle"] - 1, 2])
+    for run, colour in zip(runs, _COLOURS, strict=False):
+        impact, contact = run.contact, run.contact.constants
+        overlap, force = impact.overlap_m, np.abs(run.force_n[:, impact.at, 2])
         inside = np.flatnonzero(overlap > 0)
         some = inside[:: max(1, len(inside) // 30)]
-        line = np.linspace(0, largest_overlap(contact, before.normal_m_s), 100)
+        line = np.linspace(0, largest_overlap(contact, impact.before.normal_m_s), 100)
         left.plot(line * 1e6, hertz_force(contact, line) / 1e3, color=colour)
         left.plot(overlap[some] * 1e6, force[some] / 1e3, "o", color=colour, ms=3,
                   label=f"{series_name(run)}: engine")  # fmt: skip
         time = (run.time_s - run.time_s[inside[0]]) * 1e6
         right.plot(time[some], force[some] / 1e3, "o", color=colour, ms=3)
-        end = elastic_time(contact, before.normal_m_s) * 1e6
+        end = elastic_time(contact, impact.before.normal_m_s) * 1e6
         right.axvline(end, color=colour, lw=0.8, ls="--")
         peak = float(hertz_force(contact, line[-1])) / 1e3
         right.plot([end / 2], [peak], "+", color="black", ms=9)
@@ -112,13 +109,10 @@ def _restitution(runs: Sequence[Recording]) -> Figure:
     exact = np.array([limited_restitution(value) for value in line])
     left.plot(line, line, color="black", lw=0.9, label="what the deck says")
     left.plot(line, exact, color=GREY, label="exp(-x (π - 2 arctan x)), x = -ln(e)/π")
-    for run, colour, marker in zip(runs, COLOURS, MARKERS, strict=False):
-        value, ratio, error = [], [], []
-        for entry in run.case["contacts"]:
-            contact, (before, after) = run.contact(entry), run.impact(entry)
-            value.append(contact.restitution)
-            ratio.append(after.normal_m_s / before.normal_m_s)
-            error.append(ratio[-1] - contact.rebound)
+    for run, colour, marker in zip(runs, _COLOURS, _MARKERS, strict=False):
+        value = [impact.constants.restitution for impact in run.contacts]
+        ratio = [impact.rebound for impact in run.contacts]
+        error = [impact.rebound - impact.constants.rebound for impact in run.contacts]
         left.plot(value, ratio, marker, color=colour, ms=4, mfc="none", label=series_name(run))
         right.plot(value, np.array(error) * 1e3, marker + "-", color=colour, ms=4, lw=0.8)
     left.set(xlabel="restitution in the deck", ylabel="speed out over speed in")
@@ -127,64 +121,67 @@ def _restitution(runs: Sequence[Recording]) -> Figure:
 
 
 def _impacts(runs: Sequence[Recording]) -> Figure:
-    test = str(runs[0].case["test"])
+    test = runs[0].case.test
     quantities = QUANTITIES[test]
     figure, panels = _figure(len(quantities), 3.9)
-    for axes, (quantity, derive) in zip(panels, quantities.items(), strict=True):
-        for at, (run, colour, marker) in enumerate(zip(runs, COLOURS, MARKERS, strict=False)):
-            rows = []
-            for entry in run.case["contacts"]:
-                contact, (before, after) = run.contact(entry), run.impact(entry)
-                law = integrated_impact(contact, before).after
-                rigid = sliding_impact(contact, before)
-                rows.append(
-                    (
-                        abscissa(test, contact, before, float(entry["value"]), quantity),
-                        derive(contact, before, after),
-                        derive(contact, before, law),
-                        derive(contact, before, rigid) if rigid is not None else np.nan,
-                    )
-                )
-            x, engine, law_line, rigid_line = np.array(sorted(rows), dtype=np.float64).T
-            name = series_name(run)
-            axes.plot(x, engine, marker, color=colour, ms=5, mfc="none", label=f"{name}: engine")
-            law_name, rigid_name = _REFERENCES if at == 0 else (None, None)
-            axes.plot(x, law_line, "-", color=colour, lw=0.9, label=law_name)
-            if not np.isnan(rigid_line).all():
-                axes.plot(x, rigid_line, "--", color="black", lw=0.9, label=rigid_name)
+    for axes, quantity in zip(panels, quantities, strict=True):
+        names: tuple[str | None, str | None] = _REFERENCES
+        for run, colour, marker in zip(runs, _COLOURS, _MARKERS, strict=False):
+            x, engine, law, rigid = _curves(run, quantity)
+            label = f"{series_name(run)}: engine"
+            axes.plot(x, engine, marker, color=colour, ms=5, mfc="none", label=label)
+            axes.plot(x, law, "-", color=colour, lw=0.9, label=names[0])
+            if not np.isnan(rigid).all():
+                axes.plot(x, rigid, "--", color="black", lw=0.9, label=names[1])
+            names = (None, None)
         _published(axes, test, runs, quantity)
-        axes.set(xlabel=ABSCISSAE.get(quantity) or ABSCISSAE[test], ylabel=LABELS[quantity])
+        axes.set(xlabel=_ABSCISSAE.get(quantity) or _ABSCISSAE[test], ylabel=_LABELS[quantity])
         if quantity == "patch_restitution":
             axes.set_xscale("log")
-        if test.startswith("oblique_tan"):
+        if test == "oblique_tangential":
             axes.set_xlim(-0.3, 14)
     return _legend(figure, panels[0], len(panels))
 
 
+def _curves(run: Recording, quantity: str) -> Floats:
+    """Abscissa, and a quantity of the engine, the integrated law and rigid bodies, (4, M)."""
+    derive = QUANTITIES[run.case.test][quantity]
+    rows = []
+    for impact in run.contacts:
+        ends = (impact.after, impact.integrated, impact.slid)
+        values = [
+            np.nan if after is None else derive(impact.constants, impact.before, after)
+            for after in ends
+        ]
+        rows.append((abscissa(impact, quantity), *values))
+    return np.array(sorted(rows), dtype=np.float64).T
+
+
 def _published(axes: Axes, test: str, runs: Sequence[Recording], quantity: str) -> None:
-    series = dict.fromkeys(str(run.case["series"]) for run in runs)
-    for name, marker in zip((*series, *OTHERS.get(test, ())), "xx+", strict=False):
+    others = _OTHERS.get(test, ())
+    series = dict.fromkeys(run.case.series for run in runs)
+    for name, marker in zip((*series, *others), "xx+", strict=False):
         curve = published(test, name, quantity)
         if len(curve.x):
-            shade = "black" if name in OTHERS.get(test, ()) else GREY
+            shade = "black" if name in others else GREY
             label = f"published: {name}".replace("_", " ")
             axes.plot(curve.x, curve.y, marker, color=shade, ms=5, mew=0.9, label=label)
 
 
 def _time_step(runs: Sequence[Recording]) -> Figure:
     figure, (left, right) = _figure(2)
-    colours = {True: BLUE, False: ORANGE}
     for limit, rows in convergence(runs).items():
+        colour = BLUE if limit else ORANGE
         steps, error = np.array(rows, dtype=np.float64).T
         name = f"limitForce {'on' if limit else 'off'}, order {fitted_order(rows):.2f}"
-        left.loglog(steps, error, "o-", color=colours[limit], ms=4, label=name)
+        left.loglog(steps, error, "o-", color=colour, ms=4, label=name)
         left.loglog(steps, 1 / steps, ":", color=GREY, label="tolerance" if limit else None)
         fraction = [
-            100 * run.case["timestep_s"] / run.case["rayleigh_time_s"]
-            for run in sorted(runs, key=lambda run: run.steps_per_contact)
-            if run.case["limit_force"] == limit
+            100 * run.case.timestep_s / run.case.rayleigh_time_s
+            for run in sorted(runs, key=lambda run: run.case.steps_per_contact)
+            if run.case.limit_force == limit
         ]
-        right.loglog(fraction, error, "o-", color=colours[limit], ms=4)
+        right.loglog(fraction, error, "o-", color=colour, ms=4)
     left.set(xlabel="time steps in a contact", ylabel="error of speed out over speed in")
     right.set(xlabel="time step in % of the Rayleigh time")
     return _legend(figure, left, 3)
@@ -192,9 +189,9 @@ def _time_step(runs: Sequence[Recording]) -> Figure:
 
 def _bounce(runs: Sequence[Recording]) -> Figure:
     figure, (axes,) = _figure(1)
-    for run, colour in zip(runs, COLOURS, strict=False):
+    for run, colour in zip(runs, _COLOURS, strict=False):
         impacts, energy = flight_energy(run)
-        name = f"{run.steps_per_contact} steps a contact"
+        name = f"{run.case.steps_per_contact} steps a contact"
         axes.plot(impacts, (energy - 1) * 1e6, ".", ms=2, color=colour, label=name)
     axes.set(xlabel="impacts", ylabel="change of the energy of flight, ppm")
     return _legend(figure, axes)
@@ -204,9 +201,9 @@ def _momentum(runs: Sequence[Recording]) -> Figure:
     figure, panels = _figure(2)
     (run,) = runs
     for axes, at, what in zip(panels, (0, 1), ("linear", "angular"), strict=True):
-        for entry, colour in zip(run.case["contacts"], COLOURS, strict=False):
-            change = np.linalg.norm(momenta(run, entry)[at], axis=1)
-            label = f"collision {entry['value']}"
+        for contact, colour in zip(run.contacts, _COLOURS, strict=False):
+            change = np.linalg.norm(momentum_changes(contact)[at], axis=1)
+            label = f"collision {contact.value}"
             axes.semilogy(run.time_s * 1e6, np.maximum(change, 1e-18), color=colour, label=label)
         axes.set(xlabel="time in µs", ylabel=f"change of {what} momentum, share")
         axes.set_ylim(1e-18, 1e-8)
@@ -233,14 +230,13 @@ def _column(runs: Sequence[Recording]) -> Figure:
 def _incline(runs: Sequence[Recording]) -> Figure:
     figure, (left, right) = _figure(2)
     (run,) = runs
-    entries = run.case["contacts"]
-    x = [float(entry["value"]) for entry in entries]
+    x = [contact.value for contact in run.contacts]
     for axes, at, label in (
         (left, 0, "acceleration down the slope in m/s²"),
         (right, 1, "acceleration of the spin in rad/s²"),
     ):
-        reference = [incline_reference(run, entry)[at] for entry in entries]
-        engine = [incline_slopes(run, entry)[at] for entry in entries]
+        reference = [incline_reference(contact)[at] for contact in run.contacts]
+        engine = [incline_slopes(contact)[at] for contact in run.contacts]
         axes.plot(x, reference, "-", color="black", lw=0.9, label="rolling, then slipping")
         axes.plot(x, engine, "o", color=BLUE, mfc="none", label="engine")
         axes.axvline(1.0, color=GREY, lw=0.8, ls=":")
@@ -248,7 +244,7 @@ def _incline(runs: Sequence[Recording]) -> Figure:
     return _legend(figure, left)
 
 
-_DRAW: dict[str, Callable[[Sequence[Recording]], Figure]] = {
+_DRAW: Mapping[str, Callable[[Sequence[Recording]], Figure]] = {
     "elastic_pair": _elastic,
     "elastic_plane": _elastic,
     "restitution": _restitution,

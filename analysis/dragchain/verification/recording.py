@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.contact_law.hertz import effective_modulus
-from dragchain.contact_law.impact import Contact, Motion, Particle
+from dragchain.contact_law.hertz import effective_modulus, effective_shear, sphere_mass
+from dragchain.contact_law.impact import Contact, Motion, Particle, sliding_impact
+from dragchain.contact_law.integrated_impact import integrated_impact
 from dragchain.dumps.run_parts import iter_frames
-from dragchain.errors import DocumentError, RejectedRunError, TableError
+from dragchain.errors import TableError
 from dragchain.run.case import load_outputs
-from dragchain.run.completeness import refusal
+from dragchain.run.completeness import read_accepted
+from dragchain.verification.experiment import Experiment, Meeting
 
 _VECTORS = {
     "position_m": ("x_m", "y_m", "z_m"),
@@ -33,8 +33,7 @@ class Recording:
 
     Attributes
     ----------
-    case : mapping
-        Content of ``case.json``.
+    case : Experiment
     time_s : (T,) ndarray
     position_m, velocity_m_s, spin_rad_s, force_n : (T, N, 3) ndarray
         Of N particles in the order of their ids; the force includes gravity.
@@ -42,7 +41,7 @@ class Recording:
         Of each wall on each particle.
     """
 
-    case: Mapping[str, Any]
+    case: Experiment
     time_s: Floats
     position_m: Floats
     velocity_m_s: Floats
@@ -50,100 +49,137 @@ class Recording:
     force_n: Floats
     wall_force_n: Mapping[str, Floats]
 
-    @property
-    def steps_per_contact(self) -> int:
-        """Time steps in the shortest contact of the run."""
-        return int(self.case["steps_per_contact"])
-
     def particle(self, number: int) -> Particle:
         """Mass and radius of a particle by its id."""
-        body = self.case["bodies"][number - 1]
-        density = self.case["types"][body["type"] - 1]["density_kg_m3"]
-        radius = float(body["radius_m"])
-        return Particle(4 / 3 * math.pi * radius**3 * density, radius)
+        body = self.case.bodies[number - 1]
+        density = self.case.types[body.type - 1].density_kg_m3
+        return Particle(sphere_mass(body.radius_m, density), body.radius_m)
 
-    def contact(self, entry: Mapping[str, Any]) -> Contact:
-        """The constants of a contact, from those of its two materials."""
-        kinds = [self._type(entry["particle"]), self._type(entry["partner"])]
-        own, other = (self.case["types"][kind - 1] for kind in kinds)
-        wall = isinstance(entry["partner"], str)
-        pair = self._pair(sorted(kinds))
+    @cached_property
+    def contacts(self) -> tuple[RecordedContact, ...]:
+        """The contacts of the run."""
+        return tuple(RecordedContact(self, meeting) for meeting in self.case.contacts)
+
+    @property
+    def contact(self) -> RecordedContact:
+        """The only contact of the run."""
+        (contact,) = self.contacts
+        return contact
+
+
+@dataclass(frozen=True)
+class RecordedContact:
+    """A contact of a run: a particle, and the particle or the plane that it meets.
+
+    Raises
+    ------
+    TableError
+        From `before`, `after` and what is made of them: the surfaces touch in the first or the
+        last frame, or never.
+    """
+
+    run: Recording
+    meeting: Meeting
+
+    @property
+    def value(self) -> float:
+        """The value that differs from contact to contact."""
+        return self.meeting.value
+
+    @property
+    def at(self) -> int:
+        """Row of the particle."""
+        return self.meeting.particle - 1
+
+    @property
+    def partner_at(self) -> int | None:
+        """Row of the partner; None for a plane."""
+        partner = self.meeting.partner
+        return None if isinstance(partner, str) else partner - 1
+
+    @cached_property
+    def constants(self) -> Contact:
+        """What the law knows of the contact, from its two materials."""
+        case, partner = self.run.case, self.partner_at
+        kinds = [case.type_of(body) for body in (self.meeting.particle, self.meeting.partner)]
+        own, other = (case.types[kind - 1].elastic for kind in kinds)
+        pair = next(pair for pair in case.pairs if list(pair.types) == sorted(kinds))
         return Contact(
-            particle=self.particle(entry["particle"]),
-            partner=None if wall else self.particle(entry["partner"]),
+            particle=self.run.particle(self.meeting.particle),
+            partner=None if partner is None else self.run.particle(partner + 1),
             modulus_pa=effective_modulus(own, other),
             shear_pa=effective_shear(own, other),
-            restitution=float(pair["restitution"]),
-            friction=float(pair["friction"]),
-            limit_force=bool(self.case["limit_force"]),
+            restitution=pair.restitution,
+            friction=pair.friction,
+            limit_force=case.limit_force,
         )
 
-    def _type(self, name: int | str) -> int:
-        if isinstance(name, int):
-            return int(self.case["bodies"][name - 1]["type"])
-        return int(next(wall["type"] for wall in self.case["walls"] if wall["name"] == name))
-
-    def _pair(self, kinds: list[int]) -> Mapping[str, Any]:
-        return next(pair for pair in self.case["pairs"] if pair["types"] == kinds)
-
-    def overlap_m(self, entry: Mapping[str, Any]) -> Floats:
-        """Overlap of a contact, negative where there is a gap, shape (T,), m."""
-        particle, partner = entry["particle"] - 1, entry["partner"]
-        radius = self.case["bodies"][particle]["radius_m"]
-        if isinstance(partner, str):
-            return np.asarray(radius - self.position_m[:, particle, 2])
-        apart = self.position_m[:, particle] - self.position_m[:, partner - 1]
-        radii = radius + self.case["bodies"][partner - 1]["radius_m"]
+    @cached_property
+    def overlap_m(self) -> Floats:
+        """Overlap, negative where there is a gap, shape (T,), m."""
+        run, partner = self.run, self.partner_at
+        radius = run.case.bodies[self.at].radius_m
+        if partner is None:
+            return np.asarray(radius - run.position_m[:, self.at, 2])
+        apart = run.position_m[:, self.at] - run.position_m[:, partner]
+        radii = radius + run.case.bodies[partner].radius_m
         return np.asarray(radii - np.linalg.norm(apart, axis=1))
 
-    def motion(self, entry: Mapping[str, Any], at: int) -> Motion:
-        """Relative motion of a contact along z at a frame; normal: the speed of approach."""
-        particle, partner = entry["particle"] - 1, entry["partner"]
-        velocity, spin = self.velocity_m_s[at, particle], -self.spin_rad_s[at, particle, 1]
-        if isinstance(partner, str):
-            return Motion(-float(velocity[2]), float(velocity[0]), float(spin))
-        relative = velocity - self.velocity_m_s[at, partner - 1]
-        second = -self.spin_rad_s[at, partner - 1, 1]
-        return Motion(-float(relative[2]), float(relative[0]), float(spin), float(second))
+    def motion(self, frame: int) -> Motion:
+        """Relative motion along z at a frame; normal: the speed of approach."""
+        run, partner = self.run, self.partner_at
+        velocity, spin = run.velocity_m_s[frame, self.at], -run.spin_rad_s[frame, self.at, 1]
+        second = 0.0
+        if partner is not None:
+            velocity = velocity - run.velocity_m_s[frame, partner]
+            second = -run.spin_rad_s[frame, partner, 1]
+        return Motion(-float(velocity[2]), float(velocity[0]), float(spin), float(second))
 
-    def impact(self, entry: Mapping[str, Any]) -> tuple[Motion, Motion]:
-        """Motion before and after an impact; normal: approach, then separation.
-
-        Raises
-        ------
-        TableError
-            If the surfaces touch in the first or the last frame, or never.
-        """
-        overlap = self.overlap_m(entry)
+    @cached_property
+    def _motions(self) -> tuple[Motion, Motion]:
+        overlap = self.overlap_m
         if overlap[0] >= 0 or overlap[-1] >= 0 or not (overlap > 0).any():
-            raise TableError(
-                f"{self.case['run']}: the impact of particle {entry['particle']} is not whole in it"
-            )
-        before, after = self.motion(entry, 0), self.motion(entry, -1)
-        return before, Motion(
-            -after.normal_m_s, after.tangential_m_s, after.spin_rad_s, after.partner_spin_rad_s
-        )
+            name, particle = self.run.case.run, self.meeting.particle
+            raise TableError(f"{name}: the impact of particle {particle} is not whole in it")
+        end = self.motion(-1)
+        spins = end.spin_rad_s, end.partner_spin_rad_s
+        return self.motion(0), Motion(-end.normal_m_s, end.tangential_m_s, *spins)
 
-    def duration_s(self, entry: Mapping[str, Any]) -> float:
+    @property
+    def before(self) -> Motion:
+        """Motion before the impact."""
+        return self._motions[0]
+
+    @property
+    def after(self) -> Motion:
+        """Motion after the impact; normal: the speed of separation."""
+        return self._motions[1]
+
+    @property
+    def rebound(self) -> float:
+        """Normal speed after the impact over that before."""
+        return self.after.normal_m_s / self.before.normal_m_s
+
+    @cached_property
+    def integrated(self) -> Motion:
+        """Motion after the impact by the law integrated by scipy."""
+        return integrated_impact(self.constants, self.before).after
+
+    @property
+    def slid(self) -> Motion | None:
+        """Motion after the impact of rigid bodies that slide; None where they would not."""
+        return sliding_impact(self.constants, self.before)
+
+    @property
+    def duration_s(self) -> float:
         """Time with an overlap, by linear interpolation between frames, s."""
-        overlap = self.overlap_m(entry)
-        inside = np.flatnonzero(overlap > 0)
-        first, last = int(inside[0]), int(inside[-1])
-        return self._crossing(overlap, last) - self._crossing(overlap, first - 1)
+        inside = np.flatnonzero(self.overlap_m > 0)
+        return self._crossing_s(int(inside[-1])) - self._crossing_s(int(inside[0]) - 1)
 
-    def _crossing(self, overlap: Floats, at: int) -> float:
-        fraction = overlap[at] / (overlap[at] - overlap[at + 1])
-        return float(self.time_s[at] + fraction * (self.time_s[at + 1] - self.time_s[at]))
-
-
-def effective_shear(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
-    """Effective shear modulus 1/G* = sum (2 - nu)/G, Pa (Mindlin 1949)."""
-    compliance: float = sum(
-        2 * (2 - nu) * (1 + nu) / material["youngs_modulus_pa"]
-        for material in (first, second)
-        for nu in (material["poissons_ratio"],)
-    )
-    return 1 / compliance
+    def _crossing_s(self, frame: int) -> float:
+        overlap, time = self.overlap_m, self.run.time_s
+        fraction = overlap[frame] / (overlap[frame] - overlap[frame + 1])
+        return float(time[frame] + fraction * (time[frame + 1] - time[frame]))
 
 
 def read_recording(run_dir: Path) -> Recording:
@@ -156,41 +192,26 @@ def read_recording(run_dir: Path) -> Recording:
     DocumentError, DumpError
         A file of it cannot be used.
     """
-    record = _json(run_dir / "run.json")
-    if (reason := refusal(record)) is not None:
-        raise RejectedRunError(f"{run_dir} is refused: {reason}")
-    case = _json(run_dir / "case.json")
-    if case.get("scene") != "collide":
-        raise DocumentError(run_dir / "case.json", "scene", "is not 'collide'")
+    read_accepted(run_dir)
+    case = Experiment.read(run_dir / "case.json")
     frames = [
         (frame.step, frame.columns, np.argsort(frame.columns["particle_id"]))
         for frame in iter_frames(run_dir, load_outputs(run_dir)["bodies"])
     ]
 
-    def stacked(names: tuple[str, ...]) -> Floats:
-        return np.array(
-            [np.column_stack([columns[name][order] for name in names])
-             for _, columns, order in frames],
-            dtype=np.float64,
-        )  # fmt: skip
+    def stacked(names: Sequence[str]) -> Floats:
+        rows = (
+            np.column_stack([columns[name][order] for name in names])
+            for _, columns, order in frames
+        )
+        return np.array(list(rows), dtype=np.float64)
 
-    walls = {
-        wall["name"]: stacked(tuple(f"{wall['name']}_force_{axis}_n" for axis in "xyz"))
-        for wall in case["walls"]
-    }
     return Recording(
         case=case,
-        time_s=np.array([step for step, _, _ in frames]) * case["timestep_s"],
-        wall_force_n=walls,
+        time_s=np.array([step for step, _, _ in frames]) * case.timestep_s,
+        wall_force_n={
+            wall.name: stacked([f"{wall.name}_force_{axis}_n" for axis in "xyz"])
+            for wall in case.walls
+        },
         **{name: stacked(columns) for name, columns in _VECTORS.items()},
     )
-
-
-def _json(file: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise DocumentError(
-            file, None, "there is no such file", remedy="run the suite first"
-        ) from None
-    return dict(content)

@@ -3,32 +3,71 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
+from typing import get_args
 
 import matplotlib
 import pandas as pd
 
+from dragchain.contact_law.hertz import tangential_damping_ratio
+from dragchain.contact_law.impact import limited_restitution
 from dragchain.errors import RejectedRunError, TableError
 from dragchain.figures.style import STYLE, png
+from dragchain.report.bundle import write_bundle
 from dragchain.report.page import data_uri, render_page
 from dragchain.tables.by_step import read_table
-from dragchain.tables.parquet import write_parquet
-from dragchain.verification.checks import JUDGED, Check, judge
+from dragchain.verification.checks import JUDGED, Check, Verdict, judge
+from dragchain.verification.experiment import TESTS, Experiment
 from dragchain.verification.figures import draw
+from dragchain.verification.published import published
 from dragchain.verification.recording import Recording, read_recording
-from dragchain.verification.words import WORDS
 
-BY_SERIES = ["number", "test", "series", "quantity", "against"]
+_BY_SERIES = ["number", "test", "series", "quantity", "against"]
+
+Rows = Sequence[Mapping[Hashable, object]]
 
 
-def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> pd.DataFrame:
+@dataclass(frozen=True)
+class Section:
+    """A test on the page.
+
+    Attributes
+    ----------
+    case : Experiment
+        Of one of its runs.
+    picture : str
+        Its figure as a data URI.
+    same, others : sequence of rows
+        Comparisons with the law that the engine claims to compute, and with others.
+    steps : list of int
+        Time steps in the shortest contact of its runs.
+    """
+
+    case: Experiment
+    picture: str
+    same: Rows
+    others: Rows
+    steps: Sequence[int]
+
+
+@dataclass(frozen=True)
+class TwoSpins:
+    """Scaled spins at one scaled patch velocity, read off the published points of two tests."""
+
+    patch: float
+    tangential: float
+    angle: float
+
+
+def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> None:
     """Judge the runs of the suite and write its tables and its page.
 
-    Writes ``checks.csv`` and ``checks.parquet`` (a row is one comparison),
-    ``verification.csv`` and ``verification.parquet`` (a row is one quantity of
-    one series: its worst comparison) and ``verification.html``.
+    Writes ``checks.csv`` and ``checks.parquet`` (one row per comparison), ``verification.csv`` and
+    ``verification.parquet`` (one row per quantity of a series: its worst comparison) and
+    ``verification.html``.
 
     Parameters
     ----------
@@ -36,11 +75,6 @@ def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> pd.DataFrame:
         Made if need be.
     run_dirs : sequence of Path
         Folders of runs of the `collide` scene.
-
-    Returns
-    -------
-    DataFrame
-        The rows of ``verification.parquet``.
 
     Raises
     ------
@@ -52,38 +86,33 @@ def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> pd.DataFrame:
     if not run_dirs:
         raise TableError("no folder of a run is given, so there is nothing to verify")
     runs = [read_recording(folder) for folder in run_dirs]
-    checks = judge(runs)
-    table = pd.DataFrame([vars(check) for check in checks])
+    checks = check_table(judge(runs))
     summary = summarise(checks)
-    page = render(runs, summary)
-    out_dir.mkdir(parents=True, exist_ok=True)
-    for name, frame in (("checks", table), ("verification", summary)):
-        write_parquet(frame, out_dir / f"{name}.parquet")
-        _write(out_dir / f"{name}.csv", frame.to_csv(index=False, lineterminator="\n"))
-    _write(out_dir / "verification.html", page)
-    return summary
+    write_bundle(
+        out_dir,
+        tables={"checks": checks, "verification": summary},
+        pages={"verification": render(runs, summary)},
+    )
 
 
-def _write(file: Path, text: str) -> None:
-    draft = file.with_name(f".{file.name}.tmp")
-    draft.write_text(text, encoding="utf-8")
-    draft.replace(file)
+def check_table(checks: Sequence[Check]) -> pd.DataFrame:
+    """One row per comparison."""
+    return pd.DataFrame([vars(check) for check in checks])
 
 
-def summarise(checks: Sequence[Check]) -> pd.DataFrame:
+def summarise(checks: pd.DataFrame) -> pd.DataFrame:
     """The worst comparison of each quantity of each series, with their number."""
-    table = pd.DataFrame([vars(check) for check in checks])
-    rows = []
-    for _, group in table.groupby(BY_SERIES, sort=False):
-        worst = group.sort_values("error", kind="stable").iloc[-1].to_dict()
-        rows.append({**worst, "points": len(group)})
-    return pd.DataFrame(rows)
+    groups = [
+        group.sort_values("error", kind="stable").tail(1).assign(points=len(group))
+        for _, group in checks.groupby(_BY_SERIES, sort=False)
+    ]
+    return pd.concat(groups, ignore_index=True)
 
 
 def counts(summary: pd.DataFrame) -> dict[str, int]:
     """How many rows have each verdict."""
     verdicts = summary["verdict"].tolist()
-    return {name: verdicts.count(name) for name in ("pass", "fail", "agrees", "differs")}
+    return {name: verdicts.count(name) for name in get_args(Verdict)}
 
 
 def verdict(report_dir: Path) -> str:
@@ -97,65 +126,72 @@ def verdict(report_dir: Path) -> str:
         There is no summary.
     """
     summary = read_table(report_dir / "verification.parquet")
-    found = ", ".join(f"{number} {name}" for name, number in counts(summary).items())
+    said = ", ".join(f"{number} {name}" for name, number in counts(summary).items())
     bad = summary[summary["verdict"] == "fail"]
     if bad.empty:
-        return found
+        return said
     lines = [
         f"{row.test}, {row.series}, {row.quantity}: error {row.error:.2g}"
         f" (allowed: {row.tolerance:.2g})"
         for row in bad.itertuples()
     ]
-    raise RejectedRunError("\n  ".join([f"{report_dir / 'verification.html'}: {found}", *lines]))
+    raise RejectedRunError("\n  ".join([f"{report_dir / 'verification.html'}: {said}", *lines]))
 
 
 def render(runs: Sequence[Recording], summary: pd.DataFrame) -> str:
     """The page: HTML that needs no other file and no network."""
-    ordered = sorted(runs, key=lambda run: (run.case["number"], _place(str(run.case["test"]))))
-    parts = [
-        _part(test, list(group), summary)
-        for test, group in groupby(ordered, key=lambda run: str(run.case["test"]))
-    ]
+    ordered = sorted(runs, key=lambda run: (run.case.number, TESTS.index(run.case.test)))
+    by_test = {test: list(group) for test, group in groupby(ordered, key=lambda run: run.case.test)}
     return render_page(
         "verification/verification.html.j2",
-        {"quantity": quantity},
-        parts=parts,
+        {
+            "quantity": quantity,
+            "limited_restitution": limited_restitution,
+            "tangential_damping_ratio": tangential_damping_ratio,
+        },
+        sections={test: _section(test, group, summary) for test, group in by_test.items()},
+        spins=published_spins(by_test.get("oblique_angle"), by_test.get("oblique_tangential")),
         counts=counts(summary),
-        failures=_rows(summary[summary["verdict"] == "fail"]),
+        failures=summary[summary["verdict"] == "fail"].to_dict("records"),
         runs=len(runs),
     )
 
 
-def _place(test: str) -> int:
-    return list(WORDS).index(test)
-
-
-def _part(test: str, runs: Sequence[Recording], summary: pd.DataFrame) -> Mapping[str, object]:
+def _section(test: str, runs: Sequence[Recording], summary: pd.DataFrame) -> Section:
     rows = summary[summary["test"] == test]
+    judged = rows["against"].isin(JUDGED)
     with matplotlib.rc_context(STYLE):
         picture = data_uri(png(draw(test, runs)))
-    first = runs[0].case
-    return {
-        "test": test,
-        "number": first["number"],
-        "heading": first["heading"],
-        "words": WORDS[test],
-        "picture": picture,
-        "same": _rows(rows[rows["against"].isin(JUDGED)]),
-        "others": _rows(rows[~rows["against"].isin(JUDGED)]),
-        "steps": sorted({run.steps_per_contact for run in runs}),
-    }
+    return Section(
+        case=runs[0].case,
+        picture=picture,
+        same=rows[judged].to_dict("records"),
+        others=rows[~judged].to_dict("records"),
+        steps=sorted({run.case.steps_per_contact for run in runs}),
+    )
 
 
-def _rows(table: pd.DataFrame) -> list[dict[str, object]]:
-    return [
-        {str(key): None if _missing(value) else value for key, value in row.items()}
-        for row in table.to_dict("records")
-    ]
+SPIN_AT = 4.0
+"""Scaled patch velocity at which the published spins of two tests are compared."""
 
 
-def _missing(value: object) -> bool:
-    return isinstance(value, float) and math.isnan(value)
+def published_spins(
+    angle: Sequence[Recording] | None, tangential: Sequence[Recording] | None
+) -> TwoSpins | None:
+    """The published spins of the tests over the angle and over the tangential speed.
+
+    Both are scaled as the second is: surface speed by spin over friction times normal speed,
+    against patch velocity over the same.
+    """
+    if not angle or not tangential:
+        return None
+    impact = angle[0].contacts[0]
+    contact, before = impact.constants, impact.before
+    inclined = math.atan(SPIN_AT * contact.friction)
+    normal = math.hypot(before.normal_m_s, before.tangential_m_s) * math.cos(inclined)
+    spin = published("oblique_angle", angle[0].case.series, "spin_rad_s").at(math.degrees(inclined))
+    own = published("oblique_tangential", tangential[0].case.series, "scaled_spin").at(SPIN_AT)
+    return TwoSpins(SPIN_AT, own, contact.particle.radius_m * spin / (contact.friction * normal))
 
 
 _UNITS = {

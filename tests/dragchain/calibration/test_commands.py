@@ -56,4 +56,4 @@ def test_a_missing_sweep_is_told_with_what_makes_it(
         "x",
     ]
     assert main(words) == 1
-    assert "dragdeck drops" in capsys.readouterr().err
+    assert "snakemake calibrate" in capsys.readouterr().err

@@ -18,10 +18,11 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tiny_run_files import Raw
 
-from dragchain.dumps import fast_reader as blocks
-from dragchain.dumps.any_dump import dump_files, output_of, read_dump
+from dragchain.dumps.any_dump import dump_files, layout_of, read_dump
 from dragchain.dumps.careful_reader import read_carefully
+from dragchain.dumps.fast_reader import file_blocks, read_batches
 from dragchain.errors import DumpError, TruncatedDumpError
 from dragchain.tables.convert import dump_to_parquet
 
@@ -72,18 +73,23 @@ def expected(text_precision=True):
     return [(step, [[row[0], *map(value, row[1:])] for row in rows]) for step, rows in ROWS.items()]
 
 
-@pytest.fixture(params=[1 << 20, 150, 700], ids=lambda size: f"blocks of {size}")
-def _block_bytes(request, monkeypatch) -> None:
-    monkeypatch.setattr(blocks, "BLOCK_BYTES", request.param)
+def frames_of(source: Path, block_bytes: int, names=None):
+    """Frames as `read_dump` gives them, from blocks of a size."""
+    files = dump_files(source)
+    batches = read_batches(files, layout_of(files[0], names), block_bytes=block_bytes)
+    return (frame for batch in batches for frame in batch.frames())
 
 
-@pytest.mark.usefixtures("_block_bytes")
+in_blocks = pytest.mark.parametrize("size", [1 << 20, 150, 700], ids="blocks of {}".format)
+
+
+@in_blocks
 @pytest.mark.parametrize("suffix", [".gz", ".zst", ".bz2", ""])
 @pytest.mark.parametrize("kind", ["custom", "local"])
-def test_reads_text_by_its_header(tmp_path: Path, raw, suffix, kind) -> None:
+def test_reads_text_by_its_header(tmp_path: Path, raw, suffix, kind, size) -> None:
     file = tmp_path / f"a.dump{suffix}"
     file.write_bytes(COMPRESS[suffix](text(raw, kind=kind)))
-    frames = list(read_dump(file))
+    frames = list(frames_of(file, size))
     assert as_lists(frames) == expected()
     assert list(frames[0].columns) == list(NAMES)
     assert [frame.opening for frame in frames] == [True, False, False, False]
@@ -94,14 +100,14 @@ def test_reads_text_by_its_header(tmp_path: Path, raw, suffix, kind) -> None:
     }
 
 
-@pytest.mark.usefixtures("_block_bytes")
+@in_blocks
 @pytest.mark.parametrize("suffix", [".gz", ".zst", ""])
-def test_reads_binary_by_the_names_given(tmp_path: Path, raw, suffix) -> None:
+def test_reads_binary_by_the_names_given(tmp_path: Path, raw, suffix, size) -> None:
     file = tmp_path / f"a.bin{suffix}"
     steps = enumerate(ROWS.items(), 1)
     content = b"".join(raw.binary(step, rows, 3, ranks) for ranks, (step, rows) in steps)
     file.write_bytes(COMPRESS[suffix](content))
-    found = as_lists(read_dump(file, NAMES))
+    found = as_lists(frames_of(file, size, NAMES))
     assert [(step, sorted(rows)) for step, rows in found] == [
         (step, sorted(rows)) for step, rows in expected(False)
     ]
@@ -113,13 +119,13 @@ def test_a_binary_dump_needs_names(tmp_path: Path, raw) -> None:
         next(read_dump(tmp_path / "a.bin"))
 
 
-@pytest.mark.usefixtures("_block_bytes")
-def test_columns_may_come_in_any_order_even_within_a_file(tmp_path: Path, raw) -> None:
+@in_blocks
+def test_columns_may_come_in_any_order_even_within_a_file(tmp_path: Path, raw, size) -> None:
     turned = ("c_f[1]", "id", "x")
     (tmp_path / "a.dump").write_bytes(text(raw, [0, 7]) + text(raw, [14, 21], turned))
-    assert as_lists(read_dump(tmp_path / "a.dump")) == expected()
+    assert as_lists(frames_of(tmp_path / "a.dump", size)) == expected()
     (tmp_path / "a.dump").write_bytes(text(raw, ROWS, turned))
-    assert as_lists(read_dump(tmp_path / "a.dump", NAMES)) == expected()
+    assert as_lists(frames_of(tmp_path / "a.dump", size, NAMES)) == expected()
 
 
 def test_other_columns_are_an_error(tmp_path: Path, raw) -> None:
@@ -131,15 +137,15 @@ def test_other_columns_are_an_error(tmp_path: Path, raw) -> None:
     assert caught.value.frame == 1
 
 
-@pytest.mark.usefixtures("_block_bytes")
-def test_reads_one_frame_a_file_in_the_order_of_the_steps(tmp_path: Path, raw) -> None:
+@in_blocks
+def test_reads_one_frame_a_file_in_the_order_of_the_steps(tmp_path: Path, raw, size) -> None:
     for step in ROWS:
         (tmp_path / f"a.{step}.dump").write_bytes(text(raw, [step]))
         (tmp_path / f"b.{step}.bin").write_bytes(raw.binary(step, ROWS[step], 3, 1))
     (tmp_path / "a.x.dump").touch()
-    assert as_lists(read_dump(tmp_path / "a.*.dump")) == expected()
-    assert as_lists(read_dump(tmp_path / "b.*.bin", NAMES)) == expected(False)
-    assert all(frame.opening for frame in read_dump(tmp_path / "a.*.dump"))
+    assert as_lists(frames_of(tmp_path / "a.*.dump", size)) == expected()
+    assert as_lists(frames_of(tmp_path / "b.*.bin", size, NAMES)) == expected(False)
+    assert all(frame.opening for frame in frames_of(tmp_path / "a.*.dump", size))
 
 
 def test_an_error_in_one_of_many_files_names_it(tmp_path: Path, raw) -> None:
@@ -201,14 +207,14 @@ SPOILT = [
 ]
 
 
-@pytest.mark.usefixtures("_block_bytes")
+@in_blocks
 @pytest.mark.parametrize("suffix", ["", ".gz"])
 @pytest.mark.parametrize(
     ("what", "goes_on"),
     [*((what, False) for what in SPOILT), *((what, True) for what in SPOILT if "cut" not in what)],
 )
 def test_what_is_spoilt_is_named_and_what_came_before_kept(
-    tmp_path: Path, raw, what, suffix, goes_on
+    tmp_path: Path, raw, what, suffix, goes_on, size
 ) -> None:
     name, content, message = spoilt(raw)[what]
     write = binary if name.endswith(".bin") else text
@@ -216,7 +222,7 @@ def test_what_is_spoilt_is_named_and_what_came_before_kept(
     file, table = tmp_path / f"{name}{suffix}", tmp_path / "a.parquet"
     file.write_bytes(COMPRESS[suffix](before + content + after))
     names = NAMES if name.endswith(".bin") else None
-    frames = read_dump(file, names)
+    frames = frames_of(file, size, names)
     assert [next(frames).step, next(frames).step] == [0, 7]
     with pytest.raises(DumpError, match=message) as caught:
         next(frames)
@@ -266,9 +272,8 @@ def test_a_compressed_file_without_content_is_an_error_if_it_is_cut(tmp_path: Pa
 
 
 @pytest.mark.parametrize("name", ["a.bin", "a.bin.gz", "a.dump", "a.dump.gz"])
-def test_a_spoilt_frame_does_not_make_a_block_grow(tmp_path: Path, raw, name, monkeypatch) -> None:
+def test_a_spoilt_frame_does_not_make_a_block_grow(tmp_path: Path, raw, name) -> None:
     """Ranks that do not add up, or a count too small, before very many frames."""
-    monkeypatch.setattr(blocks, "BLOCK_BYTES", 8192)
     if "bin" in name:
         spoilt = bytearray(raw.binary(0, ROWS[0], 3, 1))
         spoilt[8] = 2
@@ -277,12 +282,12 @@ def test_a_spoilt_frame_does_not_make_a_block_grow(tmp_path: Path, raw, name, mo
         content = text(raw, [0]) + b"1 2 3 \n" * 99_000
     file = tmp_path / name
     file.write_bytes(COMPRESS[file.suffix if file.suffix == ".gz" else ""](content))
-    output = output_of(file, NAMES if "bin" in name else None)
-    found = list(blocks._blocks(file, output))
+    output = layout_of(file, NAMES if "bin" in name else None)
+    found = list(file_blocks(file, output, 8192))
     assert found[-1].stuck
     assert max(len(block.buffer) for block in found) < 40_000
     with pytest.raises(DumpError, match="frame 0"):
-        list(read_dump(file, NAMES if "bin" in name else None))
+        list(frames_of(file, 8192, NAMES if "bin" in name else None))
 
 
 ODD = ["1 2.5 3", "1  2.5 3 ", "\t1 2.5\t3", "1 +2.5 3", "1.0 2.5 3 ", "1 2.5E0 3 ", "1 .5 3. "]
@@ -306,10 +311,8 @@ def test_the_fast_way_gives_what_the_careful_way_gives(tmp_path: Path, frames, s
             for step, rows in enumerate([["1 2 3"], *frames])
         )
     )
-    output = output_of(file, None)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(blocks, "BLOCK_BYTES", size)
-        fast = [frame for batch in blocks.read_batches([file], output) for frame in batch.frames()]
+    output = layout_of(file, None)
+    fast = frames_of(file, size)
     for one, other in zip_longest(fast, read_carefully(file, output)):
         assert (one.step, one.opening) == (other.step, other.opening)
         for name, values in other.columns.items():
@@ -345,31 +348,39 @@ from dragchain.tables.convert import dump_to_parquet
 def peak():
     status = Path("/proc/self/status").read_text()
     return 1024 * int(re.search(r"VmHWM:\\s*(\\d+)", status).group(1))
-source, target, *columns = sys.argv[1:]
-small = source.replace("large", "small")
-dump_to_parquet(small, target, columns or None)
-before = peak()
-dump_to_parquet(source, target, columns or None)
-print(before, peak())
+names = sys.argv[1:]
+for size in ("small", "large"):
+    for kind in ("dump", "bin", "dump.gz"):
+        columns = names if kind == "bin" else None
+        dump_to_parquet(f"{size}.{kind}", f"{size}.{kind}.parquet", columns)
+        print(peak())
 """
+KINDS = ["dump", "bin", "dump.gz"]
+LARGE = 300
 
 
-@pytest.mark.parametrize("name", ["large.dump", "large.bin", "large.dump.gz"])
-def test_memory_does_not_grow_with_the_file(tmp_path: Path, raw, name) -> None:
-    """Twelve times the frames may not take more than a few row groups more."""
-    rows = np.random.default_rng(1).normal(size=(20_000, 3))
+@pytest.fixture(scope="module")
+def peaks(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
+    """Folder of tables of small and twelve times larger dumps; peaks of memory on the way, B."""
+    folder = tmp_path_factory.mktemp("dumps")
+    rows = np.random.default_rng(1).normal(size=(12_000, 3))
     rows[:, 0] = np.arange(len(rows))
-    columns = []
-    if name.endswith(".bin"):
-        frame, columns = raw.binary(5, rows.tolist(), 3), list(NAMES)
-    else:
-        frame = raw.text(5, rows.tolist(), NAMES, "custom")
-    frame = gzip.compress(frame, 1) if name.endswith(".gz") else frame
-    (tmp_path / name.replace("large", "small")).write_bytes(frame * 25)
-    (tmp_path / name).write_bytes(frame * 300)
-    command = [sys.executable, "-c", PEAK, tmp_path / name, tmp_path / "t.parquet", *columns]
-    before, after = map(int, subprocess.check_output(command, text=True).split())
-    assert pq.ParquetFile(tmp_path / "t.parquet").metadata.num_rows == 300 * len(rows)
-    print(before, after)
+    text = Raw.text(5, rows.tolist(), NAMES, "custom")
+    frames = text, Raw.binary(5, rows.tolist(), 3), gzip.compress(text, 1)
+    for kind, frame in zip(KINDS, frames, strict=True):
+        (folder / f"small.{kind}").write_bytes(frame * (LARGE // 12))
+        (folder / f"large.{kind}").write_bytes(frame * LARGE)
+    command = [sys.executable, "-c", PEAK, *NAMES]
+    found = subprocess.check_output(command, cwd=folder, text=True)
+    return folder, [int(line) for line in found.split()]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_memory_does_not_grow_with_the_file(peaks, kind) -> None:
+    """Twelve times the frames may not take more than a few row groups more."""
+    folder, found = peaks
+    before, after = found[len(KINDS) - 1], found[len(KINDS) + KINDS.index(kind)]
+    table = pq.ParquetFile(folder / f"large.{kind}.parquet")
+    assert table.metadata.num_rows == LARGE * 12_000
     assert after < 500e6
     assert after - before < 60e6

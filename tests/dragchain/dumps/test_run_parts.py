@@ -10,7 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from dragchain.dumps.careful_reader import read_dump_file, read_print_file
+from dragchain.dumps.careful_reader import read_print_file
+from dragchain.dumps.fast_reader import read_frames
 from dragchain.dumps.run_parts import iter_frames, iter_prints, part_files
 from dragchain.errors import DumpError, TruncatedDumpError
 from dragchain.run.case import Output
@@ -86,7 +87,7 @@ def steps_of(frames):
 
 def test_reads_a_binary_frame_written_by_hand(tmp_path: Path) -> None:
     (tmp_path / "a.bin").write_bytes(BY_HAND)
-    (frame,) = read_dump_file(tmp_path / "a.bin", PARTICLES)
+    (frame,) = read_frames([tmp_path / "a.bin"], PARTICLES)
     assert frame.step == 7
     np.testing.assert_array_equal(frame.columns["particle_id"], [3, 1])
     np.testing.assert_array_equal(frame.columns["x_m"], [0.5, -1.0])
@@ -109,7 +110,7 @@ def test_reads_a_text_dump_of_kind_custom(tmp_path: Path, raw) -> None:
     output = changed(PARTICLES, binary=False, engine_columns=("id", "x"), pattern="b.{part}.dump")
     content = raw.text(0, [[4, 1e-300]], ("id", "x"), "custom")
     (tmp_path / "b.1.dump").write_bytes(content)
-    (frame,) = read_dump_file(tmp_path / "b.1.dump", output)
+    (frame,) = read_frames([tmp_path / "b.1.dump"], output)
     np.testing.assert_array_equal(frame.columns["x_m"], [1e-300])
 
 
@@ -117,7 +118,7 @@ def test_reads_a_frame_in_a_tilted_box(tmp_path: Path, raw) -> None:
     frame = raw.binary(0, [[1, 2.0]], 2, ranks=1)
     tilted = frame[:16] + struct.pack("<i", 1) + frame[20:92] + bytes(24) + frame[92:]
     (tmp_path / "a.bin").write_bytes(tilted)
-    (read,) = read_dump_file(tmp_path / "a.bin", PARTICLES)
+    (read,) = read_frames([tmp_path / "a.bin"], PARTICLES)
     np.testing.assert_array_equal(read.columns["x_m"], [2.0])
 
 
@@ -128,7 +129,7 @@ def test_every_cut_keeps_the_frames_before_it(tmp_path: Path, raw, output, write
     file = tmp_path / output.pattern.format(part=1)
     for size in range(len(whole)):
         file.write_bytes(whole[:size])
-        frames = read_dump_file(file, output)
+        frames = read_frames([file], output)
         before = sum(size >= end for end in ends[1:])
         assert steps_of(next(frames) for _ in range(before)) == [0, 10, 20][:before]
         if size in ends:
@@ -158,14 +159,14 @@ def test_a_cut_number_is_not_read_as_another_number(tmp_path: Path, raw) -> None
 def test_refuses_a_foreign_binary(tmp_path: Path, content, message) -> None:
     (tmp_path / "a.bin").write_bytes(content)
     with pytest.raises(DumpError, match=message) as caught:
-        list(read_dump_file(tmp_path / "a.bin", PARTICLES))
+        list(read_frames([tmp_path / "a.bin"], PARTICLES))
     assert not isinstance(caught.value, TruncatedDumpError)
 
 
 def test_refuses_a_binary_of_another_width(tmp_path: Path, raw) -> None:
     (tmp_path / "a.bin").write_bytes(raw.binary(0, [[1, 2, 3]], 3))
     with pytest.raises(DumpError, match="the rows have 3 columns"):
-        list(read_dump_file(tmp_path / "a.bin", PARTICLES))
+        list(read_frames([tmp_path / "a.bin"], PARTICLES))
 
 
 def test_refuses_ranks_that_do_not_add_up(tmp_path: Path, raw) -> None:
@@ -173,7 +174,7 @@ def test_refuses_ranks_that_do_not_add_up(tmp_path: Path, raw) -> None:
     frame[8] = 1
     (tmp_path / "a.bin").write_bytes(frame)
     with pytest.raises(DumpError, match="the ranks wrote 2 rows"):
-        list(read_dump_file(tmp_path / "a.bin", PARTICLES))
+        list(read_frames([tmp_path / "a.bin"], PARTICLES))
 
 
 @pytest.mark.parametrize(
@@ -207,7 +208,7 @@ def test_refuses_a_spoilt_text_dump(tmp_path: Path, raw, old, new, message) -> N
 def test_refuses_nan_in_a_binary(tmp_path: Path, raw) -> None:
     (tmp_path / "a.bin").write_bytes(raw.binary(0, [[1, 2.0], [2, float("nan")]], 2))
     with pytest.raises(DumpError, match="row 1: x_m is nan"):
-        list(read_dump_file(tmp_path / "a.bin", PARTICLES))
+        list(read_frames([tmp_path / "a.bin"], PARTICLES))
 
 
 def test_skips_a_header_that_comes_again(tmp_path: Path) -> None:

@@ -32,8 +32,9 @@ from PIL import Image
 
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import Thresholds, event_types, find_events, surfaces
+from dragchain.loading.document import Loading
 from dragchain.loading.samples import sample
-from dragchain.loading.write import read_loading, write_loading
+from dragchain.loading.write import compute_loading, read_loading, write_loading
 from dragchain.run.case import Circle, load_case
 from dragchain.run.kinematics import workpiece_velocity
 from dragchain.run.workpiece import off_facet, read_surface, turned
@@ -46,6 +47,11 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = write_run(tmp_path_factory.mktemp("made") / "run", made_contacts())
     write_loading(folder)
     return folder
+
+
+@pytest.fixture
+def found(run: Path) -> Loading:
+    return read_loading(run)
 
 
 @pytest.fixture
@@ -125,9 +131,7 @@ def test_a_particle_with_two_contacts_has_one_stay_with_the_sum_of_both(tmp_path
             contact(i, SLIDE, (-0.004, 0.012), (-2.0, 0.0, 0.0)),
         )
     ]
-    folder = write_run(tmp_path / "run", both)
-    write_loading(folder)
-    events = pd.read_parquet(folder / "tables/contact_events.parquet")
+    events = compute_loading(write_run(tmp_path / "run", both), Thresholds()).events
     assert events["samples"].tolist() == [40]
     assert events["peak_normal_force_n"].tolist() == [3.0]
     assert events["normal_impulse_n_s"][0] == pytest.approx(40 * 3.0 * DT)
@@ -135,19 +139,18 @@ def test_a_particle_with_two_contacts_has_one_stay_with_the_sum_of_both(tmp_path
 
 
 def test_totals_are_the_sums_over_facets_and_over_events(
-    run: Path, facets: pd.DataFrame, events: pd.DataFrame
+    run: Path, found: Loading, facets: pd.DataFrame, events: pd.DataFrame
 ) -> None:
-    found = read_loading(run)
     for name in ("normal_impulse_n_s", "tangential_impulse_n_s", "force_slide_n_m", "sliding_m"):
-        assert facets[name].sum() == pytest.approx(found["totals"][name], rel=1e-12)
-        assert events[name].sum() == pytest.approx(found["totals"][name], rel=1e-12)
+        assert facets[name].sum() == pytest.approx(found.totals[name], rel=1e-12)
+        assert events[name].sum() == pytest.approx(found.totals[name], rel=1e-12)
     workpiece = pd.read_parquet(run / "tables/workpiece_force.parquet")
     for axis in ("drag", "lateral", "vertical"):
         assert facets[f"{axis}_impulse_n_s"].sum() == pytest.approx(
             workpiece[f"{axis}_n"].sum() * DT
         )
-    assert found["closure"]["workpiece_relative_error"] < 1e-12
-    assert found["closure"]["point_off_facet_max_m"] < 1e-12
+    assert found.closure.workpiece_relative_error < 1e-12
+    assert found.closure.point_off_facet_max_m < 1e-12
 
 
 def test_a_force_that_no_facet_has_is_told(tmp_path: Path) -> None:
@@ -156,39 +159,37 @@ def test_a_force_that_no_facet_has_is_told(tmp_path: Path) -> None:
     workpiece = pd.read_parquet(file)
     workpiece["lateral_n"] += 0.5
     workpiece.to_parquet(file)
-    write_loading(folder)
-    closure = read_loading(folder)["closure"]
-    assert closure["unplaced_impulse_n_s"]["lateral"] == pytest.approx(0.5 * FRAMES * DT)
-    assert closure["unplaced_impulse_n_s"]["drag"] == pytest.approx(0.0, abs=1e-12)
-    assert closure["workpiece_relative_error"] > 0.01
+    closure = compute_loading(folder, Thresholds()).summary.closure
+    assert closure.unplaced_impulse_n_s.lateral == pytest.approx(0.5 * FRAMES * DT)
+    assert closure.unplaced_impulse_n_s.drag == pytest.approx(0.0, abs=1e-12)
+    assert closure.workpiece_relative_error > 0.01
 
 
-def test_the_work_of_the_workpiece_is_drag_times_way(run: Path) -> None:
-    found = read_loading(run)
+def test_the_work_of_the_workpiece_is_drag_times_path(found: Loading) -> None:
     drag = 200 * 1.0 + FRAMES * 2.0 + 2 * 3.0 + 100 * 0.5
-    assert found["totals"]["workpiece_work_j"] == pytest.approx(drag * DT * SPEED)
+    assert found.totals["workpiece_work_j"] == pytest.approx(drag * DT * SPEED)
     fraction = 200 * 0.04 * DT * MU / (drag * DT * SPEED)
-    assert found["friction_fraction_of_work"]["value"] == pytest.approx(fraction)
-    assert found["load_while_sliding_fraction"]["value"] == pytest.approx(200 / drag)
-    assert found["types"]["rolling"]["fraction_of"]["normal_impulse_n_s"]["value"] == pytest.approx(
+    assert found.friction_fraction_of_work.value == pytest.approx(fraction)
+    assert found.load_while_sliding_fraction.value == pytest.approx(200 / drag)
+    assert found.types["rolling"].fraction_of["normal_impulse_n_s"].value == pytest.approx(
         2.0 * FRAMES / drag
     )
-    assert found["types"]["impact"]["events"] == 2
-    assert found["path_m"] == pytest.approx(SPEED * FRAMES * DT)
+    assert found.types["impact"].events == 2
+    assert found.path_m == pytest.approx(SPEED * FRAMES * DT)
 
 
-def test_an_interval_holds_its_value_and_has_a_width(run: Path) -> None:
-    per_metre = read_loading(run)["per_metre"]["force_slide_n_m"]
-    assert per_metre["ci95_low"] < per_metre["value"] < per_metre["ci95_high"]
+def test_an_interval_holds_its_value_and_has_a_width(found: Loading) -> None:
+    per_metre = found.per_metre["force_slide_n_m"]
+    assert per_metre.ci95_low < per_metre.value < per_metre.ci95_high
 
 
-def test_fewer_samples_change_the_number_of_stays(run: Path) -> None:
+def test_fewer_samples_change_the_number_of_stays(found: Loading) -> None:
     """Every tenth sees the two hits as one stay of two samples, or not at all."""
-    table = {row["every"]: row for row in read_loading(run)["sampling"]}
-    assert table[10]["largest_relative_error"]["sliding_m"] == pytest.approx(0.0, abs=1e-12)
-    assert table[10]["events"] == pytest.approx(3 + 1 / 10)
-    assert table[2]["events"] == pytest.approx(3 + 1)
-    assert table[2]["fraction_of"]["force_slide_n_m"]["sliding"] == 1.0
+    table = {row.every: row for row in found.sampling}
+    assert table[10].largest_relative_error["sliding_m"] == pytest.approx(0.0, abs=1e-12)
+    assert table[10].events == pytest.approx(3 + 1 / 10)
+    assert table[2].events == pytest.approx(3 + 1)
+    assert table[2].fraction_of["force_slide_n_m"]["sliding"] == 1.0
 
 
 def test_the_vtp_file_holds_the_table(run: Path, facets: pd.DataFrame) -> None:

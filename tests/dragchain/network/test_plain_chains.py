@@ -40,13 +40,13 @@ def assert_same_table(frame: NetworkFrame) -> None:
 
 
 @given(frames)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_tables_of_random_networks(frame: NetworkFrame) -> None:
     assert_same_table(frame)
 
 
 @given(frames, st.sampled_from([0.3, 1.0, 2.0]), st.booleans())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_paths_of_random_networks(
     frame: NetworkFrame, threshold: float, with_workpiece: bool
 ) -> None:
@@ -58,7 +58,7 @@ def test_paths_of_random_networks(
 
 
 @given(frames, st.sampled_from([30.0, 45.0, 60.0]), st.sampled_from([0.3, 1.0, 2.0]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_peters_chains_of_random_networks(frame: NetworkFrame, angle: float, factor: float) -> None:
     alpha = float(np.radians(angle))
     np.testing.assert_array_equal(particle_stress(frame), plain_stress(frame))

@@ -19,7 +19,7 @@ from dragchain.network.statistics import (
     mechanical_coordination_number,
 )
 from dragchain.network.write import write_chains
-from dragchain.tables.parquet import TableParts
+from dragchain.tables.parquet import table_writer
 
 CONTACT_COLUMNS = [
     "step", "time_s", "kind", "a_id", "b_id", "point_x_m", "point_y_m", "point_z_m",
@@ -241,11 +241,10 @@ def test_a_particle_with_two_rows_is_refused() -> None:
         a_frame([(1, 2, 1.0)], [2, 1, 3, 2])
 
 
-def test_a_table_in_parts_is_the_whole_table(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("dragchain.tables.parquet.GROUP_ROWS", 3)
+def test_a_table_in_parts_is_the_whole_table(tmp_path: Path) -> None:
     parts = [contact_rows(step, STAR[:step]) for step in (1, 2, 4, 1)]
     parts.insert(2, parts[0].iloc[:0])
-    with TableParts(tmp_path / "t.parquet") as table:
+    with table_writer(tmp_path / "t.parquet", group_rows=3) as table:
         for part in parts:
             table.write(part)
             assert not (tmp_path / "t.parquet").exists()
@@ -257,12 +256,11 @@ def test_a_table_in_parts_is_the_whole_table(tmp_path: Path, monkeypatch) -> Non
     assert schemas[0].equals(schemas[1], check_metadata=True)
 
 
-def test_a_table_in_parts_that_breaks_off_leaves_the_old_one(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("dragchain.tables.parquet.GROUP_ROWS", 1)
+def test_a_table_in_parts_that_breaks_off_leaves_the_old_one(tmp_path: Path) -> None:
     (tmp_path / "t.parquet").write_bytes(b"old")
 
     def break_off() -> None:
-        with TableParts(tmp_path / "t.parquet") as table:
+        with table_writer(tmp_path / "t.parquet", group_rows=1) as table:
             table.write(contact_rows(1, STAR))
             raise KeyboardInterrupt
 

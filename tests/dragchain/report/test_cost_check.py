@@ -10,10 +10,17 @@ from typing import Any
 import pytest
 from report_files import PICTURES, case_json, make_run, page_of, process_findings, run_json
 
-from dragchain.errors import TableError
-from dragchain.report.cost_check import actual_interval, cost_rows, prediction_for, read_advice
+from dragchain.errors import DocumentError
+from dragchain.report.cost_check import (
+    Option,
+    actual_interval,
+    cost_rows,
+    prediction_for,
+    read_advice,
+)
 from dragchain.report.study_report import write_report
-from dragchain.run.case import Case
+from dragchain.run.case import AdvisedSettings, Case
+from dragchain.run.completeness import RunRecord
 
 ASKED = {
     "tolerance": 0.05, "quantity": "drag_mean", "label": "mean drag", "held_to": 0.025,
@@ -21,6 +28,9 @@ ASKED = {
     "half_width": 0.03, "outside": ["depth over particle diameter 3 is outside of 6 to 8"],
     "fallback": None, "source": "measured 2026-01-02 on small, plan made",
 }  # fmt: skip
+
+
+RECORD = RunRecord.model_validate(run_json())
 
 
 def option(**more: Any) -> dict[str, Any]:
@@ -82,30 +92,31 @@ def test_no_advice_no_comparison(run: Path, tmp_path: Path) -> None:
 )  # fmt: skip
 def test_a_prediction_of_other_settings_is_not_compared(run: Path, other: dict[str, Any]) -> None:
     case = Case.read(run / "case.json")
-    assert prediction_for(case, [other]) is None
-    assert prediction_for(case, [other, option()]) == option()
+    wrong, right = (Option.model_validate(one) for one in (other, option()))
+    assert prediction_for(case, [wrong]) is None
+    assert prediction_for(case, [wrong, right]) == right
 
 
 def test_only_scenes_that_were_run_and_predicted_have_a_row() -> None:
-    (row,) = cost_rows(option(), {"process": run_json(), "drop_test": run_json()})
+    expected = Option.model_validate(option())
+    (row,) = cost_rows(expected, {"process": RECORD, "drop_test": RECORD})
     assert (row.scene, row.steps, row.actual_steps) == ("process", 150_000, 160_000)
     assert row.ratio == pytest.approx(76 / 50)
 
 
 def test_the_interval_of_a_run_is_that_of_the_asked_force() -> None:
-    forces = process_findings()["forces"]
-    found = actual_interval(ASKED, forces)
-    assert found == {
-        "mean": -2.5,
-        "ci95_low": -2.6,
-        "ci95_high": -2.4,
-        "fraction": pytest.approx(0.04),
-    }
-    assert actual_interval(ASKED | {"quantity": "chain_count"}, forces) is None
+    forces = process_findings().forces
+    found = actual_interval(AdvisedSettings(**ASKED), forces)
+    assert found is not None
+    assert (found.mean, found.ci95_low, found.ci95_high) == (-2.5, -2.6, -2.4)
+    assert found.fraction == pytest.approx(0.04)
+    other = AdvisedSettings(**ASKED | {"quantity": "chain_count"})
+    assert actual_interval(other, forces) is None
+    assert actual_interval(None, forces) is None
 
 
 def test_a_missing_or_foreign_advice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(TableError, match="dragdeck advise"):
+    with pytest.raises(DocumentError, match="dragdeck advise"):
         read_advice(tmp_path / "advice.json")
-    with pytest.raises(TableError, match="schema is 1"):
+    with pytest.raises(DocumentError, match="schema: is 1"):
         read_advice(advice_file(tmp_path, schema=1))

@@ -28,11 +28,17 @@ from PIL import Image
 
 from dragchain.errors import SeriesError, TableError
 from dragchain.figures import network_picture as scene
+from dragchain.figures.rendering import RenderError, check_rendering
 from dragchain.network.frame import NetworkFrame
 from dragchain.network.write import write_chains
-from dragchain.report.findings import compare, dominant_bottlenecks, read_findings, write_findings
-from dragchain.report.run_figures import drag_of_cases, energy_ratio, write_figures
+from dragchain.report.collect import compare
+from dragchain.report.findings import FILE, DropFindings, FillingFindings, ProcessFindings
+from dragchain.report.process_figures import drag_of_cases
+from dragchain.report.run_data import dominant_bottlenecks
+from dragchain.report.run_figures import FIGURES, write_figures
+from dragchain.report.upstream_figures import energy_ratio
 from dragchain.run.case import Case, PublishedDrag, Reference, load_case
+from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean
 
 
@@ -53,32 +59,41 @@ def process(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run_dir
 
 
-def test_findings_of_a_process_are_those_of_its_tables(process: Path) -> None:
-    found = write_findings(process)
-    assert found == read_findings(process)
+@pytest.fixture(scope="module")
+def drawn(process: Path) -> list[Path]:
+    """The pictures of the process run, drawn once."""
+    return write_figures(process)
+
+
+@pytest.fixture
+def found(process: Path, drawn: list[Path]) -> ProcessFindings:
+    return ProcessFindings.read(process / FILE)
+
+
+def test_findings_of_a_process_are_those_of_its_tables(found: ProcessFindings) -> None:
     steps = np.arange(200, LAST + 1, 2)
-    assert found["forces"]["drag_n"]["mean"] == pytest.approx(-resistance(steps).mean())
-    assert found["process_time_zero_s"] == pytest.approx(0.1)
-    assert found["peaks"]["count"] == 1
-    assert found["peaks"]["process_time_s"] == pytest.approx([0.23])
-    assert found["peaks"]["largest_n"] == pytest.approx(-5.0)
-    assert found["workpiece_frames"] == 31
-    assert found["ahead_behind"]["ratio"]["value"] == pytest.approx(3.0)
-    assert found["ahead_behind"]["ahead_n"]["value"] == pytest.approx(3.0)
-    assert found["depth"]["slope_n_per_m"]["value"] == pytest.approx(200.0)
-    assert found["network"]["frames"] == 16
-    assert found["chains"]["widest_paths_per_frame"] == 1.0
-    assert found["chains"]["widest_paths_to_side_fraction"] == 1.0
-    assert found["chains"]["dominant_azimuth_mean_rad"] == pytest.approx(0.0)
+    assert found.forces["drag_n"].mean == pytest.approx(-resistance(steps).mean())
+    assert found.process_time_zero_s == pytest.approx(0.1)
+    assert found.peaks.count == 1
+    assert found.peaks.process_time_s == pytest.approx([0.23])
+    assert found.peaks.largest_n == pytest.approx(-5.0)
+    assert found.workpiece_frames == 31
+    assert found.ahead_behind.ratio.value == pytest.approx(3.0)
+    assert found.ahead_behind.ahead_n.value == pytest.approx(3.0)
+    assert found.depth.slope_n_per_m.value == pytest.approx(200.0)
+    assert found.network["frames"] == 16
+    assert found.chains.widest_paths_per_frame == 1.0
+    assert found.chains.widest_paths_to_side_fraction == 1.0
+    assert found.chains.dominant_azimuth_mean_rad == pytest.approx(0.0)
 
 
-def test_a_chain_that_carries_the_drag_is_associated_with_it(process: Path) -> None:
-    found = write_findings(process)["association"]
-    assert found["rank_correlation"] == pytest.approx(1.0)
+def test_a_chain_that_carries_the_drag_is_associated_with_it(found: ProcessFindings) -> None:
+    link = found.association
+    assert link.rank_correlation == pytest.approx(1.0)
     # no other shift fits as well
-    assert found["p_value"] == pytest.approx(1 / 16)
-    assert found["frames_at_peaks"] == 2
-    assert found["bottleneck_at_peaks_mean_n"] > found["bottleneck_elsewhere_mean_n"]
+    assert link.p_value == pytest.approx(1 / 16)
+    assert link.frames_at_peaks == 2
+    assert link.bottleneck_at_peaks_mean_n > link.bottleneck_elsewhere_mean_n
 
 
 def test_a_frame_without_a_path_has_no_bottleneck() -> None:
@@ -95,34 +110,27 @@ def reference(**drag: float) -> Reference:
 
 def test_comparison_is_relative_to_the_reference() -> None:
     ours = estimate_mean(np.array([-1.98, -2.0] * 8))
-    row = compare(ours, reference(drag_mean_n=-2.59, drag_std_n=0.66))
-    assert row[0]["label"] == "experiment"
-    assert row[0]["difference_percent"] == pytest.approx(100 * (1.99 / 2.59 - 1))
-    assert row[0]["ci95_low"] < row[0]["difference_percent"] < row[0]["ci95_high"]
-    assert row[0]["std_n"] == 0.66
-    assert compare(ours, None) == []
+    (drag,) = reference_drags(reference(drag_mean_n=-2.59, drag_std_n=0.66))
+    row = compare(ours, drag)
+    assert row.label == "experiment"
+    assert row.difference_percent == pytest.approx(100 * (1.99 / 2.59 - 1))
+    assert row.ci95_low < row.difference_percent < row.ci95_high
+    assert row.std_n == 0.66
+    assert reference_drags(None) == []
 
 
 def test_a_reference_of_zero_is_refused() -> None:
-    with pytest.raises(TableError, match="experiment.drag_mean_n is 0"):
-        compare(estimate_mean(np.arange(8.0)), reference(drag_mean_n=0.0))
+    with pytest.raises(TableError, match=r"experiment\.drag_mean_n is 0"):
+        reference_drags(reference(drag_mean_n=0.0))
 
 
-def test_process_figures_are_whole_pictures(process: Path) -> None:
-    written = write_figures(process)
-    names = [
-        "forces",
-        "force_around_workpiece",
-        "force_depth",
-        "chains_peaks",
-        "network_xy",
-        "network_xz",
-    ]
-    assert [path.stem for path in written] == names
+def test_process_figures_are_whole_pictures(process: Path, drawn: list[Path]) -> None:
+    names = list(FIGURES["process"])
+    assert [path.stem for path in drawn] == names
     assert sorted(path.name for path in (process / "figures").iterdir()) == sorted(
         f"{name}.png" for name in names
     )
-    for path in written:
+    for path in drawn:
         with Image.open(path) as picture:
             picture.load()
             assert min(picture.size) > 400
@@ -271,8 +279,8 @@ def test_a_machine_that_cannot_render_is_told_what_to_install(
 ) -> None:
     monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere.json")
-    with pytest.raises(scene.RenderError, match="libgl1-mesa-dri"):
-        scene.check_rendering()
+    with pytest.raises(RenderError, match="libgl1-mesa-dri"):
+        check_rendering()
 
 
 # --- fill and drop ---------------------------------------------------------------------------
@@ -285,9 +293,13 @@ def filling(tmp_path: Path) -> Path:
     content["settled"] = {"energy_ratio": 1e-5}
     (tmp_path / "case.json").write_text(json.dumps(content))
     bed = {
+        "schema": 2,
         "bed_height_m": 0.07,
+        "top_m": 0.075,
         "solid_fraction": 0.59,
         "n_particles": 3,
+        "radius_mean_m": 0.003,
+        "radius_std_m": 0.0,
         "kinetic_energy_ratio": 1e-7,
     }
     (tmp_path / "tables").mkdir()
@@ -297,8 +309,9 @@ def filling(tmp_path: Path) -> Path:
 
 def test_a_filling_without_thermo_has_no_figure(filling: Path) -> None:
     assert write_figures(filling) == []
-    assert read_findings(filling)["bed"]["solid_fraction"] == 0.59
-    assert read_findings(filling)["rest_energy_ratio"] == 1e-5
+    found = FillingFindings.read(filling / FILE)
+    assert found.bed["solid_fraction"] == 0.59
+    assert found.rest_energy_ratio == 1e-5
 
 
 def test_a_filling_is_drawn_from_its_thermo_table(filling: Path) -> None:
@@ -337,14 +350,13 @@ def test_a_drop_is_drawn_with_its_restitution(tmp_path: Path) -> None:
     }  # fmt: skip
     save(pd.DataFrame(impacts), tmp_path, "impacts")
     assert [path.name for path in write_figures(tmp_path)] == ["drop_test.png"]
-    ratio = read_findings(tmp_path)["restitution"]
-    assert ratio["mean"] == pytest.approx(0.72)
-    assert ratio["input"] == 0.7
+    ratio = DropFindings.read(tmp_path / FILE).restitution
+    assert ratio.mean == pytest.approx(0.72)
+    assert ratio.input == 0.7
 
 
 def test_overview_has_a_row_a_case() -> None:
-    force = {"mean": -2.0, "ci95_low": -2.2, "ci95_high": -1.8}
+    force = estimate_mean(np.array([-1.8, -2.2] * 4))
     figure = drag_of_cases(["a", "b"], [force, force], [("measured", -2.59)])
     axes = figure.axes[0]
     assert [label.get_text() for label in axes.get_yticklabels()] == ["a", "b"]
-    assert axes.get_xlabel().endswith("interval")

@@ -56,7 +56,7 @@ def test_a_drop_needs_neither_bowl_nor_workpiece(tiny_run: Path, edit_json) -> N
         (lambda c: c.update(schema=1), r"case\.json: schema: is 1, this dragchain reads 2"),
         (
             lambda c: c.update(scene="stir"),
-            r"scene: is 'stir': Input should be 'drop_test', 'filling' or 'process'",
+            r"scene: is 'stir': Input should be 'drop_test', 'filling'",
         ),
         (lambda c: c["bowl"].pop("radius_m"), r"case\.json: bowl\.radius_m: is missing"),
         (

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import html
 import json
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,18 +13,15 @@ import pytest
 from tiny_run_files import DENSITY_KG_M3, GRAVITY_M_S2, RADIUS_M, WORKPIECE_RADIUS_M, case_json
 
 from dragchain.cli import main
-from dragchain.errors import TableError
+from dragchain.errors import DocumentError, TableError
+from dragchain.report.notation import MINUS
 from dragchain.report.page import page_environment
-from dragchain.scaling.fit import (
-    Expectation,
-    draw_scalings,
-    find,
-    read_runs,
-    read_scalings,
-    table,
-    write_scaling,
-)
-from dragchain.statistics.power_law import Estimate, Runs, fit_power_law
+from dragchain.scaling.document import Expectation, ScalingFile
+from dragchain.scaling.figures import draw_scalings
+from dragchain.scaling.fit import find, read_scalings, said, table, write_scaling
+from dragchain.scaling.runs import read_runs
+from dragchain.statistics.estimate import Estimate
+from dragchain.statistics.power_law import Runs, fit_power_law
 
 DEPTH = "motion.immersion_depth_m"
 LEVELS = (0.01, 0.02, 0.04)
@@ -82,22 +77,18 @@ def quadratic(write_run: Writer) -> list[Path]:
 
 
 def test_a_quadratic_drag_agrees_with_two_and_not_with_one(quadratic: list[Path]) -> None:
-    runs = read_runs(quadratic, DEPTH)
-    found = find(runs, DEPTH, Expectation(2.0, "somebody 1999"))
-    assert found["verdict"] == "agrees"
-    assert found["fit"]["exponent"]["value"] == pytest.approx(2.0, abs=0.01)
-    assert found["statement"].endswith("the interval holds the 2 of somebody 1999")
-    other = find(runs, DEPTH, Expectation(1.0))
-    assert other["verdict"] == "deviates" and "excludes the 1" in other["statement"]
-    assert find(runs, DEPTH, Expectation())["verdict"] == "no expectation"
+    found = find(quadratic, DEPTH, Expectation(exponent=2.0, source="somebody 1999"))
+    assert found.verdict == "agrees"
+    assert found.fit.exponent.value == pytest.approx(2.0, abs=0.01)
+    assert find(quadratic, DEPTH, Expectation(exponent=1.0)).verdict == "deviates"
+    assert find(quadratic, DEPTH, Expectation()).verdict == "no expectation"
 
 
 def test_the_size_is_compared_with_the_weight_on_the_workpiece(quadratic: list[Path]) -> None:
     run = read_runs(quadratic, DEPTH)[0]
     scale = DENSITY_KG_M3 * GRAVITY_M_S2 * 2.0 * WORKPIECE_RADIUS_M
-    assert run.eta == pytest.approx(2000.0 * 1.03 / scale)
-    found = find(read_runs(quadratic, DEPTH), DEPTH, Expectation(2.0))
-    assert found["eta"]["ci95_low"] < 2000.0 * 1.045 / scale < found["eta"]["ci95_high"]
+    assert run.row.eta == pytest.approx(2000.0 * 1.03 / scale)
+    assert find(quadratic, DEPTH, Expectation(exponent=2.0)).eta.contains(2000.0 * 1.045 / scale)
     assert run.gap_particles == pytest.approx(
         (0.040 - 0.020 - WORKPIECE_RADIUS_M) / (2.0 * RADIUS_M)
     )
@@ -111,13 +102,13 @@ def test_an_expectation_for_some_levels_is_judged_there(write_run: Writer) -> No
         for speed in (0.005, 0.01, 0.02, 0.08)
         for seed in (1, 2)
     ]
-    runs = read_runs(folders, field)
-    assert find(runs, field, Expectation(0.0))["verdict"] == "deviates"
-    slow = find(runs, field, Expectation(0.0, within=(0.005, 0.02)))
-    assert slow["verdict"] == "agrees" and slow["fit_within"]["runs"] == 6
-    assert slow["fit_within"]["change_per_decade"]["value"] == pytest.approx(0.0, abs=0.01)
-    assert slow["local_exponents"][-1]["value"] == pytest.approx(0.5, abs=0.01)
-    assert slow["two_terms"] is None
+    assert find(folders, field, Expectation(exponent=0.0)).verdict == "deviates"
+    slow = find(folders, field, Expectation(exponent=0.0, within=(0.005, 0.02)))
+    assert slow.verdict == "agrees"
+    assert slow.fit_within is not None and slow.fit_within.runs == 6
+    assert slow.fit_within.change_per_decade.value == pytest.approx(0.0, abs=0.01)
+    assert slow.local_exponents[-1].value == pytest.approx(0.5, abs=0.01)
+    assert slow.two_terms is None
 
 
 def test_the_command_writes_all_that_a_page_needs(
@@ -127,7 +118,7 @@ def test_the_command_writes_all_that_a_page_needs(
     words = ["step", "scaling", "--out", str(out), "--field", DEPTH, "--expected", "2"]
     assert main([*words, *map(str, quadratic)]) == 0
     assert "agrees" in capsys.readouterr().out
-    found = json.loads((out / "scaling.json").read_text())
+    found = ScalingFile.read(out / "scaling.json")
     rows = pd.read_csv(out / "scaling.csv")
     assert rows[DEPTH].tolist() == list(LEVELS) and rows.runs.tolist() == [2, 2, 2]
     assert (rows.drag_n_ci95_low < rows.drag_n).all()
@@ -158,15 +149,26 @@ def test_a_drag_along_the_motion_is_refused(write_run: Writer, tmp_path: Path) -
         write_scaling(tmp_path / "out", [folder], DEPTH, Expectation())
 
 
+def test_a_document_without_a_number_is_refused(quadratic: list[Path], tmp_path: Path) -> None:
+    found = write_scaling(tmp_path / "out", quadratic, DEPTH, Expectation(exponent=2.0))
+    file = tmp_path / "out" / "scaling.json"
+    assert ScalingFile.read(file) == found
+    content = json.loads(file.read_text())
+    del content["levels"][1]["drag_n"]["ci95_low"]
+    file.write_text(json.dumps(content))
+    with pytest.raises(DocumentError, match=r"levels\[1\]\.drag_n\.ci95_low: is missing"):
+        ScalingFile.read(file)
+
+
 def test_the_scalings_of_the_package_are_whole() -> None:
     scalings = read_scalings()
-    assert [found["study"] for found in scalings] == [
+    assert [found.study for found in scalings] == [
         f"drag-{name}" for name in ("depth", "diameter", "speed", "friction")
     ]
     for found in scalings:
-        assert found["commands"] and found["engine"] and found["started"]
-        assert asdict(_refit(found)) == pytest.approx(found["fit"]["exponent"], abs=1e-4)
-        assert list(table(found)[found["field"]]) == [level["x"] for level in found["levels"]]
+        assert found.commands and found.engine and found.started
+        assert vars(_refit(found)) == pytest.approx(vars(found.fit.exponent), abs=1e-4)
+        assert list(table(found)[found.field]) == [level.x for level in found.levels]
 
 
 def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
@@ -175,30 +177,36 @@ def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
     page = template.render(found=scalings, picture=lambda name: f"data:image/png;base64,{name}")
     assert 'src="data:image/png;base64,scaling.png"' in page
     for found in scalings:
-        assert found["statement"] in page
-        assert all(html.escape(remark, quote=True) in page for remark in found["remarks"])
+        value, low, high = (
+            f"{n:.2f}".replace("-", MINUS) for n in vars(found.judged.exponent).values()
+        )
+        assert f"{found.verdict}: exponent {value} ({low} to {high})" in page
 
 
-def test_the_remarks_name_a_lack_of_fit(write_run: Writer) -> None:
+def test_the_words_name_a_lack_of_fit(write_run: Writer) -> None:
     field = "motion.speed_m_s"
     bent = {0.005: 1.0, 0.01: 1.0, 0.02: 1.0, 0.04: 1.8, 0.08: 1.0}
     folders = [
         write_run(drag, seed, **{field: speed}) for speed, drag in bent.items() for seed in (1, 2)
     ]
-    words = " ".join(find(read_runs(folders, field), field, Expectation(0.0))["remarks"])
-    assert "does not hold" in words and "40 mm/s by +" in words
-    assert "Ten times the level changes the drag by" in words
+    found = find(folders, field, Expectation(exponent=0.0))
+    assert found.fit.lack_of_fit is not None and found.fit.lack_of_fit < 0.05
+    off = found.levels[3].deviation
+    assert off is not None and off.ci95_low > 0.0
+    assert f"40 mm/s by +{100 * off.value:.0f} %" in said(found)
 
 
-def test_one_bed_is_told(write_run: Writer) -> None:
+def test_one_bed_cannot_test_the_law(write_run: Writer) -> None:
     folders = [write_run(depth, **{DEPTH: depth}) for depth in (*LEVELS, 0.05)]
-    words = " ".join(find(read_runs(folders, DEPTH), DEPTH, Expectation(1.0))["remarks"])
-    assert "too few runs of one level" in words and "start from one bed" in words
+    found = find(folders, DEPTH, Expectation(exponent=1.0))
+    assert found.fit.lack_of_fit is None
+    assert {run.bed for run in found.runs} == {"filling-1"}
+    assert said(found).endswith("not in the intervals.")
 
 
-def _refit(found: dict[str, Any]) -> Estimate:
+def _refit(found: ScalingFile) -> Estimate:
     """The exponent from the runs in a record."""
-    runs = pd.DataFrame(found["runs"])
+    runs = pd.DataFrame([dict(run) for run in found.runs])
     drag = runs.drag_n.to_numpy()
     errors = runs.standard_error_n.to_numpy() / drag
     return fit_power_law(Runs(runs.level.to_numpy(), drag, errors, list(runs.bed))).exponent

@@ -78,17 +78,17 @@ def test_describes_a_bed_of_one_particle_by_hand(tiny_run: Path) -> None:
     """Radius 0.03 in a bowl of 0.04: height 0.06, 4/3 r^3 / (R^2 h); v^2 / 2 over g d."""
     case = changed(load_case(tiny_run), gravity_m_s2=10.0)
     bed = describe_bed(frame([[0, 0, 0.03, 0.1, 0, 0.2, 0.03]]), case)
-    assert bed["bed_height_m"] == pytest.approx(0.06)
-    assert bed["solid_fraction"] == pytest.approx(4 / 3 * 0.03**3 / (0.04**2 * 0.06))
-    assert bed["kinetic_energy_ratio"] == pytest.approx(0.5 * 0.05 / (10 * 0.06))
-    assert (bed["n_particles"], bed["radius_mean_m"], bed["radius_std_m"]) == (1, 0.03, 0.0)
+    assert bed.bed_height_m == pytest.approx(0.06)
+    assert bed.solid_fraction == pytest.approx(4 / 3 * 0.03**3 / (0.04**2 * 0.06))
+    assert bed.kinetic_energy_ratio == pytest.approx(0.5 * 0.05 / (10 * 0.06))
+    assert (bed.n_particles, bed.radius_mean_m, bed.radius_std_m) == (1, 0.03, 0.0)
 
 
 def test_the_spread_of_radii_is_that_of_the_bed(tiny_run: Path) -> None:
     rows = [[0, 0, 0.01, 0, 0, 0, r] for r in (0.009, 0.010, 0.011)]
     bed = describe_bed(frame(rows), load_case(tiny_run))
-    assert bed["radius_std_m"] == pytest.approx(0.001 * (2 / 3) ** 0.5)
-    assert bed["kinetic_energy_ratio"] == 0.0
+    assert bed.radius_std_m == pytest.approx(0.001 * (2 / 3) ** 0.5)
+    assert bed.kinetic_energy_ratio == 0.0
 
 
 def test_an_empty_bowl_is_an_error(tiny_run: Path) -> None:

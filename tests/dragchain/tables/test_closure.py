@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
@@ -34,23 +32,23 @@ def test_forces_that_add_up_pass() -> None:
     check = Closure()
     assert check.add(frame(contacts([[1, 0, 0], [0, 2, 0]])), np.array([-1, -2, 0]), counted=True)
     assert check.problem() is None
-    assert (check.content()["verdict"], check.content()["max_n"]) == ("pass", 0)
+    assert (check.record().verdict, check.record().max_n) == ("pass", 0)
 
 
 def test_a_missing_force_fails_and_is_measured() -> None:
     check = Closure()
     check.add(frame(contacts([[3, 0, 0]]), step=10), np.array([-3, 0, 0]), counted=True)
     check.add(frame(contacts([[3, 0, 0]]), step=20), np.array([-4, 0, 0]), counted=True)
-    content = check.content()
-    assert content["verdict"] == "fail"
-    assert (content["worst_step"], content["max_n"], content["max_relative"]) == (20, 1.0, 0.25)
-    assert "at step 20" in str(content["problem"])
+    record = check.record()
+    assert record.verdict == "fail"
+    assert (record.worst_step, record.max_n, record.max_relative) == (20, 1.0, 0.25)
+    assert "at step 20" in str(record.problem)
 
 
 def test_small_forces_are_measured_against_the_floor() -> None:
     check = Closure()
     check.add(frame(contacts([])), np.array([-1e-10, 0, 0]), counted=True)
-    assert check.content()["max_relative"] == pytest.approx(1e-7)
+    assert check.record().max_relative == pytest.approx(1e-7)
     assert check.problem() is None
 
 
@@ -59,25 +57,25 @@ def test_the_engines_second_evaluation_is_measured_apart() -> None:
     workpiece = contacts([[2, 0, 0]], evaluated=[[1.9, 0, 0]])
     check.add(frame(workpiece), np.array([-2, 0, 0]), counted=True)
     check.add(frame(workpiece), np.array([-2, 0, 0]), counted=False)
-    content = check.content()
-    assert content["verdict"] == "pass"
-    assert content["evaluated_max_n"] == pytest.approx(0.1)
-    assert content["evaluated_counted_mean_relative"] == pytest.approx(0.05)
+    record = check.record()
+    assert record.verdict == "pass"
+    assert record.evaluated_max_n == pytest.approx(0.1)
+    assert record.evaluated_counted_mean_relative == pytest.approx(0.05)
 
 
 def test_silent_contacts_are_counted() -> None:
     check = Closure()
     workpiece = contacts([[1, 0, 0], [0, 0, 0]], [[1, 0, 0], [0, 0.3, 0.4]], [False, True])
     check.add(frame(workpiece), np.array([-1, 0, 0]), counted=True)
-    content = check.content()
-    assert (content["contacts"], content["silent_contacts"]) == (2, 1)
-    assert content["silent_evaluated_max_n"] == pytest.approx(0.5)
+    record = check.record()
+    assert (record.contacts, record.silent_contacts) == (2, 1)
+    assert record.silent_evaluated_max_n == pytest.approx(0.5)
 
 
 def test_a_force_without_a_contact_fails_although_the_sum_is_right() -> None:
     check = Closure()
     check.add(frame(contacts([]), unplaced=[[0, 0.5, 0]]), np.array([0, -0.5, 0]), counted=True)
-    assert check.content()["max_n"] == 0
+    assert check.record().max_n == 0
     assert "1 forces on particles have no contact" in str(check.problem())
 
 
@@ -87,13 +85,13 @@ def test_a_frame_that_opens_a_file_is_noted_apart() -> None:
     assert not check.add(start, np.array([-4, 0, 0]), counted=True)
     assert check.add(start, np.array([-3, 0, 0]), counted=True)
     check.add(frame(contacts([[3, 0, 0]])), np.array([-3, 0, 0]), counted=True)
-    content = check.content()
-    assert (content["verdict"], content["frames"]) == ("pass", 1)
-    assert (content["opening_frames"], content["opening_max_relative"]) == (2, 0.25)
+    record = check.record()
+    assert (record.verdict, record.frames) == ("pass", 1)
+    assert (record.opening_frames, record.opening_max_relative) == (2, 0.25)
 
 
 def test_nothing_to_compare_fails() -> None:
     check = Closure()
     assert check.add(frame(contacts([[1, 0, 0]])), None, counted=False)
     assert "cannot be tested" in str(check.problem())
-    assert json.dumps(check.content(), allow_nan=False)
+    assert check.record().worst_step is None

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from dragchain.errors import TableError
-from dragchain.tables.impacts import find_impacts
+from dragchain.tables import impacts
+from dragchain.tables.impacts import speed_at_plate
 
 DT = 0.5
+RADIUS, GRAVITY = 0.25, 9.81
 
 
 def rows(samples):
@@ -15,10 +17,15 @@ def rows(samples):
     return {
         "step": table[:, 0].astype(np.int64),
         "time_s": DT * table[:, 0],
-        "z_m": np.zeros(len(table)),
+        "z_m": np.full(len(table), RADIUS),
         "vz_m_s": table[:, 1],
         "force_n": table[:, 2],
     }
+
+
+def find_impacts(samples, timestep_s):
+    """The particle's lowest point is at the plate's surface in every sample."""
+    return impacts.find_impacts(samples, timestep_s, RADIUS, GRAVITY)
 
 
 FIRST = [(10, -4, 0), (11, -3, 5), (12, 0, 9), (13, 2, 3), (14, 3, 0)]
@@ -52,6 +59,27 @@ def test_a_pull_at_the_end_belongs_to_the_impact() -> None:
 def test_a_particle_without_loss_rebounds_as_fast() -> None:
     found = find_impacts(rows([(0, -2, 0), (1, 0, 8), (2, 2, 0)]), DT)
     assert found["restitution"].tolist() == [1]
+
+
+def test_gravity_between_the_surface_and_a_sample_is_taken_out() -> None:
+    """Free flight on both sides of an impact that leaves half of the speed, 3 and 2 steps away."""
+    fall, up, dt = 4.0, 2.0, 0.01
+    time = np.array([-3 * dt, 0.0, 2 * dt])
+    speed = np.array([-fall + 3 * dt * GRAVITY, 0.0, up - 2 * dt * GRAVITY])
+    gap = [
+        3 * dt * fall - GRAVITY * (3 * dt) ** 2 / 2,
+        0.0,
+        2 * dt * up - GRAVITY * (2 * dt) ** 2 / 2,
+    ]
+    assert speed_at_plate(speed, gap, GRAVITY) == pytest.approx([fall, 0.0, up])
+    seen = {
+        "step": np.arange(3),
+        "time_s": time,
+        "z_m": RADIUS + np.array(gap),
+        "vz_m_s": speed,
+        "force_n": np.array([0.0, 9.0, 0.0]),
+    }
+    assert find_impacts(seen, dt)["restitution"] == pytest.approx([up / fall], rel=1e-12)
 
 
 @pytest.mark.parametrize(

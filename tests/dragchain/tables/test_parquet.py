@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from dragchain.files import write_json
-from dragchain.tables.parquet import GROUP_ROWS, TableWriter, category, column_type
+from dragchain.tables.parquet import GROUP_ROWS, category, column_type, table_writer
 
 
 def test_a_columns_name_tells_its_type() -> None:
@@ -21,7 +21,7 @@ def test_a_columns_name_tells_its_type() -> None:
 
 def test_rows_come_back_in_order(tmp_path: Path) -> None:
     file = tmp_path / "tables" / "t.parquet"
-    with TableWriter(file, ("step", "phase", "x_m")) as table:
+    with table_writer(file, ("step", "phase", "x_m")) as table:
         table.write({"step": [1, 2], "phase": category([0, 1], ("a", "b")), "x_m": [0.5, 1.5]})
         table.write({"step": [], "phase": category([], ("a", "b")), "x_m": []})
         table.write({"step": [3], "phase": category([1], ("a", "b")), "x_m": np.array([2.5])})
@@ -32,7 +32,7 @@ def test_rows_come_back_in_order(tmp_path: Path) -> None:
 
 
 def test_an_empty_table_has_its_columns(tmp_path: Path) -> None:
-    with TableWriter(tmp_path / "t.parquet", ("step", "x_m")):
+    with table_writer(tmp_path / "t.parquet", ("step", "x_m")):
         pass
     read = pq.read_table(tmp_path / "t.parquet")
     assert (read.num_rows, read.column_names) == (0, ["step", "x_m"])
@@ -40,7 +40,7 @@ def test_an_empty_table_has_its_columns(tmp_path: Path) -> None:
 
 def test_rows_are_written_while_they_come(tmp_path: Path) -> None:
     block = {"step": np.arange(GROUP_ROWS // 2 + 1)}
-    with TableWriter(tmp_path / "t.parquet", ("step",)) as table:
+    with table_writer(tmp_path / "t.parquet", ("step",)) as table:
         for _ in range(5):
             table.write(block)
         assert table.rows == 2 * 2 * len(block["step"])
@@ -49,9 +49,9 @@ def test_rows_are_written_while_they_come(tmp_path: Path) -> None:
 
 def test_a_failure_leaves_the_older_table_and_no_other_file(tmp_path: Path) -> None:
     file = tmp_path / "t.parquet"
-    with TableWriter(file, ("step",)) as table:
+    with table_writer(file, ("step",)) as table:
         table.write({"step": [1]})
-    with pytest.raises(RuntimeError), TableWriter(file, ("step",)) as table:
+    with pytest.raises(RuntimeError), table_writer(file, ("step",)) as table:
         table.write({"step": [2]})
         raise RuntimeError
     assert pq.read_table(file)["step"].to_pylist() == [1]

@@ -25,6 +25,7 @@ from dragchain import DumpError, RejectedRunError, TableError, load_case, load_o
 from dragchain.drag.force import read_counted, summarise_forces
 from dragchain.dumps.run_parts import iter_prints
 from dragchain.loading.write import write_loading
+from dragchain.tables.columns import FORCES, REFERENCE
 from dragchain.tables.write import WorkpieceSamples
 
 CONTRACT = {
@@ -271,14 +272,17 @@ def test_a_period_that_does_not_divide_is_an_error(tiny_run: Path, edit_json, ra
 
 
 def test_samples_are_found_in_blocks_and_gaps_are_not() -> None:
-    blocks = [{"step": np.array([2, 4]), "f": np.array([1.0, 2.0])}]
-    blocks.append({"step": np.array([6, 8]), "f": np.array([3.0, 4.0])})
+    names = (*FORCES, *REFERENCE)
+    blocks = [
+        {"step": np.array(steps), **{name: np.array(steps) + 0.5 for name in names}}
+        for steps in ([2, 4], [6, 8])
+    ]
     samples = WorkpieceSamples(blocks)
     assert samples.first_step == 2
-    assert samples.row(4) == {"step": 4, "f": 2.0}
-    assert samples.row(5) is None
-    assert samples.row(8) == {"step": 8, "f": 4.0}
-    assert samples.row(10) is None
+    assert (samples.at(4).force_n == 4.5).all()
+    assert samples.at(5) is None
+    assert (samples.at(8).ref_xy_m == 8.5).all()
+    assert samples.at(10) is None
     with pytest.raises(TableError, match="no samples"):
         WorkpieceSamples([])
 
@@ -294,8 +298,12 @@ def test_a_drop_gives_impacts(tiny_run: Path, edit_json, raw) -> None:
     impacts |= {"columns": columns, "engine_columns": None}
     impacts |= {"period_steps": 1, "first_step": 0, "last_step": None}
     to_scene(tiny_run, edit_json, "drop_test", {"impacts": impacts})
-    first = raw.prints([[10, 0.01, 0, -4, 0], [11, 0.011, 0, 0, 9], [12, 0.012, 0, 3, 0]], columns)
-    second = raw.prints([[30, 0.03, 0, -3, 0], [31, 0.031, 0, 0, 5], [32, 0.032, 0, 2, 0]], columns)
+    first = raw.prints(
+        [[10, 0.01, RADIUS_M, -4, 0], [11, 0.011, 0, 0, 9], [12, 0.012, RADIUS_M, 3, 0]], columns
+    )
+    second = raw.prints(
+        [[30, 0.03, RADIUS_M, -3, 0], [31, 0.031, 0, 0, 5], [32, 0.032, RADIUS_M, 2, 0]], columns
+    )
     (tiny_run / "impacts.1.txt").write_bytes(first + second)
     (made,) = write_tables(tiny_run)
     table = pd.read_parquet(made)

@@ -10,13 +10,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dragchain.errors import DocumentError
-from dragchain.tradeoff.measures import FailedCheck, Measures, Packing, write_measures
+from dragchain.errors import TableError
+from dragchain.run.completeness import AcceptanceCheck
+from dragchain.tables.bed import Packing
+from dragchain.tradeoff.measures import Measures, write_measures
 from dragchain.tradeoff.path_blocks import CountedPath, band
 from dragchain.tradeoff.quantities import QUANTITIES
 
 SPACING, COUNT = 0.1, 600
-BED = Packing(bed_height_m=0.07, solid_fraction=0.6)
+BED = Packing(
+    bed_height_m=0.07,
+    top_m=0.08,
+    solid_fraction=0.6,
+    n_particles=4,
+    radius_mean_m=0.003,
+    radius_std_m=0.0,
+    kinetic_energy_ratio=0.0,
+)
 
 
 def series() -> np.ndarray:
@@ -94,7 +104,7 @@ OUTCOME = {
 def measured(folder: Path, **outcome: object) -> Measures:
     """The measures of the tiny run as they are read from their file."""
     (folder / "outcome.json").write_text(json.dumps(OUTCOME | outcome))
-    (folder / "packing.json").write_text(BED.model_dump_json())
+    (folder / "packing.json").write_text(BED.as_text())
     found = write_measures(folder, folder / "packing.json")
     assert Measures.read(folder / "measures.json") == found
     return found
@@ -120,22 +130,24 @@ def test_a_run_by_hand(tiny_run: Path) -> None:
 
 
 def test_a_failed_run_says_only_how_it_failed(tiny_run: Path) -> None:
-    limits = {"code": "within_limits", "name": "within its limits", "seen": "3 m/s", "limit": "1"}
+    limits = AcceptanceCheck(
+        code="within_limits", name="within its limits", passed=False, seen="3 m/s", limit="1"
+    )
     checks = [
         {"code": "particles_kept", "name": "every particle kept", "passed": False,
          "seen": "3 particles", "limit": "4"},
         {"code": "finite_numbers", "name": "finite numbers", "passed": True, "seen": "all",
          "limit": "no NaN"},
-        {**limits, "passed": False},
+        limits.model_dump(),
     ]  # fmt: skip
     found = measured(tiny_run, state="failed", checks=checks)
     assert not found.complete and not found.blocks
     assert [check.code for check in found.failure] == ["particles_kept", "within_limits"]
-    assert found.telling_failure == FailedCheck(**limits)
+    assert found.telling_failure == limits
     assert found.cost.cpu_time_s == 4.0
     assert found.cost.steps_per_m == pytest.approx(1.0 / (1e-4 * 1e-3))
 
 
 def test_a_run_without_outcome_is_refused(tiny_run: Path) -> None:
-    with pytest.raises(DocumentError, match="run --outcome"):
+    with pytest.raises(TableError, match="run --outcome"):
         write_measures(tiny_run, tiny_run / "packing.json")

@@ -16,7 +16,10 @@ from dragchain.tradeoff.measures import Measures
 from dragchain.tradeoff.promises import check_promises, failures, verdict, write_promises
 
 FULL, SOFT = (1.0, 0.64, 1.0), (0.01, 0.64, 1.0)
-LOST = {"code": "within_limits", "name": "within its limits", "seen": "1 particle", "limit": "2"}
+LOST = {
+    "code": "within_limits", "name": "within its limits", "passed": False, "seen": "1 particle",
+    "limit": "2",
+}  # fmt: skip
 ASKED = {"tolerance": 0.1, "quantity": "drag_mean"}
 
 

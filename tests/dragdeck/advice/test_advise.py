@@ -6,6 +6,7 @@ import copy
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -295,7 +296,10 @@ def test_a_tolerance_about_restitution_sets_the_drop_alone(case: Case, tradeoff:
 
 @pytest.fixture
 def asking(small: dict[str, Any], write_study: Write, tradeoff: Tradeoff) -> Case:
-    (found,) = load_cases(write_study(small | {"fidelity": {"tolerance": 0.05}}), tradeoff=tradeoff)
+    (found,) = load_cases(
+        write_study(small | {"fidelity": {"tolerance": 0.05}}),
+        resolve=partial(resolve, tradeoff=tradeoff),
+    )
     return found
 
 
@@ -327,7 +331,7 @@ def test_tolerances_of_a_matrix_are_resolved_each(
 ) -> None:
     small["fidelity"] = {"tolerance": 0.05}
     small["sweep"] = {"fidelity.tolerance": [0.05, 0.02]}
-    found = load_cases(write_study(small), tradeoff=tradeoff)
+    found = load_cases(write_study(small), resolve=partial(resolve, tradeoff=tradeoff))
     scales = [case.study.chosen_fidelity().youngs_modulus_scale for case in found]
     assert scales == [0.01, 0.1]
 
@@ -354,7 +358,7 @@ def test_the_packages_own_tradeoff_can_be_read_and_resolves_tolerances(
 ) -> None:
     tradeoff = measured_tradeoff()
     assert tradeoff.study == "uhlmann2015" and len(tradeoff.promises) == 5
-    (found,) = load_cases(write_study(small | {"fidelity": {"tolerance": 0.4}}))
+    (found,) = load_cases(write_study(small | {"fidelity": {"tolerance": 0.4}}), resolve=resolve)
     assert found.advised is not None and found.advised.source.startswith(
         f"measured {tradeoff.measured}"
     )

@@ -10,31 +10,36 @@ from typing import Any
 
 import jinja2
 import pytest
-from made_tradeoff import cost, made_tradeoff
+from made_tradeoff import cost as priced
+from made_tradeoff import made_tradeoff
 
-from dragdeck.campaigns.cost_timing import BLOCK, blocks, costs, measure
+from dragchain.cli import main as dragchain
+from dragdeck.campaigns.cost_decks import (
+    CONTACT_WIDTH,
+    at_rest,
+    timed_drag,
+    timed_drop,
+    timed_filling,
+    workpiece_in,
+)
+from dragdeck.campaigns.cost_file import TimedVariant, Timing, cost, geometric
+from dragdeck.campaigns.cost_timing import BLOCK, blocks, cost_fillings, measure
 from dragdeck.campaigns.cost_variants import (
     BASES,
-    CONTACT_WIDTH,
-    Edit,
-    TimedDeck,
     Variant,
-    at_rest_deck,
-    geometric,
     standard_case,
-    timed_deck,
     variant_case,
     variants,
-    workpiece_in_deck,
 )
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
-from dragdeck.decks.render import environment
-from dragdeck.errors import InputError
+from dragdeck.decks.deck import AnyScene
+from dragdeck.decks.render import deck_text, environment
+from dragdeck.engine.batch import Batch
 from dragdeck.outlook.explain import Cost, explanation, price_of
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import drop_scene
-from dragdeck.scenes.filling import filling_scene
+from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.scene import Bed
 from dragdeck.sweep.cases import load_cases
@@ -53,9 +58,19 @@ def templates(project: Project) -> jinja2.Environment:
     return environment(project.templates)
 
 
-def deck_of(base: Case, name: str, templates: jinja2.Environment) -> TimedDeck:
-    found = {variant.name: variant for variant in [*BASES.values(), *variants(base)]}[name]
-    return timed_deck(base, found, templates, STEPS, BED, "bed.restart")
+def scene_of(base: Case, name: str, start: bool = False) -> AnyScene:
+    """The scene of a variant, as it is timed."""
+    variant = {variant.name: variant for variant in [*BASES.values(), *variants(base)]}[name]
+    case = variant_case(base, variant)
+    if variant.scene == "drop_test":
+        return variant.change(timed_drop(case, start))
+    if variant.scene == "filling":
+        return variant.change(timed_filling(case, STEPS, "packing.restart", start))
+    return variant.change(timed_drag(case, STEPS, BED, "bed.restart", start))
+
+
+def text_of(base: Case, name: str, templates: jinja2.Environment, start: bool = False) -> str:
+    return deck_text(scene_of(base, name, start), templates)
 
 
 def lines(text: str) -> list[str]:
@@ -76,37 +91,28 @@ def test_one_round_has_no_interval() -> None:
     assert (found.ratio, found.ci95_low, found.ci95_high) == (pytest.approx(2.0), None, None)
 
 
-@pytest.mark.parametrize("deck", ["run 2\n", "run 1\nrun 1\n"])
-def test_an_edit_that_does_not_fit_is_refused(deck: str) -> None:
-    with pytest.raises(InputError, match="has not the text to change"):
-        Edit(r"^run 1$", "run 3").apply(deck)
-
-
-def test_an_edit_changes_its_line_alone() -> None:
-    assert Edit(r"^run (\d)$", r"run \g<1>0").apply("rerun 1\nrun 1\n") == "rerun 1\nrun 10\n"
-
-
-def row(number: int, cpu: float, base_cpu: float, name: str = "finer") -> dict[str, Any]:
-    base = {"cpu_time_s": base_cpu, "wall_time_s": 1.0, "steps": 100}
-    return {
-        "name": name, "round": number, "cpu_time_s": cpu, "wall_time_s": 0.5, "steps": 200,
-        "base": base,
-    }  # fmt: skip
+def row(number: int, cpu: float, base_cpu: float, name: str = "finer") -> TimedVariant:
+    return TimedVariant(
+        name=name, round=number, cpu_time_s=cpu, wall_time_s=0.5, steps=200, inputs="",
+        measured="2026-11-22", load_average_before=0.0,
+        base=Timing(cpu_time_s=base_cpu, wall_time_s=1.0, steps=100),
+    )  # fmt: skip
 
 
 def test_a_cost_counts_steps_or_seconds() -> None:
     """Twice the steps in 6 s and 1.5 s against 1 s: 3 and 0.75 a step, their mean is 1.5."""
-    rows = [row(0, 6.0, 1.0), row(1, 1.5, 1.0)]
+    rows = [row(0, 6.0, 1.0), row(1, 1.5, 1.0), row(1, 9.0, 1.0, "another")]
     steps_s = {"standard": 1e-5, "finer": 0.5e-5}
-    (step,) = costs([Variant("finer", "", unit="per_step")], rows, steps_s)
-    (second,) = costs([Variant("finer", "")], rows, steps_s)
-    assert step["ratio"] == step["per_step"] == second["per_step"] == pytest.approx(1.5)
-    assert second["ratio"] == second["per_second"] == step["per_second"] == pytest.approx(3.0)
-    assert step["wall_ratio"] == pytest.approx(0.25)
-    assert second["wall_ratio"] == pytest.approx(0.5)
-    assert step["ci95_low"] < 0.75 and step["ci95_high"] > 3.0
-    assert second["ci95_low"] == pytest.approx(2 * step["ci95_low"])
-    assert (step["rounds"], step["steps"]) == (2, 200)
+    step = cost(Variant("finer", "", unit="per_step"), rows, steps_s)
+    second = cost(Variant("finer", ""), rows, steps_s)
+    assert step.ratio == step.per_step == second.per_step == pytest.approx(1.5)
+    assert second.ratio == second.per_second == step.per_second == pytest.approx(3.0)
+    assert step.wall_ratio == pytest.approx(0.25)
+    assert second.wall_ratio == pytest.approx(0.5)
+    assert step.ci95_low is not None and step.ci95_high is not None
+    assert step.ci95_low < 0.75 and step.ci95_high > 3.0
+    assert second.ci95_low == pytest.approx(2 * step.ci95_low)
+    assert (step.rounds, step.steps) == (2, 200)
 
 
 def test_every_round_times_every_variant_once_in_another_order(base: Case) -> None:
@@ -122,21 +128,23 @@ def test_every_variant_differs_from_its_base(base: Case, templates: jinja2.Envir
     chosen = variants(base)
     assert len({variant.name for variant in chosen}) == len(chosen)
     for variant in chosen:
-        deck, beside = (deck_of(base, name, templates) for name in (variant.name, variant.base))
-        other_mesh = {
-            name: len(mesh.triangles) for name, mesh in deck.meshes.items()
-        } != {name: len(mesh.triangles) for name, mesh in beside.meshes.items()}  # fmt: skip
-        other_text = lines(deck.whole) != lines(beside.whole)
-        other_bed = variant_case(base, variant).study.media != base.study.media
-        assert other_mesh or other_text or other_bed or deck.ranks != beside.ranks, variant.name
-        assert lines(deck.whole) != lines(deck.start), variant.name
+        deck, beside = (scene_of(base, name) for name in (variant.name, variant.base))
+        other_mesh = {name: len(mesh.faces) for name, mesh in deck.meshes.items()} != {
+            name: len(mesh.faces) for name, mesh in beside.meshes.items()
+        }
+        whole = lines(deck_text(deck, templates))
+        other_text = whole != lines(deck_text(beside, templates))
+        case = variant_case(base, variant)
+        other_bed = case.study.media != base.study.media
+        assert other_mesh or other_text or other_bed or case.ranks != base.ranks, variant.name
+        assert whole != lines(text_of(base, variant.name, templates, start=True)), variant.name
 
 
 def test_the_standard_drag_is_the_process_without_what_goes_before(
     base: Case, templates: jinja2.Environment
 ) -> None:
     scene = process_scene(base, BED)
-    text = deck_of(base, "standard", templates).whole
+    text = text_of(base, "standard", templates)
     steps = int(re.findall(r"^if .* then \"run (\d+) upto\"", text, re.MULTILINE)[0])
     assert -0.05 <= (steps - STEPS) / scene.deck.thermo_steps < 1
     assert steps % scene.deck.thermo_steps == 0
@@ -150,17 +158,20 @@ def test_the_standard_drag_is_the_process_without_what_goes_before(
 
 
 def test_the_plain_deck(base: Case, templates: jinja2.Environment) -> None:
-    plain, standard = (deck_of(base, name, templates) for name in ("plain", "standard"))
+    plain, standard = (scene_of(base, name) for name in ("plain", "standard"))
     fraction = base.study.chosen_fidelity().timestep_fraction
-    assert plain.timestep_s / standard.timestep_s == pytest.approx(0.2 / fraction, rel=1e-3)
-    assert "neighbor 0.001 bin" in plain.whole
-    assert "bowl.stl" in plain.whole and "bowl.stl" in plain.meshes
-    assert plain.ranks == 1
-    assert all(line in plain.whole for line in lines(standard.whole) if line.startswith("compute"))
+    assert plain.deck.timestep_s / standard.deck.timestep_s == pytest.approx(
+        0.2 / fraction, rel=1e-3
+    )
+    text = deck_text(plain, templates)
+    assert "neighbor 0.001 bin" in text
+    assert "bowl.stl" in text and "bowl.stl" in plain.meshes
+    computes = [line for line in lines(deck_text(standard, templates)) if line[:7] == "compute"]
+    assert computes and all(line in text for line in computes)
 
 
 def test_all_columns_are_asked_for_and_written(base: Case, templates: jinja2.Environment) -> None:
-    text = deck_of(base, "plain_columns", templates).whole
+    text = text_of(base, "plain_columns", templates)
     for output, compute in (
         ("contacts", "particle_contacts"),
         ("workpiece_contacts", "workpiece_contacts"),
@@ -173,7 +184,7 @@ def test_all_columns_are_asked_for_and_written(base: Case, templates: jinja2.Env
 def test_before_the_drag_only_forces_and_energies_are_written(
     base: Case, templates: jinja2.Environment
 ) -> None:
-    text = deck_of(base, "before_drag", templates).whole
+    text = text_of(base, "before_drag", templates)
     assert re.findall(r"^(?:dump|fix) write_(\w+)", text, re.MULTILINE) == [
         "thermo",
         "workpiece_force",
@@ -183,17 +194,18 @@ def test_before_the_drag_only_forces_and_energies_are_written(
 def test_every_step_of_a_drop_is_written_from_its_begin(
     base: Case, templates: jinja2.Environment
 ) -> None:
-    text = deck_of(base, "drop_every_step", templates).whole
+    text = text_of(base, "drop_every_step", templates)
     assert text.count("fix write_impacts") == 1 and "unfix write_impacts" not in text
     assert text.index("fix write_impacts") < text.index("run 0") < text.index("run ${flight}")
 
 
 def test_beds_keep_particles_but_no_workpiece(base: Case, templates: jinja2.Environment) -> None:
     meshed = variant_case(base, Variant("", "", {"bowl.facet_size_m": 0.005}))
-    for text in (
-        workpiece_in_deck(base, BED, "packing.restart", templates),
-        at_rest_deck(meshed, BED, "bed.restart", templates),
+    for scene in (
+        workpiece_in(base, BED, "packing.restart"),
+        at_rest(meshed, BED, "bed.restart"),
     ):
+        text = deck_text(scene, templates)
         assert text.index("unfix workpiece\n") < text.index("write_restart bed.restart")
         assert ("unfix bowl" in text) == ("fix bowl" in text)
         assert "dump write_" not in text and "move_drag" not in text
@@ -215,7 +227,7 @@ def test_a_variant_of_one_fidelity_parameter_says_which_and_its_level(base: Case
 
 
 def test_a_price_is_quoted_with_engine_and_date(base: Case) -> None:
-    costs = [cost("bowl_facets", 1.9, ci95_low=1.85, ci95_high=1.951), cost("bowl_fine", 1.9)]
+    costs = [priced("bowl_facets", 1.9, ci95_low=1.85, ci95_high=1.951), priced("bowl_fine", 1.9)]
     tradeoff = made_tradeoff(base, costs=costs)
     said = "putting it back costs 1.9x (1.85 to 1.95), LIGGGHTS 3.8.0, 2026-01-02"
     assert price_of("bowl_facets", tradeoff) == said
@@ -234,7 +246,7 @@ def test_explain_names_what_is_surely_cheaper(
     base: Case, high: float | None, unit: str, scene: str, shown: bool
 ) -> None:
     low = None if high is None else 0.85
-    wide = cost("wide facets", 0.9, scene=scene, unit=unit, ci95_low=low, ci95_high=high)
+    wide = priced("wide facets", 0.9, scene=scene, unit=unit, ci95_low=low, ci95_high=high)
     tradeoff = made_tradeoff(base, costs=[wide])
     table = explanation(process_scene(base), Cost(1, 1.0, ""), (), tradeoff)
     assert ("wide facets" in list(table.columns[1].cells)) == shown
@@ -242,12 +254,19 @@ def test_explain_names_what_is_surely_cheaper(
 
 
 def test_a_filling_is_timed_over_whole_frames(base: Case, templates: jinja2.Environment) -> None:
-    deck = deck_of(base, "filling_contacts", templates)
-    (period,) = re.findall(r"^dump write_contacts all local (\d+) ", deck.whole, re.MULTILINE)
-    (steps,) = re.findall(r"^run (\d+)$", deck.whole, re.MULTILINE)
+    scene = scene_of(base, "filling_contacts")
+    text = deck_text(scene, templates)
+    (period,) = re.findall(r"^dump write_contacts all local (\d+) ", text, re.MULTILINE)
+    (steps,) = re.findall(r"^run (\d+)$", text, re.MULTILINE)
     assert int(steps) % int(period) == 0
-    assert 1 / (int(period) * deck.timestep_s) == pytest.approx(20, rel=1e-3)
-    assert re.findall(r"^run (\d+)$", deck.start, re.MULTILINE) == ["1"]
+    assert 1 / (int(period) * scene.deck.timestep_s) == pytest.approx(20, rel=1e-3)
+    start = text_of(base, "filling_contacts", templates, start=True)
+    assert re.findall(r"^run (\d+)$", start, re.MULTILINE) == ["1"]
+
+
+def test_fillings_of_costs_are_those_of_its_particles(base: Case) -> None:
+    counts = [case.study.media.count for case in cost_fillings(base).values()]
+    assert counts == [300, 225]
 
 
 def test_a_measurement_is_not_overwritten(
@@ -258,7 +277,7 @@ def test_a_measurement_is_not_overwritten(
 ) -> None:
     monkeypatch.chdir(project.root)
     (project.root / "costs.json").write_text("kept")
-    assert main(["costs", "small", "--out", "costs.json"]) == 1
+    assert main(["step", "costs", "small", "--out", "costs.json"]) == 1
     assert "there already" in capsys.readouterr().err
     assert (project.root / "costs.json").read_text() == "kept"
 
@@ -269,7 +288,7 @@ def test_nothing_to_time_is_refused(
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     monkeypatch.chdir(project.root)
-    assert main(["costs", "small", "--out", "costs.json", option, "0"]) == 1
+    assert main(["step", "costs", "small", "--out", "costs.json", option, "0"]) == 1
     assert option in capsys.readouterr().err
 
 
@@ -285,9 +304,13 @@ def test_two_variants_on_the_engine(
     (case,) = load_cases(write_study(small))
     chosen = ("contact_columns", "step_0.2")
     said: list[str] = []
+    results = project.root / "results" / "small"
+    batch = Batch(results / "filling", environment(project.templates))
+    base = standard_case(case)
+    batch.result(FILLING.run_id(base), filling_scene(base))
+    assert dragchain(["tables", str(batch.folder / FILLING.run_id(base))]) == 0
 
     def time_them(out: Path, rounds: int) -> dict[str, Any]:
-        results = project.root / "results" / "small"
         measure(
             case, results, project.templates, out, said.append, rounds=rounds, seconds=0.04,
             only=chosen,
@@ -296,12 +319,12 @@ def test_two_variants_on_the_engine(
         return found
 
     first = time_them(tmp_path / "costs.json", 1)
-    beds = [line for line in said if line.startswith("making the bed")]
+    beds = [line for line in said if "part 1" in line]
     kept = json.loads((tmp_path / "costs" / "rounds.json").read_text())["rows"]
     found = time_them(tmp_path / "again.json", 2)
     rows = json.loads((tmp_path / "costs" / "rounds.json").read_text())["rows"]
     assert len(kept) == 2 and len(rows) == 4 and rows[:2] == kept
-    assert beds == [line for line in said if line.startswith("making the bed")] and beds
+    assert beds == [line for line in said if "part 1" in line] and beds
     assert found["versions"]["engine"].startswith("3.")
     columns, step = found["costs"]
     assert (columns["name"], step["name"]) == ("contact_columns", "step_0.2")
@@ -310,5 +333,6 @@ def test_two_variants_on_the_engine(
         step["per_step"] * found["bases"][0]["timestep_s"] / step["timestep_s"]
     )
     for entry in found["costs"]:
-        assert entry["ci95_low"] < entry["ratio"] < entry["ci95_high"] and entry["rounds"] == 2
+        assert entry["ci95_low"] < entry["ratio"] < entry["ci95_high"]
+        assert entry["rounds"] == 2
     assert first["costs"][0]["ci95_low"] is None

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from make_record import synthetic_record
 from scipy.integrate import solve_ivp
 
-from dragchain.calibration.fit import calibrate, prepare
-from dragchain.calibration.force_record import measure, read_record
+from dragchain.calibration.fit import calibrate_file
 from dragchain.calibration.report import write_report
-from dragchain.calibration.results import (
-    confirmed,
-    write_calibration,
-    write_synthetic,
-    write_trials,
-)
+from dragchain.calibration.results import confirmed, write_calibration
 from dragchain.calibration.simulated_drops import read_drops
-from dragchain.calibration.synthetic_record import Sensor
+from dragchain.calibration.sweep import prepare
+from dragchain.calibration.trials import Sensor, write_trials
 from dragdeck.campaigns.restitution_drops import (
     Drop,
     confirmation,
@@ -37,6 +32,7 @@ from dragdeck.campaigns.restitution_drops import (
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
 from dragdeck.decks.render import environment
+from dragdeck.engine.batch import Batch, silent
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import hertz_contact_time, rayleigh_time
 from dragdeck.project import Project
@@ -61,8 +57,8 @@ def measured_case(small: dict[str, Any], write_study: WriteStudy) -> Case:
 def test_the_default_drop_is_at_full_modulus_and_the_studys_step(case: Case) -> None:
     scene = drop_scene(case)
     assert scene.deck == drop_scene(case, DropFidelity()).deck
-    assert scene.case["youngs_modulus_scale"] == 1.0
-    ratio = scene.deck.timestep_s / scene.case["rayleigh_time_s"]
+    assert scene.case.youngs_modulus_scale == 1.0
+    ratio = scene.deck.timestep_s / scene.case.rayleigh_time_s
     assert ratio == pytest.approx(case.study.drop_test.timestep_fraction, rel=1e-3)
 
 
@@ -73,9 +69,9 @@ def test_a_drop_can_run_as_the_process_does(measured_case: Case) -> None:
     assert scene.deck.materials.youngs_moduli_pa[0] == pytest.approx(77e9 * 0.01)
     assert scene.deck.timestep_s == coarse.timestep_s
     # of the mean particle, a little larger than the smallest, which sets the step
-    assert scene.deck.timestep_s < chosen.timestep_fraction * scene.case["rayleigh_time_s"]
+    assert scene.deck.timestep_s < chosen.timestep_fraction * scene.case.rayleigh_time_s
     particle = measured_case.study.materials["ceramic"]
-    assert scene.case["rayleigh_time_s"] == pytest.approx(10 * rayleigh_time(particle, 3.27e-3))
+    assert scene.case.rayleigh_time_s == pytest.approx(10 * rayleigh_time(particle, 3.27e-3))
 
 
 def test_softer_particles_touch_for_longer(measured_case: Case) -> None:
@@ -135,7 +131,7 @@ def test_confirm_asks_for_the_fit(
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     monkeypatch.chdir(project.root)
-    assert main(["drops", "small", "confirm", "--out", "anywhere"]) == 1
+    assert main(["step", "drops", "small", "confirm", "--out", "anywhere"]) == 1
     assert "--fit" in capsys.readouterr().err
 
 
@@ -171,7 +167,7 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
     templates = environment(project.templates)
 
     def run(drops: list[Drop], name: str) -> Path:
-        return run_drops(case, drops, folder / name, templates, lambda line: None)
+        return run_drops(case, drops, Batch(folder / name, templates), silent)
 
     listed = run(short_sweep(case), "sweep")
     known = [
@@ -179,24 +175,25 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
         for k, (value, height) in enumerate([(0.68, 0.01008), (0.86, 0.00995)])
     ]
     made = run(known, "trials")
-    ready, drops = prepare(read_drops(listed)), read_drops(made)
+    swept, drops = read_drops(listed), read_drops(made)
+    production_model = prepare(swept).production
     for drop, truth in zip(known, drops.runs, strict=True):
         record = folder / f"{drop.name}.csv"
-        write_synthetic(made, drop.name, Sensor(500e3, 0.1, 3.0, 0.5, 0.01), 7, record)
-        got = calibrate(measure(read_record(record), fall_time_s=ready.known["fall_time_s"]), ready)
-        assert got.fit_reference.low < drop.restitution < got.fit_reference.high
-        low, high = (ready.production.rebound(e) for e in (got.fit.low, got.fit.high))
-        assert low < truth.rebound.mean() < high
+        record.write_text(synthetic_record(truth, Sensor(500e3, 0.1, 3.0, 0.5, 0.01), 7))
+        got = calibrate_file(record, swept)
+        assert got.fit_reference.interval.contains(drop.restitution)
+        low, high = (production_model.rebound(e) for e in (got.fit.ci95_low, got.fit.ci95_high))
+        assert low < truth.effective < high
         assert got.fit_reference.height_m == pytest.approx(drop.height_m, abs=2e-5)
 
-    result = json.loads(write_calibration(folder / "trial-0.csv", listed, folder).read_text())
-    values = (result["fit"]["restitution"], result["fit_full"]["restitution"])
+    result = write_calibration(folder / "trial-0.csv", listed, folder)
+    values = (result.fit.restitution, result.fit_full.restitution)
     checked = confirmed(read_drops(run(list(confirmation(case.study, *values))[::2], "confirm")))
-    spread = 4 * checked["std"]
-    assert checked["effective"] == pytest.approx(result["measured"]["value"], abs=spread)
+    assert checked.effective == pytest.approx(result.measured.value, abs=4 * checked.std)
     write_trials(listed, made, 1, 1, folder / "trials.json")
-    page = write_report(folder / "trial-0.csv", folder).read_text()
-    assert f"restitution: {result['put']['value']:.4g}" in page
+    write_report(folder / "trial-0.csv", folder)
+    page = (folder / "report.html").read_text()
+    assert f"restitution: {result.put.value:.4g}" in page
     assert page.count("data:image/") == 4
     assert "http" not in page
 
@@ -235,11 +232,11 @@ def test_limit_force_changes_the_rebound_as_the_law_says(
     drops = [
         Drop(f"{o}-{e}", "reference", e, o, 0.010, fine) for o in (True, False) for e in (0.5, 0.8)
     ]
-    out = run_drops(
-        measured_case, drops, project.root / "two", environment(project.templates), print
-    )
+    batch = Batch(project.root / "two", environment(project.templates))
+    out = run_drops(measured_case, drops, batch, print)
     for run in read_drops(out).runs:
-        wanted = truncated_rebound(run.restitution) if run.limit_force else run.restitution
+        deck = run.drop.restitution
+        wanted = truncated_rebound(deck) if run.drop.limit_force else deck
         # gravity acts during the contact too, the more the slower: a few 1e-4
-        assert run.rebound.mean() == pytest.approx(wanted, abs=1e-3)
+        assert run.effective == pytest.approx(wanted, abs=1e-3)
     assert truncated_rebound(0.5) - 0.5 > 0.04  # far more than what is allowed above

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from dragdeck.campaigns.verification import Impacts, Suite, contact_time, suite_file, suite_of
+from dragdeck.campaigns.verification.impacts import Impacts
+from dragdeck.campaigns.verification.lab import contact_time
+from dragdeck.campaigns.verification.suite import suite_file, suite_of
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
 from dragdeck.decks.render import deck_text, environment
@@ -25,13 +27,13 @@ def experiments(case: Case) -> dict[str, Experiment]:
 
 
 def of_test(experiments: dict[str, Experiment], name: str) -> list[Experiment]:
-    return [found for found in experiments.values() if found.facts["test"] == name]
+    return [found for found in experiments.values() if found.facts.test == name]
 
 
 def test_the_eight_published_tests_and_five_more_are_there(
     experiments: dict[str, Experiment],
 ) -> None:
-    assert {found.facts["number"] for found in experiments.values()} == set(range(1, 14))
+    assert {found.facts.number for found in experiments.values()} == set(range(1, 14))
 
 
 def test_every_experiment_is_a_deck(experiments: dict[str, Experiment], project: Project) -> None:
@@ -64,7 +66,7 @@ def test_no_two_particles_touch_at_the_start_but_in_the_column(
     experiments: dict[str, Experiment],
 ) -> None:
     for experiment in experiments.values():
-        if experiment.facts["test"] == "column":
+        if experiment.facts.test == "column":
             continue
         for one, other in itertools.combinations(experiment.bodies, 2):
             apart = math.dist(one.position_m, other.position_m)
@@ -81,10 +83,10 @@ def test_every_impact_begins_within_the_same_step(experiments: dict[str, Experim
 
 def test_the_angle_leaves_the_speed_alone(experiments: dict[str, Experiment]) -> None:
     for experiment in of_test(experiments, "oblique_angle"):
-        for body, entry in zip(experiment.bodies, experiment.facts["contacts"], strict=True):
+        for body, entry in zip(experiment.bodies, experiment.facts.contacts, strict=True):
             assert math.hypot(*body.velocity_m_s) == pytest.approx(3.9)
             tangent = body.velocity_m_s[0] / -body.velocity_m_s[2]
-            assert tangent == pytest.approx(math.tan(math.radians(entry["value"])))
+            assert tangent == pytest.approx(math.tan(math.radians(entry.value)))
 
 
 def test_opposite_spins_roll_on_each_other(experiments: dict[str, Experiment]) -> None:
@@ -95,9 +97,13 @@ def test_opposite_spins_roll_on_each_other(experiments: dict[str, Experiment]) -
 
 def test_each_restitution_is_a_type_of_its_own(experiments: dict[str, Experiment]) -> None:
     experiment = of_test(experiments, "restitution")[0]
-    values = [entry["value"] for entry in experiment.facts["contacts"]]
+    values = [entry.value for entry in experiment.facts.contacts]
     size = len(experiment.types)
-    table = collide_scene(experiment).deck.materials.restitutions
+    table = next(
+        table.values
+        for table in collide_scene(experiment).deck.materials.law.tables
+        if table.name == "restitution"
+    )
     assert [table[at * size + size - 1] for at in range(size - 1)] == values
     assert np.allclose(np.reshape(table, (size, size)), np.reshape(table, (size, size)).T)
 
@@ -148,11 +154,12 @@ def test_few_particles_are_written_every_step_and_many_are_not() -> None:
 
 
 def test_a_rigid_partner_is_stiff(case: Case) -> None:
-    suite = Suite(suite_file(), case.study)
-    series = suite.file.impacts["elastic_plane"].series[0]
-    name, material = suite.partner(series, plane=True)
+    suite = suite_file()
+    test, lab = suite.impacts["elastic_plane"], suite.lab(case.study)
+    series = test.series[0]
+    name, material = test.partner_of(series, lab)
     assert name == "rigid"
-    own = suite.materials[series.material]
+    own = lab.material(series.material)
     assert material.youngs_modulus_pa == pytest.approx(1e6 * own.youngs_modulus_pa)
 
 
@@ -168,7 +175,7 @@ def test_the_command_writes_every_deck(
     case: Case, project: Project, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(project.root)
-    assert main(["verify", "small"]) == 0
+    assert main(["step", "verify", "small"]) == 0
     runs = list(suite_of(case.study))
     for run in runs:
         folder = project.experiment_folder("verification", run)

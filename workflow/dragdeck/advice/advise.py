@@ -21,7 +21,7 @@ from dragdeck.advice.options import (
 from dragdeck.cases.case import Case
 from dragdeck.decks.case_file import AdvisedSettings
 from dragdeck.errors import InputError
-from dragdeck.outlook.measured import Tradeoff
+from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
 from dragdeck.physics.similarity import SAME_NUMBER
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.motion import path_length
@@ -145,15 +145,22 @@ class Advice:
         )
 
 
-def resolve(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Case:
+def resolve(case: Case, asked: Tolerance, tradeoff: Tradeoff | None = None) -> Case:
     """The case with the settings that a tolerance asks for; it remembers the question.
+
+    Parameters
+    ----------
+    case : Case
+    asked : Tolerance
+    tradeoff : Tradeoff, optional
+        Instead of `measured_tradeoff`.
 
     Raises
     ------
     InputError
         This quantity was not measured.
     """
-    advice = advise(case, asked, tradeoff)
+    advice = advise(case, asked, tradeoff or measured_tradeoff())
     study = with_option(case.study, advice.chosen)
     return replace(case, study=study, asked=asked, advised=advice.for_case)
 

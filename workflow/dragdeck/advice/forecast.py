@@ -14,50 +14,19 @@ from rich.table import Table
 from dragdeck import __version__
 from dragdeck.advice.advise import RESTITUTION, Advice, Spread, percent, signed
 from dragdeck.advice.options import Option, process_options, with_option
+from dragdeck.advice.speed import SCALE, Speed
 from dragdeck.cases.case import Case
 from dragdeck.decks.case_file import AdvisedSettings
 from dragdeck.decks.deck import StudyScene
 from dragdeck.documents import Document, Part
 from dragdeck.outlook.explain import Cost, expected_cost
 from dragdeck.outlook.measured import MeasuredError, Tradeoff
-from dragdeck.scenes.drop_test import drop_scene
-from dragdeck.scenes.filling import filling_scene
+from dragdeck.scenes.drop_test import DROP_TEST
+from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, process_scene
+from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import Json
 from dragdeck.study.model import CirclePath, Fidelity, Study, Tolerance
-
-SCALE = 1e-3
-"""On the modulus of the short run; more where the engine refuses so soft a particle."""
-
-
-class Speed(Part):
-    """A measured speed of the engine on this machine.
-
-    Attributes
-    ----------
-    filling_steps_per_s, drag_steps_per_s : float
-    particles, ranks : int
-    engine_version : str
-    """
-
-    filling_steps_per_s: float
-    drag_steps_per_s: float
-    particles: int
-    ranks: int
-    engine_version: str
-
-    def of(self, particles: int) -> Speed:
-        """The speed with another number of particles: a step takes a time a particle."""
-        ratio = self.particles / particles
-        filling, drag = ratio * self.filling_steps_per_s, ratio * self.drag_steps_per_s
-        return Speed(
-            filling_steps_per_s=filling,
-            drag_steps_per_s=drag,
-            particles=particles,
-            ranks=self.ranks,
-            engine_version=self.engine_version,
-        )
-
 
 DEFAULT_TOLERANCE = Tolerance(tolerance=0.05)
 """What is advised for where a study asks for nothing."""
@@ -214,10 +183,10 @@ def forecast(
     chosen = replace(case, study=with_option(case.study, option))
     process = process_scene(chosen)
     about_drop = option.drop_timestep_fraction is not None
-    scenes: list[StudyScene] = (
-        [drop_scene(chosen)] if about_drop else [filling_scene(chosen), process]
-    )
-    costs = {scene.deck.scene: _cost(scene, speed, results, tradeoff) for scene in scenes}
+    kinds = [DROP_TEST] if about_drop else [FILLING, PROCESS]
+    costs = {
+        kind.name: _cost(kind, kind.build(chosen, None), speed, results, tradeoff) for kind in kinds
+    }
     return Forecast(
         role=role,
         option=option,
@@ -229,14 +198,15 @@ def forecast(
     )
 
 
-def _cost(scene: StudyScene, speed: Speed | None, results: Path, tradeoff: Tradeoff) -> Cost:
+def _cost(
+    kind: SceneType, scene: StudyScene, speed: Speed | None, results: Path, tradeoff: Tradeoff
+) -> Cost:
     """Steps and wall time of a scene, by the speed of this machine if it was measured."""
-    name = scene.deck.scene
-    if speed is None or name == "drop_test":
-        return expected_cost(scene, results / name)
+    if speed is None or kind.single_particle:
+        return expected_cost(kind, scene, results / kind.name)
     here = speed.of(scene.case.media.count)
     rate = here.filling_steps_per_s
-    if name == "process":
+    if kind is PROCESS:
         modulus = scene.case.fidelity.youngs_modulus_scale
         rate = here.drag_steps_per_s * step_cost(SCALE, tradeoff) / step_cost(modulus, tradeoff)
     ranks = f"{speed.ranks} rank{'s' if speed.ranks > 1 else ''}"

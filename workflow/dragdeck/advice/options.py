@@ -17,9 +17,6 @@ from dragdeck.outlook.measured import (
 from dragdeck.outlook.timestep import largest_fraction
 from dragdeck.physics.similarity import carried_scale, carried_speed, softest_scale
 from dragdeck.scenes.dimensionless import describe
-from dragdeck.scenes.drop_test import DROP_TEST
-from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.process import PROCESS
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance
 
 FEWEST_RUNS = 2
@@ -80,7 +77,7 @@ def process_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterato
     limit of the measured scene, or that cost as much as the reference.
     """
     here, there = describe(case), tradeoff.scene
-    limit = largest_fraction(PROCESS, there["lowest_restitution"])
+    limit = largest_fraction("drag", there["lowest_restitution"])
     for setting in tradeoff.settings:
         error, cost = setting.errors.get(asked.quantity), setting.relative_cost
         sound = setting.failed == 0 and not setting.breaks and setting.runs >= FEWEST_RUNS
@@ -102,7 +99,7 @@ def _carried(
     slower = there["inertial_number"] / here["inertial_number"]
     fidelity = Fidelity(
         youngs_modulus_scale=max(carried_scale(scale, stiffer), softest_scale(study)),
-        timestep_fraction=min(fraction, largest_fraction(PROCESS, here["lowest_restitution"])),
+        timestep_fraction=min(fraction, largest_fraction("drag", here["lowest_restitution"])),
         filling_timestep_fraction=_filling_fraction(here),
         speed_factor=carried_speed(setting.speed_factor, slower),
     )
@@ -114,7 +111,7 @@ def _carried(
 def _filling_fraction(here: Mapping[str, float]) -> float:
     """Step of the filling over the Rayleigh time: the usual, less where damping is strong."""
     usual = float(Fidelity().filling_timestep_fraction)
-    return min(usual, largest_fraction(FILLING, here["lowest_restitution"]))
+    return min(usual, largest_fraction("settle", here["lowest_restitution"]))
 
 
 def process_reference(case: Case, tradeoff: Tradeoff) -> Option:
@@ -139,7 +136,7 @@ def finest_drop(case: Case, tradeoff: Tradeoff) -> Option:
 
 
 def _drop_limit(case: Case) -> float:
-    return largest_fraction(DROP_TEST, describe(case)["lowest_restitution"])
+    return largest_fraction("impact", describe(case)["lowest_restitution"])
 
 
 def _drop_option(case: Case, drop: MeasuredDrop, fraction: float) -> Option:

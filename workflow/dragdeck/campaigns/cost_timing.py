@@ -1,53 +1,60 @@
-"""Timing of the variants of `costs`: their beds, the rounds, the result."""
+"""Timing of the cost variants: their beds, the rounds, the result."""
 
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import platform
 import re
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
-
-import jinja2
 
 from dragdeck import __version__
+from dragdeck.campaigns.cost_decks import (
+    at_rest,
+    timed_drag,
+    timed_drop,
+    timed_filling,
+    workpiece_in,
+)
+from dragdeck.campaigns.cost_file import (
+    CostsFile,
+    Machine,
+    RoundsFile,
+    TimedVariant,
+    Timing,
+    base_cost,
+    cost,
+)
 from dragdeck.campaigns.cost_variants import (
     BASES,
-    Ratio,
-    TimedDeck,
     Variant,
-    at_rest_deck,
-    geometric,
+    bed_case,
     standard_case,
-    timed_deck,
     variant_case,
     variants,
-    workpiece_in_deck,
 )
-from dragdeck.campaigns.stability_map import tabulate
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import DECK_FILE, environment, write_run
+from dragdeck.decks.deck import AnyScene
+from dragdeck.decks.render import DECK_FILE, deck_text, environment
+from dragdeck.engine.batch import Batch
 from dragdeck.engine.log import engine_errors, loops
 from dragdeck.engine.process import Engine, command, execute, find_engine
-from dragdeck.engine.run_folder import fingerprint, run
+from dragdeck.engine.run_folder import fingerprint
+from dragdeck.engine.watch import Report
 from dragdeck.errors import EngineError, InputError
 from dragdeck.files import replace_text
-from dragdeck.mesh import Mesh, write_stl
-from dragdeck.project import find_project, study_templates
-from dragdeck.scenes.filling import FILLING, filling_scene
+from dragdeck.mesh import write_stl
+from dragdeck.project import by_run, find_project, study_templates
+from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import process_scene
-from dragdeck.scenes.scene import Bed
-
-Report = Callable[[str], None]
-Row = Mapping[str, Any]
+from dragdeck.scenes.scene import Bed, read_bed
+from dragdeck.study.model import Workpiece
 
 SECONDS = 0.15
 """Drag that the standard deck is timed over, s of process time; the others go as many steps."""
@@ -63,29 +70,16 @@ BED_FILE = "bed.restart"
 ROUNDS_FILE = "rounds.json"
 
 
-@dataclass(frozen=True)
-class Timing:
-    """What a stretch of steps took.
+def cost_fillings(case: Case) -> dict[str, Case]:
+    """A case for each filling that the variants of a study start from, by its run id."""
+    base = standard_case(case)
+    owners = (bed_case(base, variant) for variant in variants(base) if "media" in _tops(variant))
+    return by_run([base, *owners], FILLING)
 
-    Attributes
-    ----------
-    cpu_time_s : float
-        Processor time of all ranks together.
-    wall_time_s : float
-        Of the engine's loop over steps.
-    steps : int
-    """
 
-    cpu_time_s: float
-    wall_time_s: float
-    steps: int
-
-    def __sub__(self, other: Timing) -> Timing:
-        return Timing(
-            self.cpu_time_s - other.cpu_time_s,
-            self.wall_time_s - other.wall_time_s,
-            self.steps - other.steps,
-        )
+def _tops(variant: Variant) -> set[str]:
+    """Sections of the study that a variant changes."""
+    return {field.partition(".")[0] for field in variant.fields}
 
 
 def measure(
@@ -109,7 +103,7 @@ def measure(
     case : Case
         Its fidelity gives modulus and step of the standard deck.
     results : Path
-        The study's results: a settled bed that is there is used.
+        The study's results, with the settled beds that drags start from.
     templates : Path
         The project's templates.
     out : Path
@@ -130,7 +124,7 @@ def measure(
     Raises
     ------
     InputError
-        The result is there already, or a deck cannot be made.
+        The result is there already, a settled bed is not, or a deck cannot be made.
     EngineError, RejectedRunError
         A run failed or was interrupted.
     """
@@ -150,10 +144,9 @@ def measure(
     chosen = _chosen(variants(base), only)
     folder = out.resolve().parent / "costs"
     decks = environment(templates, study_templates(case))
-    beds = _Beds(base, results, folder, decks, find_engine(), report)
-    bench = _Bench(base, beds, seconds, chosen, load)
-    rows = bench.rounds(rounds)
-    replace_text(out, _json(_result(bench, rows)))
+    beds = _Beds(base, results / FILLING.name, Batch(folder / "beds", decks, report))
+    bench = _Bench(base, beds, find_engine(), folder, seconds, chosen, load, report)
+    _result(bench, bench.rounds(rounds)).write(out)
     return out
 
 
@@ -173,79 +166,56 @@ def _chosen(known: Sequence[Variant], names: Sequence[str]) -> list[Variant]:
 
 @dataclass(frozen=True)
 class _Beds:
-    """Beds that drags start from, each made once."""
+    """Beds that drags start from, each made once.
+
+    Attributes
+    ----------
+    base : Case
+        The standard case.
+    fillings : Path
+        The settled beds of the study.
+    batch : Batch
+        Runs that bring the workpiece in.
+    """
 
     base: Case
-    results: Path
-    folder: Path
-    templates: jinja2.Environment
-    engine: Engine
-    report: Report
+    fillings: Path
+    batch: Batch
 
-    def settled(self, case: Case) -> Path:
-        """The folder of a fill: the study's own if it is there."""
-        run_id = FILLING.run_id(case)
-        for place in (self.results / "filling" / run_id, self.folder / "filling" / run_id):
-            if (place / "run.json").is_file() and (place / "tables" / "packing.json").is_file():
-                return place.resolve()
-        self.report(f"filling {run_id}")
-        write_run(filling_scene(case), place, self.templates)
-        run(place, self.report)
-        tabulate(place)
-        return place.resolve()
+    def measured(self, owner: Case) -> Bed:
+        """Height of a settled bed."""
+        return read_bed(self._settled(owner) / "tables" / "packing.json")
 
-    def measured(self, case: Case) -> Bed:
-        """Height of the settled bed."""
-        file = self.settled(case) / "tables" / "packing.json"
-        found = json.loads(file.read_text(encoding="utf-8"))
-        return Bed(surface_m=found["bed_height_m"], top_m=found["top_m"])
+    def settled(self, owner: Case) -> str:
+        """Restart file of a settled bed, as a run sees it."""
+        return self._seen(self._settled(owner) / "packing.restart")
 
-    def owner(self, case: Case) -> Case:
-        """The case whose settled bed a variant is dragged through: other particles, other bed."""
-        return case if case.study.media != self.base.study.media else self.base
+    def _settled(self, owner: Case) -> Path:
+        return self.fillings / FILLING.run_id(owner)
 
-    def seen(self, file: Path) -> str:
-        """Path of a file as a deck sees it, from a folder two below this one."""
-        return os.path.relpath(file, self.folder / "any" / "any")
+    def _seen(self, file: Path) -> str:
+        """Path of a file as a deck sees it, from a folder two below that of the costs."""
+        return os.path.relpath(file.resolve(), (self.batch.folder / "any").resolve())
 
-    def with_workpiece(self, case: Case) -> Path:
+    def with_workpiece(self, case: Case, owner: Case) -> str:
         """Restart file of the bed with the workpiece in it, for a case's modulus and facets."""
-        owner = self.owner(case)
-        bed, source = self.measured(owner), self.seen(self.settled(owner) / "packing.restart")
-        text = workpiece_in_deck(owner, bed, source, self.templates)
-        begun = self._kept(owner, bed, text, "workpiece-in")
-        if _stiffness_and_facets(case) == _stiffness_and_facets(owner):
+        bed = self.measured(owner)
+        begun = self._kept("workpiece-in", workpiece_in(owner, bed, self.settled(owner)))
+        if _walls(case) == _walls(owner):
             return begun
-        return self._kept(
-            case, bed, at_rest_deck(case, bed, self.seen(begun), self.templates), "at-rest"
-        )
+        return self._kept("at-rest", at_rest(case, bed, begun))
 
-    def _kept(self, case: Case, bed: Bed, text: str, name: str) -> Path:
-        place = self.folder / "beds" / f"{name}-{_digest(text)}"
-        _write(place, {DECK_FILE: text}, process_scene(case, bed).meshes)
-        inputs, kept, known = fingerprint(place), place / BED_FILE, place / "inputs.txt"
-        if not (kept.is_file() and known.is_file() and known.read_text() == inputs):
-            self.report(f"making the bed {place.name}")
-            _time(self.engine, place, DECK_FILE, 1)
-            replace_text(known, inputs)
-        return kept.resolve()
+    def _kept(self, name: str, scene: AnyScene) -> str:
+        run = f"{name}-{_digest(deck_text(scene, self.batch.templates))}"
+        self.batch.result(run, scene)
+        return self._seen(self.batch.folder / run / BED_FILE)
 
 
-def _stiffness_and_facets(case: Case) -> Mapping[str, Any]:
+def _walls(case: Case) -> tuple[float, float | None, Workpiece]:
+    """What a bed with a workpiece in it has to come to rest with: stiffness and facets."""
     study = case.study
-    return {
-        "scale": study.chosen_fidelity().youngs_modulus_scale,
-        "bowl": study.bowl.facet_size_m,
-        "workpiece": study.workpiece,
-    }
-
-
-def _write(folder: Path, texts: Mapping[str, str], meshes: Mapping[str, Mesh]) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        replace_text(folder / name, text)
-    for name, mesh in meshes.items():
-        write_stl(mesh, folder / name)
+    scale = study.chosen_fidelity().youngs_modulus_scale
+    return scale, study.bowl.facet_size_m, study.workpiece
 
 
 def _time(engine: Engine, folder: Path, deck: str, ranks: int) -> Timing:
@@ -267,115 +237,10 @@ def _time(engine: Engine, folder: Path, deck: str, ranks: int) -> Timing:
         )
     timed = loops(text)
     return Timing(
-        ending.cpu_time_s,
-        sum(loop.wall_time_s for loop in timed),
-        sum(loop.steps for loop in timed),
+        cpu_time_s=ending.cpu_time_s,
+        wall_time_s=sum(loop.wall_time_s for loop in timed),
+        steps=sum(loop.steps for loop in timed),
     )
-
-
-@dataclass(frozen=True)
-class _Bench:
-    """Times decks in rounds, each block of variants beside its base."""
-
-    base: Case
-    beds: _Beds
-    seconds: float
-    variants: Sequence[Variant]
-    load: float
-
-    @cached_property
-    def bases(self) -> list[Variant]:
-        """The bases that the variants need."""
-        return [BASES[name] for name in dict.fromkeys(variant.base for variant in self.variants)]
-
-    @cached_property
-    def decks(self) -> Mapping[str, TimedDeck]:
-        """Every deck by the name of its variant, with its bed."""
-        return {variant.name: self._deck(variant) for variant in [*self.bases, *self.variants]}
-
-    def _deck(self, variant: Variant) -> TimedDeck:
-        case, beds = variant_case(self.base, variant), self.beds
-        bed, source, steps = None, "", 1
-        if variant.scene != "drop_test":
-            steps = round(self.seconds / process_scene(self.base).deck.timestep_s)
-            bed = beds.measured(beds.owner(case))
-            filling = beds.settled(beds.owner(case)) / "packing.restart"
-            source = beds.seen(beds.with_workpiece(case) if variant.scene == "process" else filling)
-        return timed_deck(self.base, variant, beds.templates, steps, bed, source)
-
-    @cached_property
-    def inputs(self) -> Mapping[str, str]:
-        """Hash of what a timing depends on: decks of variant and base, engine, processor."""
-        own: dict[str, str] = {}
-        for name, deck in self.decks.items():
-            folder = self._place(name)
-            folder.mkdir(parents=True, exist_ok=True)
-            for old in folder.iterdir():
-                old.unlink()
-            texts = {DECK_FILE: deck.whole, START_FILE: deck.start, **deck.files}
-            _write(folder, texts, deck.meshes)
-            own[name] = f"{fingerprint(folder)} {deck.ranks}"
-        where = f"{self.beds.engine.version} {processor()}"
-        return {
-            variant.name: _digest(f"{where} {own[variant.name]} {own[variant.base]}")
-            for variant in self.variants
-        }
-
-    def rounds(self, count: int) -> list[Row]:
-        """Time what was not timed yet; the rows of all rounds."""
-        file = self.beds.folder / ROUNDS_FILE
-        rows = _known_rows(file, self.inputs, self.beds.report)
-        for number in range(count):
-            for block in blocks(self.variants, number):
-                there = {row["name"] for row in rows if row["round"] == number}
-                missing = [variant for variant in block if variant.name not in there]
-                if missing:
-                    rows += self._block(missing, number)
-                    _write(file.parent, {file.name: _json({"schema": 2, "rows": rows})}, {})
-            self.beds.report(f"round {number + 1} of {count} is timed")
-        return [row for row in rows if row["round"] < count]
-
-    def _block(self, block: Sequence[Variant], number: int) -> list[Row]:
-        """Time a base and then the variants that are compared with it."""
-        base = self._timing(BASES[block[0].base])
-        return [self._row(variant, number, base) for variant in block]
-
-    def _row(self, variant: Variant, number: int, base: Timing) -> Row:
-        own = self._timing(variant)
-        self.beds.report(
-            f"round {number + 1}: {variant.name}: {own.cpu_time_s:.3g} s for {own.steps:,} steps,"
-            f" {variant.base}: {base.cpu_time_s:.3g} s for {base.steps:,}"
-        )
-        return {
-            "name": variant.name,
-            "round": number,
-            "inputs": self.inputs[variant.name],
-            "measured": datetime.now(UTC).date().isoformat(),
-            "load_average_before": round(self.load, 2),
-            **asdict(own),
-            "base": asdict(base),
-        }
-
-    def _timing(self, variant: Variant) -> Timing:
-        """Time of a variant's steps, its start taken out."""
-        folder, ranks = self._place(variant.name), self.decks[variant.name].ranks
-        whole, start = (
-            _time_once(self.beds.engine, folder, deck, ranks) for deck in (DECK_FILE, START_FILE)
-        )
-        return whole - start
-
-    def _place(self, name: str) -> Path:
-        return self.beds.folder / "runs" / name
-
-
-def blocks(chosen: Sequence[Variant], number: int) -> Iterator[list[Variant]]:
-    """The variants of a round in blocks of one base each; every round begins elsewhere."""
-    for base in dict.fromkeys(variant.base for variant in chosen):
-        own = [variant for variant in chosen if variant.base == base]
-        first = number * (BLOCK - 2) % len(own)
-        turned = own[first:] + own[:first]
-        for begin in range(0, len(turned), BLOCK):
-            yield turned[begin : begin + BLOCK]
 
 
 def _time_once(engine: Engine, folder: Path, deck: str, ranks: int) -> Timing:
@@ -389,111 +254,177 @@ def _time_once(engine: Engine, folder: Path, deck: str, ranks: int) -> Timing:
                 file.unlink()
 
 
-def _known_rows(file: Path, inputs: Mapping[str, str], report: Report) -> list[Row]:
+@dataclass(frozen=True)
+class _Deck:
+    """A deck to be timed, and the same deck cut short after its start."""
+
+    whole: AnyScene
+    start: AnyScene
+    ranks: int
+
+
+@dataclass(frozen=True)
+class _Bench:
+    """Times decks in rounds, each block of variants beside its base."""
+
+    base: Case
+    beds: _Beds
+    engine: Engine
+    folder: Path
+    seconds: float
+    variants: Sequence[Variant]
+    load: float
+    report: Report
+
+    @cached_property
+    def bases(self) -> list[Variant]:
+        """The bases that the variants need."""
+        return [BASES[name] for name in dict.fromkeys(variant.base for variant in self.variants)]
+
+    @cached_property
+    def decks(self) -> Mapping[str, _Deck]:
+        """Every deck by the name of its variant, with its bed."""
+        return {variant.name: self._deck(variant) for variant in [*self.bases, *self.variants]}
+
+    @property
+    def timesteps_s(self) -> Mapping[str, float]:
+        """Time step of every deck, s."""
+        return {name: deck.whole.deck.timestep_s for name, deck in self.decks.items()}
+
+    def _deck(self, variant: Variant) -> _Deck:
+        case = variant_case(self.base, variant)
+        timed = self._timed(variant, case)
+        whole, start = (variant.change(timed(cut)) for cut in (False, True))
+        return _Deck(whole, start, case.ranks if variant.scene == "process" else 1)
+
+    def _timed(self, variant: Variant, case: Case) -> Callable[[bool], AnyScene]:
+        """What makes the scene of a variant: whole, or cut short."""
+        if variant.scene == "drop_test":
+            return partial(timed_drop, case)
+        steps = round(self.seconds / process_scene(self.base).deck.timestep_s)
+        owner = bed_case(self.base, variant)
+        if variant.scene == "filling":
+            return partial(timed_filling, case, steps, self.beds.settled(owner))
+        source = self.beds.with_workpiece(case, owner)
+        return partial(timed_drag, case, steps, self.beds.measured(owner), source)
+
+    @cached_property
+    def inputs(self) -> Mapping[str, str]:
+        """Hash of what a timing depends on: decks of variant and base, engine, processor."""
+        own = {name: f"{self._write(name, deck)} {deck.ranks}" for name, deck in self.decks.items()}
+        where = f"{self.engine.version} {processor()}"
+        return {
+            variant.name: _digest(f"{where} {own[variant.name]} {own[variant.base]}")
+            for variant in self.variants
+        }
+
+    def _write(self, name: str, deck: _Deck) -> str:
+        """Write the files of a deck in place of older ones; their hash."""
+        place, templates = self._place(name), self.beds.batch.templates
+        place.mkdir(parents=True, exist_ok=True)
+        for old in place.iterdir():
+            old.unlink()
+        texts = {DECK_FILE: deck_text(deck.whole, templates), **deck.whole.files}
+        for file, text in {**texts, START_FILE: deck_text(deck.start, templates)}.items():
+            replace_text(place / file, text)
+        for file, mesh in deck.whole.meshes.items():
+            write_stl(mesh, place / file)
+        return fingerprint(place)
+
+    def rounds(self, count: int) -> list[TimedVariant]:
+        """Time what was not timed yet; the rows of all rounds."""
+        file = self.folder / ROUNDS_FILE
+        rows = _known_rows(file, self.inputs, self.report)
+        for number in range(count):
+            there = {row.name for row in rows if row.round == number}
+            for block in blocks(self.variants, number):
+                missing = [variant for variant in block if variant.name not in there]
+                if missing:
+                    rows += self._block(missing, number)
+                    RoundsFile(rows=rows).write(file)
+            self.report(f"round {number + 1} of {count} is timed")
+        return [row for row in rows if row.round < count]
+
+    def _block(self, block: Sequence[Variant], number: int) -> list[TimedVariant]:
+        """Time a base and then the variants that are compared with it."""
+        base = self._timing(block[0].base)
+        return [self._row(variant, number, base) for variant in block]
+
+    def _row(self, variant: Variant, number: int, base: Timing) -> TimedVariant:
+        own = self._timing(variant.name)
+        self.report(
+            f"round {number + 1}: {variant.name}: {own.cpu_time_s:.3g} s for {own.steps:,} steps,"
+            f" {variant.base}: {base.cpu_time_s:.3g} s for {base.steps:,}"
+        )
+        return TimedVariant(
+            **dict(own),
+            name=variant.name,
+            round=number,
+            inputs=self.inputs[variant.name],
+            measured=datetime.now(UTC).date().isoformat(),
+            load_average_before=round(self.load, 2),
+            base=base,
+        )
+
+    def _timing(self, name: str) -> Timing:
+        """Time of a deck's steps, its start taken out."""
+        place, ranks = self._place(name), self.decks[name].ranks
+        whole, start = (
+            _time_once(self.engine, place, file, ranks) for file in (DECK_FILE, START_FILE)
+        )
+        return whole - start
+
+    def _place(self, name: str) -> Path:
+        return self.folder / "runs" / name
+
+
+def blocks(chosen: Sequence[Variant], number: int) -> Iterator[list[Variant]]:
+    """The variants of a round in blocks of one base each; every round begins elsewhere."""
+    for base in dict.fromkeys(variant.base for variant in chosen):
+        own = [variant for variant in chosen if variant.base == base]
+        first = number * (BLOCK - 2) % len(own)
+        turned = own[first:] + own[:first]
+        for begin in range(0, len(turned), BLOCK):
+            yield turned[begin : begin + BLOCK]
+
+
+def _known_rows(file: Path, inputs: Mapping[str, str], report: Report) -> list[TimedVariant]:
     """Rows that were timed before; those of other decks are moved to ``archive/``."""
     if not file.is_file():
         return []
-    rows: list[Row] = json.loads(file.read_text(encoding="utf-8"))["rows"]
-    same = [row for row in rows if inputs.get(row["name"]) == row["inputs"]]
-    if len(same) < len(rows):
-        text = file.read_text(encoding="utf-8")
+    known = RoundsFile.read(file)
+    same = [row for row in known.rows if inputs.get(row.name) == row.inputs]
+    if len(same) < len(known.rows):
         kept = file.parent / "archive"
-        _write(kept, {f"rounds-{_digest(text)}.json": text}, {})
+        known.write(kept / f"rounds-{_digest(known.as_text())}.json")
         report(f"timings of other decks were moved to {kept}")
     return same
 
 
-def costs(
-    chosen: Sequence[Variant], rows: Sequence[Row], steps_s: Mapping[str, float]
-) -> list[Row]:
-    """The cost of each variant.
-
-    Parameters
-    ----------
-    chosen : sequence of Variant
-    rows : sequence of mapping
-        One for each variant and round, with the timing of its base.
-    steps_s : mapping of str to float
-        Time step of every deck by name, s.
-
-    Returns
-    -------
-    list of mapping
-        `ratio`, `low` and `high` count what `unit` says; `per_step` and
-        `per_second` are the same ratio in both units.
-    """
-    return [_cost(v, [row for row in rows if row["name"] == v.name], steps_s) for v in chosen]
-
-
-def _cost(variant: Variant, rows: Sequence[Row], steps_s: Mapping[str, float]) -> Row:
-    steps_per_second = steps_s[variant.base] / steps_s[variant.name]
-    factor = steps_per_second if variant.unit == "per_second" else 1.0
-    cpu = geometric([_per_step(row, "cpu_time_s") for row in rows])
-    wall = geometric([_per_step(row, "wall_time_s") for row in rows])
-    return {
-        "name": variant.name,
-        "scene": variant.scene,
-        "what": variant.what,
-        "against": BASES[variant.base].what,
-        "unit": variant.unit,
-        "parameter": variant.parameter,
-        "level": variant.level,
-        **_scaled(cpu, factor),
-        "per_step": cpu.ratio,
-        "per_second": cpu.ratio * steps_per_second,
-        "wall_ratio": wall.ratio * factor,
-        "rounds": len(rows),
-        "steps": rows[0]["steps"],
-        "timestep_s": steps_s[variant.name],
-    }
-
-
-def _per_step(row: Row, time: str) -> float:
-    """Time of a step over that of the base."""
-    base = row["base"]
-    return float(row[time] / row["steps"] / (base[time] / base["steps"]))
-
-
-def _scaled(found: Ratio, factor: float) -> dict[str, float | None]:
-    values = asdict(found).items()
-    return {name: None if value is None else value * factor for name, value in values}
-
-
-def _result(bench: _Bench, rows: Sequence[Row]) -> Row:
+def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> CostsFile:
     """Content of ``costs.json``."""
-    study, steps_s = bench.base.study, {n: deck.timestep_s for n, deck in bench.decks.items()}
-    return {
-        "schema": 2,
-        "study": bench.base.study_name,
-        "fidelity": study.chosen_fidelity().model_dump(mode="json"),
-        "particles": study.media.count,
-        "seconds": bench.seconds,
-        "measured": max(row["measured"] for row in rows),
-        "command": shlex.join(["dragdeck", *sys.argv[1:]]),
-        "versions": {"dragdeck": __version__, "engine": bench.beds.engine.version},
-        "machine": {"cores": os.cpu_count(), "processor": processor()},
-        "load_average_before": max(row["load_average_before"] for row in rows),
-        "bases": [_base(base, bench.variants, rows, steps_s) for base in bench.bases],
-        "costs": costs(bench.variants, rows, steps_s),
+    study, steps_s = bench.base.study, bench.timesteps_s
+    of_base = {
+        base.name: [row.base for row in rows if _base_of(bench.variants, row.name) == base.name]
+        for base in bench.bases
     }
+    return CostsFile(
+        study=bench.base.study_name,
+        fidelity=study.chosen_fidelity(),
+        particles=study.media.count,
+        seconds=bench.seconds,
+        measured=max(row.measured for row in rows),
+        command=shlex.join(["dragdeck", *sys.argv[1:]]),
+        versions={"dragdeck": __version__, "engine": bench.engine.version},
+        machine=Machine(cores=os.cpu_count(), processor=processor()),
+        load_average_before=max(row.load_average_before for row in rows),
+        bases=[base_cost(base, of_base[base.name], steps_s[base.name]) for base in bench.bases],
+        costs=[cost(variant, rows, steps_s) for variant in bench.variants],
+    )
 
 
-def _base(
-    base: Variant, chosen: Sequence[Variant], rows: Sequence[Row], steps_s: Mapping[str, float]
-) -> Row:
-    own = {variant.name for variant in chosen if variant.base == base.name}
-    times = [row["base"] for row in rows if row["name"] in own]
-    cpu = geometric([time["cpu_time_s"] / time["steps"] for time in times]).ratio
-    wall = geometric([time["wall_time_s"] / time["steps"] for time in times]).ratio
-    return {
-        "name": base.name,
-        "scene": base.scene,
-        "what": base.what,
-        "timestep_s": steps_s[base.name],
-        "steps": times[0]["steps"],
-        "cpu_us_per_step": 1e6 * cpu,
-        "steps_per_s": 1 / wall,
-    }
+def _base_of(chosen: Sequence[Variant], name: str) -> str | None:
+    return next((variant.base for variant in chosen if variant.name == name), None)
 
 
 def processor() -> str:
@@ -506,10 +437,6 @@ def processor() -> str:
 
 def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:8]
-
-
-def _json(data: Any) -> str:
-    return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
 def costs_command(

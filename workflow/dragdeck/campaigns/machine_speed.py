@@ -9,27 +9,24 @@ of the workpiece and the share of steps with output, is that of the settings ask
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import jinja2
 
-from dragdeck.advice.forecast import SCALE, Speed
-from dragdeck.campaigns.stability_map import tabulate
+from dragdeck.advice.speed import SCALE, Speed
 from dragdeck.cases.bed import bed_rayleigh_time
 from dragdeck.cases.case import Case
-from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.render import write_run
+from dragdeck.engine.batch import Batch
 from dragdeck.engine.log import loops
 from dragdeck.engine.record import RunRecord
-from dragdeck.engine.run_folder import run
+from dragdeck.engine.watch import Report
 from dragdeck.errors import EngineError, RejectedRunError
 from dragdeck.physics.rounding import timestep
 from dragdeck.physics.similarity import softest_scale
-from dragdeck.scenes.filling import FILLING, expected_surface, filling_scene
+from dragdeck.scenes.filling import FILLING, expected_surface
 from dragdeck.scenes.motion import plunge_point, start_point
-from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.scene import read_bed
+from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.scene import Bed, SceneType
 from dragdeck.study.model import CirclePath, Fidelity, Motion, Outputs, Study
 
 TIMESTEP_FRACTION = 0.5
@@ -44,7 +41,8 @@ ARRIVAL_STEPS = 3000
 LONGEST_PERIOD_STEPS = 1000
 """Most steps between frames of the slowest output; the legs are multiples of it."""
 
-Report = Callable[[str], None]
+CLEAR_DIAMETERS = 3
+"""Particle diameters above the expected surface at which the workpiece begins."""
 
 
 def measure_machine_speed(
@@ -68,27 +66,30 @@ def measure_machine_speed(
         The short run failed, so nothing is known of the speed.
     """
     short = short_case(case)
-    filling, process = (folder / scene.name / scene.run_id(short) for scene in (FILLING, PROCESS))
-    settled = _run(filling_scene(short), filling, templates, report)
-    tabulate(filling)
-    scene = process_scene(short, read_bed(filling / "tables" / "packing.json"))
-    _run(scene, process, templates, report)
+    settled = _result(Batch(folder / FILLING.name, templates, report), FILLING, short, None)
+    _result(Batch(folder / PROCESS.name, templates, report), PROCESS, short, _low_bed(short.study))
+    screen = folder / PROCESS.name / PROCESS.run_id(short) / "screen.1.txt"
     return Speed(
         filling_steps_per_s=settled.steps_per_s,
-        drag_steps_per_s=last_loop((process / "screen.1.txt").read_text(errors="replace")),
+        drag_steps_per_s=last_loop(screen.read_text(errors="replace")),
         particles=case.study.media.count,
         ranks=settled.ranks,
         engine_version=settled.engine_version,
     )
 
 
-def _run(scene: AnyScene, folder: Path, templates: jinja2.Environment, report: Report) -> RunRecord:
-    write_run(scene, folder, templates)
+def _low_bed(study: Study) -> Bed:
+    """The bed as it is expected: the workpiece begins well above it."""
+    surface = expected_surface(study)
+    return Bed(surface, surface + 2 * CLEAR_DIAMETERS * study.media.radius_mean_m)
+
+
+def _result(batch: Batch, kind: SceneType, case: Case, bed: Bed | None) -> RunRecord:
     try:
-        return run(folder, report)
+        return batch.result(kind.run_id(case), kind.build(case, bed))
     except RejectedRunError as error:
         raise RejectedRunError(
-            f"{error}\n  the calibration of the speed failed; without it: dragdeck advise --quick"
+            f"{error}\n  the measurement of the speed failed; without it: dragdeck advise --quick"
         ) from None
 
 

@@ -7,24 +7,23 @@ those are stands here; what they say is for dragchain to find out.
 
 from __future__ import annotations
 
-import json
 import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-import jinja2
 import numpy as np
 
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import environment, write_run
+from dragdeck.decks.case_file import CaseFile
+from dragdeck.decks.render import environment
 from dragdeck.documents import Document, Part
-from dragdeck.engine.run_folder import run
+from dragdeck.engine.batch import Batch
+from dragdeck.engine.watch import Report
 from dragdeck.errors import InputError
-from dragdeck.files import replace_text
 from dragdeck.physics.contact_mechanics import (
     effective_modulus,
     fall_speed,
@@ -79,6 +78,38 @@ class FitFile(Document):
 
     fit: FittedRestitution
     fit_full: FittedRestitution
+
+
+class DropOfList(Part):
+    """A drop that was run: its folder and how it differs from the others."""
+
+    folder: str
+    purpose: Purpose
+    restitution: float
+    limit_force: bool
+    height_m: float
+    youngs_modulus_scale: float
+    timestep_s: float
+    timestep_fraction: float
+
+
+class DropsFile(Document):
+    """``drops.json``: drops, and what dragchain has to know of the study."""
+
+    study: str
+    title: str
+    pair: str
+    fidelity: str
+    record: str
+    height_m: float
+    height_std_m: float
+    peaks: Literal["auto", "yes", "no"]
+    gravity_m_s2: float
+    limit_force: bool
+    restitution_now: float
+    fall_time_s: float
+    contact_time_s: float
+    drops: Sequence[DropOfList]
 
 
 @dataclass(frozen=True)
@@ -238,24 +269,15 @@ def drop_case(case: Case, drop: Drop) -> Case:
     return Case(case.file, case.settings, changed)
 
 
-def run_drops(
-    case: Case,
-    drops: Sequence[Drop],
-    folder: Path,
-    templates: jinja2.Environment,
-    report: Callable[[str], None],
-) -> Path:
+def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -> Path:
     """Run drops, each in a folder of its own, and list them in ``drops.json``.
-
-    A drop that was run before with the same inputs is not run again.
 
     Parameters
     ----------
     case : Case
     drops : sequence of Drop
-    folder : Path
-        Gets a folder a drop, and the list.
-    templates : jinja2.Environment
+    batch : Batch
+        Its folder gets a folder for each drop, and the list.
     report : callable
         Gets a line now and then.
 
@@ -263,60 +285,60 @@ def run_drops(
     -------
     Path
         The list.
+
+    Raises
+    ------
+    EngineError, RejectedRunError
+        A drop did not run to its end, or is no result.
     """
     rows = []
     for number, drop in enumerate(drops, start=1):
-        place = folder / drop.name
         scene = drop_scene(drop_case(case, drop), drop.fidelity)
-        write_run(scene, place, templates)
-        run(place, lambda line: None)
-        rows.append(_row(drop, scene.deck.timestep_s, scene.case.rayleigh_time_s))
+        batch.result(drop.name, scene)
+        rows.append(_row(drop, scene.case))
         if number % 20 == 0 or number == len(drops):
             report(f"{number} of {len(drops)} drops done")
-    listed = {"schema": 2, **_known(case), "drops": rows}
-    file = folder / DROPS_FILE
-    replace_text(file, json.dumps(listed, indent=1, allow_nan=False) + "\n")
+    file = batch.folder / DROPS_FILE
+    _listed(case, rows).write(file)
     return file
 
 
-def _row(drop: Drop, timestep_s: float, rayleigh_s: float) -> dict[str, Any]:
-    return {
-        "folder": drop.name,
-        "purpose": drop.purpose,
-        "restitution": drop.restitution,
-        "limit_force": drop.limit_force,
-        "height_m": drop.height_m,
-        "youngs_modulus_scale": drop.fidelity.youngs_modulus_scale,
-        "timestep_s": timestep_s,
-        "timestep_fraction": timestep_s / rayleigh_s,
-    }
+def _row(drop: Drop, case: CaseFile) -> DropOfList:
+    return DropOfList(
+        folder=drop.name,
+        purpose=drop.purpose,
+        restitution=drop.restitution,
+        limit_force=drop.limit_force,
+        height_m=drop.height_m,
+        youngs_modulus_scale=drop.fidelity.youngs_modulus_scale,
+        timestep_s=case.timestep_s,
+        timestep_fraction=case.timestep_s / case.rayleigh_time_s,
+    )
 
 
-def _known(case: Case) -> dict[str, Any]:
-    """What dragchain has to know of the study."""
+def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
     study, section = case.study, settings(case)
     particle, plate = study.media.material, study.workpiece.material
-    radius, modulus = (
-        study.media.radius_mean_m,
-        effective_modulus(particle_material(study), study.materials[plate]),
+    material, radius = particle_material(study), study.media.radius_mean_m
+    modulus = effective_modulus(material, study.materials[plate])
+    height, gravity = study.drop_test.height_m, study.gravity_m_s2
+    mass, speed = particle_mass(material, radius), fall_speed(height, gravity)
+    return DropsFile(
+        study=case.study_name,
+        title=study.title,
+        pair=f"{particle}-{plate}",
+        fidelity=case.fidelity_name,
+        record=section.record,
+        height_m=height,
+        height_std_m=section.height_std_m,
+        peaks=section.peaks,
+        gravity_m_s2=gravity,
+        limit_force=study.contact.limit_force,
+        restitution_now=study.pair(particle, plate).restitution,
+        fall_time_s=math.sqrt(2 * height / gravity),
+        contact_time_s=hertz_contact_time(mass, radius, modulus, speed),
+        drops=rows,
     )
-    speed = fall_speed(study.drop_test.height_m, study.gravity_m_s2)
-    mass = particle_mass(particle_material(study), radius)
-    return {
-        "study": case.study_name,
-        "title": study.title,
-        "pair": f"{particle}-{plate}",
-        "fidelity": case.fidelity_name,
-        "record": section.record,
-        "height_m": study.drop_test.height_m,
-        "height_std_m": section.height_std_m,
-        "peaks": section.peaks,
-        "gravity_m_s2": study.gravity_m_s2,
-        "limit_force": study.contact.limit_force,
-        "restitution_now": study.pair(particle, plate).restitution,
-        "fall_time_s": math.sqrt(2 * study.drop_test.height_m / study.gravity_m_s2),
-        "contact_time_s": hertz_contact_time(mass, radius, modulus, speed),
-    }
 
 
 def drops_command(
@@ -346,5 +368,5 @@ def drops_command(
         drops = list(confirmation(case.study, fitted.fit.restitution, fitted.fit_full.restitution))
     else:
         raise InputError("nothing to confirm", field="--fit", remedy="give the fit's result.json")
-    templates = environment(project.templates, study_templates(case))
-    run_drops(case, drops, out, templates, lambda line: print(line, file=sys.stderr))
+    batch = Batch(out, environment(project.templates, study_templates(case)))
+    run_drops(case, drops, batch, lambda line: print(line, file=sys.stderr, flush=True))

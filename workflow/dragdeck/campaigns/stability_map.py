@@ -5,32 +5,35 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import jinja2
+from pydantic import Field, ValidationError, model_validator
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.render import environment, write_run
-from dragdeck.engine.run_folder import run
-from dragdeck.errors import EngineError, InputError, RejectedRunError
-from dragdeck.files import replace_text
+from dragdeck.decks.render import environment
+from dragdeck.documents import Document, Part
+from dragdeck.engine.batch import Batch
+from dragdeck.engine.watch import Report
+from dragdeck.errors import InputError
 from dragdeck.project import find_project
-from dragdeck.scenes.column import column_scene
+from dragdeck.scenes.column import Packing, column_scene
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.impact import Impact, impact_scene
 from dragdeck.scenes.process import process_scene
-from dragdeck.scenes.scene import Bed
-from dragdeck.study.model import CirclePath, Study
-from dragdeck.study.yaml import read_yaml
+from dragdeck.scenes.scene import Bed, read_bed
+from dragdeck.study.base import Model, Number
+from dragdeck.study.model import CirclePath, Motion, Study
+from dragdeck.study.yaml import explained, read_yaml
 from dragdeck.sweep.cases import load_cases
 
-REGIMES = ("impact", "settle", "column", "drag")
+Regime = Literal["impact", "settle", "column", "drag"]
+REGIMES: tuple[Regime, ...] = ("impact", "settle", "column", "drag")
 """What a point models: single impacts; a bed that settles; a bed or a stack at
 rest under a load; a bed with a workpiece dragged through it."""
 
@@ -49,10 +52,44 @@ DRAG_S, SHORTEST_DRAG_M, LONGEST_DRAG_REVOLUTIONS = 1.0, 0.005, 2.0
 """A drag lasts this long, but goes this far at the least and at the most."""
 
 TRANSIENT_FRACTION = 0.2
-"""Share of a drag that its mean force leaves out."""
+"""Fraction of a drag that its mean force leaves out."""
 
-Report = Callable[[str], None]
-Settings = Mapping[str, Any]
+Value = Packing | Number
+Settings = Mapping[str, Value]
+
+
+class _Axis(Model):
+    """Values that one setting takes, while others change with it."""
+
+    values: list[Value]
+    others: dict[str, Value] = Field(default_factory=dict, alias="with")
+
+
+class _Plan(Model):
+    """The points of a regime: ``map.yaml`` describes them."""
+
+    base: dict[str, Value]
+    fractions: list[Number]
+    reference: Number
+    axes: dict[str, _Axis] = Field(default_factory=dict)
+    more: list[dict[str, Value]] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _known(self) -> _Plan:
+        changes = {*self.axes, *(key for axis in self.axes.values() for key in axis.others)}
+        unknown = changes.union(*self.more) - set(self.base)
+        if unknown:
+            raise ValueError(f"{', '.join(sorted(unknown))} is not among the base point's settings")
+        return self
+
+    def conditions(self) -> Iterator[tuple[str, Settings]]:
+        """The settings of each condition, and the axis that they lie on."""
+        yield "base", self.base
+        for name, axis in self.axes.items():
+            for value in axis.values:
+                yield name, {**self.base, name: value, **axis.others}
+        for changes in self.more:
+            yield "more", {**self.base, **changes}
 
 
 @dataclass(frozen=True)
@@ -74,7 +111,7 @@ class Point:
         Whether it is the fine-step run that the others are compared with.
     """
 
-    regime: str
+    regime: Regime
     axis: str
     settings: Settings
     fraction: float
@@ -90,10 +127,55 @@ class Point:
         """Name of the run's folder."""
         return f"{self.axis}-{self.condition}-dt-{self.fraction:g}"
 
+    @property
+    def packing(self) -> str:
+        """What a column or a drag starts from."""
+        return str(self.settings.get("packing", "bed"))
 
-def _digest(content: Settings) -> str:
+    def number(self, name: str) -> float:
+        """A setting that is a number."""
+        return float(self.settings[name])
+
+
+def _digest(content: Mapping[str, str | float]) -> str:
     text = json.dumps(content, sort_keys=True, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+
+class PointOfMap(Part):
+    """A point that was run: its folder in the results, and how it ended.
+
+    A point is refused if its deck cannot be made, and failed if an acceptance check did not pass.
+    """
+
+    regime: Regime
+    axis: str
+    condition: str
+    settings: Settings
+    fraction: float
+    reference: bool
+    folder: str
+    refused: str | None
+    state: Literal["refused", "failed", "complete"]
+
+
+class PointsFile(Document):
+    """``points/<regime>.json``: the points of a regime."""
+
+    points: Sequence[PointOfMap]
+
+
+class BedOfMap(Part):
+    """A settled bed: its materials and its folder in the results."""
+
+    settings: Settings
+    folder: str
+
+
+class BedsFile(Document):
+    """``points/beds.json``: the beds that columns and drags start from."""
+
+    beds: Sequence[BedOfMap]
 
 
 def load_points(file: Path, regime: str) -> list[Point]:
@@ -105,54 +187,30 @@ def load_points(file: Path, regime: str) -> list[Point]:
         The file is no such map, or lacks the regime.
     """
     data = read_yaml(file)
-    if regime not in data or regime not in REGIMES:
+    known = {name: name for name in REGIMES if name in data}
+    if regime not in known:
         raise InputError(
             "the map has no such regime",
             file=file,
             value=regime,
-            limit=f"one of: {', '.join(name for name in REGIMES if name in data)}",
+            limit=f"one of: {', '.join(known)}",
         )
-    plan = data[regime]
     try:
-        return list(_points(plan, regime))
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(
-            f"not a map of points: {error!r}",
-            file=file,
-            field=regime,
-            limit="base, fractions, reference, axes (each with values), more",
-        ) from None
+        plan = _Plan.model_validate(data[regime])
+    except ValidationError as error:
+        raise explained(error, file) from None
+    return list(_points(plan, known[regime]))
 
 
-def _points(plan: Mapping[str, Any], regime: str) -> Iterator[Point]:
+def _points(plan: _Plan, regime: Regime) -> Iterator[Point]:
+    fractions = [(plan.reference, True), *((fraction, False) for fraction in plan.fractions)]
     seen: set[str] = set()
-    for axis, settings in _conditions(plan):
-        fractions = [
-            (float(plan["reference"]), True),
-            *((float(f), False) for f in plan["fractions"]),
-        ]
+    for axis, settings in plan.conditions():
         for fraction, reference in fractions:
             point = Point(regime, axis, settings, fraction, reference)
-            if point.name not in seen and (axis == "base" or settings != _settings(plan, {})):
+            if point.name not in seen and (axis == "base" or settings != plan.base):
                 seen.add(point.name)
                 yield point
-
-
-def _conditions(plan: Mapping[str, Any]) -> Iterator[tuple[str, Settings]]:
-    yield "base", _settings(plan, {})
-    for axis, entry in plan.get("axes", {}).items():
-        for value in entry["values"]:
-            yield axis, _settings(plan, {axis: value, **entry.get("with", {})})
-    for changes in plan.get("more", []):
-        yield "more", _settings(plan, changes)
-
-
-def _settings(plan: Mapping[str, Any], changes: Settings) -> Settings:
-    unknown = set(changes) - set(plan["base"])
-    if unknown:
-        raise ValueError(f"{', '.join(sorted(unknown))} is not among the base point's settings")
-    merged = {**plan["base"], **changes}
-    return {key: value if key == "packing" else float(value) for key, value in merged.items()}
 
 
 def point_case(base: Case, settings: Settings, fraction: float) -> Case:
@@ -164,25 +222,26 @@ def point_case(base: Case, settings: Settings, fraction: float) -> Case:
     study = base.study
     pair = {"restitution": settings["restitution"], "friction": settings["friction"]}
     particles = study.materials[study.media.material]
+    scale = float(settings["youngs_modulus_pa"]) / particles.youngs_modulus_pa
     fidelity = study.chosen_fidelity().model_copy(
         update={
-            "youngs_modulus_scale": settings["youngs_modulus_pa"] / particles.youngs_modulus_pa,
+            "youngs_modulus_scale": scale,
             "timestep_fraction": fraction,
             "filling_timestep_fraction": fraction,
             "speed_factor": 1.0,
             "ranks": 1,
         }
     )
-    changes: dict[str, Any] = {
+    speed = settings.get("workpiece_speed_m_s")
+    changes = {
         "pairs": {name: old.model_copy(update=pair) for name, old in study.pairs.items()},
         "fidelity": fidelity,
+        "motion": study.motion if speed is None else _motion(study, float(speed)),
     }
-    if "workpiece_speed_m_s" in settings:
-        changes["motion"] = _motion(study, settings["workpiece_speed_m_s"])
     return Case(base.file, {}, study.model_copy(update=changes))
 
 
-def _motion(study: Study, speed: float) -> Any:
+def _motion(study: Study, speed: float) -> Motion:
     path = study.motion.path
     if not isinstance(path, CirclePath):
         raise InputError("the map's study drags on a circle", field="motion.path")
@@ -193,192 +252,174 @@ def _motion(study: Study, speed: float) -> Any:
     return study.motion.model_copy(update=update)
 
 
-def run_batch(
-    study_file: Path, map_file: Path, regime: str, results: Path, templates: Path, report: Report
-) -> Path:
-    """Run all points of a regime that have not been run yet, and list them all.
-
-    A run that fails is a finding like any other; one that was interrupted is
-    gone on with when the batch is run again.
-
-    Parameters
-    ----------
-    study_file, map_file : Path
-    regime : str
-        One of `REGIMES`, or `BEDS`: what columns and drags start from.
-    results : Path
-        Gets ``<regime>/<point>/`` and ``points/<regime>.json``.
-    templates : Path
-    report : callable
-        Gets lines.
-
-    Returns
-    -------
-    Path
-        The list.
-
-    Raises
-    ------
-    EngineError
-        No engine, or the batch was interrupted.
-    InputError
-        Study or map cannot be used.
-    RejectedRunError
-        The bed that a point starts from failed, or is not there yet.
-    """
-    (base,) = load_cases(study_file)
-    runs = _Runs(base, results, environment(templates, study_file.parent / "templates"))
-    rows: list[dict[str, Any]] = []
-    if regime == BEDS:
-        for own in _bed_settings(map_file):
-            rows.append({"settings": own, "folder": runs.settle_bed(own)})
-            report(f"bed settled: {rows[-1]['folder']}")
-    else:
-        points = load_points(map_file, regime)
-        for number, point in enumerate(points, 1):
-            rows.append({**_row(point), **runs.point(point)})
-            report(f"{regime} {number} of {len(points)}: {point.name}: {rows[-1]['state']}")
-    file = results / "points" / f"{regime}.json"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    replace_text(file, json.dumps({"schema": 2, "points": rows}, indent=1) + "\n")
-    return file
+def bed_names(map_file: Path) -> list[str]:
+    """Run ids of the beds that columns and drags start from, in ``filling/``."""
+    return list(_bed_settings(map_file))
 
 
-def _row(point: Point) -> dict[str, Any]:
-    return {
-        "regime": point.regime,
-        "axis": point.axis,
-        "condition": point.condition,
-        "settings": dict(point.settings),
-        "fraction": point.fraction,
-        "reference": point.reference,
-    }
-
-
-@dataclass(frozen=True)
-class _Runs:
-    """Renders and runs points, and the beds that they start from."""
-
-    base: Case
-    results: Path
-    templates: jinja2.Environment
-
-    def point(self, point: Point) -> dict[str, Any]:
-        """Run a point; its folder, its state and why it was refused, if it was."""
-        folder = self.results / point.regime / point.name
-        found: dict[str, Any] = {"folder": str(folder.relative_to(self.results)), "refused": None}
-        try:
-            scene = self._scene(point)
-        except InputError as error:
-            return {**found, "state": "refused", "refused": str(error)}
-        return {**found, "state": self._run(scene, folder)}
-
-    def _run(self, scene: AnyScene, folder: Path) -> str:
-        deck = replace(scene.deck, run=folder.name)
-        case = scene.case.model_copy(update={"run": folder.name})
-        write_run(replace(scene, deck=deck, case=case), folder, self.templates)
-        try:
-            run(folder, lambda line: None)
-        except RejectedRunError:
-            return "failed"
-        return "complete"
-
-    def _scene(self, point: Point) -> AnyScene:
-        case = point_case(self.base, point.settings, point.fraction)
-        settings = point.settings
-        if point.regime == "impact":
-            how = Impact(settings["speed_m_s"], settings["angle_deg"], settings["size_ratio"])
-            return impact_scene(case, point.name, how, point.fraction)
-        if point.regime == "settle":
-            return filling_scene(case)
-        if point.regime == "column":
-            stack = settings["packing"] == "stack"
-            bed = "" if stack else self._bed(settings).name
-            load = settings["load_factor"]
-            return column_scene(case, point.name, settings["packing"], load, point.fraction, bed)
-        folder = self._bed(settings)
-        measured = json.loads((folder / "tables" / "packing.json").read_text(encoding="utf-8"))
-        scene = process_scene(case, Bed(measured["bed_height_m"], measured["top_m"]))
-        source = f"../../filling/{folder.name}/packing.restart"
-        return replace(scene, deck=replace(scene.deck, source=source))
-
-    def _bed(self, settings: Settings) -> Path:
-        """The settled bed of these materials."""
-        folder = self.results / "filling" / _bed_name(settings)
-        if not (folder / "tables" / "packing.json").is_file():
-            raise RejectedRunError(
-                f"{folder}: the bed that this point starts from is not there\n"
-                "  remedy: settle the beds first: dragdeck stability beds"
-            )
-        return folder
-
-    def settle_bed(self, own: Settings) -> str:
-        """Settle a bed with a small step; the name of its folder."""
-        folder = self.results / "filling" / _bed_name(own)
-        case = point_case(self.base, own, SAFE_FILLING_FRACTION)
-        filling = case.study.filling.model_copy(update={"energy_ratio": BED_ENERGY_RATIO})
-        scene = filling_scene(
-            replace(case, study=case.study.model_copy(update={"filling": filling}))
-        )
-        if self._run(scene, folder) != "complete":
-            raise RejectedRunError(
-                f"{folder}: the bed that points start from failed; see its state.json"
-            )
-        tabulate(folder)
-        return str(folder.relative_to(self.results))
-
-
-def _own(settings: Settings) -> dict[str, Any]:
-    """What a bed depends on. One of elastic particles would never rest.
-
-    It settles with damped ones.
-    """
-    own = {key: settings[key] for key in ("youngs_modulus_pa", "restitution", "friction")}
-    return {**own, "restitution": min(own["restitution"], MOST_ELASTIC_BED)}
-
-
-def _bed_name(settings: Settings) -> str:
-    return f"bed-{_digest(_own(settings))}"
-
-
-def _bed_settings(map_file: Path) -> list[dict[str, Any]]:
-    """Every bed that a point of the map starts from, once."""
+def _bed_settings(map_file: Path) -> dict[str, Settings]:
+    """Every bed that a point of the map starts from, by its run id."""
     known = read_yaml(map_file)
     points = [
         point
         for regime in ("column", "drag")
         if regime in known
         for point in load_points(map_file, regime)
-        if point.settings.get("packing") != "stack"
+        if point.packing == "bed"
     ]
-    return list({_bed_name(point.settings): _own(point.settings) for point in points}.values())
+    return {_bed_name(point.settings): _own(point.settings) for point in points}
 
 
-def tabulate(folder: Path) -> None:
-    """Measure a settled bed with the analysis, which is a program of its own."""
-    words = [sys.executable, "-m", "dragchain.cli", "tables", str(folder)]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise EngineError(f"{folder}: the bed cannot be measured\n{done.stderr.strip()}")
+def _bed_name(settings: Settings) -> str:
+    return f"bed-{_digest(_own(settings))}"
 
 
-__all__: Sequence[str] = (
-    "BEDS",
-    "REGIMES",
-    "Point",
-    "load_points",
-    "point_case",
-    "run_batch",
-    "tabulate",
-)
+def _own(settings: Settings) -> dict[str, float]:
+    """What a bed depends on. One of elastic particles would never rest.
+
+    It settles with damped ones.
+    """
+    own = {key: float(settings[key]) for key in ("youngs_modulus_pa", "restitution", "friction")}
+    return {**own, "restitution": min(own["restitution"], MOST_ELASTIC_BED)}
+
+
+@dataclass(frozen=True)
+class MapRuns:
+    """Runs the points of a map, and the beds that they start from.
+
+    Runs of the same inputs are not repeated; one that was interrupted is gone on with.
+
+    Attributes
+    ----------
+    base : Case
+        Of the map's study.
+    results : Path
+        Gets ``<regime>/<point>/``, ``filling/<bed>/`` and ``points/<regime>.json``.
+    templates : jinja2.Environment
+    report : callable
+        Gets lines.
+    """
+
+    base: Case
+    results: Path
+    templates: jinja2.Environment
+    report: Report
+
+    def settle_beds(self, map_file: Path) -> Path:
+        """Settle the beds with a small step; the list of them.
+
+        Raises
+        ------
+        EngineError
+            No LIGGGHTS, or it was interrupted.
+        RejectedRunError
+            A bed did not come to rest.
+        """
+        batch, beds = Batch(self.results / "filling", self.templates), []
+        for name, own in _bed_settings(map_file).items():
+            batch.result(name, self._bed(own))
+            beds.append(BedOfMap(settings=own, folder=f"filling/{name}"))
+            self.report(f"bed settled: {name}")
+        return self._listed(BEDS, BedsFile(beds=beds))
+
+    def _bed(self, own: Settings) -> AnyScene:
+        case = point_case(self.base, own, SAFE_FILLING_FRACTION)
+        filling = case.study.filling.model_copy(update={"energy_ratio": BED_ENERGY_RATIO})
+        return filling_scene(
+            replace(case, study=case.study.model_copy(update={"filling": filling}))
+        )
+
+    def run_points(self, map_file: Path, regime: str) -> Path:
+        """Run all points of a regime; the list of them. A run that fails is a finding.
+
+        Raises
+        ------
+        InputError
+            The map cannot be used, or a bed is not there yet.
+        EngineError
+            No LIGGGHTS, or it was interrupted.
+        """
+        points, rows = load_points(map_file, regime), []
+        batch = Batch(self.results / regime, self.templates)
+        for number, point in enumerate(points, 1):
+            rows.append(self._run(batch, point))
+            self.report(f"{regime} {number} of {len(points)}: {point.name}: {rows[-1].state}")
+        return self._listed(regime, PointsFile(points=rows))
+
+    def _listed(self, name: str, content: Document) -> Path:
+        file = self.results / "points" / f"{name}.json"
+        content.write(file)
+        return file
+
+    def _run(self, batch: Batch, point: Point) -> PointOfMap:
+        bed = self._settled(point) if point.regime == "drag" else None
+        try:
+            scene = self._scene(point, bed)
+        except InputError as error:
+            return _row(point, "refused", str(error))
+        record = batch.run(point.name, scene)
+        return _row(point, "complete" if record.state == "complete" else "failed")
+
+    def _settled(self, point: Point) -> Bed:
+        """The bed that a drag starts from; one that is missing is no finding."""
+        folder = self.results / "filling" / _bed_name(point.settings)
+        return read_bed(folder / "tables" / "packing.json")
+
+    def _scene(self, point: Point, settled: Bed | None) -> AnyScene:
+        case = point_case(self.base, point.settings, point.fraction)
+        bed = _bed_name(point.settings)
+        if point.regime == "impact":
+            how = Impact(*map(point.number, ("speed_m_s", "angle_deg", "size_ratio")))
+            return impact_scene(case, point.name, how, point.fraction)
+        if point.regime == "settle":
+            return filling_scene(case)
+        if point.regime == "column":
+            packing: Packing = "stack" if point.packing == "stack" else "bed"
+            load = point.number("load_factor")
+            return column_scene(case, point.name, packing, load, point.fraction, bed)
+        scene = process_scene(case, settled)
+        source = f"../../filling/{bed}/packing.restart"
+        return replace(scene, deck=replace(scene.deck, source=source))
+
+
+def _row(
+    point: Point, state: Literal["refused", "failed", "complete"], refused: str | None = None
+) -> PointOfMap:
+    return PointOfMap(
+        regime=point.regime,
+        axis=point.axis,
+        condition=point.condition,
+        settings=point.settings,
+        fraction=point.fraction,
+        reference=point.reference,
+        folder=f"{point.regime}/{point.name}",
+        refused=refused,
+        state=state,
+    )
+
+
+def map_runs(study_file: Path, results: Path, templates: Path, report: Report) -> MapRuns:
+    """The runs of the map of a study.
+
+    Raises
+    ------
+    InputError
+        The study cannot be used.
+    """
+    (base,) = load_cases(study_file)
+    return MapRuns(base, results, environment(templates, study_file.parent / "templates"), report)
 
 
 def stability_command(regime: str, points: Path) -> None:
-    """Run one regime of the map."""
+    """Run one regime of the map, or settle its beds."""
     project = find_project(Path.cwd())
     study = project.studies / "stability" / "study.yaml"
 
     def report(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
-    run_batch(study, points, regime, project.results("stability"), project.templates, report)
+    runs = map_runs(study, project.results("stability"), project.templates, report)
+    if regime == BEDS:
+        runs.settle_beds(points)
+    else:
+        runs.run_points(points, regime)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.packing import Array, radii
 from dragdeck.physics.rounding import round_to
-from dragdeck.study.model import Material, Study
+from dragdeck.study.material import Material
+from dragdeck.study.model import Study
 
 
 def bed_radii(study: Study) -> Array:

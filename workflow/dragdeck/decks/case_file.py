@@ -9,7 +9,7 @@ from pydantic import JsonValue
 
 from dragdeck.documents import Document, Part
 from dragdeck.physics.run_limits import RunLimits
-from dragdeck.study.model import Reference
+from dragdeck.study.reference import Reference
 
 
 class RanksOfRun(Part):

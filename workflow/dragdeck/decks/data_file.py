@@ -35,7 +35,9 @@ def data_file(title: str, types: int, box: Box, bodies: Sequence[Body]) -> str:
     bodies : sequence of Body
         Numbered from 1. Velocities are written if one of them moves.
     """
-    bounds = [f"{low!r} {high!r} {axis}lo {axis}hi" for axis, (low, high) in zip("xyz", box)]
+    bounds = [
+        f"{low!r} {high!r} {axis}lo {axis}hi" for axis, (low, high) in zip("xyz", box, strict=True)
+    ]
     lines = [title, "", f"{len(bodies)} atoms", f"{types} atom types", "", *bounds]
     lines += ["", "Atoms", ""]
     lines += [

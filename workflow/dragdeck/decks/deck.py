@@ -6,13 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
+from trimesh import Trimesh
+
 from dragdeck import __version__
 from dragdeck.decks.case_file import CaseFile, CaseOfStudy
 from dragdeck.decks.outputs import Output
-from dragdeck.mesh import Mesh
 from dragdeck.physics.domain_split import ENGINE_CHOOSES
 from dragdeck.physics.engine_limits import ENGINE_HARD_PA
-from dragdeck.study.contact_law import Pair, contact_model, present
+from dragdeck.study.contact_law import Pair, contact_model, contact_settings, present
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,25 @@ class PairTable:
 
 
 @dataclass(frozen=True)
+class ContactLaw:
+    """The contact law of particles and walls alike, as LIGGGHTS writes it.
+
+    Attributes
+    ----------
+    tables : sequence of PairTable
+        The coefficients that some pair has.
+    model : str
+        Models and their names.
+    settings : sequence of str
+        Options that follow the models.
+    """
+
+    tables: Sequence[PairTable]
+    model: str
+    settings: Sequence[str]
+
+
+@dataclass(frozen=True)
 class Materials:
     """Material constants and the contact law, as LIGGGHTS wants them.
 
@@ -34,27 +54,23 @@ class Materials:
         The material of each type, in LIGGGHTS's order; the particles are first.
     youngs_moduli_pa, poissons_ratios : sequence of float
         One per type.
-    pair_tables : sequence of PairTable
-        The coefficients that some pair has.
-    contact_model : str
-        For particles and walls alike.
+    law : ContactLaw
     """
 
     names: Sequence[str]
     youngs_moduli_pa: Sequence[float]
     poissons_ratios: Sequence[float]
-    pair_tables: Sequence[PairTable]
-    contact_model: str
+    law: ContactLaw
 
 
-def contact_law(pairs: Sequence[Sequence[Pair]]) -> tuple[list[PairTable], str]:
-    """Pair tables and contact model of a square table of pairs."""
+def contact_law(pairs: Sequence[Sequence[Pair]]) -> ContactLaw:
+    """The contact law of a square table of pairs: a row and a column for each type."""
     every = [pair for row in pairs for pair in row]
     tables = [
         PairTable(name, row.engine, [getattr(pair, name) for pair in every])
         for name, row in present(every).items()
     ]
-    return tables, contact_model(every)
+    return ContactLaw(tables, contact_model(every), contact_settings(every))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +143,7 @@ class Scene(Generic[K]):
         Steps expected; an estimate where the engine decides.
     files : mapping of str to str
         Other input files: name to content.
-    meshes : mapping of str to Mesh
+    meshes : mapping of str to Trimesh
         Mesh files, by name.
     models : mapping of str to str
         What the deck models, and why.
@@ -135,16 +151,24 @@ class Scene(Generic[K]):
         What it leaves out.
     warnings : sequence of str
         What the user should know before the run.
+    override : str, optional
+        The template, if it is not the scene's own.
     """
 
     deck: Deck
     case: K
     steps: int
     files: Mapping[str, str] = field(default_factory=dict)
-    meshes: Mapping[str, Mesh] = field(default_factory=dict)
+    meshes: Mapping[str, Trimesh] = field(default_factory=dict)
     models: Mapping[str, str] = field(default_factory=dict)
     leaves_out: Mapping[str, LeftOut] = field(default_factory=dict)
     warnings: Sequence[str] = ()
+    override: str | None = None
+
+    @property
+    def template(self) -> str:
+        """The template of the input script: the scene's own unless another overrides it."""
+        return self.override or f"{self.deck.scene}.in.j2"
 
 
 StudyScene = Scene[CaseOfStudy]

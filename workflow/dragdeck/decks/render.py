@@ -73,10 +73,9 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
     InputError
         A template cannot be used: names template, line and what is missing.
     """
-    name = f"{scene.deck.scene}.in.j2"
     with _explained():
-        template = templates.get_template(name)
-        used = "templates: " + ", ".join(_used(templates, name))
+        template = templates.get_template(scene.template)
+        used = "templates: " + ", ".join(_used(templates, scene.template))
         return template.render(deck=replace(scene.deck, templates=used))
 
 

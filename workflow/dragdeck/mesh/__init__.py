@@ -6,28 +6,15 @@ of its bounding box in x and y at its lowest z. `cylinder` makes meshes that
 stand so; `place` moves a user's mesh there.
 """
 
-from dragdeck.mesh.checks import (
-    ANGLE_WARNING_DEG,
-    CURVATURE_DEG,
-    MAX_NEIGHBOURS,
-    Finding,
-    Surroundings,
-    check,
-    findings,
-)
+from dragdeck.mesh.checks import Finding, Surroundings, check, findings
 from dragdeck.mesh.files import UNITS, read, stl_text, write_stl
 from dragdeck.mesh.shapes import bowl, cylinder, polygon_radius, polygon_sides, prism
-from dragdeck.mesh.surface import NODE_PRECISION_M, Envelope, Mesh, envelope, place, weld
+from dragdeck.mesh.surface import Envelope, envelope, place, surface, weld
 
 __all__ = [
-    "ANGLE_WARNING_DEG",
-    "CURVATURE_DEG",
-    "MAX_NEIGHBOURS",
-    "NODE_PRECISION_M",
     "UNITS",
     "Envelope",
     "Finding",
-    "Mesh",
     "Surroundings",
     "bowl",
     "check",
@@ -40,6 +27,7 @@ __all__ = [
     "prism",
     "read",
     "stl_text",
+    "surface",
     "weld",
     "write_stl",
 ]

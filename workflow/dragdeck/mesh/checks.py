@@ -1,19 +1,21 @@
 """What the engine, or the physics, does not stand in a mesh.
 
-The limits are those of LIGGGHTS 3.8.0, fix mesh/surface.
+The limits are those of LIGGGHTS 3.8.0, fix mesh/surface; the geometry is trimesh's.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from trimesh import Trimesh
+from trimesh.util import unitize
 
 from dragdeck.errors import InputError
-from dragdeck.mesh.surface import NODE_PRECISION_M, Floats, Integers, Mesh, unit_vectors
+from dragdeck.mesh.surface import NODE_PRECISION_M, Integers, place
 
 CURVATURE_DEG = 0.256235
 """Default of the engine's `curvature`; no facet may have a smaller angle."""
@@ -39,43 +41,41 @@ class Surroundings:
     particle_radius_m: float
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """One thing that is wrong, or doubtful, with a mesh.
 
     Parameters
     ----------
-    severity : {"error", "warning"}
-        An error is what the engine, or the physics, does not stand.
     problem, value, limit, remedy : str
         The parts of the message.
+    severity : {"error", "warning"}
+        An error is what the engine, or the physics, does not stand.
     """
 
-    severity: Literal["error", "warning"]
     problem: str
     value: str
     limit: str
     remedy: str
+    severity: Literal["error", "warning"] = "error"
 
 
 def check(
-    mesh: Mesh,
+    mesh: Trimesh,
     *,
     file: Path | str | None = None,
     field: str | None = None,
     workpiece: bool = True,
     surroundings: Surroundings | None = None,
-    curvature_deg: float = CURVATURE_DEG,
 ) -> list[Finding]:
     """Refuse a mesh that the engine would refuse or that makes no sense.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Trimesh
         In metres, welded, as `read` and the makers return it.
     file, field : optional
         Where the mesh comes from, for the message.
-    workpiece, surroundings, curvature_deg
+    workpiece, surroundings
         As in `findings`.
 
     Returns
@@ -88,109 +88,88 @@ def check(
     InputError
         For the first error found.
     """
-    found = findings(
-        mesh, workpiece=workpiece, surroundings=surroundings, curvature_deg=curvature_deg
-    )
-    for finding in found:
-        if finding.severity == "error":
+    found = findings(mesh, workpiece=workpiece, surroundings=surroundings)
+    for problem, value, limit, remedy, severity in found:
+        if severity == "error":
             raise InputError(
-                finding.problem,
-                file=file,
-                field=field,
-                value=finding.value,
-                limit=finding.limit,
-                remedy=finding.remedy,
+                problem, file=file, field=field, value=value, limit=limit, remedy=remedy
             )
     return found
 
 
 def findings(
-    mesh: Mesh,
-    *,
-    workpiece: bool = True,
-    surroundings: Surroundings | None = None,
-    curvature_deg: float = CURVATURE_DEG,
+    mesh: Trimesh, *, workpiece: bool = True, surroundings: Surroundings | None = None
 ) -> list[Finding]:
     """List what is wrong with a mesh, the root causes first.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Trimesh
         In metres, welded.
     workpiece : bool
         Whether the mesh is a body and must be closed with its normals out.
     surroundings : Surroundings, optional
         To see whether the size is plausible.
-    curvature_deg : float
-        The deck's `curvature`: no angle of a facet may be smaller, in degrees.
     """
     broken = _empty(mesh) or _not_finite(mesh)
     if broken:
         return broken
     found = _implausible_size(mesh, surroundings) if surroundings else []
-    degenerate = _degenerate(mesh)
-    found += degenerate + _duplicates(mesh)
-    if not degenerate:
-        found += _sharp_angles(mesh, curvature_deg) + _overlaps(mesh, curvature_deg)
+    useless = _degenerate(mesh) + _duplicates(mesh)
+    found += useless or _sharp_angles(mesh) + _overlaps(mesh)
     found += _crowded_edges(mesh)
     if workpiece:
-        found += _not_a_body(mesh)
+        found += _open_edges(mesh) or _turned_normals(mesh)
     return sorted(found, key=lambda finding: finding.severity)
 
 
-def _error(problem: str, value: str, limit: str, remedy: str) -> list[Finding]:
-    return [Finding("error", problem, value, limit, remedy)]
-
-
-def _which(bad: NDArray[np.bool_]) -> str:
+def _facets(
+    bad: NDArray[np.bool_], problem: str, limit: str, remedy: str, measured: str = ""
+) -> list[Finding]:
+    """Return an error that names the bad facets, or nothing if there is none."""
+    if not bad.any():
+        return []
     numbers = np.flatnonzero(bad)
     shown = ", ".join(str(number) for number in numbers[:5])
     more = ", ..." if len(numbers) > 5 else ""
-    return f"{len(numbers)} of {len(bad)} facets (counted from 0: {shown}{more})"
+    value = f"{measured}{len(numbers)} of {len(bad)} facets (counted from 0: {shown}{more})"
+    return [Finding(problem, value, limit, remedy)]
 
 
-def _empty(mesh: Mesh) -> list[Finding]:
-    if len(mesh.triangles):
+def _empty(mesh: Trimesh) -> list[Finding]:
+    if len(mesh.faces):
         return []
-    return _error(
-        "the mesh is empty", "0 facets", "at least one facet", "export the surface as triangles"
-    )
+    remedy = "export the surface as triangles; the file may have been cut short"
+    return [Finding("the mesh is empty", "0 facets", "at least one facet", remedy)]
 
 
-def _not_finite(mesh: Mesh) -> list[Finding]:
-    bad = np.asarray(~np.isfinite(mesh.corners).all(axis=(1, 2)))
-    if not bad.any():
-        return []
-    return _error(
-        "a coordinate is not a number", _which(bad), "finite numbers", "export the mesh again"
-    )
+def _not_finite(mesh: Trimesh) -> list[Finding]:
+    bad = ~np.isfinite(mesh.triangles).all(axis=(1, 2))
+    problem = "a coordinate is not a number"
+    return _facets(bad, problem, limit="finite numbers", remedy="export the mesh again")
 
 
-def _implausible_size(mesh: Mesh, scene: Surroundings) -> list[Finding]:
-    size = float(mesh.extent.max())
+def _implausible_size(mesh: Trimesh, scene: Surroundings) -> list[Finding]:
     if _plausible(mesh, 1.0, scene):
         return []
+    problem = "the size of the workpiece makes no sense in this bowl"
+    value = " x ".join(f"{length:.4g}" for length in mesh.extents) + " m"
     limit = (
         f"narrower than the bowl (diameter {2 * scene.bowl_radius_m:g} m), no longer than ten "
         f"bowls, no smaller than a particle's radius ({scene.particle_radius_m:g} m)"
     )
-    return _error(
-        "the size of the workpiece makes no sense in this bowl",
-        " x ".join(f"{length:.4g}" for length in mesh.extent) + " m",
-        limit,
-        _unit_remedy(mesh, scene) if size > 0.0 else "export the mesh again",
-    )
+    return [Finding(problem, value, limit, _unit_remedy(mesh, scene))]
 
 
-def _plausible(mesh: Mesh, factor: float, scene: Surroundings) -> bool:
-    width, depth, height = factor * mesh.extent
+def _plausible(mesh: Trimesh, factor: float, scene: Surroundings) -> bool:
+    width, depth, height = factor * mesh.extents
     bowl_m = 2.0 * scene.bowl_radius_m
     longest = max(width, depth, height)
     narrow = max(width, depth) < bowl_m
     return bool(narrow and scene.particle_radius_m <= longest <= 10.0 * bowl_m)
 
 
-def _unit_remedy(mesh: Mesh, scene: Surroundings) -> str:
+def _unit_remedy(mesh: Trimesh, scene: Surroundings) -> str:
     if _plausible(mesh, 1e-3, scene):
         return "check the unit: in millimetres, declared as metres?"
     if _plausible(mesh, 1e3, scene):
@@ -198,114 +177,73 @@ def _unit_remedy(mesh: Mesh, scene: Surroundings) -> str:
     return "check the unit that the file is declared in, or use a workpiece of another size"
 
 
-def _degenerate(mesh: Mesh) -> list[Finding]:
-    edges = np.linalg.norm(mesh.edge_vectors, axis=2)
-    longest = edges.max(axis=1)
-    height = np.divide(
-        2.0 * mesh.facet_areas, longest, out=np.zeros_like(longest), where=longest > 0
-    )
-    repeated = (mesh.triangles == np.roll(mesh.triangles, 1, axis=1)).any(axis=1)
-    bad = repeated | (height <= NODE_PRECISION_M)
-    if not bad.any():
-        return []
-    return _error(
-        "a facet has no area",
-        _which(bad),
-        f"higher than the engine's precision, {NODE_PRECISION_M:g} m",
-        "remove degenerate facets in a mesh workpiece and export again",
-    )
+def _degenerate(mesh: Trimesh) -> list[Finding]:
+    bad = ~mesh.nondegenerate_faces(height=NODE_PRECISION_M)
+    limit = f"higher than the engine's precision, {NODE_PRECISION_M:g} m"
+    remedy = "remove degenerate facets in a mesh workpiece and export again"
+    return _facets(bad, "a facet has no area", limit, remedy)
 
 
-def _duplicates(mesh: Mesh) -> list[Finding]:
-    nodes = np.sort(mesh.triangles, axis=1)
-    _, first = np.unique(nodes, axis=0, return_index=True)
-    bad = np.ones(len(nodes), dtype=np.bool_)
-    bad[first] = False
-    if not bad.any():
-        return []
-    return _error(
-        "a facet is there twice",
-        _which(bad),
-        "every facet once",
-        "remove duplicate facets in a mesh workpiece and export again",
-    )
+def _duplicates(mesh: Trimesh) -> list[Finding]:
+    remedy = "remove duplicate facets in a mesh workpiece and export again"
+    return _facets(~mesh.unique_faces(), "a facet is there twice", "every facet once", remedy)
 
 
-def _sharp_angles(mesh: Mesh, curvature_deg: float) -> list[Finding]:
-    smallest = mesh.angles_deg.min(axis=1)
-    error, warning = smallest <= curvature_deg, smallest <= ANGLE_WARNING_DEG
-    if error.any():
-        return _error(
-            "the angle of a facet is too sharp for the engine",
-            f"{smallest.min():.4g} degrees; {_which(error)}",
-            f"above the curvature of the mesh, {curvature_deg:g} degrees",
-            "remesh with better shaped triangles",
-        )
-    if not warning.any():
-        return []
+def _sharp_angles(mesh: Trimesh) -> list[Finding]:
+    smallest = np.degrees(mesh.face_angles.min(axis=1))
+    remedy, measured = "remesh with better shaped triangles", f"{smallest.min():.4g} degrees; "
+    problem = "the angle of a facet is too sharp for the engine"
+    limit = f"above the curvature of the mesh, {CURVATURE_DEG:g} degrees"
+    errors = _facets(smallest <= CURVATURE_DEG, problem, limit, remedy, measured)
+    problem = "needle-like facets slow the engine down"
     limit = f"above {ANGLE_WARNING_DEG:g} degrees"
-    value = f"{smallest.min():.4g} degrees; {_which(warning)}"
-    remedy = "remesh with better shaped triangles"
-    return [Finding("warning", "needle-like facets slow the engine down", value, limit, remedy)]
+    doubts = _facets(smallest <= ANGLE_WARNING_DEG, problem, limit, remedy, measured)
+    return errors or [doubt._replace(severity="warning") for doubt in doubts]
 
 
-def _overlaps(mesh: Mesh, curvature_deg: float) -> list[Finding]:
-    one, other, inward = _edge_pairs(mesh)
-    flat = np.cos(np.radians(curvature_deg))
-    coplanar = np.abs(np.einsum("kc,kc->k", mesh.normals[one], mesh.normals[other])) >= flat
-    same_side = np.einsum("kc,kc->k", inward[:, 0], inward[:, 1]) > 0.0
-    different = (np.sort(mesh.triangles[one]) != np.sort(mesh.triangles[other])).any(axis=1)
-    bad = np.zeros(len(mesh.triangles), dtype=np.bool_)
-    bad[one[coplanar & same_side & different]] = True
-    if not bad.any():
+def _overlaps(mesh: Trimesh) -> list[Finding]:
+    """Find facets of one plane on the same side of the edge that they share."""
+    start, end = mesh.vertices[mesh.face_adjacency_edges].swapaxes(0, 1)
+    apex = mesh.vertices[mesh.face_adjacency_unshared]
+    turn = unitize(np.cross((end - start)[:, None], apex - start[:, None]).reshape(-1, 3))
+    cosine = np.einsum("kc,kc->k", turn[::2], turn[1::2])
+    bad = np.zeros(len(mesh.faces), dtype=np.bool_)
+    bad[mesh.face_adjacency[cosine >= np.cos(np.radians(CURVATURE_DEG)), 0]] = True
+    problem = "two facets of one plane lie on top of each other"
+    limit = "facets that share an edge lie on both sides of it"
+    return _facets(bad, problem, limit, "repair the mesh: one surface, without folds")
+
+
+def _edge_use(mesh: Trimesh) -> Integers:
+    """How many facets have an edge, in the order of `edges_unique`."""
+    return np.bincount(mesh.edges_unique_inverse)
+
+
+def _crowded_edges(mesh: Trimesh) -> list[Finding]:
+    neighbours = (_edge_use(mesh)[mesh.faces_unique_edges] - 1).sum(axis=1)
+    measured, limit = f"{neighbours.max()} neighbours; ", f"at most {MAX_NEIGHBOURS} neighbours"
+    problem = "too many facets meet at the edges of one"
+    remedy = "repair the mesh: a surface has two facets at an edge"
+    return _facets(neighbours > MAX_NEIGHBOURS, problem, limit, remedy, measured)
+
+
+def _open_edges(mesh: Trimesh) -> list[Finding]:
+    if mesh.is_watertight:
         return []
-    return _error(
-        "two facets of one plane lie on top of each other",
-        _which(bad),
-        "facets that share an edge lie on both sides of it",
-        "repair the mesh: one surface, without folds",
-    )
+    use = _edge_use(mesh)
+    value = f"{np.count_nonzero(use != 2)} of {len(use)} edges do not join exactly two facets"
+    limit = "a workpiece is a body: exactly two facets at every edge"
+    remedy = "close the holes and remove inner walls in a mesh workpiece, then export again"
+    return [Finding("the mesh is not closed", value, limit, remedy)]
 
 
-def _edge_pairs(mesh: Mesh) -> tuple[Integers, Integers, Floats]:
-    """Facets that share an edge: two (K,) arrays, and (K, 2, 3), from the edge into each."""
-    edge = mesh.edge_numbers.ravel()
-    order = np.argsort(edge, kind="stable")
-    pair = np.flatnonzero(edge[order[1:]] == edge[order[:-1]])
-    slots = np.stack([order[pair], order[pair + 1]], axis=1)
-    facet, corner = slots // 3, slots % 3
-    along = unit_vectors(mesh.edge_vectors[facet, corner])
-    inward = mesh.corners[facet, (corner + 2) % 3] - mesh.corners[facet, corner]
-    inward = inward - np.einsum("kfc,kfc->kf", inward, along)[..., None] * along
-    return facet[:, 0], facet[:, 1], inward
-
-
-def _crowded_edges(mesh: Mesh) -> list[Finding]:
-    neighbours = mesh.neighbours
-    bad = neighbours > MAX_NEIGHBOURS
-    if not bad.any():
+def _turned_normals(mesh: Trimesh) -> list[Finding]:
+    volume_m3 = place(mesh).volume
+    oriented = mesh.is_winding_consistent
+    if oriented and volume_m3 > 0.0:
         return []
-    return _error(
-        "too many facets meet at the edges of one",
-        f"{neighbours.max()} neighbours; {_which(bad)}",
-        f"at most {MAX_NEIGHBOURS} neighbours",
-        "repair the mesh: a surface has two facets at an edge",
-    )
-
-
-def _not_a_body(mesh: Mesh) -> list[Finding]:
-    loose = int(np.count_nonzero(mesh.edge_use != 2))
-    if loose:
-        return _error(
-            "the mesh is not closed",
-            f"{loose} of {len(mesh.edge_use)} edges do not join exactly two facets",
-            "a workpiece is a body: exactly two facets at every edge",
-            "close the holes and remove inner walls in a mesh workpiece, then export again",
-        )
-    if mesh.oriented and mesh.volume > 0.0:
-        return []
-    value = f"enclosed volume {mesh.volume:.4g} m3" if mesh.oriented else "mixed directions"
+    problem = "the normals do not all point out of the body"
+    value = f"enclosed volume {volume_m3:.4g} m3" if oriented else "mixed directions"
     limit = "corners counter-clockwise, seen from outside"
     remedy = "make the normals of the mesh consistent and outward"
-    problem = "the normals do not all point out of the body"
-    return [Finding("warning", problem, value, limit, remedy)]
+    return [Finding(problem, value, limit, remedy, "warning")]

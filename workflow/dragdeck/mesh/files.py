@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-from collections.abc import Callable
+import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from trimesh import Trimesh
+from trimesh.exchange.stl import load_stl
 
 from dragdeck.errors import InputError
-from dragdeck.mesh.surface import Floats, Integers, Mesh, weld
+from dragdeck.files import replace_text
+from dragdeck.mesh.surface import Floats, Integers, surface, weld
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 """Length units that a mesh file may be declared in, in metres."""
 
 
-def read(path: Path | str, unit: str) -> Mesh:
+def read(path: Path | str, unit: str) -> Trimesh:
     """Read a surface from STL (ASCII or binary), OBJ, PLY or legacy VTK.
 
-    Quadrilaterals are cut along their shorter diagonal. VTK polygon data is
-    refused: meshio does not know it, and VTK's own reader fills a file that
-    was cut short with whatever the memory holds.
+    trimesh reads STL, meshio the rest: trimesh cuts quadrilaterals along
+    whichever diagonal comes first, here they are cut along the shorter one. VTK
+    polygon data is refused: meshio does not know it, and VTK's own reader fills
+    a file that was cut short with whatever the memory holds.
 
     Parameters
     ----------
@@ -34,7 +36,7 @@ def read(path: Path | str, unit: str) -> Mesh:
 
     Returns
     -------
-    Mesh
+    Trimesh
         In metres, welded, where the file puts it.
 
     Raises
@@ -48,61 +50,56 @@ def read(path: Path | str, unit: str) -> Mesh:
         raise InputError(
             "unknown length unit", file=path, field="unit", value=unit, limit=", ".join(UNITS)
         )
-    content = _load(path)
-    points = np.asarray(content.points, dtype=np.float64)
-    if points.size and points.shape[1] != 3:
-        raise InputError("a surface in space needs three coordinates a node", file=path)
-    triangles = [_triangles(block.type, block.data, points, path) for block in content.cells]
+    points, blocks = _load(path)
+    triangles = [_triangles(block.type, block.data, points, path) for block in blocks]
     joined = np.concatenate([np.empty((0, 3), dtype=np.int64), *triangles])
-    return weld(Mesh(points * UNITS[unit], joined))
+    return weld(surface(points * UNITS[unit], joined))
 
 
-def _load(path: Path) -> Any:
-    read_format = _readers().get(path.suffix.lower())
-    if read_format is None:
+def _load(path: Path) -> tuple[Floats, list[Any]]:
+    """Read nodes, (N, 3), and cells; meshio's own `read` ends the interpreter on bad files."""
+    import meshio
+
+    readers = {
+        ".stl": _read_stl,
+        ".obj": meshio.obj.read,
+        ".ply": _read_ply,
+        ".vtk": meshio.vtk.read,
+    }
+    suffix = path.suffix.lower()
+    if suffix not in readers:
         raise InputError(
             "unknown mesh format",
             file=path,
             value=path.suffix or "no suffix",
-            limit=", ".join(_readers()),
+            limit=", ".join(readers),
             remedy="export the surface as STL",
         )
     if not path.is_file():
         raise InputError("there is no such mesh file", file=path)
     try:
-        with np.errstate(over="ignore"):  # meshio multiplies 32-bit numbers to spot a binary STL
-            return read_format(path)
-    except Exception as error:  # meshio lets any parser error out
+        content = readers[suffix](path)
+        points = np.asarray(content.points, dtype=np.float64)
+        return points.reshape(len(points), 3), content.cells
+    except Exception as error:  # both libraries let any parser error out
         raise InputError(
-            f"the mesh file is damaged, or not the {path.suffix.lower()[1:].upper()} that is read",
+            f"the mesh file is damaged, or not the {suffix[1:].upper()} that is read",
             file=path,
             value=str(error).strip() or type(error).__name__,
             remedy="export it again; VTK polygon data as STL or as an unstructured grid",
         ) from error
 
 
-def _readers() -> dict[str, Callable[[Path], Any]]:
-    """Return meshio's readers by suffix; its general one ends the interpreter on bad files."""
-    import meshio
-
-    return {
-        ".stl": _read_stl,
-        ".obj": meshio.obj.read,
-        ".ply": _read_ply,
-        ".vtk": meshio.vtk.read,
-    }
-
-
 def _read_stl(path: Path) -> Any:
-    """Read STL; meshio takes a text file that was cut off after its last corner."""
+    """Read STL, every solid of the file; a text that was cut short holds none."""
     import meshio
 
-    content = path.read_bytes()
-    facets = int.from_bytes(content[80:84], "little")
-    is_text = content.lstrip().startswith(b"solid") and len(content) != 84 + 50 * facets
-    if is_text and not content.rstrip().splitlines()[-1].strip().startswith(b"endsolid"):
-        raise meshio.ReadError("the last line is not 'endsolid'")
-    return meshio.stl.read(path)
+    with path.open("rb") as stream, warnings.catch_warnings():
+        warnings.filterwarnings("error", "string or file could not be read", DeprecationWarning)
+        content = load_stl(stream)
+    solids = content.get("geometry", {"": content}).values()
+    corners = np.concatenate([np.empty((0, 3)), *(solid["vertices"] for solid in solids)])
+    return meshio.Mesh(corners, [("triangle", np.arange(len(corners)).reshape(-1, 3))])
 
 
 def _read_ply(path: Path) -> Any:
@@ -137,7 +134,7 @@ def _split(quads: Integers, points: Floats) -> Integers:
     return turned[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
 
 
-def write_stl(mesh: Mesh, path: Path | str) -> None:
+def write_stl(mesh: Trimesh, path: Path | str) -> None:
     """Write an ASCII STL file in metres, as the engine reads it.
 
     Nine digits keep nodes apart that the engine keeps apart. The same mesh
@@ -145,27 +142,18 @@ def write_stl(mesh: Mesh, path: Path | str) -> None:
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Trimesh
         In metres.
     path : Path or str
         The file; an existing one is replaced.
     """
-    path = Path(path)
-    descriptor, draft = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(descriptor, "w", encoding="ascii", newline="\n") as stream:
-            stream.write(stl_text(mesh))
-        os.chmod(draft, 0o644)
-        os.replace(draft, path)
-    except BaseException:
-        os.unlink(draft)
-        raise
+    replace_text(Path(path), stl_text(mesh))
 
 
-def stl_text(mesh: Mesh, factor: float = 1.0) -> str:
+def stl_text(mesh: Trimesh, factor: float = 1.0) -> str:
     """Return the ASCII STL text of a mesh, its coordinates times `factor`."""
-    corners = factor * mesh.corners + 0.0  # + 0.0 turns -0 into 0
-    normals = np.round(mesh.normals, 9) + 0.0
+    corners = factor * mesh.triangles + 0.0  # + 0.0 turns -0 into 0
+    normals = np.round(mesh.face_normals, 9) + 0.0
     facets = [
         "facet normal {:.9g} {:.9g} {:.9g}\nouter loop\n".format(*normal)
         + "".join("vertex {:.9g} {:.9g} {:.9g}\n".format(*corner) for corner in facet)

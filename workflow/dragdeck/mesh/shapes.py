@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
+from trimesh import Trimesh
 
 from dragdeck.errors import InputError
-from dragdeck.mesh.surface import Floats, Integers, Mesh, weld
+from dragdeck.mesh.surface import Floats, surface, weld
 
 MAX_FACETS = 200_000
 """More facets than any workpiece needs: a facet size in the wrong unit."""
@@ -48,7 +48,7 @@ def polygon_radius(radius_m: float, sides: int) -> float:
 
 def cylinder(
     radius_m: float, length_m: float, facet_size_m: float, facet_length_m: float | None = None
-) -> Mesh:
+) -> Trimesh:
     """Make a closed upright cylinder, its bottom's centre in the origin.
 
     The outline is a polygon of the circle's perimeter (see `polygon_radius`).
@@ -70,13 +70,9 @@ def cylinder(
     Raises
     ------
     InputError
-        If a length is not a positive number, or the facets are coarser than
-        the radius or too many.
+        If the facets are coarser than the radius or too many.
     """
     along_m = facet_size_m if facet_length_m is None else facet_length_m
-    _require_positive(
-        radius_m=radius_m, length_m=length_m, facet_size_m=facet_size_m, facet_length_m=along_m
-    )
     _require_facet_size(facet_size_m, radius_m, length_m)
     sides = polygon_sides(radius_m, facet_size_m)
     return prism(sides, polygon_radius(radius_m, sides), length_m, facet_size_m, along_m)
@@ -88,7 +84,7 @@ def prism(
     length_m: float,
     facet_size_m: float,
     facet_length_m: float,
-) -> Mesh:
+) -> Trimesh:
     """Make a closed upright bar with a regular polygon as its section.
 
     Parameters
@@ -100,14 +96,13 @@ def prism(
     length_m, facet_size_m, facet_length_m : float
         Length, and longest facet legs on the caps and along the axis, in metres.
     """
-    plane, disc = _disc(sides, corner_radius_m, facet_size_m)
+    disc = _disc(sides, corner_radius_m, facet_size_m)
     side = _side(sides, corner_radius_m, length_m, facet_length_m)
-    bottom = Mesh(_lift(plane, 0.0), disc[:, ::-1])
-    top = Mesh(_lift(plane, length_m), disc)
-    return _join(bottom, side, top)
+    top = surface(disc.vertices + np.array([0.0, 0.0, length_m]), disc.faces)
+    return weld(_turned(disc) + side + top)
 
 
-def bowl(radius_m: float, height_m: float, facet_size_m: float) -> Mesh:
+def bowl(radius_m: float, height_m: float, facet_size_m: float) -> Trimesh:
     """Make an open bowl: a floor in z = 0 and a side, the normals pointing in.
 
     The sides of the polygon touch the circle from outside, so a bed that was
@@ -127,25 +122,12 @@ def bowl(radius_m: float, height_m: float, facet_size_m: float) -> Mesh:
     InputError
         As `cylinder`.
     """
-    _require_positive(radius_m=radius_m, height_m=height_m, facet_size_m=facet_size_m)
     _require_facet_size(facet_size_m, radius_m, height_m)
     sides = polygon_sides(radius_m, facet_size_m)
     corner_radius_m = radius_m / math.cos(math.pi / sides)
-    plane, disc = _disc(sides, corner_radius_m, facet_size_m)
-    outside = _side(sides, corner_radius_m, height_m, facet_size_m)
-    inside = replace(outside, triangles=outside.triangles[:, ::-1])
-    return _join(Mesh(_lift(plane, 0.0), disc), inside)
-
-
-def _require_positive(**lengths_m: float) -> None:
-    for field, value in lengths_m.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise InputError(
-                "a mesh needs a positive length",
-                field=field,
-                value=value,
-                limit="a finite number above 0, in metres",
-            )
+    floor = _disc(sides, corner_radius_m, facet_size_m)
+    side = _side(sides, corner_radius_m, height_m, facet_size_m)
+    return weld(floor + _turned(side))
 
 
 def _require_facet_size(facet_size_m: float, radius_m: float, length_m: float) -> None:
@@ -168,53 +150,40 @@ def _require_facet_size(facet_size_m: float, radius_m: float, length_m: float) -
         )
 
 
-def _ring(count: int, radius_m: float, start_rad: float = 0.0) -> Floats:
+def _ring(count: int, radius_m: float, start_rad: float = 0.0, z_m: float = 0.0) -> Floats:
     angle = start_rad + math.tau * np.arange(count) / count
-    return np.column_stack([radius_m * np.cos(angle), radius_m * np.sin(angle)])
+    return np.column_stack(
+        [radius_m * np.cos(angle), radius_m * np.sin(angle), np.full(count, z_m)]
+    )
 
 
-def _lift(plane: Floats, z_m: float) -> Floats:
-    return np.column_stack([plane, np.full(len(plane), z_m)])
-
-
-def _disc(sides: int, corner_radius_m: float, facet_size_m: float) -> tuple[Floats, Integers]:
-    """Triangulate a polygon: (N, 2) points on rings, outermost last, and (M, 3) triangles."""
+def _disc(sides: int, corner_radius_m: float, facet_size_m: float) -> Trimesh:
+    """Triangulate a polygon in z = 0, its normal up: nodes on rings, the outermost last."""
     import pyvista
 
     rings = max(1, round(corner_radius_m / facet_size_m))
-    parts = [np.zeros((1, 2))]
+    parts = [np.zeros((1, 3))]
     for ring in range(1, rings):
         count = max(5, round(sides * ring / rings))
         parts.append(_ring(count, corner_radius_m * ring / rings, math.pi * (ring % 2) / count))
-    parts.append(_ring(sides, corner_radius_m))
-    plane = np.concatenate(parts)
-    scaled = pyvista.PolyData(_lift(plane / corner_radius_m, 0.0))
-    triangles = np.asarray(scaled.delaunay_2d().faces, dtype=np.int64).reshape(-1, 4)[:, 1:]
-    if len(triangles) != 2 * len(plane) - 2 - sides:
+    points = np.concatenate([*parts, _ring(sides, corner_radius_m)])
+    faces = pyvista.PolyData(points / corner_radius_m).delaunay_2d().regular_faces
+    if len(faces) != 2 * len(points) - 2 - sides:
         raise RuntimeError(f"the triangulation of a cap of {sides} sides failed")
-    return plane, _counter_clockwise(plane, triangles)
+    clockwise = surface(points, faces).triangles_cross[:, [2]] < 0.0
+    return surface(points, np.where(clockwise, faces[:, ::-1], faces))
 
 
-def _counter_clockwise(plane: Floats, triangles: Integers) -> Integers:
-    first, second, third = np.moveaxis(plane[triangles], 1, 0)
-    (ax, ay), (bx, by) = (second - first).T, (third - first).T
-    clockwise = ax * by - ay * bx < 0.0
-    return np.where(clockwise[:, None], triangles[:, ::-1], triangles)
-
-
-def _side(sides: int, corner_radius_m: float, length_m: float, facet_size_m: float) -> Mesh:
+def _side(sides: int, corner_radius_m: float, length_m: float, facet_size_m: float) -> Trimesh:
     levels = math.ceil(length_m / facet_size_m - 1e-9)
-    ring = _ring(sides, corner_radius_m)
-    points = np.concatenate([_lift(ring, length_m * k / levels) for k in range(levels + 1)])
+    heights = [length_m * k / levels for k in range(levels + 1)]
+    points = np.concatenate([_ring(sides, corner_radius_m, z_m=z_m) for z_m in heights])
     lower = np.arange(levels * sides).reshape(levels, sides)
     beside = np.roll(lower, -1, axis=1)
     one = np.stack([lower, beside, beside + sides], axis=-1)
     other = np.stack([lower, beside + sides, lower + sides], axis=-1)
-    return Mesh(points, np.stack([one, other], axis=2).reshape(-1, 3))
+    return surface(points, np.stack([one, other], axis=2))
 
 
-def _join(*meshes: Mesh) -> Mesh:
-    offsets = np.cumsum([0, *(len(mesh.points) for mesh in meshes[:-1])])
-    points = np.concatenate([mesh.points for mesh in meshes])
-    triangles = [mesh.triangles + offset for mesh, offset in zip(meshes, offsets, strict=True)]
-    return weld(Mesh(points, np.concatenate(triangles)))
+def _turned(mesh: Trimesh) -> Trimesh:
+    return surface(mesh.vertices, mesh.faces[:, ::-1])

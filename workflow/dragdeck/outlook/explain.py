@@ -12,7 +12,7 @@ from rich.table import Table
 
 from dragdeck.decks.deck import StudyScene
 from dragdeck.outlook.measured import MeasuredCost, Tradeoff
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.scene import SceneType
 
 
 @dataclass(frozen=True)
@@ -24,24 +24,26 @@ class Cost:
     source: str
 
 
-def expected_cost(scene: StudyScene, results: Path) -> Cost:
+def expected_cost(kind: SceneType, scene: StudyScene, results: Path) -> Cost:
     """Steps and wall time to expect.
 
     Parameters
     ----------
+    kind : SceneType
     scene : Scene
+        A case of that kind.
     results : Path
         The folder of the study's runs of this scene: measured ones are used, those with
         as many particles if there are any, the others as if a step took a time a particle.
     """
-    drop = scene.deck.scene == "drop_test"
-    count = 1 if drop else scene.case.media.count
-    measured = [(1 if drop else particles, rate) for particles, rate in _measured(results)]
+    single = kind.single_particle
+    count = 1 if single else scene.case.media.count
+    measured = [(1 if single else particles, rate) for particles, rate in _measured(results)]
     measured = [(particles, rate) for particles, rate in measured if particles == count] or measured
     if measured:
         rate = sum(particles / count * rate for particles, rate in measured) / len(measured)
         return Cost(scene.steps, scene.steps / rate, f"{len(measured)} run(s) of this study here")
-    rate = SCENES[scene.deck.scene].particle_steps_per_s / count
+    rate = kind.particle_steps_per_s / count
     return Cost(scene.steps, scene.steps / rate, "assumed: no run of this study measured here")
 
 

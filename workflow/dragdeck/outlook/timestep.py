@@ -23,7 +23,7 @@ from dragdeck.physics.contact_mechanics import (
     particle_mass,
     rayleigh_time,
 )
-from dragdeck.scenes.scene import SceneType
+from dragdeck.scenes.scene import Regime, SceneType
 from dragdeck.study.model import Study
 
 ORDINARY_RESTITUTION = 0.5
@@ -178,18 +178,18 @@ def safe_fraction(case: Case, scene: SceneType) -> tuple[float, str]:
     damping = "any restitution" if strong else f"restitution of {ORDINARY_RESTITUTION:g} or more"
     engine = ", ".join(known["engine_versions"])
     source = f"{scene.regime}, {damping}; LIGGGHTS {engine}, {known['measured']}"
-    return _regime_fraction(scene, lowest), source
+    return _regime_fraction(scene.regime, lowest), source
 
 
-def _regime_fraction(scene: SceneType, lowest_restitution: float) -> float:
-    row = measured()["regimes"][scene.regime]
+def _regime_fraction(regime: Regime, lowest_restitution: float) -> float:
+    row = measured()["regimes"][regime]
     strong = lowest_restitution < ORDINARY_RESTITUTION
     return float(row["safe_fraction"] if strong else row["ordinary_fraction"])
 
 
-def largest_fraction(scene: SceneType, lowest_restitution: float) -> float:
-    """Largest step over the Rayleigh time that keeps the safety factor."""
-    return float(measured()["safety_factor"]) * _regime_fraction(scene, lowest_restitution)
+def largest_fraction(regime: Regime, lowest_restitution: float) -> float:
+    """Largest step of a regime over the Rayleigh time that keeps the safety factor."""
+    return float(measured()["safety_factor"]) * _regime_fraction(regime, lowest_restitution)
 
 
 def notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from dragdeck.study.model import Material
+from dragdeck.study.material import Material
 
 SOLID_FRACTION_ESTIMATE = 0.59
 """Solid fraction of a poured bed about twelve particles wide, an estimate used only

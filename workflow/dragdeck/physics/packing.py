@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import ndtr, ndtri
 
 from dragdeck.errors import InputError
 
@@ -70,9 +70,9 @@ def radii(count: int, mean_m: float, std_m: float) -> Array:
     """
     if count == 1 or std_m == 0:
         return np.full(count, mean_m)
-    tail = stats.norm.cdf(-CUTOFF_STD)
+    tail = float(ndtr(-CUTOFF_STD))
     levels = tail + (1 - 2 * tail) * (np.arange(count) + 0.5) / count
-    scores = stats.norm.ppf(levels)
+    scores = ndtri(levels)
     scores = (scores - scores.mean()) / scores.std()
     return np.asarray(mean_m + std_m * scores, dtype=np.float64)
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-
-from dragdeck.documents import Part
+from dataclasses import dataclass
 
 ENERGY_FACTOR = 4.0
 """How far above the energy that a particle can have at all a run is stopped. An
@@ -17,7 +16,8 @@ single particle may be. An assumption: 1 is what one contact can give; a particl
 squeezed out between others gets more."""
 
 
-class RunLimits(Part):
+@dataclass(frozen=True)
+class RunLimits:
     """What no sample of a run may be beyond, and why.
 
     Attributes

@@ -16,7 +16,7 @@ from dragdeck.decks.deck import Deck, LeftOut, Materials, Scene, contact_law
 from dragdeck.documents import Part
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.contact_law import Pair
-from dragdeck.study.model import Material
+from dragdeck.study.material import Material
 
 FRAMES_TIMES_BODIES = 25_000
 """Rows of the largest output of a run: every step for two particles, fewer frames for a rack."""
@@ -206,15 +206,12 @@ def pair_table(
     """The engine's constants; pairs that never meet repeat one that does."""
     other = next(iter(pairs.values()))
     size = range(1, len(types) + 1)
-    tables, model = contact_law(
-        [[pairs.get((min(i, j), max(i, j)), other) for j in size] for i in size]
-    )
+    law = contact_law([[pairs.get((min(i, j), max(i, j)), other) for j in size] for i in size])
     return Materials(
         names=[name for name, _ in types],
         youngs_moduli_pa=[material.youngs_modulus_pa for _, material in types],
         poissons_ratios=[material.poissons_ratio for _, material in types],
-        pair_tables=tables,
-        contact_model=model,
+        law=law,
     )
 
 

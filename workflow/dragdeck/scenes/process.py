@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from trimesh import Trimesh
+
 from dragdeck.cases.bed import bed_radii, bed_rayleigh_time, particle_material, skin
 from dragdeck.cases.case import Case, file_digest, materials_content, mesh_file
 from dragdeck.decks import outputs
@@ -20,7 +22,7 @@ from dragdeck.decks.case_file import (
 from dragdeck.decks.deck import Deck, LeftOut, Scene
 from dragdeck.decks.outputs import Output
 from dragdeck.errors import InputError
-from dragdeck.mesh import Mesh, bowl
+from dragdeck.mesh import bowl
 from dragdeck.physics.contact_mechanics import effective_modulus, hertz_contact_time, particle_mass
 from dragdeck.physics.domain_split import warnings as rank_warnings
 from dragdeck.physics.rounding import round_to, timestep
@@ -351,7 +353,7 @@ def _motion(case: Case) -> CircleOfRun | LineOfRun:
     )
 
 
-def bowl_meshes(study: Study, top_m: float) -> dict[str, Mesh]:
+def bowl_meshes(study: Study, top_m: float) -> dict[str, Trimesh]:
     """The bowl as a mesh, if the study asks for facets."""
     size = study.bowl.facet_size_m
     if size is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from dragdeck import __version__
 from dragdeck.cases.bed import particle_material, skin
@@ -28,6 +28,9 @@ from dragdeck.study.base import Json
 from dragdeck.study.model import Study
 
 C = TypeVar("C", bound=CaseOfStudy)
+
+Regime = Literal["impact", "settle", "column", "drag"]
+"""What the stability map tells apart: each has its own limit of the time step."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,7 @@ class SceneType:
         Whether it starts from the bed of a filling.
     single_particle : bool
         Whether it is a single particle at full modulus and not a bed.
-    regime : str
+    regime : Regime
         Of the stability map, whose limits apply here.
     impact_speed : callable
         Largest speed that an impact is expected to have, m/s.
@@ -107,7 +110,7 @@ class SceneType:
     inputs: tuple[str, ...]
     tables: tuple[str, ...]
     figures: tuple[str, ...]
-    regime: str
+    regime: Regime
     impact_speed: Callable[[Case], float]
     partners: Callable[[Case], Sequence[tuple[str, str, float]]]
     particle_steps_per_s: float
@@ -250,13 +253,12 @@ def material_table(study: Study, names: Sequence[str], scale: float, case: Case)
     size = range(len(names))
     with_particle = [study.pair(names[0], name) for name in names]
     # pairs without a particle never touch: they repeat one with a particle
-    tables, model = contact_law([[with_particle[max(i, j)] for j in size] for i in size])
+    law = contact_law([[with_particle[max(i, j)] for j in size] for i in size])
     return Materials(
         names=names,
         youngs_moduli_pa=moduli,
         poissons_ratios=[material.poissons_ratio for material in materials],
-        pair_tables=tables,
-        contact_model=model,
+        law=law,
     )
 
 

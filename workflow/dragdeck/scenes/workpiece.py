@@ -5,8 +5,10 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 
+from trimesh import Trimesh
+
 from dragdeck.cases.case import Case, mesh_file
-from dragdeck.mesh import Mesh, Surroundings, check, cylinder, envelope, place, read
+from dragdeck.mesh import Surroundings, check, cylinder, envelope, place, read
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.model import CylinderShape, MeshShape
 
@@ -14,7 +16,7 @@ FREEBOARD_DIAMETERS = 4
 """A generated workpiece stands this many particle diameters out of the bed."""
 
 
-def workpiece_mesh(case: Case) -> Mesh:
+def workpiece_mesh(case: Case) -> Trimesh:
     """The workpiece with its tip's centre in the origin.
 
     Raises
@@ -45,12 +47,12 @@ def workpiece_radius(case: Case) -> float:
 
 
 @lru_cache(maxsize=8)
-def _workpiece(shape: CylinderShape, length_m: float) -> Mesh:
+def _workpiece(shape: CylinderShape, length_m: float) -> Trimesh:
     return cylinder(shape.radius_m, length_m, shape.facet_size_m, shape.facet_length_m)
 
 
 @lru_cache(maxsize=8)
-def _from_file(file: Path, unit: str, surroundings: Surroundings) -> Mesh:
+def _from_file(file: Path, unit: str, surroundings: Surroundings) -> Trimesh:
     mesh = read(file, unit)
     check(mesh, file=file, field="workpiece.shape", surroundings=surroundings)
     return place(mesh)

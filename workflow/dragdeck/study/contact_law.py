@@ -33,6 +33,8 @@ class Coefficient:
         What it is called in a sentence.
     model : str
         Keywords that the contact model needs for it; none where it always counts.
+    settings : str
+        Options of the contact model that go with it.
     compared : {"each", "lowest"}
         Which value of a scene must lie within the measured range: that of each of the pairs
         particle-particle and particle-workpiece, or the lowest of all pairs.
@@ -41,6 +43,7 @@ class Coefficient:
     engine: str
     words: str
     model: str = ""
+    settings: str = ""
     compared: Literal["each", "lowest"] = "each"
 
 
@@ -62,6 +65,13 @@ class Pair(Model):
         Field(ge=0, le=10, description="Coulomb friction coefficient, dimensionless"),
         Coefficient("coefficientFriction", "friction"),
     ]
+    rolling_friction: Annotated[
+        Number,
+        Field(ge=0, le=10, description="rolling friction coefficient: largest rolling torque over "
+              "normal force and effective radius, dimensionless"),
+        Coefficient("coefficientRollingFriction", "rolling friction", "rolling_friction epsd2",
+                    "torsionTorque on"),
+    ] = 0.0  # fmt: skip
 
     def absent(self) -> set[str]:
         """Coefficients at their default."""
@@ -100,6 +110,11 @@ def present(pairs: Iterable[Pair]) -> Mapping[str, Coefficient]:
 def contact_model(pairs: Iterable[Pair]) -> str:
     """LIGGGHTS's contact model with what these pairs need."""
     return " ".join([BASE_MODEL, *(row.model for row in present(pairs).values() if row.model)])
+
+
+def contact_settings(pairs: Iterable[Pair]) -> list[str]:
+    """LIGGGHTS's options of that contact model."""
+    return [row.settings for row in present(pairs).values() if row.settings]
 
 
 def explained(pairs: Iterable[Pair]) -> tuple[list[str], list[str]]:

@@ -19,6 +19,8 @@ from pydantic import (
 
 from dragdeck.study.base import Model, NonNegative, Number, Positive, Whole
 from dragdeck.study.contact_law import Contact, Pair
+from dragdeck.study.material import Material
+from dragdeck.study.reference import Reference
 
 STUDY_FILE = "study.yaml"
 
@@ -27,16 +29,6 @@ Ranks = Annotated[
     Annotated[Literal["auto"], Tag("a-word")] | Annotated[Whole, Field(ge=1), Tag("a-number")],
     Discriminator(lambda value: "a-word" if value == "auto" else "a-number"),
 ]
-
-
-class Material(Model):
-    """An elastic material."""
-
-    youngs_modulus_pa: Positive = Field(description="Young's modulus, Pa")
-    poissons_ratio: Annotated[Number, Field(gt=-1, lt=0.5)] = Field(
-        description="Poisson's ratio, dimensionless; thermodynamics allows (-1, 0.5)"
-    )
-    density_kg_m3: Positive = Field(description="density, kg/m3")
 
 
 class Media(Model):
@@ -267,23 +259,6 @@ class Assumption(Model):
 
     field: str = Field(description="dotted name of the assumed value")
     why: str = Field(description="what the source says or does not, and why this value")
-
-
-class Drag(Model):
-    """A published drag force along the motion; negative: against it."""
-
-    drag_mean_n: Number = Field(description="mean drag, N")
-    drag_std_n: NonNegative | None = Field(
-        default=None, description="standard deviation over time, N"
-    )
-
-
-class Reference(Model):
-    """Published figures to stand beside the results."""
-
-    source: str = Field(description="where the figures come from")
-    experiment: Drag | None = Field(default=None, description="as measured")
-    simulation: Drag | None = Field(default=None, description="as simulated there")
 
 
 class Scaling(Model):

@@ -6,21 +6,22 @@ import copy
 import itertools
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
-from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
 from dragdeck.study.model import STUDY_FILE, Scaling, Tolerance
 from dragdeck.study.yaml import read_yaml, validate
 
+Resolve = Callable[[Case, Tolerance], Case]
+"""Finds the settings of a case for a tolerance: `dragdeck.advice.advise.resolve`."""
+
 
 def load_cases(
-    file: Path, fidelity: str | None = None, tradeoff: Tradeoff | None = None
+    file: Path, fidelity: str | None = None, resolve: Resolve | None = None
 ) -> list[Case]:
     """All cases of a study file.
 
@@ -30,8 +31,8 @@ def load_cases(
         The study file.
     fidelity : str, optional
         Instead of the study's own.
-    tradeoff : Tradeoff, optional
-        Resolves a tolerance, instead of `measured_tradeoff`.
+    resolve : callable, optional
+        Finds the settings where a case asks for a tolerance.
 
     Raises
     ------
@@ -49,7 +50,7 @@ def load_cases(
     plain = {**data, "sweep": {}}
     return beside_each_other(
         [
-            settle_case(file, plain, settings, tradeoff=tradeoff)
+            settle_case(file, plain, settings, resolve=resolve)
             for settings in _combinations(sweep, file)
         ]
     )
@@ -130,7 +131,7 @@ def settle_case(
     values: Mapping[str, Any],
     shown: Mapping[str, Any] | None = None,
     named_in: Path | None = None,
-    tradeoff: Tradeoff | None = None,
+    resolve: Resolve | None = None,
 ) -> Case:
     """A case from a study's plain data with some of its values replaced.
 
@@ -146,14 +147,14 @@ def settle_case(
         The values that name the case, if not all of them.
     named_in : Path, optional
         The file that names the values, for error messages, if not `file`.
-    tradeoff : Tradeoff, optional
-        Resolves a tolerance, instead of `measured_tradeoff`.
+    resolve : callable, optional
+        Finds the settings if the case asks for a tolerance.
 
     Raises
     ------
     InputError
         A value leads nowhere or breaks the study; or a tolerance is asked that
-        nothing measured can resolve.
+        nothing measured can resolve, or where only settings can be used.
     """
     combined = copy.deepcopy(dict(data))
     for field, value in values.items():
@@ -162,7 +163,16 @@ def settle_case(
     case = Case(file, values if shown is None else shown, study)
     if not isinstance(study.fidelity, Tolerance):
         return case
-    return resolve(case, study.fidelity, tradeoff or measured_tradeoff())
+    if resolve is None:
+        raise InputError(
+            "a tolerance cannot be used here",
+            file=named_in or file,
+            field="fidelity.tolerance",
+            value=study.fidelity.tolerance,
+            limit="the name of a fidelity, or its settings",
+            remedy="take the settings that dragdeck advise shows for it",
+        )
+    return resolve(case, study.fidelity)
 
 
 def study_file(studies: Path, name: str) -> Path:

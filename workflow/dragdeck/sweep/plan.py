@@ -90,7 +90,7 @@ class Points:
 
     def of(self, scene: SceneType) -> list[Case]:
         """The cases whose runs of a scene the plan needs."""
-        return self.drops if scene is DROP_TEST else self.processes
+        return self.drops if scene.single_particle else self.processes
 
 
 def read_plan(file: Path) -> Plan:

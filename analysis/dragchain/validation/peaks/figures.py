@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from textwrap import fill
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from dragchain.arrays import Floats
-from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
-from dragchain.validation.peaks.dominant_chain import DEFINITIONS, SETTINGS
-from dragchain.validation.peaks.tests import DESCRIPTORS, Found, RunSeries, Study
+from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED, legend_below, new_figure
+from dragchain.validation.peaks.averages import Lifetimes
+from dragchain.validation.peaks.findings import Study
+from dragchain.validation.peaks.lags import LagCurves
+from dragchain.validation.peaks.runs import RunSeries
+from dragchain.validation.peaks.settings import DEFAULTS, DEFINITIONS, SETTINGS, Definition
+from dragchain.validation.peaks.tests import DESCRIPTORS, PeakTest
+from dragchain.validation.peaks.verdicts import LEVEL
 
-COLOURS = {"widest_path": BLUE, "free_path": GREEN, "peters": RED, "peters_workpiece": ORANGE}
-FAMILIES = {"paths": ("free_path", "widest_path"), "Peters' chains": ("peters", "peters_workpiece")}
+COLOURS: dict[Definition, str] = {
+    "widest_path": BLUE, "free_path": GREEN, "peters": RED, "peters_workpiece": ORANGE
+}  # fmt: skip
+FAMILIES: dict[str, tuple[Definition, ...]] = {
+    "paths": ("free_path", "widest_path"),
+    "Peters' chains": ("peters", "peters_workpiece"),
+}
 LAGGED = {
     "bottleneck_over_mean": "weakest contact over\nthe mean contact",
     "stands_out": "weakest behind the workpiece\nover the shell's rms",
@@ -26,27 +35,27 @@ LAGGED = {
 FOREST = tuple(one for one in DESCRIPTORS if one.statement in ("presence", "dominance"))
 
 
-def draw(study: Study) -> dict[str, Callable[[], Figure]]:
+def draw(study: Study) -> dict[str, Figure]:
     """The figures by the name of their file."""
+    found = study.findings
     return {
-        "chains_around_peaks": lambda: _around_peaks(study.found["lags"]),
-        "chain_effects": lambda: _effects(study.tests),
-        "chain_geometry": lambda: _geometry(study),
+        "chains_around_peaks": _around_peaks(found.lags),
+        "chain_effects": _effects(found.tests),
+        "chain_geometry": _geometry(study.runs, found.lifetimes),
     }
 
 
-def _around_peaks(lags: Found) -> Figure:
+def _around_peaks(lags: LagCurves) -> Figure:
     """Event-triggered averages with the band that chance keeps."""
-    figure = Figure(figsize=(7.6, 5.0), layout="constrained")
+    figure = new_figure(5.0)
     grid = figure.subplots(len(LAGGED), len(FAMILIES), sharex=True, sharey=True)
-    lag = np.asarray(lags["lag_s"])
     for row, (name, label) in zip(grid, LAGGED.items(), strict=True):
         for axes, (family, definitions) in zip(row, FAMILIES.items(), strict=True):
-            _lag_panel(axes, lag, lags, name, definitions)
+            _lag_panel(axes, lags, name, definitions)
             axes.set_title(family)
         row[0].set_ylabel(f"{label},\nin standard deviations", fontsize=8.5)
     for axes in grid[-1]:
-        axes.set_xlabel("time after the peak in s")
+        axes.set_xlabel("time after the peak (s)")
     handles = {
         label: handle
         for axes in grid[-1]
@@ -56,39 +65,34 @@ def _around_peaks(lags: Found) -> Figure:
     return figure
 
 
-def _lag_panel(
-    axes: Axes, lag: Floats, lags: Found, name: str, definitions: tuple[str, ...]
-) -> None:
+def _lag_panel(axes: Axes, lags: LagCurves, name: str, definitions: tuple[Definition, ...]) -> None:
     axes.axvline(0.0, color=GREY, linewidth=0.7, linestyle=":")
-    axes.plot(lag, _numbers(lags["drag"]), color=GREY, linewidth=0.9, label="resistance")
+    axes.plot(lags.lag_s, lags.drag, color=GREY, linewidth=0.9, label="resistance")
     for definition in definitions:
-        curve = lags[definition][name]
-        colour = COLOURS[definition]
-        axes.plot(lag, _numbers(curve["mean"]), color=colour, label=DEFINITIONS[definition])
-    band = lags[definitions[0]][name]["band"]
-    if band is not None:
+        mean, colour = lags.curves[definition][name].mean, COLOURS[definition]
+        axes.plot(lags.lag_s, mean, color=colour, label=DEFINITIONS[definition])
+    band = lags.curves[definitions[0]][name].band
+    if np.isfinite(band):
         words = "95 % of shifted data sets stay inside"
         axes.axhspan(-band, band, color="#d9dde2", alpha=0.5, linewidth=0, label=words)
-
-
-def _numbers(values: list[float | None]) -> Floats:
-    return np.array(values, dtype=np.float64)
 
 
 # --- effects over thresholds -----------------------------------------------------------------
 
 
-def _effects(tests: pd.DataFrame) -> Figure:
-    """Draw the effect of every claimed descriptor for every definition and threshold."""
-    figure = Figure(figsize=(7.6, 6.4), layout="constrained")
+def _effects(tests: Sequence[PeakTest]) -> Figure:
+    """The effects of all settings, one panel per descriptor."""
+    of_setting = {
+        (test.descriptor, test.definition, test.thresholds): test
+        for test in tests
+        if test.peaks == "all"
+    }
+    figure = new_figure(6.4)
     grid = figure.subplots(1, len(FOREST), sharey=True)
     for axes, descriptor in zip(grid, FOREST, strict=True):
-        rows = tests[(tests["peaks"] == "all") & (tests["descriptor"] == descriptor.name)]
         for place, setting in enumerate(SETTINGS):
-            row = rows[
-                (rows["definition"] == setting.definition) & (rows["thresholds"] == setting.label)
-            ].iloc[0]
-            _effect(axes, -place - _gap(place), row)
+            test = of_setting[descriptor.name, setting.definition, setting.label]
+            _effect(axes, -place - _gap(place), test)
         axes.axvline(0.0, color="black", linewidth=0.8)
         axes.set_title(fill(descriptor.label, 16), fontsize=7.5)
         axes.tick_params(axis="x", labelsize=7.5)
@@ -102,12 +106,11 @@ def _effects(tests: pd.DataFrame) -> Figure:
         grid[0].plot([], [], "o", color=colour, label=DEFINITIONS[definition])
     grid[0].plot([], [], "o", color=GREY, mfc="white", label="unadjusted p 0.05 or more")
     figure.suptitle(
-        "at peaks less all times, in standard deviations of the run; "
-        "bars: 95 % interval over the fills; *: default thresholds",
+        "at peaks minus all times, in standard deviations of the run; "
+        "bars: 95 % CI over the packings; *: default thresholds",
         fontsize=8.5, x=0.02, ha="left",
     )  # fmt: skip
-    handles, labels = grid[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=3)
+    legend_below(figure, grid[0], columns=3)
     return figure
 
 
@@ -117,49 +120,55 @@ def _gap(place: int) -> float:
     return 0.8 * names.index(SETTINGS[place].definition)
 
 
-def _effect(axes: Axes, height: float, row: pd.Series[Any]) -> None:
-    colour = COLOURS[row["definition"]]
-    axes.plot([row["ci95_low"], row["ci95_high"]], [height, height], color=colour, linewidth=1.0)
-    sure = row["p_claimed"] < 0.05
-    axes.plot([row["effect"]], [height], "o", color=colour, markersize=4.5,
-              markerfacecolor=colour if sure else "white")  # fmt: skip
+def _effect(axes: Axes, height: float, test: PeakTest) -> None:
+    colour = COLOURS[test.definition]
+    axes.plot([test.ci95_low, test.ci95_high], [height, height], color=colour, linewidth=1.0)
+    inside = colour if test.p_claimed < LEVEL else "white"
+    axes.plot([test.effect], [height], "o", color=colour, markersize=4.5, markerfacecolor=inside)
 
 
 # --- orientation, altitude, lifetime ---------------------------------------------------------
 
 
-def _geometry(study: Study) -> Figure:
+def _geometry(runs: Sequence[RunSeries], lifetimes: Mapping[Definition, Lifetimes]) -> Figure:
     """Azimuth, altitude and lifetime of the dominant chains, at peaks and at all times."""
-    figure = Figure(figsize=(7.6, 6.0), layout="constrained")
-    defaults = {setting.definition: at for at, setting in enumerate(SETTINGS) if setting.default}
-    for row, name in enumerate(("widest_path", "peters")):
+    figure = new_figure(6.0)
+    shown: tuple[Definition, ...] = ("widest_path", "peters")
+    for row, name in enumerate(shown):
         rose: Any = figure.add_subplot(2, 3, 3 * row + 1, projection="polar")
-        _rose(rose, study.runs, defaults[name])
+        _rose(rose, runs, DEFAULTS[name])
         rose.set_title(f"{DEFINITIONS[name]}:\nazimuth, ahead up", fontsize=8.5, pad=14)
         heights, lives = (figure.add_subplot(2, 3, 3 * row + place) for place in (2, 3))
-        _altitude(heights, study.runs, defaults[name])
-        _survival(lives, study.found["lifetimes"][name])
-    handles, labels = heights.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=2)
+        _altitude(heights, runs, DEFAULTS[name])
+        _survival(lives, lifetimes[name])
+    legend_below(figure, heights)
     return figure
 
 
+_OUTLINE: dict[str, Any] = {"color": RED, "linewidth": 1.4}
+_FILLED: dict[str, Any] = {"color": GREY, "linewidth": 1.4, "fill": True, "alpha": 0.45}
+
+
 def _at_all_and_peaks(
-    runs: tuple[RunSeries, ...], at: int, column: str
-) -> Mapping[str, tuple[Floats, str]]:
-    values = [run.columns[at][column].astype(np.float64) for run in runs]
+    runs: Sequence[RunSeries], at: int, column: str
+) -> list[tuple[str, Floats, dict[str, Any]]]:
+    """The known values at all times and at peaks, each with its name and its style."""
+    values = [run.chain(at, column) for run in runs]
     peaks = [one[run.events("all")] for one, run in zip(values, runs, strict=True)]
-    found = {"all times": (np.concatenate(values), GREY), "at peaks": (np.concatenate(peaks), RED)}
-    return {name: (one[np.isfinite(one)], colour) for name, (one, colour) in found.items()}
+    groups = (("all times", values, _FILLED), ("at peaks", peaks, _OUTLINE))
+    joined = ((name, np.concatenate(parts), style) for name, parts, style in groups)
+    return [(name, one[np.isfinite(one)], style) for name, one, style in joined]
 
 
-def _rose(axes: Any, runs: tuple[RunSeries, ...], at: int) -> None:
+def _percentages(values: Floats, edges: Floats) -> Floats:
+    return np.asarray(100.0 * np.histogram(values, edges)[0] / max(len(values), 1))
+
+
+def _rose(axes: Any, runs: Sequence[RunSeries], at: int) -> None:
     axes.set_theta_zero_location("N")
     edges = np.linspace(-np.pi, np.pi, 25)
-    for name, (azimuth, colour) in _at_all_and_peaks(runs, at, "azimuth_rad").items():
-        fraction = 100.0 * np.histogram(azimuth, edges)[0] / max(len(azimuth), 1)
-        axes.stairs(fraction, edges, color=colour, fill=name == "all times",
-                    alpha=0.45 if name == "all times" else 1.0, linewidth=1.4)  # fmt: skip
+    for _, azimuth, style in _at_all_and_peaks(runs, at, "azimuth_rad"):
+        axes.stairs(_percentages(azimuth, edges), edges, **style)
     axes.set_thetagrids(np.arange(0, 360, 90), ["ahead", "left", "behind", "right"], fontsize=7.5)
     axes.set_rlabel_position(157.5)
     axes.tick_params(axis="y", labelsize=7)
@@ -167,28 +176,24 @@ def _rose(axes: Any, runs: tuple[RunSeries, ...], at: int) -> None:
     axes.yaxis.set_major_formatter("{x:.0f} %")
 
 
-def _altitude(axes: Axes, runs: tuple[RunSeries, ...], at: int) -> None:
-    found = _at_all_and_peaks(runs, at, "altitude_m")
-    top = max((one.max(initial=0.01) for one, _ in found.values()), default=0.01) * 1e3
+def _altitude(axes: Axes, runs: Sequence[RunSeries], at: int) -> None:
+    groups = _at_all_and_peaks(runs, at, "altitude_m")
+    top = 1e3 * max(height.max(initial=0.01) for _, height, _ in groups)
     edges = np.arange(0.0, top + 5.0, 5.0)
-    for name, (height, colour) in found.items():
-        fraction = 100.0 * np.histogram(height * 1e3, edges)[0] / max(len(height), 1)
-        axes.stairs(fraction, edges, orientation="horizontal", color=colour,
-                    fill=name == "all times", alpha=0.45 if name == "all times" else 1.0,
-                    linewidth=1.4, label=f"{name} ({len(height)} frames)")  # fmt: skip
-    axes.set(
-        xlabel="share of frames in %", ylabel="mean height of the chain\nabove the floor in mm"
-    )
+    for name, height, style in groups:
+        label = f"{name} ({len(height)} frames)"
+        fractions = _percentages(height * 1e3, edges)
+        axes.stairs(fractions, edges, orientation="horizontal", label=label, **style)
+    axes.set(xlabel="frames (%)", ylabel="mean height of the chain\nabove the floor (mm)")
     axes.set_title("altitude", fontsize=8.5)
 
 
-def _survival(axes: Axes, lifetime: Found) -> None:
-    survival = lifetime["survival"]
-    axes.step([0.0, *survival["time_s"]], [1.0, *survival["fraction"]], where="post", color=BLUE)
-    axes.set(xlabel="age in s", ylabel="share that lasts longer", yscale="log")
-    median = lifetime["median_s"]
-    words = "unknown" if median is None else f"{median * 1e3:.0f} ms"
+def _survival(axes: Axes, lifetime: Lifetimes) -> None:
+    survival, median_s = lifetime.survival, lifetime.median_s
+    axes.step([0.0, *survival.time_s], [1.0, *survival.fraction], where="post", color=BLUE)
+    axes.set(xlabel="age (s)", ylabel="fraction that lasts longer", yscale="log")
+    median = f"{median_s * 1e3:.0f} ms" if np.isfinite(median_s) else "unknown"
     axes.set_title(
-        f"life of a chain: median {words},\n{lifetime['lives']} lives, {lifetime['cut']} cut off",
+        f"life of a chain: median {median},\n{lifetime.lives} lives, {lifetime.cut} cut off",
         fontsize=8.5,
     )

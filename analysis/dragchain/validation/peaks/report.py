@@ -1,35 +1,66 @@
-"""Write what was found on peaks and chains: tables, figures, pictures."""
+"""Everything that the page shows on peaks and chains: tables, figures, pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib
+import pandas as pd
 
-from dragchain.figures.style import STYLE, png
-from dragchain.files import write_json
+from dragchain.figures.style import drawing, png
+from dragchain.files import write_bytes
+from dragchain.report.bundle import write_bundle
 from dragchain.tables.parquet import write_parquet
 from dragchain.validation.peaks.figures import draw
-from dragchain.validation.peaks.film import write_peak_pictures
-from dragchain.validation.peaks.tests import Found, peak_rows, study
+from dragchain.validation.peaks.film import FILM, PICTURES, peak_pictures
+from dragchain.validation.peaks.findings import Findings, study
+from dragchain.validation.peaks.runs import peak_rows
+from dragchain.validation.peaks.tests import test_table
 
 
-def write_peaks(out_dir: Path, run_dirs: Sequence[Path]) -> Found:
-    """Test the runs and write all that the page shows; the film is of the first run.
+@dataclass(frozen=True)
+class PeaksReport:
+    """What a study of peaks and chains writes.
+
+    Attributes
+    ----------
+    findings : Findings
+    peaks, tests : DataFrame
+        One row per peak and setting, and one row per test.
+    pictures : mapping of str to bytes
+        PNG pictures by name.
+    film : bytes
+        The first run's highest peak as a GIF.
+    """
+
+    findings: Findings
+    peaks: pd.DataFrame
+    tests: pd.DataFrame
+    pictures: Mapping[str, bytes]
+    film: bytes
+
+    def write(self, out_dir: Path) -> None:
+        """Write ``peaks.json``, ``chain_peaks.parquet``, ``chain_tests.*`` and ``figures/``."""
+        write_parquet(self.peaks, out_dir / "chain_peaks.parquet")
+        write_bytes(out_dir / "figures" / FILM, self.film)
+        write_bundle(
+            out_dir,
+            tables={"chain_tests": self.tests},
+            figures=self.pictures,
+            documents={"peaks": self.findings},
+        )
+
+
+def report_peaks(run_dirs: Sequence[Path], pictures: int = PICTURES) -> PeaksReport:
+    """Test the runs and draw all that the page shows; the film is of the first run.
 
     Parameters
     ----------
-    out_dir : Path
-        Gets ``peaks.json``, ``chain_peaks.parquet`` (a row a peak and setting),
-        ``chain_tests.parquet`` and ``.csv`` (a row a test) and ``figures/``.
     run_dirs : sequence of Path
-        Folders of process runs that differ by their fill, with tables and chains made.
-
-    Returns
-    -------
-    dict
-        What ``peaks.json`` holds.
+        Folders of process runs that differ by their packing, with tables and chains made.
+    pictures : int
+        Number of pictures of the film, at the most.
 
     Raises
     ------
@@ -39,14 +70,8 @@ def write_peaks(out_dir: Path, run_dirs: Sequence[Path]) -> Found:
         Pictures cannot be rendered here.
     """
     made = study(run_dirs)
-    figures = out_dir / "figures"
-    figures.mkdir(parents=True, exist_ok=True)
-    write_json(out_dir / "peaks.json", made.found)
-    write_parquet(peak_rows(made.runs), out_dir / "chain_peaks.parquet")
-    write_parquet(made.tests, out_dir / "chain_tests.parquet")
-    made.tests.to_csv(out_dir / "chain_tests.csv", index=False, lineterminator="\n")
-    with matplotlib.rc_context(STYLE):
-        for name, make in draw(made).items():
-            (figures / f"{name}.png").write_bytes(png(make()))
-    write_peak_pictures(run_dirs[0], figures)
-    return made.found
+    with drawing():
+        figures = {name: png(figure) for name, figure in draw(made).items()}
+    moments, film = peak_pictures(run_dirs[0], pictures)
+    tests = test_table(made.findings.tests)
+    return PeaksReport(made.findings, peak_rows(made.runs), tests, figures | moments, film)

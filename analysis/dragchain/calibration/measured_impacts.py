@@ -1,0 +1,365 @@
+"""The impacts in a measured drop test."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, Field
+from pydantic.json_schema import SkipJsonSchema
+
+from dragchain.arrays import Floats
+from dragchain.calibration.force_record import Note, Record
+from dragchain.documents import Document, Part
+from dragchain.errors import RecordError
+
+IMPACTS = 3
+"""Impacts compared at the most (Uhlmann et al. 2015, section 4)."""
+
+QUIET_SAMPLES = 20
+"""Samples needed before the first impact, to know baseline and noise."""
+
+THRESHOLD_STDS = 6.0
+"""An impact stands out of the noise by so many standard deviations: white noise
+does so once in 5e8 samples."""
+
+SIGNAL_TO_NOISE = 10.0
+"""The first peak is at least so many standard deviations high."""
+
+DEAD_FRACTION = 0.05
+"""What follows an impact within this share of the fall time belongs to it: a
+sensor rings, and a particle with restitution 0.05 flies for twice as long."""
+
+MAD_TO_STD = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+
+CENTROID_FRACTION = 0.2
+"""Force over peak that counts nothing for the time of an impact: a slow sensor's
+tail would be cut by the noise at another share of each impact."""
+
+FLAT_TOP = 0.4
+"""Share of a pulse's samples above half its height that may lie within 1 % of its
+top; 0.13 for an elastic Hertz impact, whose force is nearly (sin)^1.5."""
+
+
+class Impact(Part):
+    """One impact as the sensor shows it.
+
+    Attributes
+    ----------
+    impact : int
+        Its number, from 1.
+    start_s : float
+        Time of the first sample above the threshold, s.
+    peak_time_s : float
+        Time of the largest sample, s.
+    centroid_s : float
+        Mean time of the pulse, weighted with what its force has above a fifth
+        of its peak, s: the same share of a large and of a small impact.
+    peak_n : float
+        Largest sample above the baseline, N.
+    width_s : float
+        Width at half of the largest sample, between samples interpolated, s.
+    impulse_n_s : float
+        Sum of force over time, N s.
+    samples : int
+        Samples above the threshold.
+    """
+
+    impact: int
+    start_s: float
+    peak_time_s: float
+    centroid_s: float
+    peak_n: float
+    width_s: float
+    impulse_n_s: float
+    samples: int
+
+
+class Measured(Document):
+    """What a record says, ``record.json``.
+
+    Attributes
+    ----------
+    interval_s : float
+        Sampling interval, s.
+    offset_n, drift_n_per_s : float
+        Baseline at the record's start, N, and its slope, N/s.
+    noise_n : float
+        Standard deviation of the noise about the baseline, N.
+    threshold_n : float
+        Least force of an impact above the baseline, N.
+    notes : tuple of str
+        What was done to the samples, and what the user should know.
+    impacts : tuple of Impact
+        The first two or three.
+    first_pulse : (M, 2) ndarray
+        Times, s, and forces above the baseline, N, of the first impact; not in the file.
+    """
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+
+    interval_s: float
+    offset_n: float
+    drift_n_per_s: float
+    noise_n: float
+    threshold_n: float
+    notes: tuple[Note, ...] = ()
+    impacts: tuple[Impact, ...]
+    first_pulse: SkipJsonSchema[Floats] = Field(default=np.empty((0, 2)), exclude=True, repr=False)
+
+    def baseline(self, time_s: Floats, start_s: float) -> Floats:
+        """Baseline at times, for a record that starts at `start_s`, N."""
+        return self.offset_n + self.drift_n_per_s * (time_s - start_s)
+
+
+def measure(record: Record, *, fall_time_s: float) -> Measured:
+    """Find baseline, noise and the first impacts of a record.
+
+    Parameters
+    ----------
+    record : Record
+    fall_time_s : float
+        Time of the free fall before the first impact, s. What follows an
+        impact within 0.05 of it counts as its ringing.
+
+    Raises
+    ------
+    RecordError
+        ``baseline``, ``impacts``, ``coarse``, ``clipped`` or ``order``.
+    """
+    dead = max(1, round(DEAD_FRACTION * fall_time_s / record.interval_s))
+    time = record.time_s - record.time_s[0]
+    offset, drift, noise = _baseline(time, record.force_n, dead)
+    force = record.force_n - offset - drift * time
+    threshold = THRESHOLD_STDS * noise
+    pulses = _pulses(force, threshold, dead)
+    _check_count(pulses, force, noise)
+    # at most three, the last of them whole
+    whole = [(a, b) for a, b in pulses if b + 2 < len(force)][:IMPACTS]
+    if len(whole) < 2:
+        raise _too_few(len(whole))
+    impacts = tuple(
+        pulse(record.time_s, force, ends, record.interval_s, number)
+        for number, ends in enumerate(whole, start=1)
+    )
+    _check_tops(force, record.force_n, whole, noise)
+    _check_order(impacts)
+    first = slice(max(whole[0][0] - 1, 0), whole[0][1] + 2)
+    two: tuple[Note, ...] = ("two_impacts",) if len(impacts) < IMPACTS else ()
+    return Measured(
+        interval_s=record.interval_s,
+        offset_n=offset,
+        drift_n_per_s=drift,
+        noise_n=noise,
+        threshold_n=threshold,
+        notes=(*record.notes, *two),
+        impacts=impacts,
+        first_pulse=np.column_stack([record.time_s[first], force[first]]),
+    )
+
+
+def _baseline(time: Floats, force: Floats, dead: int) -> tuple[float, float, float]:
+    """Offset, drift and noise of the quiet samples.
+
+    A line through them, begun with the median and fitted again without what
+    stands out, until that changes nothing. What stands out is told by the
+    median absolute deviation, which the impacts do not touch, or by the
+    sensor's resolution where that is coarser. The noise is the standard
+    deviation of what is left.
+    """
+    coarse = _quantum(force) / 2.0
+    line = np.array([0.0, float(np.median(force))])
+    spread = MAD_TO_STD * float(np.median(np.abs(force - line[1])))
+    out = np.zeros(len(force), dtype=bool)
+    for _ in range(20):
+        before = out
+        rest = force - np.polyval(line, time)
+        out = _widened(np.abs(rest) > THRESHOLD_STDS * max(spread, coarse), dead)
+        if len(out) - out.sum() < QUIET_SAMPLES or np.array_equal(out, before):
+            break
+        line = np.polyfit(time[~out], force[~out], 1)
+        spread = MAD_TO_STD * float(np.median(np.abs((force - np.polyval(line, time))[~out])))
+    quiet = (force - np.polyval(line, time))[~out]
+    noise = float(quiet.std()) if len(quiet) >= QUIET_SAMPLES else spread
+    return float(line[1]), float(line[0]), max(noise, coarse / math.sqrt(3.0))
+
+
+def _widened(mask: NDArray[np.bool_], after: int) -> NDArray[np.bool_]:
+    """True also for `after` samples after each true one, and two before it."""
+    counts = np.zeros(len(mask) + 1, dtype=np.int64)
+    where = np.flatnonzero(mask)
+    np.add.at(counts, np.maximum(where - 2, 0), 1)
+    np.add.at(counts, np.minimum(where + after + 1, len(mask)), -1)
+    return np.cumsum(counts[:-1]) > 0
+
+
+def _quantum(force: Floats) -> float:
+    """Smallest difference between two values: the sensor's resolution, N."""
+    steps = np.diff(np.unique(force))
+    return float(steps.min()) if len(steps) else 0.0
+
+
+def _pulses(force: Floats, threshold: float, dead: int) -> list[tuple[int, int]]:
+    """First and last sample of each pulse above the threshold.
+
+    What follows its first sample within `dead` samples belongs to a pulse: its
+    unbroken run about the largest of these counts, so that neither noise at its
+    foot nor the sensor's ringing makes another one.
+    """
+    above = force > threshold
+    below = np.flatnonzero(~above)
+    found: list[tuple[int, int]] = []
+    place = 0
+    for begin in np.flatnonzero(above & ~np.roll(above, 1)).tolist():
+        if begin < place:
+            continue
+        place = begin + dead + 1
+        top = begin + int(np.argmax(force[begin:place]))
+        at = int(np.searchsorted(below, top))
+        first = int(below[at - 1]) + 1 if at > 0 else 0
+        last = int(below[at]) - 1 if at < len(below) else len(force) - 1
+        found.append((first, last))
+    return found
+
+
+def _too_few(count: int) -> RecordError:
+    return RecordError(
+        "impacts",
+        "fewer than two whole impacts",
+        value=str(count),
+        limit="at least 2, better 3",
+        remedy="record for longer, from before the first impact on",
+    )
+
+
+def _check_count(pulses: Sequence[tuple[int, int]], force: Floats, noise: float) -> None:
+    if not pulses:
+        raise _too_few(0)
+    first = pulses[0][0]
+    if first < QUIET_SAMPLES:
+        raise RecordError(
+            "baseline",
+            "no quiet baseline before the first impact",
+            value=f"{first} samples",
+            limit=f"at least {QUIET_SAMPLES}",
+            remedy="trigger earlier, so that the record begins before the particle lands",
+        )
+    if float(force.max()) < SIGNAL_TO_NOISE * noise:
+        raise RecordError(
+            "baseline",
+            "no quiet baseline: the impacts hardly stand out of the noise",
+            value=f"largest force {force.max():.3g} N, noise {noise:.3g} N (standard deviation)",
+            limit=f"a ratio of at least {SIGNAL_TO_NOISE:g}",
+            remedy="drop from higher, or use a more sensitive range",
+        )
+
+
+def pulse(
+    time: Floats, force: Floats, ends: tuple[int, int], interval: float, number: int = 1
+) -> Impact:
+    """Measure one impact.
+
+    Parameters
+    ----------
+    time, force : (N,) ndarray
+        Times, s, and forces above the baseline, N.
+    ends : (int, int)
+        First and last sample above the threshold.
+    interval : float
+        Sampling interval, s.
+    number : int
+        Of the impact.
+
+    Raises
+    ------
+    RecordError
+        ``coarse``: there is one sample only.
+    """
+    first, last = ends
+    if last - first < 1:
+        raise RecordError(
+            "coarse",
+            "sampled too coarsely to see an impact",
+            value=f"one sample at {time[first]:.6g} s, interval {interval:.3g} s",
+            limit="at least 2 samples an impact",
+            remedy="record at a higher rate",
+        )
+    top = first + int(np.argmax(force[first : last + 1]))
+    near = slice(max(first - 1, 0), last + 2)
+    weight = np.maximum(force[near] - CENTROID_FRACTION * force[top], 0.0)
+    return Impact(
+        impact=number,
+        start_s=float(time[first]),
+        peak_time_s=float(time[top]),
+        centroid_s=float(np.sum(weight * time[near]) / np.sum(weight)),
+        peak_n=float(force[top]),
+        width_s=_width(force, top, first, last) * interval,
+        impulse_n_s=float(np.sum(force[near])) * interval,
+        samples=last - first + 1,
+    )
+
+
+def _width(force: Floats, top: int, first: int, last: int) -> float:
+    """Width at half height in samples, interpolated linearly; never below one."""
+    half = 0.5 * force[top]
+    left, right = top, top
+    while left > max(first - 1, 0) and force[left - 1] >= half:
+        left -= 1
+    while right < min(last + 1, len(force) - 1) and force[right + 1] >= half:
+        right += 1
+    before = _crossing(force[left - 1], force[left], half) if left > 0 else 0.0
+    after = _crossing(force[right + 1], force[right], half) if right + 1 < len(force) else 0.0
+    return max(1.0, right - left + before + after)
+
+
+def _crossing(outside: float, inside: float, half: float) -> float:
+    """How far outside the sample above it a level is crossed, in samples."""
+    return float(np.clip((inside - half) / (inside - outside), 0.0, 1.0))
+
+
+def _check_tops(
+    force: Floats, raw: Floats, pulses: Sequence[tuple[int, int]], noise: float
+) -> None:
+    """Refuse clipped peaks.
+
+    Three signs, each enough: four equal samples in a row at the top, though
+    the noise is four times the resolution; a top too flat for an impact; the
+    same largest value in two impacts, which a rebound cannot have.
+    """
+    fine = noise > 4 * _quantum(raw)
+    tops = [raw[first : last + 1] for first, last in pulses]
+    largest = [float(samples.max()) for samples in tops]
+    for number, ((first, last), samples) in enumerate(zip(pulses, tops, strict=True), start=1):
+        high = samples[samples >= samples.max() - 0.5 * force[first : last + 1].max()]
+        flat = int(np.sum(high >= samples.max() - 0.01 * force[first : last + 1].max()))
+        equal = max(len(list(run)) for top, run in groupby(samples == samples.max()) if top)
+        if (equal >= 4 and fine) or (flat >= 4 and flat > FLAT_TOP * len(high)):
+            raise _clipped(f"impact {number} has {max(flat, equal)} samples at its top", largest)
+    if largest[0] == largest[1]:
+        raise _clipped("impacts 1 and 2 have the same largest value", largest)
+
+
+def _clipped(problem: str, largest: Sequence[float]) -> RecordError:
+    return RecordError(
+        "clipped",
+        f"{problem}: the sensor or its amplifier was at its limit",
+        value=", ".join(f"{value:.6g} N" for value in largest),
+        remedy="choose a wider range, or drop from lower",
+    )
+
+
+def _check_order(impacts: Sequence[Impact]) -> None:
+    """Refuse impacts that cannot be one particle's: a flight longer than the one before."""
+    flights = np.diff([impact.centroid_s for impact in impacts])
+    if len(flights) > 1 and flights[1] > flights[0] * (1.0 + 1e-3):
+        raise RecordError(
+            "order",
+            "the second flight is longer than the first, which no rebound is",
+            value=f"{flights[0] * 1e3:.3g} ms, then {flights[1] * 1e3:.3g} ms",
+            remedy="cut what was recorded before the first impact, and after the "
+            "particle was caught",
+        )

@@ -1,0 +1,209 @@
+"""Compute the findings of one run from its tables."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import numpy as np
+import pandas as pd
+
+from dragchain.arrays import Floats, Ints
+from dragchain.drag.around import ahead_behind, azimuth_profile, depth_profile, depth_slope
+from dragchain.drag.force import read_counted, summarise_forces
+from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
+from dragchain.report.findings import (
+    FILE,
+    AheadBehind,
+    AzimuthProfile,
+    Chains,
+    ChainsAgainstDrag,
+    Comparison,
+    DepthProfile,
+    DropFindings,
+    DropImpacts,
+    DropRestitution,
+    FillingFindings,
+    Findings,
+    Peaks,
+    ProcessFindings,
+)
+from dragchain.report.run_data import RunData
+from dragchain.run.case import load_outputs
+from dragchain.run.kinematics import drag_start_s
+from dragchain.run.reference import ReferenceDrag, reference_drags
+from dragchain.statistics.association import association, near_any
+from dragchain.statistics.correlated import MeanEstimate
+from dragchain.statistics.estimate import CONFIDENCE, Estimate, EstimateColumns
+from dragchain.tables.bed import Packing
+from dragchain.tables.impacts import effective_restitution
+
+
+def write_findings(run: RunData) -> Findings:
+    """Compute the findings of a run, write them to ``tables/figures.json`` and return them.
+
+    Raises
+    ------
+    TableError
+        If a table that the run's scene has is missing.
+    SeriesError
+        If the run is too short for its statistics.
+    """
+    collect = {"process": _process, "filling": _filling, "drop_test": _drop}[run.case.scene]
+    findings = collect(run)
+    findings.write(run.folder / FILE)
+    return findings
+
+
+# --- process ---------------------------------------------------------------------------------
+
+
+def _process(run: RunData) -> ProcessFindings:
+    samples = read_counted(run.folder, ("step", "time_s", "drag_n"))
+    forces = summarise_forces(run.folder)
+    peaks_s, peaks = _peaks(samples, run)
+    link = _association(samples, run, peaks_s)
+    frame, frames, contacts = _workpiece_contacts(run, samples)
+    azimuth, depth, force = (
+        contacts[name].to_numpy(np.float64) for name in ("azimuth_rad", "depth_m", "normal_force_n")
+    )
+    edges, around = azimuth_profile(frame, frames, azimuth, force)
+    levels, contact, line = depth_profile(frame, frames, depth, force)
+    return ProcessFindings(
+        run=run.case.run,
+        process_time_zero_s=drag_start_s(run.case),
+        forces=forces,
+        comparison=tuple(
+            compare(forces["drag_n"], reference)
+            for reference in reference_drags(run.case.reference)
+        ),
+        peaks=peaks,
+        network={"frames": len(run.network)} | _means(run.network),
+        chains=_chains(run.chains, len(run.network)),
+        association=link,
+        confidence=CONFIDENCE,
+        workpiece_frames=frames,
+        ahead_behind=AheadBehind(**ahead_behind(frame, frames, azimuth, force)),
+        azimuth=AzimuthProfile(edges_rad=tuple(edges.tolist()), force_n=EstimateColumns.of(around)),
+        depth=DepthProfile(
+            edges_m=tuple(levels.tolist()),
+            contact_n=EstimateColumns.of(contact),
+            line_load_n_per_m=EstimateColumns.of(line),
+            slope_n_per_m=depth_slope(frame, frames, depth, force),
+        ),
+    )
+
+
+def compare(ours: MeanEstimate, reference: ReferenceDrag) -> Comparison:
+    """Set the mean drag beside one of the source."""
+    difference = reference.difference(Estimate(ours.mean, ours.ci95_low, ours.ci95_high))
+    return Comparison(
+        label=reference.label,
+        mean_n=reference.mean_n,
+        std_n=reference.std_n,
+        difference_percent=100.0 * difference.value,
+        ci95_low=100.0 * difference.ci95_low,
+        ci95_high=100.0 * difference.ci95_high,
+        source=reference.source,
+    )
+
+
+def _peaks(samples: pd.DataFrame, run: RunData) -> tuple[Floats, Peaks]:
+    """Simulated times of the peaks, and the peaks."""
+    separation = peak_separation_s(run.case)
+    peaks = find_drag_peaks(
+        samples["time_s"].to_numpy(np.float64),
+        samples["drag_n"].to_numpy(np.float64),
+        min_separation_s=separation,
+    )
+    process_s = peaks.time_s - drag_start_s(run.case)
+    return peaks.time_s, Peaks(
+        count=len(peaks.index),
+        process_time_s=tuple(process_s.tolist()),
+        drag_n=tuple(peaks.drag_n.tolist()),
+        largest_n=peaks.drag_n.min(initial=np.inf),
+        separation_s=separation,
+    )
+
+
+def _means(network: pd.DataFrame) -> dict[str, float]:
+    means = network.drop(columns=["step", "time_s"]).mean()
+    return {str(name): float(mean) for name, mean in means.items()}
+
+
+def _chains(chains: pd.DataFrame, frames: int) -> Chains:
+    peters = chains[chains["definition"] == "peters"]
+    paths = chains[chains["definition"] == "widest_path"]
+    dominant = paths[paths["dominant"]]
+    whole = paths[paths["reaches_bowl"]]
+    azimuth = np.exp(1j * dominant["azimuth_rad"].to_numpy(np.float64))
+    mean_azimuth = azimuth.mean() if len(azimuth) else np.nan
+    return Chains(
+        peters_per_frame=len(peters) / frames,
+        peters_particles_mean=peters["n_particles"].mean(),
+        widest_paths_per_frame=len(whole) / frames,
+        workpiece_contacts_without_path_per_frame=(len(paths) - len(whole)) / frames,
+        widest_paths_to_side_fraction=(whole["end_kind"] == "side").mean(),
+        dominant_frames=len(dominant),
+        dominant_bottleneck_mean_n=dominant["bottleneck_n"].mean(),
+        dominant_bottleneck_max_n=dominant["bottleneck_n"].max(),
+        dominant_particles_mean=dominant["n_particles"].mean(),
+        dominant_altitude_mean_m=dominant["altitude_m"].mean(),
+        dominant_altitude_std_m=dominant["altitude_m"].std(),
+        dominant_azimuth_mean_rad=np.angle(mean_azimuth),
+        dominant_azimuth_resultant=np.abs(mean_azimuth),
+    )
+
+
+def _association(samples: pd.DataFrame, run: RunData, peaks_s: Floats) -> ChainsAgainstDrag:
+    bottleneck = run.bottlenecks_n
+    time_s = run.network["time_s"].to_numpy(np.float64)
+    resistance = -np.interp(
+        time_s, samples["time_s"].to_numpy(np.float64), samples["drag_n"].to_numpy(np.float64)
+    )
+    found = association(resistance, bottleneck)
+    reach_s = float(np.median(np.diff(time_s))) / 2.0 if len(time_s) > 1 else 0.0
+    near = near_any(time_s, peaks_s, reach_s)
+    return ChainsAgainstDrag(
+        rank_correlation=found.correlation,
+        p_value=found.p_value,
+        frames=found.samples,
+        frames_at_peaks=int(near.sum()),
+        bottleneck_at_peaks_mean_n=bottleneck[near].mean() if near.any() else np.nan,
+        bottleneck_elsewhere_mean_n=bottleneck[~near].mean() if any(~near) else np.nan,
+    )
+
+
+def _workpiece_contacts(run: RunData, samples: pd.DataFrame) -> tuple[Ints, int, pd.DataFrame]:
+    """Frame of each counted contact, number of frames (those without contact too), contacts."""
+    columns = ["step", "azimuth_rad", "depth_m", "normal_force_n", "in_statistics"]
+    contacts = run.table("workpiece_contacts", columns)
+    contacts = contacts[contacts["in_statistics"]]
+    output = load_outputs(run.folder)["workpiece_contacts"]
+    counted = samples["step"].to_numpy(np.int64)
+    written = np.arange(output.first_step, counted[-1] + 1, output.period_steps)
+    written = written[written >= counted[0]]
+    frame = np.searchsorted(written, contacts["step"].to_numpy(np.int64))
+    return frame, len(written), contacts
+
+
+# --- filling and drop ------------------------------------------------------------------------
+
+
+def _filling(run: RunData) -> FillingFindings:
+    bed = Packing.read(run.folder / "tables" / "packing.json")
+    settled = run.case.settled
+    return FillingFindings(
+        run=run.case.run,
+        bed=bed.model_dump(exclude={"version"}),
+        rest_energy_ratio=settled.energy_ratio if settled else None,
+    )
+
+
+def _drop(run: RunData) -> DropFindings:
+    impacts = run.table("impacts")
+    ratio = effective_restitution(run.folder)
+    return DropFindings(
+        run=run.case.run,
+        restitution=DropRestitution(**asdict(ratio), input=run.case.restitution),
+        impacts=DropImpacts(**{name: impacts[name].tolist() for name in DropImpacts.model_fields}),
+    )

@@ -1,0 +1,49 @@
+"""The layers of both packages, as pyproject.toml states them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import grimp
+import pytest
+from importlinter.cli import EXIT_STATUS_SUCCESS, lint_imports
+from paths import ROOT
+
+
+def imports_of(package: str) -> dict[str, set[str]]:
+    """What each module of a package imports of it."""
+    graph = grimp.build_graph(package, cache_dir=None)
+    return {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+
+
+def levels_of(imports: Mapping[str, set[str]]) -> dict[str, int]:
+    """Level of each module: one above the highest that it imports."""
+    levels: dict[str, int] = {}
+
+    def level(module: str, above: tuple[str, ...] = ()) -> int:
+        assert module not in above, f"a cycle: {' > '.join((*above, module))}"
+        if module not in levels:
+            below = (level(other, (*above, module)) for other in imports[module])
+            levels[module] = 1 + max(below, default=0)
+        return levels[module]
+
+    for module in imports:
+        level(module)
+    return levels
+
+
+def test_a_cycle_is_found() -> None:
+    with pytest.raises(AssertionError, match="a > b > a"):
+        levels_of({"a": {"b"}, "b": {"a"}})
+
+
+@pytest.mark.parametrize(("package", "most"), [("dragdeck", 10), ("dragchain", 11)])
+def test_no_cycle_and_few_levels(package: str, most: int) -> None:
+    levels = levels_of(imports_of(package))
+    assert len(levels) > 50
+    assert max(levels.values()) <= most
+
+
+def test_no_module_imports_upward() -> None:
+    found = lint_imports(config_filename=str(ROOT / "pyproject.toml"), no_cache=True)
+    assert found == EXIT_STATUS_SUCCESS

@@ -1,0 +1,74 @@
+"""Many runs in one folder: written, run, and not run again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import jinja2
+
+from dragdeck.decks.deck import AnyScene
+from dragdeck.decks.render import write_run
+from dragdeck.engine.record import RunRecord
+from dragdeck.engine.run_folder import STATE_FILE, run
+from dragdeck.engine.watch import Report
+from dragdeck.errors import RejectedRunError
+
+
+def silent(line: str) -> None:
+    """Report nothing: runs of a second or two."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Runs side by side, each in a folder that has its run id as its name.
+
+    A run of the same inputs is left as it is; one that was interrupted is gone on with.
+
+    Attributes
+    ----------
+    folder : Path
+        Gets a folder for each run.
+    templates : jinja2.Environment
+    report : callable
+        Gets lines of each run.
+    """
+
+    folder: Path
+    templates: jinja2.Environment
+    report: Report = silent
+
+    def run(self, name: str, scene: AnyScene) -> RunRecord:
+        """Write a run and bring it to its end, good or bad.
+
+        Returns
+        -------
+        RunRecord
+            Its `state` is ``failed`` if an acceptance check did not pass.
+
+        Raises
+        ------
+        InputError
+            The scene's template cannot be used.
+        EngineError
+            No LIGGGHTS, or it was interrupted.
+        """
+        try:
+            return self.result(name, scene)
+        except RejectedRunError:
+            return RunRecord.read(self.folder / name / STATE_FILE)
+
+    def result(self, name: str, scene: AnyScene) -> RunRecord:
+        """Write a run and bring it to a result.
+
+        Raises
+        ------
+        InputError, EngineError
+            As `run`.
+        RejectedRunError
+            An acceptance check did not pass.
+        """
+        deck = replace(scene.deck, run=name)
+        case = scene.case.model_copy(update={"run": name})
+        write_run(replace(scene, deck=deck, case=case), self.folder / name, self.templates)
+        return run(self.folder / name, self.report)

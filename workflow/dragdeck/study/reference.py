@@ -1,0 +1,24 @@
+"""Published figures to compare the results with."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from dragdeck.study.base import Model, NonNegative, Number
+
+
+class Drag(Model):
+    """A published drag force along the motion; negative: against it."""
+
+    drag_mean_n: Number = Field(description="mean drag, N")
+    drag_std_n: NonNegative | None = Field(
+        default=None, description="standard deviation over time, N"
+    )
+
+
+class Reference(Model):
+    """Published figures to stand beside the results."""
+
+    source: str = Field(description="where the figures come from")
+    experiment: Drag | None = Field(default=None, description="as measured")
+    simulation: Drag | None = Field(default=None, description="as simulated there")
