@@ -99,6 +99,13 @@ class Measures(Document):
     force_histogram: tuple[int, ...] = ()
 
     @property
+    def seed(self) -> int:
+        """Seed of its bed."""
+        seed = self.inputs["seed"]
+        assert isinstance(seed, int)
+        return seed
+
+    @property
     def telling_failure(self) -> AcceptanceCheck | None:
         """The acceptance check that says most about why the run failed, None if it did not."""
         by_code = {check.code: check for check in self.failure}

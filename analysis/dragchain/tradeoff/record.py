@@ -190,7 +190,7 @@ def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:
     complete = sum(run.complete for run in runs)
     return SettingEntry(
         **setting.parameters(),
-        seeds=len({run.measures.inputs["seed"] for run in runs}),
+        seeds=len({run.measures.seed for run in runs}),
         runs=len(runs),
         failed=len(runs) - complete,
         arc_m=tradeoff.arc_m * complete,

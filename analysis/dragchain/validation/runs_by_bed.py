@@ -50,7 +50,7 @@ class Point:
     @property
     def seed(self) -> int:
         """Seed of its bed."""
-        return int(self.measures.inputs["seed"])
+        return self.measures.seed
 
     @property
     def setting(self) -> tuple[object, ...]:
