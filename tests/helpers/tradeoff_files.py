@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from dragchain.tradeoff.measures import FORCE_BINS, QUANTITIES, SCHEMA
+from dragchain.documents import SCHEMA
+from dragchain.tradeoff.path_blocks import FORCE_BINS
+from dragchain.tradeoff.quantities import QUANTITIES
 
 BLOCK_M = 0.0065
 VALUES = {

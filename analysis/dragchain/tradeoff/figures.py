@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import cycle
 
 import matplotlib
@@ -15,8 +16,14 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from dragchain.arrays import Floats
 from dragchain.figures.style import BLUE, GREY, ORANGE, RED, WIDTH_IN
-from dragchain.tradeoff.compare import TOLERANCES, Comparison, Error, Setting, Tradeoff
-from dragchain.tradeoff.findings import MAIN, Drop, Reach, exceedance, force_runs
+from dragchain.tradeoff.changes import differing, hub, modulus_levels
+from dragchain.tradeoff.compare import Comparison, Error
+from dragchain.tradeoff.drops import Drop
+from dragchain.tradeoff.outcome import TOLERANCES, Tradeoff
+from dragchain.tradeoff.path_blocks import FORCE_BINS
+from dragchain.tradeoff.path_length import Reach
+from dragchain.tradeoff.quantities import MAIN
+from dragchain.tradeoff.runs import Run, Setting
 
 FLOOR = 1e-3
 """Errors below this are drawn here."""
@@ -204,13 +211,58 @@ def _pareto_legend(figure: Figure, colours: dict[float, str], markers: dict[floa
 # --- contact forces ------------------------------------------------------------------------------
 
 
+def exceedance(counts: Sequence[int]) -> tuple[Floats, Floats, float]:
+    """Share of contacts with a force above each bin's lower edge.
+
+    Parameters
+    ----------
+    counts : (70,) array_like
+        Contacts between `FORCE_BINS`.
+
+    Returns
+    -------
+    force : (70,) ndarray
+        Lower edges, N.
+    share : (70,) ndarray
+    mean : float
+        Mean force, N, each contact at the geometric middle of its bin.
+    """
+    number = np.asarray(counts, dtype=np.float64)
+    fraction = np.cumsum(number[::-1])[::-1] / number.sum()
+    middle = np.sqrt(FORCE_BINS[:-1] * FORCE_BINS[1:])
+    return FORCE_BINS[:-1], fraction, float(number @ middle / number.sum())
+
+
+def force_runs(tradeoff: Tradeoff) -> dict[float, list[Run]]:
+    """Runs whose contact forces are shown, for each modulus: all else as alike as was run."""
+    found: dict[float, list[Run]] = {}
+    levels = [tradeoff.reference.youngs_modulus_scale, *modulus_levels(tradeoff)]
+    for level in levels:
+        own = [
+            setting
+            for setting in tradeoff.settings()
+            if setting.youngs_modulus_scale == level
+            and not setting.other
+            and any(map(_has_histogram, tradeoff.of(setting)))
+        ]
+        if own:
+            centre = replace(hub(tradeoff), youngs_modulus_scale=level)
+            chosen = min(own, key=lambda one: len(differing(one, centre)))
+            found[level] = [run for run in tradeoff.of(chosen) if _has_histogram(run)]
+    return found
+
+
+def _has_histogram(run: Run) -> bool:
+    return run.complete and sum(run.measures.force_histogram) > 0
+
+
 def _forces(tradeoff: Tradeoff) -> Figure:
     shown = force_runs(tradeoff)
     colours = _colours(list(shown))
     figure = Figure(figsize=(1.25 * WIDTH_IN, 3.9), layout="constrained")
     raw, scaled = figure.subplots(1, 2, sharey=True)
     for level, runs in shown.items():
-        counts = [run.measures["force_histogram"] for run in runs]
+        counts = [run.measures.force_histogram for run in runs]
         for own in counts:
             _exceedance(raw, scaled, own, color=colours[level], lw=0.6, alpha=0.8)
         pooled = np.sum(counts, axis=0).tolist()

@@ -1,4 +1,4 @@
-"""What one process run says of every quantity that a trade compares, along its path.
+"""What one process run says of every quantity that a trade-off compares, along its path.
 
 The counted path is cut into blocks of about one mean particle diameter; each
 quantity has one value a block. A run's value is the mean over its blocks.
@@ -6,92 +6,119 @@ quantity has one value a block. A run's value is the mean over its blocks.
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
+from pydantic import JsonValue
 
-from dragchain.arrays import Floats, Ints
-from dragchain.drag.force import read_counted
+from dragchain.arrays import Floats
+from dragchain.documents import Document, Part
 from dragchain.errors import TableError
-from dragchain.files import write_json
 from dragchain.network.write import write_chains
-from dragchain.run.case import Case, load_case
-from dragchain.run.completeness import RunRecord
-from dragchain.run.kinematics import drag_phase
-from dragchain.tables.by_step import read_groups, read_table
+from dragchain.run.case import Case, Fidelity, load_case
+from dragchain.run.completeness import AcceptanceCheck, RunRecord
+from dragchain.statistics.estimate import finite
+from dragchain.tables.bed import Packing
 from dragchain.tables.write import write_tables
+from dragchain.tradeoff.path_blocks import quantities_along
 
-SCHEMA = 2
 FILE = "measures.json"
 
-LONG_WAVE, SHORT_WAVE = 2.0, 0.25
-"""Wave lengths in mean particle diameters that part the spectrum of the drag in three bands."""
-
-FORCE_BINS = np.logspace(-5.0, 2.0, 71)
-"""Edges of the histogram of normal forces on the workpiece, N."""
+TELLING_CHECKS = ("within_limits", "no_engine_error")
+"""Acceptance checks that say more than others why a run failed, the most telling first."""
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """Something a trade compares.
+class RunCost(Part):
+    """What a run cost; `steps_per_m` are those for a metre of path."""
+
+    steps: int
+    wall_time_s: float
+    cpu_time_s: float
+    ranks: int
+    timestep_s: float
+    axis_speed_m_s: float
+    steps_per_m: float
+
+    @property
+    def cpu_per_m(self) -> float:
+        """Processor time for a metre of path, s/m; NaN for a run that failed at once."""
+        return self.cpu_time_s / self.steps * self.steps_per_m if self.steps else math.nan
+
+
+class Asked(Part):
+    """The tolerance that a run's settings were chosen for."""
+
+    quantity: str
+    tolerance: float
+    held_to: float | None = None
+
+    def same(self, other: Asked) -> bool:
+        """Whether the same is asked, however well it can be held."""
+        return (self.quantity, self.tolerance) == (other.quantity, other.tolerance)
+
+
+class Measures(Document):
+    """The content of ``measures.json``.
 
     Attributes
     ----------
-    name, label, unit : str
-    squared : bool
-        Its blocks hold squares: a run's value is the root of their mean.
-    signed : bool
-        It may be zero or change its sign: errors are counted in mean drags.
+    failure : sequence of AcceptanceCheck
+        Why the run is not `complete`; it has none of what follows then.
+    arc_m : float
+        Counted path, m.
+    block_m : float
+        Length of a block, m.
+    blocks : mapping
+        Quantity to a sequence of B values, None where a block has none.
+    single : mapping
+        The quantities of the bed.
+    force_histogram : sequence of int
+        Counts of contacts on the workpiece between `FORCE_BINS`.
     """
 
-    name: str
-    label: str
-    unit: str
-    squared: bool = False
-    signed: bool = False
+    made_by = "dragchain step measure"
 
-    def of_blocks(self, blocks: Floats) -> float:
-        """A run's value from the values of its blocks, (B,)."""
-        mean = float(np.mean(blocks))
-        return math.sqrt(mean) if self.squared else mean
+    study: str
+    run: str
+    bed: str | None
+    inputs: Mapping[str, JsonValue]
+    fidelity: Fidelity
+    numbers: Mapping[str, float] = {}
+    asked: Asked | None = None
+    complete: bool
+    cost: RunCost
+    versions: Mapping[str, str]
+    started: str
+    failure: tuple[AcceptanceCheck, ...] = ()
+    arc_m: float = 0.0
+    block_m: float = 0.0
+    blocks: Mapping[str, tuple[float | None, ...]] = {}
+    single: Mapping[str, float] = {}
+    force_histogram: tuple[int, ...] = ()
+
+    @property
+    def seed(self) -> int:
+        """Seed of its bed."""
+        seed = self.inputs["seed"]
+        assert isinstance(seed, int)
+        return seed
+
+    @property
+    def telling_failure(self) -> AcceptanceCheck | None:
+        """The acceptance check that says most about why the run failed, None if it did not."""
+        by_code = {check.code: check for check in self.failure}
+        first = self.failure[0] if self.failure else None
+        return next((by_code[code] for code in TELLING_CHECKS if code in by_code), first)
+
+    def of_blocks(self, name: str) -> Floats:
+        """The values of a quantity, (B,), NaN where a block has none; (0,) if none has one."""
+        return np.array(self.blocks.get(name, ()), dtype=np.float64)
 
 
-QUANTITIES = (
-    Quantity("drag_mean", "mean drag", "N"),
-    Quantity("drag_std", "standard deviation of the drag", "N", squared=True),
-    Quantity("drag_std_long", "its part with waves over two particle diameters", "N", squared=True),
-    Quantity("drag_std_middle", "its part with waves in between", "N", squared=True),
-    Quantity("drag_std_short", "its part with waves under a quarter", "N", squared=True),
-    Quantity("lateral_mean", "mean lateral force", "N", signed=True),
-    Quantity("vertical_mean", "mean vertical force", "N", signed=True),
-    Quantity("workpiece_contacts", "contacts on the workpiece", ""),
-    Quantity("contact_force_mean", "mean normal force of a contact on the workpiece", "N"),
-    Quantity("contact_force_p50", "its median", "N"),
-    Quantity("contact_force_p90", "its 90th percentile", "N"),
-    Quantity("contact_force_p99", "its 99th percentile", "N"),
-    Quantity("workpiece_overlap", "mean overlap on the workpiece over the particle diameter", ""),
-    Quantity("coordination_number", "coordination number", ""),
-    Quantity("mechanical_coordination_number", "coordination number of loaded particles", ""),
-    Quantity("network_force_mean", "mean normal force in the network", "N"),
-    Quantity("overlap_p99", "99th percentile of particle overlap over the diameter", ""),
-    Quantity("chain_count", "Peters chains in a frame", ""),
-    Quantity("chain_length", "particles in a Peters chain", ""),
-    Quantity("chain_alignment", "mean squared cosine of chains with the motion", ""),
-    Quantity("path_bottleneck", "bottleneck of the dominant workpiece path", "N"),
-    Quantity("bed_height", "fill height", "m"),
-    Quantity("solid_fraction", "solid fraction of the bed", ""),
-)
-"""All but the last two have a value for every block of the path."""
-
-
-def write_measures(run_dir: Path, packing_table: Path) -> dict[str, Any]:
-    """Measure a run of a trade and write ``measures.json``.
+def write_measures(run_dir: Path, packing_table: Path) -> Measures:
+    """Measure a run of a trade-off and write ``measures.json``.
 
     A complete run gets its tables and chains first; of a failed one only the
     failure is written.
@@ -111,297 +138,58 @@ def write_measures(run_dir: Path, packing_table: Path) -> dict[str, Any]:
     file = run_dir / "outcome.json"
     if not file.is_file():
         raise TableError(f"{file} is not there: `dragdeck run --outcome` writes it")
-    outcome = RunRecord.read(file)
-    case = load_case(run_dir)
-    measures = {
-        "schema": SCHEMA,
-        "study": case.study,
-        "run": case.run,
-        "bed": case.upstream.get("filling"),
-        "inputs": dict(case.inputs),
-        "fidelity": vars(case.fidelity),
-        "numbers": dict(case.numbers),
-        "asked": case.asked and case.asked.model_dump(mode="json"),
-        "complete": outcome.complete,
-        "cost": _cost(case, outcome),
-        "versions": {**case.versions, "engine": outcome.engine_version},
-        "started": outcome.started,
-    }
-    if measures["complete"]:
+    outcome, case = RunRecord.read(file), load_case(run_dir)
+    measures = Measures(
+        study=case.study,
+        run=case.run,
+        bed=case.upstream.get("filling"),
+        inputs=case.inputs,
+        fidelity=case.fidelity,
+        numbers=case.numbers,
+        asked=case.asked and Asked.model_validate(case.asked.model_dump()),
+        complete=outcome.complete,
+        cost=_cost(case, outcome),
+        versions={**case.versions, "engine": outcome.engine_version},
+        started=outcome.started,
+    )
+    if measures.complete:
         write_tables(run_dir)
         write_chains(run_dir)
-        measures |= measure(run_dir, case, json.loads(packing_table.read_text(encoding="utf-8")))
+        measures = measured(measures, run_dir, case, Packing.read(packing_table))
     else:
-        measures["failure"] = [check.model_dump() for check in outcome.failed_checks]
-    write_json(run_dir / FILE, measures)
+        measures = measures.model_copy(update={"failure": outcome.failed_checks})
+    measures.write(run_dir / FILE)
     return measures
 
 
-def measure(run_dir: Path, case: Case, bed: Mapping[str, float]) -> dict[str, Any]:
-    """The quantities of a complete run from its tables.
-
-    Parameters
-    ----------
-    run_dir : Path
-    case : Case
-    bed : mapping
-        Content of ``packing.json``.
-
-    Returns
-    -------
-    dict
-        ``arc_m`` (counted path), ``block_m``, ``blocks`` (quantity to a list of
-        B values, None where a block has none), ``single`` (those of the bed), and
-        ``force_histogram`` (counts of contacts on the workpiece between `FORCE_BINS`).
-    """
-    force = read_counted(run_dir, ("step", "drag_n", "lateral_n", "vertical_n"))
-    path = _Path.of(case, force["step"].to_numpy(np.int64))
-    on_workpiece, counts = _of_workpiece_contacts(run_dir, path)
-    found: dict[str, Floats] = {
-        **_of_force(force, path),
-        **on_workpiece,
-        **_of_network(run_dir, path),
-    }
-    return {
-        "arc_m": path.length_m,
-        "block_m": path.length_m / path.blocks,
-        "blocks": {name: _listed(values) for name, values in found.items()},
-        "single": {"bed_height": bed["bed_height_m"], "solid_fraction": bed["solid_fraction"]},
-        "force_histogram": counts.tolist(),
-    }
+def measured(measures: Measures, run_dir: Path, case: Case, bed: Packing) -> Measures:
+    """The measures of a complete run with its quantities, from its tables."""
+    along = quantities_along(run_dir, case)
+    return measures.model_copy(
+        update={
+            "arc_m": along.length_m,
+            "block_m": along.block_m,
+            "blocks": {name: _listed(values) for name, values in along.blocks.items()},
+            "single": {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction},
+            "force_histogram": tuple(along.force_histogram.tolist()),
+        }
+    )
 
 
-def _listed(values: Floats) -> list[float | None]:
-    return [float(value) if math.isfinite(value) else None for value in values]
+def _listed(values: Floats) -> tuple[float | None, ...]:
+    return tuple(map(finite, values))
 
 
-def _cost(case: Case, outcome: RunRecord) -> dict[str, Any]:
+def _cost(case: Case, outcome: RunRecord) -> RunCost:
     """What a run cost; a run without its processor time counts its wall time on every rank."""
-    motion = case.motion
-    assert motion is not None
-    return {
-        "steps": outcome.steps,
-        "wall_time_s": outcome.wall_time_s,
-        "cpu_time_s": outcome.processor_time_s,
-        "ranks": outcome.ranks,
-        "timestep_s": case.timestep_s,
-        "axis_speed_m_s": motion.axis_speed_m_s,
-        "steps_per_m": 1.0 / (motion.axis_speed_m_s * case.timestep_s),
-    }
-
-
-Rows = tuple[Ints, Floats]
-"""Steps, (N,), and values, (N, ...), of N rows of a table."""
-
-
-@dataclass(frozen=True)
-class _Path:
-    """The counted path, cut into equal blocks; a step belongs to one of them."""
-
-    first_step: int
-    last_step: int
-    length_m: float
-    diameter_m: float
-    blocks: int
-
-    @classmethod
-    def of(cls, case: Case, counted_steps: Ints) -> _Path:
-        motion = case.motion
-        assert motion is not None
-        diameter = 2.0 * case.media.radius_mean_m
-        first, last = int(counted_steps[0]), int(counted_steps[-1])
-        before = max(first - int(np.median(np.diff(counted_steps))), drag_phase(case).start_step)
-        length = (last - before) * case.timestep_s * motion.axis_speed_m_s
-        return cls(before, last, length, diameter, max(1, round(length / diameter)))
-
-    def block(self, steps: Ints) -> Ints:
-        """Number of the block of each step, (N,); steps outside get the nearest."""
-        fraction = (np.asarray(steps) - self.first_step) / (self.last_step - self.first_step)
-        number = np.ceil(fraction * self.blocks).astype(np.int64) - 1
-        return np.asarray(number.clip(0, self.blocks - 1))
-
-    def mean(self, steps: Ints, values: Floats) -> Floats:
-        """Mean of N values in every block, (B,); NaN in a block without any."""
-        block = self.block(steps)
-        total = np.bincount(block, weights=values, minlength=self.blocks)
-        count = np.bincount(block, minlength=self.blocks)
-        with np.errstate(invalid="ignore"):
-            return np.asarray(total / count)
-
-    def parts(self, rows: Iterable[Rows]) -> Iterator[tuple[int, Floats]]:
-        """Values of rising steps block by block: number of the block, and what is in it.
-
-        Parameters
-        ----------
-        rows : iterable of ((N,) ndarray of int, (N, ...) ndarray)
-            Steps and values, a piece of the table each. One piece and one block are held.
-        """
-        held: list[Floats] = []
-        last = 0
-        for steps, values in rows:
-            block = self.block(steps)
-            cuts = np.flatnonzero(np.diff(block)) + 1
-            for first, end in zip([0, *cuts], [*cuts, len(block)], strict=True):
-                if held and block[first] != last:
-                    yield last, np.concatenate(held)
-                    held = []
-                held.append(values[first:end])
-                last = int(block[first])
-        if held:
-            yield last, np.concatenate(held)
-
-
-def _of_force(force: pd.DataFrame, path: _Path) -> dict[str, Floats]:
-    steps = force["step"].to_numpy(np.int64)
-    drag = force["drag_n"].to_numpy(np.float64)
-    deviation = drag - drag.mean()
-    spacing = path.length_m / len(drag)
-    bands = {
-        "long": (LONG_WAVE, math.inf),
-        "middle": (SHORT_WAVE, LONG_WAVE),
-        "short": (0.0, SHORT_WAVE),
-    }
-    squares = {
-        f"drag_std_{name}": path.mean(
-            steps, band(deviation, spacing, low * path.diameter_m, high * path.diameter_m) ** 2
-        )
-        for name, (low, high) in bands.items()
-    }
-    return {
-        "drag_mean": path.mean(steps, drag),
-        "drag_std": path.mean(steps, deviation**2),
-        **squares,
-        "lateral_mean": path.mean(steps, force["lateral_n"].to_numpy(np.float64)),
-        "vertical_mean": path.mean(steps, force["vertical_n"].to_numpy(np.float64)),
-    }
-
-
-def band(series: Floats, spacing_m: float, shortest_m: float, longest_m: float) -> Floats:
-    """The part of a series whose wave lengths lie in [shortest, longest).
-
-    Parameters
-    ----------
-    series : (N,) ndarray
-        Deviations from the mean at equal distances.
-    spacing_m : float
-        That distance, m.
-    shortest_m, longest_m : float
-        Limits of the band, m; bands that follow one another add up to the series.
-
-    Returns
-    -------
-    (N,) ndarray
-    """
-    amplitude = np.fft.rfft(series)
-    frequency = np.fft.rfftfreq(len(series), spacing_m)
-    with np.errstate(divide="ignore"):
-        wave = 1.0 / frequency
-    amplitude[~((wave >= shortest_m) & (wave < longest_m))] = 0.0
-    if math.isinf(longest_m):
-        amplitude[0] = np.sum(series)
-    return np.fft.irfft(amplitude, n=len(series))
-
-
-def _pushing_contacts(run_dir: Path) -> Iterator[Rows]:
-    """Normal force and overlap of contacts that push the workpiece, (N, 2).
-
-    A silent contact overlaps without a force and does not count.
-    """
-    file = run_dir / "tables" / "workpiece_contacts.parquet"
-    for rows in read_groups(file, ["step", "normal_force_n", "overlap_m", "in_statistics"]):
-        pushing = rows[rows["in_statistics"] & (rows["normal_force_n"] > 0.0)]
-        if len(pushing):
-            yield (
-                pushing["step"].to_numpy(np.int64),
-                pushing[["normal_force_n", "overlap_m"]].to_numpy(np.float64),
-            )
-
-
-def _of_workpiece_contacts(run_dir: Path, path: _Path) -> tuple[dict[str, Floats], Ints]:
-    """Quantities of the contacts on the workpiece, and their number between `FORCE_BINS`."""
-    frames = np.bincount(path.block(_frames(run_dir, path)), minlength=path.blocks)
-    contacts = np.zeros(path.blocks)
-    histogram = np.zeros(len(FORCE_BINS) - 1, dtype=np.int64)
-    names = ("mean", "p50", "p90", "p99")
-    found = {f"contact_force_{name}": np.full(path.blocks, math.nan) for name in names}
-    overlap = np.full(path.blocks, math.nan)
-    for number, (normal, depth) in (
-        (number, values.T) for number, values in path.parts(_pushing_contacts(run_dir))
-    ):
-        contacts[number] = len(normal)
-        overlap[number] = _mean(depth / path.diameter_m)
-        found["contact_force_mean"][number] = _mean(normal)
-        for fraction in (50, 90, 99):
-            found[f"contact_force_p{fraction}"][number] = np.percentile(normal, fraction)
-        histogram += np.histogram(normal, FORCE_BINS)[0]
-    return {
-        "workpiece_contacts": contacts / frames,
-        **found,
-        "workpiece_overlap": overlap,
-    }, histogram
-
-
-def _mean(values: Floats) -> float:
-    """Mean of values that are added one after the other."""
-    return float(np.bincount(np.zeros(len(values), dtype=np.int64), values)[0] / len(values))
-
-
-def _frames(run_dir: Path, path: _Path) -> Ints:
-    """Steps of the counted frames of the contacts on the workpiece, those without contact too."""
-    outputs = json.loads((run_dir / "columns.json").read_text(encoding="utf-8"))["outputs"]
-    period = outputs["workpiece_contacts"]["period_steps"]
-    start = outputs["workpiece_contacts"]["first_step"]
-    steps = np.arange(start, path.last_step + 1, period, dtype=np.int64)
-    return steps[steps > path.first_step]
-
-
-def _of_network(run_dir: Path, path: _Path) -> dict[str, Floats]:
-    tables = run_dir / "tables"
-    network = read_table(tables / "network.parquet")
-    steps = network["step"].to_numpy(np.int64)
-    overlap = np.full(path.blocks, math.nan)
-    for number, values in path.parts(_overlaps(tables / "contacts.parquet", path)):
-        overlap[number] = np.percentile(values, 99)
-    columns = {
-        "coordination_number": "coordination_number",
-        "mechanical_coordination_number": "mechanical_coordination_number",
-        "network_force_mean": "normal_force_mean_n",
-    }
-    return {
-        **{name: path.mean(steps, network[col].to_numpy()) for name, col in columns.items()},
-        "overlap_p99": overlap,
-        **_of_chains(read_table(tables / "chains.parquet", _CHAIN_COLUMNS), steps, path),
-    }
-
-
-def _overlaps(file: Path, path: _Path) -> Iterator[Rows]:
-    """Overlaps of particles over the mean diameter, from the path's beginning on."""
-    for rows in read_groups(file, ["step", "kind", "overlap_m"]):
-        inner = rows[(rows["kind"] == "particle-particle") & (rows["step"] > path.first_step)]
-        if len(inner):
-            yield (
-                inner["step"].to_numpy(np.int64),
-                inner["overlap_m"].to_numpy(np.float64) / path.diameter_m,
-            )
-
-
-_CHAIN_COLUMNS = [
-    *("step", "definition", "n_particles", "inclination_rad", "azimuth_rad"),
-    *("dominant", "bottleneck_n"),
-]
-
-
-def _of_chains(chains: pd.DataFrame, frames: Ints, path: _Path) -> dict[str, Floats]:
-    peters = chains[chains["definition"] == "peters"]
-    steps = peters["step"].to_numpy(np.int64)
-    along = np.cos(peters["inclination_rad"]) * np.cos(peters["azimuth_rad"])
-    paths = chains[chains["dominant"]]
-    found = np.bincount(path.block(steps), minlength=path.blocks)
-    return {
-        "chain_count": found / np.bincount(path.block(frames), minlength=path.blocks),
-        "chain_length": path.mean(steps, peters["n_particles"].to_numpy(np.float64)),
-        "chain_alignment": path.mean(steps, along.to_numpy(np.float64) ** 2),
-        "path_bottleneck": path.mean(
-            paths["step"].to_numpy(np.int64), paths["bottleneck_n"].to_numpy(np.float64)
-        ),
-    }
+    assert case.motion is not None
+    speed = case.motion.axis_speed_m_s
+    return RunCost(
+        steps=outcome.steps,
+        wall_time_s=outcome.wall_time_s,
+        cpu_time_s=outcome.processor_time_s,
+        ranks=outcome.ranks,
+        timestep_s=case.timestep_s,
+        axis_speed_m_s=speed,
+        steps_per_m=1.0 / (speed * case.timestep_s),
+    )

@@ -8,10 +8,10 @@ lies within the tolerance, broken if it lies outside, and open otherwise.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -20,16 +20,10 @@ from dragchain.arrays import Floats
 from dragchain.documents import Document, Part
 from dragchain.errors import TableError
 from dragchain.files import write_text
-from dragchain.tradeoff.compare import (
-    PARAMETERS,
-    SILENT,
-    Error,
-    Setting,
-    read_measures,
-    relative_error,
-    values_within,
-)
-from dragchain.tradeoff.measures import QUANTITIES, Quantity
+from dragchain.tradeoff.compare import Error, relative_error
+from dragchain.tradeoff.measures import Asked, Measures
+from dragchain.tradeoff.quantities import QUANTITIES
+from dragchain.tradeoff.runs import SILENT, Setting, values_within
 
 Verdict = Literal["kept", "broken", "open"]
 Scene = tuple[tuple[str, str], ...]
@@ -87,7 +81,7 @@ class Promise(Part):
     @property
     def setting(self) -> Setting:
         """What the advisor chose."""
-        return Setting(self.youngs_modulus_scale, self.timestep_fraction, self.speed_factor)
+        return Setting.of(self)
 
     @property
     def place(self) -> str:
@@ -130,26 +124,22 @@ class _Pair:
     """The runs of one promise, and those at full stiffness in the same scene."""
 
     scene: Mapping[str, str]
-    asked: Mapping[str, Any]
-    own: Sequence[Mapping[str, Any]]
-    references: Sequence[Mapping[str, Any]]
+    asked: Asked
+    own: Sequence[Measures]
+    references: Sequence[Measures]
     failed: int
-
-    @property
-    def quantity(self) -> Quantity:
-        return next(item for item in QUANTITIES if item.name == self.asked["quantity"])
 
     def logarithms(self) -> tuple[Floats, Floats]:
         """Of the quantity in the promised runs and in those at full stiffness."""
-        arc = min(run["arc_m"] for run in (*self.own, *self.references))
+        arc = min(run.arc_m for run in (*self.own, *self.references))
         own, references = (
-            np.log([abs(values_within(run, arc)[self.quantity.name]) for run in runs])
+            np.log([abs(values_within(run, arc)[self.asked.quantity]) for run in runs])
             for runs in (self.own, self.references)
         )
         return own, references
 
 
-def check_promises(files: Sequence[Path]) -> list[Promise]:
+def check_promises(runs: Sequence[Measures]) -> list[Promise]:
     """Compare every promise among the runs of a plan with the full stiffness of its scene.
 
     A scene whose runs at full stiffness all failed has nothing to compare with;
@@ -159,9 +149,8 @@ def check_promises(files: Sequence[Path]) -> list[Promise]:
 
     Parameters
     ----------
-    files : sequence of Path
-        ``measures.json`` of the runs: of the reference, which asks nothing, and
-        of those that ask for a tolerance.
+    runs : sequence of Measures
+        Of the reference, which asks nothing, and of runs that ask for a tolerance.
 
     Raises
     ------
@@ -169,7 +158,7 @@ def check_promises(files: Sequence[Path]) -> list[Promise]:
         If a scene was not run at full stiffness, a quantity may change its sign,
         or there are too few runs for an interval.
     """
-    pairs = list(_pairs([read_measures(file) for file in files]))
+    pairs = list(_pairs(runs))
     groups = [group for pair in pairs for group in pair.logarithms()]
     degrees = sum(len(group) - 1 for group in groups)
     if degrees < 1:
@@ -178,39 +167,32 @@ def check_promises(files: Sequence[Path]) -> list[Promise]:
     return [_promise_of(pair, scatter, degrees) for pair in pairs]
 
 
-def _pairs(runs: Sequence[Mapping[str, Any]]) -> Iterator[_Pair]:
+def _pairs(runs: Sequence[Measures]) -> Iterator[_Pair]:
+    signed = {quantity.name for quantity in QUANTITIES if quantity.signed}
     for scene, everyone in _by_scene(runs):
-        own = [run for run in everyone if run["complete"]]
-        references = [run for run in own if not run.get("asked")]
-        if not any(not run.get("asked") for run in everyone):
+        if all(run.asked for run in everyone):
             raise TableError(f"scene {scene}: no run at full stiffness to compare with")
-        if not references:
-            continue
-        promised: dict[tuple[str, float], list[Mapping[str, Any]]] = {}
-        for run in own:
-            if run.get("asked"):
-                promised.setdefault(_promise(run), []).append(run)
-        for kept in promised.values():
-            failed = sum(_failed(run, kept[0]) for run in everyone)
-            pair = _Pair(scene, kept[0]["asked"], kept, references, failed)
-            if pair.quantity.signed:
-                raise TableError(f"{pair.quantity.name} may change its sign: it has no promise")
-            yield pair
+        references = [run for run in everyone if run.complete and not run.asked]
+        for asked in _asked(everyone) if references else ():
+            own = [run for run in everyone if run.asked and run.asked.same(asked)]
+            complete = [run for run in own if run.complete]
+            if asked.quantity in signed:
+                raise TableError(f"{asked.quantity} may change its sign: it has no promise")
+            yield _Pair(scene, asked, complete, references, len(own) - len(complete))
 
 
-def _failed(run: Mapping[str, Any], kept: Mapping[str, Any]) -> bool:
-    return not run["complete"] and bool(run.get("asked")) and _promise(run) == _promise(kept)
+def _asked(runs: Iterable[Measures]) -> list[Asked]:
+    """What the complete ones of some runs ask for, each once."""
+    found: list[Asked] = []
+    for run in runs:
+        if run.complete and run.asked and not any(map(run.asked.same, found)):
+            found.append(run.asked)
+    return found
 
 
-def _promise(run: Mapping[str, Any]) -> tuple[str, float]:
-    return str(run["asked"]["quantity"]), float(run["asked"]["tolerance"])
-
-
-def _by_scene(
-    runs: Sequence[Mapping[str, Any]],
-) -> Iterator[tuple[dict[str, str], list[Mapping[str, Any]]]]:
+def _by_scene(runs: Sequence[Measures]) -> Iterator[tuple[dict[str, str], list[Measures]]]:
     """The inputs that tell a scene from the others, and its runs, failed ones included."""
-    scenes: dict[Scene, list[Mapping[str, Any]]] = {}
+    scenes: dict[Scene, list[Measures]] = {}
     for run in runs:
         scenes.setdefault(_scene(run), []).append(run)
     common = set.intersection(*map(set, scenes)) if len(scenes) > 1 else set()
@@ -218,27 +200,28 @@ def _by_scene(
         yield dict(item for item in key if item not in common), own
 
 
-def failures(files: Sequence[Path]) -> list[FailedRun]:
+def failures(runs: Sequence[Measures]) -> list[FailedRun]:
     """The runs that failed."""
     return [
         FailedRun(
             scene=scene,
-            asked=bool(run.get("asked")),
-            **{name: run["fidelity"][name] for name in PARAMETERS},
-            check=run["failure"][0]["name"],
-            seen=run["failure"][0]["seen"],
+            asked=run.asked is not None,
+            **Setting.of(run.fidelity).parameters(),
+            check=run.failure[0].name,
+            seen=run.failure[0].seen,
         )
-        for scene, runs in _by_scene([read_measures(file) for file in files])
-        for run in runs
-        if not run["complete"]
+        for scene, everyone in _by_scene(runs)
+        for run in everyone
+        if not run.complete
     ]
 
 
-def _scene(measures: Mapping[str, Any]) -> Scene:
-    inputs = measures["inputs"].items()
+def _scene(measures: Measures) -> Scene:
     return tuple(
         sorted(
-            (name, str(value)) for name, value in inputs if name not in SILENT and value is not None
+            (name, str(value))
+            for name, value in measures.inputs.items()
+            if name not in SILENT and value is not None
         )
     )
 
@@ -248,15 +231,15 @@ def _promise_of(pair: _Pair, scatter: float, degrees: int) -> Promise:
     difference = float(own.mean() - references.mean())
     uncertainty = scatter * math.sqrt(1 / len(own) + 1 / len(references))
     error = relative_error(difference, uncertainty, degrees)
-    tolerance = float(pair.asked["tolerance"])
-    held_to = float(pair.asked.get("held_to", tolerance))
+    tolerance = pair.asked.tolerance
+    held_to = tolerance if pair.asked.held_to is None else pair.asked.held_to
     return Promise(
         scene=pair.scene,
-        numbers=pair.own[0]["numbers"],
-        quantity=pair.quantity.name,
+        numbers=pair.own[0].numbers,
+        quantity=pair.asked.quantity,
         tolerance=tolerance,
         held_to=held_to,
-        **{name: float(pair.own[0]["fidelity"][name]) for name in PARAMETERS},
+        **Setting.of(pair.own[0].fidelity).parameters(),
         runs=len(own),
         failed=pair.failed,
         reference_runs=len(references),
@@ -268,9 +251,10 @@ def _promise_of(pair: _Pair, scatter: float, degrees: int) -> Promise:
 
 def write_promises(out_dir: Path, files: Sequence[Path]) -> list[Promise]:
     """Write ``promises.json`` and ``promises.csv`` and return what they hold."""
-    promises = check_promises(files)
-    failed = tuple(failures(files))
-    PromisesFile(promises=tuple(promises), failed=failed).write(out_dir / "promises.json")
+    runs = [Measures.read(file) for file in files]
+    promises = check_promises(runs)
+    document = PromisesFile(promises=tuple(promises), failed=tuple(failures(runs)))
+    document.write(out_dir / "promises.json")
     table = pd.DataFrame([_columns(promise) for promise in promises])
     write_text(out_dir / "promises.csv", table.to_csv(index=False))
     return promises

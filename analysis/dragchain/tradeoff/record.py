@@ -2,36 +2,21 @@
 
 from __future__ import annotations
 
-import math
 import os
 import platform
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, PlainSerializer
 
 from dragchain.documents import Document, Part
-from dragchain.tradeoff.compare import PARAMETERS, Comparison, Error, Setting, Tradeoff, breaks
-from dragchain.tradeoff.findings import CostEntry, Costs, Drop
+from dragchain.tradeoff.compare import Comparison
+from dragchain.tradeoff.costs import CostEntry, Costs
+from dragchain.tradeoff.drops import Drop
+from dragchain.tradeoff.outcome import Tradeoff, breaks
 from dragchain.tradeoff.promises import Promise
-from dragchain.tradeoff.words import long_label
-
-
-def _finite(value: object) -> object:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _six_digits(value: float | None) -> float | None:
-    return None if value is None else float(f"{value:.6g}")
-
-
-Number = Annotated[
-    float | None, BeforeValidator(_finite), PlainSerializer(_six_digits, when_used="json")
-]
-"""A number that is written with six digits; None where there is none."""
+from dragchain.tradeoff.runs import Setting
+from dragchain.tradeoff.six_digits import Number
 
 
 class Machine(Part):
@@ -93,19 +78,6 @@ class DropEntry(Part):
     relative_cost: Number
 
 
-class CostRecord(CostEntry):
-    """A cost as it was timed side by side."""
-
-    ratio: Number
-    ci95_low: Number
-    ci95_high: Number
-    per_step: Number = None
-    per_second: Number = None
-    wall_ratio: Number = None
-    timestep_s: Number = None
-    level: Number = None
-
-
 class PromiseEntry(Part):
     """A scene in which the advisor was tested: its numbers, and whether the error was met."""
 
@@ -132,28 +104,8 @@ class TradeoffRecord(Document):
     quantities: Mapping[str, QuantityEntry]
     settings: tuple[SettingEntry, ...]
     drop_test: tuple[DropEntry, ...]
-    costs: tuple[CostRecord, ...]
+    costs: tuple[CostEntry, ...]
     promises: tuple[PromiseEntry, ...]
-
-
-@dataclass(frozen=True)
-class Findings:
-    """All that tables, figures and page are made of.
-
-    Attributes
-    ----------
-    tradeoff : Tradeoff
-    drops : list of Drop
-    costs : Costs
-    promises : sequence of Promise
-    record : TradeoffRecord
-    """
-
-    tradeoff: Tradeoff
-    drops: list[Drop]
-    costs: Costs
-    promises: Sequence[Promise]
-    record: TradeoffRecord
 
 
 def record_of(
@@ -167,13 +119,13 @@ def record_of(
     """The content of ``tradeoff.json``: when, with what and on what was measured, and what."""
     measures = [run.measures for run in tradeoff.runs]
     return TradeoffRecord(
-        measured=max(one["started"] for one in measures)[:10],
+        measured=max(one.started for one in measures)[:10],
         commands=tuple(commands),
         plan=plan,
-        study=_joined(one["study"] for one in measures),
+        study=_joined(one.study for one in measures),
         versions={
             **{
-                name: _joined(one["versions"][name] for one in measures)
+                name: _joined(one.versions[name] for one in measures)
                 for name in ("dragdeck", "engine")
             },
             "python": platform.python_version(),
@@ -181,9 +133,9 @@ def record_of(
         },
         machine=Machine(cores=os.cpu_count(), processor=_processor()),
         runs=len(measures),
-        engine_hours=sum(one["cost"]["cpu_time_s"] for one in measures) / 3600.0,
+        engine_hours=sum(one.cost.cpu_time_s for one in measures) / 3600.0,
         scene=scene_numbers(tradeoff),
-        reference=FidelityParameters(**_parameters(tradeoff.reference)),
+        reference=FidelityParameters(**tradeoff.reference.parameters()),
         quantities={
             name: _quantity_entry(own, tradeoff.arc_m) for name, own in tradeoff.comparisons.items()
         },
@@ -199,7 +151,7 @@ def record_of(
             for drop in drops
             if not drop.other
         ),
-        costs=tuple(CostRecord(**entry.model_dump()) for entry in costs.entries),
+        costs=tuple(costs.entries),
         promises=tuple(PromiseEntry(numbers=one.numbers, met=one.met) for one in promises),
     )
 
@@ -215,19 +167,15 @@ def _processor() -> str:
     return names[0] if names else platform.processor()
 
 
-def scene_numbers(tradeoff: Tradeoff) -> Mapping[str, Any]:
+def scene_numbers(tradeoff: Tradeoff) -> Mapping[str, float]:
     """Dimensionless numbers of the scene, as the runs at the reference have them."""
-    numbers = [run.measures.get("numbers") for run in tradeoff.of(tradeoff.reference)]
+    numbers = [run.measures.numbers for run in tradeoff.of(tradeoff.reference)]
     return next((own for own in numbers if own), {})
-
-
-def _parameters(setting: Setting) -> dict[str, float]:
-    return {name: getattr(setting, name) for name in PARAMETERS}
 
 
 def _quantity_entry(comparison: Comparison, arc_m: float) -> QuantityEntry:
     return QuantityEntry(
-        label=long_label(comparison.quantity),
+        label=comparison.quantity.label,
         unit=comparison.quantity.unit,
         signed=comparison.quantity.signed,
         reference=comparison.reference,
@@ -241,20 +189,19 @@ def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:
     runs = tradeoff.of(setting)
     complete = sum(run.complete for run in runs)
     return SettingEntry(
-        **_parameters(setting),
-        seeds=len({run.measures["inputs"]["seed"] for run in runs}),
+        **setting.parameters(),
+        seeds=len({run.measures.seed for run in runs}),
         runs=len(runs),
         failed=len(runs) - complete,
         arc_m=tradeoff.arc_m * complete,
         breaks=breaks(tradeoff, setting),
         relative_cost=tradeoff.cost(setting),
         errors={
-            name: _error_entry(own.errors[setting], own.alone(setting, tradeoff.reference))
+            name: ErrorEntry(
+                **vars(own.errors[setting]),
+                single_parameter_error=own.alone(setting, tradeoff.reference),
+            )
             for name, own in tradeoff.comparisons.items()
             if setting in own.errors
         },
     )
-
-
-def _error_entry(error: Error, single_parameter_error: float) -> ErrorEntry:
-    return ErrorEntry(**vars(error), single_parameter_error=single_parameter_error)

@@ -11,61 +11,14 @@ from pathlib import Path
 import numpy as np
 from pydantic import JsonValue
 
-from dragchain.documents import Document, Part
 from dragchain.errors import SeriesError, TableError
-from dragchain.run.case import Case, Fidelity, load_case
-from dragchain.statistics.estimate import Estimate, Real, mean_of
-from dragchain.tradeoff.compare import PARAMETERS, SILENT
-from dragchain.tradeoff.measures import FILE
+from dragchain.run.case import Case, load_case
+from dragchain.statistics.estimate import Estimate, mean_of
+from dragchain.tradeoff.measures import FILE, Measures
+from dragchain.tradeoff.runs import changed_settings
 
 FEWEST = 2
 """Packings below which nothing is known of the differences between them."""
-
-
-class Cost(Part):
-    """Steps and processor time of a run."""
-
-    steps: int
-    cpu_time_s: float
-
-
-class Measures(Document):
-    """What a validation reads of a run's ``measures.json``; a failed run has no `arc_m`.
-
-    Attributes
-    ----------
-    numbers : mapping
-        Dimensionless numbers of the scene.
-    arc_m : float
-        Counted path.
-    single : mapping
-        Quantities of the bed, ``bed_height`` among them.
-    """
-
-    made_by = "dragchain step measure"
-
-    inputs: Mapping[str, JsonValue]
-    fidelity: Fidelity
-    numbers: Mapping[str, float] = {}
-    complete: bool
-    cost: Cost
-    versions: Mapping[str, str]
-    started: str
-    arc_m: float = math.nan
-    single: Mapping[str, Real] = {}
-
-    @property
-    def compared_inputs(self) -> dict[str, JsonValue]:
-        """Inputs by dotted name, without those that make no other setting."""
-        silent = {*SILENT, "fidelity.name", *(f"fidelity.{name}" for name in PARAMETERS)}
-        inputs = {**self.inputs, **{f"fidelity.{name}": value for name, value in self.fidelity}}
-        return {name: value for name, value in inputs.items() if name not in silent}
-
-    def changed_from(self, other: Measures) -> dict[str, JsonValue]:
-        """Inputs, by dotted name, that differ from another run's, with this run's values."""
-        own, others = self.compared_inputs, other.compared_inputs
-        names = sorted({*own, *others})
-        return {name: own.get(name) for name in names if own.get(name) != others.get(name)}
 
 
 @dataclass(frozen=True)
@@ -95,9 +48,7 @@ class Point:
     @property
     def seed(self) -> int:
         """Seed of its bed."""
-        seed = self.measures.inputs["seed"]
-        assert isinstance(seed, int)
-        return seed
+        return self.measures.seed
 
     @property
     def setting(self) -> tuple[object, ...]:
@@ -146,7 +97,7 @@ def read_points(folders: Sequence[Path]) -> Points:
     if not standard.complete:
         raise TableError(f"{folders[0]}: the reference run is not complete, so nothing is known")
     first, *points = (
-        Point(folder, load_case(folder), own, own.changed_from(standard))
+        Point(folder, load_case(folder), own, changed_settings(own, standard))
         for folder, own in measures.items()
         if own.complete
     )

@@ -21,6 +21,7 @@ from dragchain.report.page import (
     sections,
     slug,
 )
+from dragchain.tradeoff.notation import FILTERS
 
 FOLDER = Path(dragchain.__file__).parent
 TEMPLATES = sorted(file.relative_to(FOLDER).as_posix() for file in FOLDER.rglob("*.html.j2"))
@@ -84,8 +85,8 @@ def test_a_page_that_leaves_out_a_block_is_refused(block: str) -> None:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_every_page_packings_the_frame(name: str) -> None:
-    template = page_environment({"in_percent": str, "plainly": str, "quantity": str,
-                                 "setting": str}).get_template(name)  # fmt: skip
+    environment = page_environment({**FILTERS, "quantity": str, "setting": str})
+    template = environment.get_template(name)
     assert {"title", "lead", "says", "body"} <= set(template.blocks)
     source = (FOLDER / name).read_text(encoding="utf-8")
     assert source.startswith('{% extends "report/page.html.j2" %}')

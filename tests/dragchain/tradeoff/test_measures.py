@@ -11,14 +11,22 @@ import numpy as np
 import pytest
 
 from dragchain.errors import TableError
-from dragchain.files import write_json
-from dragchain.network.write import write_chains
-from dragchain.run.case import load_case
-from dragchain.tables.write import write_tables
-from dragchain.tradeoff.measures import QUANTITIES, _Path, band, measure, write_measures
+from dragchain.run.completeness import AcceptanceCheck
+from dragchain.tables.bed import Packing
+from dragchain.tradeoff.measures import Measures, write_measures
+from dragchain.tradeoff.path_blocks import CountedPath, band
+from dragchain.tradeoff.quantities import QUANTITIES
 
 SPACING, COUNT = 0.1, 600
-BED = {"bed_height_m": 0.07, "solid_fraction": 0.6}
+BED = Packing(
+    bed_height_m=0.07,
+    top_m=0.08,
+    solid_fraction=0.6,
+    n_particles=4,
+    radius_mean_m=0.003,
+    radius_std_m=0.0,
+    kinetic_energy_ratio=0.0,
+)
 
 
 def series() -> np.ndarray:
@@ -58,7 +66,7 @@ def test_a_mean_belongs_to_the_longest_waves() -> None:
     assert band(wave(5.0) + 3.0, SPACING, 0.0, 2.0) == pytest.approx(0.0, abs=1e-12)
 
 
-PATH = _Path(first_step=100, last_step=500, length_m=0.04, diameter_m=0.01, blocks=4)
+PATH = CountedPath(first_step=100, last_step=500, length_m=0.04, diameter_m=0.01, blocks=4)
 
 
 def test_a_step_belongs_to_the_block_that_it_ends_in() -> None:
@@ -87,59 +95,57 @@ def test_squares_are_rooted_after_their_mean() -> None:
     assert named["drag_std"].of_blocks(blocks) == 2.0
 
 
+OUTCOME = {
+    "schema": 2, "state": "complete", "checks": [], "steps": 50, "wall_time_s": 2.0, "ranks": 2,
+    "engine_version": "3.8.0", "started": "2026-01-01T00:00:00+00:00",
+}  # fmt: skip
+
+
+def measured(folder: Path, **outcome: object) -> Measures:
+    """The measures of the tiny run as they are read from their file."""
+    (folder / "outcome.json").write_text(json.dumps(OUTCOME | outcome))
+    (folder / "packing.json").write_text(BED.as_text())
+    found = write_measures(folder, folder / "packing.json")
+    assert Measures.read(folder / "measures.json") == found
+    return found
+
+
 def test_a_run_by_hand(tiny_run: Path) -> None:
     """One contact of (4 N + 1e5 N/m workpiece_x) / 3, seven frames and 31 samples of the force."""
-    write_tables(tiny_run)
-    write_chains(tiny_run)
-    found = measure(tiny_run, load_case(tiny_run), BED)
-    blocks = {name: values[0] for name, values in found["blocks"].items()}
-    assert set(blocks) | set(found["single"]) == {quantity.name for quantity in QUANTITIES}
-    assert found["arc_m"] == pytest.approx(6.2e-6) and found["block_m"] == found["arc_m"]
+    found = measured(tiny_run)
+    blocks = {name: values[0] for name, values in found.blocks.items()}
+    assert set(blocks) | set(found.single) == {quantity.name for quantity in QUANTITIES}
+    assert found.arc_m == pytest.approx(6.2e-6) and found.block_m == found.arc_m
     assert blocks["drag_mean"] == pytest.approx(-1.5)
     assert blocks["drag_std"] == pytest.approx((31**2 - 1) / 12 / 150**2)
-    bands = sum(blocks[f"drag_std_{name}"] for name in ("long", "middle", "short"))
-    assert bands == pytest.approx(blocks["drag_std"])
+    bands = [blocks[f"drag_std_{name}"] for name in ("long", "middle", "short")]
+    assert math.fsum(one or 0.0 for one in bands) == pytest.approx(blocks["drag_std"])
     assert blocks["workpiece_contacts"] == 1.0
     assert blocks["contact_force_mean"] == pytest.approx(1.5)
     assert blocks["contact_force_p50"] == pytest.approx(1.5)
     assert blocks["contact_force_p90"] == pytest.approx(1.58)
-    assert sum(found["force_histogram"]) == 7
+    assert sum(found.force_histogram) == 7
     assert blocks["chain_count"] == 0.0 and blocks["chain_length"] is None
-    assert found["single"] == {"bed_height": 0.07, "solid_fraction": 0.6}
-    write_json(tiny_run / "measures.json", found)  # has no NaN, which JSON cannot hold
+    assert found.single == {"bed_height": 0.07, "solid_fraction": 0.6}
 
 
 def test_a_failed_run_says_only_how_it_failed(tiny_run: Path) -> None:
+    limits = AcceptanceCheck(
+        code="within_limits", name="within its limits", passed=False, seen="3 m/s", limit="1"
+    )
     checks = [
-        {
-            "code": "particles_kept",
-            "reason": None,
-            "name": "every particle kept",
-            "passed": False,
-            "seen": "3 particles",
-            "limit": "4",
-        },
-        {
-            "code": "finite_numbers",
-            "reason": None,
-            "name": "finite numbers",
-            "passed": True,
-            "seen": "all",
-            "limit": "no NaN",
-        },
-    ]
-    outcome = {
-        "schema": 2,
-        "state": "failed", "checks": checks, "steps": 50, "wall_time_s": 2.0, "ranks": 2,
-        "engine_version": "3.8.0", "started": "2026-01-01T00:00:00+00:00",
-    }  # fmt: skip
-    (tiny_run / "outcome.json").write_text(json.dumps(outcome))
-    (tiny_run / "packing.json").write_text(json.dumps(BED))
-    found = write_measures(tiny_run, tiny_run / "packing.json")
-    assert json.loads((tiny_run / "measures.json").read_text()) == found
-    assert not found["complete"] and found["failure"] == checks[:1] and "blocks" not in found
-    assert found["cost"]["cpu_time_s"] == 4.0
-    assert found["cost"]["steps_per_m"] == pytest.approx(1.0 / (1e-4 * 1e-3))
+        {"code": "particles_kept", "name": "every particle kept", "passed": False,
+         "seen": "3 particles", "limit": "4"},
+        {"code": "finite_numbers", "name": "finite numbers", "passed": True, "seen": "all",
+         "limit": "no NaN"},
+        limits.model_dump(),
+    ]  # fmt: skip
+    found = measured(tiny_run, state="failed", checks=checks)
+    assert not found.complete and not found.blocks
+    assert [check.code for check in found.failure] == ["particles_kept", "within_limits"]
+    assert found.telling_failure == limits
+    assert found.cost.cpu_time_s == 4.0
+    assert found.cost.steps_per_m == pytest.approx(1.0 / (1e-4 * 1e-3))
 
 
 def test_a_run_without_outcome_is_refused(tiny_run: Path) -> None:

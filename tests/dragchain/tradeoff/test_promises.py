@@ -12,9 +12,14 @@ from tradeoff_files import measures, write
 
 from dragchain.errors import TableError
 from dragchain.tradeoff.compare import Error
+from dragchain.tradeoff.measures import Measures
 from dragchain.tradeoff.promises import check_promises, failures, verdict, write_promises
 
 FULL, SOFT = (1.0, 0.64, 1.0), (0.01, 0.64, 1.0)
+LOST = {
+    "code": "within_limits", "name": "within its limits", "passed": False, "seen": "1 particle",
+    "limit": "2",
+}  # fmt: skip
 ASKED = {"tolerance": 0.1, "quantity": "drag_mean"}
 
 
@@ -29,10 +34,15 @@ def scene(depth: float, ratio: float, rng: np.random.Generator, runs: int = 6) -
     return [{**run, "asked": None} for run in full] + [{**run, "asked": ASKED} for run in soft]
 
 
+def read(folder: Path, contents: list[Any]) -> list[Measures]:
+    """The measures of runs as they are read from their files."""
+    return [Measures.read(file) for file in write(folder, contents)]
+
+
 def test_promises_are_kept_and_broken_by_their_errors(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
-    files = write(tmp_path, [*scene(0.05, 1.02, rng), *scene(0.03, 1.3, rng)])
-    kept, broken = check_promises(files)
+    runs = read(tmp_path, [*scene(0.05, 1.02, rng), *scene(0.03, 1.3, rng)])
+    kept, broken = check_promises(runs)
     assert (kept.verdict, broken.verdict) == ("kept", "broken")
     assert kept.error.ci95_low < 0.02 < kept.error.ci95_high
     assert broken.error.ci95_low < 0.3 < broken.error.ci95_high
@@ -43,15 +53,15 @@ def test_promises_are_kept_and_broken_by_their_errors(tmp_path: Path) -> None:
 def test_a_promise_kept_by_the_skin_of_its_teeth_is_not_met(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     asked = {**ASKED, "tolerance": 0.2, "held_to": 0.1}
-    runs = [{**run, "asked": run["asked"] and asked} for run in scene(0.05, 1.12, rng)]
-    (check,) = check_promises(write(tmp_path, runs))
+    found = [{**run, "asked": run["asked"] and asked} for run in scene(0.05, 1.12, rng)]
+    (check,) = check_promises(read(tmp_path, found))
     assert check.verdict == "kept" and not check.met
 
 
 def test_few_runs_leave_a_promise_open(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
-    files = write(tmp_path, scene(0.05, 1.08, rng, runs=2))
-    (check,) = check_promises(files)
+    runs = read(tmp_path, scene(0.05, 1.08, rng, runs=2))
+    (check,) = check_promises(runs)
     assert check.verdict == "open"
 
 
@@ -59,27 +69,27 @@ def test_the_interval_holds_the_error_as_often_as_it_says(tmp_path: Path) -> Non
     rng = np.random.default_rng(11)
     held = 0
     for trial in range(120):
-        (check,) = check_promises(write(tmp_path / str(trial), scene(0.05, 1.1, rng, runs=2)))
+        (check,) = check_promises(read(tmp_path / str(trial), scene(0.05, 1.1, rng, runs=2)))
         held += check.error.ci95_low <= 0.1 <= check.error.ci95_high
     assert 107 <= held <= 119  # 114 expected, standard deviation 2.4
 
 
 def test_a_failed_run_does_not_count(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
-    failed = measures(SOFT, 7, rng, failure=[{"name": "within its limits", "seen": "1 particle"}])
+    failed = measures(SOFT, 7, rng, failure=[LOST])
     inputs = {**failed["inputs"], "motion.immersion_depth_m": 0.05}
-    files = write(tmp_path, [*scene(0.05, 1.0, rng), {**failed, "inputs": inputs, "asked": ASKED}])
-    (check,) = check_promises(files)
+    runs = read(tmp_path, [*scene(0.05, 1.0, rng), {**failed, "inputs": inputs, "asked": ASKED}])
+    (check,) = check_promises(runs)
     assert (check.runs, check.failed, check.verdict) == (6, 1, "kept") and not check.met
-    (lost,) = failures(files)
+    (lost,) = failures(runs)
     assert lost.asked and lost.seen == "1 particle"
 
 
 def test_without_full_stiffness_there_is_nothing_to_compare_with(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
-    files = write(tmp_path, [run for run in scene(0.05, 1.0, rng) if run["asked"]])
+    runs = read(tmp_path, [run for run in scene(0.05, 1.0, rng) if run["asked"]])
     with pytest.raises(TableError, match="no run at full stiffness"):
-        check_promises(files)
+        check_promises(runs)
 
 
 def test_what_is_written_can_be_read(tmp_path: Path) -> None:

@@ -16,14 +16,13 @@ from scipy import stats
 from dragchain.errors import DocumentError, SeriesError
 from dragchain.run.case import PublishedDrag, Reference, load_case
 from dragchain.statistics.estimate import Estimate
+from dragchain.tradeoff.measures import Measures, RunCost
 from dragchain.validation import force
 from dragchain.validation.around_workpiece import contacts_of
 from dragchain.validation.claims import verdict
 from dragchain.validation.corridor import Corridor, relative_places
 from dragchain.validation.effects import effect_table, effects
 from dragchain.validation.runs_by_bed import (
-    Cost,
-    Measures,
     Point,
     Points,
     over_packings,
@@ -60,13 +59,24 @@ def made_point(
     )
     modulus, step = parameters
     measures = Measures(
+        study="small",
+        run=folder.name,
+        bed=f"bed-{seed}",
         inputs={"seed": seed, "bowl.radius_m": 0.04, **(varied or {})},
         fidelity=changed(
             case.fidelity, youngs_modulus_scale=modulus, timestep_fraction=step, speed_factor=1.0
         ),
         single={"bed_height": 0.07},
         arc_m=20 * DIAMETER_M,
-        cost=Cost(steps=1000, cpu_time_s=60.0),
+        cost=RunCost(
+            steps=1000,
+            wall_time_s=60.0,
+            cpu_time_s=60.0,
+            ranks=1,
+            timestep_s=1e-6,
+            axis_speed_m_s=0.1,
+            steps_per_m=1e7,
+        ),
         versions={"dragdeck": "1"},
         started="2026-01-01T00:00:00+00:00",
         complete=True,

@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 from networks import R, make_frame, row
 
-from dragchain.network.chains import chain_table, dominant_path, peters_chains, widest_paths
+from dragchain.network.chain_table import chain_table
+from dragchain.network.chains import dominant_path, peters_chains, widest_paths
 from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame
 from dragchain.network.write import write_chains
 from dragchain.tables.write import write_tables

@@ -1,0 +1,222 @@
+"""What a change of a fidelity parameter does: softness by itself, and gains in cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy import stats
+
+from dragchain.statistics.estimate import student_quantile
+from dragchain.tradeoff.compare import Comparison, Error
+from dragchain.tradeoff.outcome import Tradeoff
+from dragchain.tradeoff.quantities import MAIN
+from dragchain.tradeoff.runs import OTHER, Setting
+
+RUINED = 0.1
+"""A resolved error above this ruins a quantity; a bound below it keeps it."""
+
+
+def differing(setting: Setting, base: Setting) -> list[str]:
+    """The factors in which two settings differ."""
+    own, other = setting.factors(), base.factors()
+    return [name for name in own if own[name] != other[name]]
+
+
+def hub(tradeoff: Tradeoff) -> Setting:
+    """The setting that most others differ from in one parameter only: the base of the plan."""
+    settings = [one for one in tradeoff.settings() if not one.other]
+
+    def neighbours(setting: Setting) -> tuple[int, int]:
+        near = sum(len(differing(other, setting)) == 1 for other in settings)
+        return near, len(tradeoff.of(setting))
+
+    return max(settings, key=neighbours)
+
+
+@dataclass(frozen=True)
+class SpeedUp:
+    """Processor time of one setting over another's.
+
+    Attributes
+    ----------
+    ratio : float
+    low, high : float
+        Limits of the interval of `CONFIDENCE` from the scatter between runs;
+        NaN where either has a single run, or where steps were timed side by side.
+    """
+
+    ratio: float
+    ci95_low: float
+    ci95_high: float
+
+
+def speed_up(tradeoff: Tradeoff, setting: Setting, base: Setting) -> SpeedUp:
+    """How many times cheaper a metre of path is; the medians of the runs, as `Tradeoff.cost`."""
+    ratio = tradeoff.cost(base) / tradeoff.cost(setting)
+    logs = [
+        np.log([run.measures.cost.cpu_per_m for run in tradeoff.of(one)]) for one in (setting, base)
+    ]
+    if min(map(len, logs)) < 2 or tradeoff.step_costs is not None:
+        return SpeedUp(ratio, math.nan, math.nan)
+    error = math.hypot(*(float(stats.sem(values)) for values in logs))
+    shift = error * student_quantile(sum(map(len, logs)) - 2)
+    return SpeedUp(ratio, ratio * math.exp(-shift), ratio * math.exp(shift))
+
+
+@dataclass(frozen=True)
+class Softness:
+    """What a modulus does to a quantity.
+
+    Attributes
+    ----------
+    level : float
+        The modulus scale.
+    error : Error
+    mixed : str
+        What else changed because the runs cannot tell it apart; "" if nothing.
+    """
+
+    level: float
+    error: Error
+    mixed: str
+
+    @property
+    def verdict(self) -> Literal["ruined", "kept", "open"]:
+        """``ruined``, ``kept`` or ``open``."""
+        if self.error.significant and abs(self.error.value) > RUINED:
+            return "ruined"
+        return "kept" if self.error.bound <= RUINED else "open"
+
+
+def modulus_levels(tradeoff: Tradeoff) -> list[float]:
+    """Modulus scales other than the reference's, the stiffest first."""
+    own = {setting.youngs_modulus_scale for setting in tradeoff.settings()}
+    return sorted(own - {tradeoff.reference.youngs_modulus_scale}, reverse=True)
+
+
+def softness(tradeoff: Tradeoff, comparison: Comparison, level: float) -> Softness | None:
+    """The effect of a modulus by itself, or with as little else as was run.
+
+    None if no complete run at that modulus has the quantity.
+    """
+    stiff = tradeoff.reference.youngs_modulus_scale
+    for base in (tradeoff.reference, hub(tradeoff)):
+        error = comparison.between(
+            replace(base, youngs_modulus_scale=level), replace(base, youngs_modulus_scale=stiff)
+        )
+        if error is not None:
+            return Softness(level, error, "")
+    own = [one for one in comparison.errors if one.youngs_modulus_scale == level and not one.other]
+    if not own:
+        return None
+    nearest = min(
+        own,
+        key=lambda one: (
+            len(differing(one, tradeoff.reference)),
+            len(differing(one, hub(tradeoff))),
+            -len(tradeoff.of(one)),
+        ),
+    )
+    return Softness(level, comparison.errors[nearest], str(nearest))
+
+
+@dataclass(frozen=True)
+class Verdicts:
+    """What a modulus does to the quantities: their labels by verdict."""
+
+    level: float
+    ruined: list[str]
+    kept: list[str]
+    open: list[str]
+
+
+def verdicts(tradeoff: Tradeoff) -> list[Verdicts]:
+    """For each modulus what it ruins, what it keeps, and what the runs cannot decide."""
+    rows = [Verdicts(level, [], [], []) for level in modulus_levels(tradeoff)]
+    for row in rows:
+        for comparison in tradeoff.comparisons.values():
+            soft = softness(tradeoff, comparison, row.level)
+            if soft is not None:
+                getattr(row, soft.verdict).append(comparison.quantity.label)
+    return rows
+
+
+@dataclass(frozen=True)
+class Gain:
+    """One setting against another that differs from it.
+
+    Attributes
+    ----------
+    setting, base : Setting
+    factors : list of str
+        In which they differ.
+    speed_up : SpeedUp
+    errors : dict of str to Error
+        Main quantity to what the change does to it.
+    product : float
+        Of the gains of the single changes; NaN for a single one, or where one was not run.
+    """
+
+    setting: Setting
+    base: Setting
+    factors: list[str]
+    speed_up: SpeedUp
+    errors: Mapping[str, Error]
+    product: float
+
+    @property
+    def single(self) -> bool:
+        """Whether they differ in one factor alone."""
+        return len(self.factors) == 1
+
+    @property
+    def levels(self) -> tuple[object, object]:
+        """Of its first factor, in the base and in the setting."""
+        name = self.factors[0]
+        return getattr(self.base, name), getattr(self.setting, name)
+
+
+def gains(tradeoff: Tradeoff) -> list[Gain]:
+    """Every change of the reference and of the hub whose single changes were all run.
+
+    The hub against the reference is among them in any case, and whatever is no parameter
+    against the same setting without it.
+    """
+    centre = hub(tradeoff)
+    found: list[Gain] = []
+    for base in dict.fromkeys((tradeoff.reference, centre)):
+        for setting in tradeoff.settings():
+            factors = differing(setting, base)
+            singles = [replace(base, **{name: getattr(setting, name)}) for name in factors]
+            told = setting == centre or all(map(tradeoff.of, singles))
+            if factors and setting != tradeoff.reference and told:
+                found.append(_gain(tradeoff, setting, base, factors, singles))
+    for setting in tradeoff.settings():
+        base = replace(setting, other="")
+        if setting.other and base not in (tradeoff.reference, centre) and tradeoff.of(base):
+            found.append(_gain(tradeoff, setting, base, [OTHER], [setting]))
+    names = list(tradeoff.reference.factors())
+    return sorted(found, key=lambda gain: [names.index(name) for name in gain.factors])
+
+
+def _gain(
+    tradeoff: Tradeoff,
+    setting: Setting,
+    base: Setting,
+    factors: list[str],
+    singles: Sequence[Setting],
+) -> Gain:
+    errors = {
+        name: error
+        for name in MAIN
+        if name in tradeoff.comparisons
+        and (error := tradeoff.comparisons[name].between(setting, base)) is not None
+    }
+    product = math.nan
+    if len(factors) > 1 and all(map(tradeoff.of, singles)):
+        product = math.prod(speed_up(tradeoff, one, base).ratio for one in singles)
+    return Gain(setting, base, factors, speed_up(tradeoff, setting, base), errors, product)

@@ -1,0 +1,64 @@
+"""What a run knows along its path, on measures whose effects are known."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tradeoff_files import measures
+from tradeoff_runs import REFERENCE, SOFT, contents, made
+
+from dragchain.tradeoff.outcome import Tradeoff
+from dragchain.tradeoff.path_length import along, coverage, reaches
+
+
+@pytest.fixture
+def tradeoff(tmp_path: Path) -> Tradeoff:
+    return made(tmp_path, contents())
+
+
+def test_reach_falls_with_the_root_of_the_path(tradeoff: Tradeoff) -> None:
+    (reach,) = (one for one in reaches(tradeoff) if one.quantity.name == "drag_mean")
+    assert reach.at(4.0 * reach.arc_m) == pytest.approx(0.5 * reach.halfwidth)
+    assert reach.at(reach.path_m(0.05)) == pytest.approx(0.05)
+    assert reach.seeds(reach.halfwidth / 2.01) == 5
+    assert "bed_height" not in [one.quantity.name for one in reaches(tradeoff)]
+
+
+def test_a_drift_along_the_path_is_seen(tmp_path: Path) -> None:
+    found = contents(noise=0.01)
+    growth = 1.0 + 0.05 * np.arange(8)
+    for content in found:
+        blocks = content["blocks"]
+        blocks["workpiece_contacts"] = list(growth * blocks["workpiece_contacts"])
+        blocks["drag_std"] = list(growth**2 * blocks["drag_std"])
+        blocks["lateral_mean"] = list(2.6 * growth + blocks["lateral_mean"])
+    tradeoff = made(tmp_path, found)
+    seen = {name: along(tradeoff, own.quantity) for name, own in tradeoff.comparisons.items()}
+    for name, drift in (
+        ("drag_mean", 0.0),
+        ("workpiece_contacts", 0.2 / 1.175),
+        ("drag_std", (math.sqrt(1.275**2 + 0.0031) - math.sqrt(1.075**2 + 0.0031)) / 1.18),
+        ("lateral_mean", 0.2),
+    ):
+        own = seen[name]
+        assert own is not None and own.runs == len(found)
+        assert own.drift == pytest.approx(drift, abs=0.02)
+        assert (own.drift > own.drift_halfwidth) == (drift > 0.0)
+
+
+def test_the_coverage_of_the_plan_is_found_by_simulation(tradeoff: Tradeoff) -> None:
+    found = coverage(tradeoff, "drag_mean", trials=60)
+    assert found is not None and 0.85 < found < 1.0
+    assert coverage(tradeoff, "drag_mean", trials=60) == found
+    assert coverage(tradeoff, "no such quantity", trials=1) is None
+
+
+def test_long_runs_do_not_change_how_often_an_interval_holds_the_truth(tmp_path: Path) -> None:
+    rng = np.random.default_rng(13)
+    found = [measures(REFERENCE, seed, rng) for seed in (1, 2, 3, 4)]
+    found += [measures(SOFT, seed, rng, blocks=17) for seed in (1, 2, 3, 4)]
+    held = coverage(made(tmp_path, found), "drag_mean", trials=60)
+    assert held is not None and 0.85 <= held <= 1.0
