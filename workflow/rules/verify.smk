@@ -55,9 +55,7 @@ rule run_verification:
 rule judge_verification:
     input:
         [of_experiment(run, "run.json") for run in VERIFICATION_RUNS],
-        templates=page_templates(
-            "verification/verification.html.j2", "verification/tests.html.j2"
-        ),
+        templates=page_templates("verification/verification.html.j2", "verification/tests.html.j2"),
         published="analysis/dragchain/verification/published.csv",
     output:
         multiext(
