@@ -1,4 +1,4 @@
-"""The JSON documents between the packages: their schemas, and that each is read as it is written."""
+"""The documents between the packages: their schemas, and that each is read as written."""
 
 from __future__ import annotations
 

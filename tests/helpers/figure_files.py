@@ -33,7 +33,9 @@ def case_json(scene_name: str) -> dict[str, Any]:
                  "immersion_depth_m": 0.02},
 
                "surface_m": 0.03,
-        "motion": {"kind": "line", "axis_speed_m_s": 0.1, "start_m": [-0.01, 0.0], "direction_rad": 0.0},
+        "motion": {
+            "kind": "line", "axis_speed_m_s": 0.1, "start_m": [-0.01, 0.0], "direction_rad": 0.0,
+        },
         "phases": [
             {"name": "plunge", "start_step": 0, "end_step": DRAG_START},
             {"name": "drag", "start_step": DRAG_START, "end_step": LAST},

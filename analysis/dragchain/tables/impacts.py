@@ -30,9 +30,7 @@ def speed_at_plate(speed_m_s: Floats, gap_m: Floats, gravity_m_s2: float) -> Flo
     return np.asarray(np.sqrt(np.square(speed_m_s) + 2 * gravity_m_s2 * np.asarray(gap_m)))
 
 
-def find_impacts(
-    rows: Columns, timestep_s: float, radius_m: float, gravity_m_s2: float
-) -> Rows:
+def find_impacts(rows: Columns, timestep_s: float, radius_m: float, gravity_m_s2: float) -> Rows:
     """Measure every impact in the samples around them.
 
     The samples are split where steps are missing. In each stretch an impact is

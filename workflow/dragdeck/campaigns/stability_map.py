@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal
 
 import jinja2
-from pydantic import Field, ValidationError, computed_field, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
@@ -102,6 +102,8 @@ class Point(Part):
     axis : str
         The setting that differs from the base point: ``base``, the name of an
         axis, or ``more``.
+    condition : str
+        Name of all but the step: 8 hex digits.
     settings : mapping
         All settings but the step.
     fraction : float
@@ -112,15 +114,10 @@ class Point(Part):
 
     regime: Regime
     axis: str
+    condition: str
     settings: Settings
     fraction: float
     reference: bool
-
-    @computed_field  # type: ignore[prop-decorator]
-    @property
-    def condition(self) -> str:
-        """Name of all but the step: 8 hex digits."""
-        return _digest({"regime": self.regime, **self.settings})
 
     @property
     def name(self) -> str:
@@ -204,6 +201,7 @@ def _points(plan: _Plan, regime: Regime) -> Iterator[Point]:
             point = Point(
                 regime=regime,
                 axis=axis,
+                condition=_digest({"regime": regime, **settings}),
                 settings=settings,
                 fraction=fraction,
                 reference=reference,
