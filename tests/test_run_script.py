@@ -117,7 +117,7 @@ class Machine:
         self, *arguments: str, cwd: Path | None = None, script: str = "run", **settings: str
     ) -> subprocess.CompletedProcess[str]:
         self.log.touch()
-        fakes = {"LOG": self.log, "WORKPIECE": self.bin / "tool", "BIN": self.bin}
+        fakes = {"LOG": self.log, "TOOL": self.bin / "tool", "BIN": self.bin}
         environment = {"PATH": str(self.bin), "HOME": str(self.clone)}
         environment |= {f"FAKE_{name}": str(path) for name, path in fakes.items()}
         return subprocess.run(
