@@ -65,17 +65,6 @@ class Chains(Part):
     dominant_azimuth_resultant: Real
 
 
-class ChainsAgainstDrag(Part):
-    """Spearman's correlation of resistance and dominant bottleneck over the network frames."""
-
-    rank_correlation: Real
-    p_value: Real
-    frames: int
-    frames_at_peaks: int
-    bottleneck_at_peaks_mean_n: Real
-    bottleneck_elsewhere_mean_n: Real
-
-
 class AheadBehind(Part):
     """Normal force within 90 degrees of the direction of motion and beyond, mean of a frame."""
 
@@ -129,7 +118,6 @@ class ProcessFindings(Findings):
     peaks: Peaks
     network: Mapping[str, int | Real]
     chains: Chains
-    association: ChainsAgainstDrag
     confidence: float
     workpiece_frames: int
     ahead_behind: AheadBehind
