@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import ClassVar, Literal
 
 from dragchain.documents import Document, Part
 from dragchain.statistics.correlated import MeanEstimate
-from dragchain.statistics.estimate import Estimate, EstimateColumns, Real, finite
+from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 
 FILE = Path("tables") / "figures.json"
 
@@ -159,9 +158,3 @@ class DropFindings(Findings):
     scene: Literal["drop_test"] = "drop_test"
     restitution: DropRestitution
     impacts: DropImpacts
-
-
-def mean_numbers(estimate: MeanEstimate) -> dict[str, float | bool | None]:
-    """All that is known of a mean by name, None where a number is not finite."""
-    known = asdict(estimate)
-    return {name: finite(value) if name != "reliable" else value for name, value in known.items()}
