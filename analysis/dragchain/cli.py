@@ -85,7 +85,7 @@ COMMANDS = (
 
 STEPS = (
     Command("measure", "tables, chains and measures of a run of a plan",
-            "tradeoff.measures:write_measures", (
+            "tradeoff.measure_run:write_measures", (
                 RUN_DIR,
                 _argument("--packing", type=Path, required=True, dest="packing_table",
                           help="packing.json of its bed"))),

@@ -24,7 +24,14 @@ WRITERS = {
     "stability": "dragchain.stability.document:StabilityFile",
     "scaling": "dragchain.scaling.document:ScalingFile",
     "calibration": "dragchain.calibration.results:CalibrationFile",
-    "drops": "dragdeck.campaigns.restitution_drops:DropsFile",
+    "measures": "dragchain.tradeoff.measures:Measures",
+    "promises": "dragchain.tradeoff.promises:PromisesFile",
+    "tradeoff": "dragchain.tradeoff.record:TradeoffRecord",
+    "advice": "dragdeck.advice.forecast:AdviceFile",
+    "loading": "dragchain.loading.document:Loading",
+    "figures.drop_test": "dragchain.report.findings:DropFindings",
+    "figures.filling": "dragchain.report.findings:FillingFindings",
+    "figures.process": "dragchain.report.findings:ProcessFindings",
 }
 """Name of the document: ``module:Class`` of the model that writes it."""
 
@@ -38,12 +45,16 @@ READERS = {
     "case.column": ["dragchain.run.case:Case"],
     "case.impact": ["dragchain.run.case:Case"],
     "stability": ["dragdeck.outlook.measured:StabilityMap"],
-    "drops": ["dragchain.calibration.simulated_drops:DropTest"],
+    "drops": [
+        "dragchain.calibration.simulated_drops:DropTest",
+        "dragchain.calibration.simulated_drops:DropsFile",
+    ],
     "points": ["dragchain.stability.points:PointList"],
-    "costs": ["dragchain.tradeoff.findings:CostsFile"],
+    "costs": ["dragchain.tradeoff.costs:CostsFile"],
     "packing": ["dragdeck.scenes.scene:PackingFile"],
     "calibration": ["dragdeck.campaigns.restitution_drops:FitFile"],
-    "drops": ["dragchain.calibration.simulated_drops:DropsFile"],
+    "tradeoff": ["dragdeck.outlook.measured:Tradeoff"],
+    "advice": ["dragchain.report.cost_check:Advice"],
 }
 """Models of the other package, which name what they read of a document."""
 

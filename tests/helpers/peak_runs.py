@@ -10,7 +10,8 @@ import pandas as pd
 from dragchain.arrays import Floats
 from dragchain.validation.peaks.findings import Findings, study_of
 from dragchain.validation.peaks.lifetimes import lives
-from dragchain.validation.peaks.runs import RunSeries, peak_table
+from dragchain.validation.peaks.run_series import RunSeries
+from dragchain.validation.peaks.runs import peak_table
 from dragchain.validation.peaks.settings import SETTINGS
 
 FRAMES = 400

@@ -15,7 +15,6 @@ from dragchain.report.findings import (
     AheadBehind,
     AzimuthProfile,
     Chains,
-    ChainsAgainstDrag,
     Comparison,
     DepthProfile,
     DropFindings,
@@ -105,9 +104,6 @@ def process_findings(drag: float = -2.5) -> ProcessFindings:
         peaks=Peaks(count=4, process_time_s=(), drag_n=(), largest_n=-3.9, separation_s=0.1),
         network=dict.fromkeys(network, 4.5) | {"frames": 31},
         chains=Chains.model_validate(numbers),
-        association=ChainsAgainstDrag(
-            rank_correlation=0.4, p_value=0.2, frames=31, frames_at_peaks=4,
-            bottleneck_at_peaks_mean_n=1.0, bottleneck_elsewhere_mean_n=1.0),
         ahead_behind=AheadBehind(
             ahead_n=known(1.0), behind_n=known(1.0), ratio=known(math.nan),
             fraction_ahead=known(1.0)),

@@ -148,7 +148,7 @@ rule measure_point:
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragchain.tradeoff.measures"),
+        source=source_hash("dragchain.tradeoff.measure_run"),
     shell:
         "dragchain step measure $(dirname {output}) --packing {input.bed} > {log} 2>&1"
 

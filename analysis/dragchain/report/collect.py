@@ -7,7 +7,7 @@ from dataclasses import asdict
 import numpy as np
 import pandas as pd
 
-from dragchain.arrays import Floats, Ints
+from dragchain.arrays import Ints
 from dragchain.drag.around import ahead_behind, azimuth_profile, depth_profile, depth_slope
 from dragchain.drag.force import read_counted, summarise_forces
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
@@ -16,7 +16,6 @@ from dragchain.report.findings import (
     AheadBehind,
     AzimuthProfile,
     Chains,
-    ChainsAgainstDrag,
     Comparison,
     DepthProfile,
     DropFindings,
@@ -31,7 +30,6 @@ from dragchain.report.run_data import RunData
 from dragchain.run.case import load_outputs
 from dragchain.run.kinematics import drag_start_s
 from dragchain.run.reference import ReferenceDrag, reference_drags
-from dragchain.statistics.association import association, near_any
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, EstimateColumns
 from dragchain.tables.bed import Packing
@@ -60,8 +58,6 @@ def write_findings(run: RunData) -> Findings:
 def _process(run: RunData) -> ProcessFindings:
     samples = read_counted(run.folder, ("step", "time_s", "drag_n"))
     forces = summarise_forces(run.folder)
-    peaks_s, peaks = _peaks(samples, run)
-    link = _association(samples, run, peaks_s)
     frame, frames, contacts = _workpiece_contacts(run, samples)
     azimuth, depth, force = (
         contacts[name].to_numpy(np.float64) for name in ("azimuth_rad", "depth_m", "normal_force_n")
@@ -76,10 +72,9 @@ def _process(run: RunData) -> ProcessFindings:
             compare(forces["drag_n"], reference)
             for reference in reference_drags(run.case.reference)
         ),
-        peaks=peaks,
+        peaks=_peaks(samples, run),
         network={"frames": len(run.network)} | _means(run.network),
         chains=_chains(run.chains, len(run.network)),
-        association=link,
         confidence=CONFIDENCE,
         workpiece_frames=frames,
         ahead_behind=AheadBehind(**ahead_behind(frame, frames, azimuth, force)),
@@ -107,8 +102,7 @@ def compare(ours: MeanEstimate, reference: ReferenceDrag) -> Comparison:
     )
 
 
-def _peaks(samples: pd.DataFrame, run: RunData) -> tuple[Floats, Peaks]:
-    """Simulated times of the peaks, and the peaks."""
+def _peaks(samples: pd.DataFrame, run: RunData) -> Peaks:
     separation = peak_separation_s(run.case)
     peaks = find_drag_peaks(
         samples["time_s"].to_numpy(np.float64),
@@ -116,7 +110,7 @@ def _peaks(samples: pd.DataFrame, run: RunData) -> tuple[Floats, Peaks]:
         min_separation_s=separation,
     )
     process_s = peaks.time_s - drag_start_s(run.case)
-    return peaks.time_s, Peaks(
+    return Peaks(
         count=len(peaks.index),
         process_time_s=tuple(process_s.tolist()),
         drag_n=tuple(peaks.drag_n.tolist()),
@@ -151,25 +145,6 @@ def _chains(chains: pd.DataFrame, frames: int) -> Chains:
         dominant_altitude_std_m=dominant["altitude_m"].std(),
         dominant_azimuth_mean_rad=np.angle(mean_azimuth),
         dominant_azimuth_resultant=np.abs(mean_azimuth),
-    )
-
-
-def _association(samples: pd.DataFrame, run: RunData, peaks_s: Floats) -> ChainsAgainstDrag:
-    bottleneck = run.bottlenecks_n
-    time_s = run.network["time_s"].to_numpy(np.float64)
-    resistance = -np.interp(
-        time_s, samples["time_s"].to_numpy(np.float64), samples["drag_n"].to_numpy(np.float64)
-    )
-    found = association(resistance, bottleneck)
-    reach_s = float(np.median(np.diff(time_s))) / 2.0 if len(time_s) > 1 else 0.0
-    near = near_any(time_s, peaks_s, reach_s)
-    return ChainsAgainstDrag(
-        rank_correlation=found.correlation,
-        p_value=found.p_value,
-        frames=found.samples,
-        frames_at_peaks=int(near.sum()),
-        bottleneck_at_peaks_mean_n=bottleneck[near].mean() if near.any() else np.nan,
-        bottleneck_elsewhere_mean_n=bottleneck[~near].mean() if any(~near) else np.nan,
     )
 
 

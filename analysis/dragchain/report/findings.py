@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import ClassVar, Literal
 
 from dragchain.documents import Document, Part
 from dragchain.statistics.correlated import MeanEstimate
-from dragchain.statistics.estimate import Estimate, EstimateColumns, Real, finite
+from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 
 FILE = Path("tables") / "figures.json"
 
@@ -65,17 +64,6 @@ class Chains(Part):
     dominant_azimuth_resultant: Real
 
 
-class ChainsAgainstDrag(Part):
-    """Spearman's correlation of resistance and dominant bottleneck over the network frames."""
-
-    rank_correlation: Real
-    p_value: Real
-    frames: int
-    frames_at_peaks: int
-    bottleneck_at_peaks_mean_n: Real
-    bottleneck_elsewhere_mean_n: Real
-
-
 class AheadBehind(Part):
     """Normal force within 90 degrees of the direction of motion and beyond, mean of a frame."""
 
@@ -129,7 +117,6 @@ class ProcessFindings(Findings):
     peaks: Peaks
     network: Mapping[str, int | Real]
     chains: Chains
-    association: ChainsAgainstDrag
     confidence: float
     workpiece_frames: int
     ahead_behind: AheadBehind
@@ -171,9 +158,3 @@ class DropFindings(Findings):
     scene: Literal["drop_test"] = "drop_test"
     restitution: DropRestitution
     impacts: DropImpacts
-
-
-def mean_numbers(estimate: MeanEstimate) -> dict[str, float | bool | None]:
-    """All that is known of a mean by name, None where a number is not finite."""
-    known = asdict(estimate)
-    return {name: finite(value) if name != "reliable" else value for name, value in known.items()}

@@ -14,7 +14,7 @@ from dragchain.figures import network_picture
 from dragchain.figures.bars import bars_of, depth_bars
 from dragchain.figures.network_overlay import show_network
 from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED, head, legend_below, new_figure
-from dragchain.report.findings import ChainsAgainstDrag, Comparison, ProcessFindings
+from dragchain.report.findings import Comparison, ProcessFindings
 from dragchain.report.run_data import RunData
 from dragchain.run.kinematics import drag_start_s
 from dragchain.statistics.correlated import MeanEstimate
@@ -126,17 +126,7 @@ def chains_peaks(run: RunData, found: ProcessFindings) -> Figure:
         upper.axvline(moment, color=RED, linewidth=0.7, linestyle=":")
     lower.set(xlabel="process time (s)", ylabel="bottleneck force of the\ndominant path (N)")
     lower.set_ylim(bottom=0)
-    lower.set_title(_link(found.association))
     return figure
-
-
-def _link(found: ChainsAgainstDrag) -> str:
-    if not np.isfinite(found.rank_correlation):
-        return f"{found.frames} frames, or a constant series: no correlation can be told"
-    return (
-        f"rank correlation of resistance and bottleneck {found.rank_correlation:+.2f}, "
-        f"p = {found.p_value:.3f} (circular shifts of {found.frames} frames)"
-    )
 
 
 def network_xy(run: RunData, found: ProcessFindings) -> Figure:

@@ -101,7 +101,7 @@ def _network(found: ProcessFindings) -> Row:
 
 
 def _chains(found: ProcessFindings) -> Row:
-    chains, link = found.chains, found.association
+    chains = found.chains
     return {
         "peters_chains_per_frame": chains.peters_per_frame,
         "peters_chain_particles_mean": chains.peters_particles_mean,
@@ -112,8 +112,6 @@ def _chains(found: ProcessFindings) -> Row:
         "dominant_particles_mean": chains.dominant_particles_mean,
         "dominant_altitude_mean_m": chains.dominant_altitude_mean_m,
         "dominant_azimuth_mean_rad": chains.dominant_azimuth_mean_rad,
-        "chain_drag_rank_correlation": link.rank_correlation,
-        "chain_drag_p_value": link.p_value,
     }
 
 

@@ -1,6 +1,6 @@
 """Every setting against the reference, quantity by quantity.
 
-The runs of a plan, each measured by `dragchain.tradeoff.measures`, are compared over the
+The runs of a plan, each measured by `dragchain.tradeoff.measure_run`, are compared over the
 stretch of path that all of them have. For each quantity the effects of modulus,
 time step, speed and everything else are estimated together
 (`dragchain.statistics.bed_effects`): added up where the runs do not contradict that, and for

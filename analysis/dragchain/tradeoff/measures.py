@@ -8,21 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 from pydantic import JsonValue
 
 from dragchain.arrays import Floats
 from dragchain.documents import Document, Part
-from dragchain.errors import TableError
-from dragchain.network.write import write_chains
-from dragchain.run.case import Case, Fidelity, load_case
-from dragchain.run.completeness import AcceptanceCheck, RunRecord
-from dragchain.statistics.estimate import finite
-from dragchain.tables.bed import Packing
-from dragchain.tables.write import write_tables
-from dragchain.tradeoff.path_blocks import quantities_along
+from dragchain.run.case import Fidelity
+from dragchain.run.completeness import AcceptanceCheck
 
 FILE = "measures.json"
 
@@ -115,81 +108,3 @@ class Measures(Document):
     def of_blocks(self, name: str) -> Floats:
         """The values of a quantity, (B,), NaN where a block has none; (0,) if none has one."""
         return np.array(self.blocks.get(name, ()), dtype=np.float64)
-
-
-def write_measures(run_dir: Path, packing_table: Path) -> Measures:
-    """Measure a run of a trade-off and write ``measures.json``.
-
-    A complete run gets its tables and chains first; of a failed one only the
-    failure is written.
-
-    Parameters
-    ----------
-    run_dir : Path
-        With the ``outcome.json`` of the run.
-    packing_table : Path
-        ``packing.json`` of the bed it started from.
-
-    Raises
-    ------
-    TableError
-        If the run has no outcome, or its raw outputs cannot be read.
-    """
-    file = run_dir / "outcome.json"
-    if not file.is_file():
-        raise TableError(f"{file} is not there: `dragdeck run --outcome` writes it")
-    outcome, case = RunRecord.read(file), load_case(run_dir)
-    measures = Measures(
-        study=case.study,
-        run=case.run,
-        bed=case.upstream.get("filling"),
-        inputs=case.inputs,
-        fidelity=case.fidelity,
-        numbers=case.numbers,
-        asked=case.asked and Asked.model_validate(case.asked.model_dump()),
-        complete=outcome.complete,
-        cost=_cost(case, outcome),
-        versions={**case.versions, "engine": outcome.engine_version},
-        started=outcome.started,
-    )
-    if measures.complete:
-        write_tables(run_dir)
-        write_chains(run_dir)
-        measures = measured(measures, run_dir, case, Packing.read(packing_table))
-    else:
-        measures = measures.model_copy(update={"failure": outcome.failed_checks})
-    measures.write(run_dir / FILE)
-    return measures
-
-
-def measured(measures: Measures, run_dir: Path, case: Case, bed: Packing) -> Measures:
-    """The measures of a complete run with its quantities, from its tables."""
-    along = quantities_along(run_dir, case)
-    return measures.model_copy(
-        update={
-            "arc_m": along.length_m,
-            "block_m": along.block_m,
-            "blocks": {name: _listed(values) for name, values in along.blocks.items()},
-            "single": {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction},
-            "force_histogram": tuple(along.force_histogram.tolist()),
-        }
-    )
-
-
-def _listed(values: Floats) -> tuple[float | None, ...]:
-    return tuple(map(finite, values))
-
-
-def _cost(case: Case, outcome: RunRecord) -> RunCost:
-    """What a run cost; a run without its processor time counts its wall time on every rank."""
-    assert case.motion is not None
-    speed = case.motion.axis_speed_m_s
-    return RunCost(
-        steps=outcome.steps,
-        wall_time_s=outcome.wall_time_s,
-        cpu_time_s=outcome.processor_time_s,
-        ranks=outcome.ranks,
-        timestep_s=case.timestep_s,
-        axis_speed_m_s=speed,
-        steps_per_m=1.0 / (speed * case.timestep_s),
-    )

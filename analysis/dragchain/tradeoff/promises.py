@@ -29,17 +29,6 @@ Verdict = Literal["kept", "broken", "open"]
 Scene = tuple[tuple[str, str], ...]
 
 
-class PromiseError(Part):
-    """The error of a promise; `significant`: zero is outside of its interval."""
-
-    value: float
-    se: float
-    ci95_low: float
-    ci95_high: float
-    bound: float
-    significant: bool
-
-
 class Promise(Part):
     """One promise in one scene.
 
@@ -57,7 +46,7 @@ class Promise(Part):
     youngs_modulus_scale, timestep_fraction, speed_factor : float
         What the advisor chose.
     runs, failed, reference_runs : int
-    error : PromiseError
+    error : Error
     verdict : str
     met : bool
         Whether no run failed and the error is within what the settings were chosen for.
@@ -74,7 +63,7 @@ class Promise(Part):
     runs: int
     failed: int
     reference_runs: int
-    error: PromiseError
+    error: Error
     verdict: Verdict
     met: bool
 
@@ -243,7 +232,7 @@ def _promise_of(pair: _Pair, scatter: float, degrees: int) -> Promise:
         runs=len(own),
         failed=pair.failed,
         reference_runs=len(references),
-        error=PromiseError(**vars(error)),
+        error=error,
         verdict=verdict(error, tolerance),
         met=not pair.failed and verdict(error, held_to) == "kept",
     )
@@ -263,8 +252,7 @@ def write_promises(out_dir: Path, files: Sequence[Path]) -> list[Promise]:
 def _columns(promise: Promise) -> dict[str, object]:
     """A promise as a row of ``promises.csv``."""
     row = promise.model_dump(exclude={"numbers", "error", "verdict", "met"})
-    error = Error(**promise.error.model_dump())
-    return {**row, **error.columns(), "verdict": promise.verdict, "met": promise.met}
+    return {**row, **promise.error.columns(), "verdict": promise.verdict, "met": promise.met}
 
 
 def promises_command(out_dir: Path, measures: Sequence[Path]) -> str:

@@ -16,7 +16,7 @@ from dragchain.tradeoff.drops import Drop
 from dragchain.tradeoff.outcome import Tradeoff, breaks
 from dragchain.tradeoff.promises import Promise
 from dragchain.tradeoff.runs import Setting
-from dragchain.tradeoff.six_digits import Number
+from dragchain.tradeoff.six_digits import Number, SixDigits
 
 
 class Machine(Part):
@@ -29,21 +29,21 @@ class Machine(Part):
 class FidelityParameters(Part):
     """The settings of a run that trade accuracy for speed."""
 
-    youngs_modulus_scale: Number
-    timestep_fraction: Number
-    speed_factor: Number
+    youngs_modulus_scale: SixDigits
+    timestep_fraction: SixDigits
+    speed_factor: SixDigits
 
 
 class ErrorEntry(Part):
     """An error relative to the reference; `significant`: zero is outside of its interval."""
 
-    value: Number
-    se: Number
-    ci95_low: Number
-    ci95_high: Number
-    bound: Number
+    value: SixDigits
+    se: SixDigits
+    ci95_low: SixDigits
+    ci95_high: SixDigits
+    bound: SixDigits
     significant: bool
-    single_parameter_error: Number
+    single_parameter_error: SixDigits
 
 
 class QuantityEntry(Part):
@@ -55,7 +55,7 @@ class QuantityEntry(Part):
     reference: Number
     se: Number
     run_std: Number
-    arc_m: Number
+    arc_m: SixDigits
 
 
 class SettingEntry(FidelityParameters):
@@ -64,7 +64,7 @@ class SettingEntry(FidelityParameters):
     seeds: int
     runs: int
     failed: int
-    arc_m: Number
+    arc_m: SixDigits
     breaks: bool
     relative_cost: Number
     errors: Mapping[str, ErrorEntry]
@@ -73,15 +73,15 @@ class SettingEntry(FidelityParameters):
 class DropEntry(Part):
     """A time step of the drop test; the error is that of the worst impact."""
 
-    timestep_fraction: Number
-    restitution_error: Number
-    relative_cost: Number
+    timestep_fraction: SixDigits
+    restitution_error: SixDigits
+    relative_cost: SixDigits
 
 
 class PromiseEntry(Part):
     """A scene in which the advisor was tested: its numbers, and whether the error was met."""
 
-    numbers: Mapping[str, Number]
+    numbers: Mapping[str, SixDigits]
     met: bool
 
 
@@ -98,8 +98,8 @@ class TradeoffRecord(Document):
     versions: Mapping[str, str]
     machine: Machine
     runs: int
-    engine_hours: Number
-    scene: Mapping[str, Number]
+    engine_hours: SixDigits
+    scene: Mapping[str, SixDigits]
     reference: FidelityParameters
     quantities: Mapping[str, QuantityEntry]
     settings: tuple[SettingEntry, ...]

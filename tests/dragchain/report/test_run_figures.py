@@ -87,15 +87,6 @@ def test_findings_of_a_process_are_those_of_its_tables(found: ProcessFindings) -
     assert found.chains.dominant_azimuth_mean_rad == pytest.approx(0.0)
 
 
-def test_a_chain_that_carries_the_drag_is_associated_with_it(found: ProcessFindings) -> None:
-    link = found.association
-    assert link.rank_correlation == pytest.approx(1.0)
-    # no other shift fits as well
-    assert link.p_value == pytest.approx(1 / 16)
-    assert link.frames_at_peaks == 2
-    assert link.bottleneck_at_peaks_mean_n > link.bottleneck_elsewhere_mean_n
-
-
 def test_a_frame_without_a_path_has_no_bottleneck() -> None:
     network = pd.DataFrame({"step": [1, 2, 3]})
     chains = pd.DataFrame(
@@ -141,6 +132,7 @@ def test_a_run_without_chains_names_the_missing_table(process: Path, tmp_path: P
     for name in ("case.json", "columns.json"):
         (tmp_path / name).write_bytes((process / name).read_bytes())
     save(workpiece_force_table(), tmp_path, "workpiece_force")
+    save(workpiece_contacts_table(), tmp_path, "workpiece_contacts")
     with pytest.raises(TableError, match=r"network\.parquet"):
         write_figures(tmp_path)
 

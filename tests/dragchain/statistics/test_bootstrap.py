@@ -5,11 +5,9 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import spearmanr
 
 from dragchain.drag.around import ahead_behind, azimuth_profile, depth_profile, depth_slope
 from dragchain.errors import SeriesError
-from dragchain.statistics.association import association, near_any
 from dragchain.statistics.bootstrap import block_length, bootstrap_means, estimates, frame_sums
 from dragchain.statistics.estimate import Estimate
 
@@ -140,48 +138,3 @@ def test_slope_interval_holds_the_true_slope_of_noisy_contacts() -> None:
     found = depth_slope(np.arange(4000) // 20, 200, depth, force)
     assert found.ci95_low < 5.0 < found.ci95_high
     assert found.ci95_high - found.ci95_low < 0.5
-
-
-def test_association_is_spearman_against_every_shift() -> None:
-    first, second = noise(40, 0.5, 5), noise(40, 0.5, 6)
-    found = association(first, second)
-    every = [spearmanr(first, np.roll(second, shift)).statistic for shift in range(40)]
-    assert found.correlation == pytest.approx(every[0])
-    assert found.p_value == pytest.approx(np.mean(np.abs(every) >= abs(every[0]) - 1e-9))
-
-
-def test_association_of_a_series_with_itself_is_as_sure_as_it_gets() -> None:
-    series = noise(50)
-    found = association(series, series**3)
-    assert found.correlation == pytest.approx(1.0)
-    assert found.p_value == pytest.approx(1 / 50)
-
-
-def test_slow_waves_are_not_called_associated() -> None:
-    # one wave each: a shift in time is as good as any other, whatever a naive test says
-    angle = np.linspace(0, 2 * math.pi, 200, endpoint=False)
-    found = association(np.sin(angle), np.sin(angle + 0.7))
-    assert found.correlation > 0.6
-    assert found.p_value > 0.3
-
-
-def test_too_few_frames_tell_nothing() -> None:
-    found = association(noise(7), noise(7))
-    assert (np.isnan(found.correlation), np.isnan(found.p_value), found.samples) == (True, True, 7)
-
-
-def test_a_constant_has_no_association() -> None:
-    found = association(np.ones(10), noise(10))
-    assert math.isnan(found.correlation) and math.isnan(found.p_value)
-
-
-def test_series_of_two_lengths_are_refused() -> None:
-    with pytest.raises(SeriesError, match="not 9 and 10"):
-        association(np.ones(9), np.ones(10))
-
-
-def test_near_any_includes_its_reach() -> None:
-    times = np.array([0.0, 0.25, 0.5, 1.0])
-    assert near_any(times, np.array([0.25, 0.9]), 0.25).tolist() == [True, True, True, True]
-    assert near_any(times, np.array([1.0]), 0.25).tolist() == [False, False, False, True]
-    assert near_any(times, np.array([]), 1.0).tolist() == [False] * 4

@@ -67,7 +67,7 @@ class Forecast:
         chosen = self.case.study.chosen_fidelity()
         return OptionEntry(
             role=self.role,
-            settings=chosen.model_copy(update={"ranks": self.case.ranks}),
+            settings=SettingsOfOption(**chosen.model_dump() | {"ranks": self.case.ranks}),
             drop_timestep_fraction=self.option.drop_timestep_fraction,
             error=error,
             relative_cost=self.option.relative_cost,
@@ -82,11 +82,17 @@ class Forecast:
         )
 
 
+class SettingsOfOption(Fidelity):
+    """The settings of an option, with the ranks that its runs will get."""
+
+    ranks: int
+
+
 class OptionEntry(Part):
     """An option of ``advice.json``: settings, their error, and what their runs will take."""
 
     role: str
-    settings: Fidelity
+    settings: SettingsOfOption
     drop_timestep_fraction: float | None
     error: MeasuredError | None
     relative_cost: float

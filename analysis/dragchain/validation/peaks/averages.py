@@ -12,7 +12,7 @@ from dragchain.arrays import Floats
 from dragchain.documents import Part
 from dragchain.statistics.estimate import Estimate, Real
 from dragchain.statistics.shift_test import mean_over_runs
-from dragchain.validation.peaks.runs import PeakRule, RunSeries
+from dragchain.validation.peaks.run_series import PeakRule, RunSeries
 from dragchain.validation.peaks.tests import mean_of_known
 
 TOP = 0.95

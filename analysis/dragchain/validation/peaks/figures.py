@@ -16,7 +16,7 @@ from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED, legend_below
 from dragchain.validation.peaks.averages import Lifetimes
 from dragchain.validation.peaks.findings import Study
 from dragchain.validation.peaks.lags import LagCurves
-from dragchain.validation.peaks.runs import RunSeries
+from dragchain.validation.peaks.run_series import RunSeries
 from dragchain.validation.peaks.settings import DEFAULTS, DEFINITIONS, SETTINGS, Definition
 from dragchain.validation.peaks.tests import DESCRIPTORS, PeakTest
 from dragchain.validation.peaks.verdicts import LEVEL

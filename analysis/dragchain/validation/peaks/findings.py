@@ -27,15 +27,15 @@ from dragchain.validation.peaks.averages import (
     ranks,
 )
 from dragchain.validation.peaks.lags import LagCurves, lag_curves
-from dragchain.validation.peaks.runs import (
+from dragchain.validation.peaks.run_series import (
     AVERAGED_S,
     DISTINCT_STDS,
     REACH_S,
     PeakRule,
     RunSeries,
-    read_run,
     rules_of,
 )
+from dragchain.validation.peaks.runs import read_run
 from dragchain.validation.peaks.settings import DEFAULTS, DEFINITIONS, Definition
 from dragchain.validation.peaks.tests import ASIDE_S, NEAR_S, STRONG_STDS, PeakTest, tests_of
 from dragchain.validation.peaks.verdicts import LEVEL, SMALL, StatementVerdict, judge

@@ -10,7 +10,7 @@ from dragchain.arrays import Floats, Ints
 from dragchain.documents import Part
 from dragchain.statistics.estimate import Real
 from dragchain.statistics.shift_test import band, joint, standardised
-from dragchain.validation.peaks.runs import RunSeries
+from dragchain.validation.peaks.run_series import RunSeries
 from dragchain.validation.peaks.settings import DEFAULTS, Definition
 
 LAG_S = 0.5

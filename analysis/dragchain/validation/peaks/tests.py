@@ -12,12 +12,11 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.signal import find_peaks
 
 from dragchain.arrays import Floats, Ints
 from dragchain.documents import Part
-from dragchain.statistics.association import near_any
 from dragchain.statistics.estimate import Real
 from dragchain.statistics.shift_test import (
     ShiftTest,
@@ -28,7 +27,7 @@ from dragchain.statistics.shift_test import (
     shifted_means,
     standardised,
 )
-from dragchain.validation.peaks.runs import PeakRule, RunSeries, rules_of
+from dragchain.validation.peaks.run_series import PeakRule, RunSeries, rules_of
 from dragchain.validation.peaks.settings import SETTINGS, Definition
 
 ASIDE_S = (0.05, 0.15)
@@ -292,6 +291,14 @@ def _together(
         )
         for run, event, other in zip(runs, events, others, strict=True)
     ]
+
+
+def near_any(time_s: Floats, events_s: Floats, reach_s: float) -> NDArray[np.bool_]:
+    """Which times lie within `reach_s` of an event."""
+    if not len(events_s):
+        return np.zeros(time_s.shape, dtype=bool)
+    gaps = np.abs(time_s[:, None] - events_s[None, :]).min(axis=1)
+    return np.asarray(gaps <= reach_s)
 
 
 def _asymmetry(runs: Sequence[RunSeries], at: int, rule: PeakRule) -> list[Floats]:

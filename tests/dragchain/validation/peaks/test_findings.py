@@ -15,7 +15,7 @@ from dragchain.validation.peaks.findings import Findings, study, study_of
 from dragchain.validation.peaks.lifetimes import lives
 from dragchain.validation.peaks.runs import averaged, peak_rows, peak_table
 from dragchain.validation.peaks.settings import SETTINGS, Definition
-from dragchain.validation.peaks.tests import BuiltIn, PeakTest
+from dragchain.validation.peaks.tests import BuiltIn, PeakTest, near_any
 from dragchain.validation.peaks.verdicts import judge
 
 
@@ -124,3 +124,10 @@ def test_lives_that_are_cut_off_count_as_longer_than_seen() -> None:
 def test_no_run_is_refused() -> None:
     with pytest.raises(TableError, match="no folder of a run"):
         study([])
+
+
+def test_near_any_includes_its_reach() -> None:
+    times = np.array([0.0, 0.25, 0.5, 1.0])
+    assert near_any(times, np.array([0.25, 0.9]), 0.25).tolist() == [True, True, True, True]
+    assert near_any(times, np.array([1.0]), 0.25).tolist() == [False, False, False, True]
+    assert near_any(times, np.array([]), 1.0).tolist() == [False] * 4
