@@ -45,8 +45,8 @@ case "$*" in
         sleep "${FAKE_SLOW:-0}"
         mkdir -p "$4/bin"
         cp "$0" "$4/bin/python"
-        for workpiece in snakemake dragdeck dragchain pytest ruff mypy snakefmt; do
-            cp "$FAKE_WORKPIECE" "$4/bin/$workpiece"
+        for tool in snakemake dragdeck dragchain pytest ruff mypy lint-imports snakefmt; do
+            cp "$FAKE_TOOL" "$4/bin/$tool"
         done
         ;;
     "-m pip "*)
@@ -61,7 +61,7 @@ case "$*" in
 esac
 """
 
-FAKE_WORKPIECE = """\
+FAKE_TOOL = """\
 #!/bin/sh
 name=${0##*/}
 {
@@ -75,7 +75,7 @@ name=${0##*/}
 FAKE_APT = """\
 #!/bin/sh
 echo "apt-get $*" >>"$FAKE_LOG"
-case "$*" in *liggghts*) cp "$FAKE_WORKPIECE" "$FAKE_BIN/liggghts" ;; esac
+case "$*" in *liggghts*) cp "$FAKE_TOOL" "$FAKE_BIN/liggghts" ;; esac
 """
 
 
@@ -91,13 +91,13 @@ class Machine:
         for name in ("run", "pyproject.toml", "constraints.txt", ".ci/run"):
             (self.clone / name).parent.mkdir(exist_ok=True)
             shutil.copy(ROOT / name, self.clone / name)
-        for workpiece in SYSTEM_TOOLS:
-            if found := shutil.which(workpiece):
-                (self.bin / workpiece).symlink_to(found)
-        self.add("workpiece", FAKE_WORKPIECE)
+        for tool in SYSTEM_TOOLS:
+            if found := shutil.which(tool):
+                (self.bin / tool).symlink_to(found)
+        self.add("tool", FAKE_TOOL)
         self.add("id", "#!/bin/sh\necho 1000\n")
         for name in ("liggghts", "mpirun"):
-            self.add(name, FAKE_WORKPIECE)
+            self.add(name, FAKE_TOOL)
         self.add("python3", FAKE_PYTHON)
 
     def add(self, name: str, text: str) -> Path:
@@ -117,7 +117,7 @@ class Machine:
         self, *arguments: str, cwd: Path | None = None, script: str = "run", **settings: str
     ) -> subprocess.CompletedProcess[str]:
         self.log.touch()
-        fakes = {"LOG": self.log, "WORKPIECE": self.bin / "workpiece", "BIN": self.bin}
+        fakes = {"LOG": self.log, "TOOL": self.bin / "tool", "BIN": self.bin}
         environment = {"PATH": str(self.bin), "HOME": str(self.clone)}
         environment |= {f"FAKE_{name}": str(path) for name, path in fakes.items()}
         return subprocess.run(
@@ -259,7 +259,7 @@ def test_sudo_that_asks_for_a_password_is_not_used(machine: Machine):
 
 def test_engine_of_ones_own(machine: Machine, tmp_path: Path):
     machine.remove("liggghts")
-    own = machine.add("own-engine", FAKE_WORKPIECE)
+    own = machine.add("own-engine", FAKE_TOOL)
     ended = machine.run("all", cwd=tmp_path, DRAGDECK_ENGINE="./bin/own-engine")
     assert ended.returncode == 0
     assert own.samefile(machine.done()[-1].split(" with ")[-1])
@@ -345,9 +345,9 @@ def test_the_test_of_the_queue_installs_a_slurm(machine: Machine):
         assert refused.returncode == 1
         assert "slurm-wlm munge" in refused.stderr
     for name in ("slurmctld", "munged"):
-        machine.add(name, FAKE_WORKPIECE)
+        machine.add(name, FAKE_TOOL)
     assert machine.run("test", "--slurm", "-x").returncode == 0
-    assert machine.done()[-1].startswith("pytest [-m] [slurm] [-x] ")
+    assert machine.done()[-1].startswith("pytest [--slurm] [-m] [slurm] [-x] ")
 
 
 # --- the tests -------------------------------------------------------------------------
@@ -365,8 +365,18 @@ def test_test_runs_the_checks_then_pytest(machine: Machine):
     machine.done()
     assert machine.run("test").returncode == 0
     done = machine.done()
-    assert names(done) == ["ruff", "ruff", "mypy", "snakefmt", "snakemake", "pytest"]
-    assert "[Snakefile] [workflow/rules/decks.smk]" in done[3]
+    checks = ["ruff", "ruff", "mypy", "lint-imports", "snakefmt", "snakemake"]
+    assert names(done) == [*checks, "pytest"]
+    assert "[Snakefile] [workflow/rules/decks.smk]" in done[4]
+
+
+def test_a_quick_test_leaves_out_what_is_slow(machine: Machine):
+    machine.run("setup")
+    machine.done()
+    assert machine.run("test", "--quick", "-x").returncode == 0
+    linted, tested = machine.done()
+    assert linted.startswith("ruff [check]")
+    assert "[-m] [not engine and not slow] [-x]" in tested
 
 
 def test_arguments_go_to_pytest_alone(machine: Machine):
