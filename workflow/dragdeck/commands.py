@@ -47,7 +47,7 @@ def report(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-def scene_type(name: str) -> SceneType:
+def _scene_type(name: str) -> SceneType:
     """A scene by its name.
 
     Raises
@@ -84,7 +84,7 @@ def explain(study: str, fidelity: str | None, scene: str | None) -> None:
     project = find_project(Path.cwd())
     every = project.cases(study, fidelity)
     results = project.results(study)
-    kinds = [scene_type(scene)] if scene else list(SCENES.values())
+    kinds = [_scene_type(scene)] if scene else list(SCENES.values())
     runs = ((kind, case) for kind in kinds for case in by_run(every, kind).values())
     built = ((kind, case, kind.build(case, None)) for kind, case in runs)
     show(
@@ -185,7 +185,7 @@ def render(
 ) -> None:
     """Write the input files of one run."""
     project = find_project(Path.cwd())
-    kind = scene_type(scene)
+    kind = _scene_type(scene)
     points = project.points(study, plan) if plan else None
     every = points.of(kind) if points else project.cases(study, fidelity)
     runs = cost_fillings(every[0]) if costs else by_run(every, kind)

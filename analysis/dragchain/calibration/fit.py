@@ -29,7 +29,7 @@ from dragchain.documents import Part
 from dragchain.errors import RecordError
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
 
-RISE = float(chi2.ppf(CONFIDENCE, 1))
+_RISE = float(chi2.ppf(CONFIDENCE, 1))
 """Chi square above its least value at the ends of a 95 % interval of one number: 3.84."""
 
 WIDTH_LIMIT = 1.25
@@ -77,7 +77,7 @@ class Fit(Part):
     @property
     def rise(self) -> float:
         """How far the misfit has risen where the interval ends."""
-        return RISE * self.inflation**2
+        return _RISE * self.inflation**2
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def fit(misfit: Misfit) -> Fit:
     best, least = float(found.x), float(found.fun)
     degrees = len(misfit.observed.times_s) + len(misfit.observed.log_peaks) - 1
     inflation = math.sqrt(max(1.0, least / degrees)) if degrees else 1.0
-    rise = RISE * inflation**2
+    rise = _RISE * inflation**2
 
     def above(value: float) -> float:
         return misfit(value) - least - rise

@@ -18,8 +18,8 @@ TIME_COLUMNS = {"time_s": 1.0, "time_ms": 1e-3, "time_us": 1e-6}
 FORCE_COLUMNS = {"force_n": 1.0, "force_mn": 1e-3, "force_kn": 1e3}
 """Accepted column names and their units in SI; ``force_mn`` is millinewton."""
 
-LEAST_SAMPLES = 100
-JITTER = 0.25
+_LEAST_SAMPLES = 100
+_JITTER = 0.25
 """A time may be off an even grid by this share of the interval (rounded stamps)."""
 
 Note = Literal["sign_turned", "two_impacts"]
@@ -115,9 +115,9 @@ def check_samples(time_s: Floats, force_n: Floats) -> Record:
     RecordError
         ``short``, ``numbers``, ``time`` or ``uneven``.
     """
-    if len(time_s) < LEAST_SAMPLES:
+    if len(time_s) < _LEAST_SAMPLES:
         raise RecordError(
-            "short", "too few samples", value=str(len(time_s)), limit=f"at least {LEAST_SAMPLES}"
+            "short", "too few samples", value=str(len(time_s)), limit=f"at least {_LEAST_SAMPLES}"
         )
     bad = np.flatnonzero(~(np.isfinite(time_s) & np.isfinite(force_n)))
     if len(bad):
@@ -140,13 +140,13 @@ def check_samples(time_s: Floats, force_n: Floats) -> Record:
     interval = float((time_s[-1] - time_s[0]) / (len(time_s) - 1))
     even = time_s[0] + interval * np.arange(len(time_s))
     off = np.abs(time_s - even)
-    if float(off.max()) > JITTER * interval:
+    if float(off.max()) > _JITTER * interval:
         row = int(np.argmax(off))
         raise RecordError(
             "uneven",
             "the times are not at an even interval",
             value=f"row {row + 1} is {off[row] / interval:.2g} intervals off",
-            limit=f"{JITTER:g} intervals of {interval:.3g} s",
+            limit=f"{_JITTER:g} intervals of {interval:.3g} s",
             remedy="export every sample at the sensor's own rate",
         )
     centre = float(np.median(force_n))

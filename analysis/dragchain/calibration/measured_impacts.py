@@ -19,28 +19,28 @@ from dragchain.errors import RecordError
 IMPACTS = 3
 """Impacts compared at the most (Uhlmann et al. 2015, section 4)."""
 
-QUIET_SAMPLES = 20
+_QUIET_SAMPLES = 20
 """Samples needed before the first impact, to know baseline and noise."""
 
-THRESHOLD_STDS = 6.0
+_THRESHOLD_STDS = 6.0
 """An impact stands out of the noise by so many standard deviations: white noise
 does so once in 5e8 samples."""
 
-SIGNAL_TO_NOISE = 10.0
+_SIGNAL_TO_NOISE = 10.0
 """The first peak is at least so many standard deviations high."""
 
-DEAD_FRACTION = 0.05
+_DEAD_FRACTION = 0.05
 """What follows an impact within this share of the fall time belongs to it: a
 sensor rings, and a particle with restitution 0.05 flies for twice as long."""
 
-MAD_TO_STD = 1.4826
+_MAD_TO_STD = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 
-CENTROID_FRACTION = 0.2
+_CENTROID_FRACTION = 0.2
 """Force over peak that counts nothing for the time of an impact: a slow sensor's
 tail would be cut by the noise at another share of each impact."""
 
-FLAT_TOP = 0.4
+_FLAT_TOP = 0.4
 """Share of a pulse's samples above half its height that may lie within 1 % of its
 top; 0.13 for an elastic Hertz impact, whose force is nearly (sin)^1.5."""
 
@@ -131,11 +131,11 @@ def measure(record: Record, *, fall_time_s: float) -> Measured:
     RecordError
         ``baseline``, ``impacts``, ``coarse``, ``clipped`` or ``order``.
     """
-    dead = max(1, round(DEAD_FRACTION * fall_time_s / record.interval_s))
+    dead = max(1, round(_DEAD_FRACTION * fall_time_s / record.interval_s))
     time = record.time_s - record.time_s[0]
     offset, drift, noise = _baseline(time, record.force_n, dead)
     force = record.force_n - offset - drift * time
-    threshold = THRESHOLD_STDS * noise
+    threshold = _THRESHOLD_STDS * noise
     pulses = _pulses(force, threshold, dead)
     _check_count(pulses, force, noise)
     # at most three, the last of them whole
@@ -173,18 +173,18 @@ def _baseline(time: Floats, force: Floats, dead: int) -> tuple[float, float, flo
     """
     coarse = _quantum(force) / 2.0
     line = np.array([0.0, float(np.median(force))])
-    spread = MAD_TO_STD * float(np.median(np.abs(force - line[1])))
+    spread = _MAD_TO_STD * float(np.median(np.abs(force - line[1])))
     out = np.zeros(len(force), dtype=bool)
     for _ in range(20):
         before = out
         rest = force - np.polyval(line, time)
-        out = _widened(np.abs(rest) > THRESHOLD_STDS * max(spread, coarse), dead)
-        if len(out) - out.sum() < QUIET_SAMPLES or np.array_equal(out, before):
+        out = _widened(np.abs(rest) > _THRESHOLD_STDS * max(spread, coarse), dead)
+        if len(out) - out.sum() < _QUIET_SAMPLES or np.array_equal(out, before):
             break
         line = np.polyfit(time[~out], force[~out], 1)
-        spread = MAD_TO_STD * float(np.median(np.abs((force - np.polyval(line, time))[~out])))
+        spread = _MAD_TO_STD * float(np.median(np.abs((force - np.polyval(line, time))[~out])))
     quiet = (force - np.polyval(line, time))[~out]
-    noise = float(quiet.std()) if len(quiet) >= QUIET_SAMPLES else spread
+    noise = float(quiet.std()) if len(quiet) >= _QUIET_SAMPLES else spread
     return float(line[1]), float(line[0]), max(noise, coarse / math.sqrt(3.0))
 
 
@@ -240,20 +240,20 @@ def _check_count(pulses: Sequence[tuple[int, int]], force: Floats, noise: float)
     if not pulses:
         raise _too_few(0)
     first = pulses[0][0]
-    if first < QUIET_SAMPLES:
+    if first < _QUIET_SAMPLES:
         raise RecordError(
             "baseline",
             "no quiet baseline before the first impact",
             value=f"{first} samples",
-            limit=f"at least {QUIET_SAMPLES}",
+            limit=f"at least {_QUIET_SAMPLES}",
             remedy="trigger earlier, so that the record begins before the particle lands",
         )
-    if float(force.max()) < SIGNAL_TO_NOISE * noise:
+    if float(force.max()) < _SIGNAL_TO_NOISE * noise:
         raise RecordError(
             "baseline",
             "no quiet baseline: the impacts hardly stand out of the noise",
             value=f"largest force {force.max():.3g} N, noise {noise:.3g} N (standard deviation)",
-            limit=f"a ratio of at least {SIGNAL_TO_NOISE:g}",
+            limit=f"a ratio of at least {_SIGNAL_TO_NOISE:g}",
             remedy="drop from higher, or use a more sensitive range",
         )
 
@@ -290,7 +290,7 @@ def pulse(
         )
     top = first + int(np.argmax(force[first : last + 1]))
     near = slice(max(first - 1, 0), last + 2)
-    weight = np.maximum(force[near] - CENTROID_FRACTION * force[top], 0.0)
+    weight = np.maximum(force[near] - _CENTROID_FRACTION * force[top], 0.0)
     return Impact(
         impact=number,
         start_s=float(time[first]),
@@ -337,7 +337,7 @@ def _check_tops(
         high = samples[samples >= samples.max() - 0.5 * force[first : last + 1].max()]
         flat = int(np.sum(high >= samples.max() - 0.01 * force[first : last + 1].max()))
         equal = max(len(list(run)) for top, run in groupby(samples == samples.max()) if top)
-        if (equal >= 4 and fine) or (flat >= 4 and flat > FLAT_TOP * len(high)):
+        if (equal >= 4 and fine) or (flat >= 4 and flat > _FLAT_TOP * len(high)):
             raise _clipped(f"impact {number} has {max(flat, equal)} samples at its top", largest)
     if largest[0] == largest[1]:
         raise _clipped("impacts 1 and 2 have the same largest value", largest)

@@ -21,7 +21,7 @@ from dragchain.errors import TableError
 from dragchain.files import write_text
 from dragchain.statistics.estimate import Estimate
 
-NORMAL_95 = 1.96
+_NORMAL_95 = 1.96
 """Half width of a 95 % interval of a normal distribution, in standard deviations."""
 
 SweepPurpose = Literal["production", "reference"]
@@ -188,7 +188,7 @@ def read_off(
 
     The interval includes that of the measured rebound and the scatter of the drops.
     """
-    value, own = measured.value, NORMAL_95 * model.rebound_error
+    value, own = measured.value, _NORMAL_95 * model.rebound_error
     low = value - math.hypot(value - measured.ci95_low, own)
     high = value + math.hypot(measured.ci95_high - value, own)
     return model.inverse(value), model.inverse(low), model.inverse(high)

@@ -13,10 +13,10 @@ from dragchain.calibration.measured_impacts import Measured, pulse
 from dragchain.calibration.simulated_drops import Waveform
 from dragchain.errors import RecordError
 
-SAMPLINGS = 200
+_SAMPLINGS = 200
 """Random samplings of a simulated impact, to know what sampling does to it."""
 
-SAMPLING_SEED = 20150
+_SAMPLING_SEED = 20150
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,11 @@ def sample_impact(shape: Waveform, measured: Measured, peak_n: float) -> Samplin
     RecordError
         ``coarse``: less than half of the samplings would see the impact.
     """
-    random = np.random.default_rng(SAMPLING_SEED)
+    random = np.random.default_rng(_SAMPLING_SEED)
     step, (start, end) = measured.interval_s, (shape.time_s[0], shape.time_s[-1])
     count = int((end - start) / step) + 6
     found: list[tuple[float, float, float]] = []
-    for phase in random.random(SAMPLINGS):
+    for phase in random.random(_SAMPLINGS):
         time = start + (np.arange(count) - 3 + phase) * step
         force = np.interp(time, shape.time_s, shape.force_n, 0.0, 0.0) * peak_n / shape.peak_n
         force = force + random.normal(0.0, measured.noise_n, count)
@@ -70,7 +70,7 @@ def sample_impact(shape: Waveform, measured: Measured, peak_n: float) -> Samplin
             continue
         seen = pulse(time, force, (int(above[0]), int(above[-1])), step)
         found.append((seen.peak_n / peak_n, seen.centroid_s - shape.centroid_s, seen.width_s))
-    if len(found) < SAMPLINGS / 2:
+    if len(found) < _SAMPLINGS / 2:
         raise RecordError(
             "coarse",
             "sampled too coarsely to see an impact of this particle",

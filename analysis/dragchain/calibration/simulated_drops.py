@@ -21,7 +21,7 @@ from dragchain.tables.impacts import speed_at_plate
 
 Purpose = Literal["production", "reference", "confirm", "trial"]
 
-SAMPLES = ("step", "time_s", "z_m", "vz_m_s", "force_n")
+_SAMPLES = ("step", "time_s", "z_m", "vz_m_s", "force_n")
 """Columns of a drop's output around its impacts."""
 
 
@@ -187,13 +187,13 @@ def _read_drop(folder: Path, drop: Drop) -> DropRun:
         raise TableError(f"{folder}: this drop is not complete; run `snakemake calibrate` again")
     case = load_case(folder)
     blocks = iter_prints(folder, load_outputs(folder)["impacts"])
-    rows = pd.concat([pd.DataFrame({name: block[name] for name in SAMPLES}) for block in blocks])
+    rows = pd.concat([pd.DataFrame({name: block[name] for name in _SAMPLES}) for block in blocks])
     windows = [window for _, window in rows.groupby((rows["step"].diff() != 1).cumsum())]
     if len(windows) < IMPACTS:
         raise TableError(f"{folder}: {len(windows)} impacts, a calibration needs {IMPACTS}")
     radius, gravity = case.media.radius_mean_m, case.gravity_m_s2
     pieces = [
-        waveform({name: window[name].to_numpy(np.float64) for name in SAMPLES}, radius, gravity)
+        waveform({name: window[name].to_numpy(np.float64) for name in _SAMPLES}, radius, gravity)
         for window in windows
     ]
     speeds = np.array([pieces[0][1], *(piece[2] for piece in pieces)])

@@ -15,7 +15,7 @@ from dragchain.calibration.measured_impacts import IMPACTS
 from dragchain.calibration.simulated_drops import DropRun, Drops, DropTest, Purpose
 from dragchain.errors import TableError
 
-DEGREE = 4
+_DEGREE = 4
 """Of the polynomials through the sweep."""
 
 
@@ -86,8 +86,8 @@ def emulate(
         The sweep has too few values.
     """
     value = np.array([run.drop.restitution for run in runs])
-    if len(np.unique(value)) <= DEGREE + 1:
-        raise TableError(f"a sweep needs more than {DEGREE + 1} values of the restitution")
+    if len(np.unique(value)) <= _DEGREE + 1:
+        raise TableError(f"a sweep needs more than {_DEGREE + 1} values of the restitution")
     scale = np.sqrt(height_m / np.array([run.drop.height_m for run in runs]))
     speeds = np.array([run.speeds_m_s[: IMPACTS + 1] for run in runs])
     peaks = np.log([[impact.peak_n for impact in run.impacts[:IMPACTS]] for run in runs])
@@ -120,10 +120,10 @@ def _contact_parts(run: DropRun) -> list[float]:
 
 def _polynomial(value: Floats, column: Floats) -> tuple[Polynomial, float, float]:
     """Least-squares polynomial, scatter of one point about it, standard error of its mean."""
-    fitted = Polynomial.fit(value, column, DEGREE)
+    fitted = Polynomial.fit(value, column, _DEGREE)
     rest = column - fitted(value)
-    scatter = math.sqrt(float(rest @ rest) / (len(value) - DEGREE - 1))
-    return fitted, scatter, scatter * math.sqrt((DEGREE + 1) / len(value))
+    scatter = math.sqrt(float(rest @ rest) / (len(value) - _DEGREE - 1))
+    return fitted, scatter, scatter * math.sqrt((_DEGREE + 1) / len(value))
 
 
 @dataclass(frozen=True)

@@ -22,21 +22,21 @@ from dragchain.documents import Document, Part
 from dragchain.errors import RecordError
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, flattened
 
-LEAD_S = 0.02
+_LEAD_S = 0.02
 """What a record shows before the first impact, s."""
 
-TAIL_S = 0.01
+_TAIL_S = 0.01
 """What it shows after the last, s."""
 
-RATES_HZ = (200e3, 500e3, 1e6)
-NOISE_FRACTIONS = (0.002, 0.01)
+_RATES_HZ = (200e3, 500e3, 1e6)
+_NOISE_FRACTIONS = (0.002, 0.01)
 """Lowest and highest noise of a trial: standard deviation over the first peak."""
 
-OFFSET_FRACTION = 0.5
-DRIFT_FRACTION = 0.02
+_OFFSET_FRACTION = 0.5
+_DRIFT_FRACTION = 0.02
 """Largest offset, and largest drift over the record, over the first peak."""
 
-NOTHING = Estimate(math.nan, math.nan, math.nan)
+_NOTHING = Estimate(math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True)
@@ -91,9 +91,9 @@ class Trial:
     noise_fraction: float
     deck_known: float
     effective_known: float
-    deck: Estimate = NOTHING
-    put: Estimate = NOTHING
-    effective: Estimate = NOTHING
+    deck: Estimate = _NOTHING
+    put: Estimate = _NOTHING
+    effective: Estimate = _NOTHING
     chi2: float | None = None
     degrees: int | None = None
     refused: str | None = None
@@ -144,8 +144,8 @@ def record_of(run: DropRun, sensor: Sensor, random: np.random.Generator) -> Reco
     """What a sensor shows of a simulated drop, begun at a random phase."""
     step = 1.0 / sensor.rate_hz
     first, last = run.impacts[0].time_s[0], run.impacts[IMPACTS - 1].time_s[-1]
-    start = first - LEAD_S + random.random() * step
-    time = start + step * np.arange(int((last + TAIL_S - start) / step))
+    start = first - _LEAD_S + random.random() * step
+    time = start + step * np.arange(int((last + _TAIL_S - start) / step))
     force = np.zeros(len(time))
     for shape in run.impacts[:IMPACTS]:
         force += np.interp(time, shape.time_s, shape.force_n, 0.0, 0.0)
@@ -160,10 +160,10 @@ def record_of(run: DropRun, sensor: Sensor, random: np.random.Generator) -> Reco
 def _some_sensor(peak_n: float, random: np.random.Generator) -> Sensor:
     """A sensor drawn for a trial, fit for a first peak of `peak_n`."""
     return Sensor(
-        rate_hz=float(random.choice(RATES_HZ)),
-        noise_n=float(random.uniform(*NOISE_FRACTIONS)) * peak_n,
-        offset_n=float(random.uniform(-OFFSET_FRACTION, OFFSET_FRACTION)) * peak_n,
-        drift_n_per_s=float(random.uniform(-DRIFT_FRACTION, DRIFT_FRACTION)) * peak_n / 0.15,
+        rate_hz=float(random.choice(_RATES_HZ)),
+        noise_n=float(random.uniform(*_NOISE_FRACTIONS)) * peak_n,
+        offset_n=float(random.uniform(-_OFFSET_FRACTION, _OFFSET_FRACTION)) * peak_n,
+        drift_n_per_s=float(random.uniform(-_DRIFT_FRACTION, _DRIFT_FRACTION)) * peak_n / 0.15,
         resolution_n=peak_n / 2**12,
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from dragchain.arrays import Floats, Ints
 
-ON_LIMIT_RAD = 1e-6
+_ON_LIMIT_RAD = 1e-6
 """A contact nearer to a limit than this is on it; points are written with nine digits."""
 
 
@@ -24,7 +24,7 @@ def beyond(angle_rad: Floats) -> Floats:
     angle_rad : (c,) ndarray
         Angle from the limit.
     """
-    return np.heaviside(np.where(np.abs(angle_rad) < ON_LIMIT_RAD, 0.0, angle_rad), 0.5)
+    return np.heaviside(np.where(np.abs(angle_rad) < _ON_LIMIT_RAD, 0.0, angle_rad), 0.5)
 
 
 def within(azimuth_rad: Floats, limit_rad: float) -> Floats:
@@ -64,4 +64,4 @@ def parts(azimuth_rad: Floats, bins: int) -> tuple[Ints, Ints]:
         found: Ints = np.floor((angle + np.pi) / width).astype(np.int64) % bins
         return found
 
-    return part(azimuth_rad - ON_LIMIT_RAD), part(azimuth_rad + ON_LIMIT_RAD)
+    return part(azimuth_rad - _ON_LIMIT_RAD), part(azimuth_rad + _ON_LIMIT_RAD)

@@ -22,7 +22,7 @@ from dragchain.dumps.decompress import Content
 from dragchain.dumps.frame import Columns, Frame, Layout, is_integer_column
 from dragchain.errors import DumpError, TruncatedDumpError
 
-BLOCK_ROWS = 20_000
+_BLOCK_ROWS = 20_000
 """Rows of a ``fix print`` file that are read at once."""
 
 MAX_RANKS = 1_000_000
@@ -268,7 +268,7 @@ def _integers(column: NDArray[np.float64], name: str, at: _Cursor) -> NDArray[np
 
 
 def read_print_file(
-    file: Path, output: Layout, *, block_rows: int = BLOCK_ROWS
+    file: Path, output: Layout, *, block_rows: int = _BLOCK_ROWS
 ) -> Iterator[Columns]:
     """Blocks of rows of one ``fix print`` file.
 

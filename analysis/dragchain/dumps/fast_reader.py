@@ -26,7 +26,7 @@ from dragchain.dumps.careful_reader import MAX_RANKS, read_carefully
 from dragchain.dumps.decompress import Content
 from dragchain.dumps.frame import Columns, Frame, Layout, is_integer_column
 
-BLOCK_BYTES = 1 << 19
+_BLOCK_BYTES = 1 << 19
 """What is read at once; a block grows until it holds a whole frame."""
 
 HELD_BYTES = 1 << 26
@@ -90,7 +90,7 @@ def read_frames(files: Iterable[Path], output: Layout) -> Iterator[Frame]:
 
 
 def read_batches(
-    files: Iterable[Path], output: Layout, *, block_bytes: int = BLOCK_BYTES
+    files: Iterable[Path], output: Layout, *, block_bytes: int = _BLOCK_BYTES
 ) -> Iterator[Batch]:
     """Frames of files of one output, in batches.
 
@@ -295,7 +295,7 @@ class Block:
         return _Parsed(frames[:done], cells, size)
 
 
-def file_blocks(file: Path, output: Layout, block_bytes: int = BLOCK_BYTES) -> Iterator[Block]:
+def file_blocks(file: Path, output: Layout, block_bytes: int = _BLOCK_BYTES) -> Iterator[Block]:
     """The blocks of a file; each but the last is cut before a frame."""
     held, offset, more = np.empty(0, dtype=np.uint8), 0, block_bytes
     form: _Form | None = _Binary(output) if output.binary else None

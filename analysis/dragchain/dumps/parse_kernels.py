@@ -166,7 +166,7 @@ def _read_digits(at, digits):
 
 
 @njit(nogil=True, cache=True, inline="always")
-def read_number(at):
+def _read_number(at):
     """Read one decimal number.
 
     Parameters
@@ -279,7 +279,7 @@ def _text_rows(at, rows, first, whole, cells):
     width = len(whole)
     for row in range(first, first + rows):
         for column in range(width):
-            digits, power, negative, after = read_number(at)
+            digits, power, negative, after = _read_number(at)
             if after == at:
                 return _U0
             if whole[column]:

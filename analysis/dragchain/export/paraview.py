@@ -52,9 +52,9 @@ class ParaviewWriter:
         """Write the files of one frame."""
         import pyvista as pv
 
-        parts = {"particles": particles_mesh(frame_data, with_chains=self._with_chains)}
+        parts = {"particles": _particles_mesh(frame_data, with_chains=self._with_chains)}
         if frame_data.network is not None:
-            parts["contacts"] = contacts_mesh(frame_data, with_chains=self._with_chains)
+            parts["contacts"] = _contacts_mesh(frame_data, with_chains=self._with_chains)
         if self._workpiece is not None and frame_data.workpiece is not None:
             parts["workpiece"] = placed(self._workpiece, *frame_data.workpiece)
         name = f"{frame_data.step:0{self._width}d}"
@@ -89,7 +89,7 @@ def pvd(files: list[tuple[float, str]]) -> str:
     )
 
 
-def particles_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
+def _particles_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     """The particles as points with what is known of each.
 
     ``id``, ``radius`` (m), ``v`` (m/s) and ``omega`` (rad/s); with contacts
@@ -113,13 +113,13 @@ def particles_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     return mesh
 
 
-def contacts_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
+def _contacts_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     """The contacts as lines from centre to centre, or from centre to contact point.
 
     Each has ``kind`` (0 between particles, 1 with the workpiece, 2 the floor, 3 the side), ``id1``
     and ``id2`` (as ``a_id`` and ``b_id``), ``force_n`` (on the first), and the columns
     ``normal_force_n``, ``tangential_force_n`` and ``overlap_m``; with chains those of
-    `particles_mesh`. No two lines share a point, so that data of the lines can be moved to
+    `_particles_mesh`. No two lines share a point, so that data of the lines can be moved to
     their points without a mean.
     """
     import pyvista as pv

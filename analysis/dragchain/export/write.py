@@ -27,7 +27,7 @@ class Writer(Protocol):
         """Write what comes after the last one."""
 
 
-FORMATS: dict[str, tuple[str, Callable[[Path, FrameSeries], Writer]]] = {
+_FORMATS: dict[str, tuple[str, Callable[[Path, FrameSeries], Writer]]] = {
     "paraview": (paraview.MAIN, paraview.ParaviewWriter),
     "xyz": (xyz.MAIN, xyz.XyzWriter),
 }
@@ -84,9 +84,9 @@ def write_export(
     ExportError
         If there is nothing to export, no room for it, or something in its place.
     """
-    if to not in FORMATS:
-        raise ExportError(f"the format is {to!r}, not one of {', '.join(FORMATS)}")
-    main, writer_of = FORMATS[to]
+    if to not in _FORMATS:
+        raise ExportError(f"the format is {to!r}, not one of {', '.join(_FORMATS)}")
+    main, writer_of = _FORMATS[to]
     run = Run.open(run_dir)
     series = FrameSeries.of(run, Selection() if selection is None else selection)
     target = run.folder / "export" / to if out is None else out

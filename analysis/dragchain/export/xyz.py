@@ -19,7 +19,7 @@ from dragchain.network.statistics import contact_counts
 MAIN = "run.xyz"
 """The file to open."""
 
-COLUMNS = {
+_COLUMNS = {
     "id": ("particle_id",),
     "pos": ("x_m", "y_m", "z_m"),
     "velo": ("vx_m_s", "vy_m_s", "vz_m_s"),
@@ -28,7 +28,7 @@ COLUMNS = {
 }
 """Columns of ``particles.parquet`` under the names by which OVITO knows them."""
 
-SPECIES = "X"
+_SPECIES = "X"
 """What each line begins with, as in any XYZ file: no chemical element."""
 
 _PLAIN = pyarrow.csv.WriteOptions(include_header=False, delimiter=" ", quoting_style="none")
@@ -50,8 +50,8 @@ class XyzWriter:
 
     def add(self, frame_data: FrameData) -> None:
         """Append one frame; numbers are written so that they read back to the last bit."""
-        columns: dict[str, pa.Array] = {"species": pa.repeat(SPECIES, len(frame_data.particles))}
-        for name in (name for names in COLUMNS.values() for name in names):
+        columns: dict[str, pa.Array] = {"species": pa.repeat(_SPECIES, len(frame_data.particles))}
+        for name in (name for names in _COLUMNS.values() for name in names):
             columns[name] = pa.array(frame_data.particles[name].to_numpy())
         if frame_data.network is not None:
             columns["coordination"] = pa.array(contact_counts(frame_data.network))
@@ -66,7 +66,7 @@ class XyzWriter:
 
 def header(frame_data: FrameData) -> str:
     """The two lines before the particles of a frame."""
-    kinds = [f"{name}:{'I' if name == 'id' else 'R'}:{len(of)}" for name, of in COLUMNS.items()]
+    kinds = [f"{name}:{'I' if name == 'id' else 'R'}:{len(of)}" for name, of in _COLUMNS.items()]
     if frame_data.network is not None:
         kinds.append("Coordination:I:1")
     words = [

@@ -36,11 +36,11 @@ def show_network(
     axes.imshow(image, extent=tuple(extent.tolist()), interpolation="antialiased")
     axes.grid(False)
     axes.set(xlabel="x (mm)", ylabel=f"{view[1]} (mm)", xlim=extent[:2], ylim=extent[2:])
-    mark_chain(axes, shown, [0, 1] if view == "xy" else [0, 2], width, halo)
-    mark_motion(axes, shown, view)
+    _mark_chain(axes, shown, [0, 1] if view == "xy" else [0, 2], width, halo)
+    _mark_motion(axes, shown, view)
 
 
-def mark_chain(
+def _mark_chain(
     axes: Axes, shown: Scene, pick: Sequence[int], width: float = 1.6, halo: float = 3.0
 ) -> None:
     """Outline the dominant path on axes in mm; `pick` names the two coordinates."""
@@ -61,7 +61,7 @@ def mark_chain(
             )
 
 
-def mark_motion(axes: Axes, shown: Scene, view: View) -> None:
+def _mark_motion(axes: Axes, shown: Scene, view: View) -> None:
     """Draw the direction of motion where it hides little.
 
     Behind the workpiece, or above the bed.

@@ -28,10 +28,10 @@ from dragchain.tables.workpiece_pose import workpiece_places
 
 View = Literal["xy", "xz"]
 
-PICTURE_TIME_S = 4.5
+_PICTURE_TIME_S = 4.5
 """Process time, counted from the start of the drag, at which the paper shows the network."""
 
-COLOURS = ("#1e8f4e", "#f0c929", "#c8102e")
+_COLOURS = ("#1e8f4e", "#f0c929", "#c8102e")
 _PIXELS_PER_MM = 14
 _SIDES = 18
 _MARGIN_M = 0.004
@@ -95,7 +95,7 @@ def cylinder_radii(
     return np.asarray(np.clip(normal_force_n, 0.0, None) / largest * radius_mean_m)
 
 
-def picture_step(steps: Floats, process_time_s: Floats, wanted_s: float = PICTURE_TIME_S) -> int:
+def picture_step(steps: Floats, process_time_s: Floats, wanted_s: float = _PICTURE_TIME_S) -> int:
     """The step nearest to `wanted_s`, or the last one if the frames do not reach that far.
 
     Parameters
@@ -111,7 +111,7 @@ def picture_step(steps: Floats, process_time_s: Floats, wanted_s: float = PICTUR
     return int(steps[row])
 
 
-def load_scene(run_dir: Path, case: Case, wanted_s: float = PICTURE_TIME_S) -> Scene:
+def load_scene(run_dir: Path, case: Case, wanted_s: float = _PICTURE_TIME_S) -> Scene:
     """Read what the picture of a process run shows at the frame nearest to `wanted_s`.
 
     Raises
@@ -167,7 +167,7 @@ def window(case: Case, scene: Scene, view: View) -> Window:
     floor = (-_MARGIN_M, 1.25 * needed(case.surface_m, "surface_m"))
     diameter = 2.0 * case.media.radius_mean_m
     half = WINDOW_DIAMETERS * diameter
-    whole = shows_all(case)
+    whole = _shows_all(case)
     middle = np.zeros(2) if whole else scene.workpiece_m[:2]
     low = np.full(2, -bowl_m) if whole else np.maximum(middle - half, -bowl_m)
     high = np.full(2, bowl_m) if whole else np.minimum(middle + half, bowl_m)
@@ -183,7 +183,7 @@ def window(case: Case, scene: Scene, view: View) -> Window:
     return Window(*corners, np.asarray(near))
 
 
-def shows_all(case: Case) -> bool:
+def _shows_all(case: Case) -> bool:
     """Whether pictures of a case show its whole bowl."""
     reach = needed(case.bowl, "bowl").radius_m + _MARGIN_M
     return reach <= WINDOW_DIAMETERS * 2.0 * case.media.radius_mean_m
@@ -191,7 +191,7 @@ def shows_all(case: Case) -> bool:
 
 def cut_words(case: Case, view: View) -> str:
     """What a picture leaves out, in words; empty if it shows the whole bowl."""
-    if shows_all(case):
+    if _shows_all(case):
         return ""
     words = f"shown: up to {WINDOW_DIAMETERS:g} particle diameters beside the workpiece"
     if view == "xy":
@@ -330,4 +330,4 @@ def colour_map() -> Any:
     """The colour map of the pictures, green over yellow to red."""
     from matplotlib.colors import LinearSegmentedColormap
 
-    return LinearSegmentedColormap.from_list("network", list(COLOURS))
+    return LinearSegmentedColormap.from_list("network", list(_COLOURS))

@@ -35,7 +35,7 @@ STYLE: dict[RcKeyType, Any] = {
     "legend.fontsize": 8,
 }
 WIDTH_IN = 7.6
-DPI = 150
+_DPI = 150
 
 
 def drawing() -> AbstractContextManager[None]:
@@ -62,7 +62,7 @@ def head(figure: Figure, text: str, size: float = 9.5) -> None:
 def png(figure: Figure) -> bytes:
     """A figure as PNG without transparency."""
     drawn, small = BytesIO(), BytesIO()
-    figure.savefig(drawn, format="png", dpi=DPI)
+    figure.savefig(drawn, format="png", dpi=_DPI)
     with Image.open(drawn) as picture:
         picture.convert("RGB").save(small, format="png", optimize=True)
     return small.getvalue()

@@ -18,13 +18,13 @@ from dragchain.run.kinematics import needed
 from dragchain.run.workpiece import Surface, off_facet
 from dragchain.statistics.bootstrap import block_length
 
-OFF_FACET = 1e-5
+_OFF_FACET = 1e-5
 """Largest distance of a contact point from its facet over the workpiece's length: rounding."""
 
-BLOCK_ROWS = 100_000
+_BLOCK_ROWS = 100_000
 """Contacts that are held against their facets at once."""
 
-UNCERTAIN = ("normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
+_UNCERTAIN = ("normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
 """Sums of a facet that come with a standard error."""
 
 
@@ -38,9 +38,9 @@ def check_facets(sampled: Sampled, surface: Surface, case: Case) -> float:
             f" 0 to {len(surface.corners) - 1}: is it the mesh of this run?"
         )
     point = sampled.rows[POINT].to_numpy()
-    parts = np.array_split(np.arange(len(facet)), 1 + len(facet) // BLOCK_ROWS)
+    parts = np.array_split(np.arange(len(facet)), 1 + len(facet) // _BLOCK_ROWS)
     off = np.concatenate([off_facet(point[part], surface.corners[facet[part]]) for part in parts])
-    limit = OFF_FACET * needed(case.workpiece, "workpiece").length_m
+    limit = _OFF_FACET * needed(case.workpiece, "workpiece").length_m
     worst = int(off.argmax())
     if off[worst] > limit:
         raise TableError(
@@ -62,7 +62,7 @@ def facet_table(sampled: Sampled, surface: Surface, events: pd.DataFrame) -> pd.
     samples = np.bincount(facet, minlength=count)
     names = (*AMOUNTS, *WORKPIECE)
     sums = {name: np.bincount(facet, rows[name], count) for name in names}
-    errors = {f"{name}_se": _standard_error(sampled, name, count) for name in UNCERTAIN}
+    errors = {f"{name}_se": _standard_error(sampled, name, count) for name in _UNCERTAIN}
     area = surface.areas
     return pd.DataFrame(
         {

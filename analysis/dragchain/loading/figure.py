@@ -26,13 +26,13 @@ from dragchain.run.case import Case, Circle
 from dragchain.run.kinematics import needed
 from dragchain.run.workpiece import Surface
 
-COLOURS = "magma_r"
-QUANTITY = "force_slide_pa"
-LABEL = "normal force times sliding distance, per area of the workpiece\nand path length (N/m²)"
+_COLOURS = "magma_r"
+_QUANTITY = "force_slide_pa"
+_LABEL = "normal force times sliding distance, per area of the workpiece\nand path length (N/m²)"
 
 
 @dataclass(frozen=True)
-class Eye:
+class _Eye:
     """A side of the workpiece.
 
     Where the eye is in the workpiece's frame, and what the view is called.
@@ -44,11 +44,11 @@ class Eye:
     motion: str
 
 
-VIEWS = {
-    "front": Eye(1.0, 0.0, "from ahead", "⊙ motion"),
-    "left": Eye(0.0, 1.0, "from the left", "← motion"),
-    "rear": Eye(-1.0, 0.0, "from behind", "⊗ motion"),
-    "right": Eye(0.0, -1.0, "from the right", "motion →"),
+_VIEWS = {
+    "front": _Eye(1.0, 0.0, "from ahead", "⊙ motion"),
+    "left": _Eye(0.0, 1.0, "from the left", "← motion"),
+    "rear": _Eye(-1.0, 0.0, "from behind", "⊗ motion"),
+    "right": _Eye(0.0, -1.0, "from the right", "motion →"),
 }
 
 _PIXELS = 900
@@ -76,26 +76,26 @@ def draw_workpiece(
     """
     check_rendering()
     cylinder = needed(case.workpiece, "workpiece").kind == "cylinder"
-    names = ("front", "rear") if cylinder else tuple(VIEWS)
+    names = ("front", "rear") if cylinder else tuple(_VIEWS)
     widths = [1.0, 1.0, 2.8, 2.4] if cylinder else [1.0] * 4 + [1.4]
     scale = Normalize(0.0, _largest(facets))
     mesh = as_polydata(surface)
-    mesh.cell_data[QUANTITY] = facets[QUANTITY].to_numpy()
+    mesh.cell_data[_QUANTITY] = facets[_QUANTITY].to_numpy()
     with drawing():
         figure = new_figure(_height_in(case, widths[0] / sum(widths)))
         panels = figure.subplots(1, len(widths), sharey=True, width_ratios=widths)
         for axes, name in zip(panels, names, strict=False):
-            _view(axes, mesh, VIEWS[name], scale, case)
+            _view(axes, mesh, _VIEWS[name], scale, case)
         if cylinder:
             _unrolled(panels[2], sampled, scale, case)
         _profile(panels[-1], loading.profiles["depth"])
         panels[0].set_ylabel("depth (mm)")
         panels[0].set_ylim(_depths(case)[::-1])
         bar = figure.colorbar(
-            ScalarMappable(scale, COLOURS), ax=panels.tolist(), location="bottom", extend="max",
+            ScalarMappable(scale, _COLOURS), ax=panels.tolist(), location="bottom", extend="max",
             shrink=0.6, aspect=40,
         )  # fmt: skip
-        bar.set_label(LABEL)
+        bar.set_label(_LABEL)
         head(figure, _title(loading, case))
         return save(figure, run_dir / "figures" / "workpiece.png")
 
@@ -115,11 +115,11 @@ def _half_width(case: Case) -> float:
 
 def _largest(facets: pd.DataFrame) -> float:
     """The top of the colour scale: what 99 % of the loaded area stays below."""
-    loaded = facets[facets[QUANTITY] > 0.0].sort_values(QUANTITY)
+    loaded = facets[facets[_QUANTITY] > 0.0].sort_values(_QUANTITY)
     if loaded.empty:
         return 1.0
     fraction = loaded["area_m2"].cumsum() / loaded["area_m2"].sum()
-    return float(loaded[QUANTITY].to_numpy()[np.searchsorted(fraction, 0.99)])
+    return float(loaded[_QUANTITY].to_numpy()[np.searchsorted(fraction, 0.99)])
 
 
 def _depths(case: Case) -> tuple[float, float]:
@@ -128,7 +128,7 @@ def _depths(case: Case) -> tuple[float, float]:
     return -0.25 * deepest, 1.06 * deepest
 
 
-def _view(axes: Axes, mesh: Any, eye: Eye, scale: Normalize, case: Case) -> None:
+def _view(axes: Axes, mesh: Any, eye: _Eye, scale: Normalize, case: Case) -> None:
     """Set a rendered side of the workpiece on axes of width and depth (mm)."""
     image, half = _render(mesh, eye, scale, case), 1e3 * _half_width(case)
     high, low = _depths(case)
@@ -148,13 +148,13 @@ def _keeps_direction(case: Case) -> bool:
     return not isinstance(motion, Circle) or motion.orientation == "follow_path"
 
 
-def _render(mesh: Any, eye: Eye, scale: Normalize, case: Case) -> Image:
+def _render(mesh: Any, eye: _Eye, scale: Normalize, case: Case) -> Image:
     """A side of the workpiece in parallel projection."""
     high, low = _depths(case)
     height = (low - high) * 1e-3
     plotter = new_plotter(max(8, round(_PIXELS * 2 * _half_width(case) / height)), _PIXELS)
     plotter.add_mesh(
-        mesh, scalars=QUANTITY, cmap=COLOURS, clim=(scale.vmin, scale.vmax), lighting=False,
+        mesh, scalars=_QUANTITY, cmap=_COLOURS, clim=(scale.vmin, scale.vmax), lighting=False,
         show_edges=True, edge_color="#c9ced6", line_width=0.5, show_scalar_bar=False,
     )  # fmt: skip
     middle = needed(case.workpiece, "workpiece").immersion_depth_m - 0.5e-3 * (high + low)
@@ -175,7 +175,7 @@ def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> Non
         sums += np.histogram2d(rows["depth_m"], middles[part], grid, weights=half)[0]
     area = workpiece.radius_m * (azimuths[1] - azimuths[0]) * (depths[1] - depths[0])
     shown = sums / (area * sampled.path_m)
-    axes.pcolormesh(np.degrees(azimuths), depths * 1e3, shown, cmap=COLOURS, norm=scale)
+    axes.pcolormesh(np.degrees(azimuths), depths * 1e3, shown, cmap=_COLOURS, norm=scale)
     axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle="--")
     axes.axhline(workpiece.immersion_depth_m * 1e3, color=GREY, linewidth=0.8)
     axes.set_xticks(np.arange(-180, 181, 90), ["back", "right", "ahead", "left", "back"])

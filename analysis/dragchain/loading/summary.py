@@ -40,24 +40,24 @@ from dragchain.run.case import Case
 from dragchain.statistics.bootstrap import estimates
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
 
-THINNING = (2, 5, 10)
+_THINNING = (2, 5, 10)
 """Every n-th sample is taken to see what a lower rate of samples would give."""
 
-GAPS = (0, 1, 2, 5)
+_GAPS = (0, 1, 2, 5)
 """Samples without force that may lie within an event, to see what they do to its number."""
 
-MOBILISED = (0.9, 0.95, 0.99, 0.999)
+_MOBILISED = (0.9, 0.95, 0.99, 0.999)
 """Limits of a sliding contact, to see what they do to the sums."""
 
 DEPTH_BINS, AZIMUTH_BINS = 20, 24
 
-KNOWN = (*AMOUNTS, "normal_work_j", "workpiece_work_j")
+_KNOWN = (*AMOUNTS, "normal_work_j", "workpiece_work_j")
 """Amounts of which totals are known."""
 
-BY_TYPE = ("samples", "normal_impulse_n_s", "sliding_m", "force_slide_n_m", "friction_work_j")
+_BY_TYPE = ("samples", "normal_impulse_n_s", "sliding_m", "force_slide_n_m", "friction_work_j")
 """Amounts of which each type's fraction has an interval."""
 
-INTENSITIES = (
+_INTENSITIES = (
     *("duration_s", "peak_normal_force_n", "mean_normal_force_n", "normal_impulse_n_s"),
     *("sliding_m", "friction_work_j"),
 )
@@ -110,28 +110,28 @@ def summarise(
             )
             for name, moved in {"as stated": limits, **limits.varied()}.items()
         ),
-        mobilised=tuple(_mobilised(sampled.rows, limit) for limit in MOBILISED),
-        gaps=tuple(Gap(samples=gap, events=_count(sampled.rows, 1 + gap)) for gap in GAPS),
+        mobilised=tuple(_mobilised(sampled.rows, limit) for limit in _MOBILISED),
+        gaps=tuple(Gap(samples=gap, events=_count(sampled.rows, 1 + gap)) for gap in _GAPS),
         profiles=_profiles(sampled),
-        sampling=tuple(_thinned(sampled, every, case, limits) for every in THINNING),
+        sampling=tuple(_thinned(sampled, every, case, limits) for every in _THINNING),
         closure=_closure(sampled, facets, events, off_facet_m),
     )
 
 
 def _totals(sampled: Sampled, events: pd.DataFrame) -> Totals:
-    rows, count = sampled.rows, len(KNOWN)
+    rows, count = sampled.rows, len(_KNOWN)
     ahead = within(rows["azimuth_rad"].to_numpy(np.float64), np.pi / 2)
     sums = np.column_stack(
         [
-            *(sampled.per_frame(rows[name]) for name in KNOWN),
-            *(sampled.per_frame(rows[name] * ahead) for name in KNOWN),
+            *(sampled.per_frame(rows[name]) for name in _KNOWN),
+            *(sampled.per_frame(rows[name] * ahead) for name in _KNOWN),
             sampled.per_frame(),
             sampled.per_frame(rows["normal_impulse_n_s"] * rows["mobilised"]),
             np.bincount(events["frame"], minlength=sampled.frames),
         ]
     )
     impulse, friction, normal, whole = (
-        KNOWN.index(name)
+        _KNOWN.index(name)
         for name in ("normal_impulse_n_s", "friction_work_j", "normal_work_j", "workpiece_work_j")
     )
     metre = sampled.path_m / sampled.frames
@@ -152,9 +152,9 @@ def _totals(sampled: Sampled, events: pd.DataFrame) -> Totals:
     found = estimates(sums, statistic)
     friction_part, normal_part, sliding_part, contacts, begins = found[2 * count :]
     return Totals(
-        totals={name: float(rows[name].sum()) for name in KNOWN} | {"events": len(events)},
-        per_metre=dict(zip(KNOWN, found, strict=False)) | {"events": begins},
-        front_fraction=dict(zip(KNOWN, found[count:], strict=False)),
+        totals={name: float(rows[name].sum()) for name in _KNOWN} | {"events": len(events)},
+        per_metre=dict(zip(_KNOWN, found, strict=False)) | {"events": begins},
+        front_fraction=dict(zip(_KNOWN, found[count:], strict=False)),
         friction_fraction_of_work=friction_part,
         normal_fraction_of_work=normal_part,
         load_while_sliding_fraction=sliding_part,
@@ -167,9 +167,9 @@ def _types(sampled: Sampled, events: pd.DataFrame, event: Ints) -> dict[str, Con
     rows = sampled.rows.assign(samples=1.0)
     kind, frames = events["type"].to_numpy(), sampled.frames
     of_rows = kind[event]
-    amounts = [sampled.per_frame(rows[name] * (of_rows == t)) for t in TYPES for name in BY_TYPE]
+    amounts = [sampled.per_frame(rows[name] * (of_rows == t)) for t in TYPES for name in _BY_TYPE]
     begun = [np.bincount(events["frame"][kind == t], minlength=frames) for t in TYPES]
-    width = len(BY_TYPE)
+    width = len(_BY_TYPE)
 
     def statistic(means: Floats) -> Floats:
         loads = means[..., : width * len(TYPES)].reshape(*means.shape[:-1], len(TYPES), width)
@@ -182,8 +182,8 @@ def _types(sampled: Sampled, events: pd.DataFrame, event: Ints) -> dict[str, Con
     return {
         name: ContactType(
             events=int((kind == name).sum()),
-            fraction_of={key: next(found) for key in (*BY_TYPE, "events")},
-            intensity={key: _quantiles(events[key][kind == name]) for key in INTENSITIES},
+            fraction_of={key: next(found) for key in (*_BY_TYPE, "events")},
+            intensity={key: _quantiles(events[key][kind == name]) for key in _INTENSITIES},
         )
         for name in TYPES
     }

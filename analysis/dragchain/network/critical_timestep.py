@@ -10,7 +10,7 @@ from scipy.sparse.linalg import eigsh
 
 from dragchain.arrays import Floats, Ints
 
-DENSE_BODIES = 20
+_DENSE_BODIES = 20
 """Up to this many bodies the matrix is solved whole."""
 
 
@@ -87,8 +87,8 @@ def largest_frequency(network: Network) -> float:
     """
     if not len(network.a):
         return 0.0
-    matrix = scaled_stiffness(network)
-    if len(network.mass_kg) <= DENSE_BODIES:
+    matrix = _scaled_stiffness(network)
+    if len(network.mass_kg) <= _DENSE_BODIES:
         largest = float(np.linalg.eigvalsh(matrix.toarray())[-1])
     else:
         start = np.random.default_rng(1).normal(size=matrix.shape[0])  # the same result every time
@@ -116,7 +116,7 @@ def damped_fraction(restitution: float) -> float:
     return float(np.hypot(1.0, ratio) - ratio)
 
 
-def scaled_stiffness(network: Network) -> csr_array:
+def _scaled_stiffness(network: Network) -> csr_array:
     """``M^-1/2 K M^-1/2``, (6 N, 6 N).
 
     For each particle three displacements, then three rotations.

@@ -15,7 +15,7 @@ from dragchain.arrays import Ints
 from dragchain.network.clusters import Clusters, frame_clusters
 from dragchain.network.frame import KINDS, NetworkFrame
 
-LEAST_CONTACTS = 4
+_LEAST_CONTACTS = 4
 """A particle with fewer contacts is a rattler. Four is the mean number with which frictional
 spheres are isostatic; Thornton (2000) leaves out only particles with fewer than two."""
 
@@ -38,7 +38,7 @@ def coordination_number(counts: NDArray[np.integer[Any]]) -> float:
 
 
 def mechanical_coordination_number(
-    counts: NDArray[np.integer[Any]], least: int = LEAST_CONTACTS
+    counts: NDArray[np.integer[Any]], least: int = _LEAST_CONTACTS
 ) -> float:
     """The mean number of contacts of the particles that carry load.
 
@@ -70,7 +70,7 @@ def frame_statistics(frame: NetworkFrame, clusters: Clusters | None = None) -> d
         **of_kind,
         "coordination_number": coordination_number(counts),
         "mechanical_coordination_number": mechanical_coordination_number(counts),
-        "rattler_fraction": _mean(counts < LEAST_CONTACTS),
+        "rattler_fraction": _mean(counts < _LEAST_CONTACTS),
         "normal_force_mean_n": mean,
         "normal_force_max_n": float(normal.max()) if normal.size else mean,
         "above_mean_fraction": _mean(normal > mean),

@@ -19,7 +19,7 @@ from dragchain.run.case import AdvisedSettings, Case, changed_inputs
 from dragchain.run.completeness import RunRecord
 from dragchain.statistics.correlated import MeanEstimate
 
-INTERVALS = {"drag_mean": "drag_n", "vertical_mean": "vertical_n"}
+_INTERVALS = {"drag_mean": "drag_n", "vertical_mean": "vertical_n"}
 """Quantities of a tolerance of which a run knows an interval, and the force each is a mean of."""
 
 
@@ -140,7 +140,7 @@ def actual_interval(
 
     None where nothing was asked, or a single run has no interval of it.
     """
-    name = INTERVALS.get(asked.quantity) if asked else None
+    name = _INTERVALS.get(asked.quantity) if asked else None
     if name is None or not forces[name].mean:
         return None
     force = forces[name]

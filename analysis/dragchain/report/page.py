@@ -20,7 +20,7 @@ from dragchain.report import notation
 LARGE_PICTURE = 200_000
 """Bytes above which a page holds a picture as WebP; ``figures/`` keeps the PNG."""
 
-HEADING = re.compile(r'<h2 id="([^"]+)">(.*?)</h2>')
+_HEADING = re.compile(r'<h2 id="([^"]+)">(.*?)</h2>')
 
 Filters = Mapping[str, Callable[..., object]]
 
@@ -63,7 +63,7 @@ def slug(title: str) -> str:
 
 def sections(body: str) -> list[tuple[str, str]]:
     """Return anchor and title, as HTML, of every section of a page's body."""
-    return HEADING.findall(body)
+    return _HEADING.findall(body)
 
 
 def data_uri(picture: bytes, kind: str = "png") -> str:

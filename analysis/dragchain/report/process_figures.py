@@ -20,8 +20,8 @@ from dragchain.run.kinematics import drag_start_s
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 
-RUN_IN = "#d9dde2"
-REFERENCES = (RED, GREEN, GREY)
+_RUN_IN = "#d9dde2"
+_REFERENCES = (RED, GREEN, GREY)
 
 
 def forces(run: RunData, found: ProcessFindings) -> Figure:
@@ -33,12 +33,12 @@ def forces(run: RunData, found: ProcessFindings) -> Figure:
     axes = figure.subplots()
     axes.plot(time_s, trace.lateral_n, color=ORANGE, lw=0.7, label="lateral (left of motion)")
     axes.plot(time_s, trace.drag_n, color=BLUE, lw=0.8, label="drag (along motion)")
-    axes.axvspan(float(time_s[0]), start, color=RUN_IN, alpha=0.6, linewidth=0, label="run-in")
+    axes.axvspan(float(time_s[0]), start, color=_RUN_IN, alpha=0.6, linewidth=0, label="run-in")
     axes.fill_between([start, end], ours.ci95_low, ours.ci95_high, color="black", alpha=0.15, lw=0)
     interval = f"{ours.ci95_low:.2f} to {ours.ci95_high:.2f}"
     label = f"mean drag {ours.mean:.2f} N, 95 % interval {interval} N"
     axes.plot([start, end], [ours.mean] * 2, color="black", label=label)
-    for row, colour in zip(found.comparison, cycle(REFERENCES), strict=False):
+    for row, colour in zip(found.comparison, cycle(_REFERENCES), strict=False):
         label = f"{row.label} mean {row.mean_n:.2f} N" + _spread(row)
         axes.plot([start, end], [row.mean_n] * 2, linestyle="--", color=colour, label=label)
     axes.set(xlabel="process time (s)", ylabel="force on the workpiece (N)", xlim=(0, time_s[-1]))
@@ -189,7 +189,7 @@ def drag_of_cases(
         for key in ("mean", "ci95_low", "ci95_high")
     )
     axes.errorbar(mean, place, xerr=[mean - low, high - mean], fmt="o", color=BLUE, capsize=3)
-    for (label, value), colour in zip(references, cycle(REFERENCES), strict=False):
+    for (label, value), colour in zip(references, cycle(_REFERENCES), strict=False):
         axes.axvline(value, color=colour, linestyle="--", label=f"{label} {value:.2f} N")
     axes.set_yticks(place, names)
     axes.set(xlabel="mean drag (N), 95 % confidence interval", ylim=(len(names) - 0.5, -0.5))

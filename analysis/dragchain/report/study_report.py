@@ -32,10 +32,10 @@ from dragchain.report.summary import summary
 from dragchain.run.case import Assumption, load_case
 from dragchain.statistics.correlated import RELIABLE_TIMES
 
-SHOWN = 6
+_SHOWN = 6
 """Cases that the head of the page names; more are in its first table alone."""
 
-FROM_LOADING = "workpiece"
+_FROM_LOADING = "workpiece"
 """The figure of `dragchain.loading`, without which a report is still made."""
 
 
@@ -119,11 +119,11 @@ def _pictures(run: ReportedRun[Findings]) -> list[Picture]:
     """The figures of a run; only a filling may lack one, as it may have no thermo table."""
     scene = run.case.scene
     found = []
-    for name in (*FIGURES[scene], *([FROM_LOADING] if scene == "process" else [])):
+    for name in (*FIGURES[scene], *([_FROM_LOADING] if scene == "process" else [])):
         file = run.folder / "figures" / f"{name}.png"
         if (uri := file_uri(file)) is not None:
             found.append(Picture(name, uri))
-        elif scene != "filling" and name != FROM_LOADING:
+        elif scene != "filling" and name != _FROM_LOADING:
             raise TableError(f"{file}: there is no such file; run `dragchain figures` first")
     return found
 
@@ -137,7 +137,7 @@ def _render(sections: Sequence[Section], table: pd.DataFrame) -> str:
         sections=sections,
         overview=_overview(studies) if len(studies) > 1 else None,
         columns={str(name): table[name].tolist() for name in table},
-        shown=SHOWN,
+        shown=_SHOWN,
         reliable_times=RELIABLE_TIMES,
     )
 

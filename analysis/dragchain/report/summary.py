@@ -19,10 +19,10 @@ Row = dict[str, Cell]
 
 def summary(studies: Sequence[StudyRuns]) -> pd.DataFrame:
     """The summary table; a number that there is none of is NaN."""
-    return pd.DataFrame([summary_row(study) for study in studies])
+    return pd.DataFrame([_summary_row(study) for study in studies])
 
 
-def summary_row(study: StudyRuns) -> Row:
+def _summary_row(study: StudyRuns) -> Row:
     """The row of a process run."""
     case, found, record = study.process.case, study.process.findings, study.process.record
     return {

@@ -163,7 +163,7 @@ class CirclePath(WorkpiecePath):
     @classmethod
     def of(cls, motion: Circle) -> CirclePath:
         """The path of a motion."""
-        kind = CirclePath if motion.orientation == "fixed" else TurningCirclePath
+        kind = CirclePath if motion.orientation == "fixed" else _TurningCirclePath
         speed, start = motion.axis_speed_m_s, motion.start_direction_rad
         return kind(speed, start, motion.sign, motion.radius_m)
 
@@ -178,7 +178,7 @@ class CirclePath(WorkpiecePath):
 
 
 @dataclass(frozen=True)
-class TurningCirclePath(CirclePath):
+class _TurningCirclePath(CirclePath):
     """A circle whose workpiece turns with it: ``w x r`` with ``w = sign speed / radius``."""
 
     def velocity(self, point_m: Floats, direction_rad: Floats) -> Floats:
@@ -191,14 +191,17 @@ class TurningCirclePath(CirclePath):
         return direction_rad
 
 
-PATHS: Mapping[str, Callable[[Any], WorkpiecePath]] = {"circle": CirclePath.of, "line": LinePath.of}
+_PATHS: Mapping[str, Callable[[Any], WorkpiecePath]] = {
+    "circle": CirclePath.of,
+    "line": LinePath.of,
+}
 """The path of each kind of motion."""
 
 
 def path_of(case: Case) -> WorkpiecePath:
     """How the workpiece is driven in the drag."""
     motion = motion_of(case)
-    return PATHS[motion.kind](motion)
+    return _PATHS[motion.kind](motion)
 
 
 def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:

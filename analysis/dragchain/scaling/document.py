@@ -23,7 +23,7 @@ class Axis(NamedTuple):
     factor: float = 1.0
 
 
-AXES: Mapping[str, Axis] = {
+_AXES: Mapping[str, Axis] = {
     "motion.immersion_depth_m": Axis("depth of the tip", "mm", 1e3),
     "workpiece.shape.radius_m": Axis("radius of the workpiece", "mm", 1e3),
     "motion.speed_m_s": Axis("speed of the workpiece", "mm/s", 1e3),
@@ -206,4 +206,4 @@ class ScalingFile(Document):
         if block == "pairs" and entry.endswith(".friction"):
             pair = entry.removesuffix(".friction")
             return Axis(f"friction coefficient, {pair.replace('-', ' on ')}")
-        return AXES.get(self.field, Axis(self.field))
+        return _AXES.get(self.field, Axis(self.field))

@@ -17,15 +17,15 @@ from dragchain.figures.style import BLUE, GREEN, ORANGE, STYLE, WIDTH_IN
 from dragchain.report.notation import MINUS
 from dragchain.scaling.document import CurvePoint, ScaledRun, ScalingFile
 
-INK = "#1d2733"
-LEAST_SPAN = 2.5
+_INK = "#1d2733"
+_LEAST_SPAN = 2.5
 """An axis of drag spans at least this factor, so that chance does not look like a trend."""
 
-PAD = 1.12
-SIDEWAYS = 0.015
+_PAD = 1.12
+_SIDEWAYS = 0.015
 """Runs of a level stand side by side, this part of the level apart."""
 
-TICKS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+_TICKS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 
 
 def draw_scaling(found: ScalingFile) -> Figure:
@@ -108,7 +108,7 @@ def _points(axes: Axes, found: ScalingFile, factor: float) -> None:
         "_",
         ms=17,
         mew=2.0,
-        color=INK,
+        color=_INK,
         label="mean of a level",
     )
     runs = found.runs
@@ -119,7 +119,7 @@ def _points(axes: Axes, found: ScalingFile, factor: float) -> None:
         fmt="o",
         ms=4.0,
         mfc="white",
-        color=INK,
+        color=_INK,
         elinewidth=0.9,
         zorder=3,
         label="a run and its standard error",
@@ -130,23 +130,23 @@ def _beside(runs: Sequence[ScaledRun]) -> list[float]:
     """Factors on the levels of runs that put beds side by side."""
     beds = sorted({run.bed for run in runs})
     middle = 0.5 * (len(beds) - 1)
-    return [1.0 + SIDEWAYS * (beds.index(run.bed) - middle) for run in runs]
+    return [1.0 + _SIDEWAYS * (beds.index(run.bed) - middle) for run in runs]
 
 
 def _ticks(axes: Axes, found: ScalingFile, factor: float) -> None:
     """Every level on the horizontal axis, round numbers on the vertical."""
     levels = [factor * level.x for level in found.levels]
-    axes.set_xlim(levels[0] / PAD, levels[-1] * PAD)
+    axes.set_xlim(levels[0] / _PAD, levels[-1] * _PAD)
     axes.xaxis.set_major_locator(FixedLocator(levels))
     axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.xaxis.set_minor_locator(NullLocator())
     low, high = axes.get_ylim()
-    stretch = max(1.0, math.sqrt(LEAST_SPAN * low / high))
+    stretch = max(1.0, math.sqrt(_LEAST_SPAN * low / high))
     low, high = low / stretch, high * stretch
     axes.set_ylim(low, high)
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     wide = high > 12.0 * low
-    steps = (1.0, 2.0, 5.0) if wide else TICKS
+    steps = (1.0, 2.0, 5.0) if wide else _TICKS
     axes.yaxis.set_major_locator(FixedLocator([s * 10.0**d for d in decades for s in steps]))
     axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())

@@ -38,16 +38,16 @@ from dragchain.statistics.power_law import (
 )
 from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
 
-STORED = Path(__file__).parent / "data"
+_STORED = Path(__file__).parent / "data"
 """The scalings that were measured for the documentation."""
 
-ORDER = ("drag-depth", "drag-diameter", "drag-speed", "drag-friction")
+_ORDER = ("drag-depth", "drag-diameter", "drag-speed", "drag-friction")
 """The studies of slow drag, in the order of the documentation; others follow."""
 
 SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particles")
 """Numbers of the scene that a scaling reports."""
 
-CURVE_POINTS = 41
+_CURVE_POINTS = 41
 
 
 def find(
@@ -141,7 +141,7 @@ def _fitted(law: PowerLaw) -> FittedLaw:
 def _curve(law: PowerLaw) -> list[float]:
     """Levels at which a curve is drawn."""
     levels = law.runs.levels
-    return [float(x) for x in np.geomspace(levels[0], levels[-1], CURVE_POINTS)]
+    return [float(x) for x in np.geomspace(levels[0], levels[-1], _CURVE_POINTS)]
 
 
 def _shifted(law: PowerLaw, power: float) -> ShiftedLaw:
@@ -213,9 +213,9 @@ def table(found: ScalingFile) -> pd.DataFrame:
 
 def read_scalings() -> list[ScalingFile]:
     """The scalings that come with the package, those of slow drag first."""
-    found = [ScalingFile.read(file) for file in STORED.glob("*.json")]
-    place = {name: number for number, name in enumerate(ORDER)}
-    return sorted(found, key=lambda one: (place.get(one.study, len(ORDER)), one.study))
+    found = [ScalingFile.read(file) for file in _STORED.glob("*.json")]
+    place = {name: number for number, name in enumerate(_ORDER)}
+    return sorted(found, key=lambda one: (place.get(one.study, len(_ORDER)), one.study))
 
 
 def scaling_command(

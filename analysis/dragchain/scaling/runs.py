@@ -12,7 +12,7 @@ from dragchain.run.case import Case, Circle, load_case
 from dragchain.run.kinematics import needed
 from dragchain.scaling.document import ScaledRun
 
-UNLIKE = frozenset({"seed"})
+_UNLIKE = frozenset({"seed"})
 """Inputs that runs of one scaling may differ in, beside its field."""
 
 
@@ -83,7 +83,7 @@ def _check_alike(cases: Sequence[Case], field: str) -> None:
     for case in others:
         same = {**case.inputs, "fidelity": case.fidelity}
         for name, value in wanted.items():
-            if name not in (field, *UNLIKE) and same.get(name) != value:
+            if name not in (field, *_UNLIKE) and same.get(name) != value:
                 raise TableError(
                     f"{case.run}: {name} is {same.get(name)!r}, in {first.run} it is {value!r}; "
                     f"the runs of a scaling differ in {field} and seed only"

@@ -22,7 +22,7 @@ from dragchain.tables.run_folder import Run
 REST_FLOOR = 1e-7
 """Kinetic energy over N m g d below which a loaded bed is at rest whatever it did before."""
 
-LAST_SAMPLES = 50
+_LAST_SAMPLES = 50
 """Samples at the end of a resting bed's run whose mean energy counts: a quarter of them."""
 
 
@@ -94,7 +94,7 @@ def measure_resting(point: PointRun, run: Run) -> RestingBed:
         overlap_ratio=overlap,
         frequency_rad_s=frequency,
         height_m=float(last.columns["z_m"].mean()),
-        rest_energy_ratio=float(_energy(run)[-LAST_SAMPLES:].mean()) / unit,
+        rest_energy_ratio=float(_energy(run)[-_LAST_SAMPLES:].mean()) / unit,
     )
 
 

@@ -32,7 +32,7 @@ from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WorkpieceFrame
 from dragchain.tables.write import workpiece_force_rows
 
-NETWORK_FRAMES = 8
+_NETWORK_FRAMES = 8
 """Frames of a reference whose networks are looked at; the stiffest counts."""
 
 _PARTNER = {
@@ -112,7 +112,7 @@ def _contacts(point: PointRun, run: Run) -> tuple[float, float]:
     particles = {frame.step: frame for frame in run.frames("particles")}
     pairs = {frame.step: frame for frame in run.frames("contacts")}
     steps = np.array(sorted(pairs))
-    every = steps[np.linspace(0, len(steps) - 1, min(len(steps), NETWORK_FRAMES)).astype(int)]
+    every = steps[np.linspace(0, len(steps) - 1, min(len(steps), _NETWORK_FRAMES)).astype(int)]
     some = set(every.tolist() if point.point.reference else every[:1].tolist())
     largest = frequency = 0.0
     for workpiece in run.workpiece_frames():

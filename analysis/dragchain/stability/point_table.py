@@ -15,7 +15,7 @@ from dragchain.stability.classes import Seen, Verdict, classify
 from dragchain.stability.measured import COLUMNS, Measure, Measured
 from dragchain.stability.points import PointRun, Settings
 
-SMALL_STEP = 0.4
+_SMALL_STEP = 0.4
 """Steps over the Rayleigh time up to which the heights of settled beds differ by chance."""
 
 _ERRORS = ("restitution", "peak force", "tangential speed", "height", "mean drag")
@@ -109,7 +109,7 @@ def _height_scatter(runs: Sequence[PointRun], measured: Sequence[Measured | None
     heights = [
         own.height_m
         for run, own in zip(runs, measured, strict=True)
-        if isinstance(own, Bed) and run.point.fraction <= SMALL_STEP
+        if isinstance(own, Bed) and run.point.fraction <= _SMALL_STEP
     ]
     return float(np.std(heights, ddof=1) / np.mean(heights)) if len(heights) > 2 else math.inf
 

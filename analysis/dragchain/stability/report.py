@@ -37,7 +37,7 @@ from dragchain.stability.safe_steps import (
     regimes,
 )
 
-MEASURES: Mapping[str, Measure] = {
+_MEASURES: Mapping[str, Measure] = {
     "impact": measure_impacts,
     "settle": measure_settled,
     "column": measure_resting,
@@ -72,10 +72,10 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
         A run was interrupted.
     """
     runs = read_points(lists)
-    classified = classify_points(runs, MEASURES)
+    classified = classify_points(runs, _MEASURES)
     points = point_table(classified)
     by_condition = conditions(points)
-    document = summarise(points, by_condition, runs)
+    document = _summarise(points, by_condition, runs)
     sizes = _run_sizes(runs)
     with matplotlib.rc_context(STYLE):
         drawn = draw(points, by_condition, document.restitution_error, sizes)
@@ -89,7 +89,7 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
     )
 
 
-def summarise(
+def _summarise(
     points: pd.DataFrame, by_condition: pd.DataFrame, runs: Sequence[PointRun]
 ) -> StabilityFile:
     """What ``dragdeck check`` uses: safe steps, errors of impacts, and where they come from."""

@@ -17,7 +17,7 @@ REGIMES = ("impact", "settle", "column", "drag")
 SAFETY_FACTOR = 0.8
 """On the largest step that was seen to be safe: about one step of the map's grid."""
 
-ORDINARY_RESTITUTION = 0.5
+_ORDINARY_RESTITUTION = 0.5
 """Below this the damping of the contacts makes the safe step much smaller."""
 
 RULE = 0.2
@@ -110,7 +110,7 @@ def regimes(found: pd.DataFrame) -> dict[str, SafeSteps]:
 def _regime(found: pd.DataFrame) -> SafeSteps:
     usable = found[found["usable"]]
     base = usable[usable["axis"] == "base"]
-    ordinary = usable[usable["restitution"] >= ORDINARY_RESTITUTION]
+    ordinary = usable[usable["restitution"] >= _ORDINARY_RESTITUTION]
     worst = usable.sort_values("safe_fraction", kind="stable").iloc[0]
     safe, safe_critical = float(worst["safe_fraction"]), float(usable["safe_critical"].min())
     return SafeSteps(
@@ -153,7 +153,7 @@ def error_table(points: pd.DataFrame) -> RestitutionErrors:
     impacts = impacts[impacts["state"] == "complete"]
     steps = impacts["steps_per_contact"].to_numpy()
     bins = np.floor(np.log10(steps) * _ERROR_BINS_PER_DECADE).astype(int)
-    ordinary = (impacts["setting_restitution"] >= ORDINARY_RESTITUTION).to_numpy()
+    ordinary = (impacts["setting_restitution"] >= _ORDINARY_RESTITUTION).to_numpy()
     groups = [bins == number for number in np.unique(bins)]
     errors = impacts["restitution_error"].abs().to_numpy()
     forces = impacts["peak_force_error"].abs().to_numpy()

@@ -23,7 +23,7 @@ from dragchain.statistics.shared_bed import Effects, Whitened, alike, same
 Combination = tuple[tuple[str, Hashable], ...]
 """Factors and their levels, those of the reference left out."""
 
-LARGEST_FRACTION = 0.98
+_LARGEST_FRACTION = 0.98
 """Largest share of the variance that a bed is allowed to explain."""
 
 
@@ -92,7 +92,7 @@ def _best_fraction(design: Floats, values: Floats, same_bed: Floats) -> float:
         model = Whitened.of(design, values, alike(same_bed, fraction))
         return model.log_determinants + 0.5 * model.degrees * math.log(max(model.square, 1e-300))
 
-    found = minimize_scalar(loss, bounds=(0.0, LARGEST_FRACTION), method="bounded")
+    found = minimize_scalar(loss, bounds=(0.0, _LARGEST_FRACTION), method="bounded")
     return float(found.x) if found.fun < loss(0.0) else 0.0
 
 

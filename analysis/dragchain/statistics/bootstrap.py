@@ -15,8 +15,8 @@ from dragchain.errors import SeriesError
 from dragchain.statistics.correlated import MIN_SAMPLES, autocorrelation_time
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
 
-RESAMPLES = 2000
-SEED = 20150101
+_RESAMPLES = 2000
+_SEED = 20150101
 
 
 def block_length(sums: Floats) -> int:
@@ -30,7 +30,7 @@ def block_length(sums: Floats) -> int:
     return int(np.clip(np.ceil(4.0 * longest), np.ceil(count ** (1 / 3)), count // 4))
 
 
-def bootstrap_means(sums: Floats, length: int, resamples: int = RESAMPLES) -> Floats:
+def bootstrap_means(sums: Floats, length: int, resamples: int = _RESAMPLES) -> Floats:
     """Return resampled column means by circular blocks (Politis and Romano 1992).
 
     Parameters
@@ -49,7 +49,7 @@ def bootstrap_means(sums: Floats, length: int, resamples: int = RESAMPLES) -> Fl
     total = np.vstack([np.zeros(sums.shape[1]), np.cumsum(np.vstack([sums, sums]), axis=0)])
     block_means = (total[length : length + count] - total[:count]) / length
     blocks = -(-count // length)
-    starts = np.random.default_rng(SEED).integers(0, count, (resamples, blocks))
+    starts = np.random.default_rng(_SEED).integers(0, count, (resamples, blocks))
     return np.asarray(np.stack([block_means[row].mean(axis=0) for row in starts]))
 
 

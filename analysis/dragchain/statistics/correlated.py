@@ -14,7 +14,7 @@ from dragchain.statistics.estimate import CONFIDENCE, student_quantile
 MIN_SAMPLES = 8
 """Fewer samples carry no autocorrelation worth estimating."""
 
-WINDOW = 5.0
+_WINDOW = 5.0
 """Lags are summed up to this many autocorrelation times (Sokal 1997, section 3)."""
 
 RELIABLE_TIMES = 50.0
@@ -141,7 +141,7 @@ def autocorrelation_time(series: ArrayLike) -> float:
         return 0.5
     covariance = autocovariance(samples)
     sums = np.cumsum(covariance) / covariance[0] - 0.5
-    window = int(np.argmax(np.arange(len(sums)) >= WINDOW * sums))
+    window = int(np.argmax(np.arange(len(sums)) >= _WINDOW * sums))
     count = len(samples)
     unbiased = (1.0 + (2 * window + 1) / count) / (1.0 + 1.0 / count)
     return max(0.5, float(sums[window]) * unbiased)

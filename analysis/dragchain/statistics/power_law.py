@@ -22,13 +22,13 @@ from dragchain.errors import SeriesError
 from dragchain.statistics.estimate import Estimate
 from dragchain.statistics.shared_bed import Effects, Whitened, alike, same
 
-LEAST_LEVELS = 3
+_LEAST_LEVELS = 3
 """A line through two levels always fits."""
 
-LARGEST_FRACTION = 0.9
+_LARGEST_FRACTION = 0.9
 """Largest share of the variance that a bed is allowed to explain."""
 
-SPREADS = (1e-4, 2.0)
+_SPREADS = (1e-4, 2.0)
 """Limits of the standard deviation between runs, in logarithms."""
 
 
@@ -89,9 +89,9 @@ class Runs:
         numbers = np.array([self.x, self.values, self.errors])
         if not (np.isfinite(numbers).all() and (numbers[:2] > 0.0).all()):
             raise SeriesError("a power law needs levels and means that are finite and above zero")
-        if len(self.levels) < LEAST_LEVELS:
+        if len(self.levels) < _LEAST_LEVELS:
             raise SeriesError(
-                f"{len(self.levels)} level(s) cannot test a power law: give {LEAST_LEVELS} or more"
+                f"{len(self.levels)} level(s) cannot test a power law: give {_LEAST_LEVELS} or more"
             )
         if self.degrees(2) < 1:
             raise SeriesError(f"{len(self.x)} runs leave nothing to tell chance by: run more seeds")
@@ -157,8 +157,8 @@ def estimate_scatter(runs: Runs, design: Floats) -> Scatter:
         scatter = Scatter(float(np.exp(parameters[0])), float(parameters[1]))
         return _minus_likelihood(design, runs.logarithms, runs.covariance(scatter))
 
-    least, most = (float(limit) for limit in np.log(SPREADS))
-    fraction = LARGEST_FRACTION if runs.fractions_beds else 0.0
+    least, most = (float(limit) for limit in np.log(_SPREADS))
+    fraction = _LARGEST_FRACTION if runs.fractions_beds else 0.0
     trials = itertools.product(np.linspace(least, most, 12)[1:-2], {0.0, 0.5 * fraction})
     start = min((np.array(trial) for trial in trials), key=loss)
     found = minimize(loss, start, bounds=[(least, most), (0.0, fraction)], method="L-BFGS-B")

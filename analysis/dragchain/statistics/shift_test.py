@@ -20,7 +20,7 @@ from dragchain.statistics.estimate import CONFIDENCE, Estimate, student_quantile
 SHIFTS = 19_999
 """Random shifts of the joint null distribution: the smallest p-value is 1 in 20,000."""
 
-SEED = 20150101
+_SEED = 20150101
 _ROUNDING = 1e-9
 
 
@@ -93,7 +93,7 @@ def standardised(series: Floats, means: Floats) -> Floats:
     return np.asarray((means - known.mean()) / spread)
 
 
-def draw_shifts(lengths: Sequence[int], count: int = SHIFTS, seed: int = SEED) -> Ints:
+def draw_shifts(lengths: Sequence[int], count: int = SHIFTS, seed: int = _SEED) -> Ints:
     """Draw shifts for runs of these numbers of frames, (count, runs); the same every time."""
     parts = np.random.default_rng(seed).random((count, len(lengths)))
     return np.asarray(np.floor(parts * np.asarray(lengths)), dtype=np.int64)

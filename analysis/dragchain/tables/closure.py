@@ -18,7 +18,7 @@ SHARED_LIMIT = 0.05
 """The same where one wall serves workpiece and bowl (``mesh_id`` in workpiece_contacts): a
 particle that touches both has one force, which is shared out by estimate."""
 
-FLOOR_N = 1e-3
+_FLOOR_N = 1e-3
 """Smaller forces on the workpiece do not serve as the scale of the error."""
 
 
@@ -145,10 +145,10 @@ class Closure:
                 f"at step {worst.step} the forces on the particles miss the force on the workpiece"
                 f" by {worst.gap_n:.3g} N, {worst.relative:.3g} of it (limit {self.limit:g})"
             )
-        if self.unplaced_max_n > FLOOR_N:
+        if self.unplaced_max_n > _FLOOR_N:
             return (
                 f"{self.unplaced} forces on particles have no contact in workpiece_contacts,"
-                f" the largest {self.unplaced_max_n:.3g} N (limit {FLOOR_N:g} N)"
+                f" the largest {self.unplaced_max_n:.3g} N (limit {_FLOOR_N:g} N)"
             )
         return None
 
@@ -160,7 +160,7 @@ class Closure:
             verdict="pass" if problem is None else "fail",
             problem=problem,
             limit=self.limit,
-            force_floor_n=FLOOR_N,
+            force_floor_n=_FLOOR_N,
             frames=len(self._errors),
             worst_step=worst.step if worst else None,
             max_relative=worst.relative if worst else 0.0,
@@ -179,7 +179,7 @@ class Closure:
 
 
 def _error(frame: WorkpieceFrame, workpiece_force_n: Floats, counted: bool) -> _Error:
-    scale = max(float(np.linalg.norm(workpiece_force_n)), FLOOR_N)
+    scale = max(float(np.linalg.norm(workpiece_force_n)), _FLOOR_N)
     applied = frame.workpiece.force_n.sum(axis=0) + frame.unplaced_n.sum(axis=0)
     gap = float(np.linalg.norm(applied + workpiece_force_n))
     evaluated = frame.workpiece.evaluated_n.sum(axis=0)

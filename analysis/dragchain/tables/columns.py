@@ -9,7 +9,7 @@ def vector(name: str, unit: str) -> tuple[str, str, str]:
 
 
 FORCES = vector("force", "n")
-TORQUES = vector("torque", "n_m")
+_TORQUES = vector("torque", "n_m")
 POINT = vector("point", "m")
 SLIP = vector("slip", "m_s")
 REFERENCE = vector("ref", "m")
@@ -21,7 +21,7 @@ SPIN = ("wx_rad_s", "wy_rad_s", "wz_rad_s")
 KINEMATICS = ("particle_id", *CENTRE, *VELOCITY, *SPIN, "radius_m")
 
 WORKPIECE_FORCE = (
-    "step", "time_s", "phase", *FORCES, *TORQUES, *REFERENCE,
+    "step", "time_s", "phase", *FORCES, *_TORQUES, *REFERENCE,
     "direction_rad", "drag_n", "lateral_n", "vertical_n", "in_statistics",
 )  # fmt: skip
 WORKPIECE_CONTACTS = (

@@ -19,7 +19,7 @@ from dragchain.files import draft_of
 GROUP_ROWS = 131_072
 """Rows of a row group: what a table holds in memory while it is written."""
 
-CATEGORY = pa.dictionary(pa.int8(), pa.string())
+_CATEGORY = pa.dictionary(pa.int8(), pa.string())
 """Type of a column that holds one of a few texts."""
 
 Rows = Mapping[str, NDArray[Any] | pa.Array]
@@ -35,7 +35,7 @@ def category(codes: Any, labels: tuple[str, ...]) -> pa.Array:
 def column_type(name: str) -> pa.DataType:
     """Tell a column's type by its name: ids int64, labels text, flags bool, else float64."""
     if name in ("phase", "kind"):
-        return CATEGORY
+        return _CATEGORY
     if name == "in_statistics":
         return pa.bool_()
     if name == "impact" or is_integer_column(name):
@@ -48,7 +48,7 @@ def _schema(columns: Sequence[str]) -> pa.Schema:
     return pa.schema([pa.field(name, column_type(name), nullable=False) for name in columns])
 
 
-def encodings(schema: pa.Schema) -> dict[str, object]:
+def _encodings(schema: pa.Schema) -> dict[str, object]:
     """How the columns are stored: options of a Parquet writer that change no value.
 
     Whole numbers rise slowly or stay: differences. Bytes of like weight of neighbouring
@@ -56,7 +56,7 @@ def encodings(schema: pa.Schema) -> dict[str, object]:
     radii are few: dictionaries.
     """
     split = {pa.int64(): "DELTA_BINARY_PACKED", pa.float64(): "BYTE_STREAM_SPLIT"}
-    labels = (CATEGORY, pa.string(), pa.large_string())
+    labels = (_CATEGORY, pa.string(), pa.large_string())
     few = [field.name for field in schema if field.type in labels or field.name == "radius_m"]
     return {
         "compression": "zstd",
@@ -148,7 +148,7 @@ class TableWriter:
 
     def _open(self) -> pq.ParquetWriter:
         if self._writer is None:
-            self._writer = pq.ParquetWriter(self._draft, self._schema, **encodings(self._schema))
+            self._writer = pq.ParquetWriter(self._draft, self._schema, **_encodings(self._schema))
         return self._writer
 
     def _flush(self) -> None:

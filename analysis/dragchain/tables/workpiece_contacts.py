@@ -17,7 +17,7 @@ from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
 from dragchain.tables.columns import CENTRE, FORCES, POINT, SPIN, VELOCITY
 
-BOWL_MESH = 1
+_BOWL_MESH = 1
 """``mesh_id`` of a contact when the bowl is a mesh too."""
 
 
@@ -143,7 +143,7 @@ def join_workpiece_frame(particles: Frame, contacts: Frame) -> WorkpieceFrame:
     all_contacts = _place(contacts, pushed)
     unplaced = np.ones(len(known), dtype=np.bool_)
     unplaced[np.searchsorted(known, all_contacts.particle_id[~all_contacts.silent])] = False
-    on_bowl = contacts.columns.get("mesh_id", np.zeros(contacts.rows)) == BOWL_MESH
+    on_bowl = contacts.columns.get("mesh_id", np.zeros(contacts.rows)) == _BOWL_MESH
     return WorkpieceFrame(
         particles.step,
         all_contacts.select(~on_bowl),

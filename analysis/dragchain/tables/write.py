@@ -88,7 +88,7 @@ def write_tables(run_dir: Path | str) -> list[Path]:
         If the outputs contradict each other.
     """
     run = Run.open(run_dir)
-    tables = [table for table in TABLES[run.case.scene] if run.wrote(*table.needs)]
+    tables = [table for table in _TABLES[run.case.scene] if run.wrote(*table.needs)]
     for table in tables:
         table.write(run, run.table(table.name))
     return [run.table(table.name) for table in tables]
@@ -344,7 +344,7 @@ _THERMO = Table("thermo.parquet", ("thermo",), _write_thermo)
 _PARTICLES = Table("particles.parquet", ("particles",), _write_particles)
 _ON_WORKPIECE = ("workpiece_particles", "workpiece_contacts")
 
-TABLES: Mapping[Scene, tuple[Table, ...]] = {
+_TABLES: Mapping[Scene, tuple[Table, ...]] = {
     "drop_test": (_THERMO, Table("impacts.parquet", ("impacts",), _write_impacts)),
     "filling": (_THERMO, _PARTICLES, Table("packing.json", ("particles",), _write_packing)),
     "process": (

@@ -14,7 +14,7 @@ from dragchain.tradeoff.outcome import StepCosts, Tradeoff
 from dragchain.tradeoff.runs import Setting
 from dragchain.tradeoff.six_digits import Number, SixDigits
 
-PLAIN = ("plain_full", "plain")
+_PLAIN = ("plain_full", "plain")
 """Names of the cost of the plain deck, that at full stiffness first."""
 
 
@@ -78,7 +78,7 @@ class Costs:
     def plain_entry(self) -> CostEntry | None:
         """The cost of the plain deck, at full stiffness if that was timed."""
         by_name = {entry.name: entry for entry in self.entries}
-        return next((by_name[name] for name in PLAIN if name in by_name), None)
+        return next((by_name[name] for name in _PLAIN if name in by_name), None)
 
     def standard_in(self, tradeoff: Tradeoff) -> Setting:
         """The `standard`; a file that does not name it is taken to mean the `hub`."""

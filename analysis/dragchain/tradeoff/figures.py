@@ -28,17 +28,17 @@ from dragchain.tradeoff.runs import Run, Setting
 FLOOR = 1e-3
 """Errors below this are drawn here."""
 
-INK = "#1d2733"
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", "p", ">", "d")
-COLUMNS = 3
-TITLES = {
+_INK = "#1d2733"
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", "p", ">", "d")
+_COLUMNS = 3
+_TITLES = {
     "drag_std": "standard deviation of drag",
     "contact_force_mean": "mean contact force on the workpiece",
     "contact_force_p90": "90th percentile of contact forces",
 }
 """Of panels and lines, where the label leans on the one before or is too long."""
 
-SHOWN_REACHES = (
+_SHOWN_REACHES = (
     *("drag_mean", "drag_std", "workpiece_contacts", "contact_force_mean", "contact_force_p90"),
     *("coordination_number", "chain_count", "path_bottleneck"),
 )
@@ -49,7 +49,7 @@ def draw(tradeoff: Tradeoff, reaches: Sequence[Reach], drops: Sequence[Drop]) ->
     drawn: dict[str, Figure] = {}
     if any(name in tradeoff.comparisons for name in MAIN):
         drawn["pareto"] = _pareto(tradeoff)
-    if force_runs(tradeoff):
+    if _force_runs(tradeoff):
         drawn["contact_forces"] = _forces(tradeoff)
     if reaches:
         drawn["path"] = _path(reaches)
@@ -96,19 +96,19 @@ def _pareto(tradeoff: Tradeoff) -> Figure:
     settings = _fidelity_settings(tradeoff)
     colours = _colours([one.youngs_modulus_scale for one in tradeoff.settings()])
     steps = sorted({one.timestep_fraction for one in settings})
-    markers = dict(zip(steps, cycle(MARKERS), strict=False))
-    rows = math.ceil(len(names) / COLUMNS)
+    markers = dict(zip(steps, cycle(_MARKERS), strict=False))
+    rows = math.ceil(len(names) / _COLUMNS)
     figure = Figure(figsize=(1.25 * WIDTH_IN, 2.6 * rows + 0.9), layout="constrained")
-    panels = figure.subplots(rows, COLUMNS, sharex=True, sharey=True, squeeze=False)
+    panels = figure.subplots(rows, _COLUMNS, sharex=True, sharey=True, squeeze=False)
     for axes, name in zip(panels.flat, names, strict=False):
         _pareto_panel(axes, tradeoff, tradeoff.comparisons[name], settings, colours, markers)
     for axes in panels.flat[len(names) :]:
         axes.set_visible(False)
     for number, axes in enumerate(panels.flat[: len(names)]):
-        if number + COLUMNS >= len(names):
+        if number + _COLUMNS >= len(names):
             axes.set_xlabel("cost over the reference's")
             axes.tick_params(labelbottom=True)
-        if number % COLUMNS == 0:
+        if number % _COLUMNS == 0:
             axes.set_ylabel("size of the error in %")
     _shared_limits(panels.flat[0], tradeoff, settings, names)
     own = {one.youngs_modulus_scale for one in settings}
@@ -140,7 +140,7 @@ def _pareto_panel(
             markerfacecolor=colour if error.significant else "white",
             markersize=5.5,
         )
-        axes.plot(cost, max(error.bound, FLOOR), "_", color=INK, markersize=7)
+        axes.plot(cost, max(error.bound, FLOOR), "_", color=_INK, markersize=7)
         if setting.speed_factor != tradeoff.reference.speed_factor:
             axes.annotate(
                 f"v x {setting.speed_factor:g}",
@@ -152,8 +152,8 @@ def _pareto_panel(
             )
     front = list(_front([(tradeoff.cost(one), max(e.bound, FLOOR)) for one, e in points]))
     if front:
-        axes.step(*zip(*front, strict=True), where="post", color=INK, lw=0.9, alpha=0.7, zorder=1)
-    axes.set_title(TITLES.get(comparison.quantity.name, comparison.quantity.label))
+        axes.step(*zip(*front, strict=True), where="post", color=_INK, lw=0.9, alpha=0.7, zorder=1)
+    axes.set_title(_TITLES.get(comparison.quantity.name, comparison.quantity.label))
     _percent_axis(axes)
 
 
@@ -202,8 +202,8 @@ def _pareto_legend(figure: Figure, colours: dict[float, str], markers: dict[floa
         Line2D(
             [], [], ls="", marker="o", color=GREY, markerfacecolor="white", label="not resolved"
         ),
-        Line2D([], [], ls="", marker="_", color=INK, markersize=8, label="bound (95 %)"),
-        Line2D([], [], color=INK, lw=0.9, label="front of the bounds"),
+        Line2D([], [], ls="", marker="_", color=_INK, markersize=8, label="bound (95 %)"),
+        Line2D([], [], color=_INK, lw=0.9, label="front of the bounds"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8)
 
@@ -233,7 +233,7 @@ def exceedance(counts: Sequence[int]) -> tuple[Floats, Floats, float]:
     return FORCE_BINS[:-1], fraction, float(number @ middle / number.sum())
 
 
-def force_runs(tradeoff: Tradeoff) -> dict[float, list[Run]]:
+def _force_runs(tradeoff: Tradeoff) -> dict[float, list[Run]]:
     """Runs whose contact forces are shown, for each modulus: all else as alike as was run."""
     found: dict[float, list[Run]] = {}
     levels = [tradeoff.reference.youngs_modulus_scale, *modulus_levels(tradeoff)]
@@ -257,7 +257,7 @@ def _has_histogram(run: Run) -> bool:
 
 
 def _forces(tradeoff: Tradeoff) -> Figure:
-    shown = force_runs(tradeoff)
+    shown = _force_runs(tradeoff)
     colours = _colours(list(shown))
     figure = Figure(figsize=(1.25 * WIDTH_IN, 3.9), layout="constrained")
     raw, scaled = figure.subplots(1, 2, sharey=True)
@@ -313,16 +313,16 @@ def _path(reaches: Sequence[Reach]) -> Figure:
     axes = figure.subplots()
     arc = reaches[0].arc_m
     paths: Floats = np.geomspace(arc / 4.0, arc * 16.0, 50)
-    shown = [reach for reach in reaches if reach.quantity.name in SHOWN_REACHES]
+    shown = [reach for reach in reaches if reach.quantity.name in _SHOWN_REACHES]
     styles = cycle(("-", "--", ":"))
-    shades = cycle((BLUE, ORANGE, RED, "#009E73", "#CC79A7", "#56B4E9", INK, GREY))
+    shades = cycle((BLUE, ORANGE, RED, "#009E73", "#CC79A7", "#56B4E9", _INK, GREY))
     for reach in sorted(shown, key=lambda one: -one.halfwidth):
-        label = TITLES.get(reach.quantity.name, reach.quantity.label)
+        label = _TITLES.get(reach.quantity.name, reach.quantity.label)
         halfwidth = [reach.at(float(path)) for path in paths]
         axes.plot(1e3 * paths, halfwidth, next(styles), color=next(shades), label=label)
     for tolerance in TOLERANCES:
         axes.axhline(tolerance, color="#c8ced6", lw=0.8, ls="--", zorder=0)
-    axes.axvline(1e3 * arc, color=INK, lw=0.8, ls=":")
+    axes.axvline(1e3 * arc, color=_INK, lw=0.8, ls=":")
     axes.set(xscale="log", yscale="log")
     axes.set_xlabel("counted path of one run in mm (dotted: the path that is compared)")
     axes.set_ylabel("half-width of the 95 % interval in %")
@@ -341,7 +341,9 @@ def _drop(drops: Sequence[Drop]) -> Figure:
     own = [drop for drop in drops[1:] if not drop.other]
     step = [100.0 * drop.timestep_fraction for drop in own]
     axes.plot(step, [max(abs(drop.error), 1e-6) for drop in own], "o-", color=BLUE, label="mean")
-    axes.plot(step, [max(drop.bound, 1e-6) for drop in own], "_--", color=INK, label="worst impact")
+    axes.plot(
+        step, [max(drop.bound, 1e-6) for drop in own], "_--", color=_INK, label="worst impact"
+    )
     axes.set(xscale="log", yscale="log", ylabel="error of restitution in %")
     axes.set_xlabel("time step in % of the Rayleigh time")
     _percent_axis(axes)

@@ -19,7 +19,7 @@ from dragchain.run.completeness import AcceptanceCheck
 
 FILE = "measures.json"
 
-TELLING_CHECKS = ("within_limits", "no_engine_error")
+_TELLING_CHECKS = ("within_limits", "no_engine_error")
 """Acceptance checks that say more than others why a run failed, the most telling first."""
 
 
@@ -103,7 +103,7 @@ class Measures(Document):
         """The acceptance check that says most about why the run failed, None if it did not."""
         by_code = {check.code: check for check in self.failure}
         first = self.failure[0] if self.failure else None
-        return next((by_code[code] for code in TELLING_CHECKS if code in by_code), first)
+        return next((by_code[code] for code in _TELLING_CHECKS if code in by_code), first)
 
     def of_blocks(self, name: str) -> Floats:
         """The values of a quantity, (B,), NaN where a block has none; (0,) if none has one."""

@@ -9,7 +9,7 @@ from dragchain.report.notation import DASH, MINUS, number
 from dragchain.tradeoff.changes import SpeedUp
 from dragchain.tradeoff.compare import Error
 
-FOLD = 2.0
+_FOLD = 2.0
 """Relative errors from this on are told as multiples."""
 
 
@@ -29,14 +29,14 @@ def plainly(fraction: float) -> str:
 
 def error_size(error: Error) -> str:
     """An error in per cent; a large one as a multiple."""
-    if error.value >= FOLD:
+    if error.value >= _FOLD:
         return f"{number(1.0 + error.value, 2)}-fold"
     return f"{in_percent(error.value)} %"
 
 
 def error_interval(error: Error) -> str:
     """The interval of an error, in per cent; that of a large one in multiples."""
-    if error.value >= FOLD:
+    if error.value >= _FOLD:
         return f"{number(1.0 + error.ci95_low, 2)} to {number(1.0 + error.ci95_high, 2)}"
     return f"{in_percent(error.ci95_low)} to {in_percent(error.ci95_high)} %"
 

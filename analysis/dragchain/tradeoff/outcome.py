@@ -145,7 +145,7 @@ def breaks(tradeoff: Tradeoff, setting: Setting) -> bool:
     return change is not None and change.significant and abs(change.value) > BROKEN
 
 
-def candidates(tradeoff: Tradeoff, quantities: Sequence[str]) -> list[Setting]:
+def _candidates(tradeoff: Tradeoff, quantities: Sequence[str]) -> list[Setting]:
     """The settings that could be recommended instead of the reference.
 
     They change nothing but the fidelity, are cheaper, have a step that is known
@@ -191,12 +191,12 @@ def recommend(
     Returns
     -------
     Setting or None
-        One of the `candidates`; None if there is none but the reference.
+        One of the `_candidates`; None if there is none but the reference.
     """
     names = [quantity] if isinstance(quantity, str) else list(quantity)
     able = [
         setting
-        for setting in candidates(tradeoff, names)
+        for setting in _candidates(tradeoff, names)
         if largest_bound(tradeoff, names, setting) <= tolerance
     ]
     return min(able, key=tradeoff.cost, default=None)
@@ -234,7 +234,7 @@ class Choice:
 def choose(tradeoff: Tradeoff, names: Sequence[str], tolerance: float) -> Choice:
     """What to run so that each of some quantities is within a tolerance."""
     setting = recommend(tradeoff, names, tolerance)
-    able = candidates(tradeoff, names)
+    able = _candidates(tradeoff, names)
     nearest = min(able, key=lambda one: largest_bound(tradeoff, names, one), default=None)
     shown = setting or nearest
     if shown is None:

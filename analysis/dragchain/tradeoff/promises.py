@@ -26,7 +26,7 @@ from dragchain.tradeoff.quantities import QUANTITIES
 from dragchain.tradeoff.runs import SILENT, Setting, values_within
 
 Verdict = Literal["kept", "broken", "open"]
-Scene = tuple[tuple[str, str], ...]
+_Scene = tuple[tuple[str, str], ...]
 
 
 class Promise(Part):
@@ -181,7 +181,7 @@ def _asked(runs: Iterable[Measures]) -> list[Asked]:
 
 def _by_scene(runs: Sequence[Measures]) -> Iterator[tuple[dict[str, str], list[Measures]]]:
     """The inputs that tell a scene from the others, and its runs, failed ones included."""
-    scenes: dict[Scene, list[Measures]] = {}
+    scenes: dict[_Scene, list[Measures]] = {}
     for run in runs:
         scenes.setdefault(_scene(run), []).append(run)
     common = set.intersection(*map(set, scenes)) if len(scenes) > 1 else set()
@@ -205,7 +205,7 @@ def failures(runs: Sequence[Measures]) -> list[FailedRun]:
     ]
 
 
-def _scene(measures: Measures) -> Scene:
+def _scene(measures: Measures) -> _Scene:
     return tuple(
         sorted(
             (name, str(value))

@@ -134,7 +134,7 @@ def record_of(
         machine=Machine(cores=os.cpu_count(), processor=_processor()),
         runs=len(measures),
         engine_hours=sum(one.cost.cpu_time_s for one in measures) / 3600.0,
-        scene=scene_numbers(tradeoff),
+        scene=_scene_numbers(tradeoff),
         reference=FidelityParameters(**tradeoff.reference.parameters()),
         quantities={
             name: _quantity_entry(own, tradeoff.arc_m) for name, own in tradeoff.comparisons.items()
@@ -167,7 +167,7 @@ def _processor() -> str:
     return names[0] if names else platform.processor()
 
 
-def scene_numbers(tradeoff: Tradeoff) -> Mapping[str, float]:
+def _scene_numbers(tradeoff: Tradeoff) -> Mapping[str, float]:
     """Dimensionless numbers of the scene, as the runs at the reference have them."""
     numbers = [run.measures.numbers for run in tradeoff.of(tradeoff.reference)]
     return next((own for own in numbers if own), {})

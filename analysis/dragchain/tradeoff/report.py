@@ -27,12 +27,12 @@ from dragchain.tradeoff.quantities import MAIN
 from dragchain.tradeoff.record import TradeoffRecord, record_of
 from dragchain.tradeoff.runs import read_runs
 
-TOGETHER = ("contact_force_mean", "contact_force_p90")
+_TOGETHER = ("contact_force_mean", "contact_force_p90")
 """What the distribution of contact forces is judged by."""
 
-CHOSEN = (
-    *((name,) for name in ("drag_mean", "drag_std", "workpiece_contacts", *TOGETHER)),
-    TOGETHER,
+_CHOSEN = (
+    *((name,) for name in ("drag_mean", "drag_std", "workpiece_contacts", *_TOGETHER)),
+    _TOGETHER,
     *((name,) for name in ("coordination_number", "chain_count", "chain_length")),
 )
 """The quantities, or the two together, that the page names settings for."""
@@ -124,7 +124,7 @@ def render(findings: Findings, figures: Mapping[str, bytes]) -> str:
     """The page: HTML that needs no other file and no network."""
     tradeoff, comparisons = findings.tradeoff, findings.tradeoff.comparisons
     levels = modulus_levels(tradeoff)
-    named = [names for names in CHOSEN if all(name in comparisons for name in names)]
+    named = [names for names in _CHOSEN if all(name in comparisons for name in names)]
     return render_page(
         "tradeoff/tradeoff.html.j2",
         FILTERS,

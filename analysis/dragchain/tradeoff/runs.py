@@ -14,7 +14,7 @@ from dragchain.run.case import changed_inputs
 from dragchain.tradeoff.measures import FILE, Measures
 from dragchain.tradeoff.quantities import QUANTITIES
 
-PARAMETERS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
+_PARAMETERS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
 OTHER = "other"
 """The factor that holds all else a point changes."""
 
@@ -44,12 +44,12 @@ class Setting:
     @classmethod
     def of(cls, parameters: object, other: str = "") -> Setting:
         """The setting of what has the parameters as attributes."""
-        modulus, step, speed = (float(getattr(parameters, name)) for name in PARAMETERS)
+        modulus, step, speed = (float(getattr(parameters, name)) for name in _PARAMETERS)
         return cls(modulus, step, speed, other)
 
     def parameters(self) -> dict[str, float]:
         """Fidelity parameter to level."""
-        return {name: getattr(self, name) for name in PARAMETERS}
+        return {name: getattr(self, name) for name in _PARAMETERS}
 
     def __str__(self) -> str:
         parts = [
@@ -140,7 +140,7 @@ def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Se
 
 def _inputs(measures: Measures) -> dict[str, JsonValue]:
     fidelity = {f"fidelity.{name}": value for name, value in measures.fidelity}
-    silent = {*SILENT, "fidelity.name", *(f"fidelity.{name}" for name in PARAMETERS)}
+    silent = {*SILENT, "fidelity.name", *(f"fidelity.{name}" for name in _PARAMETERS)}
     inputs = {**measures.inputs, **fidelity}
     return {name: value for name, value in inputs.items() if name not in silent}
 

@@ -23,7 +23,7 @@ from dragchain.tables.by_step import read_table
 from dragchain.validation.corridor import Network, bin_by_bin, corridor, network
 from dragchain.validation.runs_by_bed import Point, over_packings
 
-FRONT = np.pi / 4.0
+_FRONT = np.pi / 4.0
 """The front of the workpiece: azimuths within 45 degrees of the motion."""
 
 
@@ -97,19 +97,19 @@ class Statements(Part):
     network: Network
 
 
-RATIOS = ("ahead_behind", "deep_over_shallow", "front_over_flank", "outer_over_inner")
+_RATIOS = ("ahead_behind", "deep_over_shallow", "front_over_flank", "outer_over_inner")
 """Numbers that are averaged by their logarithms."""
 
-NUMBERS = (
+_NUMBERS = (
     "fraction_ahead", "depth_slope_n_per_m", "front_fraction", "front_contact_n", "flank_contact_n",
-    *RATIOS,
+    *_RATIOS,
 )  # fmt: skip
 
 
 def of_packings(packings: Sequence[Point]) -> Statements:
     """Every number over the packings."""
     around = [contacts_of(point) for point in packings]
-    numbers = {name: _together([getattr(one, name) for one in around], name) for name in NUMBERS}
+    numbers = {name: _together([getattr(one, name) for one in around], name) for name in _NUMBERS}
     profiles = {
         "azimuth": _profile([one.azimuth for one in around], circumference(AZIMUTH_BINS)),
         "depth": _profile([one.depth for one in around], around[0].depth_edges_m),
@@ -122,7 +122,7 @@ def of_packings(packings: Sequence[Point]) -> Statements:
 
 def _together(values: Sequence[float | None], name: str) -> Estimate | None:
     known = [value for value in values if value is not None]
-    return over_packings(known, ratio=name in RATIOS) if len(known) == len(values) else None
+    return over_packings(known, ratio=name in _RATIOS) if len(known) == len(values) else None
 
 
 def _profile(curves: Sequence[Floats], edges: Floats) -> Profile:
@@ -145,8 +145,8 @@ def contacts_of(point: Point) -> Contacts:
         table[name].to_numpy(np.float64) for name in ("azimuth_rad", "depth_m", "normal_force_n")
     )
     ahead = float((force * within(azimuth, np.pi / 2)).sum() / force.sum())
-    front = within(azimuth, FRONT)
-    flank = within(azimuth, 2 * FRONT) - front
+    front = within(azimuth, _FRONT)
+    flank = within(azimuth, 2 * _FRONT) - front
     in_front, at_flanks = float((force * front).sum()), float((force * flank).sum())
     immersion = needed(point.case.workpiece, "workpiece").immersion_depth_m
     levels = np.linspace(0.0, immersion, DEPTH_BINS + 1)

@@ -23,13 +23,13 @@ from dragchain.statistics.estimate import Estimate, EstimateColumns
 from dragchain.tables.by_step import read_groups
 from dragchain.validation.runs_by_bed import Point, over_packings
 
-WIDTH = 1.0
+_WIDTH = 1.0
 """Half width of the corridor beyond the workpiece's radius, in particle diameters."""
 
-BIN = 0.5
+_BIN = 0.5
 """Length of a bin along the corridor, in particle diameters."""
 
-FAR_SIDE = 2.0 * np.pi / 3.0
+_FAR_SIDE = 2.0 * np.pi / 3.0
 """The bed far from the workpiece: seen from the bowl's axis, more than 120 degrees away from it."""
 
 
@@ -137,7 +137,7 @@ def corridor(point: Point) -> Corridor:
     workpiece, diameter = needed(case.workpiece, "workpiece"), 2.0 * case.media.radius_mean_m
     radius = workpiece.radius_m
     wall = (np.sqrt(case.bowl.radius_m**2 - case.motion.radius_m**2) - radius) / diameter
-    edges = np.arange(0.0, wall + 1e-9, BIN)
+    edges = np.arange(0.0, wall + 1e-9, _BIN)
     tip = case.surface_m - workpiece.immersion_depth_m
     ahead, behind = _Bins.of(edges), _Bins.of(edges)
     far: list[Floats] = []
@@ -146,11 +146,11 @@ def corridor(point: Point) -> Corridor:
         inside = (z > tip) & (z < case.surface_m)
         force = contacts["normal_force_n"].to_numpy(np.float64)
         along, across, turned = relative_places(contacts)
-        near = inside & (np.abs(across) <= radius + WIDTH * diameter)
+        near = inside & (np.abs(across) <= radius + _WIDTH * diameter)
         distance = (np.abs(along) - radius) / diameter
         ahead.add(distance, force, near & (along > 0.0))
         behind.add(distance, force, near & (along < 0.0))
-        far.append(force[inside & (np.abs(turned) > FAR_SIDE)])
+        far.append(force[inside & (np.abs(turned) > _FAR_SIDE)])
     beyond = np.concatenate(far)
     return Corridor(
         edges=edges,

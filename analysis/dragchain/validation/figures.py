@@ -21,7 +21,7 @@ from dragchain.validation.effects import Effect
 from dragchain.validation.force import Compared, Force, Spectrum
 from dragchain.validation.runs_by_bed import Point
 
-COLOURS = {"experiment": GREEN, "simulation": ORANGE}
+_COLOURS = {"experiment": GREEN, "simulation": ORANGE}
 
 
 def traces(packings: Sequence[Point], compared: Sequence[Compared]) -> Figure:
@@ -50,7 +50,7 @@ def traces(packings: Sequence[Point], compared: Sequence[Compared]) -> Figure:
 
 def _bands(axes: Axes, compared: Sequence[Compared]) -> None:
     for row in compared:
-        colour = COLOURS[row.label]
+        colour = _COLOURS[row.label]
         axes.axhline(row.mean_n, color=colour, linestyle="--", label=f"{row.label} mean")
         if row.std_n and row.label == "experiment":
             low, high = row.mean_n - row.std_n, row.mean_n + row.std_n
@@ -58,15 +58,15 @@ def _bands(axes: Axes, compared: Sequence[Compared]) -> None:
             axes.axhspan(low, high, color=colour, alpha=0.12, linewidth=0, label=label)
 
 
-Row = tuple[str, Estimate, str]
+_Row = tuple[str, Estimate, str]
 """Name, value and colour of a row of `_rows`."""
 
 
 def comparison(force: Force, compared: Sequence[Compared], effects: Sequence[Effect]) -> Figure:
     """Mean drags: the source's, each packing's with its own interval, and all together."""
     together = force.together["drag_n"].mean
-    rows: list[Row] = [
-        (row.label, Estimate.around(row.mean_n, 0.0), COLOURS[row.label]) for row in compared
+    rows: list[_Row] = [
+        (row.label, Estimate.around(row.mean_n, 0.0), _COLOURS[row.label]) for row in compared
     ]
     for packing in force.packings:
         own = packing.drag_n
@@ -88,7 +88,7 @@ def _fidelity(row: Effect) -> str:
 
 def assumed(effects: Sequence[Effect]) -> Figure:
     """What each assumed input does to the mean drag."""
-    rows: list[Row] = []
+    rows: list[_Row] = []
     for one in effects:
         if one.quantity == "drag_mean" and one.field:
             name = f"{one.field} = {_value(one.value)} (is {_value(one.reference_value)})"
@@ -103,7 +103,7 @@ def _value(value: object) -> str:
     return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
-def _rows(rows: Sequence[Row], label: str) -> Figure:
+def _rows(rows: Sequence[_Row], label: str) -> Figure:
     """Values with their intervals, one below the other."""
     figure = new_figure(0.9 + 0.27 * len(rows))
     axes = figure.subplots()

@@ -19,9 +19,9 @@ from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.statistics.estimate import Estimate, Real
 from dragchain.validation.runs_by_bed import Point, over_packings
 
-COMPONENTS = ("drag_n", "lateral_n", "vertical_n")
+_COMPONENTS = ("drag_n", "lateral_n", "vertical_n")
 
-PROMINENCES = (0.5, 1.0, 2.0)
+_PROMINENCES = (0.5, 1.0, 2.0)
 """Least prominence of a peak in standard deviations of the drag; the middle one is the rule."""
 
 SEGMENT = 6.0
@@ -139,7 +139,7 @@ def of_packings(packings: Sequence[Point]) -> Force:
     rows = [_packing_force(point) for point in packings]
     return Force(
         packings=tuple(rows),
-        together={name: _together([getattr(row, name) for row in rows]) for name in COMPONENTS},
+        together={name: _together([getattr(row, name) for row in rows]) for name in _COMPONENTS},
         alike=_alike([row.drag_n for row in rows]),
         peaks=_peaks(packings),
         spectrum=spectrum(packings),
@@ -147,8 +147,8 @@ def of_packings(packings: Sequence[Point]) -> Force:
 
 
 def _packing_force(point: Point) -> PackingForce:
-    samples, own = read_counted(point.folder, COMPONENTS), point.measures
-    drag, lateral, vertical = (estimate_mean(samples[name].to_numpy()) for name in COMPONENTS)
+    samples, own = read_counted(point.folder, _COMPONENTS), point.measures
+    drag, lateral, vertical = (estimate_mean(samples[name].to_numpy()) for name in _COMPONENTS)
     return PackingForce(
         run=point.case.run,
         seed=point.seed,
@@ -190,12 +190,12 @@ def _alike(drags: Sequence[MeanEstimate]) -> Likeness:
 
 def _peaks(packings: Sequence[Point]) -> Peaks:
     """Peaks by the rule of docs/outputs.md, at three least prominences."""
-    counts: dict[float, list[float]] = {factor: [] for factor in PROMINENCES}
+    counts: dict[float, list[float]] = {factor: [] for factor in _PROMINENCES}
     times, largest = [], []
     for point in packings:
         samples = read_counted(point.folder, ("time_s", "drag_n"))
         time_s, drag = (samples[name].to_numpy(np.float64) for name in ("time_s", "drag_n"))
-        for factor in PROMINENCES:
+        for factor in _PROMINENCES:
             peaks = find_drag_peaks(
                 time_s,
                 drag,

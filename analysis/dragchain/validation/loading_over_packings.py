@@ -14,7 +14,7 @@ from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.validation.runs_by_bed import Point, over_packings
 
-PER_METRE = {
+_PER_METRE = {
     "normal_impulse_n_s": "N s/m",
     "sliding_m": "m/m",
     "force_slide_n_m": "N m/m",
@@ -22,7 +22,7 @@ PER_METRE = {
 }
 """Amounts per metre of path, each with its unit."""
 
-SHARES = ("events", "normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
+_SHARES = ("events", "normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
 
 
 class LoadingRow(Part):
@@ -89,7 +89,7 @@ def _numbers(loading: Loading) -> dict[tuple[str, str], float]:
     }
     return {
         ("mean_contacts", ""): loading.mean_contacts.value,
-        **{(name, unit): loading.per_metre[name].value for name, unit in PER_METRE.items()},
+        **{(name, unit): loading.per_metre[name].value for name, unit in _PER_METRE.items()},
         **{(name, "%"): 100.0 * one.value for name, one in fractions.items()},
     }
 
@@ -97,7 +97,7 @@ def _numbers(loading: Loading) -> dict[tuple[str, str], float]:
 def _shares(types: Sequence[ContactType]) -> dict[str, Estimate]:
     return {
         name: over_packings([100.0 * one.fraction_of[name].value for one in types])
-        for name in SHARES
+        for name in _SHARES
     }
 
 

@@ -28,7 +28,7 @@ from dragchain.validation.force import of_packings as force_of
 from dragchain.validation.peaks.report import PeaksReport, report_peaks
 from dragchain.validation.runs_by_bed import Points, read_points
 
-SAME_SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particles")
+_SAME_SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particles")
 """Numbers that a scene shares with the sweeps that are shown beside it."""
 
 
@@ -73,7 +73,7 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     points = read_points(run_dirs)
     found = validate(points, command)
     peaks = report_peaks([point.folder for point in points.packings])
-    pictures = draw(points, found)
+    pictures = _draw(points, found)
     page = render(points, found, peaks, pictures)
     peaks.write(out_dir)
     write_bundle(
@@ -99,18 +99,18 @@ def validate(points: Points, command: str) -> Validation:
         comparison=compare(force.together["drag_n"], first.case),
         load=loading.of_packings(points.packings),
         statements=statements,
-        scalings=tuple(scalings_of(first.measures.numbers)),
+        scalings=tuple(_scalings_of(first.measures.numbers)),
         claims=claims(statements),
         effects=tuple(effects(points)),
     )
 
 
-def scalings_of(numbers: Mapping[str, float]) -> list[ScalingFile]:
+def _scalings_of(numbers: Mapping[str, float]) -> list[ScalingFile]:
     """The packaged sweeps that were made in a scene with these numbers."""
     return [
         found
         for found in read_scalings()
-        if all(math.isclose(found.scene[k], numbers[k], rel_tol=0.01) for k in SAME_SCENE)
+        if all(math.isclose(found.scene[k], numbers[k], rel_tol=0.01) for k in _SAME_SCENE)
     ]
 
 
@@ -157,7 +157,7 @@ def _profile(profile: Profile, unit: str) -> pd.DataFrame:
     return pd.DataFrame({**_bins(profile.edges, unit), **values})
 
 
-def draw(points: Points, found: Validation) -> dict[str, bytes]:
+def _draw(points: Points, found: Validation) -> dict[str, bytes]:
     """The figures of the page as PNG, by name."""
     with drawing():
         drawn = {

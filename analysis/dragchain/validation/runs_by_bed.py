@@ -17,7 +17,7 @@ from dragchain.statistics.estimate import Estimate, mean_of
 from dragchain.tradeoff.measures import FILE, Measures
 from dragchain.tradeoff.runs import changed_settings
 
-FEWEST = 2
+_FEWEST = 2
 """Packings below which nothing is known of the differences between them."""
 
 
@@ -102,10 +102,10 @@ def read_points(folders: Sequence[Path]) -> Points:
         if own.complete
     )
     packings = [first, *(point for point in points if point.setting == first.setting)]
-    if len(packings) < FEWEST:
+    if len(packings) < _FEWEST:
         raise TableError(
             f"{len(packings)} complete run at the reference's settings: the differences between "
-            f"packings need {FEWEST} at least; give the plan's reference more seeds"
+            f"packings need {_FEWEST} at least; give the plan's reference more seeds"
         )
     others = [point for point in points if point.setting != first.setting]
     return Points(sorted(packings, key=lambda point: point.seed), others)
@@ -133,8 +133,8 @@ def over_packings(values: Sequence[float], *, ratio: bool = False) -> Estimate:
     SeriesError
         If there are fewer than two packings.
     """
-    if len(values) < FEWEST:
-        raise SeriesError(f"an interval over packings needs {FEWEST} of them, not {len(values)}")
+    if len(values) < _FEWEST:
+        raise SeriesError(f"an interval over packings needs {_FEWEST} of them, not {len(values)}")
     with np.errstate(divide="ignore", invalid="ignore"):
         numbers = np.log(values) if ratio else np.asarray(values, dtype=np.float64)
     if not np.isfinite(numbers).all():

@@ -34,43 +34,43 @@ from dragchain.verification.quantities import (
 )
 from dragchain.verification.recording import RecordedContact, Recording
 
-NORMAL = 1.0
+_NORMAL = 1.0
 """Damping sees the velocity half a step late: an error of about one step per contact."""
 
-OBLIQUE = 5.0
+_OBLIQUE = 5.0
 """Sticking and sliding begin within a step, up to four times: a few steps per contact."""
 
-SECOND_ORDER = 1.0
+_SECOND_ORDER = 1.0
 """An elastic impact is integrated to second order, but for its two ends."""
 
-SAME_NUMBERS = 1e-6
+_SAME_NUMBERS = 1e-6
 """Two evaluations of one formula from the same state."""
 
-CONSERVED = 1e-9
+_CONSERVED = 1e-9
 """Sums of thousands of steps in double precision."""
 
-BOUNCES = 0.01
+_BOUNCES = 0.01
 """Energy after 1,000 impacts: one such bounce of ceramic on steel loses half of it."""
 
-AT_REST = 1e-3
+_AT_REST = 1e-3
 """What is left of the motion of a column of particles after many of its periods."""
 
-FITTED = 0.01
+_FITTED = 0.01
 """Slope of a velocity that still carries the ringing of the contact."""
 
-ORDER = 0.2
+_ORDER = 0.2
 """Scatter of a fitted order of convergence about a whole number."""
 
 READ_OFF, READ_OFF_CURVE = 0.01, 0.05
 """Points of a published figure, and values between them."""
 
 EXACT = "exact formula"
-INTEGRATED = "law integrated by scipy"
+_INTEGRATED = "law integrated by scipy"
 COULOMB = "Coulomb sliding of rigid bodies"
-INPUT = "restitution in the deck"
-PUBLISHED = "published curve"
+_INPUT = "restitution in the deck"
+_PUBLISHED = "published curve"
 
-JUDGED = (EXACT, INTEGRATED)
+JUDGED = (EXACT, _INTEGRATED)
 """References that are the same law: a difference is a failure."""
 
 Verdict = Literal["pass", "fail", "agrees", "differs"]
@@ -185,20 +185,20 @@ def _elastic(run: Recording) -> Iterator[Check]:
         ("duration_s", elastic_time(contact, speed), impact.duration_s),
         ("rebound_over_approach", 1.0, impact.rebound),
     ):
-        tolerance = SECOND_ORDER / run.case.steps_per_contact
+        tolerance = _SECOND_ORDER / run.case.steps_per_contact
         yield from compare(run, quantity, EXACT, [(math.nan, reference, engine)], tolerance)
     worst = float(np.abs(force - hertz_force(contact, overlap)).max())
     yield from compare(
-        run, "force_at_any_overlap_n", EXACT, [(math.nan, 0.0, worst)], SAME_NUMBERS, strongest
+        run, "force_at_any_overlap_n", EXACT, [(math.nan, 0.0, worst)], _SAME_NUMBERS, strongest
     )
     for value in published(run.case.test, run.case.series, "force_n").y:
         row = (math.nan, float(value), float(force.max()))
-        yield from compare(run, "force_n", PUBLISHED, [row], READ_OFF)
+        yield from compare(run, "force_n", _PUBLISHED, [row], READ_OFF)
 
 
 def _rebounds(run: Recording) -> Iterator[Check]:
     rows = [(impact.value, impact.constants.rebound, impact.rebound) for impact in run.contacts]
-    tolerance = NORMAL / run.case.steps_per_contact
+    tolerance = _NORMAL / run.case.steps_per_contact
     yield from compare(run, "rebound_over_approach", EXACT, rows, tolerance, 1.0)
 
 
@@ -206,13 +206,13 @@ def _restitution(run: Recording) -> Iterator[Check]:
     yield from _rebounds(run)
     if run.case.limit_force:
         rows = [(each.value, each.constants.restitution, each.rebound) for each in run.contacts]
-        tolerance = NORMAL / run.case.steps_per_contact
-        yield from compare(run, "rebound_over_approach", INPUT, rows, tolerance, 1.0)
+        tolerance = _NORMAL / run.case.steps_per_contact
+        yield from compare(run, "rebound_over_approach", _INPUT, rows, tolerance, 1.0)
 
 
 def _oblique(run: Recording) -> Iterator[Check]:
     case, impacts = run.case, run.contacts
-    tolerance = OBLIQUE / case.steps_per_contact
+    tolerance = _OBLIQUE / case.steps_per_contact
     arm = max(_arm(impact) for impact in impacts)
     yield from _rebounds(run)
     for quantity, derive in QUANTITIES[case.test].items():
@@ -226,10 +226,10 @@ def _oblique(run: Recording) -> Iterator[Check]:
                 sliding.append((x, derive(contact, before, impact.slid), engine))
             if curve.spans(at := abscissa(impact, quantity)):
                 drawn.append((x, curve.at(at), engine))
-        yield from compare(run, quantity, INTEGRATED, same, tolerance)
+        yield from compare(run, quantity, _INTEGRATED, same, tolerance)
         scale = max(abs(reference) for _, reference, _ in same)
         yield from compare(run, quantity, COULOMB, sliding, tolerance + arm, scale)
-        yield from compare(run, quantity, PUBLISHED, drawn, READ_OFF_CURVE, scale)
+        yield from compare(run, quantity, _PUBLISHED, drawn, READ_OFF_CURVE, scale)
 
 
 def _arm(impact: RecordedContact) -> float:
@@ -240,7 +240,7 @@ def _arm(impact: RecordedContact) -> float:
 
 def _time_step(run: Recording) -> Iterator[Check]:
     row = (math.nan, run.contact.constants.rebound, run.contact.rebound)
-    tolerance = NORMAL / run.case.steps_per_contact
+    tolerance = _NORMAL / run.case.steps_per_contact
     yield from compare(run, "rebound_over_approach", EXACT, [row], tolerance, 1.0)
 
 
@@ -250,7 +250,7 @@ def _order_of_convergence(runs: Sequence[Recording]) -> list[Check]:
     if len(limited) < 3:
         return []
     row = (math.nan, 1.0, fitted_order(convergence(limited)[True]))
-    checks = compare(limited[-1], "order_of_convergence", EXACT, [row], ORDER, 1.0)
+    checks = compare(limited[-1], "order_of_convergence", EXACT, [row], _ORDER, 1.0)
     name = f"{limited[-1].case.series}, limitForce on, all steps"
     return [replace(check, series=name) for check in checks]
 
@@ -261,7 +261,7 @@ def _bounce(run: Recording) -> Iterator[Check]:
     enough = float(min(int(impacts[-1]), least))
     yield from compare(run, "impacts", EXACT, [(math.nan, float(least), enough)], 0.0)
     worst = float(np.abs(energy - 1).max())
-    yield from compare(run, "energy_change", EXACT, [(math.nan, 0.0, worst)], BOUNCES, 1.0)
+    yield from compare(run, "energy_change", EXACT, [(math.nan, 0.0, worst)], _BOUNCES, 1.0)
 
 
 def _momentum(run: Recording) -> Iterator[Check]:
@@ -270,18 +270,18 @@ def _momentum(run: Recording) -> Iterator[Check]:
             (contact.value, 0.0, float(np.linalg.norm(momentum_changes(contact)[at], axis=1).max()))
             for contact in run.contacts
         ]
-        yield from compare(run, quantity, EXACT, rows, CONSERVED, 1.0)
+        yield from compare(run, quantity, EXACT, rows, _CONSERVED, 1.0)
 
 
 def _column(run: Recording) -> Iterator[Check]:
     loads = column_loads(run)
     floor = float(run.wall_force_n["plane"][last_fifth(run), 0, 2].mean())
-    yield from compare(run, "floor_force_n", EXACT, [(math.nan, loads[0][1], floor)], AT_REST)
+    yield from compare(run, "floor_force_n", EXACT, [(math.nan, loads[0][1], floor)], _AT_REST)
     rows = [
         (float(at), hertz_overlap(contact, weight), overlap)
         for at, (contact, weight, overlap) in enumerate(loads, start=1)
     ]
-    yield from compare(run, "overlap_m", EXACT, rows, AT_REST)
+    yield from compare(run, "overlap_m", EXACT, rows, _AT_REST)
 
 
 def _incline(run: Recording) -> Iterator[Check]:
@@ -290,7 +290,7 @@ def _incline(run: Recording) -> Iterator[Check]:
             (contact.value, incline_reference(contact)[at], incline_slopes(contact)[at])
             for contact in run.contacts
         ]
-        yield from compare(run, quantity, EXACT, rows, FITTED)
+        yield from compare(run, quantity, EXACT, rows, _FITTED)
     angle = math.radians(needed(run.case.angle_deg, "angle_deg"))
     gravity = math.hypot(*run.case.gravity_m_s2) * math.cos(angle)
     force = run.wall_force_n["plane"][second_half(run)]
@@ -302,7 +302,7 @@ def _incline(run: Recording) -> Iterator[Check]:
         )
         for contact in run.contacts
     ]
-    yield from compare(run, "normal_force_n", EXACT, weights, FITTED)
+    yield from compare(run, "normal_force_n", EXACT, weights, _FITTED)
 
 
 CHECKS: Mapping[str, Callable[[Recording], Iterator[Check]]] = {

@@ -35,13 +35,13 @@ OUTSIDE_FACTOR = 0.5
 """On the tolerance when a scene lies outside of the measured range. An
 assumption: nothing measured says how much an error grows there."""
 
-NORMAL_95 = 1.96
+_NORMAL_95 = 1.96
 """Half-width of a 95 % interval in standard deviations of a normal distribution."""
 
 RESTITUTION = "restitution"
 """The quantity of the drop test; all others are of the process."""
 
-RANGE_LABELS = {
+_RANGE_LABELS = {
     "workpiece_to_particle": "ratio of workpiece to particle diameter",
     "depth_to_particle": "ratio of depth to particle diameter",
     "bowl_to_particle": "ratio of bowl to particle diameter",
@@ -189,7 +189,7 @@ def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
     options = list(drop_options(case, tradeoff) if drop else process_options(case, tradeoff, asked))
     reference = finest_drop(case, tradeoff) if drop else process_reference(case, tradeoff)
     names = ("lowest_restitution",) if drop else None
-    outside = list(outside_of(describe(case), tradeoff, names))
+    outside = list(_outside_of(describe(case), tradeoff, names))
     held_to = asked.tolerance * (OUTSIDE_FACTOR if outside else 1.0)
     holding = [option for option in options if option.error and option.error.limit <= held_to]
     chosen = min(holding, key=_cost_then_bound, default=reference)
@@ -252,7 +252,7 @@ def breaking_note(case: Case, tradeoff: Tradeoff | None) -> list[tuple[str, str]
     return [("breaking step", text)]
 
 
-def outside_of(
+def _outside_of(
     here: Mapping[str, float], tradeoff: Tradeoff, names: Sequence[str] | None = None
 ) -> Iterator[Outside]:
     """The numbers of a scene that are outside of the measured range.
@@ -262,12 +262,12 @@ def outside_of(
     below, nor the inertial number above, what any setting was measured at.
     """
     scenes = [tradeoff.scene, *(one.numbers for one in tradeoff.promises if one.met)]
-    for name in RANGE_LABELS if names is None else names:
+    for name in _RANGE_LABELS if names is None else names:
         values = [scene.get(name, 0.0) for scene in scenes]
         low, high = (1 - WIDENING) * min(values), (1 + WIDENING) * max(values)
         value = here.get(name, 0.0)  # an absent coefficient
         if not low <= value <= high:
-            yield Outside(RANGE_LABELS[name], value, low, high)
+            yield Outside(_RANGE_LABELS[name], value, low, high)
     if names is None:
         yield from _outside_numbers(here, tradeoff)
 
@@ -335,7 +335,7 @@ def _spread(study: Study, asked: Tolerance, tradeoff: Tradeoff) -> Spread | None
     counted = path_length(study.motion) - study.motion.transient_m
     if quantity.run_std is None or counted <= 0:
         return None
-    alone = NORMAL_95 * quantity.run_std
+    alone = _NORMAL_95 * quantity.run_std
     half_width = alone * math.sqrt(quantity.arc_m / counted)
     return Spread(half_width, counted, quantity.arc_m * (alone / asked.tolerance) ** 2)
 

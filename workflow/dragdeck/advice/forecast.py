@@ -28,7 +28,7 @@ from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import Json
 from dragdeck.study.model import CirclePath, Fidelity, Study, Tolerance
 
-DEFAULT_TOLERANCE = Tolerance(tolerance=0.05)
+_DEFAULT_TOLERANCE = Tolerance(tolerance=0.05)
 """What is advised for where a study asks for nothing."""
 
 
@@ -130,7 +130,7 @@ def question(case: Case, tolerance: float | None, quantity: str | None) -> Toler
     pydantic.ValidationError
         The command line asks for what no study may.
     """
-    base = case.asked or DEFAULT_TOLERANCE
+    base = case.asked or _DEFAULT_TOLERANCE
     named = {"tolerance": tolerance, "quantity": quantity}
     given = {name: value for name, value in named.items() if value is not None}
     return Tolerance.model_validate({**base.model_dump(), **given})
@@ -274,11 +274,11 @@ def tables(
         table.add_column(name)
     for row in rows:
         option = row.option
-        error = "errors are against it" if option.error is None else error_text(option.error)
+        error = "errors are against it" if option.error is None else _error_text(option.error)
         bound = "" if option.error is None else percent(option.error.bound)
         style = "bold" if row.role == "advised" else None
         cost, steps = f"{option.relative_cost:.3g}", f"{sum(row.steps.values()):,}"
-        wall = clock(sum(row.wall_times_s.values()))
+        wall = _clock(sum(row.wall_times_s.values()))
         table.add_row(row.role, str(option), error, bound, cost, steps, wall, style=style)
     yield table
     said = Table(show_header=False)
@@ -309,7 +309,7 @@ def _of_own(case: Case, advice: Advice, own: Option | None) -> str:
     if own is None or own.error is None:
         return f"{name} is none of the measured settings that may be used here"
     return (
-        f"{name}: error of {advice.label} {error_text(own.error)}, "
+        f"{name}: error of {advice.label} {_error_text(own.error)}, "
         f"bound {percent(own.error.bound)}, cost {own.relative_cost:.3g}"
     )
 
@@ -352,12 +352,12 @@ def _of_chance(advice: Advice, spread: Spread, study: Study) -> str:
     return f"{text}: more than the tolerance, which takes {whole}, or the mean over {seeds} seeds"
 
 
-def error_text(error: MeasuredError) -> str:
+def _error_text(error: MeasuredError) -> str:
     """An error with its interval."""
     return f"{signed(error.value)} ({signed(error.ci95_low)} to {signed(error.ci95_high)})"
 
 
-def clock(seconds: float) -> str:
+def _clock(seconds: float) -> str:
     """A time in minutes and seconds."""
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes} min {rest:02d} s"

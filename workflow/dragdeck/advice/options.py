@@ -19,10 +19,10 @@ from dragdeck.physics.similarity import carried_scale, carried_speed, softest_sc
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance
 
-FEWEST_RUNS = 2
+_FEWEST_RUNS = 2
 """Runs of a setting below which its error is not believed."""
 
-PROCESS_OF_DROP = "standard"
+_PROCESS_OF_DROP = "standard"
 """Fidelity of the process in a study whose tolerance is about the drop test."""
 
 
@@ -66,7 +66,7 @@ def with_option(study: Study, option: Option) -> Study:
     if option.drop_timestep_fraction is None:
         return study.model_copy(update={"fidelity": option.fidelity})
     drop = study.drop_test.model_copy(update={"timestep_fraction": option.drop_timestep_fraction})
-    return study.model_copy(update={"fidelity": PROCESS_OF_DROP, "drop_test": drop})
+    return study.model_copy(update={"fidelity": _PROCESS_OF_DROP, "drop_test": drop})
 
 
 def process_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterator[Option]:
@@ -80,7 +80,7 @@ def process_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterato
     limit = largest_fraction("drag", there["lowest_restitution"])
     for setting in tradeoff.settings:
         error, cost = setting.errors.get(asked.quantity), setting.relative_cost
-        sound = setting.failed == 0 and not setting.breaks and setting.runs >= FEWEST_RUNS
+        sound = setting.failed == 0 and not setting.breaks and setting.runs >= _FEWEST_RUNS
         stable = sound and setting.timestep_fraction <= limit * (1 + 1e-9)
         if error is None or cost is None or not stable:
             continue
@@ -150,5 +150,5 @@ def _drop_option(case: Case, drop: MeasuredDrop, fraction: float) -> Option:
         bound=abs(value),
         single_parameter_error=0.0,
     )
-    process = {**BUILT_IN_FIDELITIES, **case.study.fidelities}[PROCESS_OF_DROP]
+    process = {**BUILT_IN_FIDELITIES, **case.study.fidelities}[_PROCESS_OF_DROP]
     return Option(process, error, drop.relative_cost, fraction)

@@ -27,7 +27,7 @@ DAMPED_S, DAMPING_TIME_S, FREE_S = 0.005, 0.001, 0.05
 """How a bed comes to rest with another modulus or other facets: damped for the
 first time, speeds falling with the second, then free for the third, s."""
 
-FRAME_FRACTION = 0.05
+_FRAME_FRACTION = 0.05
 """Fraction of a frame's steps by which a drag may be shorter than asked, to end with a frame."""
 
 CONTACT_COLUMNS = (
@@ -39,19 +39,19 @@ CONTACT_COLUMNS = (
 CONTACT_WIDTH = 41
 """Numbers of a contact with `CONTACT_COLUMNS`."""
 
-CONTACT_COMPUTES = {"contacts": "particle_contacts", "workpiece_contacts": "workpiece_contacts"}
+_CONTACT_COMPUTES = {"contacts": "particle_contacts", "workpiece_contacts": "workpiece_contacts"}
 """The compute that each output of contacts writes."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class ColumnsDeck(ProcessDeck):
+class _ColumnsDeck(ProcessDeck):
     """A process that writes all columns of its contacts."""
 
     contact_columns: str
 
 
 @dataclass(frozen=True, kw_only=True)
-class RestDeck(ProcessDeck):
+class _RestDeck(ProcessDeck):
     """A bed that comes to rest: damping of a particle, kg/s, and steps with and without it."""
 
     damping_kg_s: float
@@ -60,14 +60,14 @@ class RestDeck(ProcessDeck):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TimedDropDeck(DropDeck):
+class _TimedDropDeck(DropDeck):
     """A drop test whose first flight may be cut short."""
 
     flight_steps: int | None
 
 
 @dataclass(frozen=True, kw_only=True)
-class TimedFillingDeck(FillingDeck):
+class _TimedFillingDeck(FillingDeck):
     """A settled bed that goes on: steps, and steps between frames of contacts."""
 
     timed_steps: int
@@ -99,13 +99,13 @@ def _restart_points(scene: AnyScene) -> AnyScene:
 def _with_all_columns(scene: AnyScene) -> AnyScene:
     """A process that writes every column of a contact instead of those that are read."""
     wide = [
-        replace(output, columns=_all_columns(CONTACT_COMPUTES[output.name]))
-        if output.name in CONTACT_COMPUTES
+        replace(output, columns=_all_columns(_CONTACT_COMPUTES[output.name]))
+        if output.name in _CONTACT_COMPUTES
         else output
         for output in scene.deck.outputs
     ]
     own = vars(scene.deck) | {"outputs": wide}
-    deck = ColumnsDeck(**own, contact_columns=CONTACT_COLUMNS)
+    deck = _ColumnsDeck(**own, contact_columns=CONTACT_COLUMNS)
     return replace(scene, deck=deck, override="costs/contact_columns.in.j2")
 
 
@@ -124,7 +124,7 @@ _IN_DECK: Mapping[Change, Callable[[AnyScene], AnyScene]] = {
 def timed_drop(case: Case, start: bool) -> AnyScene:
     """The drop test to its first impact, or its first steps."""
     scene = drop_scene(case)
-    deck = TimedDropDeck(**vars(scene.deck), flight_steps=1 if start else None)
+    deck = _TimedDropDeck(**vars(scene.deck), flight_steps=1 if start else None)
     deck = replace(deck, impact_steps=1) if start else deck
     return replace(scene, deck=deck, override="costs/drop_test.in.j2")
 
@@ -134,7 +134,7 @@ def timed_filling(case: Case, steps: int, source: str, start: bool) -> AnyScene:
     scene, period = filling_scene(case), _filling_period(case.study)
     own = vars(scene.deck) | {"source": source, "checkpoint_steps": 0}
     timed = 1 if start else _whole_frames(steps, period)
-    deck = TimedFillingDeck(**own, timed_steps=timed, frame_steps=period)
+    deck = _TimedFillingDeck(**own, timed_steps=timed, frame_steps=period)
     return replace(scene, deck=deck, files={}, override="costs/filling.in.j2")
 
 
@@ -152,7 +152,7 @@ def timed_drag(case: Case, steps: int, bed: Bed, source: str, start: bool) -> An
 
 def _whole_frames(steps: int, period: int) -> int:
     """About that many steps, to the end of a frame."""
-    return period * max(1, math.ceil(steps / period - FRAME_FRACTION))
+    return period * max(1, math.ceil(steps / period - _FRAME_FRACTION))
 
 
 def _begun(scene: AnyScene, source: str, steps: int) -> AnyScene:
@@ -182,7 +182,7 @@ def at_rest(case: Case, bed: Bed, source: str) -> AnyScene:
     scene, study = process_scene(case, bed), case.study
     begun, dt = _begun(scene, source, 0).deck, scene.deck.timestep_s
     mass = particle_mass(particle_material(study), study.media.radius_mean_m)
-    deck = RestDeck(
+    deck = _RestDeck(
         **vars(begun) | {"legs": (), "outputs": ()},
         damping_kg_s=mass / DAMPING_TIME_S,
         damped_steps=math.ceil(DAMPED_S / dt),

@@ -57,18 +57,18 @@ from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.scene import Bed, read_bed
 from dragdeck.study.model import Workpiece
 
-SECONDS = 0.15
+_SECONDS = 0.15
 """Drag that the standard deck is timed over, s of process time; the others go as many steps."""
 
 BLOCK = 5
 """Variants that share one timing of their base, so that the two are close in time."""
 
-QUIET = 0.3
+_QUIET = 0.3
 """Load average above which the machine counts as busy: half a process and more."""
 
-START_FILE = "start.liggghts"
-BED_FILE = "bed.restart"
-ROUNDS_FILE = "rounds.json"
+_START_FILE = "start.liggghts"
+_BED_FILE = "bed.restart"
+_ROUNDS_FILE = "rounds.json"
 
 
 def measure(
@@ -79,7 +79,7 @@ def measure(
     report: Report,
     *,
     rounds: int = 3,
-    seconds: float = SECONDS,
+    seconds: float = _SECONDS,
     only: Sequence[str] = (),
 ) -> Path:
     """Time all variants of a study's standard deck and write their costs.
@@ -127,7 +127,7 @@ def measure(
         if not value > 0:
             raise InputError("nothing to time", field=name, value=value, limit="greater than 0")
     load = os.getloadavg()[0]
-    if load > QUIET:
+    if load > _QUIET:
         report(f"warning: the machine is busy (load average {load:.2f}); CPU times will scatter")
     base = standard_case(case)
     chosen = _chosen(variants(base), only)
@@ -197,7 +197,7 @@ class _Beds:
     def _kept(self, name: str, scene: AnyScene) -> str:
         run = f"{name}-{_digest(deck_text(scene, self.batch.templates))}"
         self.batch.result(run, scene)
-        return self._seen(self.batch.folder / run / BED_FILE)
+        return self._seen(self.batch.folder / run / _BED_FILE)
 
 
 def _walls(case: Case) -> tuple[float, float | None, Workpiece]:
@@ -314,7 +314,7 @@ class _Bench:
         for old in place.iterdir():
             old.unlink()
         texts = {DECK_FILE: deck_text(deck.whole, templates), **deck.whole.files}
-        for file, text in {**texts, START_FILE: deck_text(deck.start, templates)}.items():
+        for file, text in {**texts, _START_FILE: deck_text(deck.start, templates)}.items():
             replace_text(place / file, text)
         for file, mesh in deck.whole.meshes.items():
             write_stl(mesh, place / file)
@@ -322,7 +322,7 @@ class _Bench:
 
     def rounds(self, count: int) -> list[TimedVariant]:
         """Time what was not timed yet; the rows of all rounds."""
-        file = self.folder / ROUNDS_FILE
+        file = self.folder / _ROUNDS_FILE
         rows = _known_rows(file, self.inputs, self.report)
         for number in range(count):
             there = {row.name for row in rows if row.round == number}
@@ -359,7 +359,7 @@ class _Bench:
         """Time of a deck's steps, its start taken out."""
         place, ranks = self._place(name), self.decks[name].ranks
         whole, start = (
-            _time_once(self.engine, place, file, ranks) for file in (DECK_FILE, START_FILE)
+            _time_once(self.engine, place, file, ranks) for file in (DECK_FILE, _START_FILE)
         )
         return whole - start
 
@@ -450,6 +450,6 @@ def costs_command(
         out,
         report,
         rounds=rounds,
-        seconds=SECONDS if seconds is None else seconds,
+        seconds=_SECONDS if seconds is None else seconds,
         only=only,
     )

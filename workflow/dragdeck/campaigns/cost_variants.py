@@ -33,7 +33,7 @@ Change = Literal[
 ]
 """What no study field can say; `cost_decks` makes the change."""
 
-LONGEST_STEP = 0.64
+_LONGEST_STEP = 0.64
 """Fraction of the Rayleigh time at which full stiffness is timed against the plain
 deck: the largest that docs/stability.md recommends for a slow drag."""
 
@@ -67,7 +67,7 @@ class Variant:
     @property
     def scene(self) -> SceneName:
         """Scene of its deck."""
-        return SCENE_OF_BASE[self.base]
+        return _SCENE_OF_BASE[self.base]
 
     @property
     def own_particles(self) -> bool:
@@ -87,7 +87,7 @@ class Variant:
         return float(self.fields[f"fidelity.{self.parameter}"]) if self.parameter else None
 
 
-SCENE_OF_BASE: Mapping[str, SceneName] = {
+_SCENE_OF_BASE: Mapping[str, SceneName] = {
     "standard": "process",
     "before_drag": "process",
     "drop_test": "drop_test",
@@ -253,8 +253,8 @@ def _plain(study: Study) -> Iterator[Variant]:
         yield Variant("plain_even_facets", text, {**fields, **even})
     stiff = {"fidelity.youngs_modulus_scale": 1.0}
     yield Variant("plain_full", f"{what}, full stiffness", {**fields, **stiff})
-    what = f"full stiffness at {100 * LONGEST_STEP:g} % of Rayleigh, nothing else"
-    yield Variant("full", what, {**stiff, "fidelity.timestep_fraction": LONGEST_STEP})
+    what = f"full stiffness at {100 * _LONGEST_STEP:g} % of Rayleigh, nothing else"
+    yield Variant("full", what, {**stiff, "fidelity.timestep_fraction": _LONGEST_STEP})
 
 
 def _other_scenes(study: Study) -> Iterator[Variant]:

@@ -29,19 +29,19 @@ from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import Bed, SceneType
 from dragdeck.study.model import CirclePath, Fidelity, Motion, Outputs, Study
 
-TIMESTEP_FRACTION = 0.5
+_TIMESTEP_FRACTION = 0.5
 """Step of its process over the Rayleigh time."""
 
 DRAG_STEPS = 6000
 """Steps that are timed."""
 
-ARRIVAL_STEPS = 3000
+_ARRIVAL_STEPS = 3000
 """Steps in which the workpiece goes in, and steps in which it goes to its path."""
 
-LONGEST_PERIOD_STEPS = 1000
+_LONGEST_PERIOD_STEPS = 1000
 """Most steps between frames of the slowest output; the legs are multiples of it."""
 
-CLEAR_DIAMETERS = 3
+_CLEAR_DIAMETERS = 3
 """Particle diameters above the expected surface at which the workpiece begins."""
 
 
@@ -81,7 +81,7 @@ def measure_machine_speed(
 def _low_bed(study: Study) -> Bed:
     """The bed as it is expected: the workpiece begins well above it."""
     surface = expected_surface(study)
-    return Bed(surface, surface + 2 * CLEAR_DIAMETERS * study.media.radius_mean_m)
+    return Bed(surface, surface + 2 * _CLEAR_DIAMETERS * study.media.radius_mean_m)
 
 
 def _result(batch: Batch, kind: SceneType, case: Case, bed: Bed | None) -> RunRecord:
@@ -113,7 +113,7 @@ def short_case(case: Case) -> Case:
     asked = study.chosen_fidelity()
     soft = Fidelity(
         youngs_modulus_scale=max(SCALE, softest_scale(study)),
-        timestep_fraction=min(TIMESTEP_FRACTION, asked.timestep_fraction),
+        timestep_fraction=min(_TIMESTEP_FRACTION, asked.timestep_fraction),
         filling_timestep_fraction=asked.filling_timestep_fraction,
         skin_m=asked.skin_m,
         ranks=case.ranks,
@@ -141,7 +141,7 @@ def _motion(study: Study, pace: float, timestep_s: float) -> Motion:
     """
     motion = study.motion
     speed = pace * motion.speed_m_s
-    length, arrival_s = speed * DRAG_STEPS * timestep_s, ARRIVAL_STEPS * timestep_s
+    length, arrival_s = speed * DRAG_STEPS * timestep_s, _ARRIVAL_STEPS * timestep_s
     here, there = plunge_point(motion), start_point(motion)
     way = math.dist(here, there) or motion.immersion_depth_m
     path = motion.path
@@ -163,7 +163,7 @@ def _motion(study: Study, pace: float, timestep_s: float) -> Motion:
 
 def _outputs(outputs: Outputs, pace: float, timestep_s: float) -> Outputs:
     """As many frames a step as asked, or more: no leg is shorter than a frame."""
-    least = 1 / (LONGEST_PERIOD_STEPS * timestep_s)
+    least = 1 / (_LONGEST_PERIOD_STEPS * timestep_s)
     names = ("workpiece_force_hz", "workpiece_contacts_hz", "network_hz")
     rates = {name: max(pace * getattr(outputs, name), least) for name in names}
     return outputs.model_copy(update={**rates, "n_checkpoints": 0})

@@ -36,30 +36,30 @@ from dragdeck.project import find_project, study_templates
 from dragdeck.scenes.drop_test import DropFidelity, drop_scene
 from dragdeck.study.model import Calibration, Study
 
-DROPS_FILE = "drops.json"
+_DROPS_FILE = "drops.json"
 IMPACTS = 3
 """Impacts compared (Uhlmann et al. 2015, section 4)."""
 
-RESTITUTIONS = tuple(round(0.05 * k, 2) for k in range(8, 21))
+_RESTITUTIONS = tuple(round(0.05 * k, 2) for k in range(8, 21))
 """Deck values of the sweep: 0.40, 0.45, ... 1.00."""
 
-OTHER_RESTITUTIONS = RESTITUTIONS[::2]
+_OTHER_RESTITUTIONS = _RESTITUTIONS[::2]
 """With the contact option that the study does not use."""
 
-PHASES = 4
+_PHASES = 4
 """Production drops per deck value. Their heights differ by a share of a step's
 path, so that the first contact begins at another place within a time step."""
 
-REFERENCE_FRACTION = 0.01
+_REFERENCE_FRACTION = 0.01
 """Finest time step of the sweep over the Rayleigh time: restitution converged to 1e-4."""
 
-TRIAL_FRACTION = 0.005
+_TRIAL_FRACTION = 0.005
 """Time step of a trial's record over the Rayleigh time: half the sweep's finest."""
 
-GOLDEN = 0.618
+_GOLDEN = 0.618
 """Share of a step between the phases of reference drops, one a deck value."""
 
-TRIAL_RANGE = (0.5, 0.9)
+_TRIAL_RANGE = (0.5, 0.9)
 """Deck values of the trials' records."""
 
 Purpose = Literal["production", "reference", "confirm", "trial"]
@@ -192,16 +192,16 @@ def sweep(study: Study) -> Iterator[Drop]:
     its step; at the reference, where the step is fine, one, each at another
     phase.
     """
-    coarse, fine = production(study), full(study, REFERENCE_FRACTION)
+    coarse, fine = production(study), full(study, _REFERENCE_FRACTION)
     for limit_force in (True, False):
         used = limit_force == study.contact.limit_force
         word = "limited" if limit_force else "free"
-        for number, value in enumerate(RESTITUTIONS if used else OTHER_RESTITUTIONS):
-            for phase in range(PHASES):
-                height = _height(study, coarse, (phase + 0.5) / PHASES)
+        for number, value in enumerate(_RESTITUTIONS if used else _OTHER_RESTITUTIONS):
+            for phase in range(_PHASES):
+                height = _height(study, coarse, (phase + 0.5) / _PHASES)
                 name = f"production-{word}-{value:.2f}-{phase}"
                 yield Drop(name, "production", value, limit_force, height, coarse)
-            height = _height(study, fine, (number * GOLDEN) % 1.0)
+            height = _height(study, fine, (number * _GOLDEN) % 1.0)
             name = f"reference-{word}-{value:.2f}"
             yield Drop(name, "reference", value, limit_force, height, fine)
 
@@ -209,10 +209,10 @@ def sweep(study: Study) -> Iterator[Drop]:
 def confirmation(study: Study, restitution: float, full_restitution: float) -> Iterator[Drop]:
     """Drops at the fitted values: production over the phases, and one at full modulus."""
     coarse, option = production(study), study.contact.limit_force
-    for phase in range(2 * PHASES):
-        height = _height(study, coarse, (phase + 0.25) / (2 * PHASES))
+    for phase in range(2 * _PHASES):
+        height = _height(study, coarse, (phase + 0.25) / (2 * _PHASES))
         yield Drop(f"confirm-{phase}", "confirm", restitution, option, height, coarse)
-    fine = full(study, REFERENCE_FRACTION)
+    fine = full(study, _REFERENCE_FRACTION)
     height = study.drop_test.height_m
     yield Drop("confirm-full", "reference", full_restitution, option, height, fine)
 
@@ -226,9 +226,9 @@ def trials(study: Study, count: int, seed: int) -> Iterator[Drop]:
     random = np.random.default_rng(seed)
     section = study.calibration
     spread = section.height_std_m if section else 0.0
-    finer = full(study, TRIAL_FRACTION)
+    finer = full(study, _TRIAL_FRACTION)
     for number in range(1, count + 1):
-        value = round(float(random.uniform(*TRIAL_RANGE)), 4)
+        value = round(float(random.uniform(*_TRIAL_RANGE)), 4)
         height = study.drop_test.height_m + float(random.normal(0.0, spread))
         option = study.contact.limit_force
         yield Drop(f"trial-{number:03d}", "trial", value, option, height, finer)
@@ -298,7 +298,7 @@ def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -
         rows.append(_row(drop, scene.case))
         if number % 20 == 0 or number == len(drops):
             report(f"{number} of {len(drops)} drops done")
-    file = batch.folder / DROPS_FILE
+    file = batch.folder / _DROPS_FILE
     _listed(case, rows).write(file)
     return file
 

@@ -37,21 +37,21 @@ REGIMES: tuple[Regime, ...] = ("impact", "settle", "column", "drag")
 """What a point models: single impacts; a bed that settles; a bed or a stack at
 rest under a load; a bed with a workpiece dragged through it."""
 
-BEDS = "beds"
+_BEDS = "beds"
 
-MOST_ELASTIC_BED = 0.86
+_MOST_ELASTIC_BED = 0.86
 """Restitution of the beds of more elastic particles while they settle."""
 
-BED_ENERGY_RATIO = 1e-4
+_BED_ENERGY_RATIO = 1e-4
 """When such a bed counts as settled: without friction single particles go round for long."""
 
-SAFE_FILLING_FRACTION = 0.1
+_SAFE_FILLING_FRACTION = 0.1
 """Step over the Rayleigh time of the beds that drags and columns start from."""
 
 DRAG_S, SHORTEST_DRAG_M, LONGEST_DRAG_REVOLUTIONS = 1.0, 0.005, 2.0
 """A drag lasts this long, but goes this far at the least and at the most."""
 
-TRANSIENT_FRACTION = 0.2
+_TRANSIENT_FRACTION = 0.2
 """Fraction of a drag that its mean force leaves out."""
 
 Value = Packing | Number
@@ -163,7 +163,7 @@ class BedOfMap(Part):
     folder: str
 
 
-class BedsFile(Document):
+class _BedsFile(Document):
     """``points/beds.json``: the beds that columns and drags start from."""
 
     beds: Sequence[BedOfMap]
@@ -246,7 +246,7 @@ def _motion(study: Study, speed: float) -> Motion:
     around = 2 * math.pi * path.radius_m
     length = min(max(DRAG_S * speed, SHORTEST_DRAG_M), LONGEST_DRAG_REVOLUTIONS * around)
     turned = path.model_copy(update={"revolutions": length / around})
-    update = {"speed_m_s": speed, "path": turned, "transient_m": TRANSIENT_FRACTION * length}
+    update = {"speed_m_s": speed, "path": turned, "transient_m": _TRANSIENT_FRACTION * length}
     return study.motion.model_copy(update=update)
 
 
@@ -278,7 +278,7 @@ def _own(settings: Settings) -> dict[str, float]:
     It settles with damped ones.
     """
     own = {key: float(settings[key]) for key in ("youngs_modulus_pa", "restitution", "friction")}
-    return {**own, "restitution": min(own["restitution"], MOST_ELASTIC_BED)}
+    return {**own, "restitution": min(own["restitution"], _MOST_ELASTIC_BED)}
 
 
 @dataclass(frozen=True)
@@ -318,11 +318,11 @@ class MapRuns:
             batch.result(name, self._bed(own))
             beds.append(BedOfMap(settings=own, folder=f"filling/{name}"))
             self.report(f"bed settled: {name}")
-        return self._listed(BEDS, BedsFile(beds=beds))
+        return self._listed(_BEDS, _BedsFile(beds=beds))
 
     def _bed(self, own: Settings) -> AnyScene:
-        case = point_case(self.base, own, SAFE_FILLING_FRACTION)
-        filling = case.study.filling.model_copy(update={"energy_ratio": BED_ENERGY_RATIO})
+        case = point_case(self.base, own, _SAFE_FILLING_FRACTION)
+        filling = case.study.filling.model_copy(update={"energy_ratio": _BED_ENERGY_RATIO})
         return filling_scene(
             replace(case, study=case.study.model_copy(update={"filling": filling}))
         )
@@ -402,7 +402,7 @@ def stability_command(regime: str, points: Path) -> None:
         print(line, file=sys.stderr, flush=True)
 
     runs = map_runs(study, project.results("stability"), project.templates, report)
-    if regime == BEDS:
+    if regime == _BEDS:
         runs.settle_beds(points)
     else:
         runs.run_points(points, regime)

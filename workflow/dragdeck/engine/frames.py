@@ -7,14 +7,14 @@ from pathlib import Path
 
 from dragdeck.decks.outputs import OutputOfRun
 
-TAIL_BYTES = 4_000_000
+_TAIL_BYTES = 4_000_000
 """How much of a text output's end is looked at first; a dump's frame can be longer."""
 
 _HEADER = struct.Struct("<qqi6i6d2i")
 _CHUNK = struct.Struct("<i")
 
 
-def last_frame(file: Path, output: OutputOfRun, *, tail_bytes: int = TAIL_BYTES) -> int | None:
+def last_frame(file: Path, output: OutputOfRun, *, tail_bytes: int = _TAIL_BYTES) -> int | None:
     """Step of a file's last frame, or None where that frame is not whole.
 
     Parameters

@@ -25,13 +25,13 @@ ENGINE_VARIABLE = "DRAGDECK_ENGINE"
 LAUNCHER_VARIABLE = "DRAGDECK_LAUNCHER"
 """Environment variable with a launcher of one's own, for example ``srun --mpi=pmix``."""
 
-QUEUE_VARIABLES = ("SLURM_", "PMI")
+_QUEUE_VARIABLES = ("SLURM_", "PMI")
 """Beginnings of the names of a queue's variables."""
 
 OLDEST_VERSION = (3, 8, 0)
 """Oldest engine that the decks were run on."""
 
-POLL_S = 0.2
+_POLL_S = 0.2
 Watch = Callable[[float], None]
 
 
@@ -188,10 +188,10 @@ def execute(words: Sequence[str], folder: Path, screen: Path, watch: Watch) -> E
             try:
                 while (cpu_time_s := _ended(process)) is None and not asked:
                     watch(time.monotonic() - begun)
-                    time.sleep(POLL_S if time.monotonic() - begun > 1 else 0.02)
+                    time.sleep(_POLL_S if time.monotonic() - begun > 1 else 0.02)
             finally:
                 if process.returncode is None:
-                    end_all(process.pid)
+                    _end_all(process.pid)
                     cpu_time_s = _ended(process, options=0)
     assert cpu_time_s is not None
     return Ending(process.returncode, bool(asked), time.monotonic() - begun, cpu_time_s)
@@ -214,7 +214,7 @@ def _environment(words: list[str]) -> dict[str, str]:
     others; ``mpirun`` would ask Slurm for nodes, and our ranks stay on this one.
     """
     own = words[:1] == _own_launcher()[:1]
-    hidden = () if own else QUEUE_VARIABLES
+    hidden = () if own else _QUEUE_VARIABLES
     seen = {name: value for name, value in os.environ.items() if not name.startswith(hidden)}
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     return {**seen, "OMP_NUM_THREADS": "1", **(allowed if os.geteuid() == 0 else {})}
@@ -235,7 +235,7 @@ def _heeding_signals() -> Iterator[list[int]]:
             signal.signal(number, handler)
 
 
-def end_all(pid: int) -> None:
+def _end_all(pid: int) -> None:
     """Kill a process and all that it started: mpirun's ranks have groups of their own."""
     with contextlib.suppress(psutil.NoSuchProcess):
         top = psutil.Process(pid)

@@ -31,9 +31,9 @@ from dragdeck.engine.watch import LimitMet, Report, Watcher
 from dragdeck.errors import EngineError, InputError, RejectedRunError
 
 STATE_FILE = "state.json"
-RESULT_FILE = "run.json"
-ARCHIVE = "archive"
-AS_RUN = "as_run"
+_RESULT_FILE = "run.json"
+_ARCHIVE = "archive"
+_AS_RUN = "as_run"
 
 
 def run(folder: Path, report: Report, *, again: bool = False, every_s: float = 10.0) -> RunRecord:
@@ -86,7 +86,7 @@ def run(folder: Path, report: Report, *, again: bool = False, every_s: float = 1
             _keep_inputs(folder)
         record = _begin_part(folder, record, digest, engine, inputs.fidelity.ranks)
         record = _Part(folder, inputs, columns, record, report).execute(engine, every_s)
-    record.write(folder / RESULT_FILE)
+    record.write(folder / _RESULT_FILE)
     return record
 
 
@@ -294,7 +294,7 @@ def _failed(folder: Path, record: RunRecord) -> str:
 
 def _keep_inputs(folder: Path) -> None:
     """Keep the deck as it was run: a later render may replace it."""
-    kept = folder / AS_RUN
+    kept = folder / _AS_RUN
     kept.mkdir(exist_ok=True)
     for name in (DECK_FILE, CASE_FILE, COLUMNS_FILE):
         shutil.copy2(folder / name, kept / name)
@@ -302,13 +302,13 @@ def _keep_inputs(folder: Path) -> None:
 
 def _archive(folder: Path, inputs: str, report: Report) -> None:
     """Move what a run of other inputs left out of the way; delete nothing."""
-    place = folder / ARCHIVE / inputs[:8]
+    place = folder / _ARCHIVE / inputs[:8]
     number = 1
     while place.exists():
         number += 1
-        place = folder / ARCHIVE / f"{inputs[:8]}-{number}"
+        place = folder / _ARCHIVE / f"{inputs[:8]}-{number}"
     place.mkdir(parents=True)
-    new = {DECK_FILE, CASE_FILE, COLUMNS_FILE, ARCHIVE}
+    new = {DECK_FILE, CASE_FILE, COLUMNS_FILE, _ARCHIVE}
     sources = {file.name for file in (*folder.glob("*.data"), *folder.glob("*.stl"))}
     for file in folder.iterdir():
         if file.name not in new | sources:

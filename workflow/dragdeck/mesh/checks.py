@@ -17,13 +17,13 @@ from trimesh.util import unitize
 from dragdeck.errors import InputError
 from dragdeck.mesh.surface import NODE_PRECISION_M, Integers, place
 
-CURVATURE_DEG = 0.256235
+_CURVATURE_DEG = 0.256235
 """Default of the engine's `curvature`; no facet may have a smaller angle."""
 
-ANGLE_WARNING_DEG = 0.5
+_ANGLE_WARNING_DEG = 0.5
 """Below this smallest angle the engine warns of a skewed element."""
 
-MAX_NEIGHBOURS = 5
+_MAX_NEIGHBOURS = 5
 """Facets that may share an edge with a facet."""
 
 
@@ -193,11 +193,11 @@ def _sharp_angles(mesh: Trimesh) -> list[Finding]:
     smallest = np.degrees(mesh.face_angles.min(axis=1))
     remedy, measured = "remesh with better shaped triangles", f"{smallest.min():.4g} degrees; "
     problem = "the angle of a facet is too sharp for the engine"
-    limit = f"above the curvature of the mesh, {CURVATURE_DEG:g} degrees"
-    errors = _facets(smallest <= CURVATURE_DEG, problem, limit, remedy, measured)
+    limit = f"above the curvature of the mesh, {_CURVATURE_DEG:g} degrees"
+    errors = _facets(smallest <= _CURVATURE_DEG, problem, limit, remedy, measured)
     problem = "needle-like facets slow the engine down"
-    limit = f"above {ANGLE_WARNING_DEG:g} degrees"
-    doubts = _facets(smallest <= ANGLE_WARNING_DEG, problem, limit, remedy, measured)
+    limit = f"above {_ANGLE_WARNING_DEG:g} degrees"
+    doubts = _facets(smallest <= _ANGLE_WARNING_DEG, problem, limit, remedy, measured)
     return errors or [doubt._replace(severity="warning") for doubt in doubts]
 
 
@@ -208,7 +208,7 @@ def _overlaps(mesh: Trimesh) -> list[Finding]:
     turn = unitize(np.cross((end - start)[:, None], apex - start[:, None]).reshape(-1, 3))
     cosine = np.einsum("kc,kc->k", turn[::2], turn[1::2])
     bad = np.zeros(len(mesh.faces), dtype=np.bool_)
-    bad[mesh.face_adjacency[cosine >= np.cos(np.radians(CURVATURE_DEG)), 0]] = True
+    bad[mesh.face_adjacency[cosine >= np.cos(np.radians(_CURVATURE_DEG)), 0]] = True
     problem = "two facets of one plane lie on top of each other"
     limit = "facets that share an edge lie on both sides of it"
     return _facets(bad, problem, limit, "repair the mesh: one surface, without folds")
@@ -221,10 +221,10 @@ def _edge_use(mesh: Trimesh) -> Integers:
 
 def _crowded_edges(mesh: Trimesh) -> list[Finding]:
     neighbours = (_edge_use(mesh)[mesh.faces_unique_edges] - 1).sum(axis=1)
-    measured, limit = f"{neighbours.max()} neighbours; ", f"at most {MAX_NEIGHBOURS} neighbours"
+    measured, limit = f"{neighbours.max()} neighbours; ", f"at most {_MAX_NEIGHBOURS} neighbours"
     problem = "too many facets meet at the edges of one"
     remedy = "repair the mesh: a surface has two facets at an edge"
-    return _facets(neighbours > MAX_NEIGHBOURS, problem, limit, remedy, measured)
+    return _facets(neighbours > _MAX_NEIGHBOURS, problem, limit, remedy, measured)
 
 
 def _open_edges(mesh: Trimesh) -> list[Finding]:

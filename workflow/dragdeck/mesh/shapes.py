@@ -10,10 +10,10 @@ from trimesh import Trimesh
 from dragdeck.errors import InputError
 from dragdeck.mesh.surface import Floats, surface, weld
 
-MAX_FACETS = 200_000
+_MAX_FACETS = 200_000
 """More facets than any workpiece needs: a facet size in the wrong unit."""
 
-MIN_SIDES = 8
+_MIN_SIDES = 8
 """The coarsest polygon that still passes for a circle."""
 
 
@@ -28,7 +28,7 @@ def polygon_sides(radius_m: float, facet_size_m: float) -> int:
         The circle, and the longest side wanted, in metres.
     """
     quarter = math.ceil(math.pi * radius_m / (2.0 * facet_size_m) - 1e-9)
-    return max(MIN_SIDES, 4 * quarter)
+    return max(_MIN_SIDES, 4 * quarter)
 
 
 def polygon_radius(radius_m: float, sides: int) -> float:
@@ -140,12 +140,12 @@ def _require_facet_size(facet_size_m: float, radius_m: float, length_m: float) -
             remedy="ask for a smaller facet size",
         )
     facets = 2.0 * math.tau * radius_m * (length_m + radius_m) / facet_size_m**2
-    if facets > MAX_FACETS:
+    if facets > _MAX_FACETS:
         raise InputError(
             f"about {facets:.3g} facets would be needed",
             field="facet_size_m",
             value=facet_size_m,
-            limit=f"at most {MAX_FACETS} facets",
+            limit=f"at most {_MAX_FACETS} facets",
             remedy="ask for a larger facet size, in metres",
         )
 

@@ -74,7 +74,7 @@ def price_of(name: str, tradeoff: Tradeoff | None) -> str:
     return f"putting it back costs {_ratio(cost, tradeoff)}"
 
 
-def cheaper_choices(scene: str, tradeoff: Tradeoff) -> Iterable[tuple[str, str]]:
+def _cheaper_choices(scene: str, tradeoff: Tradeoff) -> Iterable[tuple[str, str]]:
     """What was measured to make a scene cheaper, beyond doubt, by a simulated second."""
     for cost in tradeoff.costs:
         sure = cost.ci95_high is not None and cost.ci95_high < 1
@@ -125,7 +125,7 @@ def explanation(
     table.add_row("", "steps", f"about {cost.steps:,}")
     minutes, seconds = divmod(round(cost.wall_time_s), 60)
     table.add_row("", "wall time", f"about {minutes} min {seconds:02d} s ({cost.source})")
-    for what, text in cheaper_choices(deck.scene, tradeoff) if tradeoff else ():
+    for what, text in _cheaper_choices(deck.scene, tradeoff) if tradeoff else ():
         table.add_row("cheaper", what, text)
     table.add_section()
     for what, text in notes:

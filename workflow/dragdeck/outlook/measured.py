@@ -12,7 +12,7 @@ from dragdeck.documents import Document, Part
 from dragdeck.errors import InputError
 
 _DATA = Path(str(resources.files("dragdeck"))) / "data"
-TRADEOFF_FILE = _DATA / "tradeoff.json"
+_TRADEOFF_FILE = _DATA / "tradeoff.json"
 """The trade-off that was measured with this version."""
 
 
@@ -176,7 +176,7 @@ class Tradeoff(Document):
 
 
 @cache
-def measured_tradeoff(file: Path = TRADEOFF_FILE) -> Tradeoff:
+def measured_tradeoff(file: Path = _TRADEOFF_FILE) -> Tradeoff:
     """The measured trade-off.
 
     Raises
@@ -187,7 +187,7 @@ def measured_tradeoff(file: Path = TRADEOFF_FILE) -> Tradeoff:
     return Tradeoff.read(file)
 
 
-def tradeoff_if_measured(file: Path = TRADEOFF_FILE) -> Tradeoff | None:
+def tradeoff_if_measured(file: Path = _TRADEOFF_FILE) -> Tradeoff | None:
     """`measured_tradeoff`, or None where it cannot be read.
 
     For what is only told, not chosen.

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_OVER_MEAN = 1.5
+_MOST_OVER_MEAN = 1.5
 """A warning is given where the fullest rank has more than this times the mean."""
 
 ENGINE_CHOOSES = "* * 1"
@@ -19,7 +19,7 @@ _POINTS = 129
 """Points across a cell at which the width of the bowl is taken."""
 
 Counts = tuple[int, int, int]
-Fractions = NDArray[np.float64]
+_Fractions = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def _split(grid: Counts, filled: FilledBowl) -> Split:
     return Split(grid, float(known.max()), own.ravel().tolist())
 
 
-def _floor_fractions(grid: Counts, filled: FilledBowl, reach_m: float) -> Fractions:
+def _floor_fractions(grid: Counts, filled: FilledBowl, reach_m: float) -> _Fractions:
     """Share of the bowl's floor in each cell of x and y, widened by a reach."""
     radius, half_width = filled.radius_m, filled.half_width_m
     x_edges, y_edges = (_edges(n, -half_width, half_width) for n in grid[:2])
@@ -141,7 +141,7 @@ def _floor_fractions(grid: Counts, filled: FilledBowl, reach_m: float) -> Fracti
     return fractions
 
 
-def _height_fractions(count: int, filled: FilledBowl, reach_m: float) -> Fractions:
+def _height_fractions(count: int, filled: FilledBowl, reach_m: float) -> _Fractions:
     """Share of the bed's height in each layer of cells, widened by a reach."""
     edges = _edges(count, filled.bottom_m, filled.top_m)
     low = np.clip(edges[:-1] - reach_m, 0, filled.height_m)
@@ -149,7 +149,7 @@ def _height_fractions(count: int, filled: FilledBowl, reach_m: float) -> Fractio
     return np.asarray((high - low) / filled.height_m)
 
 
-def _edges(count: int, low: float, high: float) -> Fractions:
+def _edges(count: int, low: float, high: float) -> _Fractions:
     return np.linspace(low, high, count + 1)
 
 
@@ -161,10 +161,10 @@ def warnings(found: Split) -> list[str]:
             f"{found.idle} of {ranks} ranks would have no particle, in a grid of "
             f"{' x '.join(map(str, found.grid))}: take another number (fidelity.ranks)"
         ]
-    if found.most_over_mean > MOST_OVER_MEAN:
+    if found.most_over_mean > _MOST_OVER_MEAN:
         return [
             f"the fullest of {ranks} ranks would have {found.most_over_mean:.2g} times the mean "
-            f"number of particles, more than {MOST_OVER_MEAN:g}: a number with more factors splits "
-            "more evenly (fidelity.ranks)"
+            f"number of particles, more than {_MOST_OVER_MEAN:g}: a number with more factors "
+            "splits more evenly (fidelity.ranks)"
         ]
     return []

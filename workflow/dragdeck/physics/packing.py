@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 CUTOFF_STD = 2.5
 """Radii lie within this many standard deviations of the untruncated normal."""
 
-SPACING = 1.2
+_SPACING = 1.2
 """Lattice spacing over the largest diameter: room to jitter, and to fall."""
 
 FIRST_SPEED_M_S = 0.3
@@ -95,7 +95,7 @@ def pour(particle_radii_m: Array, bowl_radius_m: float, seed: int) -> Particles:
     random = np.random.default_rng(seed)
     largest = float(particle_radii_m.max())
     sites = _sites(len(particle_radii_m), bowl_radius_m, largest)
-    jitter = (SPACING - 1) * largest * 0.999
+    jitter = (_SPACING - 1) * largest * 0.999
     velocities = random.normal(0.0, FIRST_SPEED_M_S, sites.shape)
     velocities[:, 2] = -np.abs(velocities[:, 2])  # none leaves through the top
     return Particles(
@@ -107,8 +107,8 @@ def pour(particle_radii_m: Array, bowl_radius_m: float, seed: int) -> Particles:
 
 def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Array:
     """The lowest `count` points of a square lattice in the bowl, (count, 3)."""
-    step = 2 * SPACING * largest_m
-    room = largest_m * (1 + math.sqrt(2) * (SPACING - 1))  # the jitter is along x and along y
+    step = 2 * _SPACING * largest_m
+    room = largest_m * (1 + math.sqrt(2) * (_SPACING - 1))  # the jitter is along x and along y
     reach = bowl_radius_m - room
     if reach < 0:
         widest = largest_m * bowl_radius_m / room
@@ -124,5 +124,5 @@ def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Array:
     inside = x**2 + y**2 <= reach**2
     layer = np.column_stack([x[inside], y[inside]])
     layers = -(-count // len(layer))
-    heights = np.repeat(SPACING * largest_m + step * np.arange(layers), len(layer))
+    heights = np.repeat(_SPACING * largest_m + step * np.arange(layers), len(layer))
     return np.column_stack([np.tile(layer, (layers, 1)), heights])[:count]

@@ -17,7 +17,7 @@ SAME_NUMBER = 0.02
 """Scenes whose numbers differ by no more than this share count as the same: the
 solid fraction behind the numbers is not known better."""
 
-FASTEST_FACTOR = 100.0
+_FASTEST_FACTOR = 100.0
 """Largest speed factor that a study may have."""
 
 
@@ -75,7 +75,7 @@ def carried_speed(factor: float, ratio: float) -> float:
     """
     if _same(ratio):
         return factor
-    allowed = min(ratio * factor, 1 + ratio * (factor - 1), FASTEST_FACTOR)
+    allowed = min(ratio * factor, 1 + ratio * (factor - 1), _FASTEST_FACTOR)
     return max(1.0, rounded(allowed, up=False))
 
 

@@ -18,7 +18,7 @@ from dragdeck.physics.rounding import round_to
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.material import Material
 
-FRAMES_TIMES_BODIES = 25_000
+_FRAMES_TIMES_BODIES = 25_000
 """Rows of the largest output of a run: every step for two particles, fewer frames for a rack."""
 
 
@@ -144,7 +144,7 @@ class Experiment:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CollideDeck(Deck):
+class _CollideDeck(Deck):
     """What the collide template sees."""
 
     walls: Sequence[Wall]
@@ -157,17 +157,17 @@ def collide_scene(experiment: Experiment) -> Scene[CollideCase]:
     last = experiment.steps // every * every
     look = max(1, experiment.steps // 10)
     size = math.hypot(*experiment.gravity_m_s2)
-    deck = CollideDeck(
+    deck = _CollideDeck(
         title=experiment.title,
         study=experiment.group,
         scene="collide",
         run=experiment.run,
         source="bodies.data",
-        materials=pair_table(experiment.types, experiment.pairs),
+        materials=_pair_table(experiment.types, experiment.pairs),
         limit_force=experiment.limit_force,
         gravity_m_s2=size,
         gravity_direction=_direction(experiment.gravity_m_s2, size),
-        skin_m=skin(experiment.bodies),
+        skin_m=_skin(experiment.bodies),
         timestep_s=experiment.timestep_s,
         outputs=(
             outputs.thermo(look, experiment.steps // look * look),
@@ -181,7 +181,7 @@ def collide_scene(experiment: Experiment) -> Scene[CollideCase]:
         deck=deck,
         case=_case(experiment),
         steps=experiment.steps,
-        files={"bodies.data": bodies_data(experiment)},
+        files={"bodies.data": _bodies_data(experiment)},
         models={"every particle": "placed and set in motion by hand", "exact walls": "planes"},
         leaves_out={
             "output of pairs": LeftOut("forces on so few particles say all"),
@@ -192,15 +192,15 @@ def collide_scene(experiment: Experiment) -> Scene[CollideCase]:
 
 def frame_period(steps: int, bodies: int) -> int:
     """Steps between frames, so that a run of many particles stays small."""
-    return max(1, math.ceil(steps * bodies / FRAMES_TIMES_BODIES))
+    return max(1, math.ceil(steps * bodies / _FRAMES_TIMES_BODIES))
 
 
-def skin(bodies: Sequence[Body]) -> float:
+def _skin(bodies: Sequence[Body]) -> float:
     """Neighbour skin, m: a fifth of the smallest radius."""
     return round_to(0.2 * min(body.radius_m for body in bodies), 3)
 
 
-def pair_table(
+def _pair_table(
     types: Sequence[tuple[str, Material]], pairs: Mapping[tuple[int, int], Pair]
 ) -> Materials:
     """The engine's constants; pairs that never meet repeat one that does."""
@@ -215,7 +215,7 @@ def pair_table(
     )
 
 
-def bodies_data(experiment: Experiment) -> str:
+def _bodies_data(experiment: Experiment) -> str:
     """The data file, with a box that no particle can leave."""
     duration = experiment.steps * experiment.timestep_s
     x, y, z = (_side(experiment, axis, duration) for axis in range(3))

@@ -19,24 +19,24 @@ from dragdeck.physics.run_limits import RunLimits, run_limits
 from dragdeck.scenes.filling import box_top, filling_content, first_particles
 from dragdeck.scenes.scene import case_of_study, material_table
 
-STACK = 12
+_STACK = 12
 """Particles of a stack."""
 
-TUBE_CLEARANCE = 0.02
+_TUBE_CLEARANCE = 0.02
 """Gap between a stack's particles and its tube, as a share of the radius: the stack
 leans and has about two contacts with particles and one with the tube a particle."""
 
-LOAD_FRACTION = 0.1
+_LOAD_FRACTION = 0.1
 """Step over the Rayleigh time while the particles come to rest under the load."""
 
-LOAD_S = 0.15
+_LOAD_S = 0.15
 """Time they get for that, s."""
 
-DRAG_S = 0.004
+_DRAG_S = 0.004
 """Time in which the drag takes a particle's speed to 1/e, s."""
 
-TEST_STEPS = 4000
-FRAME_STEPS = 20
+_TEST_STEPS = 4000
+_FRAME_STEPS = 20
 
 Packing = Literal["stack", "bed"]
 
@@ -57,7 +57,7 @@ class ColumnCase(CaseOfStudy):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ColumnDeck(Deck):
+class _ColumnDeck(Deck):
     """What the column template sees."""
 
     stack: bool
@@ -101,13 +101,13 @@ def column_scene(
     stack = packing == "stack"
     material = particle_material(study)
     rayleigh = rayleigh_time(material, radius, scale) if stack else bed_rayleigh_time(study)
-    dt, load_dt = timestep(rayleigh, fraction), timestep(rayleigh, LOAD_FRACTION)
-    count = STACK if stack else study.media.count
-    tube = (1 + TUBE_CLEARANCE) * radius if stack else study.bowl.radius_m
-    top = 2 * radius * (STACK + 4) if stack else box_top(study, first_particles(study))
+    dt, load_dt = timestep(rayleigh, fraction), timestep(rayleigh, _LOAD_FRACTION)
+    count = _STACK if stack else study.media.count
+    tube = (1 + _TUBE_CLEARANCE) * radius if stack else study.bowl.radius_m
+    top = 2 * radius * (_STACK + 4) if stack else box_top(study, first_particles(study))
     types = study.type_names()
     gravity, mass = load_factor * study.gravity_m_s2, particle_mass(material, radius)
-    deck = ColumnDeck(
+    deck = _ColumnDeck(
         title="Particles at rest under a load",
         study=case.study_name,
         scene="column",
@@ -119,18 +119,18 @@ def column_scene(
         skin_m=skin(study),
         timestep_s=dt,
         outputs=(
-            outputs.thermo(FRAME_STEPS, TEST_STEPS),
-            outputs.particles(TEST_STEPS, 0, TEST_STEPS, False),
-            outputs.contacts(TEST_STEPS, 0, TEST_STEPS),
+            outputs.thermo(_FRAME_STEPS, _TEST_STEPS),
+            outputs.particles(_TEST_STEPS, 0, _TEST_STEPS, False),
+            outputs.contacts(_TEST_STEPS, 0, _TEST_STEPS),
         ),
-        thermo_steps=FRAME_STEPS,
+        thermo_steps=_FRAME_STEPS,
         stack=stack,
         bowl_type=types.index(study.bowl.material) + 1,
         bowl_radius_m=tube,
         load_timestep_s=load_dt,
-        load_steps=math.ceil(LOAD_S / load_dt),
-        test_steps=TEST_STEPS,
-        drag_kg_s=mass / DRAG_S,
+        load_steps=math.ceil(_LOAD_S / load_dt),
+        test_steps=_TEST_STEPS,
+        drag_kg_s=mass / _DRAG_S,
     )
     return Scene(
         deck=deck,
@@ -141,7 +141,7 @@ def column_scene(
             filling_content(case),
             dt,
             rayleigh,
-            phases=[Phase(name="test", start_step=0, end_step=TEST_STEPS)],
+            phases=[Phase(name="test", start_step=0, end_step=_TEST_STEPS)],
             gravity_m_s2=gravity,
             media=MediaOfRun(
                 count=count,
@@ -153,7 +153,7 @@ def column_scene(
             column=LoadedPacking(packing=packing, load_factor=load_factor),
             limits=run_limits(count, mass, gravity, top, 0.0),
         ),
-        steps=math.ceil(LOAD_S / load_dt) + TEST_STEPS,
+        steps=math.ceil(_LOAD_S / load_dt) + _TEST_STEPS,
         files={"particles.data": _stack(case, radius, tube, top, len(types))} if stack else {},
     )
 
@@ -166,7 +166,7 @@ def _stack(case: Case, radius: float, tube: float, top: float, types: int) -> st
     bodies = [
         Body(1, radius, density,
              (lean * (-1) ** i, 0.1 * lean * (i % 3 - 1), radius + i * rise * 1.0001))
-        for i in range(STACK)
+        for i in range(_STACK)
     ]  # fmt: skip
     side = 2 * tube
     return data_file("a stack", types, ((-side, side), (-side, side), (-radius, top)), bodies)

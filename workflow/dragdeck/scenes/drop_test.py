@@ -23,7 +23,7 @@ from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
 from dragdeck.study.model import Study
 
-MARGIN = 0.5
+_MARGIN = 0.5
 """Steps written before and after a contact, as a share of its Hertz time."""
 
 
@@ -75,8 +75,8 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene[DropTe
     names = list(dict.fromkeys((study.media.material, study.workpiece.material)))
     rayleigh = rayleigh_time(particle_material(study), radius, scale)
     dt = fidelity.timestep_s or timestep(rayleigh, study.drop_test.timestep_fraction)
-    contact_steps = slowest_contact_time(study, scale) / dt
-    margin = max(10, round(MARGIN * contact_steps))
+    contact_steps = _slowest_contact_time(study, scale) / dt
+    margin = max(10, round(_MARGIN * contact_steps))
     deck = DropDeck(
         title=f"Drop test: {study.title}",
         study=case.study_name,
@@ -132,7 +132,7 @@ def _modulus(scale: float) -> dict[str, str]:
     return {f"Young's modulus times {scale:g}": "as asked, to see what it changes"}
 
 
-def slowest_contact_time(study: Study, scale: float = 1.0) -> float:
+def _slowest_contact_time(study: Study, scale: float = 1.0) -> float:
     """Hertz time of the last impact, the slowest and so the longest, s."""
     particle, plate = particle_material(study), study.materials[study.workpiece.material]
     radius = study.media.radius_mean_m

@@ -40,14 +40,14 @@ from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
 from dragdeck.study.model import Study
 
-CHECK_INTERVAL_S = 0.02
+_CHECK_INTERVAL_S = 0.02
 """Time between two looks at the kinetic energy, about the fall over one particle."""
 
 MOST_OVERLAP = 0.01
 """Overlap over the diameter, by the weight of the bed, above which a warning is given: an
 assumption; forces on the workpiece are several times those of the weight."""
 
-SETTLING_ESTIMATE_S = 0.5
+_SETTLING_ESTIMATE_S = 0.5
 """Time from the last particle's arrival to rest, an estimate used for expectations only."""
 
 
@@ -74,11 +74,11 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         that the engine refuses.
     """
     study = case.study
-    check_capacity(case)
+    _check_capacity(case)
     fidelity = study.chosen_fidelity()
     rayleigh = bed_rayleigh_time(study)
     dt = timestep(rayleigh, fidelity.filling_timestep_fraction)
-    check_steps = max(1, math.ceil(CHECK_INTERVAL_S / dt))
+    check_steps = max(1, math.ceil(_CHECK_INTERVAL_S / dt))
     particles = first_particles(study)
     top = box_top(study, particles)
     longest = study.filling.max_time_s
@@ -138,7 +138,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         },
         warnings=[
             *rank_warnings(parts),
-            *overlap_warnings(study),
+            *_overlap_warnings(study),
             *_skin_warnings(study, particles, dt),
         ],
     )
@@ -156,7 +156,7 @@ def first_particles(study: Study) -> Particles:
     return pour(bed_radii(study), study.bowl.radius_m, study.seed)
 
 
-def check_capacity(case: Case) -> None:
+def _check_capacity(case: Case) -> None:
     """Refuse more particles than the bowl can hold.
 
     Raises
@@ -236,7 +236,7 @@ def floor_overlap(study: Study) -> float:
     return bed_overlap(effective_modulus(particle, particle, scale), pressure)
 
 
-def overlap_warnings(study: Study) -> list[str]:
+def _overlap_warnings(study: Study) -> list[str]:
     """A warning where particles are too soft for the bed above them."""
     overlap = floor_overlap(study)
     if overlap <= MOST_OVERLAP:
@@ -278,7 +278,7 @@ def _energy_unit(study: Study) -> float:
 
 def _expected_time(study: Study, particles: Particles) -> float:
     fall = fall_speed(_free_fall(study, particles), study.gravity_m_s2) / study.gravity_m_s2
-    return fall + SETTLING_ESTIMATE_S
+    return fall + _SETTLING_ESTIMATE_S
 
 
 def _free_fall(study: Study, particles: Particles) -> float:

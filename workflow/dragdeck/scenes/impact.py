@@ -23,13 +23,13 @@ from dragdeck.physics.rounding import timestep
 from dragdeck.physics.run_limits import RunLimits, run_limits
 from dragdeck.scenes.scene import case_of_study, material_table
 
-PHASES = 16
+_PHASES = 16
 """Impacts in one run, each begun at another sixteenth of a step."""
 
-FRAMES_PER_CONTACT = 200
+_FRAMES_PER_CONTACT = 200
 """Frames written over a contact where the step is small enough."""
 
-CONTACT_TIMES = 4
+_CONTACT_TIMES = 4
 """Length of the run in elastic contact times: room for the slowest rebound."""
 
 
@@ -53,7 +53,7 @@ class Impact:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ImpactDeck(Deck):
+class _ImpactDeck(Deck):
     """What the impact template sees."""
 
     plate: bool
@@ -114,13 +114,13 @@ def impact_scene(case: Case, run: str, impact: Impact, fraction: float) -> Scene
     modulus = effective_modulus(material, material, scale)
     normal_speed = impact.speed_m_s * math.cos(math.radians(impact.angle_deg))
     contact = hertz_contact_time(body_mass, body_radius, modulus, normal_speed)
-    period = max(1, math.floor(contact / dt / FRAMES_PER_CONTACT))
-    frames = math.ceil((CONTACT_TIMES * contact / dt + 10) / period)
+    period = max(1, math.floor(contact / dt / _FRAMES_PER_CONTACT))
+    frames = math.ceil((_CONTACT_TIMES * contact / dt + 10) / period)
     travel = impact.speed_m_s * frames * period * dt
     bodies = _bodies(radius, material.density_kg_m3, impact, dt)
-    side = 6 * radius * max(1.0, impact.size_ratio) * PHASES + travel
+    side = 6 * radius * max(1.0, impact.size_ratio) * _PHASES + travel
     height = 2 * radius * (2 + 2 * impact.size_ratio) + 2 * travel
-    deck = ImpactDeck(
+    deck = _ImpactDeck(
         title="Single impacts",
         study=case.study_name,
         scene="impact",
@@ -182,9 +182,9 @@ def _bodies(radius_m: float, density_kg_m3: float, impact: Impact, dt: float) ->
     struck_m = impact.size_ratio * radius_m
     pitch = 6 * max(radius_m, struck_m)
     bodies = []
-    for phase in range(PHASES):
-        y = pitch * (phase - 0.5 * (PHASES - 1))
-        gap = normal * dt * (1 + (phase + 0.5) / PHASES)
+    for phase in range(_PHASES):
+        y = pitch * (phase - 0.5 * (_PHASES - 1))
+        gap = normal * dt * (1 + (phase + 0.5) / _PHASES)
         place, velocity = (0.0, y, radius_m + gap), (along, 0.0, -normal)
         bodies.append(Body(1, radius_m, density_kg_m3, place, velocity))
         if struck_m > 0.0:

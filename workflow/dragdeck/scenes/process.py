@@ -45,12 +45,12 @@ from dragdeck.study.base import Json
 from dragdeck.study.contact_law import explained
 from dragdeck.study.model import CirclePath, CylinderShape, MeshShape, Study
 
-WORKPIECE_MESH = "workpiece.stl"
+_WORKPIECE_MESH = "workpiece.stl"
 
-FEWEST_STEPS_PER_CONTACT = 5
+_FEWEST_STEPS_PER_CONTACT = 5
 """Below this many steps in a contact at the workpiece's speed a warning is given."""
 
-JAMMING_GAP = 2.0
+_JAMMING_GAP = 2.0
 """Particle diameters between workpiece and bowl below which a warning is given: an arch of two
 particles at 1.7 diameters held a workpiece until the force was 190 N, and then left the bowl."""
 
@@ -128,18 +128,18 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     fidelity = study.chosen_fidelity()
     bed = bed or _expected_bed(study)
     surface = bed.surface_m
-    check_fit(case, surface)
+    _check_fit(case, surface)
     rayleigh = bed_rayleigh_time(study)
     dt = timestep(rayleigh, fidelity.timestep_fraction)
-    periods = output_periods(study, dt)
+    periods = _output_periods(study, dt)
     clear = round_to(bed.top_m + study.media.radius_mean_m, 6)
     start = (*plunge_point(study.motion), clear)
     dive = start[2] - (surface - study.motion.immersion_depth_m)
-    timed = timed_legs(legs(study.motion, dive, fidelity.speed_factor), study, dt, periods.network)
+    timed = _timed_legs(legs(study.motion, dive, fidelity.speed_factor), study, dt, periods.network)
     drag, last = timed[-1], timed[-1].end_step
     types = study.type_names()
     top = box_top(study, first_particles(study))
-    check_headroom(case, clear, top)
+    _check_headroom(case, clear, top)
     parts = rank_split(case, top)
     deck = ProcessDeck(
         title=study.title,
@@ -168,7 +168,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         deck=deck,
         case=_process_case(case, bed.surface_m, timed, top, dt, rayleigh),
         steps=last,
-        meshes={WORKPIECE_MESH: workpiece_mesh(case), **bowl_meshes(study, top)},
+        meshes={_WORKPIECE_MESH: workpiece_mesh(case), **_bowl_meshes(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
         warnings=[*_warnings(case, dt), *rank_warnings(parts)],
@@ -180,7 +180,7 @@ def _expected_bed(study: Study) -> Bed:
     return Bed(surface, surface + 2 * study.media.radius_mean_m)
 
 
-def check_fit(case: Case, surface_m: float) -> None:
+def _check_fit(case: Case, surface_m: float) -> None:
     """Refuse a workpiece that leaves the bowl or goes through its floor.
 
     Raises
@@ -216,7 +216,7 @@ def check_fit(case: Case, surface_m: float) -> None:
         )
 
 
-def check_headroom(case: Case, tip_m: float, top_m: float) -> None:
+def _check_headroom(case: Case, tip_m: float, top_m: float) -> None:
     """Refuse a workpiece that would stick out of the simulation box before it goes in.
 
     Raises
@@ -236,7 +236,7 @@ def check_headroom(case: Case, tip_m: float, top_m: float) -> None:
         )
 
 
-def output_periods(study: Study, timestep_s: float) -> Periods:
+def _output_periods(study: Study, timestep_s: float) -> Periods:
     """Steps between frames: at least the asked rates, each a multiple of the faster one."""
     rates = study.outputs
     per_second = study.chosen_fidelity().speed_factor * timestep_s
@@ -246,7 +246,9 @@ def output_periods(study: Study, timestep_s: float) -> Periods:
     return Periods(force, contacts, network)
 
 
-def timed_legs(plan: Sequence[Leg], study: Study, timestep_s: float, period: int) -> list[TimedLeg]:
+def _timed_legs(
+    plan: Sequence[Leg], study: Study, timestep_s: float, period: int
+) -> list[TimedLeg]:
     """Give every leg its steps; each ends with a whole network period.
 
     A plunge or an approach goes a little slower to end where it should; the
@@ -315,7 +317,7 @@ def _process_case(
             kind=study.workpiece.shape.kind,
             radius_m=workpiece_radius(case),
             length_m=workpiece_length(case),
-            mesh=WORKPIECE_MESH,
+            mesh=_WORKPIECE_MESH,
             immersion_depth_m=study.motion.immersion_depth_m,
         ),
         motion=_motion(case),
@@ -353,7 +355,7 @@ def _motion(case: Case) -> CircleOfRun | LineOfRun:
     )
 
 
-def bowl_meshes(study: Study, top_m: float) -> dict[str, Trimesh]:
+def _bowl_meshes(study: Study, top_m: float) -> dict[str, Trimesh]:
     """The bowl as a mesh, if the study asks for facets."""
     size = study.bowl.facet_size_m
     if size is None:
@@ -409,22 +411,22 @@ def _warnings(case: Case, timestep_s: float) -> list[str]:
     diameter = 2 * study.media.radius_mean_m
     found = []
     gap = study.bowl.radius_m - farthest_reach(study.motion) - workpiece_radius(case)
-    if gap < JAMMING_GAP * diameter:
+    if gap < _JAMMING_GAP * diameter:
         found.append(
             f"the gap between workpiece and bowl is {gap / diameter:.2g} particle "
             f"diameters, less than "
-            f"{JAMMING_GAP:g}: particles can jam in it, with forces far beyond those of the bed"
+            f"{_JAMMING_GAP:g}: particles can jam in it, with forces far beyond those of the bed"
         )
-    steps = contact_steps(study, timestep_s)
-    if steps < FEWEST_STEPS_PER_CONTACT:
+    steps = _contact_steps(study, timestep_s)
+    if steps < _FEWEST_STEPS_PER_CONTACT:
         found.append(
             f"a contact at the workpiece's speed takes {steps:.1f} steps, fewer than "
-            f"{FEWEST_STEPS_PER_CONTACT}: single impacts are not resolved"
+            f"{_FEWEST_STEPS_PER_CONTACT}: single impacts are not resolved"
         )
     return found
 
 
-def contact_steps(study: Study, timestep_s: float) -> float:
+def _contact_steps(study: Study, timestep_s: float) -> float:
     """Steps of an elastic impact of a particle on the workpiece at the workpiece's speed."""
     fidelity = study.chosen_fidelity()
     particle, workpiece = particle_material(study), study.materials[study.workpiece.material]
@@ -468,7 +470,7 @@ PROCESS = SceneType(
     slug=lambda case: case.name,
     content=_content,
     build=process_scene,
-    inputs=(WORKPIECE_MESH,),
+    inputs=(_WORKPIECE_MESH,),
     tables=(
         "thermo.parquet",
         "workpiece_force.parquet",

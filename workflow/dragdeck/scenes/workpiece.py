@@ -12,7 +12,7 @@ from dragdeck.mesh import Surroundings, check, cylinder, envelope, place, read
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.model import CylinderShape, MeshShape
 
-FREEBOARD_DIAMETERS = 4
+_FREEBOARD_DIAMETERS = 4
 """A generated workpiece stands this many particle diameters out of the bed."""
 
 
@@ -37,7 +37,7 @@ def workpiece_length(case: Case) -> float:
     study = case.study
     if isinstance(study.workpiece.shape, MeshShape):
         return envelope(workpiece_mesh(case)).length_m
-    freeboard = FREEBOARD_DIAMETERS * 2 * study.media.radius_mean_m
+    freeboard = _FREEBOARD_DIAMETERS * 2 * study.media.radius_mean_m
     return round_to(study.motion.immersion_depth_m + freeboard, 6)
 
 

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from dragdeck.study.base import Model, Number
 
-BASE_MODEL = "hertz tangential history"
+_BASE_MODEL = "hertz tangential history"
 """Hertz-Mindlin with the history of the tangential spring (LIGGGHTS: ``pair gran``)."""
 
 
@@ -109,7 +109,7 @@ def present(pairs: Iterable[Pair]) -> Mapping[str, Coefficient]:
 
 def contact_model(pairs: Iterable[Pair]) -> str:
     """LIGGGHTS's contact model with what these pairs need."""
-    return " ".join([BASE_MODEL, *(row.model for row in present(pairs).values() if row.model)])
+    return " ".join([_BASE_MODEL, *(row.model for row in present(pairs).values() if row.model)])
 
 
 def contact_settings(pairs: Iterable[Pair]) -> list[str]:

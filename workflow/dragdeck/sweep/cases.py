@@ -62,7 +62,7 @@ def beside_each_other(cases: Iterable[Case]) -> list[Case]:
     return [replace(case, beside=len(known)) for case in known]
 
 
-LEAST_LEVELS = 3
+_LEAST_LEVELS = 3
 """Levels that a power law is fitted to: two would fit any."""
 
 
@@ -97,13 +97,13 @@ def _check_scaling(scaling: Scaling, sweep: Mapping[str, list[Any]], file: Path)
         )
     levels = [_level(value, field, file) for value in sweep[field]]
     low, high = scaling.fit_range or (min(levels), max(levels))
-    if sum(low <= level <= high for level in levels) < LEAST_LEVELS:
+    if sum(low <= level <= high for level in levels) < _LEAST_LEVELS:
         raise InputError(
             f"too few levels from {low:g} to {high:g} for a power law",
             file=file,
             field=f"sweep.{field}",
             value=sweep[field],
-            limit=f"{LEAST_LEVELS} levels or more",
+            limit=f"{_LEAST_LEVELS} levels or more",
             remedy="add levels" + (", or widen scaling.fit_range" if scaling.fit_range else ""),
         )
 

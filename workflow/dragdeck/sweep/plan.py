@@ -28,7 +28,7 @@ from dragdeck.sweep.cases import beside_each_other, settle_case
 
 Settings = Mapping[str, Any]
 
-PATH_LENGTH = ("motion.path.revolutions", "motion.path.length_m")
+_PATH_LENGTH = ("motion.path.revolutions", "motion.path.length_m")
 
 
 class Block(Model):
@@ -179,8 +179,8 @@ def _unnamed(settings: Settings) -> dict[str, Any]:
 def _path_length(study: Study) -> tuple[str, float]:
     path = study.motion.path
     if path.kind == "circle":
-        return PATH_LENGTH[0], path.revolutions
-    return PATH_LENGTH[1], path.length_m
+        return _PATH_LENGTH[0], path.revolutions
+    return _PATH_LENGTH[1], path.length_m
 
 
 def _case(base: Case, values: Settings, shown: Settings, plan_file: Path) -> Case:

@@ -199,7 +199,7 @@ class ChainNumbers:
     altitude_m: float = np.nan
 
 
-NO_CHAIN = ChainNumbers()
+_NO_CHAIN = ChainNumbers()
 
 
 def describe(
@@ -210,7 +210,7 @@ def describe(
     With `with_workpiece` false the mean force leaves out the contacts of the workpiece.
     """
     if chain is None:
-        return NO_CHAIN
+        return _NO_CHAIN
     particles = list(chain.particles)
     forces = frame.normal_force
     mean = around.mean_n if with_workpiece else around.free_mean_n
@@ -257,7 +257,7 @@ def _paths(frame: NetworkFrame, around: Around) -> Iterator[ChainNumbers]:
         for setting in SETTINGS:
             if setting.definition == definition:
                 strong = numbers.bottleneck_n > setting.force_factor * mean
-                yield numbers if strong else NO_CHAIN
+                yield numbers if strong else _NO_CHAIN
 
 
 def _peters_chains(frame: NetworkFrame, around: Around) -> Iterator[ChainNumbers]:

@@ -21,18 +21,18 @@ from dragchain.validation.peaks.settings import DEFAULTS, DEFINITIONS, SETTINGS,
 from dragchain.validation.peaks.tests import DESCRIPTORS, PeakTest
 from dragchain.validation.peaks.verdicts import LEVEL
 
-COLOURS: dict[Definition, str] = {
+_COLOURS: dict[Definition, str] = {
     "widest_path": BLUE, "free_path": GREEN, "peters": RED, "peters_workpiece": ORANGE
 }  # fmt: skip
-FAMILIES: dict[str, tuple[Definition, ...]] = {
+_FAMILIES: dict[str, tuple[Definition, ...]] = {
     "paths": ("free_path", "widest_path"),
     "Peters' chains": ("peters", "peters_workpiece"),
 }
-LAGGED = {
+_LAGGED = {
     "bottleneck_over_mean": "weakest contact over\nthe mean contact",
     "stands_out": "weakest behind the workpiece\nover the shell's rms",
 }
-FOREST = tuple(one for one in DESCRIPTORS if one.statement in ("presence", "dominance"))
+_FOREST = tuple(one for one in DESCRIPTORS if one.statement in ("presence", "dominance"))
 
 
 def draw(study: Study) -> dict[str, Figure]:
@@ -48,9 +48,9 @@ def draw(study: Study) -> dict[str, Figure]:
 def _around_peaks(lags: LagCurves) -> Figure:
     """Event-triggered averages with the band that chance keeps."""
     figure = new_figure(5.0)
-    grid = figure.subplots(len(LAGGED), len(FAMILIES), sharex=True, sharey=True)
-    for row, (name, label) in zip(grid, LAGGED.items(), strict=True):
-        for axes, (family, definitions) in zip(row, FAMILIES.items(), strict=True):
+    grid = figure.subplots(len(_LAGGED), len(_FAMILIES), sharex=True, sharey=True)
+    for row, (name, label) in zip(grid, _LAGGED.items(), strict=True):
+        for axes, (family, definitions) in zip(row, _FAMILIES.items(), strict=True):
             _lag_panel(axes, lags, name, definitions)
             axes.set_title(family)
         row[0].set_ylabel(f"{label},\nin standard deviations", fontsize=8.5)
@@ -69,7 +69,7 @@ def _lag_panel(axes: Axes, lags: LagCurves, name: str, definitions: tuple[Defini
     axes.axvline(0.0, color=GREY, linewidth=0.7, linestyle=":")
     axes.plot(lags.lag_s, lags.drag, color=GREY, linewidth=0.9, label="resistance")
     for definition in definitions:
-        mean, colour = lags.curves[definition][name].mean, COLOURS[definition]
+        mean, colour = lags.curves[definition][name].mean, _COLOURS[definition]
         axes.plot(lags.lag_s, mean, color=colour, label=DEFINITIONS[definition])
     band = lags.curves[definitions[0]][name].band
     if np.isfinite(band):
@@ -88,8 +88,8 @@ def _effects(tests: Sequence[PeakTest]) -> Figure:
         if test.peaks == "all"
     }
     figure = new_figure(6.4)
-    grid = figure.subplots(1, len(FOREST), sharey=True)
-    for axes, descriptor in zip(grid, FOREST, strict=True):
+    grid = figure.subplots(1, len(_FOREST), sharey=True)
+    for axes, descriptor in zip(grid, _FOREST, strict=True):
         for place, setting in enumerate(SETTINGS):
             test = of_setting[descriptor.name, setting.definition, setting.label]
             _effect(axes, -place - _gap(place), test)
@@ -101,8 +101,8 @@ def _effects(tests: Sequence[PeakTest]) -> Figure:
     names = [setting.label + ("  *" if setting.default else "") for setting in SETTINGS]
     grid[0].set_yticks(places, names, fontsize=7.5)
     for tick, setting in zip(grid[0].get_yticklabels(), SETTINGS, strict=True):
-        tick.set_color(COLOURS[setting.definition])
-    for definition, colour in COLOURS.items():
+        tick.set_color(_COLOURS[setting.definition])
+    for definition, colour in _COLOURS.items():
         grid[0].plot([], [], "o", color=colour, label=DEFINITIONS[definition])
     grid[0].plot([], [], "o", color=GREY, mfc="white", label="unadjusted p 0.05 or more")
     figure.suptitle(
@@ -121,7 +121,7 @@ def _gap(place: int) -> float:
 
 
 def _effect(axes: Axes, height: float, test: PeakTest) -> None:
-    colour = COLOURS[test.definition]
+    colour = _COLOURS[test.definition]
     axes.plot([test.ci95_low, test.ci95_high], [height, height], color=colour, linewidth=1.0)
     inside = colour if test.p_claimed < LEVEL else "white"
     axes.plot([test.effect], [height], "o", color=colour, markersize=4.5, markerfacecolor=inside)

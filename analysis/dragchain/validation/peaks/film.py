@@ -30,7 +30,7 @@ from dragchain.run.kinematics import drag_start_s
 from dragchain.tables.by_step import read_table
 from dragchain.tables.workpiece_pose import workpiece_places
 
-QUIET_S = 0.2
+_QUIET_S = 0.2
 """The quiet moment is the middle of the stretch of this length with the least resistance."""
 
 BEFORE_S, AFTER_S = 1.0, 1.0
@@ -43,7 +43,7 @@ PICTURES = 34
 PICTURE_MS = 150
 """How long each picture stands."""
 
-COLOURS = 80
+_COLOURS = 80
 _PIXELS_PER_MM = 8.0
 _FILM_PIXELS_PER_MM = 5.0
 
@@ -74,7 +74,7 @@ class PeakAndQuiet:
         return float(np.interp(time_s, self.time_s, self.resistance_n))
 
 
-def peak_and_quiet(run_dir: Path) -> PeakAndQuiet:
+def _peak_and_quiet(run_dir: Path) -> PeakAndQuiet:
     """Find the peak with the largest resistance and the stretch with the smallest.
 
     Raises
@@ -89,7 +89,7 @@ def peak_and_quiet(run_dir: Path) -> PeakAndQuiet:
     peaks = find_drag_peaks(time_s, drag, min_separation_s=peak_separation_s(case))
     if not len(peaks.index):
         raise TableError(f"{run_dir}: the drag has no peak to show; drag for longer")
-    wide = max(1, round(QUIET_S / float(np.median(np.diff(time_s)))))
+    wide = max(1, round(_QUIET_S / float(np.median(np.diff(time_s)))))
     wide = min(wide, len(drag))
     level = np.convolve(-drag, np.full(wide, 1.0 / wide), mode="valid")
     quiet_s = float(time_s[int(level.argmin()) + wide // 2])
@@ -122,7 +122,7 @@ def peak_pictures(run_dir: Path, pictures: int = PICTURES) -> tuple[dict[str, by
         If pictures cannot be rendered here.
     """
     check_rendering()
-    moments = peak_and_quiet(run_dir)
+    moments = _peak_and_quiet(run_dir)
     wanted = (moments.peak_s, moments.quiet_s)
     pair = [scene.load_scene(run_dir, moments.case, time_s) for time_s in wanted]
     views: tuple[View, ...] = ("xy", "xz")
@@ -190,7 +190,7 @@ def _film(moments: PeakAndQuiet, pictures: int) -> bytes:
     """The peak as an animated GIF, seen from above."""
     scenes = _scenes(moments, pictures)
     largest = _largest_force(scenes)
-    return animate([_picture(moments, shown, largest) for shown in scenes])
+    return _animate([_picture(moments, shown, largest) for shown in scenes])
 
 
 def film_steps(steps: Ints, process_s: Floats, peak_s: float, pictures: int = PICTURES) -> Ints:
@@ -256,7 +256,7 @@ def _swatches() -> Image.Image:
     return Image.fromarray(np.rint(255.0 * np.stack(rows)).astype(np.uint8))
 
 
-def animate(pictures: Sequence[Image.Image]) -> bytes:
+def _animate(pictures: Sequence[Image.Image]) -> bytes:
     """The pictures, all of one size, as a GIF that repeats, with one palette for all."""
     some = pictures[:: max(1, len(pictures) // 6)]
     width, height = some[0].size
@@ -265,7 +265,7 @@ def animate(pictures: Sequence[Image.Image]) -> bytes:
         sheet.paste(picture, (0, at * height))
     swatches = _swatches().resize((width, height), Image.Resampling.NEAREST)
     sheet.paste(swatches, (0, height * len(some)))
-    palette = sheet.quantize(COLOURS)
+    palette = sheet.quantize(_COLOURS)
     flat = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     file = BytesIO()
     flat[0].save(

@@ -13,13 +13,13 @@ from dragchain.statistics.shift_test import band, joint, standardised
 from dragchain.validation.peaks.run_series import RunSeries
 from dragchain.validation.peaks.settings import DEFAULTS, Definition
 
-LAG_S = 0.5
+_LAG_S = 0.5
 """The averages reach this far before and after a peak."""
 
-BAND_SHIFTS = 2000
+_BAND_SHIFTS = 2000
 """Shifts from which the band comes."""
 
-LAGGED = ("bottleneck_over_mean", "stands_out", "exists")
+_LAGGED = ("bottleneck_over_mean", "stands_out", "exists")
 """Numbers of the chain that are averaged."""
 
 
@@ -57,7 +57,7 @@ class LagCurves(Part):
 def lag_curves(runs: Sequence[RunSeries], shifts: Ints) -> LagCurves:
     """Average the chains and the resistance around all peaks, by lag."""
     interval_s = min(run.interval_s for run in runs)
-    lags = np.arange(-round(LAG_S / interval_s), round(LAG_S / interval_s) + 1)
+    lags = np.arange(-round(_LAG_S / interval_s), round(_LAG_S / interval_s) + 1)
     lag_s = interval_s * lags.astype(np.float64)
     resistance = _by_shift(runs, [run.resistance_n for run in runs])
     curves = {
@@ -65,7 +65,7 @@ def lag_curves(runs: Sequence[RunSeries], shifts: Ints) -> LagCurves:
             name: _curve(
                 _by_shift(runs, [run.chain(at, name) for run in runs]), lags, lag_s, shifts
             )
-            for name in LAGGED
+            for name in _LAGGED
         }
         for definition, at in DEFAULTS.items()
     }
@@ -86,7 +86,7 @@ def _mean(by_shift: Sequence[Floats], lags: Ints) -> Floats:
 
 
 def _curve(by_shift: Sequence[Floats], lags: Ints, lag_s: Floats, shifts: Ints) -> LagCurve:
-    mean, width = _mean(by_shift, lags), band(by_shift, shifts[:BAND_SHIFTS], lags)
+    mean, width = _mean(by_shift, lags), band(by_shift, shifts[:_BAND_SHIFTS], lags)
     return LagCurve(
         mean=tuple(mean.tolist()),
         by_run=tuple(tuple(run[lags % len(run)].tolist()) for run in by_shift),

@@ -21,8 +21,8 @@ from dragchain.network.chains import ALPHA_RAD, STRESS_FACTOR, THRESHOLD
 FORCE_FACTORS = (0.5, 1.0, 1.5, 2.0, 10.0)
 """Times the mean normal force. Up to 2 a path is there almost always; at 10 only at times."""
 
-ANGLES_DEG = (30.0, 45.0, 60.0)
-STRESS_FACTORS = (0.5, 1.0, 1.5, 6.0)
+_ANGLES_DEG = (30.0, 45.0, 60.0)
+_STRESS_FACTORS = (0.5, 1.0, 1.5, 6.0)
 """Times the mean stress: 6 for the same reason."""
 
 Definition = Literal["widest_path", "free_path", "peters", "peters_workpiece"]
@@ -77,8 +77,8 @@ class Setting:
 
 def _settings() -> tuple[Setting, ...]:
     """One threshold is varied at a time."""
-    angles = [(float(np.radians(angle)), STRESS_FACTOR) for angle in ANGLES_DEG]
-    stresses = [(ALPHA_RAD, factor) for factor in STRESS_FACTORS if factor != STRESS_FACTOR]
+    angles = [(float(np.radians(angle)), STRESS_FACTOR) for angle in _ANGLES_DEG]
+    stresses = [(ALPHA_RAD, factor) for factor in _STRESS_FACTORS if factor != STRESS_FACTOR]
     paths: tuple[Definition, ...] = ("widest_path", "free_path")
     chains: tuple[Definition, ...] = ("peters", "peters_workpiece")
     return (

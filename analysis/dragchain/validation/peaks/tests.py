@@ -108,13 +108,13 @@ DESCRIPTORS = (
     Descriptor("altitude_m", "altitude in m", "", 0, _FREE),
 )
 
-ORDER = Descriptor("order", "before less after", "order", 1, _HELD)
-COVERAGE = Descriptor("coverage", "peaks with a strong chain", "coverage", 1, _HELD, bounded=True)
-REVERSE = Descriptor("reverse", "strong chains with a peak", "reverse", 1, _HELD, bounded=True)
+_ORDER = Descriptor("order", "before less after", "order", 1, _HELD)
+_COVERAGE = Descriptor("coverage", "peaks with a strong chain", "coverage", 1, _HELD, bounded=True)
+_REVERSE = Descriptor("reverse", "strong chains with a peak", "reverse", 1, _HELD, bounded=True)
 ORIENTATION = Descriptor(
     "resultant", "resultant of the azimuth", "orientation", 1, _FREE, bounded=True
 )
-FRACTIONS = (COVERAGE.name, REVERSE.name)
+FRACTIONS = (_COVERAGE.name, _REVERSE.name)
 
 
 class PeakTest(Part):
@@ -252,10 +252,10 @@ def _odds_ratio(first: float, second: float) -> float:
 
 def _events(runs: Sequence[RunSeries], shifts: Ints, at: int, rule: PeakRule) -> Iterator[PeakTest]:
     peaks = [run.events(rule) for run in runs]
-    yield _test(at, rule, ORDER, shift_test(_asymmetry(runs, at, rule), shifts))
+    yield _test(at, rule, _ORDER, shift_test(_asymmetry(runs, at, rule), shifts))
     pairs = (
-        (COVERAGE, peaks, [strong_frames(run, at) for run in runs]),
-        (REVERSE, [strongest(run, at) for run in runs], peaks),
+        (_COVERAGE, peaks, [_strong_frames(run, at) for run in runs]),
+        (_REVERSE, [strongest(run, at) for run in runs], peaks),
     )
     for descriptor, events, others in pairs:
         shared = _together(runs, events, others)
@@ -267,7 +267,7 @@ def _events(runs: Sequence[RunSeries], shifts: Ints, at: int, rule: PeakRule) ->
     yield _test(at, rule, ORIENTATION, turned, expected=by_chance)
 
 
-def strong_frames(run: RunSeries, at: int) -> Ints:
+def _strong_frames(run: RunSeries, at: int) -> Ints:
     """Frames with a strong chain (`STRONG_STDS`)."""
     strength = run.strength(at)
     level = strength.mean() + STRONG_STDS * strength.std(ddof=1)
@@ -278,7 +278,7 @@ def strongest(run: RunSeries, at: int) -> Ints:
     """Frames at which a strong chain is strongest, no two closer than peaks may be."""
     apart = max(1.0, run.separation_s / run.interval_s)
     index, _ = find_peaks(run.strength(at), distance=apart)
-    return np.asarray(index[np.isin(index, strong_frames(run, at))], dtype=np.int64)
+    return np.asarray(index[np.isin(index, _strong_frames(run, at))], dtype=np.int64)
 
 
 def _together(

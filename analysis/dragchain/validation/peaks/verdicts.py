@@ -36,7 +36,7 @@ SMALL = 0.2
 """An effect below this many standard deviations is small (Cohen 1988)."""
 
 Verdict = Literal["proved", "supported", "refuted", "not supported", "cannot be told"]
-FREE: Definition = "free_path"
+_FREE: Definition = "free_path"
 """The only definition free of what is built in: its verdict is that of a statement."""
 
 
@@ -89,7 +89,7 @@ def judge(tests: Sequence[PeakTest]) -> tuple[StatementVerdict, ...]:
         cells = {
             name: _judgement([t for t in about if t.definition == name]) for name in DEFINITIONS
         }
-        verdict = cells[FREE].verdict
+        verdict = cells[_FREE].verdict
         verdicts.append(StatementVerdict(statement=statement, verdict=verdict, by_definition=cells))
     return tuple(verdicts)
 

@@ -21,11 +21,11 @@ from dragdeck.study.contact_law import Pair
 from dragdeck.study.material import Material
 from dragdeck.study.model import Study
 
-GROUP = "verification"
+_GROUP = "verification"
 """Folder below ``results/``."""
 
 RIGID = "rigid"
-RIGID_FACTOR = 1e6
+_RIGID_FACTOR = 1e6
 """Stiffness of a rigid partner over the particle's: its own deformation is below 1 ppm.
 LIGGGHTS has no rigid material. The density of a rigid particle is 1,000-fold."""
 
@@ -82,7 +82,7 @@ class Lab:
         """A rigid partner of a material."""
         own = self.material(name)
         stiff = {
-            "youngs_modulus_pa": RIGID_FACTOR * own.youngs_modulus_pa,
+            "youngs_modulus_pa": _RIGID_FACTOR * own.youngs_modulus_pa,
             "density_kg_m3": 1e3 * own.density_kg_m3,
         }
         return own.model_copy(update=stiff)
@@ -157,7 +157,7 @@ def experiment(
     )
     unnamed = Experiment(
         **{"title": test.title, "limit_force": True, "walls": (), **more},
-        group=GROUP,
+        group=_GROUP,
         run="",
         types=types,
         bodies=bodies,
