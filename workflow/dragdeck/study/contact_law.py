@@ -56,19 +56,18 @@ class Pair(Model):
 
     restitution: Annotated[
         Number,
-        Field(gt=0.05, le=1, description="coefficient of normal restitution; LIGGGHTS takes "
-              "(0.05, 1]"),
+        Field(gt=0.05, le=1, description="coefficient of normal restitution"),
         Coefficient("coefficientRestitution", "restitution", compared="lowest"),
     ]  # fmt: skip
     friction: Annotated[
         Number,
-        Field(ge=0, le=10, description="Coulomb friction coefficient, dimensionless"),
+        Field(ge=0, le=10, description="Coulomb friction coefficient"),
         Coefficient("coefficientFriction", "friction"),
     ]
     rolling_friction: Annotated[
         Number,
-        Field(ge=0, le=10, description="rolling friction coefficient: largest rolling torque over "
-              "normal force and effective radius, dimensionless"),
+        Field(ge=0, le=10, description="coefficient of rolling friction: largest rolling torque / "
+              "(normal force x effective radius)"),
         Coefficient("coefficientRollingFriction", "rolling friction", "rolling_friction epsd2",
                     "torsionTorque on"),
     ] = 0.0  # fmt: skip
@@ -87,7 +86,7 @@ class Contact(Model):
 
     limit_force: bool = Field(
         default=True,
-        description="no attraction at the end of an impact (dry particles do not stick)",
+        description="suppress tensile normal forces (LIGGGHTS: limitForce); for dry particles",
     )
 
 

@@ -15,12 +15,13 @@ from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
 
 _INTRODUCTION = """# The study file
 
-`studies/<name>/study.yaml` is YAML. All values are SI; numbers may be written
-`5e6`. A key that is not listed here is refused. `*` stands for a name of yours.
-A dotted name, such as `motion.speed_m_s`, is how errors, `sweep` and
-`assumptions` name a field.
+`studies/<name>/study.yaml` is a YAML file. All values are in SI units. Numbers may be
+written as `5e6`. A key that is not listed here is refused. `*` stands for a name of
+your choice. Error messages, `sweep` and `assumptions` refer to a field by its dotted
+name, such as `motion.speed_m_s`. Coefficients, fractions and multipliers are
+dimensionless.
 
-This page is made from the model: `./run dragdeck step fields > docs/study.md`.
+This page is generated from the model: `./run dragdeck step fields > docs/study.md`.
 """
 
 

@@ -13,7 +13,5 @@ class Material(Model):
     """An elastic material."""
 
     youngs_modulus_pa: Positive = Field(description="Young's modulus, Pa")
-    poissons_ratio: Annotated[Number, Field(gt=-1, lt=0.5)] = Field(
-        description="Poisson's ratio, dimensionless; thermodynamics allows (-1, 0.5)"
-    )
+    poissons_ratio: Annotated[Number, Field(gt=-1, lt=0.5)] = Field(description="Poisson's ratio")
     density_kg_m3: Positive = Field(description="density, kg/m3")

@@ -34,10 +34,12 @@ Ranks = Annotated[
 class Media(Model):
     """The particles."""
 
-    material: str = Field(description="name among materials")
+    material: str = Field(description="name of an entry of materials")
     count: Annotated[Whole, Field(ge=1)] = Field(description="number of particles")
-    radius_mean_m: Positive = Field(description="mean radius, m")
-    radius_std_m: NonNegative = Field(default=0.0, description="standard deviation of the radii, m")
+    radius_mean_m: Positive = Field(description="mean particle radius, m")
+    radius_std_m: NonNegative = Field(
+        default=0.0, description="standard deviation of the particle radii, m"
+    )
 
     @model_validator(mode="after")
     def _spread(self) -> Media:
@@ -52,22 +54,22 @@ class Media(Model):
 class Bowl(Model):
     """A flat-bottomed cylindrical bowl about the z axis, floor at z = 0."""
 
-    material: str = Field(description="name among materials")
+    material: str = Field(description="name of an entry of materials")
     radius_m: Positive = Field(description="inner radius, m")
     height_m: Positive = Field(description="inner height from the floor to the rim, m")
     facet_size_m: Positive | None = Field(
         default=None,
-        description="edge length of the bowl's facets, m; none: an exact plane and cylinder",
+        description="edge length of the bowl's mesh elements, m; none: analytical walls",
     )
 
 
 class CylinderShape(Model):
     """A generated round workpiece with flat ends."""
 
-    kind: Literal["cylinder"] = Field(description="a generated workpiece")
+    kind: Literal["cylinder"] = Field(description="a generated cylinder")
     radius_m: Positive = Field(description="radius, m")
-    facet_size_m: Positive = Field(default=0.0015, description="facet edges around the axis, m")
-    facet_length_m: Positive = Field(default=0.01, description="facet edges along the axis, m")
+    facet_size_m: Positive = Field(default=0.0015, description="mesh size around the axis, m")
+    facet_length_m: Positive = Field(default=0.01, description="mesh size along the axis, m")
 
 
 class MeshShape(Model):
@@ -81,16 +83,16 @@ class MeshShape(Model):
 class Workpiece(Model):
     """The workpiece that is dragged."""
 
-    material: str = Field(description="name among materials")
+    material: str = Field(description="name of an entry of materials")
     shape: Annotated[CylinderShape | MeshShape, Field(discriminator="kind")]
 
 
 class CirclePath(Model):
     """A circle about the bowl's axis, begun on the +x axis."""
 
-    kind: Literal["circle"] = Field(description="about the bowl's axis, begun on +x")
+    kind: Literal["circle"] = Field(description="a circle about the bowl's axis, starting on +x")
     radius_m: Positive = Field(description="radius of the path of the workpiece's axis, m")
-    revolutions: Positive = Field(default=1.0, description="how far, revolutions")
+    revolutions: Positive = Field(default=1.0, description="path length, revolutions")
     direction: Literal["ccw", "cw"] = Field(
         default="ccw", description="direction seen from above: ccw (counter-clockwise) or cw"
     )
@@ -105,7 +107,7 @@ class LinePath(Model):
     """A straight line."""
 
     kind: Literal["line"] = Field(description="a straight line")
-    start_m: tuple[Number, Number] = Field(description="x and y where the drag begins, m")
+    start_m: tuple[Number, Number] = Field(description="x and y at the start of the drag, m")
     direction_deg: Number = Field(default=0.0, description="direction of motion from +x, degrees")
     length_m: Positive = Field(description="length of the drag, m")
 
@@ -122,15 +124,15 @@ class Motion(Model):
     )
     plunge_at_m: tuple[Number, Number] | None = Field(
         default=None,
-        description="x and y where the workpiece goes in, m; none: the bowl's axis for a circle, "
-        "the start for a line",
+        description="x and y at which the workpiece is immersed, m; none: the bowl's axis for a "
+        "circle, the start for a line",
     )
-    plunge_speed_m_s: Positive = Field(default=0.05, description="speed of going in, m/s")
+    plunge_speed_m_s: Positive = Field(default=0.05, description="plunge speed, m/s")
     approach_speed_m_s: Positive = Field(
-        default=0.02, description="speed from the plunge to the path, m/s"
+        default=0.02, description="speed from the plunge position to the path, m/s"
     )
     transient_m: NonNegative = Field(
-        description="first stretch of the path that no statistic counts, m"
+        description="initial path length excluded from all statistics, m"
     )
 
 
@@ -139,23 +141,23 @@ class DropTest(Model):
 
     height_m: Positive = Field(default=0.010, description="free height below the particle, m")
     impacts: Annotated[Whole, Field(ge=1, le=20)] = Field(
-        default=3, description="impacts to follow"
+        default=3, description="number of impacts"
     )
     timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=0.02, description="time step as a share of the Rayleigh time"
+        default=0.02, description="time step as a fraction of the Rayleigh time"
     )
 
 
 class Calibration(Model):
     """A measured drop test, to find the restitution of particle on workpiece material."""
 
-    record: str = Field(description="CSV of force over time; relative to the study's folder")
+    record: str = Field(description="CSV of force against time; relative to the study's folder")
     height_std_m: Positive = Field(
         default=1e-4, description="standard uncertainty of drop_test.height_m in the test, m"
     )
     peaks: Literal["auto", "yes", "no"] = Field(
         default="auto",
-        description="fit the ratios of the peak forces too; auto: if the sensor was fast enough",
+        description="also fit the ratios of the peak forces; auto: if the sensor is fast enough",
     )
 
 
@@ -164,21 +166,28 @@ class Filling(Model):
 
     energy_ratio: Positive = Field(
         default=1e-5,
-        description="mean kinetic energy of a particle over m g d, below which it rests",
+        description="settling criterion: mean kinetic energy per particle / (m g d)",
     )
-    max_time_s: Positive = Field(default=10.0, description="give up after this much time, s")
+    max_time_s: Positive = Field(
+        default=10.0,
+        description="the run fails if the packing has not settled within this simulated time, s",
+    )
 
 
 class Outputs(Model):
     """How often a process run writes; every rate is a lower bound, in process time."""
 
-    workpiece_force_hz: Positive = Field(default=1000.0, description="total force and torque, Hz")
-    workpiece_contacts_hz: Positive = Field(
-        default=200.0, description="contacts on the workpiece, Hz"
+    workpiece_force_hz: Positive = Field(
+        default=1000.0, description="minimum sampling rate of total force and torque, Hz"
     )
-    network_hz: Positive = Field(default=20.0, description="all contacts and particles, Hz")
+    workpiece_contacts_hz: Positive = Field(
+        default=200.0, description="minimum sampling rate of the contacts on the workpiece, Hz"
+    )
+    network_hz: Positive = Field(
+        default=20.0, description="minimum sampling rate of all contacts and particles, Hz"
+    )
     n_checkpoints: Annotated[Whole, Field(ge=0)] = Field(
-        default=50, description="restart points over the run"
+        default=50, description="number of restart points per run"
     )
 
     @model_validator(mode="after")
@@ -196,22 +205,22 @@ class Fidelity(Model):
     """What a user trades between speed and accuracy."""
 
     youngs_modulus_scale: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=1.0, description="factor on every Young's modulus, dimensionless"
+        default=1.0, description="multiplier of every Young's modulus"
     )
     timestep_fraction: Annotated[Number, Field(gt=0, le=2)] = Field(
-        default=0.2, description="time step of the process over the Rayleigh time"
+        default=0.2, description="time step of the process as a fraction of the Rayleigh time"
     )
     filling_timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=0.25, description="time step of the fill over the Rayleigh time"
+        default=0.25, description="time step of the filling as a fraction of the Rayleigh time"
     )
     speed_factor: Annotated[Number, Field(ge=1, le=100)] = Field(
-        default=1.0, description="factor on the speed of the workpiece, dimensionless"
+        default=1.0, description="multiplier of the speed of the workpiece"
     )
     skin_m: Positive | None = Field(
-        default=None, description="neighbour skin, m; none: 0.1 of the mean radius"
+        default=None, description="neighbour skin, m; none: 0.1 of the mean particle radius"
     )
     ranks: Ranks = Field(
-        default=2, description="engine processes; auto: by particles, cases and cores (docs/big.md)"
+        default=2, description="MPI ranks; auto: from particles, cases and cores (docs/big.md)"
     )
 
 
@@ -234,9 +243,11 @@ class Tolerance(Model):
     """An error to stay within, instead of settings; the advisor finds them."""
 
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
-        description="largest relative error that the settings may cause, dimensionless"
+        description="largest relative error caused by the settings"
     )
-    quantity: Quantity = Field(default="drag_mean", description="what the error is about")
+    quantity: Quantity = Field(
+        default="drag_mean", description="quantity to which the tolerance applies"
+    )
 
 
 def _form(value: object) -> str:
@@ -258,20 +269,20 @@ class Assumption(Model):
     """A value that the source of the study does not give."""
 
     field: str = Field(description="dotted name of the assumed value")
-    why: str = Field(description="what the source says or does not, and why this value")
+    why: str = Field(description="what the source reports, and the reason for the value")
 
 
 class Scaling(Model):
     """A power law to look for in the mean drag over the levels of one sweep field."""
 
-    field: str = Field(description="dotted name of a field of sweep, its levels numbers above 0")
+    field: str = Field(description="dotted name of a field of sweep; its levels must be above 0")
     expected_exponent: Number | None = Field(
-        default=None, description="exponent to compare the fitted one with"
+        default=None, description="exponent with which the fitted one is compared"
     )
-    source: str | None = Field(default=None, description="where that exponent comes from")
+    source: str | None = Field(default=None, description="source of the expected exponent")
     fit_range: tuple[Positive, Positive] | None = Field(
         default=None,
-        description="levels from ... to, where the exponent is expected; none: everywhere",
+        description="lowest and highest level at which the exponent is expected; none: all levels",
     )
 
     @model_validator(mode="after")
@@ -297,10 +308,12 @@ BUILT_IN_FIDELITIES: Mapping[str, Fidelity] = {
 class Study(Model):
     """A whole study file."""
 
-    title: str = Field(description="for headings")
+    title: str = Field(description="title, for headings")
     gravity_m_s2: Positive = Field(default=9.81, description="gravity along -z, m/s2")
     materials: dict[str, Material]
-    pairs: dict[str, Pair] = Field(description="'a-b': what materials a and b do to each other")
+    pairs: dict[str, Pair] = Field(
+        description="'a-b': coefficients of the contact of materials a and b"
+    )
     media: Media
     bowl: Bowl
     workpiece: Workpiece
@@ -312,14 +325,16 @@ class Study(Model):
     outputs: Outputs = Outputs()
     fidelity: AnyFidelity = Field(
         default="standard",
-        description="name of a fidelity; or its settings; or a tolerance to find settings for",
+        description="name of a fidelity, or settings, or a tolerance that selects settings",
     )
     fidelities: dict[str, Fidelity] = Field(default_factory=dict)
     seed: Annotated[Whole, Field(ge=0, lt=2**32)] = Field(
-        default=1, description="of the first positions and velocities of the particles"
+        default=1,
+        description="random seed of the initial positions and velocities (one seed = one packing)",
     )
     sweep: dict[str, list[Any]] = Field(
-        default_factory=dict, description="dotted field: values; every combination is a case"
+        default_factory=dict,
+        description="dotted field: list of values; every combination is a case",
     )
     scaling: Scaling | None = None
     assumptions: list[Assumption] = Field(default_factory=list)
