@@ -21,7 +21,7 @@ PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 
 def test_the_study_page_is_made_from_the_model() -> None:
     shown = (ROOT / "docs/study.md").read_text()
-    assert shown == page(), "run: dragdeck fields > docs/study.md"
+    assert shown == page(), "run: dragdeck step fields > docs/study.md"
 
 
 def test_every_field_has_a_meaning() -> None:

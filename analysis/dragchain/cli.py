@@ -31,9 +31,9 @@ RUN_DIRS = _argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="
 OUT_DIR = _argument(
     "--out", type=Path, required=True, metavar="DIR", dest="out_dir", help="folder of the results"
 )
-MADE_BY = _argument("--command", help="what made the runs, for the record")
+MADE_BY = _argument("--command", help="command that made the runs, for the record")
 DROPS = _argument("--drops", type=Path, required=True, dest="drops_file", help="drops.json")
-RECORD = _argument("record", type=Path, metavar="RECORD", help="the CSV of force over time")
+RECORD = _argument("record", type=Path, metavar="RECORD", help="CSV of force against time")
 MEASURES = _argument(
     "measures", type=Path, nargs="+", metavar="MEASURES", help="measures.json of the runs"
 )
@@ -60,80 +60,89 @@ class Command:
 
 
 COMMANDS = (
-    Command("tables", "tables of a run from its raw outputs", "tables.write:write_tables",
+    Command("tables", "make the tables of a run from its raw outputs", "tables.write:write_tables",
             (RUN_DIR,)),
-    Command("chains", "contact network and force chains of a run, from its tables",
+    Command("chains", "find contact network and force chains of a run, from its tables",
             "network.write:write_chains", (RUN_DIR,)),
-    Command("loading", "load, sliding and friction work on the workpiece's facets",
+    Command("loading", "map load, sliding and friction work on the workpiece",
             "loading.write:write_loading", (RUN_DIR,)),
-    Command("figures", "figures of a run, from its tables", "report.run_figures:write_figures",
+    Command("figures", "draw the figures of a run, from its tables",
+            "report.run_figures:write_figures",
             (RUN_DIR,)),
-    Command("export", "frames of a run for ParaView or OVITO", "export.write:export_command", (
+    Command("export", "export a run to ParaView or OVITO", "export.write:export_command", (
         RUN_DIR,
         _argument("--to", required=True, choices=("paraview", "xyz"),
-                  help="VTP files with a PVD, or extended XYZ"),
+                  help="VTP files with a PVD time series, or extended XYZ"),
         _argument("--out", type=Path, metavar="DIR", help="default: export/TO in the run's folder"),
         _argument("--from-time", type=float, metavar="S", help="first simulated time, s"),
         _argument("--to-time", type=float, metavar="S", help="last simulated time, s"),
         _argument("--every", type=int, default=1, metavar="N", help="every N-th frame only"),
-        _argument("--replace", action="store_true", help="write over an earlier export"))),
-    Command("report", "report on the process runs of a study", "report.study_report:write_report", (
+        _argument("--replace", action="store_true", help="overwrite an earlier export"))),
+    Command("report", "write the report on the process runs of a study",
+            "report.study_report:write_report", (
         OUT_DIR, RUN_DIRS,
         _argument("--advice", type=Path, metavar="FILE", help="advice.json of the study"))),
 )  # fmt: skip
 """What a user calls."""
 
 STEPS = (
-    Command("measure", "tables, chains and measures of a run of a plan",
+    Command("measure", "make tables, chains and measures of a run of a plan",
             "tradeoff.measure_run:write_measures", (
                 RUN_DIR,
                 _argument("--packing", type=Path, required=True, dest="packing_table",
-                          help="packing.json of its bed"))),
-    Command("tradeoff", "report on speed against accuracy", "tradeoff.report:write_tradeoff", (
+                          help="packing.json of its packing"))),
+    Command("tradeoff", "write the report on speed and accuracy",
+            "tradeoff.report:write_tradeoff", (
         OUT_DIR, MEASURES, MADE_BY,
         _argument("--reference", type=Path, required=True, metavar="RUN_DIR",
                   dest="reference_run", help="a run at the reference settings"),
         _argument("--drops", type=Path, nargs="*", default=[], metavar="RUN_DIR",
                   help="drop tests"),
-        _argument("--costs", type=Path, metavar="FILE", help="costs of what decks leave out"),
-        _argument("--promises", type=Path, metavar="FILE", help="promises on other scenes"),
+        _argument("--costs", type=Path, metavar="FILE", help="costs.json"),
+        _argument("--promises", type=Path, metavar="FILE", help="promises.json"),
         _argument("--plan", default="", metavar="NAME", help="name of the plan"),
         _argument("--largest-step", type=float, default=math.inf,
                   help="largest fraction of the Rayleigh time to recommend"))),
-    Command("promises", "the advisor's promises against runs of other scenes",
+    Command("promises", "test the advisor's predictions on other scenes",
             "tradeoff.promises:promises_command", (OUT_DIR, MEASURES)),
-    Command("scaling", "power law of the mean drag over one field", "scaling.fit:scaling_command", (
+    Command("scaling", "fit a power law of the mean drag over one field",
+            "scaling.fit:scaling_command", (
         OUT_DIR, RUN_DIRS, MADE_BY,
         _argument("--field", required=True, help="dotted name of the field"),
-        _argument("--expected", type=float, metavar="N", help="exponent to compare with"),
-        _argument("--source", help="where that exponent comes from"),
+        _argument("--expected", type=float, metavar="N", help="expected exponent"),
+        _argument("--source", help="source of the expected exponent"),
         _argument("--fit-range", type=float, nargs=2, metavar=("LOW", "HIGH"),
                   help="levels for which the exponent is expected"))),
-    Command("validate", "runs of a study beside its source", "validation.report:write_validation",
+    Command("validate", "compare the runs of a study with its source",
+            "validation.report:write_validation",
             (OUT_DIR, RUN_DIRS, _argument("--command", required=True, help="for the record"))),
-    Command("stability", "report on a stability map", "stability.report:write_stability", (
+    Command("stability", "write the report on a stability map",
+            "stability.report:write_stability", (
         OUT_DIR,
         _argument("lists", type=Path, nargs="+", metavar="POINTS", help="lists of points"))),
-    Command("verify", "checks of the verification suite", "verification.report:write_verification",
+    Command("verify", "check the runs of the verification suite",
+            "verification.report:write_verification",
             (OUT_DIR, RUN_DIRS)),
     Command("verdict", "fail if a quantity of the suite failed", "verification.report:verdict", (
-        _argument("report_dir", type=Path, metavar="DIR", help="what `verify` wrote"),)),
-    Command("record", "impacts of a measured drop test", "calibration.results:write_record", (
+        _argument("report_dir", type=Path, metavar="DIR", help="folder written by `verify`"),)),
+    Command("record", "find the impacts of a measured drop test",
+            "calibration.results:write_record", (
         RECORD,
         _argument("--fall-time", type=float, required=True, metavar="S", dest="fall_time_s",
                   help="free fall before the first impact, s"),
         _argument("--out", type=Path, required=True, metavar="FILE", help="record.json"))),
-    Command("calibrate", "restitution from a measured drop test",
+    Command("calibrate", "fit the restitution to a measured drop test",
             "calibration.results:calibrate_command", (RECORD, DROPS, OUT_DIR)),
-    Command("trials", "known restitutions recovered from synthetic records",
+    Command("trials", "recover known restitutions from synthetic records",
             "calibration.trials:write_trials", (
                 DROPS,
                 _argument("--trials", type=Path, required=True, dest="trials_file",
                           help="drops.json of the trials"),
-                _argument("--seed", type=int, default=1, help="seed of sensors and noise"),
-                _argument("--records", type=int, default=1, help="records of each drop"),
+                _argument("--seed", type=int, default=1,
+                          help="seed of the sensors and their noise"),
+                _argument("--records", type=int, default=1, help="number of records per drop"),
                 _argument("--out", type=Path, required=True, metavar="FILE", help="trials.json"))),
-    Command("calibration-report", "figures and page of a calibration",
+    Command("calibration-report", "write figures and page of a calibration",
             "calibration.report:write_report", (
                 RECORD,
                 _argument("folder", type=Path, metavar="DIR", help="folder of the calibration"))),

@@ -20,9 +20,9 @@ def _argument(*names: str, **options: Any) -> tuple[tuple[str, ...], dict[str, A
 
 
 STUDY = _argument("study", help="name of a folder in studies/")
-FIDELITY = _argument("--fidelity", help="instead of the study's own")
-PLAN = _argument("--plan", help="the points of this plan instead of the study's cases")
-OUT_DIR = _argument("--out", type=Path, required=True, metavar="DIR", help="their folder")
+FIDELITY = _argument("--fidelity", help="fidelity to use instead of the study's own")
+PLAN = _argument("--plan", help="use the design points of this plan instead of the study's cases")
+OUT_DIR = _argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
 
 
 @dataclass(frozen=True)
@@ -41,23 +41,25 @@ class Command:
 
 
 COMMANDS = (
-    Command("check", "check a study and LIGGGHTS, run nothing", "commands:check",
+    Command("check", "check a study and LIGGGHTS without running anything", "commands:check",
             (STUDY, FIDELITY)),
     Command("explain", "what the input scripts model, leave out and cost", "commands:explain", (
         STUDY, FIDELITY,
-        _argument("scene", nargs="?", help="drop_test, filling or process; all if none"))),
-    Command("cases", "the cases of a study and their runs", "commands:cases",
+        _argument("scene", nargs="?", help="drop_test, filling or process; default: all"))),
+    Command("cases", "list the cases of a study and their runs", "commands:cases",
             (STUDY, FIDELITY, PLAN)),
-    Command("advise", "settings for a tolerance, with their error and cost", "commands:advise", (
+    Command("advise", "find settings for a tolerance, with their error and cost",
+            "commands:advise", (
         STUDY, FIDELITY,
-        _argument("--tolerance", type=float, help="instead of the study's own"),
-        _argument("--quantity", help="what the tolerance is about"),
+        _argument("--tolerance", type=float, help="tolerance to use instead of the study's own"),
+        _argument("--quantity", help="quantity to which the tolerance applies"),
         _argument("--quick", action="store_true", help="do not measure the speed of LIGGGHTS"))),
     Command("run", "run the input script in a folder, or resume it", "commands:run", (
         _argument("folder", type=Path),
         _argument("--outcome", type=Path, metavar="FILE",
                   help="write the result to FILE and succeed even if the run is rejected"),
-        _argument("--again", action="store_true", help="start anew, even if it failed before"),
+        _argument("--again", action="store_true",
+                  help="start again even if the run was rejected before"),
         _argument("--every", type=float, default=10.0, metavar="S", dest="every_s",
                   help="seconds between reports"))),
 )  # fmt: skip
@@ -67,11 +69,11 @@ STEPS = (
     Command("render", "write the input script of one run", "commands:render", (
         STUDY, FIDELITY, PLAN,
         _argument("--costs", action="store_true",
-                  help="a filling that the timing of the costs starts from"),
+                  help="a filling from which the timing of the costs starts"),
         _argument("scene", help="drop_test, filling or process"),
         _argument("run", help="run id, as `dragdeck cases` lists it"),
         _argument("--packing", type=Path, help="packing.json of the settled bed (process)"))),
-    Command("fields", "the fields of a study file as a page", "study.field_page:show", ()),
+    Command("fields", "print the fields of a study file as a page", "study.field_page:show", ()),
     Command("verify", "write the input scripts of the verification suite",
             "campaigns.verification.suite:render_suite", (STUDY, FIDELITY)),
     Command("drops", "run the drop tests that a calibration needs",
@@ -79,20 +81,21 @@ STEPS = (
                 STUDY, FIDELITY, OUT_DIR,
                 _argument("set", choices=("sweep", "confirm", "trials")),
                 _argument("--fit", type=Path, help="result.json of the fit (confirm)"),
-                _argument("--count", type=int, default=10, help="number of trials"),
-                _argument("--seed", type=int, default=1, help="seed of the trials"))),
+                _argument("--count", type=int, default=10, help="number of trials (trials)"),
+                _argument("--seed", type=int, default=1, help="seed of the trials (trials)"))),
     Command("stability", "run one regime of the stability map",
             "campaigns.stability_map:stability_command", (
                 _argument("regime", help="impact, settle, beds, column or drag"),
                 _argument("--map", type=Path, required=True, dest="points", help="map.yaml"))),
-    Command("costs", "time what each thing left out would cost",
+    Command("costs", "time what each omitted option would cost",
             "campaigns.cost_timing:costs_command", (
                 STUDY, FIDELITY,
-                _argument("--rounds", type=int, default=3, help="how often each deck is timed"),
+                _argument("--rounds", type=int, default=3,
+                          help="number of timings of each input script"),
                 _argument("--seconds", type=float, metavar="S",
-                          help="drag of the standard deck that is timed"),
+                          help="simulated time of the timed drag, s"),
                 _argument("--only", nargs="+", default=[], metavar="NAME",
-                          help="these variants only"),
+                          help="time only these variants"),
                 _argument("--out", type=Path, required=True, metavar="FILE", help="costs.json"))),
 )  # fmt: skip
 """What the rules call: ``dragdeck step NAME``."""

@@ -236,7 +236,7 @@ Quantity = Literal[
     "chain_length",
     "restitution",
 ]
-"""What a tolerance can be about; docs/trade.md defines each."""
+"""What a tolerance can be about; docs/tradeoff.md defines each."""
 
 
 class Tolerance(Model):
