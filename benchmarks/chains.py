@@ -251,7 +251,7 @@ def page_tables(kind: str, found: list[dict[str, Any]]) -> str:
     """Rates by size, ratios to the oracle, and exponents."""
     contacts = [one["contacts"] for one in found]
     lines = [
-        f"### {kind}: million contacts a second, by processor time",
+        f"### {kind}: million contacts per second of CPU time",
         "",
         f"| contacts | particles | on workpieces | {' | '.join(JOBS)} |",
         f"| ---: | ---: | ---: |{' ---: |' * len(JOBS)}",
@@ -263,7 +263,7 @@ def page_tables(kind: str, found: list[dict[str, Any]]) -> str:
         lines.append(f"| {counts} | {' | '.join(rates)} |")
     lines += [
         "",
-        "Faster than the oracle by (median of rounds, least to largest):",
+        "Speed-up relative to the oracle (median of rounds, smallest to largest):",
         "",
         f"| contacts | {' | '.join(JOBS)} |",
         f"| ---: |{' ---: |' * len(JOBS)}",
@@ -277,7 +277,7 @@ def page_tables(kind: str, found: list[dict[str, Any]]) -> str:
         lines.append(f"| {one['contacts']:,} | {' | '.join(cells)} |")
     lines += [
         "",
-        "Exponent of processor time over contacts, with 95 % interval:",
+        "Exponent of CPU time against contacts, with 95 % CI:",
         "",
         "| sizes | " + " | ".join(JOBS) + " |",
         f"| --- |{' ---: |' * len(JOBS)}",
@@ -293,7 +293,7 @@ def stream_table(found: list[dict[str, Any]]) -> str:
     lines = [
         "### Runs: tables read, chains, clusters and statistics written (`dragchain chains`)",
         "",
-        "| contacts a frame | frames | million contacts/s | peak MB | of it, at the start |",
+        "| contacts per frame | frames | million contacts/s | peak MB | of it, at the start |",
         "| ---: | ---: | ---: | ---: | ---: |",
     ]
     for one in found:

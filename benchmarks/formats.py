@@ -170,7 +170,7 @@ def main() -> None:
     options = parser.parse_args()
     selection = Selection(every=options.every)
     series = FrameSeries.of(Run.open(options.run_dir), selection)
-    lines = ["| | frames/s a core | MB/s a core | MB/s |", "| --- | ---: | ---: | ---: |"]
+    lines = ["| | frames/s per core | MB/s per core | MB/s |", "| --- | ---: | ---: | ---: |"]
     with tempfile.TemporaryDirectory() as name:
         sizes = {}
         for to in ("paraview", "xyz"):

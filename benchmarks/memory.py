@@ -211,7 +211,7 @@ def table(found: dict[str, list[dict[str, float]]], drag: Drag) -> str:
     """What was measured, as a Markdown table."""
     lines = [
         f"| command | peak MB, {drag.seconds:.1f} s | peak MB, {drag.times * drag.seconds:.1f} s"
-        " | kB a second | seconds in 500 MB more | processor s | processor s, long |",
+        " | kB per second | seconds in 500 MB more | CPU time (s) | CPU time, long run (s) |",
         "| --- | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
     more_s = (drag.times - 1) * drag.seconds

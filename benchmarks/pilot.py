@@ -54,7 +54,7 @@ ANALYSIS = ("tables", "chains", "loading", "figures")
 
 @dataclass(frozen=True)
 class Command:
-    """What one command took: processor time in s and the most memory in MB."""
+    """What one command took: CPU time (s) and the most memory in MB."""
 
     cpu_time_s: float
     peak_mb: float
@@ -145,7 +145,7 @@ def measure(project: Project, particles: int) -> tuple[Size, Case, Path]:
     """Fill, drag, analyse."""
     case = case_of(project, particles)
     filling = made(project, case, FILLING, None)
-    commands = {"tables of the fill": kept("tables", filling)}
+    commands = {"tables of the filling": kept("tables", filling)}
     drag = made(project, case, PROCESS, bed_of(filling))
     commands |= {name: kept(name, drag) for name in ANALYSIS}
     return size_of(particles, filling, drag, commands), case, filling
@@ -257,9 +257,9 @@ def rounds(folder: Path, steps: int, count: int) -> list[dict[int, Timing]]:
 def engine_table(sizes: Sequence[Size]) -> str:
     """Cost of a particle and step, and bytes."""
     lines = [
-        "| particles | steps of the fill | ranks | ns a particle and step | steps of the "
+        "| particles | steps of the filling | ranks | ns per particle and step | steps of the "
         "drag | ranks "
-        "| ns a particle and step | contacts a particle | raw bytes a particle and frame |",
+        "| ns per particle and step | contacts per particle | raw bytes per particle and frame |",
         "| ---: " * 9 + "|",
     ]
     for size in sizes:
@@ -277,8 +277,7 @@ def engine_table(sizes: Sequence[Size]) -> str:
 def analysis_table(sizes: Sequence[Size]) -> str:
     """Cost of each command, of a particle and frame, and memory."""
     lines = [
-        "| command | particles | frames | processor time in s | µs a particle and frame "
-        "| peak MB |",
+        "| command | particles | frames | CPU time (s) | µs per particle and frame | peak MB |",
         "| --- | ---: | ---: | ---: | ---: | ---: |",
     ]
     for name in sizes[0].commands:
@@ -295,9 +294,9 @@ def analysis_table(sizes: Sequence[Size]) -> str:
 def ranks_table(timed: Mapping[int, tuple[int, list[dict[int, Timing]]]]) -> str:
     """Two ranks against one."""
     lines = [
-        "| particles | steps | ns a particle and step, one rank | two ranks | processor "
-        "time, two over one "
-        "| by the clock, two over one | particles of the two ranks | MB of one rank, of "
+        "| particles | steps | ns per particle and step, one rank | two ranks | CPU time, "
+        "2 ranks / 1 rank "
+        "| wall-clock time, 2 ranks / 1 rank | particles of the two ranks | MB of one rank, of "
         "each of two |",
         "| ---: | ---: | ---: | ---: | ---: | ---: | --- | --- |",
     ]
@@ -350,14 +349,14 @@ def main() -> None:
     parts = [
         f"{machine()}, LIGGGHTS {find_engine().version}."
         f" {options.rounds} rounds of one rank against two.",
-        "### Engine: whole runs",
+        "### LIGGGHTS: whole runs",
         engine_table(sizes),
         "### Analysis",
         analysis_table(sizes),
     ]
     if timed:
         parts += [
-            "### Two ranks against one: the bed at rest, the workpiece above it",
+            "### Two ranks and one: bed at rest, workpiece above it",
             ranks_table(timed),
         ]
     output = "\n\n".join(parts)

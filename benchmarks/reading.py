@@ -232,7 +232,7 @@ def table(kind: str, file: Path, found: dict[str, list[dict[str, float]]]) -> st
     lines = [
         f"### {kind}: {size / 1e6:.0f} MB, {found['ours'][0]['rows']:,.0f} rows",
         "",
-        "| reader | MB/s | MB/s a core | ours is faster by | by processor time | peak MB |",
+        "| reader | MB/s | MB/s per core | speed-up of ours | by CPU time | peak MB |",
         "| --- | ---: | ---: | ---: | ---: | ---: |",
     ]
     for reader, ones in found.items():
