@@ -375,6 +375,7 @@ def peaks(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
     return folder, [int(line) for line in found.split()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_memory_does_not_grow_with_the_file(peaks, kind) -> None:
     """Twelve times the frames may not take more than a few row groups more."""

@@ -600,6 +600,7 @@ def lengths(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", ["paraview", "xyz"])
 def test_memory_does_not_grow_with_the_run(lengths: Path, to: str) -> None:
     """Twelve times the frames take no more than a few batches of rows more."""

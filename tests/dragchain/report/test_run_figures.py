@@ -41,6 +41,8 @@ from dragchain.run.case import Case, PublishedDrag, Reference, load_case
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean
 
+pytestmark = pytest.mark.slow  # its data take seconds to make
+
 
 @pytest.fixture(scope="module")
 def process(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -21,6 +21,8 @@ from dragchain.tradeoff.costs import read_costs
 from dragchain.tradeoff.drops import choose_drop, read_drops
 from dragchain.tradeoff.notation import in_percent, plainly, times
 
+pytestmark = pytest.mark.slow  # its data take seconds to make
+
 COSTS = [
     {"name": "plain", "scene": "process", "what": "the <plain> deck", "ratio": 2.0,
      "ci95_low": 1.9, "ci95_high": 2.1},

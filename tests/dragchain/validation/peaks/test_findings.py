@@ -18,6 +18,8 @@ from dragchain.validation.peaks.settings import SETTINGS, Definition
 from dragchain.validation.peaks.tests import BuiltIn, PeakTest, near_any
 from dragchain.validation.peaks.verdicts import judge
 
+pytestmark = pytest.mark.slow  # its data take seconds to make
+
 
 def verdicts(findings: Findings) -> dict[str, str]:
     return {row.statement: row.verdict for row in findings.statements}
