@@ -166,7 +166,7 @@ def measure(kind: str, frame: Path, size: int, rounds: int, largest: int) -> dic
             if count <= largest:
                 found[name]["plain"].append(seconds(theirs))
     if count <= largest:
-        assert chains.peters_chains(net) == plain.plain_peters(net)
+        assert chains.peters_rows(net).particle_lists() == plain.plain_peters(net)
         assert chains.widest_paths(net) == plain.plain_paths(net)
         assert np.array_equal(chains.particle_stress(net), plain.plain_stress(net))
     print(kind, found, flush=True)

@@ -2,7 +2,7 @@
 
 ``peters``
     Quasi-linear chains of highly stressed particles (Peters, Muthuswamy, Wibowo and Tordesillas
-    2005, Phys. Rev. E 72, 041307), see `peters_chains`.
+    2005, Phys. Rev. E 72, 041307), see `peters_rows`.
 ``widest_path``
     For each strong workpiece contact the path through strong contacts to the bowl whose weakest
     contact is strongest, see `widest_paths`.
@@ -112,13 +112,13 @@ def major_stress(stress: Floats) -> tuple[Floats, Floats]:
     return values[:, -1], vectors[:, :, -1]
 
 
-def peters_chains(
+def peters_rows(
     frame: NetworkFrame,
     alpha_rad: float = ALPHA_RAD,
     stress_factor: float = STRESS_FACTOR,
     major: tuple[Floats, Floats] | None = None,
-) -> list[list[int]]:
-    """The quasi-linear force chains as ordered rows of the frame's particles.
+) -> ChainRows:
+    """The quasi-linear force chains, with the contacts between their particles.
 
     A particle is highly stressed when its major compressive principal stress is above
     `stress_factor` times the mean of all particles (1 in the paper). Two highly stressed particles
@@ -130,16 +130,6 @@ def peters_chains(
     chains. A chain starts at its higher end, and the chains come by the height of their starts.
     `major` is what `major_stress` returns for the frame, if it is known already.
     """
-    return peters_rows(frame, alpha_rad, stress_factor, major).particle_lists()
-
-
-def peters_rows(
-    frame: NetworkFrame,
-    alpha_rad: float = ALPHA_RAD,
-    stress_factor: float = STRESS_FACTOR,
-    major: tuple[Floats, Floats] | None = None,
-) -> ChainRows:
-    """The chains of `peters_chains` with the contacts between their particles."""
     stress, axis = major_stress(particle_stress(frame)) if major is None else major
     high = stress > stress_factor * stress.mean() if stress.size else stress > 0.0
     candidates, end = _candidates(frame, alpha_rad, high, axis)

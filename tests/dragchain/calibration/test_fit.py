@@ -299,7 +299,7 @@ def test_a_restitution_outside_the_sweep_is_refused(sweep: Sweep, e: float) -> N
     assert refused.value.reason == "range"
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     e=st.floats(0.5, 0.9),
     rate=st.floats(250e3, 2e6),

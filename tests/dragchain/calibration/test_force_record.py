@@ -115,7 +115,7 @@ def test_only_the_first_three_count() -> None:
     assert len(found(time, force).impacts) == 3
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     rate=st.floats(40e3, 1.5e6),
     phase=st.floats(0, 1, exclude_max=True),
@@ -294,7 +294,7 @@ def test_a_clipped_amplifier_is_refused(rate: float) -> None:
     assert refused.value.reason == "clipped"
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     rate=st.floats(40e3, 1.5e6),
     phase=st.floats(0, 1, exclude_max=True),

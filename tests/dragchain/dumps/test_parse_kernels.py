@@ -62,7 +62,7 @@ formats = st.sampled_from(["%.9g", "%.6g", "%.15g", "%.16g", "%.17g", "%.0f", "%
 
 
 @given(doubles, formats)
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=1000)
 @example(5e-324, "%.17g")
 @example(1.7976931348623157e308, "%.17g")
 @example(2.2250738585072014e-308, "%.17g")
@@ -87,7 +87,7 @@ decimals = st.builds(
 
 
 @given(decimals)
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=1000)
 @example("0.0e-400")
 @example("9007199254740993")
 @example("9007199254740993e22")
@@ -101,7 +101,7 @@ def test_reads_any_decimal_as_python_does_or_leaves_it(word: str) -> None:
 
 
 @given(st.floats(1e-300, 1e300), st.integers(-1, 1), st.integers(17, 19))
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=500)
 def test_reads_what_lies_near_half_way_between_two_doubles(value, off, digits) -> None:
     half = (Fraction(value) + Fraction(math.nextafter(value, math.inf))) / 2
     power = math.floor(math.log10(value)) - digits + 1

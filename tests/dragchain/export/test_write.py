@@ -36,7 +36,7 @@ from dragchain.network.chain_table import chain_table
 from dragchain.network.chains import (
     WidestPath,
     dominant_path,
-    peters_chains,
+    peters_rows,
     widest_paths,
 )
 from dragchain.network.frame import NetworkFrame, read_frames
@@ -283,7 +283,7 @@ def check_membership(frame: NetworkFrame, found: Membership, paths: list[WidestP
     assert best is not None
     assert set(np.flatnonzero(found.contact_dominant)) == set(best.contacts)
     assert set(np.flatnonzero(found.particle_dominant)) == set(best.particles)
-    for number, chain in enumerate(peters_chains(frame), start=1):
+    for number, chain in enumerate(peters_rows(frame).particle_lists(), start=1):
         assert set(np.flatnonzero(found.particle_peters == number)) == set(chain)
         assert (found.contact_peters == number).sum() == len(chain) - 1
 

@@ -106,7 +106,7 @@ def test_a_frame_without_contacts_has_no_cluster() -> None:
     edge=st.integers(2, 6),
     levels=st.sampled_from([None, 1, 4]),
 )
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_clusters_are_those_of_a_flood(seed: int, edge: int, levels: int | None) -> None:
     frame = random_frame(seed, edge=edge, levels=levels)
     found = frame_clusters(frame)

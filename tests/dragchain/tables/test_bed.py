@@ -53,7 +53,7 @@ def test_a_large_particle_reaches_over_several_probes() -> None:
 
 
 @given(st.lists(st.tuples(*[st.floats(-1, 1)] * 2, st.floats(0.1, 3), st.floats(0.1, 0.4))))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_it_is_what_a_plain_search_finds(particles) -> None:
     particles = [*particles, (0.0, 0.0, 0.3, 0.3)]
     table = np.array(particles)

@@ -104,7 +104,7 @@ forces = st.floats(-10, 10, allow_nan=False)
     applied=arrays.arrays(np.float64, (4, 3), elements=forces),
     data=st.data(),
 )
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_contacts_of_a_particle_always_add_up_to_its_force(owners, applied, data) -> None:
     evaluated = data.draw(arrays.arrays(np.float64, (len(owners), 3), elements=forces))
     particles = frame(PARTICLES, [[i + 1, 9, 9, 9, 1, *applied[i]] for i in range(4)])

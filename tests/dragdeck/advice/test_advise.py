@@ -92,7 +92,7 @@ ROWS = st.lists(
 )
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(ROWS, st.floats(1e-3, 0.6), st.floats(1e-3, 0.6), st.floats(0.2, 5.0))
 def test_no_setting_beyond_its_tolerance_and_less_accuracy_is_never_dearer(
     case: Case,

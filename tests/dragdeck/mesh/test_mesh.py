@@ -108,7 +108,7 @@ def test_cylinder_against_the_formulas(facet_size_m: float):
     assert m.findings(workpiece, surroundings=SCENE) == []
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     radius=st.floats(1e-4, 0.05),
     slenderness=st.floats(0.3, 20),
@@ -314,7 +314,7 @@ def test_vtk_polygon_data_is_refused_with_a_way_out(tmp_path: Path):
     assert "unstructured grid" in str(caught.value.remedy)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @example(part=0.9453125, suffix=".stl")
 @given(part=st.floats(0.0, 0.99), suffix=st.sampled_from([".stl", ".obj", ".ply", ".vtk"]))
 def test_a_file_cut_short_never_passes(

@@ -28,7 +28,7 @@ def test_no_spread_means_equal_particles() -> None:
     assert set(radii(7, 2e-3, 0.0)) == {2e-3}
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     count=st.integers(1, 600),
     width=st.floats(3, 20),

@@ -10,7 +10,7 @@ import pytest
 from networks import R, make_frame, row
 
 from dragchain.network.chain_table import chain_table
-from dragchain.network.chains import dominant_path, peters_chains, widest_paths
+from dragchain.network.chains import dominant_path, peters_rows, widest_paths
 from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame
 from dragchain.network.write import write_chains
 from dragchain.tables.write import write_tables
@@ -139,7 +139,7 @@ def test_chains_on_the_workpiece_alone_are_told_from_chains_on_workpiece_and_bow
     contacts = [(1, WORKPIECE, 5.0), (1, 2, 5.0), (2, 3, 5.0), (3, 4, 5.0), (4, 5, 0.1)]
     weak = {91: (0.5, 0.5, R), 92: (0.5, 0.6, R)}
     frame = make_frame(row(5) | weak, [*contacts, (91, FLOOR, 0.01), (92, FLOOR, 0.01)])
-    assert peters_chains(frame)
+    assert len(peters_rows(frame)) > 0
     of_default = {setting.definition: row for setting, row in by_setting(frame) if setting.default}
     assert of_default["peters"].exists == 0.0
     # stresses go as the sums of forces: 10, 10, 10, 5.1, 0.1, 0.01 and 0.01, with a mean of 5.03
