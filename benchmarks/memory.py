@@ -164,14 +164,16 @@ def other_filling(run: Path) -> Path:
 Arguments = Callable[[Path, Path], list[Path | str]]
 
 COMMANDS: dict[str, Arguments] = {
-    "tables": lambda run, _: [run],
-    "chains": lambda run, _: [run],
-    "measure": lambda run, bed: [run, "--filling-table", bed],
-    "removal": lambda run, _: [run],
-    "figures": lambda run, _: [run],
-    "report": lambda run, _: ["--out", run / "report", run],
-    "peaks": lambda run, _: ["--out", run / "peaks", run],
-    "validate": lambda run, _: ["--out", run / "validation", run, other_filling(run)],
+    "tables": lambda run, _: ["tables", run],
+    "chains": lambda run, _: ["chains", run],
+    "measure": lambda run, bed: ["step", "measure", run, "--packing", bed],
+    "loading": lambda run, _: ["loading", run],
+    "figures": lambda run, _: ["figures", run],
+    "report": lambda run, _: ["report", "--out", run / "report", run],
+    "validate": lambda run, _: [
+        *("step", "validate", "--command", "benchmark"),
+        *("--out", run / "validation", run, other_filling(run)),
+    ],
 }
 """Commands in the order in which each finds what it needs, and their arguments."""
 
@@ -189,7 +191,7 @@ def measure(arguments: list[str]) -> dict[str, float]:
 
 def run_command(command: str, run: Path, bed: Path) -> dict[str, float]:
     """Measure one command on one run."""
-    words = [sys.executable, __file__, "--measure", command, *COMMANDS[command](run, bed)]
+    words = [sys.executable, __file__, "--measure", *COMMANDS[command](run, bed)]
     done = subprocess.run([str(w) for w in words], capture_output=True, text=True, check=False)
     if done.returncode:
         sys.exit(f"{command} failed on {run}:\n{done.stderr}")

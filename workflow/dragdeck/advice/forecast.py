@@ -274,7 +274,7 @@ def tables(
         table.add_column(name)
     for row in rows:
         option = row.option
-        error = "errors are against it" if option.error is None else _error_text(option.error)
+        error = "reference" if option.error is None else _error_text(option.error)
         bound = "" if option.error is None else percent(option.error.bound)
         style = "bold" if row.role == "advised" else None
         cost, steps = f"{option.relative_cost:.3g}", f"{sum(row.steps.values()):,}"
@@ -292,7 +292,7 @@ def tables(
 def _about(
     case: Case, advice: Advice, advised: Forecast, own: Option | None
 ) -> Iterator[tuple[str, str]]:
-    yield "cost", f"processor time over the reference's; advised: 1/{advice.speedup:.3g} of it"
+    yield "cost", f"ratio of CPU time to that of the reference; advised: 1/{advice.speedup:.3g}"
     yield "errors", f"relative to the reference settings, {advice.source}"
     yield "wall time", f"{' and '.join(advised.steps)}; speed: {advised.source}"
     if case.asked is None:

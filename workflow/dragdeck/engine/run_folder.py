@@ -284,7 +284,7 @@ def _stopped(folder: Path, asked: bool, exit_status: int) -> str:
 
 
 def _failed(folder: Path, record: RunRecord) -> str:
-    lines = [f"{folder}: the run failed and is no result"]
+    lines = [f"{folder}: run rejected: it did not pass the acceptance checks listed below"]
     for check in record.checks:
         if not check.passed:
             lines.append(f"  check:  {check.name}: {check.seen} (limit: {check.limit})")

@@ -66,7 +66,7 @@ class Split:
 
     @property
     def mean(self) -> float:
-        """Own particles a rank."""
+        """Own particles of each rank."""
         return sum(self.particles) / len(self.particles)
 
     @property
@@ -91,7 +91,7 @@ class Split:
         if len(self.particles) == 1:
             return f"{shown}: one rank, {self.mean:,.0f} particles"
         return (
-            f"{shown}: {min(self.particles):,.0f} to {max(self.particles):,.0f} particles a rank, "
+            f"{shown}: {min(self.particles):,.0f} to {max(self.particles):,.0f} particles per rank, "
             f"{self.largest:,.0f} with those of its neighbours"
         )
 
