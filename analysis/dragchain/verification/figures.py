@@ -99,7 +99,7 @@ def _elastic(runs: Sequence[Recording]) -> Figure:
     left.set(xlabel="overlap (µm)", ylabel="normal force (kN)")
     left.set_title("line: Hertz (Johnson 1985, eq. 4.23)", fontsize=8.5)
     right.set(xlabel="time since first contact (µs)")
-    right.set_title("+: Hertz's maximum force; dashed: Hertz's contact time", fontsize=8.5)
+    right.set_title("+: maximum force, dashed: contact time (Hertz)", fontsize=8.5)
     return _legend(figure, left, 3)
 
 
