@@ -32,7 +32,7 @@ def draw_impacts(record: Record, found: Calibration, confirm: Drops) -> Figure:
         axes.set_title(f"impact {impact.impact}: {impact.samples} samples", fontsize=8.5)
         axes.tick_params(labelleft=place == 0)
     assert first is not None
-    first.set_ylabel("force in N")
+    first.set_ylabel("force (N)")
     figure.legend(*first.get_legend_handles_labels(), loc="outside lower left", ncols=3)
     return figure
 
@@ -44,11 +44,11 @@ def _whole(axes: Axes, time: Floats, force: Floats, found: Calibration) -> None:
         label = f"{impact.impact}"
         axes.annotate(label, (at, impact.peak_n), (5, -3), textcoords="offset points", color=RED)
         axes.plot(at, impact.peak_n, "v", color=RED, markersize=4)
-    axes.set(xlabel="time in ms", ylabel="force in N")
+    axes.set(xlabel="time (ms)", ylabel="force (N)")
     axes.set_title(
         f"{1e-3 / found.measured.interval_s:.0f} kHz, noise {found.measured.noise_n:.3g} N, "
         f"offset {found.measured.offset_n:.3g} N and drift {found.measured.drift_n_per_s:.2g} N/s "
-        "taken away"
+        "removed"
     )
 
 
@@ -56,7 +56,7 @@ def _one_impact(
     axes: Axes, since: Floats, force: Floats, impact: int, drops: tuple[DropRun, DropRun]
 ) -> None:
     widest = 0.0
-    names = ("simulated, full modulus", "simulated, production")
+    names = ("simulated, physical modulus", "simulated, production settings")
     for drop, style, colour, name in zip(drops, "-:", (RED, GREY), names, strict=True):
         shape = drop.impacts[impact]
         time = shape.time_s - shape.centroid_s
@@ -64,7 +64,7 @@ def _one_impact(
         widest = max(widest, float(np.abs(time).max()))
     near = np.abs(since) < widest
     axes.plot(since[near] * 1e6, force[near], "o", color=BLUE, ms=3, label="measured", zorder=2)
-    axes.set(xlabel="time in µs")
+    axes.set(xlabel="time (µs)")
 
 
 def draw_fit(found: Calibration) -> Figure:
@@ -86,23 +86,23 @@ def _misfit(axes: Axes, found: Calibration) -> None:
     axes.axhline(fit.rise, color=GREY, linestyle="--", linewidth=0.9)
     axes.axvspan(low, high, color=BLUE, alpha=0.12, linewidth=0)
     axes.axvline(best, color=RED)
-    axes.set(xlabel="restitution in the deck", ylabel="misfit above its least")
-    axes.set(ylim=(0, 3 * fit.rise), title=f"{best:.4f} (95 %: {low:.4f} to {high:.4f})")
+    axes.set(xlabel="input restitution", ylabel="misfit minus its minimum")
+    axes.set(ylim=(0, 3 * fit.rise), title=f"{best:.4f} (95 % CI {low:.4f} to {high:.4f})")
 
 
 def _residuals(axes: Axes, found: Calibration) -> None:
     fit = found.fit
     names = [f"time of impact {k + 2}" for k in range(len(found.observed.times_s))]
-    names += [f"peak {k + 2} over peak 1" for k in range(len(found.observed.log_peaks))]
+    names += [f"peak {k + 2} / peak 1" for k in range(len(found.observed.log_peaks))]
     place = np.arange(len(names))
     axes.barh(place, fit.residuals, color=GREEN, height=0.5)
     axes.axvline(0.0, color="black", linewidth=0.8)
     axes.set_yticks(place, names)
     limit = max(2.5, 1.1 * float(np.abs(fit.residuals).max()))
-    axes.set(xlabel="measured less simulated,\nin standard uncertainties", xlim=(-limit, limit))
+    axes.set(xlabel="measured minus simulated\n(standard uncertainties)", xlim=(-limit, limit))
     axes.invert_yaxis()
     p_value = "no test possible" if fit.p_value is None else f"p = {fit.p_value:.2g}"
-    axes.set_title(f"chi² {fit.chi2:.2g}, {fit.degrees} degrees, {p_value}")
+    axes.set_title(f"chi² {fit.chi2:.2g}, {fit.degrees} degrees of freedom, {p_value}")
 
 
 def draw_bias(bias: pd.DataFrame, result: CalibrationFile) -> Figure:
@@ -111,8 +111,8 @@ def draw_bias(bias: pd.DataFrame, result: CalibrationFile) -> Figure:
     left, right = figure.subplots(1, 2)
     for purpose, colour in zip(PURPOSES, (BLUE, ORANGE), strict=True):
         settings = result.settings[purpose]
-        made = f"modulus times {settings.youngs_modulus_scale:g}"
-        made += f", step {settings.timestep_fraction:.0%}"
+        made = f"modulus x {settings.youngs_modulus_scale:g}"
+        made += f", time step {settings.timestep_fraction:.0%}"
         for option, mark in ((True, "o-"), (False, "s--")):
             rows = bias[(bias["purpose"] == purpose) & (bias["limit_force"] == option)]
             deck, out = rows["restitution_deck"], rows["restitution_effective"]
@@ -122,8 +122,8 @@ def draw_bias(bias: pd.DataFrame, result: CalibrationFile) -> Figure:
             right.errorbar(deck, out - deck, bars, fmt=mark, ms=3, color=colour, elinewidth=0.7)
     _measured_lines(left, result.measured.value, result.fit.restitution)
     right.axhline(0.0, color="black", linewidth=0.8)
-    left.set(xlabel="restitution in the deck", ylabel="effective restitution")
-    right.set(xlabel="restitution in the deck", ylabel="effective less deck")
+    left.set(xlabel="input restitution", ylabel="effective restitution")
+    right.set(xlabel="input restitution", ylabel="effective minus input restitution")
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=2)
     return figure
 
@@ -134,7 +134,7 @@ def _measured_lines(axes: Axes, rebound: float, deck: float) -> None:
     axes.plot([ends[0], deck, deck], [rebound, rebound, ends[0]], ":", color=RED)
     for label, place in (
         (f"measured {rebound:.3f}", (ends[0], rebound)),
-        (f"put {deck:.3f}", (deck, ends[0])),
+        (f"set {deck:.3f}", (deck, ends[0])),
     ):
         axes.annotate(label, place, (3, 3), textcoords="offset points", color=RED)
     axes.set(xlim=ends, ylim=ends)
@@ -144,7 +144,7 @@ def draw_trials(trials: pd.DataFrame) -> Figure:
     """Recovered less known value with its interval, trial by trial."""
     shown = trials[trials["refused"].isna()].reset_index(drop=True)
     figure = Figure(figsize=(WIDTH_IN, 3.0), layout="constrained")
-    panels = (("deck", "deck value, full modulus"), ("effective", "rebound, production"))
+    panels = (("deck", "input value"), ("effective", "rebound, production settings"))
     for axes, (name, title) in zip(figure.subplots(1, 2), panels, strict=True):
         error, low, high = (
             (shown[f"{name}{end}"] - shown[f"{name}_known"]).to_numpy(np.float64)
@@ -163,7 +163,7 @@ def draw_trials(trials: pd.DataFrame) -> Figure:
                 capsize=2,
             )
         axes.axhline(0.0, color="black", linewidth=0.8)
-        axes.set(xlabel="trial", ylabel="recovered less known")
-        axes.set_title(f"{title}: {int(held.sum())} of {len(trials)} held")
+        axes.set(xlabel="trial", ylabel="recovered minus true")
+        axes.set_title(f"{title}: {int(held.sum())} of {len(trials)} within CI")
         axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 2))
     return figure

@@ -45,10 +45,10 @@ class _Eye:
 
 
 _VIEWS = {
-    "front": _Eye(1.0, 0.0, "from ahead", "⊙ motion"),
-    "left": _Eye(0.0, 1.0, "from the left", "← motion"),
-    "rear": _Eye(-1.0, 0.0, "from behind", "⊗ motion"),
-    "right": _Eye(0.0, -1.0, "from the right", "motion →"),
+    "front": _Eye(1.0, 0.0, "front", "⊙ motion"),
+    "left": _Eye(0.0, 1.0, "left", "← motion"),
+    "rear": _Eye(-1.0, 0.0, "rear", "⊗ motion"),
+    "right": _Eye(0.0, -1.0, "right", "motion →"),
 }
 
 _PIXELS = 900
@@ -180,15 +180,17 @@ def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> Non
     axes.axhline(workpiece.immersion_depth_m * 1e3, color=GREY, linewidth=0.8)
     axes.set_xticks(np.arange(-180, 181, 90), ["back", "right", "ahead", "left", "back"])
     axes.grid(False)
-    axes.set(xlabel="azimuth from the motion")
-    axes.set_title("mantle, unrolled\n(dashed: surface at rest)", fontsize=8.5)
+    axes.set(xlabel="azimuth from direction of motion")
+    axes.set_title("lateral surface, unrolled\n(dashed: bed surface at rest)", fontsize=8.5)
 
 
 def _profile(axes: Axes, profile: Profile) -> None:
     """Draw force times sliding distance against depth with its interval."""
     depth_bars(axes, profile.edges, bars_of(profile.force_slide, 1e-3), BLUE)
-    axes.set(xlabel="force times sliding per path\nand depth (N m/(m mm))", xlim=(0.0, None))
-    axes.set_title("by depth, end included\n(bars: 95 % interval)", fontsize=8.5)
+    axes.set(
+        xlabel="force times sliding distance per\npath and depth (N m/(m mm))", xlim=(0.0, None)
+    )
+    axes.set_title("by depth, incl. end face\n(bars: 95 % CI)", fontsize=8.5)
 
 
 def _title(loading: Loading, case: Case) -> str:
@@ -197,10 +199,10 @@ def _title(loading: Loading, case: Case) -> str:
     front = loading.front_fraction["force_slide_n_m"]
     fraction = loading.friction_fraction_of_work.value
     return (
-        f"{case.case or case.run}: sliding of particles on the workpiece, "
-        f"{loading.path_m * 1e3:.0f} mm of its way in {loading.time_s:.1f} s\n"
-        f"friction work {work.value:.3g} J a metre ({work.ci95_low:.3g} to {work.ci95_high:.3g}),"
-        f" {100 * fraction:.1f} % of all work of the workpiece\n"
-        f"front half: {100 * front.value:.0f} % of force times sliding"
-        f" ({100 * front.ci95_low:.0f} to {100 * front.ci95_high:.0f})"
+        f"{case.case or case.run}: sliding load on the workpiece, "
+        f"{loading.path_m * 1e3:.0f} mm of path in {loading.time_s:.1f} s\n"
+        f"friction work {work.value:.3g} J/m (95 % CI {work.ci95_low:.3g} to {work.ci95_high:.3g}),"
+        f" {100 * fraction:.1f} % of the work of the workpiece\n"
+        f"front half: {100 * front.value:.0f} % of force times sliding distance"
+        f" (95 % CI {100 * front.ci95_low:.0f} to {100 * front.ci95_high:.0f})"
     )

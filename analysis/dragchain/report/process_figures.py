@@ -31,12 +31,12 @@ def forces(run: RunData, found: ProcessFindings) -> Figure:
     start, end = float(time_s[trace.counted][0]), float(time_s[-1])
     figure = new_figure(3.6)
     axes = figure.subplots()
-    axes.plot(time_s, trace.lateral_n, color=ORANGE, lw=0.7, label="lateral (left of motion)")
-    axes.plot(time_s, trace.drag_n, color=BLUE, lw=0.8, label="drag (along motion)")
-    axes.axvspan(float(time_s[0]), start, color=_RUN_IN, alpha=0.6, linewidth=0, label="run-in")
+    axes.plot(time_s, trace.lateral_n, color=ORANGE, lw=0.7, label="lateral force (left of motion)")
+    axes.plot(time_s, trace.drag_n, color=BLUE, lw=0.8, label="drag force (along motion)")
+    axes.axvspan(float(time_s[0]), start, color=_RUN_IN, alpha=0.6, linewidth=0, label="transient")
     axes.fill_between([start, end], ours.ci95_low, ours.ci95_high, color="black", alpha=0.15, lw=0)
     interval = f"{ours.ci95_low:.2f} to {ours.ci95_high:.2f}"
-    label = f"mean drag {ours.mean:.2f} N, 95 % interval {interval} N"
+    label = f"mean drag {ours.mean:.2f} N (95 % CI {interval} N)"
     axes.plot([start, end], [ours.mean] * 2, color="black", label=label)
     for row, colour in zip(found.comparison, cycle(_REFERENCES), strict=False):
         label = f"{row.label} mean {row.mean_n:.2f} N" + _spread(row)
@@ -54,7 +54,7 @@ def _spread(row: Comparison) -> str:
 
 def _reliability(ours: MeanEstimate) -> str:
     text = f"drag {ours.mean:.2f} ± {ours.std:.2f} N (± standard deviation)"
-    doubt = "" if ours.reliable else ": too few to rely on the interval"
+    doubt = "" if ours.reliable else " (too few for a reliable CI)"
     return f"{text}, {ours.effective_samples:.0f} effective samples{doubt}"
 
 
@@ -76,7 +76,7 @@ def force_around_workpiece(run: RunData, found: ProcessFindings) -> Figure:
     head(
         figure,
         "normal force on the workpiece by azimuth from the direction of motion,\n"
-        f"mean of a frame in N per {np.degrees(edges[1] - edges[0]):.0f}° (bars: 95 % interval)\n"
+        f"mean over frames (N per {np.degrees(edges[1] - edges[0]):.0f}°); bars: 95 % CI\n"
         f"ahead {sums.ahead_n.value:.2f} N, behind {sums.behind_n.value:.2f} N, "
         + _ratio(sums.ratio),
         size=9,
@@ -88,7 +88,7 @@ def _ratio(ratio: Estimate) -> str:
     if not np.isfinite(ratio.value):
         return "no contact behind"
     high = f"{ratio.ci95_high:.1f}" if np.isfinite(ratio.ci95_high) else "unbounded"
-    return f"ratio {ratio.value:.1f} (95 %: {ratio.ci95_low:.1f} to {high})"
+    return f"ratio {ratio.value:.1f} (95 % CI {ratio.ci95_low:.1f} to {high})"
 
 
 def force_depth(run: RunData, found: ProcessFindings) -> Figure:
@@ -100,11 +100,11 @@ def force_depth(run: RunData, found: ProcessFindings) -> Figure:
     left.set(xlabel="mean normal force per contact (N)", ylabel="depth below the surface (mm)")
     left.set_title(
         f"slope {slope.value * 1e-3:.4f} N/mm\n"
-        f"(95 %: {slope.ci95_low * 1e-3:.4f} to {slope.ci95_high * 1e-3:.4f})"
+        f"(95 % CI {slope.ci95_low * 1e-3:.4f} to {slope.ci95_high * 1e-3:.4f})"
     )
     depth_bars(right, depth.edges_m, bars_of(depth.line_load_n_per_m, 1e-3), GREEN)
-    right.set(xlabel="normal force of all contacts per depth (N/mm)")
-    right.set_title("the deepest bin holds the contacts\nof the workpiece's edge and end")
+    right.set(xlabel="total normal force per depth (N/mm)")
+    right.set_title("deepest bin includes the contacts\non edge and end face")
     left.invert_yaxis()
     return figure
 
@@ -149,7 +149,7 @@ def _network(run: RunData, view: network_picture.View, side: str) -> Figure:
     largest = float(shown.frame.normal_force.max(initial=0.0))
     scale = ScalarMappable(Normalize(0.0, largest), network_picture.colour_map())
     bar = figure.colorbar(scale, ax=axes, shrink=0.8, pad=0.02)
-    bar.set_label("normal force of a contact (N); cylinder radius in proportion")
+    bar.set_label("normal force per contact (N); cylinder radius proportional")
     cut = network_picture.cut_words(run.case, view)
     axes.set_title(
         f"contact network {side}, process time {shown.process_time_s:.2f} s; "
@@ -165,7 +165,7 @@ def _path_words(shown: network_picture.Scene) -> str:
     forces = shown.frame.normal_force[list(shown.dominant.contacts)]
     return (
         "outlined: dominant path from workpiece to bowl, "
-        f"{len(shown.dominant.particles)} particles, weakest contact {forces.min():.2f} N"
+        f"{len(shown.dominant.particles)} particles, bottleneck {forces.min():.2f} N"
     )
 
 
@@ -192,7 +192,7 @@ def drag_of_cases(
     for (label, value), colour in zip(references, cycle(_REFERENCES), strict=False):
         axes.axvline(value, color=colour, linestyle="--", label=f"{label} {value:.2f} N")
     axes.set_yticks(place, names)
-    axes.set(xlabel="mean drag (N), 95 % confidence interval", ylim=(len(names) - 0.5, -0.5))
+    axes.set(xlabel="mean drag (N); bars: 95 % confidence interval", ylim=(len(names) - 0.5, -0.5))
     if references:
         legend_below(figure, axes)
     return figure

@@ -44,11 +44,11 @@ def filling(run: RunData, found: FillingFindings) -> Figure | None:
     axes.semilogy(table["time_s"], ratio, color=BLUE)
     rest, bed = found.rest_energy_ratio, found.bed
     if rest is not None:
-        axes.axhline(rest, color=RED, linestyle="--", label=f"at rest below {rest:g}")
+        axes.axhline(rest, color=RED, linestyle="--", label=f"settling criterion: {rest:g}")
         axes.legend(loc="upper right")
-    axes.set(xlabel="simulated time (s)", ylabel="mean kinetic energy of a particle\n/ (m g d)")
+    axes.set(xlabel="simulated time (s)", ylabel="mean kinetic energy per particle\n/ (m g d)")
     axes.set_title(
-        f"{bed['n_particles']} particles, height {bed['bed_height_m'] * 1e3:.1f} mm, "
+        f"{bed['n_particles']} particles, bed height {bed['bed_height_m'] * 1e3:.1f} mm, "
         f"solid fraction {bed['solid_fraction']:.3f}"
     )
     return figure
@@ -75,12 +75,12 @@ def drop_test(run: RunData, found: DropFindings) -> Figure:
         right = _speed_axes(axes, limit)
         right.plot(time_us, speed_m_s[near], color=RED, linewidth=1.0)
         right.tick_params(labelright=number == len(panels) - 1, colors=RED)
-    right.set_ylabel("speed upwards (m/s)", color=RED)
+    right.set_ylabel("upward velocity (m/s)", color=RED)
     panels[0].set_ylabel("force on the particle (N)", color=BLUE)
     head(
         figure,
-        f"restitution {ratio.mean:.3f} ({ratio.lowest:.3f} to {ratio.highest:.3f}) "
-        f"with {ratio.input:.3f} in the deck",
+        f"effective coefficient of restitution {ratio.mean:.3f} "
+        f"(range {ratio.lowest:.3f} to {ratio.highest:.3f}); input value {ratio.input:.3f}",
     )
     return figure
 

@@ -60,8 +60,8 @@ def _panel(axes: Axes, found: ScalingFile) -> None:
     axes.set(xscale="log", yscale="log")
     _law(axes, found, factor)
     _points(axes, found, factor)
-    axes.set_xlabel(f"{label} in {unit}" if unit else label)
-    axes.set_ylabel("size of the mean drag in N")
+    axes.set_xlabel(f"{label} ({unit})" if unit else label)
+    axes.set_ylabel("mean drag force magnitude (N)")
     axes.set_title(_title(found))
     _ticks(axes, found, factor)
 
@@ -80,18 +80,18 @@ def _law(axes: Axes, found: ScalingFile, factor: float) -> None:
     judged = found.judged
     x, values = _line(judged.curve, factor)
     low, high = ([getattr(p, end) for p in judged.curve] for end in ("ci95_low", "ci95_high"))
-    axes.fill_between(x, low, high, color=BLUE, alpha=0.15, lw=0, label="95 % band of the law")
+    axes.fill_between(x, low, high, color=BLUE, alpha=0.15, lw=0, label="95 % confidence band")
     axes.plot(x, values, color=BLUE, lw=1.8, label="fitted power law")
     if found.fit_within:
         whole = _line(found.fit.curve, factor)
-        axes.plot(*whole, ":", color=BLUE, lw=1.2, label="power law over all levels")
+        axes.plot(*whole, ":", color=BLUE, lw=1.2, label="power law, full range")
     if found.expected.exponent is not None:
         every, _ = _line(found.fit.curve)
         slope = (every / judged.centre) ** found.expected.exponent
         slope = judged.drag_at_centre_n.value * slope
         axes.plot(factor * every, slope, "--", color=ORANGE, lw=1.4, label="expected slope")
     if found.shifted:
-        label = "expected power of level + offset"
+        label = "expected power law with offset"
         axes.plot(*_line(found.shifted.curve, factor), "-.", color=GREEN, lw=1.2, label=label)
 
 
@@ -109,7 +109,7 @@ def _points(axes: Axes, found: ScalingFile, factor: float) -> None:
         ms=17,
         mew=2.0,
         color=_INK,
-        label="mean of a level",
+        label="mean per level",
     )
     runs = found.runs
     axes.errorbar(
@@ -122,7 +122,7 @@ def _points(axes: Axes, found: ScalingFile, factor: float) -> None:
         color=_INK,
         elinewidth=0.9,
         zorder=3,
-        label="a run and its standard error",
+        label="run, ± standard error",
     )
 
 

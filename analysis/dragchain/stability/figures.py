@@ -40,10 +40,10 @@ _COLOURS = {
 _INK = "#1d2733"
 _LETTERS = {STABLE: "", INACCURATE: "i", OVERLAP: "o", ENERGY: "e", LOST: "L", REFUSED: "x"}
 _TITLES = {
-    "impact": "Single impacts ({} in each run, each met at another moment within a step)",
-    "settle": "Settling: {} particles fall into a bowl",
-    "column": "At rest under a load: the settled bed, or a stack in a tube",
-    "drag": "Slow drag: a workpiece goes in and is dragged through the bed",
+    "impact": "Single impacts ({} per run, at different phases within a time step)",
+    "settle": "Settling of {} particles in a bowl",
+    "column": "At rest under load: settled packing or column of particles in a tube",
+    "drag": "Slow drag: workpiece plunges in and is dragged through the packing",
 }
 
 
@@ -96,7 +96,7 @@ def _map(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> Figure:
     axes.set_ylim(len(conditions) - 0.5, -0.5)
     axes.set_xticks(range(len(steps)), [f"{100 * step:g}" for step in steps])
     axes.set_yticks(range(len(conditions)), conditions["label"].tolist(), fontsize=7.5)
-    axes.set_xlabel("time step in % of the Rayleigh time of the smallest particle")
+    axes.set_xlabel("time step (% of Rayleigh time of the smallest particle)")
     figure.suptitle(title, x=0.01, ha="left", fontsize=9.5)
     axes.grid(False)
     axes.tick_params(length=0)
@@ -105,8 +105,8 @@ def _map(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> Figure:
         for kind in _classes_of(points)
     ]
     handles += [
-        Line2D([], [], color=_INK, lw=1.6, label="critical step of the network"),
-        Line2D([], [], color=_INK, lw=1.6, ls=":", label="the same, damped"),
+        Line2D([], [], color=_INK, lw=1.6, label="critical step of the contact network"),
+        Line2D([], [], color=_INK, lw=1.6, ls=":", label="critical step, damped"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=8)
     return figure
@@ -144,15 +144,15 @@ def _errors(impacts: pd.DataFrame, table: RestitutionErrors) -> Figure:
     )
     steps = table.steps_per_contact
     axes.plot(steps, table.worst, color=RED, label="largest, any restitution")
-    axes.plot(steps, table.ordinary_worst, color=BLUE, label="largest, e of 0.5 or more")
+    axes.plot(steps, table.ordinary_worst, color=BLUE, label="largest, e ≥ 0.5")
     axes.plot(steps, table.median, color=_INK, label="median")
-    axes.axhline(TOLERANCE, color=GREY, ls="--", lw=1, label="tolerance of the map")
+    axes.axhline(TOLERANCE, color=GREY, ls="--", lw=1, label="tolerance")
     axes.set(xscale="log", yscale="log", ylim=(5e-6, 10))
-    axes.set_xlabel("steps per contact (elastic Hertz contact time over time step)")
-    axes.set_ylabel("largest error of restitution in a run")
-    axes.set_title("Single impacts: error of restitution against the fine step")
+    axes.set_xlabel("time steps per contact (elastic Hertz contact time / time step)")
+    axes.set_ylabel("largest error of restitution per run")
+    axes.set_title("Single impacts: error of restitution relative to the reference step")
     axes.legend(loc="upper right")
-    figure.colorbar(shades, label="restitution in the deck")
+    figure.colorbar(shades, label="input restitution")
     return figure
 
 
@@ -160,8 +160,8 @@ def _fractions(points: pd.DataFrame) -> Figure:
     """Every point over its step as a fraction of the Rayleigh time and of the critical step."""
     figure = Figure(figsize=(WIDTH_IN, 4.2), layout="constrained")
     panels: Sequence[tuple[str, str, float, Sequence[str]]] = (
-        ("fraction", "step over the Rayleigh time", RULE, REGIMES),
-        ("fraction_of_critical", "step over the critical step", 1.0, ()),
+        ("fraction", "time step / Rayleigh time", RULE, REGIMES),
+        ("fraction_of_critical", "time step / critical step", 1.0, ()),
     )
     for place, (column, label, limit, names) in enumerate(panels, start=1):
         axes = figure.add_subplot(1, 2, place)

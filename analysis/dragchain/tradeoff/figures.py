@@ -106,10 +106,10 @@ def _pareto(tradeoff: Tradeoff) -> Figure:
         axes.set_visible(False)
     for number, axes in enumerate(panels.flat[: len(names)]):
         if number + _COLUMNS >= len(names):
-            axes.set_xlabel("cost over the reference's")
+            axes.set_xlabel("cost / reference cost")
             axes.tick_params(labelbottom=True)
         if number % _COLUMNS == 0:
-            axes.set_ylabel("size of the error in %")
+            axes.set_ylabel("absolute error (%)")
     _shared_limits(panels.flat[0], tradeoff, settings, names)
     own = {one.youngs_modulus_scale for one in settings}
     _pareto_legend(figure, {level: c for level, c in colours.items() if level in own}, markers)
@@ -191,7 +191,7 @@ def _front(points: Sequence[tuple[float, float]]) -> Iterator[tuple[float, float
 
 def _pareto_legend(figure: Figure, colours: dict[float, str], markers: dict[float, str]) -> None:
     handles = [
-        Line2D([], [], ls="", marker="o", color=colour, label=f"modulus x {level:g}")
+        Line2D([], [], ls="", marker="o", color=colour, label=f"E x {level:g}")
         for level, colour in colours.items()
     ]
     handles += [
@@ -200,10 +200,10 @@ def _pareto_legend(figure: Figure, colours: dict[float, str], markers: dict[floa
     ]
     handles += [
         Line2D(
-            [], [], ls="", marker="o", color=GREY, markerfacecolor="white", label="not resolved"
+            [], [], ls="", marker="o", color=GREY, markerfacecolor="white", label="not significant"
         ),
-        Line2D([], [], ls="", marker="_", color=_INK, markersize=8, label="bound (95 %)"),
-        Line2D([], [], color=_INK, lw=0.9, label="front of the bounds"),
+        Line2D([], [], ls="", marker="_", color=_INK, markersize=8, label="upper bound (95 %)"),
+        Line2D([], [], color=_INK, lw=0.9, label="Pareto front"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8)
 
@@ -268,11 +268,11 @@ def _forces(tradeoff: Tradeoff) -> Figure:
         pooled = np.sum(counts, axis=0).tolist()
         _exceedance(raw, scaled, pooled, color=colours[level], lw=1.7, label=f"{runs[0].setting}")
     raw.set(
-        xlabel="normal force of a contact on the workpiece in N", ylabel="share of contacts above"
+        xlabel="normal force of a contact on the workpiece (N)", ylabel="fraction of contacts above"
     )
-    scaled.set(xlabel="normal force over its mean")
-    raw.set_title("as it is")
-    scaled.set_title("over the mean")
+    scaled.set(xlabel="normal force / mean normal force")
+    raw.set_title("absolute")
+    scaled.set_title("relative to the mean")
     for axes in (raw, scaled):
         axes.set(xscale="log", yscale="log", ylim=(1e-4, 1.3))
     _limit(raw, shown_forces=1e-3)
@@ -324,8 +324,8 @@ def _path(reaches: Sequence[Reach]) -> Figure:
         axes.axhline(tolerance, color="#c8ced6", lw=0.8, ls="--", zorder=0)
     axes.axvline(1e3 * arc, color=_INK, lw=0.8, ls=":")
     axes.set(xscale="log", yscale="log")
-    axes.set_xlabel("counted path of one run in mm (dotted: the path that is compared)")
-    axes.set_ylabel("half-width of the 95 % interval in %")
+    axes.set_xlabel("path length of one run (mm); dotted: length compared here")
+    axes.set_ylabel("half-width of the 95 % CI (%)")
     _percent_axis(axes)
     _plain_axis(axes)
     figure.legend(loc="outside right center", fontsize=8)
@@ -342,10 +342,10 @@ def _drop(drops: Sequence[Drop]) -> Figure:
     step = [100.0 * drop.timestep_fraction for drop in own]
     axes.plot(step, [max(abs(drop.error), 1e-6) for drop in own], "o-", color=BLUE, label="mean")
     axes.plot(
-        step, [max(drop.bound, 1e-6) for drop in own], "_--", color=_INK, label="worst impact"
+        step, [max(drop.bound, 1e-6) for drop in own], "_--", color=_INK, label="largest error"
     )
-    axes.set(xscale="log", yscale="log", ylabel="error of restitution in %")
-    axes.set_xlabel("time step in % of the Rayleigh time")
+    axes.set(xscale="log", yscale="log", ylabel="error of restitution (%)")
+    axes.set_xlabel("time step (% of Rayleigh time)")
     _percent_axis(axes)
     _plain_axis(axes)
     axes.legend()

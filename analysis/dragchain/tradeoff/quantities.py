@@ -40,7 +40,7 @@ class Quantity:
 
 QUANTITIES = (
     Quantity("drag_mean", "mean drag", "N", "mean drag"),
-    Quantity("drag_std", "standard deviation of the drag", "N", "sd of drag", squared=True),
+    Quantity("drag_std", "standard deviation of the drag", "N", "std. dev. of drag", squared=True),
     Quantity("drag_std_long", "drag variations over two particle diameters", "N", squared=True),
     Quantity("drag_std_middle", "drag variations in between", "N", squared=True),
     Quantity("drag_std_short", "drag variations under a quarter of a diameter", "N", squared=True),

@@ -42,7 +42,7 @@ def traces(packings: Sequence[Point], compared: Sequence[Compared]) -> Figure:
             f"packing {point.seed}: {drag.mean():.2f} ± {drag.std(ddof=1):.2f} N, "
             f"{len(peaks.index)} peaks"
         )
-        axes.set_ylabel("drag (N)")
+        axes.set_ylabel("drag force (N)")
     panels[-1].set(xlabel="process time (s)")
     legend_below(figure, panels[0], columns=4)
     return figure
@@ -54,7 +54,7 @@ def _bands(axes: Axes, compared: Sequence[Compared]) -> None:
         axes.axhline(row.mean_n, color=colour, linestyle="--", label=f"{row.label} mean")
         if row.std_n and row.label == "experiment":
             low, high = row.mean_n - row.std_n, row.mean_n + row.std_n
-            label = "experiment, one standard deviation"
+            label = "experiment, ± one standard deviation"
             axes.axhspan(low, high, color=colour, alpha=0.12, linewidth=0, label=label)
 
 
@@ -72,7 +72,7 @@ def comparison(force: Force, compared: Sequence[Compared], effects: Sequence[Eff
         own = packing.drag_n
         estimate = Estimate(own.mean, own.ci95_low, own.ci95_high)
         rows.append((f"packing {packing.seed}", estimate, BLUE))
-    rows.append(("packings together", together, "black"))
+    rows.append(("all packings", together, "black"))
     for one in effects:
         if one.quantity == "drag_mean" and not one.field:
             changes = (one.change, one.ci95_low, one.ci95_high)
@@ -91,7 +91,7 @@ def assumed(effects: Sequence[Effect]) -> Figure:
     rows: list[_Row] = []
     for one in effects:
         if one.quantity == "drag_mean" and one.field:
-            name = f"{one.field} = {_value(one.value)} (is {_value(one.reference_value)})"
+            name = f"{one.field} = {_value(one.value)} (assumed: {_value(one.reference_value)})"
             change = Estimate(100 * one.change, 100 * one.ci95_low, 100 * one.ci95_high)
             rows.append((name, change, BLUE))
     figure = _rows(rows, "change of the mean drag (%); bars: 95 % CI")
@@ -125,10 +125,12 @@ def spectrum(found: Spectrum) -> Figure:
     axes.fill_between(
         waves, density.ci95_low, density.ci95_high, color=BLUE, alpha=0.2, linewidth=0
     )
-    axes.loglog(waves, density.mean, color=BLUE, label="mean of the packings; band: all of them")
-    label = f"half of the variance lies to the left: waves over {half:.1f} particle diameters"
+    axes.loglog(waves, density.mean, color=BLUE, label="mean over packings; band: their range")
+    label = f"half of the variance to the left (wavelength > {half:.1f} particle diameters)"
     axes.axvline(1.0 / half, color=RED, linestyle="--", label=label)
-    axes.set(xlabel="waves per particle diameter of path", ylabel="power (N² particle diameters)")
+    axes.set(
+        xlabel="wavenumber (1 / particle diameter)", ylabel="power density (N² particle diameters)"
+    )
     axes.legend(loc="upper right")
     return figure
 
@@ -151,7 +153,7 @@ def around(found: Statements) -> Figure:
     left.set_title(f"normal force\n(% per {np.degrees(edges[1] - edges[0]):.0f}°)")
     depth_bars(right, found.depth.edges, bars_of(found.depth.columns), BLUE)
     right.invert_yaxis()
-    right.set(xlabel="mean normal force of a contact (N)", ylabel="depth (mm)")
+    right.set(xlabel="mean normal force per contact (N)", ylabel="depth (mm)")
     right.set_title("bars: 95 % CI over packings")
     return figure
 
@@ -169,11 +171,11 @@ def corridor(network: Network) -> Figure:
         )
         axes.plot(middle, side.value, "o-", color=colour, markersize=4, label=name)
     far = network.far_n.value
-    axes.axhline(far, color="black", linestyle="--", label="far from the workpiece")
+    axes.axhline(far, color="black", linestyle="--", label="far field")
     wall = network.wall_diameters
     axes.axvline(wall, color=GREY, linewidth=2.0)
-    axes.text(wall, 0.0, " bowl", color=GREY, va="bottom")
+    axes.text(wall, 0.0, " bowl wall", color=GREY, va="bottom")
     axes.set(xlabel="distance from the workpiece's surface (particle diameters)", ylim=(0, None),
-             ylabel="mean normal force\nof a contact (N)", xlim=(0, wall + 0.5))  # fmt: skip
+             ylabel="mean normal force\nper contact (N)", xlim=(0, wall + 0.5))  # fmt: skip
     axes.legend()
     return figure

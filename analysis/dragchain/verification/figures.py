@@ -36,15 +36,15 @@ _COLOURS = (BLUE, ORANGE, GREEN, RED, "#7a4fa3", "#5b8a99")
 _MARKERS = "os^vDP"
 
 _LABELS = {
-    "angle_deg": "angle of incidence from the normal in degrees",
-    "tangential_restitution": "tangential velocity out over in",
-    "spin_rad_s": "spin after in rad/s",
-    "rebound_angle_deg": "rebound angle of the\ncontact patch in degrees",
+    "angle_deg": "angle of incidence from the normal (°)",
+    "tangential_restitution": "tangential velocity ratio, out / in",
+    "spin_rad_s": "spin after impact (rad/s)",
+    "rebound_angle_deg": "rebound angle of the\ncontact patch (°)",
     "scaled_patch": "patch velocity out /\n(friction x normal speed out)",
     "scaled_spin": "surface speed by spin out /\n(friction x normal speed in)",
-    "patch_restitution": "minus patch velocity out over in",
+    "patch_restitution": "-(patch velocity out / in)",
     "recoil_tangent": "tangent of the recoil angle",
-    "tangential_m_s": "relative tangential velocity\nof the centres after in m/s",
+    "tangential_m_s": "relative tangential velocity\nof the centres after impact (m/s)",
 }
 _ABSCISSAE = {
     "oblique_angle": _LABELS["angle_deg"],
@@ -52,10 +52,10 @@ _ABSCISSAE = {
     "oblique_tangential": "patch velocity in / (friction x normal speed in)",
     "patch_restitution": "7/2 friction (1 + e) x normal speed\n/ patch velocity in",
     "recoil_tangent": "tangent of the angle of incidence",
-    "spin_pair": "spin before in rad/s",
-    "spin_pair_same": "spin before in rad/s",
+    "spin_pair": "spin before impact (rad/s)",
+    "spin_pair_same": "spin before impact (rad/s)",
 }
-_REFERENCES = ("line: the law integrated by scipy", "Coulomb sliding of rigid bodies")
+_REFERENCES = ("line: contact law integrated by scipy", "rigid-body sliding with Coulomb friction")
 _OTHERS: Mapping[str, tuple[str, ...]] = {
     "oblique_angle": ("experiment (Kharaz et al. 2001)",),
     "oblique_tangential": ("finite elements (Wu)",),
@@ -89,17 +89,17 @@ def _elastic(runs: Sequence[Recording]) -> Figure:
         line = np.linspace(0, largest_overlap(contact, impact.before.normal_m_s), 100)
         left.plot(line * 1e6, hertz_force(contact, line) / 1e3, color=colour)
         left.plot(overlap[some] * 1e6, force[some] / 1e3, "o", color=colour, ms=3,
-                  label=f"{series_name(run)}: engine")  # fmt: skip
+                  label=f"{series_name(run)}: LIGGGHTS")  # fmt: skip
         time = (run.time_s - run.time_s[inside[0]]) * 1e6
         right.plot(time[some], force[some] / 1e3, "o", color=colour, ms=3)
         end = elastic_time(contact, impact.before.normal_m_s) * 1e6
         right.axvline(end, color=colour, lw=0.8, ls="--")
         peak = float(hertz_force(contact, line[-1])) / 1e3
         right.plot([end / 2], [peak], "+", color="black", ms=9)
-    left.set(xlabel="overlap in µm", ylabel="normal force in kN")
+    left.set(xlabel="overlap (µm)", ylabel="normal force (kN)")
     left.set_title("line: Hertz (Johnson 1985, eq. 4.23)", fontsize=8.5)
-    right.set(xlabel="time since touching in µs")
-    right.set_title("+: Hertz's largest force, dashed: his contact time", fontsize=8.5)
+    right.set(xlabel="time since first contact (µs)")
+    right.set_title("+: maximum force, dashed: contact time (Hertz)", fontsize=8.5)
     return _legend(figure, left, 3)
 
 
@@ -107,7 +107,7 @@ def _restitution(runs: Sequence[Recording]) -> Figure:
     figure, (left, right) = _figure(2)
     line = np.linspace(0.055, 1, 200)
     exact = np.array([limited_restitution(value) for value in line])
-    left.plot(line, line, color="black", lw=0.9, label="what the deck says")
+    left.plot(line, line, color="black", lw=0.9, label="input value")
     left.plot(line, exact, color=GREY, label="exp(-x (π - 2 arctan x)), x = -ln(e)/π")
     for run, colour, marker in zip(runs, _COLOURS, _MARKERS, strict=False):
         value = [impact.constants.restitution for impact in run.contacts]
@@ -115,8 +115,8 @@ def _restitution(runs: Sequence[Recording]) -> Figure:
         error = [impact.rebound - impact.constants.rebound for impact in run.contacts]
         left.plot(value, ratio, marker, color=colour, ms=4, mfc="none", label=series_name(run))
         right.plot(value, np.array(error) * 1e3, marker + "-", color=colour, ms=4, lw=0.8)
-    left.set(xlabel="restitution in the deck", ylabel="speed out over speed in")
-    right.set(xlabel="restitution in the deck", ylabel="engine minus exact\nin thousandths")
+    left.set(xlabel="input restitution", ylabel="rebound velocity ratio, out / in")
+    right.set(xlabel="input restitution", ylabel="LIGGGHTS minus exact ($10^{-3}$)")
     return _legend(figure, left)
 
 
@@ -128,7 +128,7 @@ def _impacts(runs: Sequence[Recording]) -> Figure:
         names: tuple[str | None, str | None] = _REFERENCES
         for run, colour, marker in zip(runs, _COLOURS, _MARKERS, strict=False):
             x, engine, law, rigid = _curves(run, quantity)
-            label = f"{series_name(run)}: engine"
+            label = f"{series_name(run)}: LIGGGHTS"
             axes.plot(x, engine, marker, color=colour, ms=5, mfc="none", label=label)
             axes.plot(x, law, "-", color=colour, lw=0.9, label=names[0])
             if not np.isnan(rigid).all():
@@ -182,8 +182,8 @@ def _time_step(runs: Sequence[Recording]) -> Figure:
             if run.case.limit_force == limit
         ]
         right.loglog(fraction, error, "o-", color=colour, ms=4)
-    left.set(xlabel="time steps in a contact", ylabel="error of speed out over speed in")
-    right.set(xlabel="time step in % of the Rayleigh time")
+    left.set(xlabel="time steps per contact", ylabel="error of the rebound velocity ratio")
+    right.set(xlabel="time step (% of Rayleigh time)")
     return _legend(figure, left, 3)
 
 
@@ -191,9 +191,9 @@ def _bounce(runs: Sequence[Recording]) -> Figure:
     figure, (axes,) = _figure(1)
     for run, colour in zip(runs, _COLOURS, strict=False):
         impacts, energy = flight_energy(run)
-        name = f"{run.case.steps_per_contact} steps a contact"
+        name = f"{run.case.steps_per_contact} steps per contact"
         axes.plot(impacts, (energy - 1) * 1e6, ".", ms=2, color=colour, label=name)
-    axes.set(xlabel="impacts", ylabel="change of the energy of flight, ppm")
+    axes.set(xlabel="impacts", ylabel="change of the kinetic energy (ppm)")
     return _legend(figure, axes)
 
 
@@ -205,7 +205,7 @@ def _momentum(runs: Sequence[Recording]) -> Figure:
             change = np.linalg.norm(momentum_changes(contact)[at], axis=1)
             label = f"collision {contact.value}"
             axes.semilogy(run.time_s * 1e6, np.maximum(change, 1e-18), color=colour, label=label)
-        axes.set(xlabel="time in µs", ylabel=f"change of {what} momentum, share")
+        axes.set(xlabel="time (µs)", ylabel=f"relative change of {what} momentum")
         axes.set_ylim(1e-18, 1e-8)
     return _legend(figure, panels[0], 3)
 
@@ -217,13 +217,13 @@ def _column(runs: Sequence[Recording]) -> Figure:
     floor = run.wall_force_n["plane"][:, 0, 2]
     left.plot(run.time_s * 1e3, floor / loads[0][1], color=BLUE, lw=0.8)
     left.axhline(1.0, color="black", lw=0.8)
-    left.set(xlabel="time in ms", ylabel="floor force over weight")
+    left.set(xlabel="time (ms)", ylabel="floor force / weight")
     height = np.arange(1, len(loads) + 1)
     exact = np.array([hertz_overlap(contact, weight) for contact, weight, _ in loads])
-    right.plot(exact * 1e9, height, "k+", ms=10, label="Hertz under the weight above")
+    right.plot(exact * 1e9, height, "k+", ms=10, label="Hertz, weight above the contact")
     overlap = np.array([row[2] for row in loads])
-    right.plot(overlap * 1e9, height, "o", color=BLUE, mfc="none", label="engine")
-    right.set(xlabel="overlap in nm", ylabel="contact, from the floor up", yticks=height)
+    right.plot(overlap * 1e9, height, "o", color=BLUE, mfc="none", label="LIGGGHTS")
+    right.set(xlabel="overlap (nm)", ylabel="contact number, from the floor", yticks=height)
     return _legend(figure, right)
 
 
@@ -232,13 +232,13 @@ def _incline(runs: Sequence[Recording]) -> Figure:
     (run,) = runs
     x = [contact.value for contact in run.contacts]
     for axes, at, label in (
-        (left, 0, "acceleration down the slope in m/s²"),
-        (right, 1, "acceleration of the spin in rad/s²"),
+        (left, 0, "acceleration down the slope (m/s²)"),
+        (right, 1, "angular acceleration (rad/s²)"),
     ):
         reference = [incline_reference(contact)[at] for contact in run.contacts]
         engine = [incline_slopes(contact)[at] for contact in run.contacts]
-        axes.plot(x, reference, "-", color="black", lw=0.9, label="rolling, then slipping")
-        axes.plot(x, engine, "o", color=BLUE, mfc="none", label="engine")
+        axes.plot(x, reference, "-", color="black", lw=0.9, label="exact: rolling, slipping")
+        axes.plot(x, engine, "o", color=BLUE, mfc="none", label="LIGGGHTS")
         axes.axvline(1.0, color=GREY, lw=0.8, ls=":")
         axes.set(xlabel="tan(angle) / (7/2 friction)", ylabel=label, xscale="log")
     return _legend(figure, left)

@@ -99,8 +99,8 @@ def test_page_shows_the_contacts_on_the_workpiece_if_they_are_known(
     words = " ".join(re.sub("<[^>]+>", " ", html).split())
     assert "impact 2 0.33 % (" in words
     assert "resting 1 17 % (" in words
-    assert "normal impulse in N s 0.856" in words
-    assert "friction work in J 0.00200" in words
+    assert "normal impulse (N s) 0.856" in words
+    assert "friction work (J) 0.00200" in words
 
 
 def test_page_says_what_counts(process: Path, tmp_path: Path) -> None:

@@ -29,8 +29,8 @@ _FAMILIES: dict[str, tuple[Definition, ...]] = {
     "Peters' chains": ("peters", "peters_workpiece"),
 }
 _LAGGED = {
-    "bottleneck_over_mean": "weakest contact over\nthe mean contact",
-    "stands_out": "weakest behind the workpiece\nover the shell's rms",
+    "bottleneck_over_mean": "bottleneck force /\nmean contact force",
+    "stands_out": "bottleneck behind the workpiece\n/ RMS of the shell",
 }
 _FOREST = tuple(one for one in DESCRIPTORS if one.statement in ("presence", "dominance"))
 
@@ -53,7 +53,7 @@ def _around_peaks(lags: LagCurves) -> Figure:
         for axes, (family, definitions) in zip(row, _FAMILIES.items(), strict=True):
             _lag_panel(axes, lags, name, definitions)
             axes.set_title(family)
-        row[0].set_ylabel(f"{label},\nin standard deviations", fontsize=8.5)
+        row[0].set_ylabel(f"{label}\n(standard deviations)", fontsize=8.5)
     for axes in grid[-1]:
         axes.set_xlabel("time after the peak (s)")
     handles = {
@@ -67,13 +67,13 @@ def _around_peaks(lags: LagCurves) -> Figure:
 
 def _lag_panel(axes: Axes, lags: LagCurves, name: str, definitions: tuple[Definition, ...]) -> None:
     axes.axvline(0.0, color=GREY, linewidth=0.7, linestyle=":")
-    axes.plot(lags.lag_s, lags.drag, color=GREY, linewidth=0.9, label="resistance")
+    axes.plot(lags.lag_s, lags.drag, color=GREY, linewidth=0.9, label="drag force magnitude")
     for definition in definitions:
         mean, colour = lags.curves[definition][name].mean, _COLOURS[definition]
         axes.plot(lags.lag_s, mean, color=colour, label=DEFINITIONS[definition])
     band = lags.curves[definitions[0]][name].band
     if np.isfinite(band):
-        words = "95 % of shifted data sets stay inside"
+        words = "simultaneous 95 % null band"
         axes.axhspan(-band, band, color="#d9dde2", alpha=0.5, linewidth=0, label=words)
 
 
@@ -104,9 +104,9 @@ def _effects(tests: Sequence[PeakTest]) -> Figure:
         tick.set_color(_COLOURS[setting.definition])
     for definition, colour in _COLOURS.items():
         grid[0].plot([], [], "o", color=colour, label=DEFINITIONS[definition])
-    grid[0].plot([], [], "o", color=GREY, mfc="white", label="unadjusted p 0.05 or more")
+    grid[0].plot([], [], "o", color=GREY, mfc="white", label="unadjusted p ≥ 0.05")
     figure.suptitle(
-        "at peaks minus all times, in standard deviations of the run; "
+        "difference between peaks and all times (standard deviations of the run); "
         "bars: 95 % CI over the packings; *: default thresholds",
         fontsize=8.5, x=0.02, ha="left",
     )  # fmt: skip
@@ -185,15 +185,15 @@ def _altitude(axes: Axes, runs: Sequence[RunSeries], at: int) -> None:
         fractions = _percentages(height * 1e3, edges)
         axes.stairs(fractions, edges, orientation="horizontal", label=label, **style)
     axes.set(xlabel="frames (%)", ylabel="mean height of the chain\nabove the floor (mm)")
-    axes.set_title("altitude", fontsize=8.5)
+    axes.set_title("height", fontsize=8.5)
 
 
 def _survival(axes: Axes, lifetime: Lifetimes) -> None:
     survival, median_s = lifetime.survival, lifetime.median_s
     axes.step([0.0, *survival.time_s], [1.0, *survival.fraction], where="post", color=BLUE)
-    axes.set(xlabel="age (s)", ylabel="fraction that lasts longer", yscale="log")
+    axes.set(xlabel="lifetime (s)", ylabel="fraction surviving", yscale="log")
     median = f"{median_s * 1e3:.0f} ms" if np.isfinite(median_s) else "unknown"
     axes.set_title(
-        f"life of a chain: median {median},\n{lifetime.lives} lives, {lifetime.cut} cut off",
+        f"lifetime: median {median},\n{lifetime.lives} chains, {lifetime.cut} censored",
         fontsize=8.5,
     )

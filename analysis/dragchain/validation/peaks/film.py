@@ -141,11 +141,11 @@ def _side_by_side(moments: PeakAndQuiet, pair: Sequence[Scene], view: View) -> F
     figure = new_figure(5.5)
     grid = figure.add_gridspec(2, 2, height_ratios=(3.6, 1.3))
     axes = [figure.add_subplot(grid[0, column]) for column in (0, 1)]
-    for name, place, shown in zip(("at the peak", "at the quiet moment"), axes, pair, strict=True):
+    for name, place, shown in zip(("highest peak", "lowest drag"), axes, pair, strict=True):
         _network(place, moments, shown, view, look, f"{name}, ")
     scale = ScalarMappable(Normalize(0.0, look.largest_n), scene.colour_map())
     bar = figure.colorbar(scale, ax=axes, shrink=0.75, pad=0.01, aspect=28)
-    bar.set_label("normal force of a contact (N);\ncylinder radius in proportion", fontsize=8)
+    bar.set_label("normal force per contact (N);\ncylinder radius proportional", fontsize=8)
     _trace(figure.add_subplot(grid[1, :]), moments, [shown.process_time_s for shown in pair])
     return figure
 
@@ -167,19 +167,19 @@ def _chain_words(shown: Scene) -> str:
     if shown.dominant is None:
         return "no path of strong contacts to the bowl"
     weakest = shown.frame.normal_force[list(shown.dominant.contacts)].min()
-    return f"outlined: {len(shown.dominant.particles)} particles, weakest contact {weakest:.2f} N"
+    return f"outlined: {len(shown.dominant.particles)} particles, bottleneck {weakest:.2f} N"
 
 
 def _trace(axes: Axes, moments: PeakAndQuiet, marked_s: Sequence[float]) -> None:
     axes.plot(moments.time_s, moments.resistance_n, color=BLUE, linewidth=0.7)
-    for name, at, lift in zip(("peak", "quiet"), marked_s, (4, -9), strict=True):
+    for name, at, lift in zip(("peak", "lowest"), marked_s, (4, -9), strict=True):
         level = moments.resistance_at(at)
         axes.axvline(at, color=RED, linewidth=0.8, linestyle=":")
         axes.plot([at], [level], "o", color=RED, markersize=5)
         axes.annotate(
             name, (at, level), (5, lift), textcoords="offset points", color=RED, weight="bold"
         )
-    axes.set(xlabel="process time (s)", ylabel="resistance (N),\nminus the drag")
+    axes.set(xlabel="process time (s)", ylabel="drag force\nmagnitude (N)")
     axes.margins(x=0.01, y=0.15)
 
 
@@ -240,7 +240,7 @@ def _picture(moments: PeakAndQuiet, shown: Scene, largest_n: float) -> Image.Ima
     below.axvline(at, color=RED, linewidth=0.8)
     below.plot([at], [moments.resistance_at(at)], "o", color=RED, markersize=6)
     below.set(xlabel="process time (s)")
-    below.set_ylabel("resistance (N)", fontsize=8)
+    below.set_ylabel("drag force\nmagnitude (N)", fontsize=8)
     drawn = BytesIO()
     figure.savefig(drawn, format="png", dpi=100)
     with Image.open(drawn) as picture:
