@@ -19,7 +19,7 @@ WRITERS = {
     "case.impact": "dragdeck.scenes.impact:ImpactCase",
     "drops": "dragdeck.campaigns.restitution_drops:DropsFile",
     "points": "dragdeck.campaigns.stability_map:PointsFile",
-    "costs": "dragdeck.campaigns.cost_file:CostsFile",
+    "costs": "cost_file:CostsFile",
     "packing": "dragchain.tables.bed:Packing",
     "stability": "dragchain.stability.document:StabilityFile",
     "scaling": "dragchain.scaling.document:ScalingFile",

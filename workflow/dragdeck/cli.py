@@ -68,8 +68,6 @@ COMMANDS = (
 STEPS = (
     Command("render", "write the input script of one run", "commands:render", (
         STUDY, FIDELITY, PLAN,
-        _argument("--costs", action="store_true",
-                  help="a filling from which the timing of the costs starts"),
         _argument("scene", help="drop_test, filling or process"),
         _argument("run", help="run id, as `dragdeck cases` lists it"),
         _argument("--packing", type=Path, help="packing.json of the settled bed (process)"))),
@@ -87,16 +85,6 @@ STEPS = (
             "campaigns.stability_map:stability_command", (
                 _argument("regime", help="impact, settle, beds, column or drag"),
                 _argument("--map", type=Path, required=True, dest="points", help="map.yaml"))),
-    Command("costs", "time what each omitted option would cost",
-            "campaigns.cost_timing:costs_command", (
-                STUDY, FIDELITY,
-                _argument("--rounds", type=int, default=3,
-                          help="number of timings of each input script"),
-                _argument("--seconds", type=float, metavar="S",
-                          help="simulated time of the timed drag, s"),
-                _argument("--only", nargs="+", default=[], metavar="NAME",
-                          help="time only these variants"),
-                _argument("--out", type=Path, required=True, metavar="FILE", help="costs.json"))),
 )  # fmt: skip
 """What the rules call: ``dragdeck step NAME``."""
 

@@ -23,7 +23,6 @@ from dragdeck.advice.forecast import (
 )
 from dragdeck.advice.options import with_option
 from dragdeck.advice.speed import Speed
-from dragdeck.campaigns.cost_variants import cost_fillings
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import StudyScene
@@ -178,7 +177,6 @@ def render(
     study: str,
     fidelity: str | None,
     plan: str | None,
-    costs: bool,
     scene: str,
     run: str,
     packing: Path | None,
@@ -188,7 +186,7 @@ def render(
     kind = _scene_type(scene)
     points = project.points(study, plan) if plan else None
     every = points.of(kind) if points else project.cases(study, fidelity)
-    runs = cost_fillings(every[0]) if costs else by_run(every, kind)
+    runs = by_run(every, kind)
     if run not in runs:
         raise InputError(
             f"no {scene} run of this name",

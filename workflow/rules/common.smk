@@ -5,7 +5,6 @@ from shlex import quote
 
 from snakemake.exceptions import WorkflowError
 
-from dragdeck.campaigns.cost_variants import cost_fillings
 from dragdeck.campaigns.restitution_drops import record_file
 from dragdeck.campaigns.stability_map import bed_names
 from dragdeck.campaigns.verification.suite import suite_of
@@ -104,20 +103,12 @@ def points_by_run(scene, plan=PLAN):
     return by_run(points(plan).of(SCENES[scene]), SCENES[scene])
 
 
-@cache
-def fillings_of_costs():
-    """A case for each filling that the timing of the costs starts from."""
-    return explained(cost_fillings, CASES[0])
-
-
 def origins(place):
     """Where cases of a folder's runs come from: how to name them on the command line, and by run."""
-    scene, fidelity = PLACES[place], fidelity_option()
+    scene = PLACES[place]
     if place != POINTS:
-        yield fidelity, by_run(CASES, scene)
+        yield fidelity_option(), by_run(CASES, scene)
     yield f"--plan {PLAN}", points_by_run(scene.name)
-    if place == "filling":
-        yield f"--costs {fidelity}", fillings_of_costs()
     yield f"--plan {VALIDATION}", points_by_run(scene.name, VALIDATION)
 
 

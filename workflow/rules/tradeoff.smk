@@ -12,12 +12,6 @@ def every_drop_point(file):
     return [f"{run_path(STUDY, 'drop_test', run)}/{file}" for run in points_by_run("drop_test")]
 
 
-def packings_of_costs(wildcards):
-    """The settled beds that the timing of the costs starts from."""
-    beds = (run_path(STUDY, "filling", run) for run in fillings_of_costs())
-    return [f"{bed}/tables/packing.json" for bed in beds]
-
-
 # Processor times side by side: no other job may run meanwhile.
 rule measure_costs:
     input:
@@ -25,7 +19,7 @@ rule measure_costs:
         templates_of("filling"),
         templates_of("process"),
         overrides=sorted(str(relative(file)) for file in PROJECT.templates.glob("costs/*.j2")),
-        packings=packings_of_costs,
+        script=sorted(str(relative(file)) for file in PROJECT.root.glob("benchmarks/costs/*.py")),
     output:
         of_tradeoff("costs.json"),
     log:
@@ -39,10 +33,10 @@ rule measure_costs:
         study=STUDY,
         fidelity=fidelity_option,
         rounds=lambda wildcards: points().cost_rounds,
-        case=SCENES["process"].digest(CASES[0]),
-        source=source_hash("dragdeck.campaigns.cost_timing"),
+        cases=[scene.digest(CASES[0]) for scene in SCENES.values()],
+        source=source_hash("dragdeck.engine.batch", "dragdeck.project", "dragchain.tables.write"),
     shell:
-        "dragdeck step costs {params.study} {params.fidelity} --rounds {params.rounds}"
+        "python benchmarks/costs {params.study} {params.fidelity} --rounds {params.rounds}"
         " --out {output} 2>&1 | tee -i {log}"
 
 

@@ -1,4 +1,4 @@
-"""What a run is expected to take."""
+"""What a run is expected to take, and what the things that it leaves out would."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ import json
 from pathlib import Path
 
 import pytest
+from made_tradeoff import cost as priced
+from made_tradeoff import made_tradeoff
 
 from dragdeck.cases.case import Case
-from dragdeck.outlook.explain import expected_cost
+from dragdeck.outlook.explain import Cost, expected_cost, explanation, price_of
 from dragdeck.scenes.filling import FILLING, filling_scene
+from dragdeck.scenes.process import process_scene
 
 
 def measured(results: Path, name: str, particles: int, steps_per_s: float) -> None:
@@ -37,3 +40,30 @@ def test_other_runs_count_by_their_particles(case: Case, tmp_path: Path) -> None
     measured(tmp_path, "big", 10 * case.study.media.count, 50.0)
     cost = expected_cost(FILLING, scene, tmp_path)
     assert cost.wall_time_s == pytest.approx(scene.steps / 500.0)
+
+
+def test_a_price_is_quoted_with_engine_and_date(case: Case) -> None:
+    costs = [priced("bowl_facets", 1.9, ci95_low=1.85, ci95_high=1.951), priced("bowl_fine", 1.9)]
+    tradeoff = made_tradeoff(case, costs=costs)
+    said = "putting it back costs 1.9x (1.85 to 1.95), LIGGGHTS 3.8.0, 2026-01-02"
+    assert price_of("bowl_facets", tradeoff) == said
+    assert price_of("bowl_fine", tradeoff).startswith("putting it back costs 1.9x, LIGGGHTS")
+    assert "not measured" in price_of("two_ranks", tradeoff)
+    assert "not measured" in price_of("bowl_facets", None)
+
+
+@pytest.mark.parametrize(
+    ("high", "unit", "scene", "shown"),
+    [(0.95, "per_second", "process", True), (1.01, "per_second", "process", False),
+     (None, "per_second", "process", False), (0.95, "per_step", "process", False),
+     (0.95, "per_second", "filling", False)],
+)  # fmt: skip
+def test_explain_names_what_is_surely_cheaper(
+    case: Case, high: float | None, unit: str, scene: str, shown: bool
+) -> None:
+    low = None if high is None else 0.85
+    wide = priced("wide facets", 0.9, scene=scene, unit=unit, ci95_low=low, ci95_high=high)
+    tradeoff = made_tradeoff(case, costs=[wide])
+    table = explanation(process_scene(case), Cost(1, 1.0, ""), (), tradeoff)
+    assert ("wide facets" in list(table.columns[1].cells)) == shown
+    assert any("not measured" in str(cell) for cell in table.columns[2].cells)

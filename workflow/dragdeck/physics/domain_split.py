@@ -91,8 +91,8 @@ class Split:
         if len(self.particles) == 1:
             return f"{shown}: one rank, {self.mean:,.0f} particles"
         return (
-            f"{shown}: {min(self.particles):,.0f} to {max(self.particles):,.0f} particles per rank, "
-            f"{self.largest:,.0f} with those of its neighbours"
+            f"{shown}: {min(self.particles):,.0f} to {max(self.particles):,.0f} particles per "
+            f"rank, {self.largest:,.0f} with those of its neighbours"
         )
 
 

@@ -14,7 +14,6 @@ from typing import Any, Literal
 from dragdeck.cases.case import Case
 from dragdeck.outlook.measured import FidelityParameters
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
-from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import ProcessDeck, process_scene
 from dragdeck.study.model import CylinderShape, Study
 from dragdeck.sweep.cases import settle_case
@@ -136,13 +135,6 @@ def variant_case(base: Case, variant: Variant) -> Case:
 def bed_case(base: Case, variant: Variant) -> Case:
     """The case whose settled bed a variant is dragged through: other particles, other bed."""
     return variant_case(base, variant) if variant.own_particles else base
-
-
-def cost_fillings(case: Case) -> dict[str, Case]:
-    """A case for each filling that the variants of a study start from, by its run id."""
-    base = standard_case(case)
-    owners = (bed_case(base, variant) for variant in variants(base) if variant.own_particles)
-    return {FILLING.run_id(owner): owner for owner in (base, *owners)}
 
 
 def variants(base: Case) -> list[Variant]:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from dragdeck.campaigns.cost_variants import Change
+from cost_variants import Change
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene

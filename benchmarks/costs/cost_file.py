@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy import stats
 
-from dragdeck.campaigns.cost_variants import BASES, SceneName, Variant
+from cost_variants import BASES, SceneName, Variant
 from dragdeck.documents import Document, Part
 from dragdeck.outlook.measured import MeasuredCost
 from dragdeck.study.model import Fidelity

@@ -5,16 +5,17 @@ from __future__ import annotations
 import json
 import math
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import jinja2
 import pytest
-from made_tradeoff import cost as priced
-from made_tradeoff import made_tradeoff
+from paths import ROOT
 
-from dragchain.cli import main as dragchain
-from dragdeck.campaigns.cost_decks import (
+from cost_beds import make_tables
+from cost_decks import (
     CONTACT_WIDTH,
     at_rest,
     changed,
@@ -23,25 +24,24 @@ from dragdeck.campaigns.cost_decks import (
     timed_filling,
     workpiece_in,
 )
-from dragdeck.campaigns.cost_file import TimedVariant, Timing, cost, geometric
-from dragdeck.campaigns.cost_timing import BLOCK, blocks, measure
-from dragdeck.campaigns.cost_variants import (
+from cost_file import TimedVariant, Timing, cost, geometric
+from cost_timing import BLOCK, blocks, measure
+from cost_variants import (
     BASES,
     Variant,
-    cost_fillings,
+    bed_case,
     standard_case,
     variant_case,
     variants,
 )
 from dragdeck.cases.case import Case
-from dragdeck.cli import main
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import deck_text, environment
-from dragdeck.engine.batch import Batch
-from dragdeck.outlook.explain import Cost, explanation, price_of
+from dragdeck.engine.batch import silent
+from dragdeck.errors import DragdeckError, InputError
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import drop_scene
-from dragdeck.scenes.filling import FILLING, filling_scene
+from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.scene import Bed
 from dragdeck.sweep.cases import load_cases
@@ -229,33 +229,6 @@ def test_a_variant_of_one_fidelity_parameter_says_which_and_its_level(base: Case
     assert known["skin_0.2"] == known["bowl_facets"] == known["full"] == (None, None)
 
 
-def test_a_price_is_quoted_with_engine_and_date(base: Case) -> None:
-    costs = [priced("bowl_facets", 1.9, ci95_low=1.85, ci95_high=1.951), priced("bowl_fine", 1.9)]
-    tradeoff = made_tradeoff(base, costs=costs)
-    said = "putting it back costs 1.9x (1.85 to 1.95), LIGGGHTS 3.8.0, 2026-01-02"
-    assert price_of("bowl_facets", tradeoff) == said
-    assert price_of("bowl_fine", tradeoff).startswith("putting it back costs 1.9x, LIGGGHTS")
-    assert "not measured" in price_of("two_ranks", tradeoff)
-    assert "not measured" in price_of("bowl_facets", None)
-
-
-@pytest.mark.parametrize(
-    ("high", "unit", "scene", "shown"),
-    [(0.95, "per_second", "process", True), (1.01, "per_second", "process", False),
-     (None, "per_second", "process", False), (0.95, "per_step", "process", False),
-     (0.95, "per_second", "filling", False)],
-)  # fmt: skip
-def test_explain_names_what_is_surely_cheaper(
-    base: Case, high: float | None, unit: str, scene: str, shown: bool
-) -> None:
-    low = None if high is None else 0.85
-    wide = priced("wide facets", 0.9, scene=scene, unit=unit, ci95_low=low, ci95_high=high)
-    tradeoff = made_tradeoff(base, costs=[wide])
-    table = explanation(process_scene(base), Cost(1, 1.0, ""), (), tradeoff)
-    assert ("wide facets" in list(table.columns[1].cells)) == shown
-    assert any("not measured" in str(cell) for cell in table.columns[2].cells)
-
-
 def test_a_filling_is_timed_over_whole_frames(base: Case, templates: jinja2.Environment) -> None:
     scene = scene_of(base, "filling_contacts")
     text = deck_text(scene, templates)
@@ -267,32 +240,38 @@ def test_a_filling_is_timed_over_whole_frames(base: Case, templates: jinja2.Envi
     assert re.findall(r"^run (\d+)$", start, re.MULTILINE) == ["1"]
 
 
-def test_fillings_of_costs_are_those_of_its_particles(base: Case) -> None:
-    counts = [case.study.media.count for case in cost_fillings(base).values()]
-    assert counts == [300, 225]
+def test_only_other_particles_need_another_bed(base: Case) -> None:
+    owners = (bed_case(base, variant) for variant in variants(base))
+    assert {case.study.media.count for case in owners} == {300, 225}
 
 
-def test_a_measurement_is_not_overwritten(
-    case: Case,
-    project: Project,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(project.root)
+def test_a_measurement_is_not_overwritten(case: Case, project: Project) -> None:
     (project.root / "costs.json").write_text("kept")
-    assert main(["step", "costs", "small", "--out", "costs.json"]) == 1
-    assert "there already" in capsys.readouterr().err
+    words = [sys.executable, ROOT / "benchmarks/costs", case.study_name, "--out", "costs.json"]
+    done = subprocess.run(words, cwd=project.root, capture_output=True, text=True)
+    assert done.returncode == 1 and "there already" in done.stderr
+    assert "Traceback" not in done.stderr
     assert (project.root / "costs.json").read_text() == "kept"
 
 
-@pytest.mark.parametrize("option", ["--rounds", "--seconds"])
+@pytest.mark.parametrize(("option", "rounds", "seconds"), [("--rounds", 0, 1.0),
+                                                           ("--seconds", 1, 0.0)])  # fmt: skip
 def test_nothing_to_time_is_refused(
-    option: str, case: Case, project: Project, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
-    monkeypatch.chdir(project.root)
-    assert main(["step", "costs", "small", "--out", "costs.json", option, "0"]) == 1
-    assert option in capsys.readouterr().err
+    option: str, rounds: int, seconds: float, case: Case, project: Project, tmp_path: Path
+) -> None:
+    out = tmp_path / "costs.json"
+    with pytest.raises(InputError, match=f"{option}: nothing to time"):
+        measure(case, project.templates, out, silent, rounds=rounds, seconds=seconds)
+
+
+def test_an_unknown_variant_is_refused(case: Case, project: Project, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such variant"):
+        measure(case, project.templates, tmp_path / "costs.json", silent, only=["unknown"])
+
+
+def test_a_run_without_tables_says_why(tmp_path: Path) -> None:
+    with pytest.raises(DragdeckError, match="no tables were made\\ndragchain: "):
+        make_tables(tmp_path)
 
 
 @pytest.mark.engine
@@ -307,17 +286,9 @@ def test_two_variants_on_the_engine(
     (case,) = load_cases(write_study(small))
     chosen = ("contact_columns", "step_0.2")
     said: list[str] = []
-    results = project.root / "results" / "small"
-    batch = Batch(results / "filling", environment(project.templates))
-    base = standard_case(case)
-    batch.result(FILLING.run_id(base), filling_scene(base))
-    assert dragchain(["tables", str(batch.folder / FILLING.run_id(base))]) == 0
 
     def time_them(out: Path, rounds: int) -> dict[str, Any]:
-        measure(
-            case, results, project.templates, out, said.append, rounds=rounds, seconds=0.04,
-            only=chosen,
-        )  # fmt: skip
+        measure(case, project.templates, out, said.append, rounds=rounds, seconds=0.04, only=chosen)
         found: dict[str, Any] = json.loads(out.read_text())
         return found
 

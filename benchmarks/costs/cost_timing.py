@@ -1,8 +1,7 @@
-"""Timing of the cost variants: their beds, the rounds, the result."""
+"""Timing of the cost variants: the rounds and the result."""
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
 import re
@@ -14,16 +13,9 @@ from datetime import UTC, datetime
 from functools import cached_property, partial
 from pathlib import Path
 
-from dragdeck import __version__
-from dragdeck.campaigns.cost_decks import (
-    at_rest,
-    changed,
-    timed_drag,
-    timed_drop,
-    timed_filling,
-    workpiece_in,
-)
-from dragdeck.campaigns.cost_file import (
+from cost_beds import Beds, digest
+from cost_decks import changed, timed_drag, timed_drop, timed_filling
+from cost_file import (
     CostsFile,
     Machine,
     RoundsFile,
@@ -32,7 +24,7 @@ from dragdeck.campaigns.cost_file import (
     base_cost,
     cost,
 )
-from dragdeck.campaigns.cost_variants import (
+from cost_variants import (
     BASES,
     Variant,
     bed_case,
@@ -40,6 +32,7 @@ from dragdeck.campaigns.cost_variants import (
     variant_case,
     variants,
 )
+from dragdeck import __version__
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import DECK_FILE, deck_text, environment
@@ -51,13 +44,10 @@ from dragdeck.engine.watch import Report
 from dragdeck.errors import EngineError, InputError
 from dragdeck.files import replace_text
 from dragdeck.mesh import write_stl
-from dragdeck.project import find_project, study_templates
-from dragdeck.scenes.filling import FILLING
+from dragdeck.project import study_templates
 from dragdeck.scenes.process import process_scene
-from dragdeck.scenes.scene import Bed, read_bed
-from dragdeck.study.model import Workpiece
 
-_SECONDS = 0.15
+SECONDS = 0.15
 """Drag that the standard deck is timed over, s of process time; the others go as many steps."""
 
 BLOCK = 5
@@ -67,19 +57,17 @@ _QUIET = 0.3
 """Load average above which the machine counts as busy: half a process and more."""
 
 _START_FILE = "start.liggghts"
-_BED_FILE = "bed.restart"
 _ROUNDS_FILE = "rounds.json"
 
 
 def measure(
     case: Case,
-    results: Path,
     templates: Path,
     out: Path,
     report: Report,
     *,
     rounds: int = 3,
-    seconds: float = _SECONDS,
+    seconds: float = SECONDS,
     only: Sequence[str] = (),
 ) -> Path:
     """Time all variants of a study's standard deck and write their costs.
@@ -91,8 +79,6 @@ def measure(
     ----------
     case : Case
         Its fidelity gives modulus and step of the standard deck.
-    results : Path
-        The study's results, with the settled beds that drags start from.
     templates : Path
         The project's templates.
     out : Path
@@ -113,9 +99,11 @@ def measure(
     Raises
     ------
     InputError
-        The result is there already, a settled bed is not, or a deck cannot be made.
+        The result is there already, or a deck cannot be made.
     EngineError, RejectedRunError
         A run failed or was interrupted.
+    DragdeckError
+        The tables of a settled bed could not be made.
     """
     if out.exists():
         raise InputError(
@@ -133,7 +121,7 @@ def measure(
     chosen = _chosen(variants(base), only)
     folder = out.resolve().parent / "costs"
     decks = environment(templates, study_templates(case))
-    beds = _Beds(base, results / FILLING.name, Batch(folder / "beds", decks, report))
+    beds = Beds(Batch(folder / "beds", decks, report))
     bench = _Bench(base, beds, find_engine(), folder, seconds, chosen, load, report)
     _result(bench, bench.rounds(rounds)).write(out)
     return out
@@ -151,60 +139,6 @@ def _chosen(known: Sequence[Variant], names: Sequence[str]) -> list[Variant]:
                 remedy="choose among these",
             )
     return [by_name[name] for name in names] or list(known)
-
-
-@dataclass(frozen=True)
-class _Beds:
-    """Beds that drags start from, each made once.
-
-    Attributes
-    ----------
-    base : Case
-        The standard case.
-    fillings : Path
-        The settled beds of the study.
-    batch : Batch
-        Runs that bring the workpiece in.
-    """
-
-    base: Case
-    fillings: Path
-    batch: Batch
-
-    def measured(self, owner: Case) -> Bed:
-        """Height of a settled bed."""
-        return read_bed(self._settled(owner) / "tables" / "packing.json")
-
-    def settled(self, owner: Case) -> str:
-        """Restart file of a settled bed, as a run sees it."""
-        return self._seen(self._settled(owner) / "packing.restart")
-
-    def _settled(self, owner: Case) -> Path:
-        return self.fillings / FILLING.run_id(owner)
-
-    def _seen(self, file: Path) -> str:
-        """Path of a file as a deck sees it, from a folder two below that of the costs."""
-        return os.path.relpath(file.resolve(), self.batch.folder.resolve().parent / "any" / "any")
-
-    def with_workpiece(self, case: Case, owner: Case) -> str:
-        """Restart file of the bed with the workpiece in it, for a case's modulus and facets."""
-        bed = self.measured(owner)
-        begun = self._kept("workpiece-in", workpiece_in(owner, bed, self.settled(owner)))
-        if _walls(case) == _walls(owner):
-            return begun
-        return self._kept("at-rest", at_rest(case, bed, begun))
-
-    def _kept(self, name: str, scene: AnyScene) -> str:
-        run = f"{name}-{_digest(deck_text(scene, self.batch.templates))}"
-        self.batch.result(run, scene)
-        return self._seen(self.batch.folder / run / _BED_FILE)
-
-
-def _walls(case: Case) -> tuple[float, float | None, Workpiece]:
-    """What a bed with a workpiece in it has to come to rest with: stiffness and facets."""
-    study = case.study
-    scale = study.chosen_fidelity().youngs_modulus_scale
-    return scale, study.bowl.facet_size_m, study.workpiece
 
 
 def _time(engine: Engine, folder: Path, deck: str, ranks: int) -> Timing:
@@ -257,7 +191,7 @@ class _Bench:
     """Times decks in rounds, each block of variants beside its base."""
 
     base: Case
-    beds: _Beds
+    beds: Beds
     engine: Engine
     folder: Path
     seconds: float
@@ -292,10 +226,11 @@ class _Bench:
             return partial(timed_drop, case)
         steps = round(self.seconds / process_scene(self.base).deck.timestep_s)
         owner = bed_case(self.base, variant)
+        settled = self.beds.settled(owner)
         if variant.scene == "filling":
-            return partial(timed_filling, case, steps, self.beds.settled(owner))
+            return partial(timed_filling, case, steps, settled.source)
         source = self.beds.with_workpiece(case, owner)
-        return partial(timed_drag, case, steps, self.beds.measured(owner), source)
+        return partial(timed_drag, case, steps, settled.bed, source)
 
     @cached_property
     def inputs(self) -> Mapping[str, str]:
@@ -303,7 +238,7 @@ class _Bench:
         own = {name: f"{self._write(name, deck)} {deck.ranks}" for name, deck in self.decks.items()}
         where = f"{self.engine.version} {processor()}"
         return {
-            variant.name: _digest(f"{where} {own[variant.name]} {own[variant.base]}")
+            variant.name: digest(f"{where} {own[variant.name]} {own[variant.base]}")
             for variant in self.variants
         }
 
@@ -385,7 +320,7 @@ def _known_rows(file: Path, inputs: Mapping[str, str], report: Report) -> list[T
     same = [row for row in known.rows if inputs.get(row.name) == row.inputs]
     if len(same) < len(known.rows):
         kept = file.parent / "archive"
-        known.write(kept / f"rounds-{_digest(known.as_text())}.json")
+        known.write(kept / f"rounds-{digest(known.as_text())}.json")
         report(f"timings of other decks were moved to {kept}")
     return same
 
@@ -403,7 +338,7 @@ def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> CostsFile:
         particles=study.media.count,
         seconds=bench.seconds,
         measured=max(row.measured for row in rows),
-        command=shlex.join(["dragdeck", *sys.argv[1:]]),
+        command=shlex.join(["python", "benchmarks/costs", *sys.argv[1:]]),
         versions={"dragdeck": __version__, "engine": bench.engine.version},
         machine=Machine(cores=os.cpu_count(), processor=processor()),
         load_average_before=max(row.load_average_before for row in rows),
@@ -422,34 +357,3 @@ def processor() -> str:
     text = known.read_text(encoding="utf-8") if known.is_file() else ""
     found = re.search(r"^model name\s*:\s*(.+)$", text, flags=re.MULTILINE)
     return found.group(1).strip() if found else platform.processor() or platform.machine()
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:8]
-
-
-def costs_command(
-    study: str,
-    fidelity: str | None,
-    rounds: int,
-    seconds: float | None,
-    only: Sequence[str],
-    out: Path,
-) -> None:
-    """Time what a study's input scripts leave out."""
-    project = find_project(Path.cwd())
-    case = project.cases(study, fidelity)[0]
-
-    def report(line: str) -> None:
-        print(line, file=sys.stderr, flush=True)
-
-    measure(
-        case,
-        project.results(study),
-        project.templates,
-        out,
-        report,
-        rounds=rounds,
-        seconds=_SECONDS if seconds is None else seconds,
-        only=only,
-    )
