@@ -1,4 +1,4 @@
-"""What everything that a study's input scripts leave out would cost: docs/costs.md.
+"""The cost of each option that a study's input scripts omit (docs/costs.md).
 
     python benchmarks/costs STUDY --out FILE [--rounds 3] [--seconds 0.15] [--only NAME ...]
 
@@ -49,19 +49,23 @@ def _report(line: str) -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python benchmarks/costs",
-        description="Time what each thing that input scripts leave out would cost.",
+        description="Time what each omitted option would cost.",
     )
     parser.add_argument("study", help="name of a folder in studies/")
     parser.add_argument("--fidelity", help="instead of the study's own")
-    parser.add_argument("--rounds", type=int, default=3, help="how often each deck is timed")
+    parser.add_argument(
+        "--rounds", type=int, default=3, help="number of timings of each input script"
+    )
     parser.add_argument(
         "--seconds",
         type=float,
         default=SECONDS,
         metavar="S",
-        help="drag of the standard deck that is timed",
+        help="simulated time of the timed drag, s",
     )
-    parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these variants only")
+    parser.add_argument(
+        "--only", nargs="+", default=[], metavar="NAME", help="time only these variants"
+    )
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="costs.json")
     return parser
 

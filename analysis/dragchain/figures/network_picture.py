@@ -193,10 +193,10 @@ def cut_words(case: Case, view: View) -> str:
     """What a picture leaves out, in words; empty if it shows the whole bowl."""
     if _shows_all(case):
         return ""
-    words = f"shown: up to {WINDOW_DIAMETERS:g} particle diameters beside the workpiece"
+    words = f"section: up to {WINDOW_DIAMETERS:g} particle diameters beside the workpiece"
     if view == "xy":
         return words
-    return words + f", {DEPTH_DIAMETERS:g} before and behind it"
+    return words + f", {DEPTH_DIAMETERS:g} in front of and behind it"
 
 
 @dataclass(frozen=True)

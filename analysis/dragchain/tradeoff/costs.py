@@ -54,7 +54,7 @@ class StandardFidelity(Part):
 class CostsFile(Document):
     """What is read of ``costs.json``."""
 
-    made_by = "dragdeck step costs"
+    made_by = "python benchmarks/costs"
 
     fidelity: StandardFidelity | None = None
     costs: tuple[CostEntry, ...]

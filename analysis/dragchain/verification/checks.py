@@ -67,7 +67,7 @@ READ_OFF, READ_OFF_CURVE = 0.01, 0.05
 EXACT = "exact formula"
 _INTEGRATED = "law integrated by scipy"
 COULOMB = "Coulomb sliding of rigid bodies"
-_INPUT = "restitution in the deck"
+_INPUT = "input restitution"
 _PUBLISHED = "published curve"
 
 JUDGED = (EXACT, _INTEGRATED)

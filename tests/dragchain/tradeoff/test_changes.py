@@ -85,6 +85,6 @@ def test_a_gain_has_an_interval_from_the_scatter_of_costs(tmp_path: Path) -> Non
 def test_softness_ruins_what_it_was_made_to_ruin(tmp_path: Path) -> None:
     (row,) = verdicts(made(tmp_path, contents()))
     assert row.level == 0.01
-    assert "mean normal force of a contact on the workpiece" in row.ruined
+    assert "mean normal force per contact on the workpiece" in row.ruined
     assert "mean lateral force" in row.ruined
-    assert "contacts on the workpiece" in row.kept and "fill height" in row.kept
+    assert "contacts on the workpiece" in row.kept and "bed height" in row.kept

@@ -106,7 +106,7 @@ def _effects(tests: Sequence[PeakTest]) -> Figure:
         grid[0].plot([], [], "o", color=colour, label=DEFINITIONS[definition])
     grid[0].plot([], [], "o", color=GREY, mfc="white", label="unadjusted p ≥ 0.05")
     figure.suptitle(
-        "difference between peaks and all times (standard deviations of the run); "
+        "peaks minus all times (standard deviations); "
         "bars: 95 % CI over the packings; *: default thresholds",
         fontsize=8.5, x=0.02, ha="left",
     )  # fmt: skip

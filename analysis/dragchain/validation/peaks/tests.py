@@ -92,23 +92,23 @@ _DIVIDED = _levels("against", "against", "against")
 _BORNE = _levels("value", "value", "value")
 
 DESCRIPTORS = (
-    Descriptor("exists", "there is one", "presence", 1, _HELD),
+    Descriptor("exists", "chain present", "presence", 1, _HELD),
     Descriptor("bottleneck_over_mean", "weakest contact / mean contact", "presence", 1, _HELD),
     Descriptor("outer_over_mean", "weakest beyond 1st link / mean", "presence", 1, _FREE),
     Descriptor("stands_out", "weakest behind workpiece / shell rms", "dominance", 1, _FREE),
     Descriptor("bottleneck_over_drag", "weakest contact / drag", "dominance", 1, _DIVIDED),
     Descriptor(
-        "workpiece_fraction", "share of the drag at its workpiece contact", "dominance", 1, _BORNE
+        "workpiece_fraction", "fraction of drag at its workpiece contact", "dominance", 1, _BORNE
     ),
-    Descriptor("left_s", "time until it ends in s", "breaking", -1, _FREE),
-    Descriptor("life_s", "lifetime in s", "", 0, _FREE),
+    Descriptor("left_s", "remaining lifetime (s)", "breaking", -1, _FREE),
+    Descriptor("life_s", "lifetime (s)", "", 0, _FREE),
     Descriptor("particles", "number of particles", "", 0, _FREE),
     Descriptor("straightness", "straightness", "", 0, _FREE),
-    Descriptor("angle_rad", "angle to the motion in rad", "", 0, _FREE),
-    Descriptor("altitude_m", "altitude in m", "", 0, _FREE),
+    Descriptor("angle_rad", "angle to the motion (rad)", "", 0, _FREE),
+    Descriptor("altitude_m", "height (m)", "", 0, _FREE),
 )
 
-_ORDER = Descriptor("order", "before less after", "order", 1, _HELD)
+_ORDER = Descriptor("order", "before minus after", "order", 1, _HELD)
 _COVERAGE = Descriptor("coverage", "peaks with a strong chain", "coverage", 1, _HELD, bounded=True)
 _REVERSE = Descriptor("reverse", "strong chains with a peak", "reverse", 1, _HELD, bounded=True)
 ORIENTATION = Descriptor(
