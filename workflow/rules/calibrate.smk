@@ -2,22 +2,6 @@
 # used is refused before any drop is run.
 
 
-def drop_record(wildcards):
-    """The measured drop test of the study."""
-    return str(explained(record_file, CASES[0]).relative_to(PROJECT.root))
-
-
-def fall_time(wildcards):
-    """Free fall before the first impact of the drop test, s."""
-    study = CASES[0].study
-    return (2 * study.drop_test.height_m / study.gravity_m_s2) ** 0.5
-
-
-def calibration_inputs():
-    """What the drops of a calibration are made from: the study and the drop's templates."""
-    return [str(relative(CASES[0].file)), *templates_of("drop_test")]
-
-
 rule read_drop_record:
     input:
         drop_record,

@@ -189,3 +189,89 @@ def advice_option(wildcards):
     """How to name the advice on the command line, if there is or will be one."""
     known = asked_advice("process") or (PROJECT.root / ADVICE).is_file()
     return f"--advice {ADVICE}" if known else ""
+
+
+# --- calibration ------------------------------------------------------------------
+
+
+def drop_record(wildcards):
+    """The measured drop test of the study."""
+    return str(explained(record_file, CASES[0]).relative_to(PROJECT.root))
+
+
+def fall_time(wildcards):
+    """Free fall before the first impact of the drop test, s."""
+    study = CASES[0].study
+    return (2 * study.drop_test.height_m / study.gravity_m_s2) ** 0.5
+
+
+def calibration_inputs():
+    """What the drops of a calibration are made from: the study and the drop's templates."""
+    return [str(relative(CASES[0].file)), *templates_of("drop_test")]
+
+
+# --- verification -----------------------------------------------------------------
+
+
+def of_experiment(run, file):
+    """Path of a file of a run of the verification suite."""
+    return f"{run_path('verification', 'collide', run)}/{file}"
+
+
+# --- stability map ----------------------------------------------------------------
+
+STABILITY_MAP = config.get("stability_map", "studies/stability/map.yaml")
+
+
+def stability_templates():
+    """Every template that a deck of the stability map could use."""
+    files = sorted(PROJECT.templates.glob("*.j2"))
+    return [str(file.relative_to(PROJECT.root)) for file in files]
+
+
+def stability_beds():
+    """Folders of the fillings that columns and drags start from; none without a map."""
+    file = PROJECT.root / STABILITY_MAP
+    names = explained(bed_names, file) if file.is_file() else []
+    return [run_path("stability", "filling", name) for name in names]
+
+
+def beds_of_regime(wildcards):
+    """Columns and drags start from settled beds."""
+    wanted = wildcards.regime in ("column", "drag")
+    return [f"{bed}/tables/packing.json" for bed in STABILITY_BEDS] if wanted else []
+
+
+# --- trade-off --------------------------------------------------------------------
+
+
+def promises_option(wildcards):
+    """How to name the checks on other scenes on the command line, if they were made."""
+    file = of_study("tradeoff/promises", "promises.json")
+    return f"--promises {file}" if (PROJECT.root / file).is_file() else ""
+
+
+def every_drop_point(file):
+    """One file of every drop test of the trade."""
+    return [f"{run_path(STUDY, 'drop_test', run)}/{file}" for run in points_by_run("drop_test")]
+
+
+# --- scaling ----------------------------------------------------------------------
+
+
+def scaling_options(wildcards):
+    """What the study's block scaling asks for, as options of the command line."""
+    scaling = CASES[0].study.scaling
+    if scaling is None:
+        raise WorkflowError(
+            f"{relative(CASES[0].file)}: scaling: a required key is missing\n"
+            "  remedy: name the field to fit a power law over, see docs/scaling.md"
+        )
+    options = ["--field", scaling.field]
+    if scaling.expected_exponent is not None:
+        options += ["--expected", scaling.expected_exponent]
+    if scaling.source is not None:
+        options += ["--source", scaling.source]
+    if scaling.fit_range is not None:
+        options += ["--fit-range", *scaling.fit_range]
+    return " ".join(quote(str(option)) for option in options)

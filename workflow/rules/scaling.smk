@@ -1,24 +1,6 @@
 # The mean drag over one field of the study's sweep, and the power law in it.
 
 
-def scaling_options(wildcards):
-    """What the study's block scaling asks for, as options of the command line."""
-    scaling = CASES[0].study.scaling
-    if scaling is None:
-        raise WorkflowError(
-            f"{relative(CASES[0].file)}: scaling: a required key is missing\n"
-            "  remedy: name the field to fit a power law over, see docs/scaling.md"
-        )
-    options = ["--field", scaling.field]
-    if scaling.expected_exponent is not None:
-        options += ["--expected", scaling.expected_exponent]
-    if scaling.source is not None:
-        options += ["--source", scaling.source]
-    if scaling.fit_range is not None:
-        options += ["--fit-range", *scaling.fit_range]
-    return " ".join(quote(str(option)) for option in options)
-
-
 rule write_scaling:
     input:
         every("process", "tables/workpiece_force.parquet"),

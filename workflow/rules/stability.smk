@@ -1,29 +1,8 @@
 # The stability map: a job a regime, each with many small runs. A run that fails
 # is a finding; a batch that is interrupted goes on where it was.
 
-STABILITY_MAP = config.get("stability_map", "studies/stability/map.yaml")
-
-
-def stability_templates():
-    """Every template that a deck of the stability map could use."""
-    files = sorted(PROJECT.templates.glob("*.j2"))
-    return [str(file.relative_to(PROJECT.root)) for file in files]
-
-
-def stability_beds():
-    """Folders of the fillings that columns and drags start from; none without a map."""
-    file = PROJECT.root / STABILITY_MAP
-    names = explained(bed_names, file) if file.is_file() else []
-    return [run_path("stability", "filling", name) for name in names]
-
 
 STABILITY_BEDS = stability_beds()
-
-
-def beds_of_regime(wildcards):
-    """Columns and drags start from settled beds."""
-    wanted = wildcards.regime in ("column", "drag")
-    return [f"{bed}/tables/packing.json" for bed in STABILITY_BEDS] if wanted else []
 
 
 # These fillings are no cases of the study: they differ in their materials.

@@ -1,17 +1,6 @@
 # The trade of speed against accuracy: costs, report and checks.
 
 
-def promises_option(wildcards):
-    """How to name the checks on other scenes on the command line, if they were made."""
-    file = of_study("tradeoff/promises", "promises.json")
-    return f"--promises {file}" if (PROJECT.root / file).is_file() else ""
-
-
-def every_drop_point(file):
-    """One file of every drop test of the trade."""
-    return [f"{run_path(STUDY, 'drop_test', run)}/{file}" for run in points_by_run("drop_test")]
-
-
 # Processor times side by side: no other job may run meanwhile.
 rule measure_costs:
     input:

@@ -3,11 +3,6 @@
 VERIFICATION_RUNS = list(suite_of(CASES[0].study))
 
 
-def of_experiment(run, file):
-    """Path of a file of a run of the verification suite."""
-    return f"{run_path('verification', 'collide', run)}/{file}"
-
-
 rule render_verification:
     input:
         templates_of("collide"),
