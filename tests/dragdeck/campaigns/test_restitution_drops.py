@@ -193,7 +193,7 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
     write_trials(listed, made, 1, 1, folder / "trials.json")
     write_report(folder / "trial-0.csv", folder)
     page = (folder / "report.html").read_text()
-    assert f"restitution: {result.put.value:.4g}" in page
+    assert f"<b>{result.put.value:.4g}</b>" in page
     assert page.count("data:image/") == 4
     assert "http" not in page
 
