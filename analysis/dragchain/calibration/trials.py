@@ -229,7 +229,7 @@ def _table(trials: Sequence[Trial]) -> pd.DataFrame:
     """Trials as a table, one row each: intervals as ``<name>``, ``<name>_low``, ``<name>_high``."""
     rows = []
     for trial in trials:
-        row = flattened(vars(trial), "low", "high")
+        row = flattened(vars(trial))
         row |= {"deck_held": trial.deck_held, "effective_held": trial.effective_held}
         row["refused"] = row.pop("refused")
         rows.append(row)

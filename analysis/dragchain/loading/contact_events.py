@@ -210,7 +210,7 @@ def _sums(
             "start_s": heads["time_s"].to_numpy(),
             "samples": samples,
             "duration_s": samples * interval_s,
-            "whole": (begins > 0) & (begins + samples < frames),
+            "complete": (begins > 0) & (begins + samples < frames),
             "azimuth_rad": heads["azimuth_rad"].to_numpy(),
             "depth_m": heads["depth_m"].to_numpy(),
             "peak_normal_force_n": peak,
@@ -255,7 +255,7 @@ def event_types(
     longest = max(limits.impact_times * surfaces(case).contact_time_s, interval_s)
     speed = motion_of(case).axis_speed_m_s
     sliding, rolling = events["sliding_m"] / events["duration_s"], events["rolling_m_s"]
-    short = events["whole"] & (events["duration_s"] <= longest * (1 + 1e-9))
+    short = events["complete"] & (events["duration_s"] <= longest * (1 + 1e-9))
     rests = sliding + rolling < limits.rest * speed
     slides = sliding >= limits.slide_to_roll * rolling
     return np.select([short, rests, slides], [IMPACT, RESTING, SLIDING], ROLLING)

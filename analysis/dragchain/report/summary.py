@@ -95,8 +95,8 @@ def _network(found: ProcessFindings) -> Row:
         "ahead_behind_ratio_ci95_low": sides.ratio.ci95_low,
         "ahead_behind_ratio_ci95_high": sides.ratio.ci95_high,
         "depth_slope_n_per_m": slope.value,
-        "depth_slope_ci95_low_n_m": slope.ci95_low,
-        "depth_slope_ci95_high_n_m": slope.ci95_high,
+        "depth_slope_ci95_low_n_per_m": slope.ci95_low,
+        "depth_slope_ci95_high_n_per_m": slope.ci95_high,
     }
 
 

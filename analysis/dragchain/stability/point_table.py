@@ -167,9 +167,12 @@ def _row(point: ClassifiedPoint) -> dict[str, object]:
 
 def _error_columns(seen: Seen) -> dict[str, float]:
     columns = {f"{name.replace(' ', '_')}_error": math.nan for name in _ERRORS}
-    columns |= {"mean_drag_error_low": math.nan, "mean_drag_error_high": math.nan}
+    columns |= {"mean_drag_error_ci95_low": math.nan, "mean_drag_error_ci95_high": math.nan}
     for name, error in seen.errors.items():
         columns[f"{name.replace(' ', '_')}_error"] = error.value
     if (drag := seen.errors.get("mean drag")) is not None:
-        columns |= {"mean_drag_error_low": drag.ci95_low, "mean_drag_error_high": drag.ci95_high}
+        columns |= {
+            "mean_drag_error_ci95_low": drag.ci95_low,
+            "mean_drag_error_ci95_high": drag.ci95_high,
+        }
     return columns

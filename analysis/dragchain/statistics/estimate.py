@@ -84,15 +84,13 @@ class EstimateColumns:
         return cls(*(tuple(getattr(one, name) for one in estimates) for name in names))
 
 
-def flattened(
-    row: Mapping[str, object], low: str = "ci95_low", high: str = "ci95_high"
-) -> dict[str, object]:
-    """A row of a table: an estimate as ``<name>``, ``<name>_<low>`` and ``<name>_<high>``."""
+def flattened(row: Mapping[str, object]) -> dict[str, object]:
+    """A row of a table: an estimate as ``<name>``, ``<name>_ci95_low`` and ``<name>_ci95_high``."""
     flat: dict[str, object] = {}
     for name, value in row.items():
         flat[name] = value
         if isinstance(value, Estimate):
-            ends = {f"{name}_{low}": value.ci95_low, f"{name}_{high}": value.ci95_high}
+            ends = {f"{name}_ci95_low": value.ci95_low, f"{name}_ci95_high": value.ci95_high}
             flat |= {name: value.value, **ends}
     return flat
 

@@ -17,7 +17,7 @@ from dragchain.tradeoff.quantities import MAIN
 from dragchain.tradeoff.runs import OTHER, Setting
 
 RUINED = 0.1
-"""A resolved error above this ruins a quantity; a bound below it keeps it."""
+"""A significant error above this ruins a quantity; a bound below it keeps it."""
 
 
 def differing(setting: Setting, base: Setting) -> list[str]:

@@ -53,7 +53,7 @@ class Error:
 
     def columns(self) -> dict[str, float]:
         """The numbers as columns of a table."""
-        names = {"value": "error", "significant": "resolved"}
+        names = {"value": "error"}
         return {names.get(name, name): number for name, number in vars(self).items()}
 
 

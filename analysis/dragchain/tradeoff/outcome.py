@@ -127,7 +127,7 @@ def breaks(tradeoff: Tradeoff, setting: Setting) -> bool:
     """Whether a setting's time step is too long: it failed, or the drag is wrong because of it.
 
     The mean drag differs from that at the best known shorter step, all else
-    alike, by more than `BROKEN`, and the difference is resolved.
+    alike, by more than `BROKEN`, and the difference is significant.
     """
     if not all(run.complete for run in tradeoff.of(setting)):
         return True

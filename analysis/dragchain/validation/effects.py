@@ -34,7 +34,7 @@ class Effect(Part):
     change, ci95_low, ci95_high : float
         Relative change, against the same fidelity without the changed input, or against the
         packings if it changes the fidelity alone.
-    exponent, exponent_low, exponent_high : float or None
+    exponent, exponent_ci95_low, exponent_ci95_high : float or None
         Of the change over that of the input.
     """
 
@@ -50,8 +50,8 @@ class Effect(Part):
     ci95_low: float
     ci95_high: float
     exponent: float | None
-    exponent_low: float | None
-    exponent_high: float | None
+    exponent_ci95_low: float | None
+    exponent_ci95_high: float | None
 
 
 def effects(points: Points) -> list[Effect]:
@@ -136,8 +136,8 @@ def _of_quantity(points: Points, quantity: str, sizes: Sequence[float]) -> Itera
             ci95_low=change.ci95_low,
             ci95_high=change.ci95_high,
             exponent=exponent and exponent.value,
-            exponent_low=exponent and exponent.ci95_low,
-            exponent_high=exponent and exponent.ci95_high,
+            exponent_ci95_low=exponent and exponent.ci95_low,
+            exponent_ci95_high=exponent and exponent.ci95_high,
         )
 
 

@@ -95,7 +95,7 @@ def test_every_particle_gets_the_type_it_was_made_for(events: pd.DataFrame) -> N
         (HIT, "impact", 1),
         (REST, "resting", 100),
     ]
-    assert events["whole"].tolist() == [False, True, True, True, True]
+    assert events["complete"].tolist() == [False, True, True, True, True]
 
 
 def test_the_paths_of_a_rolling_and_of_a_sliding_particle(events: pd.DataFrame) -> None:

@@ -182,7 +182,9 @@ def test_effects_are_found_against_what_they_change(points: Points) -> None:
     assert soft.ci95_low < 0.05 < soft.ci95_high and soft.runs == 3
     assert (wide.field, wide.value, wide.reference_value) == ("bowl.radius_m", 0.08, 0.04)
     assert wide.ci95_high < 0.0 and wide.ci95_low < -0.5 < wide.ci95_high
-    assert wide.exponent_low < -1.0 < wide.exponent_high  # half the drag at twice the radius
+    assert (
+        wide.exponent_ci95_low < -1.0 < wide.exponent_ci95_high
+    )  # half the drag at twice the radius
     spread = table[table["quantity"] == "drag_std"]
     assert (spread.ci95_low < spread.change).all() and (spread.change < spread.ci95_high).all()
 

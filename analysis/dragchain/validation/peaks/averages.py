@@ -74,13 +74,13 @@ class Survival(Part):
 class Lifetimes(Part):
     """How long the dominant chain stays the same, each life once, and as seen at a moment.
 
-    A life that touches the first or the last frame is ``cut``: longer than seen, its end unknown.
+    A life that touches the first or the last frame is ``truncated``: its end is unknown.
     What is seen at a moment is more often a long life than a short one; peaks are to be compared
     with moments, not with lives.
     """
 
     lives: int
-    cut: int
+    truncated: int
     median_s: Real
     mean_s: Real
     longest_s: float
@@ -147,15 +147,15 @@ def _std(values: Floats) -> float:
 
 def lifetimes(runs: Sequence[RunSeries], at: int) -> Lifetimes:
     """Lifetimes for a place in `SETTINGS`."""
-    durations, cut = _each_life(runs, at)
-    survival = _kaplan_meier(durations, cut)
+    durations, truncated = _each_life(runs, at)
+    survival = _kaplan_meier(durations, truncated)
 
     def seen(name: str, at_peaks: bool) -> Estimate:
         return _over_runs(mean_of_known, [_chosen(run, at, name, at_peaks) for run in runs])
 
     return Lifetimes(
         lives=len(durations),
-        cut=int(cut.sum()),
+        truncated=int(truncated.sum()),
         median_s=survival.median_s,
         mean_s=mean_of_known(durations),
         longest_s=float(durations.max(initial=0.0)),
@@ -170,19 +170,19 @@ def lifetimes(runs: Sequence[RunSeries], at: int) -> Lifetimes:
 
 def _each_life(runs: Sequence[RunSeries], at: int) -> tuple[Floats, NDArray[np.bool_]]:
     """Duration of every life, and whether an end of its run cut it off."""
-    durations, cut = [], []
+    durations, truncated = [], []
     for run in runs:
         chains = run.chains[at]
         first = chains[chains["life"] >= 0].drop_duplicates("life")
         durations.append(first["life_s"].to_numpy(np.float64))
-        cut.append(first["cut"].to_numpy(bool))
-    return np.concatenate(durations), np.concatenate(cut)
+        truncated.append(first["truncated"].to_numpy(bool))
+    return np.concatenate(durations), np.concatenate(truncated)
 
 
-def _kaplan_meier(durations: Floats, cut: NDArray[np.bool_]) -> Survival:
+def _kaplan_meier(durations: Floats, truncated: NDArray[np.bool_]) -> Survival:
     if not durations.size:
         return Survival(time_s=(), fraction=(), median_s=np.nan)
-    data = CensoredData(uncensored=durations[~cut], right=durations[cut])
+    data = CensoredData(uncensored=durations[~truncated], right=durations[truncated])
     survival = ecdf(data).sf
     times, fractions = survival.quantiles, survival.probabilities
     below = np.flatnonzero(fractions <= 0.5)

@@ -194,6 +194,6 @@ def _survival(axes: Axes, lifetime: Lifetimes) -> None:
     axes.set(xlabel="lifetime (s)", ylabel="fraction surviving", yscale="log")
     median = f"{median_s * 1e3:.0f} ms" if np.isfinite(median_s) else "unknown"
     axes.set_title(
-        f"lifetime: median {median},\n{lifetime.lives} chains, {lifetime.cut} censored",
+        f"lifetime: median {median},\n{lifetime.lives} chains, {lifetime.truncated} censored",
         fontsize=8.5,
     )

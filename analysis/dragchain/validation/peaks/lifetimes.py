@@ -28,7 +28,7 @@ class Lives:
         interval; NaN without a chain.
     age_s, left_s : (N,) ndarray
         Time since its first frame and until its last one.
-    cut : (N,) ndarray of bool
+    truncated : (N,) ndarray of bool
         Whether the life touches the first or the last frame, so that it is longer than seen.
     """
 
@@ -36,7 +36,7 @@ class Lives:
     life_s: Floats
     age_s: Floats
     left_s: Floats
-    cut: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
 
 
 def overlap(first: Sequence[int], second: Sequence[int]) -> float:
@@ -79,5 +79,5 @@ def lives(particle_ids: Sequence[Sequence[int]], time_s: Floats) -> Lives:
         life_s=times(frames[life]),
         age_s=times(place - first[life]),
         left_s=times(last[life] - place),
-        cut=there & ends[life],
+        truncated=there & ends[life],
     )

@@ -117,7 +117,7 @@ def test_lives_that_are_cut_off_count_as_longer_than_seen() -> None:
     particles = [[1]] * 100 + [[2]] * 20 + [[3]] * 280
     chains = run.chains[0].assign(**vars(lives(particles, run.time_s)))
     found = lifetimes([replace(run, chains=(chains,) * len(SETTINGS))], 0)
-    assert found.lives == 3 and found.cut == 2
+    assert found.lives == 3 and found.truncated == 2
     # one known end of three lives: 2/3 last longer, and no median can be told
     assert found.survival.fraction[0] == pytest.approx(2 / 3)
     assert math.isnan(found.median_s)

@@ -22,10 +22,10 @@ def test_lives_of_a_sequence_made_by_hand() -> None:
     assert np.isnan(found.life_s[2]) and np.isnan(found.age_s[2])
     assert found.age_s[[0, 1, 3, 4]] == pytest.approx([0.0, 0.01, 0.0, 0.01])
     assert found.left_s[[0, 1, 3, 4]] == pytest.approx([0.01, 0.0, 0.01, 0.0])
-    assert found.cut.tolist() == [True, True, False, False, False, True, True]
+    assert found.truncated.tolist() == [True, True, False, False, False, True, True]
 
 
 def test_frames_without_a_chain_have_no_life() -> None:
     found = lives([[], [], []], 0.01 * np.arange(3))
     assert found.life.tolist() == [-1, -1, -1] and np.isnan(found.life_s).all()
-    assert not found.cut.any()
+    assert not found.truncated.any()
