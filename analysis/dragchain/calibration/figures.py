@@ -148,7 +148,7 @@ def draw_trials(trials: pd.DataFrame) -> Figure:
     for axes, (name, title) in zip(figure.subplots(1, 2), panels, strict=True):
         error, low, high = (
             (shown[f"{name}{end}"] - shown[f"{name}_known"]).to_numpy(np.float64)
-            for end in ("", "_low", "_high")
+            for end in ("", "_ci95_low", "_ci95_high")
         )
         held = shown[f"{name}_held"].to_numpy(bool)
         place = np.arange(1, len(shown) + 1)

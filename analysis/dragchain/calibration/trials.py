@@ -226,7 +226,7 @@ def coverage(held: Sequence[bool]) -> Coverage:
 
 
 def _table(trials: Sequence[Trial]) -> pd.DataFrame:
-    """Trials as a table, one row each: intervals as ``<name>``, ``<name>_low``, ``<name>_high``."""
+    """Trials as a table, one row each: intervals as ``<name>_ci95_low``, ``<name>_ci95_high``."""
     rows = []
     for trial in trials:
         row = flattened(vars(trial))
