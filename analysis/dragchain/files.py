@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -35,8 +34,3 @@ def write_bytes(file: Path, content: bytes) -> None:
     """Write a file that appears under its name only once it is whole."""
     with draft_of(file) as draft:
         draft.write_bytes(content)
-
-
-def write_json(file: Path, content: Mapping[str, object]) -> None:
-    """Write a JSON file that appears under its name only once it is whole."""
-    write_text(file, json.dumps(content, indent=1, allow_nan=False) + "\n")

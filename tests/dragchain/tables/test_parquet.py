@@ -7,7 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from dragchain.files import write_json
+from dragchain.documents import Document
 from dragchain.tables.parquet import GROUP_ROWS, category, column_type, table_writer
 
 
@@ -58,9 +58,13 @@ def test_a_failure_leaves_the_older_table_and_no_other_file(tmp_path: Path) -> N
     assert [path.name for path in tmp_path.iterdir()] == ["t.parquet"]
 
 
+class One(Document):
+    b: float
+
+
 def test_json_has_no_nan_and_leaves_no_half_file(tmp_path: Path) -> None:
-    write_json(tmp_path / "a.json", {"b": 1.5})
-    with pytest.raises(ValueError, match="JSON"):
-        write_json(tmp_path / "a.json", {"b": float("nan")})
-    assert (tmp_path / "a.json").read_text() == '{\n "b": 1.5\n}\n'
+    One(b=1.5).write(tmp_path / "a.json")
+    with pytest.raises(ValueError, match="finite number"):
+        One(b=float("nan")).write(tmp_path / "a.json")
+    assert (tmp_path / "a.json").read_text() == '{\n "schema": 2,\n "b": 1.5\n}\n'
     assert [path.name for path in tmp_path.iterdir()] == ["a.json"]

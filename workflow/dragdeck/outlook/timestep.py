@@ -157,12 +157,16 @@ def safe_fraction(case: Case, scene: SceneType) -> tuple[float, str]:
     Strongly damped particles have a limit of their own. The safety factor is not in it.
     """
     known = stability_map()
-    lowest = min(pair.restitution for pair in case.study.pairs.values())
+    lowest = _lowest_restitution(case)
     strong = lowest < ORDINARY_RESTITUTION
     damping = "any restitution" if strong else f"restitution of {ORDINARY_RESTITUTION:g} or more"
     engine = ", ".join(known.engine_versions)
     source = f"{scene.regime}, {damping}; LIGGGHTS {engine}, {known.measured}"
     return _regime_fraction(scene.regime, lowest), source
+
+
+def _lowest_restitution(case: Case) -> float:
+    return min(pair.restitution for pair in case.study.pairs.values())
 
 
 def _regime_fraction(regime: Regime, lowest_restitution: float) -> float:
@@ -180,8 +184,7 @@ def largest_fraction(regime: Regime, lowest_restitution: float) -> float:
 
 def largest_of_case(case: Case, kind: SceneType) -> float:
     """`largest_fraction` of a case's run of a scene."""
-    lowest = min(pair.restitution for pair in case.study.pairs.values())
-    return largest_fraction(kind.regime, lowest)
+    return largest_fraction(kind.regime, _lowest_restitution(case))
 
 
 def notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:
