@@ -54,7 +54,7 @@ def read_record(file: Path) -> Record:
     Parameters
     ----------
     file : Path
-        A header line, then a row a sample; ``,`` or ``;`` or a tab between
+        A header line, then one row per sample; ``,`` or ``;`` or a tab between
         columns, a point in numbers; lines that begin with ``#`` are comments.
         One column of `TIME_COLUMNS` and one of `FORCE_COLUMNS`; others are
         left alone.

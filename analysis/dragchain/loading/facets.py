@@ -54,7 +54,7 @@ def check_facets(sampled: Sampled, surface: Surface, case: Case) -> float:
 
 
 def facet_table(sampled: Sampled, surface: Surface, events: pd.DataFrame) -> pd.DataFrame:
-    """The sums of each facet, a row a facet in the order of their numbers."""
+    """The sums of each facet, one row per facet in the order of their numbers."""
     rows, count = sampled.rows, len(surface.corners)
     facet = rows["facet_id"].to_numpy()
     peak = np.zeros(count)

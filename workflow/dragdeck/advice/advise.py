@@ -100,7 +100,7 @@ class Advice:
     reference : Option
     outside : sequence of Outside
     fallback : str or None
-        Why the reference was chosen although nothing measured holds the tolerance.
+        Why the reference was chosen although nothing measured meets the tolerance.
     spread : Spread or None
         None for the drop test.
     source : str
@@ -166,7 +166,7 @@ def resolve(case: Case, asked: Tolerance, tradeoff: Tradeoff | None = None) -> C
 
 
 def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
-    """The cheapest measured settings whose error holds a tolerance.
+    """The cheapest measured settings whose error is within a tolerance.
 
     Where the case's scene lies outside of the measured range the error is held
     to `OUTSIDE_FACTOR` of the tolerance. Where nothing measured holds it, the
@@ -315,7 +315,7 @@ def _fallback(
     reference: Option,
     tradeoff: Tradeoff,
 ) -> str:
-    """Why the reference: nothing cheaper holds the tolerance; and what is known of it."""
+    """Why the reference: nothing cheaper meets the tolerance; and what is known of it."""
     best = min((option.error.limit for option in options if option.error), default=None)
     smallest = "" if best is None else f"; the smallest bound is {percent(best)}"
     text = (

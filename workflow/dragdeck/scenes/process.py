@@ -210,7 +210,7 @@ def _check_fit(case: Case, surface_m: float) -> None:
             file=case.file,
             field="motion.immersion_depth_m",
             value=study.motion.immersion_depth_m,
-            limit=f"at most {deepest:.4g} m: a bed {surface_m:.4g} m high less one "
+            limit=f"at most {deepest:.4g} m: a bed {surface_m:.4g} m high minus one "
             f"largest particle",
             remedy="submerge the workpiece less, or fill in more particles",
         )
