@@ -31,11 +31,19 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("numprocesses", None):
+        _longest_files_first(items)
     if config.getoption("--slurm"):
         return
     for item in items:
         if item.get_closest_marker("slurm"):
             item.add_marker(pytest.mark.skip(reason="starts a Slurm: give --slurm"))
+
+
+def _longest_files_first(items: list[pytest.Item]) -> None:
+    """Let no process begin with a long file when the others have nothing left to do."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: ("workflow" not in item.path.parts[-2:], item.path not in slow))
 
 
 @pytest.fixture

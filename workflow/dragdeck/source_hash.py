@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import hashlib
 from collections.abc import Iterator
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -47,20 +48,27 @@ def source_files(*modules: str) -> dict[str, Path]:
     return found
 
 
+@cache
 def _file(name: str) -> Path | None:
-    try:
-        spec = find_spec(name)
-    except ModuleNotFoundError:  # `from package import function`: not a module
+    """The file of a module, found without importing what it stands in; None for another name."""
+    package, *inner = name.split(".")
+    top = find_spec(package)
+    if top is None or top.origin is None:
         return None
-    return Path(spec.origin) if spec is not None and spec.origin is not None else None
+    place = Path(top.origin).parent.joinpath(*inner)
+    files = (place / "__init__.py", place.with_suffix(".py"))
+    return next((file for file in files if file.is_file()), None)
 
 
-def _imports(file: Path, package: str) -> Iterator[str]:
+@cache
+def _imports(file: Path, package: str) -> tuple[str, ...]:
+    return tuple(name for name in _imported(file) if name.partition(".")[0] == package)
+
+
+def _imported(file: Path) -> Iterator[str]:
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
+            yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module is not None:
-            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-        else:
-            continue
-        yield from (name for name in names if name.partition(".")[0] == package)
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.typing import RcKeyType
 from PIL import Image
@@ -61,11 +63,12 @@ def head(figure: Figure, text: str, size: float = 9.5) -> None:
 
 def png(figure: Figure) -> bytes:
     """A figure as PNG without transparency."""
-    drawn, small = BytesIO(), BytesIO()
-    figure.savefig(drawn, format="png", dpi=_DPI)
-    with Image.open(drawn) as picture:
-        picture.convert("RGB").save(small, format="png", optimize=True)
-    return small.getvalue()
+    figure.set_dpi(_DPI)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    picture = BytesIO()
+    Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").save(picture, format="png")
+    return picture.getvalue()
 
 
 def save(figure: Figure, file: Path) -> Path:
