@@ -34,8 +34,9 @@ from cost_variants import (
 )
 from dragdeck import __version__
 from dragdeck.cases.case import Case
+from dragdeck.decks import DECK_FILE
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.render import DECK_FILE, deck_text, environment
+from dragdeck.decks.render import deck_text, environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.log import engine_errors, loops
 from dragdeck.engine.process import Engine, command, execute, find_engine

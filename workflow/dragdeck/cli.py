@@ -54,7 +54,8 @@ COMMANDS = (
         _argument("--tolerance", type=float, help="tolerance to use instead of the study's own"),
         _argument("--quantity", help="quantity to which the tolerance applies"),
         _argument("--quick", action="store_true", help="do not measure the speed of LIGGGHTS"))),
-    Command("run", "run the input script in a folder, or resume it", "commands:run", (
+    Command("run", "run the input script in a folder, or resume it",
+            "engine.run_folder:run_command", (
         _argument("folder", type=Path),
         _argument("--outcome", type=Path, metavar="FILE",
                   help="write the result to FILE and succeed even if the run is rejected"),

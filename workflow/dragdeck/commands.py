@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -28,8 +27,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.deck import StudyScene
 from dragdeck.decks.render import deck_text, environment, write_run
 from dragdeck.engine.process import find_engine
-from dragdeck.engine.run_folder import outcome as run_to_outcome
-from dragdeck.engine.run_folder import run as run_folder
+from dragdeck.engine.watch import say
 from dragdeck.errors import InputError
 from dragdeck.outlook import bed as bed_outlook
 from dragdeck.outlook import timestep as timestep_outlook
@@ -39,11 +37,6 @@ from dragdeck.project import Project, by_run, find_project, study_templates
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import Bed, SceneType, read_bed
 from dragdeck.study.yaml import explained
-
-
-def report(line: str) -> None:
-    """Say something on the way."""
-    print(line, file=sys.stderr, flush=True)
 
 
 def _scene_type(name: str) -> SceneType:
@@ -154,7 +147,7 @@ def _machine_speed(project: Project, case: Case, advice: Advice) -> Speed:
     chosen = replace(case, study=with_option(case.study, advice.chosen))
     templates = environment(project.templates, study_templates(case))
     with tempfile.TemporaryDirectory(prefix="dragdeck-") as folder:
-        return measure_machine_speed(chosen, Path(folder), templates, report)
+        return measure_machine_speed(chosen, Path(folder), templates, say)
 
 
 def _keep(file: Path, content: AdviceFile) -> None:
@@ -162,15 +155,7 @@ def _keep(file: Path, content: AdviceFile) -> None:
     try:
         content.write(file)
     except OSError as error:
-        report(f"not written: {error}")
-
-
-def run(folder: Path, outcome: Path | None, again: bool, every_s: float) -> None:
-    """Run the input script in a folder, or resume it."""
-    if outcome is not None:
-        run_to_outcome(folder, outcome, report, every_s=every_s)
-    else:
-        run_folder(folder, report, again=again, every_s=every_s)
+        say(f"not written: {error}")
 
 
 def render(
@@ -198,7 +183,7 @@ def render(
     case = runs[run]
     built = kind.build(case, _bed(kind, packing))
     for warning in built.warnings:
-        report(f"warning: {warning}")
+        say(f"warning: {warning}")
     folder = project.run_folder(case, kind, of_plan=plan is not None)
     write_run(built, folder, environment(project.templates, study_templates(case)))
 

@@ -35,6 +35,7 @@ class Camera:
     focal_point: Sequence[float]
     up: Sequence[float] = (0.0, 0.0, 1.0)
 
+
 _EMPTY_PICTURE = """
 import vtkmodules.vtkRenderingOpenGL2
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow

@@ -64,7 +64,7 @@ def head(figure: Figure, text: str, size: float = 9.5) -> None:
 def png(figure: Figure) -> bytes:
     """A figure as PNG without transparency."""
     figure.set_dpi(_DPI)
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     picture = BytesIO()
     Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").save(picture, format="png")

@@ -8,7 +8,6 @@ those are stands here; what they say is for dragchain to find out.
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +21,7 @@ from dragdeck.decks.case_file import CaseFile
 from dragdeck.decks.render import environment
 from dragdeck.documents import Document, Part
 from dragdeck.engine.batch import Batch
-from dragdeck.engine.watch import Report
+from dragdeck.engine.watch import Report, say
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import (
     effective_modulus,
@@ -369,4 +368,4 @@ def drops_command(
     else:
         raise InputError("nothing to confirm", field="--fit", remedy="give the fit's result.json")
     batch = Batch(out, environment(project.templates, study_templates(case)))
-    run_drops(case, drops, batch, lambda line: print(line, file=sys.stderr, flush=True))
+    run_drops(case, drops, batch, say)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import environment
 from dragdeck.documents import Document, Part
 from dragdeck.engine.batch import Batch
-from dragdeck.engine.watch import Report
+from dragdeck.engine.watch import Report, say
 from dragdeck.errors import InputError
 from dragdeck.project import find_project
 from dragdeck.scenes.column import Packing, column_scene
@@ -397,11 +396,7 @@ def stability_command(regime: str, points: Path) -> None:
     """Run one regime of the map, or settle its beds."""
     project = find_project(Path.cwd())
     study = project.studies / "stability" / "study.yaml"
-
-    def report(line: str) -> None:
-        print(line, file=sys.stderr, flush=True)
-
-    runs = map_runs(study, project.results("stability"), project.templates, report)
+    runs = map_runs(study, project.results("stability"), project.templates, say)
     if regime == _BEDS:
         runs.settle_beds(points)
     else:

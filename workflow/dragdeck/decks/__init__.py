@@ -1,1 +1,6 @@
 """Input scripts and the other files that a run starts from."""
+
+DECK_FILE = "in.liggghts"
+CASE_FILE = "case.json"
+COLUMNS_FILE = "columns.json"
+"""Files of a run's folder, beside its particles and meshes."""

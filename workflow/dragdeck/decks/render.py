@@ -10,15 +10,12 @@ from pathlib import Path
 import jinja2
 import jinja2.meta
 
+from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.errors import InputError
 from dragdeck.files import replace_text
 from dragdeck.mesh import write_stl
-
-DECK_FILE = "in.liggghts"
-CASE_FILE = "case.json"
-COLUMNS_FILE = "columns.json"
 
 
 def environment(project: Path, study: Path | None = None) -> jinja2.Environment:

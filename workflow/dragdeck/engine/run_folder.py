@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE
 from dragdeck.decks.outputs import ColumnsFile
-from dragdeck.decks.render import CASE_FILE, COLUMNS_FILE, DECK_FILE
 from dragdeck.engine import log
 from dragdeck.engine.acceptance import check_run
 from dragdeck.engine.checkpoints import (
@@ -27,7 +27,7 @@ from dragdeck.engine.checkpoints import (
 )
 from dragdeck.engine.process import Ending, Engine, command, execute, find_engine
 from dragdeck.engine.record import AcceptanceCheck, RunInputs, RunPart, RunRecord
-from dragdeck.engine.watch import LimitMet, Report, Watcher
+from dragdeck.engine.watch import LimitMet, Report, Watcher, say
 from dragdeck.errors import EngineError, InputError, RejectedRunError
 
 STATE_FILE = "state.json"
@@ -90,7 +90,7 @@ def run(folder: Path, report: Report, *, again: bool = False, every_s: float = 1
     return record
 
 
-def outcome(folder: Path, file: Path, report: Report, *, every_s: float = 10.0) -> None:
+def run_to_outcome(folder: Path, file: Path, report: Report, *, every_s: float = 10.0) -> None:
     """Bring a run to its end, good or bad, and write how it ended to a file.
 
     For studies of where runs fail: a run that an acceptance check or a limit stopped has an
@@ -106,6 +106,14 @@ def outcome(folder: Path, file: Path, report: Report, *, every_s: float = 10.0) 
     except RejectedRunError as error:
         report(str(error))
     RunRecord.read(folder / STATE_FILE).write(file)
+
+
+def run_command(folder: Path, outcome: Path | None, again: bool, every_s: float) -> None:
+    """Run the input script in a folder, or resume it."""
+    if outcome is not None:
+        run_to_outcome(folder, outcome, say, every_s=every_s)
+    else:
+        run(folder, say, again=again, every_s=every_s)
 
 
 def fingerprint(folder: Path) -> str:

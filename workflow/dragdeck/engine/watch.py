@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,11 @@ from dragdeck.engine.record import AcceptanceCheck
 from dragdeck.physics.run_limits import RunLimits
 
 Report = Callable[[str], None]
+
+
+def say(line: str) -> None:
+    """Tell the user something on the way."""
+    print(line, file=sys.stderr, flush=True)
 
 
 @dataclass(frozen=True)
