@@ -36,7 +36,8 @@ from dragdeck import __version__
 from dragdeck.cases.case import Case
 from dragdeck.decks import DECK_FILE
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.render import deck_text, environment
+from dragdeck.decks.render import deck_text
+from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.log import engine_errors, loops
 from dragdeck.engine.process import Engine, command, execute, find_engine
@@ -249,7 +250,7 @@ class _Bench:
         place.mkdir(parents=True, exist_ok=True)
         for old in place.iterdir():
             old.unlink()
-        texts = {DECK_FILE: deck_text(deck.whole, templates), **deck.whole.files}
+        texts = {DECK_FILE: deck_text(deck.whole, templates), **deck.whole.texts()}
         for file, text in {**texts, _START_FILE: deck_text(deck.start, templates)}.items():
             replace_text(place / file, text)
         for file, mesh in deck.whole.meshes.items():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 
@@ -26,6 +28,13 @@ class InputError(DragdeckError):
         What would be accepted.
     remedy : str, optional
         What the user can do.
+
+    Attributes
+    ----------
+    line : int or None
+        Line of the field in the file, where it is known.
+    more : sequence of InputError
+        Further problems of the same input; the message contains them all.
     """
 
     def __init__(
@@ -44,10 +53,16 @@ class InputError(DragdeckError):
         self.value = value
         self.limit = limit
         self.remedy = remedy
-        super().__init__(self._message())
+        self.line: int | None = None
+        self.more: Sequence[InputError] = ()
+        super().__init__(problem)
+
+    def __str__(self) -> str:
+        return "\n".join([self._message(), *map(str, self.more)])
 
     def _message(self) -> str:
-        where = ": ".join(str(part) for part in (self.file, self.field) if part is not None)
+        file = self.file if self.line is None else f"{self.file}:{self.line}"
+        where = ": ".join(str(part) for part in (file, self.field) if part is not None)
         lines = [f"{where}: {self.problem}" if where else self.problem]
         if self.value is not None:
             lines.append(f"  value:  {self.value}")
@@ -56,6 +71,19 @@ class InputError(DragdeckError):
         if self.remedy is not None:
             lines.append(f"  remedy: {self.remedy}")
         return "\n".join(lines)
+
+
+def together(errors: Iterable[InputError]) -> InputError:
+    """Several errors as one that names them all, each once; it has the fields of the first."""
+    first, *more = {str(error): error for error in errors}.values()
+    first.more = (*first.more, *more)
+    return first
+
+
+def near(word: str, known: Iterable[str]) -> str | None:
+    """The known word that a wrong one resembles, as a remedy; None where none does."""
+    found = difflib.get_close_matches(word, list(known), n=1)
+    return f"did you mean {found[0]!r}?" if found else None
 
 
 class EngineError(DragdeckError):

@@ -8,18 +8,22 @@ from snakemake.exceptions import WorkflowError
 from dragdeck.campaigns.restitution_drops import record_file
 from dragdeck.campaigns.stability_map import bed_names
 from dragdeck.campaigns.verification.suite import suite_of
-from dragdeck.decks.render import environment, template_files
+from dragdeck.decks.templates import environment, template_files
 from dragdeck.errors import DragdeckError
 from dragdeck.outlook.timestep import largest_of_case
-from dragdeck.project import PLACES, POINTS, Project, by_run, run_path, study_templates
+from dragdeck.project import (
+    PLACES,
+    POINTS,
+    Project,
+    by_run,
+    run_path,
+    study_templates,
+    workflow_settings,
+)
 from dragdeck.scenes.registry import SCENES
 from dragdeck.source_hash import source_hash
+from dragdeck.study.yaml import warnings
 
-PROJECT = Project(Path(workflow.basedir))
-STUDY = config.get("study", "uhlmann2015")
-FIDELITY = config.get("fidelity")
-PLAN = config.get("plan", "default")
-VALIDATION = config.get("plan", "paper")
 
 
 def explained(function, *arguments):
@@ -30,7 +34,15 @@ def explained(function, *arguments):
         raise WorkflowError(str(error))
 
 
-CASES = explained(PROJECT.cases, STUDY, FIDELITY)
+PROJECT = Project(Path(workflow.basedir))
+SETTINGS = explained(workflow_settings, config)
+STUDY, FIDELITY = SETTINGS["study"], SETTINGS["fidelity"]
+PLAN = SETTINGS["plan"] or "default"
+VALIDATION = SETTINGS["plan"] or "paper"
+CASES = explained(PROJECT.cases, STUDY, FIDELITY or None)
+
+for WARNING in dict.fromkeys(text for case in CASES for text in warnings(case.study)):
+    logger.warning(f"warning: {STUDY}: {WARNING}")
 
 
 wildcard_constraints:
@@ -78,7 +90,7 @@ def relative(file):
 
 def templates_of(scene):
     """Every template that a scene's deck is made of."""
-    templates = environment(PROJECT.templates, study_templates(CASES[0]))
+    templates = explained(environment, PROJECT.templates, study_templates(CASES[0]))
     return [str(relative(file)) for file in explained(template_files, templates, scene)]
 
 
@@ -196,7 +208,7 @@ def advice_option(wildcards):
 
 def drop_record(wildcards):
     """The measured drop test of the study."""
-    return str(explained(record_file, CASES[0]).relative_to(PROJECT.root))
+    return str(relative(explained(record_file, CASES[0])))
 
 
 def fall_time(wildcards):
@@ -220,7 +232,7 @@ def of_experiment(run, file):
 
 # --- stability map ----------------------------------------------------------------
 
-STABILITY_MAP = config.get("stability_map", "studies/stability/map.yaml")
+STABILITY_MAP = SETTINGS["stability_map"]
 
 
 def stability_templates():

@@ -11,7 +11,8 @@ import pytest
 from paths import ROOT
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import deck_text, environment, write_run
+from dragdeck.decks.render import deck_text, write_run
+from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
 from dragdeck.project import Project
 from dragdeck.scenes.process import PROCESS, process_scene
@@ -187,6 +188,6 @@ def test_an_impossible_scene_is_refused(
 
 
 def test_a_narrow_gap_is_a_warning(small: dict[str, Any], write_study: Callable[..., Path]) -> None:
-    small["motion"]["path"]["radius_m"] = 0.016
+    small["motion"]["path"]["radius_m"] = 0.012
     (case,) = load_cases(write_study(small))
     assert any("jam" in warning for warning in process_scene(case, BED).warnings)

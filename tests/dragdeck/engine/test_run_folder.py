@@ -16,7 +16,8 @@ import psutil
 import pytest
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import environment, write_run
+from dragdeck.decks.render import write_run
+from dragdeck.decks.templates import environment
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.run_folder import fingerprint, run
 from dragdeck.engine.watch import Progress, Watcher

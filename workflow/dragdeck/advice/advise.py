@@ -24,7 +24,6 @@ from dragdeck.errors import InputError
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
 from dragdeck.physics.similarity import SAME_NUMBER
 from dragdeck.scenes.dimensionless import describe
-from dragdeck.scenes.motion import path_length
 from dragdeck.study.contact_law import compared_labels
 from dragdeck.study.model import Study, Tolerance
 
@@ -224,31 +223,69 @@ def _check_quantity(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> None:
         )
 
 
-def breaking_note(case: Case, tradeoff: Tradeoff | None) -> list[tuple[str, str]]:
-    """What ``check`` and ``explain`` say of the step at which soft particles were seen to break.
+@dataclass(frozen=True)
+class _BreakingStep:
+    """The smallest step over the Rayleigh time that failed, and where it did."""
 
-    Soft particles break at shorter steps, as shares of the Rayleigh time: the next
-    softer level that was measured counts. Nothing is said where nothing was
-    measured.
-    """
+    fraction: float
+    where: str
+
+    def __str__(self) -> str:
+        return f"{100 * self.fraction:.3g} %, {self.where}"
+
+
+def _breaking_step(case: Case, tradeoff: Tradeoff | None) -> _BreakingStep | None:
+    """Where the next softer level that was measured broke; None where nothing was measured."""
     if tradeoff is None:
-        return []
-    chosen = case.study.chosen_fidelity()
-    limit = chosen.youngs_modulus_scale * (1 + 1e-9)
+        return None
+    limit = case.study.chosen_fidelity().youngs_modulus_scale * (1 + 1e-9)
     broken = [
-        (one.youngs_modulus_scale, one.timestep_fraction)
+        (-one.youngs_modulus_scale, one.timestep_fraction)
         for one in tradeoff.settings
         if one.breaks and one.speed_factor == 1 and one.youngs_modulus_scale <= limit
     ]
     if not broken:
+        return None
+    level, fraction = min(broken)
+    where = f"where the drag was wrong or a run failed with E x {-level:g}"
+    return _BreakingStep(fraction, f"{where} ({tradeoff.study}, {tradeoff.measured})")
+
+
+def check_timestep(case: Case, tradeoff: Tradeoff | None) -> None:
+    """Refuse a step of the process that was measured to be too long, unless the study accepts it.
+
+    Raises
+    ------
+    InputError
+        The step is at or beyond the breaking step, and ``accepted.unsafe_timestep`` gives no
+        reason.
+    """
+    step, chosen = _breaking_step(case, tradeoff), case.study.chosen_fidelity()
+    if step is None or chosen.timestep_fraction < step.fraction:
+        return
+    if case.study.accepted.unsafe_timestep is None:
+        raise InputError(
+            "the time step is not safe",
+            file=case.file,
+            field="fidelity.timestep_fraction",
+            value=f"{chosen.timestep_fraction:g} with E x {chosen.youngs_modulus_scale:g}",
+            limit=f"below {step}",
+            remedy="choose a smaller one; or, if you mean it, say why in accepted.unsafe_timestep",
+        )
+
+
+def breaking_note(case: Case, tradeoff: Tradeoff | None) -> list[tuple[str, str]]:
+    """What ``check`` and ``explain`` say of the step at which soft particles were seen to break.
+
+    Soft particles break at shorter steps, as shares of the Rayleigh time: the next
+    softer level that was measured counts. Nothing is said where nothing was measured.
+    """
+    step = _breaking_step(case, tradeoff)
+    if step is None:
         return []
-    level = max(scale for scale, _ in broken)
-    fraction = min(fraction for scale, fraction in broken if scale == level)
-    verdict = "below" if chosen.timestep_fraction < fraction else "NOT BELOW"
-    text = (
-        f"{100 * chosen.timestep_fraction:.3g} % is {verdict} {100 * fraction:.3g} %, where the "
-        f"drag was wrong or a run failed with E x {level:g} ({tradeoff.study}, {tradeoff.measured})"
-    )
+    own = case.study.chosen_fidelity().timestep_fraction
+    verdict = "below" if own < step.fraction else "NOT BELOW"
+    text = f"{100 * own:.3g} % is {verdict} {step}"
     return [("breaking step", text)]
 
 
@@ -332,7 +369,7 @@ def _fallback(
 def _spread(study: Study, asked: Tolerance, tradeoff: Tradeoff) -> Spread | None:
     """Chance in one run's value, from the spread of measured runs; falls with the root of path."""
     quantity = tradeoff.quantities[asked.quantity]
-    counted = path_length(study.motion) - study.motion.transient_m
+    counted = study.motion.path_length_m - study.motion.transient_m
     if quantity.run_std is None or counted <= 0:
         return None
     alone = _NORMAL_95 * quantity.run_std

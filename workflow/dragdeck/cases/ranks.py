@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 from dragdeck.errors import InputError
 
 CORES_VARIABLE = "DRAGDECK_CORES"
 """Environment variable: cores that ``ranks: auto`` may count on, if not those seen here."""
+
+_USUAL_RANKS = 2
+"""The default of a fidelity, which every machine takes."""
 
 FEWEST_PARTICLES_A_RANK = 5000
 """``ranks: auto`` gives no rank fewer particles. Two ranks of 5,000 particles were measured to take
@@ -31,6 +35,27 @@ def auto_ranks(particles: int, cases: int, cores: int) -> int:
         Of the machine.
     """
     return max(1, min(cores // cases, particles // FEWEST_PARTICLES_A_RANK))
+
+
+def check_ranks(ranks: int, file: Path) -> None:
+    """Refuse more ranks than this machine has cores.
+
+    Raises
+    ------
+    InputError
+        Names `CORES_VARIABLE`, for runs that are on another machine.
+    """
+    cores = max(cores_here(), _USUAL_RANKS)
+    if ranks > cores:
+        raise InputError(
+            "more ranks than cores: they would wait for each other",
+            file=file,
+            field="fidelity.ranks",
+            value=ranks,
+            limit=f"at most {cores} here",
+            remedy=f"use fewer, or auto; if the runs are on another machine, set {CORES_VARIABLE} "
+            "to its cores",
+        )
 
 
 def cores_here() -> int:

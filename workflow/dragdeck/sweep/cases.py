@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import itertools
-import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -12,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from dragdeck.cases.case import Case
-from dragdeck.errors import InputError
-from dragdeck.study.model import STUDY_FILE, Scaling, Tolerance
+from dragdeck.errors import InputError, near, together
+from dragdeck.study.consistency import check_name
+from dragdeck.study.model import STUDY_FILE, Scaling, Study, Tolerance
 from dragdeck.study.yaml import read_yaml, validate
 
 Resolve = Callable[[Case, Tolerance], Case]
@@ -42,18 +42,54 @@ def load_cases(
     data = read_yaml(file)
     if fidelity is not None:
         data["fidelity"] = fidelity
-    validate({**data, "sweep": {}}, file)
     study = validate(data, file)
     sweep = study.sweep
     if study.scaling is not None:
         _check_scaling(study.scaling, sweep, file)
+    _check_sweep(study, file)
     plain = {**data, "sweep": {}}
-    return beside_each_other(
-        [
-            settle_case(file, plain, settings, resolve=resolve)
-            for settings in _combinations(sweep, file)
-        ]
-    )
+    found: list[Case] = []
+    errors: list[InputError] = []
+    for settings in _combinations(sweep):
+        try:
+            found.append(settle_case(file, plain, settings, resolve=resolve))
+        except InputError as error:
+            errors.append(error)
+    if errors:
+        raise together(errors)
+    _check_doubles(found)
+    return beside_each_other(found)
+
+
+def _check_sweep(study: Study, file: Path) -> None:
+    """Refuse a sweep without values or with more cases than are accepted."""
+    for field, values in study.sweep.items():
+        if not values:
+            raise InputError("no values", file=file, field=f"sweep.{field}", remedy="give some")
+    count, most = math.prod(map(len, study.sweep.values())), study.accepted.cases
+    if count > most:
+        raise InputError(
+            "more cases than are accepted",
+            file=file,
+            field="sweep",
+            value=f"{count} cases",
+            limit=f"{most} (accepted.cases)",
+            remedy=f"sweep fewer values; or, if you mean it, set accepted.cases: {count}",
+        )
+
+
+def _check_doubles(found: list[Case]) -> None:
+    """Refuse two cases of the same content: a value is given twice, perhaps written otherwise."""
+    first: dict[str, Case] = {}
+    for case in found:
+        same = first.setdefault(f"{case.asked} {case.study.model_dump_json()}", case)
+        if same is not case:
+            raise InputError(
+                f"a value is given twice: the cases {same.name} and {case.name} are the same",
+                file=case.file,
+                field="sweep",
+                remedy="remove one",
+            )
 
 
 def beside_each_other(cases: Iterable[Case]) -> list[Case]:
@@ -183,6 +219,8 @@ def study_file(studies: Path, name: str) -> Path:
     InputError
         No such study; lists those there are.
     """
+    for error in check_name(name, "name of the study"):
+        raise error
     file = studies / name / STUDY_FILE
     if not file.is_file():
         known = sorted(found.parent.name for found in studies.glob(f"*/{STUDY_FILE}"))
@@ -190,23 +228,12 @@ def study_file(studies: Path, name: str) -> Path:
             f"unknown study {name!r}",
             file=studies,
             limit=f"one of: {', '.join(known) or 'none here'}",
-            remedy=f"choose one of these, or make {file}",
+            remedy=near(name, known) or f"choose one of these, or make {file}",
         )
     return file
 
 
-def _combinations(sweep: Mapping[str, list[Any]], file: Path) -> Iterator[dict[str, Any]]:
-    for field, values in sweep.items():
-        if not values:
-            raise InputError("no values", file=file, field=f"sweep.{field}", remedy="give some")
-        if len({json.dumps(value, sort_keys=True) for value in values}) < len(values):
-            raise InputError(
-                "a value is given twice",
-                file=file,
-                field=f"sweep.{field}",
-                value=values,
-                remedy="remove one",
-            )
+def _combinations(sweep: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
     for combination in itertools.product(*sweep.values()):
         yield dict(zip(sweep, combination, strict=True))
 

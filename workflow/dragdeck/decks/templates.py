@@ -1,0 +1,297 @@
+"""The templates of input scripts: what they may use, and whether a study's own fit the project's.
+
+A template is data: it runs in Jinja's sandbox, within limits of time and memory, and each value
+that it inserts passes `quoted`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import resource
+import signal
+import threading
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from jinja2 import nodes
+from jinja2.exceptions import SecurityError
+from jinja2.meta import find_referenced_templates
+from jinja2.runtime import BlockReference, Context, Macro
+from jinja2.sandbox import ImmutableSandboxedEnvironment, safe_range
+from markupsafe import Markup
+
+from dragdeck.errors import InputError, near, together
+
+_NOT_IN_A_VALUE = set("$&#\"'\\")
+"""What LIGGGHTS reads as a variable, a continued line, a comment or a quotation."""
+
+_TRUSTING = ("e", "escape", "forceescape", "random", "safe", "tojson", "urlize", "xmlattr")
+"""Filters of Jinja that would pass text by `quoted`, or give another script each time."""
+
+_MOST_SECONDS, _MOST_BYTES = 10.0, 2**30
+"""What rendering a script may take."""
+
+
+class _Sandbox(ImmutableSandboxedEnvironment):
+    """Macros, blocks and ``range`` may be called, and nothing else."""
+
+    intercepted_binops = frozenset(["**"])
+
+    def is_safe_callable(self, obj: Any) -> bool:
+        return isinstance(obj, Macro | BlockReference) or obj is safe_range
+
+    def call_binop(self, context: Context, operator: str, left: Any, right: Any) -> Any:
+        return math.pow(left, right)  # never a number of a million digits
+
+
+def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
+    """The Jinja environment: a study's own templates first, then the project's.
+
+    Parameters
+    ----------
+    project : Path
+        The project's folder of templates. Its files are also known as
+        ``base/<name>``, so that a study's template of the same name can extend
+        the one it replaces.
+    study : Path, optional
+        The study's folder of templates.
+
+    Raises
+    ------
+    InputError
+        A template of the study is used by no input script, or overrides no block.
+    """
+    folders = [str(study)] if study is not None and study.is_dir() else []
+    loader = jinja2.ChoiceLoader(
+        [
+            jinja2.FileSystemLoader([*folders, str(project)]),
+            jinja2.PrefixLoader({"base": jinja2.FileSystemLoader(str(project))}),
+        ]
+    )
+    found = _Sandbox(
+        loader=loader,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=True,  # tells the text of templates from values; `quoted` does the rest
+        finalize=_inserted,
+    )
+    for name in _TRUSTING:
+        del found.filters[name]
+    found.filters.update(num=number, nums=numbers, comment=comment)
+    if folders and study is not None:
+        with explained():
+            _check_own(found, study, project)
+    return found
+
+
+def number(value: float) -> str:
+    """A number that reads back exactly."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise TypeError(f"{value!r} is not a number")
+    return repr(value if isinstance(value, int) else float(value))
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Numbers that read back exactly, with spaces between."""
+    return " ".join(number(value) for value in values)
+
+
+def comment(text: str) -> str:
+    """Free text as LIGGGHTS can have it in a comment: without the characters that it reads."""
+    return "".join(char for char in text if char.isprintable() and char not in _NOT_IN_A_VALUE)
+
+
+def quoted(value: object) -> Markup:
+    """A value as it may stand in an input script.
+
+    Raises
+    ------
+    ValueError
+        A text has a character that LIGGGHTS would read as more than a part of a word.
+    TypeError
+        Neither text nor number.
+    """
+    if isinstance(value, Markup):
+        return value  # the text of a template
+    if not isinstance(value, str):
+        return Markup(number(value))  # type: ignore[arg-type]
+    bad = {char for char in value if char in _NOT_IN_A_VALUE or not char.isprintable()}
+    if bad:
+        shown = " ".join(ascii(char) for char in sorted(bad))
+        raise ValueError(f"{value[:80]!a} cannot stand in an input script: it has {shown}")
+    return Markup(value)
+
+
+@jinja2.pass_context
+def _inserted(context: Context, value: object) -> Markup:
+    """`quoted`; with the context, Jinja leaves constants for it too."""
+    if isinstance(value, jinja2.Undefined):
+        str(value)  # raises, with the name
+    return quoted(value)
+
+
+@contextlib.contextmanager
+def explained() -> Iterator[None]:
+    """Turn what a template raises into an error that names template and line; limit what it takes.
+
+    Raises
+    ------
+    InputError
+        Whatever went wrong in the template.
+    """
+    try:
+        with _limited():
+            yield
+    except jinja2.TemplateSyntaxError as error:
+        raise InputError(
+            f"template syntax: {error.message}",
+            file=error.filename or error.name,
+            field=f"line {error.lineno}",
+        ) from None
+    except jinja2.TemplateNotFound as error:
+        raise InputError(
+            "no such template",
+            file=str(error.name),
+            remedy="put it into the study's templates/, or correct the name",
+        ) from None
+    except RecursionError as error:
+        raise _failed(error, "extends or calls itself", 'extend "base/<name>" instead') from None
+    except MemoryError as error:
+        raise _failed(error, "needs more than 1 GB of memory", "make it smaller") from None
+    except TimeoutError as error:
+        raise _failed(error, f"takes longer than {_MOST_SECONDS:g} s", "make it smaller") from None
+    except SecurityError as error:
+        remedy = "use values, filters and macros only; see docs/templates.md"
+        raise _failed(error, f"is not allowed in a template: {error}", remedy) from None
+    except (jinja2.UndefinedError, TypeError) as error:
+        remedy = "correct the name, or set it there; docs/templates.md lists the values"
+        raise _failed(error, f"a value is missing: {error}", remedy) from None
+    except (jinja2.TemplateError, ArithmeticError, LookupError, ValueError) as error:
+        raise _failed(error, f"cannot be used: {error}", "see docs/templates.md") from None
+
+
+def _failed(error: BaseException, problem: str, remedy: str) -> InputError:
+    """An error with the template file and the line where it arose."""
+    trace, place = error.__traceback__, ("template", "?")
+    while trace is not None:
+        file = trace.tb_frame.f_code.co_filename
+        if file.endswith(".j2"):
+            place = (file, str(trace.tb_lineno))
+        trace = trace.tb_next
+    return InputError(problem, file=place[0], field=f"line {place[1]}", remedy=remedy)
+
+
+@contextlib.contextmanager
+def _limited() -> Iterator[None]:
+    """Let no template run for ever or fill the memory; time is limited in the main thread only."""
+
+    def stop(signal_number: int, frame: object) -> None:
+        raise TimeoutError
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    most = _address_space() + _MOST_BYTES
+    main = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGALRM, stop) if main else None
+    try:
+        resource.setrlimit(resource.RLIMIT_AS, (most if soft < 0 else min(soft, most), hard))
+        if main:
+            signal.setitimer(signal.ITIMER_REAL, _MOST_SECONDS, 1.0)
+        yield
+    finally:
+        if main:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            signal.signal(signal.SIGALRM, before)
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def _address_space() -> int:
+    """Bytes of memory that this process has mapped."""
+    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+
+
+def used(templates: jinja2.Environment, *names: str) -> list[str]:
+    """Names of the templates that some templates are made of, themselves first."""
+    found: list[str] = []
+    waiting = list(names)
+    while waiting:
+        current = waiting.pop(0)
+        if current not in found:
+            found.append(current)
+            referenced = find_referenced_templates(_parsed(templates, current))
+            waiting.extend(name for name in referenced if name is not None)
+    return found
+
+
+def file_of(templates: jinja2.Environment, name: str) -> Path:
+    """The file of a template."""
+    assert templates.loader is not None
+    _, file, _ = templates.loader.get_source(templates, name)
+    return Path(str(file))
+
+
+def _parsed(templates: jinja2.Environment, name: str) -> nodes.Template:
+    assert templates.loader is not None
+    source, file, _ = templates.loader.get_source(templates, name)
+    return templates.parse(source, name, file)
+
+
+def template_files(templates: jinja2.Environment, scene: str) -> list[Path]:
+    """The template files that a scene's deck is made of, in no order that matters.
+
+    Raises
+    ------
+    InputError
+        One of them is missing or cannot be parsed.
+    """
+    with explained():
+        return sorted({file_of(templates, name) for name in used(templates, f"{scene}.in.j2")})
+
+
+def _check_own(templates: jinja2.Environment, study: Path, project: Path) -> None:
+    """Refuse files of a study that no input script uses, and blocks that override nothing."""
+    own = {str(file.relative_to(study)) for file in study.rglob("*") if file.is_file()}
+    own = {name for name in own if not any(part.startswith(".") for part in Path(name).parts)}
+    known = {str(file.relative_to(project)) for file in project.rglob("*.j2")}
+    reached = set(used(templates, *sorted(own & known)))
+    errors = [
+        InputError(
+            "no input script uses this template",
+            file=study / name,
+            limit=f"a name of {project.name}/, or one that such a template extends or imports",
+            remedy=near(name, known) or "remove it, or correct the name",
+        )
+        for name in sorted(own - reached)
+    ]
+    for name in sorted(own & reached):
+        errors += _idle_blocks(templates, name)
+    if errors:
+        raise together(errors)
+
+
+def _idle_blocks(templates: jinja2.Environment, name: str) -> Iterator[InputError]:
+    """What an extending template has outside of the blocks of the templates it extends."""
+    tree = _parsed(templates, name)
+    if tree.find(nodes.Extends) is None:
+        return
+    others = [_parsed(templates, other) for other in used(templates, name)[1:]]
+    known = {block.name for other in others for block in other.find_all(nodes.Block)}
+    for node in tree.body:
+        text = getattr(node, "nodes", [None])[0]
+        if isinstance(node, nodes.Block) and node.name not in known:
+            problem, remedy = f"no template has a block {node.name!r}", near(node.name, known)
+        elif isinstance(text, nodes.TemplateData) and text.data.strip():
+            problem, remedy = "text outside of blocks is left out", "move it into a block"
+        else:
+            continue
+        yield InputError(
+            problem,
+            file=file_of(templates, name),
+            field=f"line {node.lineno}",
+            limit=f"blocks: {', '.join(sorted(known))}",
+            remedy=remedy,
+        )
