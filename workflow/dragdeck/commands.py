@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -64,16 +64,14 @@ def check(study: str, fidelity: str | None) -> None:
     notes: dict[str, None] = {}
     errors: list[InputError] = []
     for kind in SCENES.values():
-        for alike in _but_for_the_seed(by_run(every, kind)):
-            case = next(iter(alike.values()))
+        for run_id, case in by_run(_but_for_the_seed(every), kind).items():
             try:
                 scene = _built(kind, case, None)
                 deck_text(scene, templates)
             except InputError as error:
                 errors.append(error)
                 continue
-            for run_id in alike:
-                print(f"{kind.name} {run_id}: time step {scene.deck.timestep_s:.3g} s")
+            print(f"{kind.name} {run_id}: time step {scene.deck.timestep_s:.3g} s")
             for what, text in _expectations(case, kind, scene):
                 print(f"  {what}: {text}")
             notes.update(dict.fromkeys(f"{case.name}: {text}" for text in scene.warnings))
@@ -84,13 +82,9 @@ def check(study: str, fidelity: str | None) -> None:
     print(f"{study}: {len(every)} case(s) can be run; LIGGGHTS {find_engine().version}")
 
 
-def _but_for_the_seed(runs: Mapping[str, Case]) -> Iterable[Mapping[str, Case]]:
-    """Runs whose cases differ in nothing but the seed, together: nothing to check depends on it."""
-    groups: dict[str, dict[str, Case]] = {}
-    for run_id, case in runs.items():
-        settings = {name: value for name, value in case.settings.items() if name != "seed"}
-        groups.setdefault(repr(settings), {})[run_id] = case
-    return groups.values()
+def _but_for_the_seed(cases: list[Case]) -> Iterable[Case]:
+    """The first of all cases that differ in the seed alone: nothing to check depends on it."""
+    return {str({**case.settings, "seed": 0}): case for case in reversed(cases)}.values()
 
 
 def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 
 
@@ -80,10 +80,15 @@ def together(errors: Iterable[InputError]) -> InputError:
     return first
 
 
-def near(word: str, known: Iterable[str]) -> str | None:
-    """The known word that a wrong one resembles, as a remedy; None where none does."""
-    found = difflib.get_close_matches(word, list(known), n=1)
-    return f"did you mean {found[0]!r}?" if found else None
+def near(word: str, known: Iterable[str]) -> str:
+    """A question about the known word that a wrong one resembles; empty where none does."""
+    return "".join(f"did you mean {name!r}? " for name in get_close_matches(word, list(known), 1))
+
+
+def choices(word: str, known: Iterable[str]) -> str:
+    """What may stand in place of a wrong word, as a limit."""
+    names = list(known)
+    return f"{near(word, names)}one of: {', '.join(names) or 'none here'}"
 
 
 class EngineError(DragdeckError):

@@ -5,21 +5,19 @@ The grammar of result paths stands here and nowhere else.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from dragdeck.advice.advise import check_timestep, resolve
 from dragdeck.cases.case import Case
-from dragdeck.errors import InputError, near, together
+from dragdeck.errors import InputError, choices
 from dragdeck.outlook.measured import Tradeoff, tradeoff_if_measured
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import NAME, NAME_LIMIT
-from dragdeck.study.consistency import check_name
 from dragdeck.study.yaml import located
 from dragdeck.sweep.cases import load_cases, study_file
 from dragdeck.sweep.plan import Points, plan_points, read_plan
@@ -85,15 +83,13 @@ class Project:
             There is no such plan or study, or they do not fit together.
         """
         file = Path(plan) if plan.endswith(".yaml") else self.plans / f"{plan}.yaml"
-        for error in check_name(file.stem, "name of the plan"):
-            raise error
-        if not file.is_file():
+        if not NAME.fullmatch(file.stem) or not file.is_file():
             known = sorted(found.stem for found in self.plans.glob("*.yaml"))
             raise InputError(
-                "no such plan",
-                file=file,
-                limit=f"one of: {', '.join(known)}; or the path of a .yaml file",
-                remedy=near(plan, known) or "choose one of these, or write one",
+                f"no such plan: {plan!a}",
+                file=self.plans,
+                limit=f"{choices(plan, known)}; or the path of a .yaml file",
+                remedy=f"choose one of these, or write one; its name has {NAME_LIMIT}",
             )
         return plan_points(read_plan(file), file, self.cases(study)[0])
 
@@ -109,50 +105,6 @@ class Project:
     def experiment_folder(self, group: str, run: str) -> Path:
         """The folder of a run of the `collide` scene, which belongs to no case of a study."""
         return self.root / run_path(group, "collide", run)
-
-
-_DEFAULTS = {
-    "study": "uhlmann2015",
-    "fidelity": "",
-    "plan": "",
-    "stability_map": "studies/stability/map.yaml",
-}
-"""What ``--config`` may set; no fidelity is the study's own, no plan that of the target."""
-
-_KEYS = f"use one of: {', '.join(_DEFAULTS)}"
-
-_PATH = re.compile(r"[A-Za-z0-9._/-]+")
-
-_PATHS = ("plan", "stability_map")
-
-
-def workflow_settings(config: Mapping[str, object]) -> dict[str, str]:
-    """The settings of a call of the workflow: what ``--config`` says, and defaults.
-
-    Raises
-    ------
-    InputError
-        A key is unknown, or a value cannot be part of a path or a command.
-    """
-    found = [
-        InputError("unknown key of --config", field=key, remedy=near(key, _DEFAULTS) or _KEYS)
-        for key in config
-        if key not in _DEFAULTS
-    ]
-    values = {key: str(config.get(key) or default) for key, default in _DEFAULTS.items()}
-    found += [
-        InputError(
-            "value of --config",
-            field=key,
-            value=ascii(value),
-            limit=NAME_LIMIT + ("; a path may contain '/'" if key in _PATHS else ""),
-        )
-        for key, value in values.items()
-        if not (_PATH if key in _PATHS else NAME).fullmatch(value or "none")
-    ]
-    if found:
-        raise together(found)
-    return values
 
 
 def find_project(start: Path) -> Project:

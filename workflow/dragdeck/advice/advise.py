@@ -223,32 +223,33 @@ def _check_quantity(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> None:
         )
 
 
-@dataclass(frozen=True)
-class _BreakingStep:
-    """The smallest step over the Rayleigh time that failed, and where it did."""
+def _breaking_step(case: Case, tradeoff: Tradeoff | None) -> tuple[float, str]:
+    """The step over the Rayleigh time at which soft particles were seen to break, and where.
 
-    fraction: float
-    where: str
-
-    def __str__(self) -> str:
-        return f"{100 * self.fraction:.3g} %, {self.where}"
-
-
-def _breaking_step(case: Case, tradeoff: Tradeoff | None) -> _BreakingStep | None:
-    """Where the next softer level that was measured broke; None where nothing was measured."""
-    if tradeoff is None:
-        return None
+    Soft particles break at shorter steps, as shares of the Rayleigh time: the next softer level
+    that was measured counts. Infinite where nothing was measured.
+    """
     limit = case.study.chosen_fidelity().youngs_modulus_scale * (1 + 1e-9)
     broken = [
         (-one.youngs_modulus_scale, one.timestep_fraction)
-        for one in tradeoff.settings
+        for one in (tradeoff.settings if tradeoff else ())
         if one.breaks and one.speed_factor == 1 and one.youngs_modulus_scale <= limit
     ]
-    if not broken:
-        return None
+    if tradeoff is None or not broken:
+        return math.inf, ""
     level, fraction = min(broken)
-    where = f"where the drag was wrong or a run failed with E x {-level:g}"
-    return _BreakingStep(fraction, f"{where} ({tradeoff.study}, {tradeoff.measured})")
+    return fraction, (
+        f"{100 * fraction:.3g} %, where the drag was wrong or a run failed with E x {-level:g} "
+        f"({tradeoff.study}, {tradeoff.measured})"
+    )
+
+
+def breaking_note(case: Case, tradeoff: Tradeoff | None) -> list[tuple[str, str]]:
+    """What ``check`` and ``explain`` say of the breaking step; nothing if none was measured."""
+    fraction, where = _breaking_step(case, tradeoff)
+    own = case.study.chosen_fidelity().timestep_fraction
+    verdict = "below" if own < fraction else "NOT BELOW"
+    return [("breaking step", f"{100 * own:.3g} % is {verdict} {where}")] if where else []
 
 
 def check_timestep(case: Case, tradeoff: Tradeoff | None) -> None:
@@ -257,36 +258,19 @@ def check_timestep(case: Case, tradeoff: Tradeoff | None) -> None:
     Raises
     ------
     InputError
-        The step is at or beyond the breaking step, and ``accepted.unsafe_timestep`` gives no
-        reason.
+        The step is not below the breaking step, and the study gives no reason for that.
     """
-    step, chosen = _breaking_step(case, tradeoff), case.study.chosen_fidelity()
-    if step is None or chosen.timestep_fraction < step.fraction:
-        return
-    if case.study.accepted.unsafe_timestep is None:
+    fraction, where = _breaking_step(case, tradeoff)
+    chosen = case.study.chosen_fidelity()
+    if chosen.timestep_fraction >= fraction and not case.study.accepted.unsafe_timestep:
         raise InputError(
-            "the time step is not safe",
+            f"the time step is not safe with E x {chosen.youngs_modulus_scale:g}",
             file=case.file,
             field="fidelity.timestep_fraction",
-            value=f"{chosen.timestep_fraction:g} with E x {chosen.youngs_modulus_scale:g}",
-            limit=f"below {step}",
+            value=chosen.timestep_fraction,
+            limit=f"below {where}",
             remedy="choose a smaller one; or, if you mean it, say why in accepted.unsafe_timestep",
         )
-
-
-def breaking_note(case: Case, tradeoff: Tradeoff | None) -> list[tuple[str, str]]:
-    """What ``check`` and ``explain`` say of the step at which soft particles were seen to break.
-
-    Soft particles break at shorter steps, as shares of the Rayleigh time: the next
-    softer level that was measured counts. Nothing is said where nothing was measured.
-    """
-    step = _breaking_step(case, tradeoff)
-    if step is None:
-        return []
-    own = case.study.chosen_fidelity().timestep_fraction
-    verdict = "below" if own < step.fraction else "NOT BELOW"
-    text = f"{100 * own:.3g} % is {verdict} {step}"
-    return [("breaking step", text)]
 
 
 def _outside_of(

@@ -10,9 +10,6 @@ from dragdeck.errors import InputError
 CORES_VARIABLE = "DRAGDECK_CORES"
 """Environment variable: cores that ``ranks: auto`` may count on, if not those seen here."""
 
-_USUAL_RANKS = 2
-"""The default of a fidelity, which every machine takes."""
-
 FEWEST_PARTICLES_A_RANK = 5000
 """``ranks: auto`` gives no rank fewer particles. Two ranks of 5,000 particles were measured to take
 1.08 times the processor time of one with all (docs/big.md); smaller runs are soon done
@@ -38,14 +35,14 @@ def auto_ranks(particles: int, cases: int, cores: int) -> int:
 
 
 def check_ranks(ranks: int, file: Path) -> None:
-    """Refuse more ranks than this machine has cores.
+    """Refuse more ranks than this machine has cores; the default of two runs everywhere.
 
     Raises
     ------
     InputError
         Names `CORES_VARIABLE`, for runs that are on another machine.
     """
-    cores = max(cores_here(), _USUAL_RANKS)
+    cores = max(cores_here(), 2)
     if ranks > cores:
         raise InputError(
             "more ranks than cores: they would wait for each other",
@@ -53,8 +50,7 @@ def check_ranks(ranks: int, file: Path) -> None:
             field="fidelity.ranks",
             value=ranks,
             limit=f"at most {cores} here",
-            remedy=f"use fewer, or auto; if the runs are on another machine, set {CORES_VARIABLE} "
-            "to its cores",
+            remedy=f"use fewer, or auto; or set {CORES_VARIABLE} to the cores of another machine",
         )
 
 

@@ -10,12 +10,13 @@ import contextlib
 import math
 import resource
 import signal
-import threading
-from collections.abc import Iterable, Iterator
+import traceback
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import jinja2
+import psutil
 from jinja2 import nodes
 from jinja2.exceptions import SecurityError
 from jinja2.meta import find_referenced_templates
@@ -23,7 +24,7 @@ from jinja2.runtime import BlockReference, Context, Macro
 from jinja2.sandbox import ImmutableSandboxedEnvironment, safe_range
 from markupsafe import Markup
 
-from dragdeck.errors import InputError, near, together
+from dragdeck.errors import InputError, choices, together
 
 _NOT_IN_A_VALUE = set("$&#\"'\\")
 """What LIGGGHTS reads as a variable, a continued line, a comment or a quotation."""
@@ -33,6 +34,20 @@ _TRUSTING = ("e", "escape", "forceescape", "random", "safe", "tojson", "urlize",
 
 _MOST_SECONDS, _MOST_BYTES = 10.0, 2**30
 """What rendering a script may take."""
+
+
+_FAILURES: Mapping[type[BaseException], tuple[str, str]] = {
+    RecursionError: ("extends or calls itself without end", 'extend "base/<name>" instead'),
+    MemoryError: ("needs more memory than a template may have", "make it smaller"),
+    TimeoutError: (f"takes longer than {_MOST_SECONDS:g} s", "make it smaller"),
+    SecurityError: ("is not allowed: ", "docs/templates.md lists what a template may use"),
+    jinja2.TemplateNotFound: ("no such template: ", "put it into templates/, or correct the name"),
+    jinja2.TemplateSyntaxError: ("template syntax: ", "see docs/templates.md"),
+    jinja2.UndefinedError: ("a value is missing: ", "docs/templates.md lists the values"),
+    Exception: ("a value cannot be used: ", "docs/templates.md lists the values"),
+}
+"""What a template may raise: the problem, which goes on with the exception if it ends with a space,
+and the remedy."""
 
 
 class _Sandbox(ImmutableSandboxedEnvironment):
@@ -130,14 +145,12 @@ def quoted(value: object) -> Markup:
 @jinja2.pass_context
 def _inserted(context: Context, value: object) -> Markup:
     """`quoted`; with the context, Jinja leaves constants for it too."""
-    if isinstance(value, jinja2.Undefined):
-        str(value)  # raises, with the name
-    return quoted(value)
+    return quoted(str(value) if isinstance(value, jinja2.Undefined) else value)
 
 
 @contextlib.contextmanager
 def explained() -> Iterator[None]:
-    """Turn what a template raises into an error that names template and line; limit what it takes.
+    """Limit what templates take, and turn what they raise into an error with file and line.
 
     Raises
     ------
@@ -147,71 +160,46 @@ def explained() -> Iterator[None]:
     try:
         with _limited():
             yield
-    except jinja2.TemplateSyntaxError as error:
-        raise InputError(
-            f"template syntax: {error.message}",
-            file=error.filename or error.name,
-            field=f"line {error.lineno}",
-        ) from None
-    except jinja2.TemplateNotFound as error:
-        raise InputError(
-            "no such template",
-            file=str(error.name),
-            remedy="put it into the study's templates/, or correct the name",
-        ) from None
-    except RecursionError as error:
-        raise _failed(error, "extends or calls itself", 'extend "base/<name>" instead') from None
-    except MemoryError as error:
-        raise _failed(error, "needs more than 1 GB of memory", "make it smaller") from None
-    except TimeoutError as error:
-        raise _failed(error, f"takes longer than {_MOST_SECONDS:g} s", "make it smaller") from None
-    except SecurityError as error:
-        remedy = "use values, filters and macros only; see docs/templates.md"
-        raise _failed(error, f"is not allowed in a template: {error}", remedy) from None
-    except (jinja2.UndefinedError, TypeError) as error:
-        remedy = "correct the name, or set it there; docs/templates.md lists the values"
-        raise _failed(error, f"a value is missing: {error}", remedy) from None
-    except (jinja2.TemplateError, ArithmeticError, LookupError, ValueError) as error:
-        raise _failed(error, f"cannot be used: {error}", "see docs/templates.md") from None
+    except InputError:
+        raise
+    except Exception as error:
+        problem, remedy = next(
+            texts for kind, texts in _FAILURES.items() if isinstance(error, kind)
+        )
+        file, line = _place(error)
+        text = f"{problem}{error}" if problem.endswith(" ") else problem
+        raise InputError(text, file=file, field=f"line {line}", remedy=remedy) from None
 
 
-def _failed(error: BaseException, problem: str, remedy: str) -> InputError:
-    """An error with the template file and the line where it arose."""
-    trace, place = error.__traceback__, ("template", "?")
-    while trace is not None:
-        file = trace.tb_frame.f_code.co_filename
-        if file.endswith(".j2"):
-            place = (file, str(trace.tb_lineno))
-        trace = trace.tb_next
-    return InputError(problem, file=place[0], field=f"line {place[1]}", remedy=remedy)
+def _place(error: Exception) -> tuple[str, int | str]:
+    """Template file and line where an error arose."""
+    if isinstance(error, jinja2.TemplateSyntaxError):
+        return error.filename or "template", error.lineno
+    place: tuple[str, int | str] = ("template", "?")
+    for frame, line in traceback.walk_tb(error.__traceback__):
+        if frame.f_code.co_filename.endswith(".j2"):
+            place = (frame.f_code.co_filename, line)
+    return place
 
 
 @contextlib.contextmanager
 def _limited() -> Iterator[None]:
-    """Let no template run for ever or fill the memory; time is limited in the main thread only."""
+    """Let no template run for ever or fill the memory."""
 
-    def stop(signal_number: int, frame: object) -> None:
+    def stop(number: int, frame: object) -> None:
         raise TimeoutError
 
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    most = _address_space() + _MOST_BYTES
-    main = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGALRM, stop) if main else None
+    most = psutil.Process().memory_info().vms + _MOST_BYTES
+    before = signal.signal(signal.SIGALRM, stop)
     try:
         resource.setrlimit(resource.RLIMIT_AS, (most if soft < 0 else min(soft, most), hard))
-        if main:
-            signal.setitimer(signal.ITIMER_REAL, _MOST_SECONDS, 1.0)
+        signal.setitimer(signal.ITIMER_REAL, _MOST_SECONDS, 1.0)
         yield
     finally:
-        if main:
-            signal.setitimer(signal.ITIMER_REAL, 0)
-            signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
-
-
-def _address_space() -> int:
-    """Bytes of memory that this process has mapped."""
-    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 
 
 def used(templates: jinja2.Environment, *names: str) -> list[str]:
@@ -254,44 +242,25 @@ def template_files(templates: jinja2.Environment, scene: str) -> list[Path]:
 
 def _check_own(templates: jinja2.Environment, study: Path, project: Path) -> None:
     """Refuse files of a study that no input script uses, and blocks that override nothing."""
-    own = {str(file.relative_to(study)) for file in study.rglob("*") if file.is_file()}
-    own = {name for name in own if not any(part.startswith(".") for part in Path(name).parts)}
+    files = {str(file.relative_to(study)) for file in study.rglob("[!.]*") if file.is_file()}
     known = {str(file.relative_to(project)) for file in project.rglob("*.j2")}
-    reached = set(used(templates, *sorted(own & known)))
-    errors = [
-        InputError(
-            "no input script uses this template",
-            file=study / name,
-            limit=f"a name of {project.name}/, or one that such a template extends or imports",
-            remedy=near(name, known) or "remove it, or correct the name",
-        )
-        for name in sorted(own - reached)
+    reached = set(used(templates, *sorted(files & known)))
+    found = [
+        InputError("no input script uses it", file=study / name, limit=choices(name, known))
+        for name in sorted(files - reached)
     ]
-    for name in sorted(own & reached):
-        errors += _idle_blocks(templates, name)
-    if errors:
-        raise together(errors)
+    for name in sorted(files & reached):
+        found += _idle_blocks(templates, name)
+    if found:
+        raise together(found)
 
 
 def _idle_blocks(templates: jinja2.Environment, name: str) -> Iterator[InputError]:
     """What an extending template has outside of the blocks of the templates it extends."""
-    tree = _parsed(templates, name)
-    if tree.find(nodes.Extends) is None:
-        return
-    others = [_parsed(templates, other) for other in used(templates, name)[1:]]
+    tree, *others = (_parsed(templates, each) for each in used(templates, name))
     known = {block.name for other in others for block in other.find_all(nodes.Block)}
-    for node in tree.body:
-        text = getattr(node, "nodes", [None])[0]
+    for node in tree.body if tree.find(nodes.Extends) else ():
         if isinstance(node, nodes.Block) and node.name not in known:
-            problem, remedy = f"no template has a block {node.name!r}", near(node.name, known)
-        elif isinstance(text, nodes.TemplateData) and text.data.strip():
-            problem, remedy = "text outside of blocks is left out", "move it into a block"
-        else:
-            continue
-        yield InputError(
-            problem,
-            file=file_of(templates, name),
-            field=f"line {node.lineno}",
-            limit=f"blocks: {', '.join(sorted(known))}",
-            remedy=remedy,
-        )
+            file, line = file_of(templates, name), f"line {node.lineno}"
+            problem = f"no template that it extends has a block {node.name!r}"
+            yield InputError(problem, file=file, field=line, limit=choices(node.name, known))

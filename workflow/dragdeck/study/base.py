@@ -14,9 +14,10 @@ Json = Mapping[str, JsonValue]
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 """Names of studies, plans, materials and fidelities: they become parts of paths and commands."""
 
-NAME_LIMIT = "up to 64 letters (a-z, A-Z), digits, '.', '_' and '-', the first a letter or digit"
+NAME_LIMIT = "up to 64 letters (a-z), digits, '.', '_' and '-', the first a letter or digit"
 
-_DECIMAL = re.compile(r"[-+]?((0|[1-9]\d*)(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+DECIMAL = re.compile(r"[-+]?((0|[1-9]\d*)(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+"""How a number may be written."""
 
 _LONGEST_LINE = 300
 
@@ -26,7 +27,7 @@ def _number(value: object) -> object:
     if isinstance(value, bool):
         raise ValueError("a truth value stands where a number belongs")
     if isinstance(value, str):
-        if not _DECIMAL.fullmatch(value):
+        if not DECIMAL.fullmatch(value):
             raise ValueError(f"{value!r} is text, not a number: write it as 300, 0.5 or 5e6")
         return float(value)
     return value
@@ -41,8 +42,23 @@ def _one_line(text: str) -> str:
     return text
 
 
+def _name(text: str) -> str:
+    if not NAME.fullmatch(text):
+        raise ValueError(f"a name has {NAME_LIMIT}")
+    return text
+
+
+def _material_name(text: str) -> str:
+    if "-" in text:
+        raise ValueError("the name of a material has no '-', which joins a pair of them")
+    return _name(text)
+
+
 Line = Annotated[str, AfterValidator(_one_line)]
 """Free text in one line."""
+
+Name = Annotated[str, AfterValidator(_name)]
+MaterialName = Annotated[str, AfterValidator(_material_name)]
 
 
 def _whole(value: object) -> object:

@@ -4,123 +4,121 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from itertools import combinations_with_replacement
+from itertools import product
 
-from dragdeck.errors import InputError, near
-from dragdeck.study.base import NAME, NAME_LIMIT
-from dragdeck.study.model import BUILT_IN_FIDELITIES, CylinderShape, Study
+from dragdeck.errors import InputError, choices
+from dragdeck.study.base import flat
+from dragdeck.study.model import BUILT_IN_FIDELITIES, CylinderShape, Scaling, Study
 
-_MOST_FACETS = 1_000_000
+_MOST_FACETS = 1e6
 """Facets of a generated mesh."""
 
 _NO_SWEEP = ("accepted", "assumptions", "reference", "scaling", "sweep", "title")
 """Blocks that no run depends on: cases that differ in them would be the same."""
 
+_LEAST_LEVELS = 3
+"""Levels that a power law is fitted to: two would fit any."""
 
-def contradictions(study: Study) -> Iterator[InputError]:
-    """Every contradiction within a study; the errors name no file."""
-    yield from _names(study)
-    yield from _materials(study)
-    yield from _motion(study)
-    yield from _facets(study)
-    for field in study.sweep:
-        if field.split(".")[0] in _NO_SWEEP:
-            yield InputError(
-                "no run depends on it: it cannot be swept",
-                field=f"sweep.{field}",
-                remedy="name a field that the runs depend on",
-            )
+_Found = Iterator[tuple[str, str, str]]
+"""Field, what is wrong with it, and what would be accepted."""
 
 
-def check_name(name: str, field: str | None = None, *, dash: bool = True) -> Iterator[InputError]:
-    """The problem of a name that cannot be part of a path or a command, if it has one."""
-    if not NAME.fullmatch(name) or (not dash and "-" in name):
-        yield InputError(
-            "is no name that can be used in paths and commands",
-            field=field,
-            value=ascii(name),
-            limit=NAME_LIMIT if dash else f"{NAME_LIMIT}; no '-', which joins two materials",
-            remedy="rename it",
-        )
+def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
+    """Every contradiction within a whole study, or one of its cases; the errors name no file."""
+    values = flat(study.plain())
+    for check in (_names, _pairs, _motion, _facets, *([_sweep] if whole else [])):
+        for field, problem, limit in check(study):
+            yield InputError(problem, field=field, value=values.get(field), limit=limit)
 
 
-def _names(study: Study) -> Iterator[InputError]:
-    for name in study.materials:
-        yield from check_name(name, "materials", dash=False)
-    for name in study.fidelities:
-        yield from check_name(name, "fidelities")
-    known = {**BUILT_IN_FIDELITIES, **study.fidelities}
-    if isinstance(study.fidelity, str):
-        yield from _known(study.fidelity, known, "fidelity", "unknown fidelity")
-
-
-def _known(name: str, known: Iterable[str], field: str, problem: str) -> Iterator[InputError]:
-    if name not in known:
-        limit = f"one of: {', '.join(known)}"
-        problem = f"{problem} {name!r}"
-        yield InputError(problem, field=field, limit=limit, remedy=near(name, known))
-
-
-def _materials(study: Study) -> Iterator[InputError]:
+def _names(study: Study) -> _Found:
     for owner in ("media", "bowl", "workpiece"):
         name = getattr(study, owner).material
-        yield from _known(name, study.materials, f"{owner}.material", "no such material:")
-    both = combinations_with_replacement(study.materials, 2)
-    pairs = {f"{one}-{other}" for pair in both for one, other in (pair, pair[::-1])}
+        yield from _known(f"{owner}.material", name, study.materials, "no such material")
+    if isinstance(study.fidelity, str):
+        known = {**BUILT_IN_FIDELITIES, **study.fidelities}
+        yield from _known("fidelity", study.fidelity, known, "unknown fidelity")
+
+
+def _known(field: str, name: str, known: Iterable[str], problem: str) -> _Found:
+    if name not in known:
+        yield field, f"{problem} {name!r}", choices(name, known)
+
+
+def _pairs(study: Study) -> _Found:
+    every = ["-".join(both) for both in product(study.materials, repeat=2)]
     for key, pair in study.pairs.items():
-        yield from _known(key, pairs, f"pairs.{key}", "no pair of two materials:")
         back = "-".join(key.split("-")[::-1])
+        yield from _known(f"pairs.{key}", key, every, "no pair of two materials:")
         if key < back and study.pairs.get(back, pair) != pair:
-            yield InputError(
-                f"{key} and {back} are the same pair with different values",
-                field=f"pairs.{back}",
-                remedy="remove one of them",
-            )
+            yield f"pairs.{back}", f"differs from {key}, which is the same pair", "one of them"
     for other in study.type_names():
         key, back = f"{study.media.material}-{other}", f"{other}-{study.media.material}"
-        if key in pairs and not {key, back} & set(study.pairs):
-            yield InputError(
-                f"pairs has no entry '{key}', and these two will touch",
-                field="pairs",
-                remedy="add it",
-            )
+        if key in every and not {key, back} & set(study.pairs):
+            yield "pairs", f"has no entry {key!r}, and these two will touch", "all that touch"
 
 
-def _motion(study: Study) -> Iterator[InputError]:
-    motion, length = study.motion, study.motion.path_length_m
-    if motion.transient_m >= length:
-        yield InputError(
-            "no path is left for the statistics",
-            field="motion.transient_m",
-            value=motion.transient_m,
-            limit=f"below the length of the path, {length:.4g} m",
-            remedy="use a shorter transient or a longer path",
-        )
-    seconds = length / motion.speed_m_s
-    if study.outputs.network_hz * seconds < 1:
-        yield InputError(
-            "not one frame of the contact network is written during the drag",
-            field="outputs.network_hz",
-            value=study.outputs.network_hz,
-            limit=f"at least {1 / seconds:.3g} Hz, one frame in a drag of {seconds:.3g} s",
-            remedy="use a higher rate or a longer path",
-        )
+def _motion(study: Study) -> _Found:
+    length = study.motion.path_length_m
+    if study.motion.transient_m >= length:
+        limit = f"below the length of the path, {length:.4g} m"
+        yield "motion.transient_m", "no path is left for the statistics", limit
+    rate = study.motion.speed_m_s / length
+    if study.outputs.network_hz < rate:
+        problem = "not one frame of the contact network is written during the drag"
+        yield "outputs.network_hz", problem, f"at least {rate:.3g} Hz; or use a longer path"
 
 
-def _facets(study: Study) -> Iterator[InputError]:
-    shape, bowl, depth = study.workpiece.shape, study.bowl, study.motion.immersion_depth_m
-    sizes = {}
+def _facets(study: Study) -> _Found:
+    shape, bowl, media = study.workpiece.shape, study.bowl, study.media
+    facets = {}
     if isinstance(shape, CylinderShape):
-        area = 4 * math.pi * shape.radius_m * (depth + 8 * study.media.radius_mean_m)
-        sizes["workpiece.shape.facet_size_m"] = area / shape.facet_size_m / shape.facet_length_m
-    if bowl.facet_size_m is not None:
+        length = study.motion.immersion_depth_m + 8 * media.radius_mean_m
+        facet = shape.facet_size_m * shape.facet_length_m
+        facets["workpiece.shape.facet_size_m"] = 4 * math.pi * shape.radius_m * length / facet
+    if size := bowl.facet_size_m:
         area = 2 * math.pi * bowl.radius_m * (2 * bowl.height_m + bowl.radius_m)
-        sizes["bowl.facet_size_m"] = area / bowl.facet_size_m**2
-    for field, facets in sizes.items():
-        if facets > _MOST_FACETS:
-            yield InputError(
-                f"makes a mesh of some {facets:.1g} facets",
-                field=field,
-                limit=f"at most {_MOST_FACETS} facets",
-                remedy="use larger facets",
-            )
+        facets["bowl.facet_size_m"] = area / size**2
+    for field, count in facets.items():
+        if count > _MOST_FACETS:
+            yield field, f"a mesh of some {count:.1g} facets", f"at most {_MOST_FACETS:g} facets"
+
+
+def _sweep(study: Study) -> _Found:
+    for field, values in study.sweep.items():
+        if not values:
+            yield f"sweep.{field}", "no values", "one value or more"
+        if field.split(".")[0] in _NO_SWEEP:
+            yield f"sweep.{field}", "no run depends on it", "a field that the runs depend on"
+    count, most = math.prod(map(len, study.sweep.values())), study.accepted.cases
+    if count > most:
+        limit = f"{most}; if you mean it, set accepted.cases: {count}"
+        yield "sweep", f"makes {count} cases, more than are accepted", limit
+    if study.scaling is not None:
+        yield from _scaling(study.scaling, study)
+
+
+def _scaling(scaling: Scaling, study: Study) -> _Found:
+    """Why the sweep cannot tell the power law."""
+    field, others = scaling.field, [name for name in study.sweep if name != "seed"]
+    if field not in others:
+        yield "scaling.field", f"{field} is not a field of sweep", choices(field, others)
+        return
+    if len(others) > 1:
+        problem = "another field varies too, so that the drag is no function of one"
+        yield "sweep", problem, f"{field} and seed"
+    levels = [_level(value) for value in study.sweep[field]]
+    low, high = scaling.fit_range or (0.0, math.inf)
+    if not all(level > 0 for level in levels):
+        yield f"sweep.{field}", "a power law needs numbers above 0", "numbers above 0"
+    elif sum(low <= level <= high for level in levels) < _LEAST_LEVELS:
+        problem = f"too few levels from {low:g} to {high:g} for a power law"
+        yield f"sweep.{field}", problem, f"{_LEAST_LEVELS} levels or more"
+
+
+def _level(value: object) -> float:
+    """A level of a scaling as a number, NaN if it is none."""
+    try:
+        return math.nan if isinstance(value, bool) else float(str(value))
+    except ValueError:
+        return math.nan

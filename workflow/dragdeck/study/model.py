@@ -17,7 +17,16 @@ from pydantic import (
     model_validator,
 )
 
-from dragdeck.study.base import Line, Model, NonNegative, Number, Positive, Whole
+from dragdeck.study.base import (
+    Line,
+    MaterialName,
+    Model,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    Whole,
+)
 from dragdeck.study.contact_law import Contact, Pair
 from dragdeck.study.material import Material
 from dragdeck.study.reference import Reference
@@ -330,7 +339,7 @@ class Study(Model):
 
     title: Line = Field(description="title in one line, for headings")
     gravity_m_s2: Positive = Field(default=9.81, description="gravity along -z, m/s2")
-    materials: dict[str, Material]
+    materials: dict[MaterialName, Material]
     pairs: dict[str, Pair] = Field(
         description="'a-b': coefficients of the contact of materials a and b"
     )
@@ -347,7 +356,7 @@ class Study(Model):
         default="standard",
         description="name of a fidelity, or settings, or a tolerance that selects settings",
     )
-    fidelities: dict[str, Fidelity] = Field(default_factory=dict)
+    fidelities: dict[Name, Fidelity] = Field(default_factory=dict)
     seed: Annotated[Whole, Field(ge=0, lt=2**32)] = Field(
         default=1,
         description="random seed of the initial positions and velocities (one seed = one packing)",

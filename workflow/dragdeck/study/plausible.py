@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import contextlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatch
@@ -71,49 +71,28 @@ _RANGES = {
 """By dotted field. Assumptions: they span laboratory and industrial processes, and more."""
 
 
-@dataclass(frozen=True)
-class Implausible:
-    """A value that is hardly meant, and whether it is refused."""
-
-    error: InputError
-    refused: bool
-
-
-def implausible(data: Mapping[str, Any]) -> Iterator[Implausible]:
-    """Every value of a study's plain data that is not plausible; nothing about what is no number.
+def implausible(data: Mapping[str, Any]) -> Iterator[tuple[InputError, bool]]:
+    """Every value of a study's plain data that is hardly meant, and whether it is refused.
 
     Parameters
     ----------
     data : mapping
-        Numbers may be text, as YAML 1.1 reads ``5e6``.
+        Numbers may be text, as YAML 1.1 reads ``5e6``; what is no number is passed by.
     """
-    for field, value in _numbers(data):
+    for field, value in _numbers(flat(data)):
         known = next((row for name, row in _RANGES.items() if fnmatch(field, name)), None)
         if known is None or known.low <= value <= known.high:
             continue
         refused = not known.least <= value <= known.most
-        low, high = (known.least, known.most) if refused else (known.low, known.high)
-        yield Implausible(
-            InputError(
-                "is not plausible: a slip of the unit" if known.slips else "is not plausible",
-                field=field,
-                value=f"{value:g}",
-                limit=f"{low:g} to {high:g}" + ("" if refused else " (usual)"),
-                remedy=known.hint(value),
-            ),
-            refused,
-        )
+        limit = f"{known.least:g} to {known.most:g}; usual: {known.low:g} to {known.high:g}"
+        problem, remedy = "is not plausible", known.hint(value)
+        yield InputError(problem, field=field, value=value, limit=limit, remedy=remedy), refused
 
 
-def _numbers(data: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
-    for field, value in flat(data).items():
-        items = {field: value}
+def _numbers(values: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    for field, value in values.items():
         if isinstance(value, list | tuple):
-            items = {f"{field}.{index}": item for index, item in enumerate(value)}
-        for name, item in items.items():
-            try:
-                number = math.nan if isinstance(item, bool) else float(item)
-            except (TypeError, ValueError, OverflowError):
-                continue
-            if math.isfinite(number):
-                yield name, number
+            yield from _numbers({f"{field}.{index}": item for index, item in enumerate(value)})
+        elif isinstance(value, int | float | str) and not isinstance(value, bool):
+            with contextlib.suppress(ValueError, OverflowError):
+                yield field, float(value)

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from dragdeck.errors import InputError, near, together
-from dragdeck.study.base import Model
+from dragdeck.study.base import DECIMAL, Model
 from dragdeck.study.consistency import contradictions
 from dragdeck.study.model import STUDY_FILE, Study
 from dragdeck.study.plausible import implausible
@@ -40,20 +40,19 @@ def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
 
 
 _Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
-_YAML_1_1 = ("bool", "float", "int", "timestamp")
-_Loader.yaml_implicit_resolvers = {
-    first: [row for row in rows if row[0].rpartition(":")[2] not in _YAML_1_1]
-    for first, rows in yaml.SafeLoader.yaml_implicit_resolvers.items()
-}
-for _tag, _pattern, _first in (
-    ("bool", "true|True|TRUE|false|False|FALSE", "tTfF"),
-    ("int", "[-+]?(0|[1-9][0-9]*)", "-+0123456789"),
-    ("float", r"[-+]?((0|[1-9][0-9]*)\.[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", "-+.0123456789"),
-    ("float", r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)", "-+."),
-):
-    _Loader.add_implicit_resolver(
-        f"tag:yaml.org,2002:{_tag}", re.compile(f"(?:{_pattern})$"), list(_first)
-    )
+
+
+_PLAIN = re.compile(rf"{DECIMAL.pattern}|[-+]?\.(inf|nan)|true|false", re.ASCII | re.IGNORECASE)
+
+
+def _scalar(loader: _Loader, node: yaml.ScalarNode) -> Any:
+    """A decimal number or a truth value; whatever else YAML 1.1 has a type for is text."""
+    read = yaml.SafeLoader.yaml_constructors[node.tag]
+    return read(loader, node) if _PLAIN.fullmatch(node.value) else node.value
+
+
+for _tag in ("bool", "float", "int", "timestamp"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}", _scalar)
 
 
 def read_yaml(file: Path) -> dict[str, Any]:
@@ -114,26 +113,31 @@ def _lines(node: yaml.Node | None, prefix: str) -> Iterator[tuple[str, int]]:
         yield from _lines(value, f"{prefix}{name}.")
 
 
-def validate(data: Mapping[str, Any], file: Path | str) -> Study:
+def validate(data: Mapping[str, Any], file: Path | str, *, whole: bool = False) -> Study:
     """Check plain data against the study model, and its values against each other.
+
+    Parameters
+    ----------
+    data : mapping
+    file : Path or str
+        For error messages.
+    whole : bool
+        Whether it is a study with its sweep, and not a case of it.
 
     Raises
     ------
     InputError
         Names every problem with its line, field, value, limit and a remedy.
     """
-    found: list[InputError] = []
-    study = None
+    found, study = [], None
     try:
         study = Study.model_validate(data)
     except ValidationError as error:
-        found += _problems(error)
+        found = _problems(error)
     known = {error.field for error in found}
-    found += [
-        each.error for each in implausible(data) if each.refused and each.error.field not in known
-    ]
+    found += [error for error, refused in implausible(data) if refused and error.field not in known]
     if study is not None:
-        found += contradictions(study)
+        found += contradictions(study, whole)
     if study is None or found:
         raise _of_file(found, file)
     return study
@@ -141,14 +145,23 @@ def validate(data: Mapping[str, Any], file: Path | str) -> Study:
 
 def warnings(study: Study) -> list[str]:
     """Values of a valid study that are hardly meant, one line each."""
-    errors = (each.error for each in implausible(study.plain()) if not each.refused)
     return [
-        f"{error.field} {error.value} {error.problem}; {error.remedy}; usual: {error.limit}"
-        for error in errors
+        f"{error.field} {error.value:g} {error.problem}; {error.remedy}; {error.limit}"
+        for error, _ in implausible(study.plain())
     ]
 
 
-_FORMS = ("cylinder", "circle", "line", "a-name", "a-number", "a-word", "settings", "a-tolerance")
+_FORMS = (
+    "cylinder",
+    "circle",
+    "line",
+    "a-name",
+    "a-number",
+    "a-word",
+    "settings",
+    "a-tolerance",
+    "[key]",
+)
 """Names of alternatives, which are no part of a field's dotted name."""
 
 _LIMITS = {
@@ -177,18 +190,16 @@ def _problems(error: ValidationError) -> list[InputError]:
 
 def _problem(issue: ErrorDetails) -> InputError:
     """One problem that a model found."""
-    kind, context = issue["type"], issue.get("ctx", {})
+    kind = issue["type"]
     field = ".".join(str(part) for part in issue["loc"] if part not in _FORMS)
-    limit = _LIMITS[kind].format(**context) if kind in _LIMITS else None
+    limit = _LIMITS[kind].format(**issue.get("ctx", {})) if kind in _LIMITS else None
     problem, remedy = issue["msg"].removeprefix("Value error, "), None
     value: object = issue["input"]
     if kind == "extra_forbidden":
-        problem = "unknown key"
-        remedy = near(str(issue["loc"][-1]), _every_key()) or "see docs/study.md"
+        hint = near(str(issue["loc"][-1]), _every_key())
+        problem, remedy = "unknown key", f"{hint}remove it, or see docs/study.md for its spelling"
     elif kind == "missing":
         problem, remedy, value = "a required key is missing", "add it", None
-    elif kind == "literal_error" and isinstance(value, str):
-        remedy = near(value, re.findall(r"'(.*?)'", context["expected"]))
     if isinstance(value, Mapping | BaseModel):
         value = None
     return InputError(problem, field=field or None, value=_shown(value), limit=limit, remedy=remedy)
