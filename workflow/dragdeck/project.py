@@ -74,13 +74,13 @@ class Project:
             raise located(error) from None
         return found
 
-    def points(self, study: str, plan: str) -> Points:
-        """The points of a plan for a study, both by name; a plan may be a path too.
+    def plan_file(self, plan: str) -> Path:
+        """The file of a plan, which is known by its name or its path.
 
         Raises
         ------
         InputError
-            There is no such plan or study, or they do not fit together.
+            There is no such plan.
         """
         file = Path(plan) if plan.endswith(".yaml") else self.plans / f"{plan}.yaml"
         if not NAME.fullmatch(file.stem) or not file.is_file():
@@ -91,6 +91,17 @@ class Project:
                 limit=f"{choices(plan, known)}; or the path of a .yaml file",
                 remedy=f"choose one of these, or write one; its name has {NAME_LIMIT}",
             )
+        return file
+
+    def points(self, study: str, plan: str) -> Points:
+        """The points of a plan for a study, both by name; a plan may be a path too.
+
+        Raises
+        ------
+        InputError
+            There is no such plan or study, or they do not fit together.
+        """
+        file = self.plan_file(plan)
         return plan_points(read_plan(file), file, self.cases(study)[0])
 
     def results(self, study: str) -> Path:

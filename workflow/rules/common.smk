@@ -1,4 +1,5 @@
 # What the rules share: the study, its cases, the paths of its runs.
+import re
 from functools import cache
 from pathlib import Path
 from shlex import quote
@@ -9,7 +10,7 @@ from dragdeck.campaigns.restitution_drops import record_file
 from dragdeck.campaigns.stability_map import bed_names
 from dragdeck.campaigns.verification.suite import suite_of
 from dragdeck.decks.templates import environment, template_files
-from dragdeck.errors import DragdeckError
+from dragdeck.errors import DragdeckError, choices
 from dragdeck.outlook.timestep import largest_of_case
 from dragdeck.project import (
     PLACES,
@@ -18,12 +19,11 @@ from dragdeck.project import (
     by_run,
     run_path,
     study_templates,
-    workflow_settings,
 )
 from dragdeck.scenes.registry import SCENES
 from dragdeck.source_hash import source_hash
+from dragdeck.study.base import NAME, NAME_LIMIT
 from dragdeck.study.yaml import warnings
-
 
 
 def explained(function, *arguments):
@@ -34,11 +34,39 @@ def explained(function, *arguments):
         raise WorkflowError(str(error))
 
 
+# What --config may set; without a plan, each target has its own.
+DEFAULTS = {
+    "study": "uhlmann2015",
+    "fidelity": "",
+    "plan": "",
+    "stability_map": "studies/stability/map.yaml",
+}
+
+
+def refuse_setting(key, problem, limit):
+    """End the workflow because of a key or value of --config."""
+    raise WorkflowError(f"--config {key}={config[key]}: {problem}\n  limit:  {limit}")
+
+
+def check_settings():
+    """Refuse keys of --config that nothing reads, and values that no path or command can hold."""
+    for key, value in config.items():
+        if key not in DEFAULTS:
+            refuse_setting(key, "unknown key", choices(str(key), DEFAULTS))
+        file = key == "stability_map" or (key == "plan" and str(value).endswith(".yaml"))
+        if file and not re.fullmatch("[A-Za-z0-9._/-]+", str(value)):
+            refuse_setting(
+                key, "not the path of a file", "letters (a-z), digits, '.', '_', '-', '/'"
+            )
+        if not file and not NAME.fullmatch(str(value)):
+            refuse_setting(key, "not a name", NAME_LIMIT)
+
+
+check_settings()
 PROJECT = Project(Path(workflow.basedir))
-SETTINGS = explained(workflow_settings, config)
-STUDY, FIDELITY = SETTINGS["study"], SETTINGS["fidelity"]
-PLAN = SETTINGS["plan"] or "default"
-VALIDATION = SETTINGS["plan"] or "paper"
+STUDY, FIDELITY, PLAN, STABILITY_MAP = (str(config.get(*item)) for item in DEFAULTS.items())
+PLAN, VALIDATION = PLAN or "default", PLAN or "paper"
+explained(PROJECT.plan_file, PLAN)
 CASES = explained(PROJECT.cases, STUDY, FIDELITY or None)
 
 for WARNING in dict.fromkeys(text for case in CASES for text in warnings(case.study)):
@@ -231,8 +259,6 @@ def of_experiment(run, file):
 
 
 # --- stability map ----------------------------------------------------------------
-
-STABILITY_MAP = SETTINGS["stability_map"]
 
 
 def stability_templates():
