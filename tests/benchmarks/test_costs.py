@@ -38,7 +38,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
-from dragdeck.engine.batch import silent
+from dragdeck.engine.reports import silent
 from dragdeck.errors import DragdeckError, InputError
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import drop_scene

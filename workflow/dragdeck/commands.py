@@ -31,7 +31,7 @@ from dragdeck.decks.deck import StudyScene
 from dragdeck.decks.render import deck_text, write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
-from dragdeck.engine.watch import say
+from dragdeck.engine.reports import say
 from dragdeck.errors import InputError, together
 from dragdeck.outlook import bed as bed_outlook
 from dragdeck.outlook import timestep as timestep_outlook

@@ -21,9 +21,13 @@ from dragdeck.project import (
     study_templates,
 )
 from dragdeck.scenes.registry import SCENES
+from dragdeck.engine.reports import say
+from dragdeck.snakemake_lock import clear_stale_locks
 from dragdeck.source_hash import source_hash
 from dragdeck.study.base import NAME, NAME_LIMIT
 from dragdeck.study.yaml import warnings
+
+clear_stale_locks(Path(".snakemake"), say)
 
 
 def explained(function, *arguments):
