@@ -100,6 +100,7 @@ def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
         if not kind.single_particle and LAUNCHER_VARIABLE not in os.environ:
             check_ranks(case.ranks, case.file)
     except InputError as error:
+        error.file = error.file or case.file
         raise located(error) from None
     return replace(scene, warnings=[*warnings(case.study), *scene.warnings])
 

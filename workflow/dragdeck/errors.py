@@ -60,6 +60,11 @@ class InputError(DragdeckError):
     def __str__(self) -> str:
         return "\n".join([self._message(), *map(str, self.more)])
 
+    def parts(self) -> Sequence[InputError]:
+        """The error and the further ones, each by itself."""
+        every, self.more = (self, *self.more), ()
+        return every
+
     def _message(self) -> str:
         file = self.file if self.line is None else f"{self.file}:{self.line}"
         where = ": ".join(str(part) for part in (file, self.field) if part is not None)
@@ -75,8 +80,9 @@ class InputError(DragdeckError):
 
 def together(errors: Iterable[InputError]) -> InputError:
     """Several errors as one that names them all, each once; it has the fields of the first."""
-    first, *more = {str(error): error for error in errors}.values()
-    first.more = (*first.more, *more)
+    every = {str(one): one for error in errors for one in error.parts()}
+    first, *more = every.values()
+    first.more = more
     return first
 
 

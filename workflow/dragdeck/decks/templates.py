@@ -12,6 +12,7 @@ import resource
 import signal
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -225,7 +226,12 @@ def file_of(templates: jinja2.Environment, name: str) -> Path:
 def _parsed(templates: jinja2.Environment, name: str) -> nodes.Template:
     assert templates.loader is not None
     source, file, _ = templates.loader.get_source(templates, name)
-    return templates.parse(source, name, file)
+    return _tree(templates, source, name, file)
+
+
+@lru_cache(maxsize=64)
+def _tree(env: jinja2.Environment, source: str, name: str, file: str | None) -> nodes.Template:
+    return env.parse(source, name, file)
 
 
 def template_files(templates: jinja2.Environment, scene: str) -> list[Path]:

@@ -8,10 +8,7 @@ from itertools import product
 
 from dragdeck.errors import InputError, choices
 from dragdeck.study.base import flat
-from dragdeck.study.model import BUILT_IN_FIDELITIES, CylinderShape, Scaling, Study
-
-_MOST_FACETS = 1e6
-"""Facets of a generated mesh."""
+from dragdeck.study.model import BUILT_IN_FIDELITIES, Scaling, Study
 
 _NO_SWEEP = ("accepted", "assumptions", "reference", "scaling", "sweep", "title")
 """Blocks that no run depends on: cases that differ in them would be the same."""
@@ -26,7 +23,7 @@ _Found = Iterator[tuple[str, str, str]]
 def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
     """Every contradiction within a whole study, or one of its cases; the errors name no file."""
     values = flat(study.plain())
-    for check in (_names, _pairs, _motion, _facets, *([_sweep] if whole else [])):
+    for check in (_names, _pairs, _motion, *([_sweep] if whole else [])):
         for field, problem, limit in check(study):
             yield InputError(problem, field=field, value=values.get(field), limit=limit)
 
@@ -67,21 +64,6 @@ def _motion(study: Study) -> _Found:
     if study.outputs.network_hz < rate:
         problem = "not one frame of the contact network is written during the drag"
         yield "outputs.network_hz", problem, f"at least {rate:.3g} Hz; or use a longer path"
-
-
-def _facets(study: Study) -> _Found:
-    shape, bowl, media = study.workpiece.shape, study.bowl, study.media
-    facets = {}
-    if isinstance(shape, CylinderShape):
-        length = study.motion.immersion_depth_m + 8 * media.radius_mean_m
-        facet = shape.facet_size_m * shape.facet_length_m
-        facets["workpiece.shape.facet_size_m"] = 4 * math.pi * shape.radius_m * length / facet
-    if size := bowl.facet_size_m:
-        area = 2 * math.pi * bowl.radius_m * (2 * bowl.height_m + bowl.radius_m)
-        facets["bowl.facet_size_m"] = area / size**2
-    for field, count in facets.items():
-        if count > _MOST_FACETS:
-            yield field, f"a mesh of some {count:.1g} facets", f"at most {_MOST_FACETS:g} facets"
 
 
 def _sweep(study: Study) -> _Found:

@@ -46,7 +46,7 @@ class _Range:
 
 
 _RANGES = {
-    "media.count": _Range(1, 1, 2e6, 1e7, {}),
+    "media.count": _Range(1, 1, 1e6, 4e6, {}),
     "media.radius_mean_m": _Range(1e-5, 1e-4, 0.02, 0.1, _LENGTH),
     "bowl.radius_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
     "bowl.height_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),

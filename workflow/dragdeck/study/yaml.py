@@ -134,12 +134,14 @@ def validate(data: Mapping[str, Any], file: Path | str, *, whole: bool = False) 
         study = Study.model_validate(data)
     except ValidationError as error:
         found = _problems(error)
-    known = {error.field for error in found}
-    found += [error for error, refused in implausible(data) if refused and error.field not in known]
-    if study is not None:
-        found += contradictions(study, whole)
-    if study is None or found:
-        raise _of_file(found, file)
+    wrong = {error.field for error in found}
+    doubts = [row for row in implausible(data) if row[0].field not in wrong]
+    found += [error for error, _ in doubts]
+    doubtful = {error.field for error in found}
+    others = contradictions(study, whole) if study else iter(())
+    more = [error for error in others if error.field not in doubtful]
+    if study is None or more or any(refused for _, refused in doubts):
+        raise _of_file([*found, *more], file)
     return study
 
 
