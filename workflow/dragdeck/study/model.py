@@ -167,7 +167,9 @@ class DropTest(Model):
 class Calibration(Model):
     """A measured drop test, to find the restitution of particle on workpiece material."""
 
-    record: Line = Field(description="CSV of force against time; relative to the study's folder")
+    record: Line = Field(
+        pattern=r"^[^{}]*$", description="CSV of force against time; relative to the study's folder"
+    )
     height_std_m: Positive = Field(
         default=1e-4, description="standard uncertainty of drop_test.height_m in the test, m"
     )
