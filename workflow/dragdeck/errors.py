@@ -60,11 +60,6 @@ class InputError(DragdeckError):
     def __str__(self) -> str:
         return "\n".join([self._message(), *map(str, self.more)])
 
-    def parts(self) -> Sequence[InputError]:
-        """The error and the further ones, each by itself."""
-        every, self.more = (self, *self.more), ()
-        return every
-
     def _message(self) -> str:
         file = self.file if self.line is None else f"{self.file}:{self.line}"
         where = ": ".join(str(part) for part in (file, self.field) if part is not None)
@@ -80,9 +75,11 @@ class InputError(DragdeckError):
 
 def together(errors: Iterable[InputError]) -> InputError:
     """Several errors as one that names them all, each once; it has the fields of the first."""
-    every = {str(one): one for error in errors for one in error.parts()}
+    every = {one._message(): one for error in errors for one in (error, *error.more)}
     first, *more = every.values()
     first.more = more
+    for one in more:
+        one.more = ()
     return first
 
 

@@ -129,7 +129,7 @@ def test_problems_of_all_cases_are_named_together(
     small["sweep"] = {"motion.speed_m_s": [0.01, -1, -2], "seed": [1, -3]}
     with pytest.raises(InputError) as caught:
         load_cases(write_study(small))
-    values = [error.value for error in caught.value.parts()]
+    values = [error.value for error in (caught.value, *caught.value.more)]
     assert sorted(map(str, values)) == ["-1", "-2", "-3"]
 
 
