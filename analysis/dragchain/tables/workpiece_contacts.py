@@ -3,6 +3,9 @@
 ``workpiece_contacts`` says where the particles touch the workpiece, but its forces are
 evaluated a second time for output; ``workpiece_particles`` says what force each particle
 received. One `WorkpieceFrame` joins the two for one step.
+
+LIGGGHTS counts a particle over a convex edge twice, once for each facet. `_merged` makes one
+contact of those of a particle that lie within one contact patch.
 """
 
 from __future__ import annotations
@@ -13,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
+from dragchain.contact_law.coulomb import within_friction
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
+from dragchain.run.case import Case, friction_with
 from dragchain.tables.columns import CENTRE, FORCES, POINT, SPIN, VELOCITY
 
 _BOWL_MESH = 1
@@ -32,7 +37,8 @@ class WallContacts:
     point_m : (N, 3) ndarray
         Contact point.
     force_n, evaluated_n : (N, 3) ndarray
-        Force on the particle as applied, and as the engine evaluated it for output.
+        Force on the particle as applied, and as the engine evaluated it for output, its
+        tangential part within the limit of friction.
     normal : (N, 3) ndarray
         Unit vector from the contact point to the particle's centre; zero where the
         particle received no force, because no centre is written then.
@@ -88,6 +94,8 @@ class WorkpieceFrame:
         Forces applied to particles for which no contact was written.
     opening : bool
         Whether its forces may have been evaluated anew; see `Frame`.
+    merged : int
+        Contacts on the workpiece that were made part of another one of their particle.
     """
 
     step: int
@@ -95,6 +103,20 @@ class WorkpieceFrame:
     bowl: WallContacts
     unplaced_n: Floats
     opening: bool
+    merged: int = 0
+
+
+@dataclass(frozen=True)
+class WallFriction:
+    """Coefficients of friction of a particle with workpiece and bowl."""
+
+    workpiece: float
+    bowl: float
+
+    @classmethod
+    def of(cls, case: Case) -> WallFriction:
+        """Those of a process."""
+        return cls(friction_with(case, "workpiece"), friction_with(case, "bowl"))
 
 
 def tangential_force(force_n: Floats, normal: Floats) -> Floats:
@@ -103,11 +125,14 @@ def tangential_force(force_n: Floats, normal: Floats) -> Floats:
     return np.asarray(np.linalg.norm(force_n - along, axis=1))
 
 
-def join_workpiece_frame(particles: Frame, contacts: Frame) -> WorkpieceFrame:
+def join_workpiece_frame(
+    particles: Frame, contacts: Frame, friction: WallFriction
+) -> WorkpieceFrame:
     """Give every contact the force that its particle received.
 
-    The force of a particle with one contact is that contact's. A particle with k
-    contacts received A in all while E_1 ... E_k were evaluated for output:
+    The evaluated forces are cut to the limit of friction, and the contacts of a particle within
+    one contact patch become one. The force of a particle with one contact is that contact's. A
+    particle with k contacts received A in all while E_1 ... E_k were evaluated for output:
     contact i gets E_i + (A - sum of E) / k, so that the contacts of a particle add
     up to what moved it.
 
@@ -115,6 +140,8 @@ def join_workpiece_frame(particles: Frame, contacts: Frame) -> WorkpieceFrame:
     ----------
     particles, contacts : Frame
         ``workpiece_particles`` and ``workpiece_contacts`` of one step.
+    friction : WallFriction
+        Coefficients of friction.
 
     Returns
     -------
@@ -139,27 +166,98 @@ def join_workpiece_frame(particles: Frame, contacts: Frame) -> WorkpieceFrame:
         raise TableError(
             f"step {particles.step}: workpiece_particles holds a particle more than once"
         )
+    written = np.count_nonzero(~_on_bowl(contacts))
+    contacts = _merged(_within_friction(contacts, pushed, friction), pushed)
     contacts = contacts.take(np.lexsort((contacts.ids("facet_id"), contacts.ids("particle_id"))))
     all_contacts = _place(contacts, pushed)
     unplaced = np.ones(len(known), dtype=np.bool_)
     unplaced[np.searchsorted(known, all_contacts.particle_id[~all_contacts.silent])] = False
-    on_bowl = contacts.columns.get("mesh_id", np.zeros(contacts.rows)) == _BOWL_MESH
+    on_bowl = _on_bowl(contacts)
     return WorkpieceFrame(
         particles.step,
         all_contacts.select(~on_bowl),
         all_contacts.select(on_bowl),
         pushed.vectors(*FORCES)[unplaced],
         particles.opening,
+        written - np.count_nonzero(~on_bowl),
     )
+
+
+def _on_bowl(contacts: Frame) -> NDArray[np.bool_]:
+    return np.asarray(contacts.columns.get("mesh_id", np.zeros(contacts.rows)) == _BOWL_MESH)
+
+
+def _rows_of(contacts: Frame, particles: Frame) -> tuple[NDArray[np.bool_], Ints]:
+    """Which contacts (N,) are of particles that received a force, and the rows of those."""
+    known, ids = particles.ids("particle_id"), contacts.ids("particle_id")
+    at = np.searchsorted(known, ids)
+    loud = np.append(known, 0)[at] == ids
+    return loud, at[loud]
+
+
+def _within_friction(contacts: Frame, particles: Frame, friction: WallFriction) -> Frame:
+    """Cut the evaluated forces on particles that received one; see `within_friction`."""
+    loud, at = _rows_of(contacts, particles)
+    forces, points = contacts.vectors(*FORCES), contacts.vectors(*POINT)
+    normal = _unit(particles.vectors(*CENTRE)[at] - points[loud])
+    limit = np.where(_on_bowl(contacts)[loud], friction.bowl, friction.workpiece)
+    forces[loud], _ = within_friction(forces[loud], normal, limit)
+    return contacts.replaced(FORCES, forces)
+
+
+def _merged(contacts: Frame, particles: Frame) -> Frame:
+    """Make one contact of those of a particle that lie within one contact patch.
+
+    A sphere of radius R that overlaps a plane by d meets it in a circle of radius sqrt(2 R d).
+    Over a convex edge LIGGGHTS finds a second contact in this circle: the point of the edge next
+    to the sphere. The deepest contact keeps its facet and overlap and gets the sum of the forces.
+    Its point moves within its plane to the mean of the points, weighted by d^(3/2) as Hertz's
+    forces are. Contacts farther apart, as in a groove, stay separate.
+    """
+    overlap, body = contacts.columns["overlap_m"], _on_bowl(contacts)
+    contacts = contacts.take(np.lexsort((-overlap, body, contacts.ids("particle_id"))))
+    loud, at = _rows_of(contacts, particles)
+    points, overlap = contacts.vectors(*POINT), np.maximum(contacts.columns["overlap_m"], 1e-30)
+    patch = np.full(contacts.rows, -1.0)
+    patch[loud] = 2.0 * particles.columns["radius_m"][at] * overlap[loud]
+    head = _heads(contacts.ids("particle_id"), _on_bowl(contacts), points, patch)
+    kept, slot = np.unique(head, return_inverse=True)
+    if len(kept) == contacts.rows:
+        return contacts
+    weight = overlap**1.5
+    moved = weight[:, None] * (points - points[head])
+    moved = _sums(slot, moved, len(kept)) / np.bincount(slot, weight)[:, None]
+    several = np.bincount(slot) > 1
+    centre = np.zeros_like(points)
+    centre[loud] = particles.vectors(*CENTRE)[at]
+    normal = _unit((centre[kept] - points[kept])[several])
+    moved[several] -= np.einsum("ij,ij->i", moved[several], normal)[:, None] * normal
+    merged = contacts.take(kept).replaced(POINT, points[kept] + moved)
+    return merged.replaced(FORCES, _sums(slot, contacts.vectors(*FORCES), len(kept)))
+
+
+def _heads(particle_id: Ints, body: NDArray[np.bool_], points: Floats, patch_m2: Floats) -> Ints:
+    """The contact whose patch each of (N,) contacts lies in, itself if in none.
+
+    The contacts of a particle with a body follow each other, deepest first.
+    """
+    own = np.arange(len(points))
+    new = np.r_[True, (np.diff(particle_id) != 0) | np.diff(body)][: len(points)]
+    rank = own - np.maximum.accumulate(np.where(new, own, 0))
+    head = own.copy()
+    for place in range(1, rank.max(initial=0) + 1):
+        for ahead in range(place, 0, -1):
+            rows = np.flatnonzero((rank == place) & (head == own))
+            others = rows - ahead
+            apart = np.square(points[rows] - points[others]).sum(axis=1)
+            inside = (head[others] == others) & (apart <= patch_m2[others])
+            head[rows[inside]] = others[inside]
+    return head
 
 
 def _place(contacts: Frame, particles: Frame) -> WallContacts:
     """Join contacts with the particles that received a force, sorted by their ids."""
-    known, ids = particles.ids("particle_id"), contacts.ids("particle_id")
-    at = np.searchsorted(known, ids)
-    silent = np.append(known, 0)[at] != ids
-    loud = ~silent
-    at = at[loud]
+    loud, at = _rows_of(contacts, particles)
     evaluated, points = contacts.vectors(*FORCES), contacts.vectors(*POINT)
     force, normal = np.zeros_like(evaluated), np.zeros_like(evaluated)
     surface = np.full_like(evaluated, np.nan)
@@ -170,7 +268,7 @@ def _place(contacts: Frame, particles: Frame) -> WallContacts:
         turning = np.cross(particles.vectors(*SPIN)[at], points[loud] - centre)
         surface[loud] = particles.vectors(*VELOCITY)[at] + turning
     return WallContacts(
-        particle_id=ids,
+        particle_id=contacts.ids("particle_id"),
         facet_id=contacts.ids("facet_id"),
         point_m=points,
         force_n=force,
@@ -178,16 +276,19 @@ def _place(contacts: Frame, particles: Frame) -> WallContacts:
         normal=normal,
         surface_m_s=surface,
         overlap_m=np.asarray(contacts.columns["overlap_m"], dtype=np.float64),
-        silent=silent,
+        silent=~loud,
     )
+
+
+def _sums(at: Ints, vectors: Floats, count: int) -> Floats:
+    """Sums of (N, 3) vectors by row, (count, 3)."""
+    return np.column_stack([np.bincount(at, column, count) for column in vectors.T])
 
 
 def _fraction(evaluated: Floats, at: Ints, applied: Floats) -> Floats:
     """Correct (N, 3) evaluated forces to add up to (K, 3) applied ones, particle by particle."""
     count = np.bincount(at, minlength=len(applied))
-    total = np.column_stack(
-        [np.bincount(at, weights=evaluated[:, k], minlength=len(applied)) for k in range(3)]
-    )
+    total = _sums(at, evaluated, len(applied))
     missing = (applied - total)[at] / count[at][:, None]
     return np.where(count[at][:, None] == 1, applied[at], evaluated + missing)
 
