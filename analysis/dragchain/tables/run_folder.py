@@ -31,9 +31,9 @@ class WorkpiecePair:
         """The step."""
         return self.particles.step
 
-    def join(self) -> WorkpieceFrame:
+    def join(self, *, merge: bool = True) -> WorkpieceFrame:
         """Give every contact the force that its particle received; see `join_workpiece_frame`."""
-        return join_workpiece_frame(self.particles, self.contacts, self.friction)
+        return join_workpiece_frame(self.particles, self.contacts, self.friction, merge=merge)
 
 
 @dataclass(frozen=True)

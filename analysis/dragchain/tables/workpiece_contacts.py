@@ -126,7 +126,7 @@ def tangential_force(force_n: Floats, normal: Floats) -> Floats:
 
 
 def join_workpiece_frame(
-    particles: Frame, contacts: Frame, friction: WallFriction
+    particles: Frame, contacts: Frame, friction: WallFriction, *, merge: bool = True
 ) -> WorkpieceFrame:
     """Give every contact the force that its particle received.
 
@@ -142,6 +142,8 @@ def join_workpiece_frame(
         ``workpiece_particles`` and ``workpiece_contacts`` of one step.
     friction : WallFriction
         Coefficients of friction.
+    merge : bool
+        False for the contacts as LIGGGHTS counts them.
 
     Returns
     -------
@@ -166,8 +168,10 @@ def join_workpiece_frame(
         raise TableError(
             f"step {particles.step}: workpiece_particles holds a particle more than once"
         )
-    written = np.count_nonzero(~_on_bowl(contacts))
-    contacts = _merged(_within_friction(contacts, pushed, friction), pushed)
+    written = int(np.count_nonzero(~_on_bowl(contacts)))
+    contacts = _within_friction(contacts, pushed, friction)
+    if merge:
+        contacts = _merged(contacts, pushed)
     contacts = contacts.take(np.lexsort((contacts.ids("facet_id"), contacts.ids("particle_id"))))
     all_contacts = _place(contacts, pushed)
     unplaced = np.ones(len(known), dtype=np.bool_)
@@ -179,7 +183,7 @@ def join_workpiece_frame(
         all_contacts.select(on_bowl),
         pushed.vectors(*FORCES)[unplaced],
         particles.opening,
-        written - np.count_nonzero(~on_bowl),
+        written - int(np.count_nonzero(~on_bowl)),
     )
 
 
