@@ -22,6 +22,8 @@ from dragchain.errors import TableError
 from dragchain.run.case import Case, friction_with
 from dragchain.tables.columns import CENTRE, FORCES, POINT, SPIN, VELOCITY
 
+_NORMAL = ("normal_x", "normal_y", "normal_z")
+
 _BOWL_MESH = 1
 """``mesh_id`` of a contact when the bowl is a mesh too."""
 
@@ -40,8 +42,8 @@ class WallContacts:
         Force on the particle as applied, and as the engine evaluated it for output, its
         tangential part within the limit of friction.
     normal : (N, 3) ndarray
-        Unit vector from the contact point to the particle's centre; zero where the
-        particle received no force, because no centre is written then.
+        Unit vector from the contact point to the particle's centre, the mean of several merged
+        contacts; zero where the particle received no force, because no centre is written then.
     surface_m_s : (N, 3) ndarray
         Velocity of the particle's surface at the contact point, v + w x r with r
         from the particle's centre; NaN where the particle received no force, and
@@ -200,13 +202,14 @@ def _rows_of(contacts: Frame, particles: Frame) -> tuple[NDArray[np.bool_], Ints
 
 
 def _within_friction(contacts: Frame, particles: Frame, friction: WallFriction) -> Frame:
-    """Cut the evaluated forces on particles that received one; see `within_friction`."""
+    """Add the normals, and cut the evaluated forces on particles that received one."""
     loud, at = _rows_of(contacts, particles)
     forces, points = contacts.vectors(*FORCES), contacts.vectors(*POINT)
-    normal = _unit(particles.vectors(*CENTRE)[at] - points[loud])
+    normal = np.zeros_like(points)
+    normal[loud] = _unit(particles.vectors(*CENTRE)[at] - points[loud])
     limit = np.where(_on_bowl(contacts)[loud], friction.bowl, friction.workpiece)
-    forces[loud], _ = within_friction(forces[loud], normal, limit)
-    return contacts.replaced(FORCES, forces)
+    forces[loud], _ = within_friction(forces[loud], normal[loud], limit)
+    return contacts.replaced((*FORCES, *_NORMAL), np.column_stack([forces, normal]))
 
 
 def _merged(contacts: Frame, particles: Frame) -> Frame:
@@ -214,30 +217,26 @@ def _merged(contacts: Frame, particles: Frame) -> Frame:
 
     A sphere of radius R that overlaps a plane by d meets it in a circle of radius sqrt(2 R d).
     Over a convex edge LIGGGHTS finds a second contact in this circle: the point of the edge next
-    to the sphere. The deepest contact keeps its facet and overlap and gets the sum of the forces.
-    Its point moves within its plane to the mean of the points, weighted by d^(3/2) as Hertz's
-    forces are. Contacts farther apart, as in a groove, stay separate.
+    to the sphere. The deepest contact keeps point, facet and overlap and gets the sum of the
+    forces. Its normal is the mean of the normals, weighted by d^(3/2) as Hertz's forces are.
+    Contacts farther apart, as in a groove, stay separate.
     """
-    overlap, body = contacts.columns["overlap_m"], _on_bowl(contacts)
-    contacts = contacts.take(np.lexsort((-overlap, body, contacts.ids("particle_id"))))
+    depth, body = contacts.columns["overlap_m"], _on_bowl(contacts)
+    contacts = contacts.take(np.lexsort((-depth, body, contacts.ids("particle_id"))))
     loud, at = _rows_of(contacts, particles)
-    points, overlap = contacts.vectors(*POINT), np.maximum(contacts.columns["overlap_m"], 1e-30)
+    overlap = np.maximum(contacts.columns["overlap_m"], 0.0)
     patch = np.full(contacts.rows, -1.0)
     patch[loud] = 2.0 * particles.columns["radius_m"][at] * overlap[loud]
+    points = contacts.vectors(*POINT)
     head = _heads(contacts.ids("particle_id"), _on_bowl(contacts), points, patch)
     kept, slot = np.unique(head, return_inverse=True)
-    if len(kept) == contacts.rows:
-        return contacts
-    weight = overlap**1.5
-    moved = weight[:, None] * (points - points[head])
-    moved = _sums(slot, moved, len(kept)) / np.bincount(slot, weight)[:, None]
     several = np.bincount(slot) > 1
-    centre = np.zeros_like(points)
-    centre[loud] = particles.vectors(*CENTRE)[at]
-    normal = _unit((centre[kept] - points[kept])[several])
-    moved[several] -= np.einsum("ij,ij->i", moved[several], normal)[:, None] * normal
-    merged = contacts.take(kept).replaced(POINT, points[kept] + moved)
-    return merged.replaced(FORCES, _sums(slot, contacts.vectors(*FORCES), len(kept)))
+    forces, normals = contacts.vectors(*FORCES), contacts.vectors(*_NORMAL)
+    mean = _sums(slot, overlap[:, None] ** 1.5 * normals, len(kept))
+    normal = normals[kept]
+    normal[several] = _unit(mean[several])
+    both = np.column_stack([_sums(slot, forces, len(kept)), normal])
+    return contacts.take(kept).replaced((*FORCES, *_NORMAL), both)
 
 
 def _heads(particle_id: Ints, body: NDArray[np.bool_], points: Floats, patch_m2: Floats) -> Ints:
@@ -263,11 +262,10 @@ def _place(contacts: Frame, particles: Frame) -> WallContacts:
     """Join contacts with the particles that received a force, sorted by their ids."""
     loud, at = _rows_of(contacts, particles)
     evaluated, points = contacts.vectors(*FORCES), contacts.vectors(*POINT)
-    force, normal = np.zeros_like(evaluated), np.zeros_like(evaluated)
+    force = np.zeros_like(evaluated)
     surface = np.full_like(evaluated, np.nan)
     centre = particles.vectors(*CENTRE)[at]
     force[loud] = _fraction(evaluated[loud], at, particles.vectors(*FORCES))
-    normal[loud] = _unit(centre - points[loud])
     if {*VELOCITY, *SPIN} <= particles.columns.keys():
         turning = np.cross(particles.vectors(*SPIN)[at], points[loud] - centre)
         surface[loud] = particles.vectors(*VELOCITY)[at] + turning
@@ -277,7 +275,7 @@ def _place(contacts: Frame, particles: Frame) -> WallContacts:
         point_m=points,
         force_n=force,
         evaluated_n=evaluated,
-        normal=normal,
+        normal=contacts.vectors(*_NORMAL),
         surface_m_s=surface,
         overlap_m=np.asarray(contacts.columns["overlap_m"], dtype=np.float64),
         silent=~loud,
