@@ -136,9 +136,9 @@ def unbalanced(folder: Path, friction: float) -> np.ndarray:
 def test_contact_forces_weight_and_inertia_of_every_particle_balance(finished: Path) -> None:
     """What is left is the damping of half a step; the dumped forces alone miss by far more."""
     (folder,) = (finished / "results/small/process").glob("*0.016*")
-    cut, written = (np.quantile(unbalanced(folder, mu), [0.5, 0.9]) for mu in (0.34, 1e9))
-    assert 0.0 < cut[0] < 0.02
-    assert (cut < 0.5 * written).all()
+    cut, written = (np.quantile(unbalanced(folder, mu), 0.9) for mu in (0.34, 1e9))
+    assert cut < 0.02
+    assert cut < 0.25 * written
 
 
 def test_all_contact_columns_would_give_the_same_tables(finished: Path, tmp_path: Path) -> None:
