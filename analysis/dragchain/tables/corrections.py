@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -13,6 +12,11 @@ from dragchain.tables.network_contacts import KINDS, ContactRows
 
 _ROUNDING = 1e-6
 """A force above the limit by this fraction is rounded, not cut."""
+
+_COUNTS = (
+    *("particle_contacts", "cut", "strong_contacts", "strong_cut"),
+    *("workpiece_contacts", "merged"),
+)
 
 
 class Corrections(Document):
@@ -26,11 +30,11 @@ class Corrections(Document):
         Contacts between particles, and those with a tangential force above the limit of friction.
     strong_contacts, strong_cut : int
         The same of contacts whose normal force is above the mean of their frame.
-    removed_fraction : float
-        What was cut off, over the sum of the tangential forces as written.
     workpiece_contacts, merged : int
         Contacts on the workpiece, and those that became part of another one; the sum of both was
         written.
+    removed_fraction : float
+        What was cut off, over the sum of the tangential forces between particles as written.
     """
 
     made_by: ClassVar[str] = "dragchain tables"
@@ -40,49 +44,31 @@ class Corrections(Document):
     cut: int
     strong_contacts: int
     strong_cut: int
-    removed_fraction: float
     workpiece_contacts: int
     merged: int
+    removed_fraction: float
+
+    @classmethod
+    def of(cls, friction: float, sums: Floats) -> Self:
+        """The document of the sums of `count_corrections`."""
+        counts = dict(zip(_COUNTS, sums[:6].astype(int).tolist(), strict=True))
+        fraction = float(sums[6] / sums[7]) if sums[7] else 0.0
+        return cls(friction=friction, **counts, removed_fraction=fraction)
 
 
-@dataclass
-class Corrector:
-    """Collects the corrections frame by frame.
+def count_corrections(rows: ContactRows, merged: int) -> Floats:
+    """The counts of one frame as `Corrections` has them, and tangential force removed and written.
 
-    Parameters
-    ----------
-    friction : float
-        Coefficient of friction between particles.
+    Returns
+    -------
+    (8,) ndarray
+        Sums of frames are those of a run.
     """
-
-    friction: float
-    _counts: Floats = field(default_factory=lambda: np.zeros(6))
-    _forces_n: Floats = field(default_factory=lambda: np.zeros(2))
-
-    def add(self, rows: ContactRows, workpiece_contacts: int, merged: int) -> None:
-        """Take in the contacts of one frame."""
-        between = rows.kind == KINDS.index("particle-particle")
-        normal, left, removed = (
-            values[between]
-            for values in (rows.normal_force_n, rows.tangential_force_n, rows.removed_n)
-        )
-        cut = removed > _ROUNDING * left
-        strong = normal > normal.mean() if len(normal) else cut
-        counts = [len(cut), cut.sum(), strong.sum(), (cut & strong).sum()]
-        self._counts += [*counts, workpiece_contacts, merged]
-        self._forces_n += [removed.sum(), (removed + left).sum()]
-
-    def record(self) -> Corrections:
-        """The content of ``corrections.json``."""
-        removed, written = self._forces_n
-        contacts, cut, strong, strong_cut, on_workpiece, merged = self._counts.astype(int).tolist()
-        return Corrections(
-            friction=self.friction,
-            particle_contacts=contacts,
-            cut=cut,
-            strong_contacts=strong,
-            strong_cut=strong_cut,
-            removed_fraction=float(removed / written) if written else 0.0,
-            workpiece_contacts=on_workpiece,
-            merged=merged,
-        )
+    between, on_workpiece = (
+        rows.kind == KINDS.index(f"particle-{body}") for body in ("particle", "workpiece")
+    )
+    left, removed = rows.tangential_force_n[between], rows.removed_n[between]
+    cut, normal = removed > _ROUNDING * left, rows.normal_force_n[between]
+    strong = normal > normal.mean() if len(normal) else cut
+    counts = [len(cut), cut.sum(), strong.sum(), (cut & strong).sum(), on_workpiece.sum(), merged]
+    return np.array([*counts, removed.sum(), (removed + left).sum()], dtype=np.float64)

@@ -10,12 +10,8 @@ from pathlib import Path
 from dragchain.dumps.frame import Columns, Frame
 from dragchain.dumps.run_parts import iter_frames, iter_prints
 from dragchain.errors import TableError
-from dragchain.run.case import Case, Output, load_case, load_outputs
-from dragchain.tables.workpiece_contacts import (
-    WallFriction,
-    WorkpieceFrame,
-    join_workpiece_frame,
-)
+from dragchain.run.case import Case, Output, friction_with, load_case, load_outputs
+from dragchain.tables.workpiece_contacts import WorkpieceFrame, join_workpiece_frame
 
 
 @dataclass(frozen=True)
@@ -24,7 +20,7 @@ class WorkpiecePair:
 
     particles: Frame
     contacts: Frame
-    friction: WallFriction
+    friction: tuple[float, float]
 
     @property
     def step(self) -> int:
@@ -77,7 +73,7 @@ class Run:
 
     def workpiece_pairs(self) -> Iterator[WorkpiecePair]:
         """What `workpiece_frames` joins, for those who need some steps only."""
-        friction = WallFriction.of(self.case)
+        friction = friction_with(self.case, "workpiece"), friction_with(self.case, "bowl")
         pairs = zip_longest(self.frames("workpiece_particles"), self.frames("workpiece_contacts"))
         for particles, contacts in pairs:
             if particles is None or contacts is None:

@@ -19,7 +19,6 @@ from dragchain.arrays import Floats, Ints
 from dragchain.contact_law.coulomb import within_friction
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
-from dragchain.run.case import Case, friction_with
 from dragchain.tables.columns import CENTRE, FORCES, POINT, SPIN, VELOCITY
 
 _NORMAL = ("normal_x", "normal_y", "normal_z")
@@ -108,19 +107,6 @@ class WorkpieceFrame:
     merged: int = 0
 
 
-@dataclass(frozen=True)
-class WallFriction:
-    """Coefficients of friction of a particle with workpiece and bowl."""
-
-    workpiece: float
-    bowl: float
-
-    @classmethod
-    def of(cls, case: Case) -> WallFriction:
-        """Those of a process."""
-        return cls(friction_with(case, "workpiece"), friction_with(case, "bowl"))
-
-
 def tangential_force(force_n: Floats, normal: Floats) -> Floats:
     """Magnitude of the part of (N, 3) forces that is normal to (N, 3) unit vectors."""
     along = np.einsum("ij,ij->i", force_n, normal)[:, None] * normal
@@ -128,7 +114,7 @@ def tangential_force(force_n: Floats, normal: Floats) -> Floats:
 
 
 def join_workpiece_frame(
-    particles: Frame, contacts: Frame, friction: WallFriction, *, merge: bool = True
+    particles: Frame, contacts: Frame, friction: tuple[float, float], *, merge: bool = True
 ) -> WorkpieceFrame:
     """Give every contact the force that its particle received.
 
@@ -142,8 +128,8 @@ def join_workpiece_frame(
     ----------
     particles, contacts : Frame
         ``workpiece_particles`` and ``workpiece_contacts`` of one step.
-    friction : WallFriction
-        Coefficients of friction.
+    friction : (float, float)
+        Coefficients of friction of a particle with workpiece and bowl.
     merge : bool
         False for the contacts as LIGGGHTS counts them.
 
@@ -201,13 +187,13 @@ def _rows_of(contacts: Frame, particles: Frame) -> tuple[NDArray[np.bool_], Ints
     return loud, at[loud]
 
 
-def _within_friction(contacts: Frame, particles: Frame, friction: WallFriction) -> Frame:
+def _within_friction(contacts: Frame, particles: Frame, friction: tuple[float, float]) -> Frame:
     """Add the normals, and cut the evaluated forces on particles that received one."""
     loud, at = _rows_of(contacts, particles)
     forces, points = contacts.vectors(*FORCES), contacts.vectors(*POINT)
     normal = np.zeros_like(points)
     normal[loud] = _unit(particles.vectors(*CENTRE)[at] - points[loud])
-    limit = np.where(_on_bowl(contacts)[loud], friction.bowl, friction.workpiece)
+    limit = np.array(friction)[_on_bowl(contacts)[loud].astype(int)]
     forces[loud], _ = within_friction(forces[loud], normal[loud], limit)
     return contacts.replaced((*FORCES, *_NORMAL), np.column_stack([forces, normal]))
 

@@ -37,7 +37,7 @@ from dragchain.tables.columns import (
     WORKPIECE_CONTACTS,
     WORKPIECE_FORCE,
 )
-from dragchain.tables.corrections import Corrector
+from dragchain.tables.corrections import Corrections, count_corrections
 from dragchain.tables.impacts import find_impacts
 from dragchain.tables.network_contacts import KINDS, ContactRows, contact_rows
 from dragchain.tables.parquet import Rows, category, table_writer
@@ -279,16 +279,16 @@ def _write_particles(run: Run, file: Path) -> None:
 def _write_contacts(run: Run, file: Path) -> None:
     bowl_radius = needed(run.case.bowl, "bowl").radius_m
     particles, pairs = run.frames("particles"), run.workpiece_pairs()
-    corrector = Corrector(friction_with(run.case, "media"))
+    friction, corrected = friction_with(run.case, "media"), np.zeros(8)
     with table_writer(file, CONTACTS) as table:
         for frame in run.frames("contacts"):
             workpiece = _frame_at(pairs, frame.step, "workpiece_contacts").join()
             beside = _frame_at(particles, frame.step, "particles")
             touching = workpiece.workpiece, workpiece.bowl
-            rows = contact_rows(beside, frame, *touching, bowl_radius, corrector.friction)
-            corrector.add(rows, len(workpiece.workpiece), workpiece.merged)
+            rows = contact_rows(beside, frame, *touching, bowl_radius, friction)
+            corrected += count_corrections(rows, workpiece.merged)
             table.write(_contact_columns(frame.step, rows, run.case))
-    corrector.record().write(run.table("corrections.json"))
+    Corrections.of(friction, corrected).write(run.table("corrections.json"))
 
 
 class _Stepped(Protocol):

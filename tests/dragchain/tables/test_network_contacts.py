@@ -5,7 +5,7 @@ import pytest
 
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
-from dragchain.tables.corrections import Corrector
+from dragchain.tables.corrections import Corrections, count_corrections
 from dragchain.tables.network_contacts import KINDS, contact_rows
 from dragchain.tables.workpiece_contacts import WallContacts
 
@@ -79,20 +79,17 @@ def test_corrections_count_what_was_cut() -> None:
     """Normal forces 3 and 1: the mean is 2; the first is above it and cut, the second neither."""
     particles = [[1, 0, 0, 5, 2, *CALM], [2, 2.9, 0, 5, 1, *CALM], [3, 5.8, 0, 5, 2, *CALM]]
     contacts = [[1, 2, -3, 0, 4, 0.1], [2, 3, -1, 0, 0.5, 0.1]]
-    corrector = Corrector(0.5)
-    for _ in range(2):
-        corrector.add(rows_of(particles, contacts, friction=0.5), 9, 1)
-    found = corrector.record()
+    on_rod = wall([[1, 0, 5]], [[2, 0, 1]], [[1, 0, 0]], [False])
+    rows = rows_of(particles, contacts, workpiece=on_rod, friction=0.5)
+    found = Corrections.of(0.5, 2 * count_corrections(rows, 3))
     assert (found.particle_contacts, found.cut) == (4, 2)
     assert (found.strong_contacts, found.strong_cut) == (2, 2)
     assert found.removed_fraction == pytest.approx(2.5 / 4.5)
-    assert (found.workpiece_contacts, found.merged) == (18, 2)
+    assert (found.workpiece_contacts, found.merged) == (2, 6)
 
 
 def test_a_frame_without_contacts_corrects_nothing() -> None:
-    corrector = Corrector(0.5)
-    corrector.add(rows_of([]), 0, 0)
-    assert corrector.record().removed_fraction == 0
+    assert Corrections.of(0.5, count_corrections(rows_of([]), 0)).removed_fraction == 0
 
 
 def test_a_contact_seen_from_the_other_particle_is_the_same() -> None:

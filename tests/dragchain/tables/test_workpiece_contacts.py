@@ -8,7 +8,7 @@ from hypothesis.extra import numpy as arrays
 
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
-from dragchain.tables.workpiece_contacts import WallFriction, WorkpieceFrame, join_workpiece_frame
+from dragchain.tables.workpiece_contacts import WorkpieceFrame, join_workpiece_frame
 
 PARTICLES = ("particle_id", "x_m", "y_m", "z_m", "radius_m", "force_x_n", "force_y_n", "force_z_n")
 CONTACTS = (
@@ -27,7 +27,7 @@ def frame(names, rows, step=100):
 
 
 def joined_of(particles: Frame, contacts: Frame, friction: float = 10.0) -> WorkpieceFrame:
-    return join_workpiece_frame(particles, contacts, WallFriction(friction, friction))
+    return join_workpiece_frame(particles, contacts, (friction, friction))
 
 
 def test_a_single_contact_takes_the_applied_force() -> None:
