@@ -11,7 +11,7 @@ import jinja2
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.engine_commands import leaving_folder
-from dragdeck.decks.outputs import ColumnsFile
+from dragdeck.decks.outputs import ColumnsFile, in_writing_order
 from dragdeck.decks.templates import explained, file_of, used
 from dragdeck.errors import InputError
 from dragdeck.files import file_checksum, replace_text
@@ -30,7 +30,8 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
     with explained():
         template = templates.get_template(scene.template)
         names = "templates: " + ", ".join(used(templates, scene.template))
-        text = template.render(deck=replace(scene.deck, templates=names))
+        outputs = in_writing_order(scene.deck.outputs)
+        text = template.render(deck=replace(scene.deck, templates=names, outputs=outputs))
     for command, why in leaving_folder(text, scene.deck.source):
         raise InputError(
             f"the input script would {why}",
