@@ -40,7 +40,12 @@ from dragdeck.scenes.filling import (
 )
 from dragdeck.scenes.motion import Leg, farthest_reach, legs, plunge_point, start_direction
 from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
-from dragdeck.scenes.workpiece import workpiece_length, workpiece_mesh, workpiece_radius
+from dragdeck.scenes.workpiece import (
+    workpiece_length,
+    workpiece_mesh,
+    workpiece_radius,
+    workpiece_warnings,
+)
 from dragdeck.study.base import Json
 from dragdeck.study.contact_law import explained
 from dragdeck.study.model import CirclePath, CylinderShape, MeshShape, Study
@@ -199,6 +204,16 @@ def _check_fit(case: Case, surface_m: float) -> None:
             value=f"axis up to {reach:.4g} m from the bowl's axis, workpiece radius {radius:.4g} m",
             limit=f"together below the bowl's radius {study.bowl.radius_m:g} m",
             remedy="use a smaller path or workpiece, or a wider bowl",
+        )
+    length = workpiece_length(case)
+    if length < study.motion.immersion_depth_m:
+        raise InputError(
+            "the workpiece is shorter than its immersion: particles would close above it",
+            file=case.file,
+            field="motion.immersion_depth_m",
+            value=study.motion.immersion_depth_m,
+            limit=f"at most the length of the workpiece, {length:.4g} m",
+            remedy="submerge the workpiece less, or model it with the shaft that holds it",
         )
     deepest = surface_m - 2 * float(bed_radii(study).max())
     if study.motion.immersion_depth_m > deepest:
@@ -409,7 +424,7 @@ def _leaves_out(study: Study) -> dict[str, LeftOut]:
 def _warnings(case: Case, timestep_s: float) -> list[str]:
     study = case.study
     diameter = 2 * study.media.radius_mean_m
-    found = []
+    found = workpiece_warnings(case)
     gap = study.bowl.radius_m - farthest_reach(study.motion) - workpiece_radius(case)
     if gap < _JAMMING_GAP * diameter:
         found.append(
