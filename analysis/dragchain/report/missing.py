@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -84,20 +85,25 @@ def missing_run(run_dir: Path, error: DragchainError) -> MissingRun:
 
 def _reason(run_dir: Path, error: DragchainError) -> tuple[str, str]:
     for step in _STEPS:
-        found = _of_record(run_dir) if step == "run" else None
-        if found := found or _of_log(run_dir / "logs" / f"{step}.log"):
+        if step == "run" and (found := _of_records(run_dir)):
+            return found
+        if found := _of_log(run_dir / "logs" / f"{step}.log"):
             return found
     if not (run_dir / "case.json").is_file():
         return "not run, since a run before it has no result", "see that run"
     return _split(str(error))
 
 
-def _of_record(run_dir: Path) -> tuple[str, str] | None:
-    """What ``state.json`` says of a run that did not come to its end, or failed a check."""
-    try:
-        record = RunRecord.read(run_dir / "state.json")
-    except DragchainError:
-        return None
+def _of_records(run_dir: Path) -> tuple[str, str] | None:
+    """What is recorded of a run that did not come to its end, or failed a check."""
+    for name in ("state.json", "run.json"):
+        with suppress(DragchainError):
+            if found := _of_record(RunRecord.read(run_dir / name)):
+                return found
+    return None
+
+
+def _of_record(record: RunRecord) -> tuple[str, str] | None:
     if record.state in ("running", "stopped"):
         return (
             f"interrupted, or still running; last known step {record.last_step:,}",
