@@ -170,6 +170,13 @@ def test_arguments_reach_snakemake_whole_and_from_anywhere(machine: Machine, tmp
     )
 
 
+def test_a_symbolic_link_leads_to_the_clone(machine: Machine, tmp_path: Path):
+    (tmp_path / "link").symlink_to(machine.clone / "run")
+    ended = machine.run("all", cwd=tmp_path, script="../link")
+    assert ended.returncode == 0
+    assert machine.done()[-1].startswith(f"snakemake [all] in {machine.clone} ")
+
+
 @pytest.mark.parametrize("name", ["dragdeck", "dragchain"])
 def test_console_scripts_are_reached(machine: Machine, name: str):
     machine.run(name, "explain", "--help")

@@ -36,8 +36,10 @@ rule write_report:
 
 
 onerror:
-    # The mark that the report is whole goes, so that the next call makes the report anew.
-    if any(job.rule.name == "write_report" for job in workflow.dag.needrun_jobs()):
+    # Not after Ctrl-C. The mark that the report is whole goes, so that the next call makes it anew.
+    stopped = "user request" in Path(log).read_text(errors="replace")
+    wanted = any(job.rule.name == "write_report" for job in workflow.dag.needrun_jobs())
+    if wanted and not stopped:
         runs = " ".join(folder for name in SCENES for folder in every_folder(name))
         advice = f"--advice {ADVICE}" if Path(ADVICE).is_file() else ""
         shell(

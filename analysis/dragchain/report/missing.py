@@ -109,12 +109,12 @@ def _of_record(record: RunRecord) -> tuple[str, str] | None:
             f"interrupted, or still running; last known step {record.last_step:,}",
             "run the study again: it goes on from the last checkpoint",
         )
-    failed = record.failed_checks
-    if not failed:
+    if not record.failed_checks:
         return None
-    seen = (f"{check.name}: {check.seen} (limit: {check.limit})" for check in failed)
-    remedies = dict.fromkeys(_REMEDIES.get(check.code, _READ_SCREEN) for check in failed)
-    return "; ".join(seen), "; ".join(remedies)
+    first, *others = record.failed_checks
+    more = f"; and {len(others)} more" if others else ""
+    seen = f"failed check: {first.name}: {first.seen} (limit: {first.limit}){more}"
+    return seen, _REMEDIES.get(first.code, _READ_SCREEN)
 
 
 def _of_log(log: Path) -> tuple[str, str] | None:
