@@ -7,10 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from dragdeck.decks.case_file import CountOfRun, Phase, RanksOfRun, SettlingCriterion
 from dragdeck.documents import Document, Part
-from dragdeck.engine.log import Decomposition
-from dragdeck.physics.run_limits import RunLimits
 
 State = Literal["running", "stopped", "failed", "complete"]
 CheckCode = Literal[
@@ -22,9 +19,33 @@ CheckCode = Literal[
     "finite_numbers",
     "within_limits",
     "output_complete",
+    "packing_whole",
     "ranks",
 ]
 CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", "energy", "speed"]
+
+
+class ParticlesPerRank(Part):
+    """Mean, largest and smallest number of particles on a rank."""
+
+    mean: float
+    most: int
+    least: int
+
+
+class Decomposition(Part):
+    """The split that LIGGGHTS made of the simulation box.
+
+    Attributes
+    ----------
+    grid : (int, int, int)
+        Ranks along x, y and z.
+    particles : ParticlesPerRank or None
+        At the end of the last ``run`` command; None before one has ended.
+    """
+
+    grid: tuple[int, int, int]
+    particles: ParticlesPerRank | None
 
 
 class AcceptanceCheck(Part):
@@ -49,7 +70,13 @@ class AcceptanceCheck(Part):
 
 
 class RunPart(Part):
-    """A part of a run: from its start or a checkpoint to its end or the next interruption."""
+    """A part of a run: from its start or a checkpoint to its end or the next interruption.
+
+    Attributes
+    ----------
+    gap : int or None
+        The first step that some output lacks after a part that came to its end.
+    """
 
     part: int
     checkpoint: str | None = Field(alias="from")
@@ -58,6 +85,7 @@ class RunPart(Part):
     cpu_time_s: float | None = None
     exit_status: int | None = None
     to_step: int | None = None
+    gap: int | None = None
 
 
 class RunRecord(Document):
@@ -77,6 +105,8 @@ class RunRecord(Document):
         Whether it was stopped because it passed a limit.
     """
 
+    remedy = "delete it: the run starts anew, and what is there moves to archive/"
+
     state: State
     inputs: str
     started: str
@@ -95,25 +125,3 @@ class RunRecord(Document):
     def last_part(self) -> RunPart:
         """The part that runs or ran last."""
         return self.parts[-1]
-
-
-class RunInputs(Document):
-    """What the runner reads of ``case.json``.
-
-    Attributes
-    ----------
-    settled : SettlingCriterion or None
-        Of a run that must end with a bed at rest.
-    limits : RunLimits or None
-        Of a run that is watched.
-    """
-
-    remedy = "write it with: dragdeck step render"
-
-    scene: str
-    run: str
-    fidelity: RanksOfRun
-    media: CountOfRun
-    phases: Sequence[Phase] = ()
-    settled: SettlingCriterion | None = None
-    limits: RunLimits | None = None
