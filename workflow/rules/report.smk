@@ -1,6 +1,7 @@
 # The report on the study. A run that fails takes only what is made from it along: the report on
 # the others is written all the same and lists it, and the call ends with an error.
 
+
 rule write_report:
     input:
         [
