@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,17 @@ def test_the_outputs_of_the_deck_are_those_of_columns_json(
         assert output["pattern"].replace("{part}", "${part}") in deck
         if output["engine_columns"]:
             assert " ".join(output["engine_columns"]) in deck
+
+
+def test_contacts_are_written_after_all_that_reads_stored_forces(
+    case: Case, project: Project
+) -> None:
+    """In whatever order a scene lists its outputs, see `in_writing_order`."""
+    scene = process_scene(case, BED)
+    turned = replace(scene, deck=replace(scene.deck, outputs=scene.deck.outputs[::-1]))
+    deck = deck_text(turned, environment(project.templates))
+    dumps = [line.split()[3] for line in deck.splitlines() if line.startswith("dump ")]
+    assert dumps == ["custom", "custom", "local", "local"]
 
 
 def own_template(case: Case, text: str) -> None:

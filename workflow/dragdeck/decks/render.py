@@ -13,7 +13,7 @@ import jinja2.meta
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.outputs import ColumnsFile
+from dragdeck.decks.outputs import ColumnsFile, in_writing_order
 from dragdeck.errors import InputError
 from dragdeck.files import file_checksum, replace_text
 from dragdeck.mesh import stl_text
@@ -74,7 +74,8 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
     with _explained():
         template = templates.get_template(scene.template)
         used = "templates: " + ", ".join(_used(templates, scene.template))
-        return template.render(deck=replace(scene.deck, templates=used))
+        outputs = in_writing_order(scene.deck.outputs)
+        return template.render(deck=replace(scene.deck, templates=used, outputs=outputs))
 
 
 @contextlib.contextmanager

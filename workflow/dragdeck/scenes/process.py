@@ -494,6 +494,7 @@ PROCESS = SceneType(
         "particles.parquet",
         "contacts.parquet",
         "closure.json",
+        "corrections.json",
     ),
     network=("network.parquet", "chains.parquet", "clusters.parquet"),
     loading=("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp"),
