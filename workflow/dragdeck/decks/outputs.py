@@ -10,6 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from markupsafe import Markup
+
 from dragdeck.documents import Document, Part
 
 Kind = Literal["print", "custom", "local"]
@@ -105,9 +107,9 @@ class Output:
         return f"{self.name}.{{part}}.{ending[self.kind]}"
 
     @property
-    def file(self) -> str:
+    def file(self) -> Markup:
         """File name as a deck writes it, with the engine's variable for the part."""
-        return self.pattern.replace("{part}", "${part}")
+        return Markup(self.pattern.replace("{part}", "${part}"))
 
     @property
     def text_format(self) -> str:
