@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
 from dragchain.dumps.run_parts import iter_prints
-from dragchain.figures.style import BLUE, RED, head, new_figure
+from dragchain.figures.style import BLUE, RED, head, new_panels
 from dragchain.report.findings import DropFindings, DropImpacts, FillingFindings
 from dragchain.report.run_data import RunData
 from dragchain.run.case import Case, load_outputs
@@ -39,8 +39,7 @@ def filling(run: RunData, found: FillingFindings) -> Figure | None:
     table = table[table["n_particles"] > 0]
     energy = (table["kinetic_energy_j"] + table["rotational_energy_j"]).to_numpy(np.float64)
     ratio = energy_ratio(energy, table["n_particles"].to_numpy(np.float64), run.case)
-    figure = new_figure(3.2)
-    axes = figure.subplots()
+    figure, (axes,) = new_panels(3.2)
     axes.semilogy(table["time_s"], ratio, color=BLUE)
     rest, bed = found.rest_energy_ratio, found.bed
     if rest is not None:
@@ -62,19 +61,17 @@ def drop_test(run: RunData, found: DropFindings) -> Figure:
         for name in ("time_s", "vz_m_s", "force_n")
     )
     impacts, ratio = found.impacts, found.restitution
-    figure = new_figure(3.2)
-    panels = np.atleast_1d(figure.subplots(1, len(impacts.start_time_s), sharey=True))
+    figure, panels = new_panels(3.2, len(impacts.start_time_s), sharey=True)
     limit = 1.1 * float(np.abs(speed_m_s).max())
     for number, axes in enumerate(panels):
         start, duration = impacts.start_time_s[number], impacts.duration_s[number]
         near = (time_s >= start - 0.3 * duration) & (time_s <= start + 1.3 * duration)
         time_us = (time_s[near] - start) * 1e6
         axes.plot(time_us, force_n[near], color=BLUE)
-        axes.set_title(_impact_words(number, impacts), fontsize=8)
-        axes.set_xlabel("time (µs)")
+        axes.set(xlabel="time (µs)", title=_impact_words(number, impacts))
         right = _speed_axes(axes, limit)
         right.plot(time_us, speed_m_s[near], color=RED, linewidth=1.0)
-        right.tick_params(labelright=number == len(panels) - 1, colors=RED)
+        right.tick_params(labelright=axes is panels[-1], colors=RED)
     right.set_ylabel("upward velocity (m/s)", color=RED)
     panels[0].set_ylabel("force on the particle (N)", color=BLUE)
     head(
