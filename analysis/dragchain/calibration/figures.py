@@ -15,16 +15,8 @@ from dragchain.calibration.force_record import Record
 from dragchain.calibration.results import PURPOSES, CalibrationFile
 from dragchain.calibration.simulated_drops import DropRun, Drops
 from dragchain.figures.marks import row_names
-from dragchain.figures.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    legend_below,
-    new_figure,
-    new_panels,
-)
+from dragchain.figures.panels import legend_below, new_figure, new_panels
+from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
 
 
 def draw_impacts(record: Record, found: Calibration, confirm: Drops) -> Figure:

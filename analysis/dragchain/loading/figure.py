@@ -15,8 +15,9 @@ from matplotlib.ticker import MaxNLocator
 from dragchain.drag.around import AZIMUTH_BINS
 from dragchain.drag.azimuth import circumference, parts
 from dragchain.figures.marks import bars_of, depth_bars
+from dragchain.figures.panels import head, new_panels
 from dragchain.figures.rendering import Camera, Image, check_rendering, new_plotter, photograph
-from dragchain.figures.style import GREY, WIDTH_IN, drawing, head, new_panels, save
+from dragchain.figures.style import GREY, WIDTH_IN, drawing, save
 from dragchain.loading.document import Loading, Profile
 from dragchain.loading.facets import as_polydata
 from dragchain.loading.samples import Sampled

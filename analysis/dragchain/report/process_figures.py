@@ -12,17 +12,8 @@ from matplotlib.figure import Figure
 from dragchain.figures import network_picture
 from dragchain.figures.marks import bars_of, compass, compass_bars, depth_bars, row, row_names
 from dragchain.figures.network_overlay import show_network
-from dragchain.figures.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    head,
-    legend_below,
-    new_figure,
-    new_panels,
-)
+from dragchain.figures.panels import head, legend_below, new_figure, new_panels
+from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
 from dragchain.report.findings import Comparison, ProcessFindings
 from dragchain.report.run_data import RunData
 from dragchain.run.kinematics import drag_start_s

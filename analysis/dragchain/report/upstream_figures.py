@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
 from dragchain.dumps.run_parts import iter_prints
-from dragchain.figures.style import BLUE, RED, head, new_panels
+from dragchain.figures.panels import head, new_panels
+from dragchain.figures.style import BLUE, RED
 from dragchain.report.findings import DropFindings, DropImpacts, FillingFindings
 from dragchain.report.run_data import RunData
 from dragchain.run.case import Case, load_outputs

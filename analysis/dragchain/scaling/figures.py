@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from dragchain.arrays import Floats
-from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN, legend_below, new_panels
+from dragchain.figures.panels import legend_below, new_panels
+from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN
 from dragchain.report.notation import MINUS
 from dragchain.scaling.document import CurvePoint, ScaledRun, ScalingFile
 

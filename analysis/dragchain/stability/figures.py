@@ -12,17 +12,8 @@ from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
 from dragchain.figures.marks import keys, log_ticks, row_names
-from dragchain.figures.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    RED,
-    head,
-    legend_below,
-    new_panels,
-)
+from dragchain.figures.panels import head, legend_below, new_panels
+from dragchain.figures.style import BLUE, GREEN, GREY, INK, ORANGE, RED
 from dragchain.stability.classes import (
     CLASSES,
     ENERGY,

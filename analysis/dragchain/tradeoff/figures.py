@@ -14,16 +14,8 @@ from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
 from dragchain.figures.marks import keys, log_ticks
-from dragchain.figures.style import (
-    BLUE,
-    INK,
-    LIGHT,
-    MARKERS,
-    SERIES,
-    WIDE_IN,
-    legend_below,
-    new_panels,
-)
+from dragchain.figures.panels import legend_below, new_panels
+from dragchain.figures.style import BLUE, INK, LIGHT, MARKERS, SERIES, WIDE_IN
 from dragchain.tradeoff.changes import differing, hub, modulus_levels
 from dragchain.tradeoff.compare import Error
 from dragchain.tradeoff.drops import Drop

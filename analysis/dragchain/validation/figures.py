@@ -11,16 +11,8 @@ from matplotlib.figure import Figure
 from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
 from dragchain.figures.marks import band, bars_of, compass, compass_bars, depth_bars, row, row_names
-from dragchain.figures.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    legend_below,
-    new_figure,
-    new_panels,
-)
+from dragchain.figures.panels import legend_below, new_figure, new_panels
+from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
 from dragchain.run.kinematics import drag_start_s
 from dragchain.statistics.estimate import Estimate
 from dragchain.validation.around_workpiece import Statements

@@ -16,7 +16,8 @@ from dragchain.contact_law.impact import (
     largest_overlap,
     limited_restitution,
 )
-from dragchain.figures.style import BLUE, GREY, MARKERS, ORANGE, SERIES, legend_below, new_panels
+from dragchain.figures.panels import legend_below, new_panels
+from dragchain.figures.style import BLUE, GREY, MARKERS, ORANGE, SERIES
 from dragchain.verification.published import published
 from dragchain.verification.quantities import (
     QUANTITIES,

@@ -13,17 +13,8 @@ from matplotlib.ticker import MaxNLocator
 
 from dragchain.arrays import Floats
 from dragchain.figures.marks import compass, keys, row, row_names
-from dragchain.figures.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    RED,
-    head,
-    legend_below,
-    new_figure,
-    new_panels,
-)
+from dragchain.figures.panels import head, legend_below, new_figure, new_panels
+from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
 from dragchain.validation.peaks.averages import Lifetimes
 from dragchain.validation.peaks.findings import Study
 from dragchain.validation.peaks.lags import LagCurves
@@ -167,11 +158,11 @@ def _altitude(axes: Axes, runs: Sequence[RunSeries], at: int) -> None:
     top = 1e3 * max(height.max(initial=0.01) for _, height, _ in groups)
     edges = np.arange(0.0, top + 5.0, 5.0)
     for name, height, style in groups:
-        label = f"{name} ({len(height)} frames)"
         fractions = _percentages(height * 1e3, edges)
-        axes.stairs(fractions, edges, orientation="horizontal", label=label, **style)
+        axes.stairs(fractions, edges, orientation="horizontal", label=name, **style)
     axes.set(xlabel="frames (%)", ylabel="mean height of the chain\nabove the floor (mm)")
-    axes.set_title("height")
+    all_times, at_peaks = (len(height) for _, height, _ in groups)
+    axes.set_title(f"height: {all_times} frames,\n{at_peaks} at peaks")
 
 
 def _survival(axes: Axes, lifetime: Lifetimes) -> None:

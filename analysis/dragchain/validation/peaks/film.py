@@ -21,8 +21,9 @@ from dragchain.errors import TableError
 from dragchain.figures import network_picture as scene
 from dragchain.figures.network_overlay import show_network
 from dragchain.figures.network_picture import Look, Scene, View
+from dragchain.figures.panels import new_figure
 from dragchain.figures.rendering import check_rendering
-from dragchain.figures.style import BLUE, CHAIN, RED, drawing, new_figure, png
+from dragchain.figures.style import BLUE, CHAIN, RED, drawing, png
 from dragchain.network.chains import dominant_path, widest_paths
 from dragchain.network.frame import read_frames
 from dragchain.run.case import Case, load_case
