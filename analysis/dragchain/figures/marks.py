@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -27,28 +27,22 @@ class _Interval(Protocol):
     def ci95_high(self) -> Any: ...
 
 
-class Bars(NamedTuple):
-    """Values and how far their intervals reach to either side of them, (n,) each."""
-
-    value: Floats
-    below: Floats
-    above: Floats
-
-
-def bars_of(columns: EstimateColumns, unit: float = 1.0) -> Bars:
-    """Estimates times a unit as bars; an interval that excludes its value reaches up to it."""
+def _with_reach(columns: EstimateColumns, unit: float) -> tuple[Floats, Floats]:
+    """Values times a unit, (n,), and how far their intervals reach below and above, (2, n)."""
     value, low, high = (
         np.array(getattr(columns, name)) * unit for name in ("value", "ci95_low", "ci95_high")
     )
-    return Bars(value, value - np.minimum(low, value), np.maximum(high, value) - value)
+    return value, np.clip([value - low, high - value], 0.0, None)
 
 
-def depth_bars(axes: Axes, edges_m: Sequence[float], bars: Bars, colour: str = BLUE) -> None:
+def depth_bars(
+    axes: Axes, edges_m: Sequence[float], columns: EstimateColumns, unit: float = 1.0
+) -> None:
     """Draw values in bins of depth (mm on the vertical axis, downwards) with their intervals."""
-    edges = np.asarray(edges_m) * 1e3
+    edges, (value, reach) = np.asarray(edges_m) * 1e3, _with_reach(columns, unit)
     middle = (edges[:-1] + edges[1:]) / 2
-    axes.barh(middle, bars.value, height=0.9 * np.diff(edges), color=colour, alpha=0.75)
-    axes.errorbar(bars.value, middle, xerr=bars[1:], fmt="none", ecolor="black")
+    axes.barh(middle, value, height=0.9 * np.diff(edges), color=BLUE, alpha=0.75)
+    axes.errorbar(value, middle, xerr=reach, fmt="none", ecolor="black")
     axes.set_ylim(edges[-1], edges[0])
 
 
@@ -67,14 +61,16 @@ def compass(figure: Figure, *place: int) -> Any:
     return axes
 
 
-def compass_bars(axes: Any, edges_rad: Sequence[float], bars: Bars) -> None:
+def compass_bars(
+    axes: Any, edges_rad: Sequence[float], columns: EstimateColumns, unit: float = 1.0
+) -> None:
     """Draw values by azimuth with their intervals, ahead in another colour than behind."""
-    edges = np.array(edges_rad)
+    edges, (value, reach) = np.array(edges_rad), _with_reach(columns, unit)
     middle = (edges[:-1] + edges[1:]) / 2
     colours = np.where(np.abs(middle) < np.pi / 2, BLUE, ORANGE)
-    axes.bar(middle, bars.value, np.diff(edges), color=colours, edgecolor="white", linewidth=0.6)
-    reach = [np.minimum(bars.below, bars.value), bars.above]
-    axes.errorbar(middle, bars.value, reach, fmt="none", ecolor="black", elinewidth=0.8)
+    axes.bar(middle, value, np.diff(edges), color=colours, edgecolor="white", linewidth=0.6)
+    reach[0] = np.minimum(reach[0], value)
+    axes.errorbar(middle, value, reach, fmt="none", ecolor="black", elinewidth=0.8)
     axes.set_rmin(0.0)
 
 
@@ -94,10 +90,9 @@ def row_names(axes: Axes, names: Sequence[str], places: Sequence[float] | None =
     axes.set_ylim(at[-1] + 0.5, at[0] - 0.5)
 
 
-def keys(axes: Axes, marks: Mapping[str, Mapping[str, Any]]) -> None:
-    """Entries of the legend that nothing drawn has: labels with a line's style."""
-    for label, style in marks.items():
-        axes.plot([], [], label=label, **{"color": GREY, "ls": "", "marker": "o", **style})
+def key(axes: Axes, label: str, **style: Any) -> None:
+    """An entry of the legend that nothing drawn has: a grey dot, or another style of a line."""
+    axes.plot([], [], label=label, **{"color": GREY, "ls": "", "marker": "o", **style})
 
 
 def log_ticks(axis: Axis, unit: float = 1.0, steps: Sequence[float] = (1.0,)) -> None:

@@ -6,11 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
 from dragchain.arrays import Floats
-from dragchain.figures.network_picture import Scene, View
+from dragchain.figures.network_picture import Scene, View, colour_map
 from dragchain.figures.rendering import Image
 from dragchain.figures.style import CHAIN
 
@@ -38,6 +41,13 @@ def show_network(
     axes.set(xlabel="x (mm)", ylabel=f"{view[1]} (mm)", xlim=extent[:2], ylim=extent[2:])
     _mark_chain(axes, shown, [0, 1] if view == "xy" else [0, 2], width, halo)
     _mark_motion(axes, shown, view)
+
+
+def force_bar(figure: Figure, panels: Sequence[Axes], largest_n: float) -> None:
+    """Put the colours of the normal force beside panels."""
+    scale = ScalarMappable(Normalize(0.0, largest_n), colour_map())
+    label = "normal force per contact (N);\ncylinder radius proportional"
+    figure.colorbar(scale, ax=list(panels), shrink=0.8, pad=0.02, aspect=28, label=label)
 
 
 def _mark_chain(axes: Axes, shown: Scene, pick: Sequence[int], width: float, halo: float) -> None:

@@ -8,11 +8,13 @@ radius at the largest.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from matplotlib.colors import Colormap, LinearSegmentedColormap
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
@@ -126,8 +128,15 @@ def load_scene(run_dir: Path, case: Case, wanted_s: float = _PICTURE_TIME_S) -> 
     frame = next(read_frames(run_dir, (step, step)), None)
     if frame is None:
         raise TableError(f"particles.parquet lacks step {step}, which network.parquet has")
+    return scene_of(frame, workpiece_places(run_dir, case), start_s)
+
+
+def scene_of(
+    frame: NetworkFrame, place: Callable[[int], tuple[Floats, float]], start_s: float
+) -> Scene:
+    """What the picture of a frame shows, from the workpiece's place and turn at each step."""
     path = dominant_path(frame, widest_paths(frame))
-    return Scene(frame, *workpiece_places(run_dir, case)(step), path, frame.time_s - start_s)
+    return Scene(frame, *place(frame.step), path, frame.time_s - start_s)
 
 
 @dataclass(frozen=True)
@@ -160,9 +169,9 @@ def window(case: Case, scene: Scene, view: View) -> Window:
     half = np.inf if whole else WINDOW_DIAMETERS * diameter
     low, high = np.maximum(middle - half, -bowl_m), np.minimum(middle + half, bowl_m)
     point = scene.frame.point[:, :2]
-    near = np.logical_and(point >= low, point <= high).all(axis=1)
+    near = np.asarray(np.logical_and(point >= low, point <= high).all(axis=1))
     if view == "xz":
-        near &= np.abs(point[:, 1] - middle[1]) <= DEPTH_DIAMETERS * diameter
+        near = near & (np.abs(point[:, 1] - middle[1]) <= DEPTH_DIAMETERS * diameter)
         low, high = (
             np.array([end[0], level]) for end, level in zip((low, high), floor, strict=True)
         )
@@ -282,8 +291,6 @@ def _tubes(axis: Floats, force: Floats, radius: Floats) -> Any:
     return mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES, capping=True)
 
 
-def colour_map() -> Any:
+def colour_map() -> Colormap:
     """The colour map of the pictures, green over yellow to red."""
-    from matplotlib.colors import LinearSegmentedColormap
-
     return LinearSegmentedColormap.from_list("network", list(_COLOURS))

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 
 from dragchain.drag.around import AZIMUTH_BINS
 from dragchain.drag.azimuth import circumference, parts
-from dragchain.figures.marks import bars_of, depth_bars
+from dragchain.figures.marks import depth_bars
 from dragchain.figures.panels import head, new_panels
 from dragchain.figures.rendering import Camera, Image, check_rendering, new_plotter, photograph
 from dragchain.figures.style import GREY, WIDTH_IN, drawing, save
@@ -170,7 +170,7 @@ def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> Non
 
 def _profile(axes: Axes, profile: Profile) -> None:
     """Draw force times sliding distance against depth with its interval."""
-    depth_bars(axes, profile.edges, bars_of(profile.force_slide, 1e-3))
+    depth_bars(axes, profile.edges, profile.force_slide, 1e-3)
     axes.set(xlim=(0.0, None), title="by depth, incl. end face\n(bars: 95 % CI)")
     axes.set_xlabel("force times sliding\ndistance per path and\ndepth (N m/(m mm))")
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from itertools import cycle
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from dragchain.figures import network_picture
-from dragchain.figures.marks import bars_of, compass, compass_bars, depth_bars, row, row_names
-from dragchain.figures.network_overlay import show_network
+from dragchain.figures.marks import compass, compass_bars, depth_bars, row, row_names
+from dragchain.figures.network_overlay import force_bar, show_network
 from dragchain.figures.panels import head, legend_below, new_figure, new_panels
 from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
 from dragchain.report.findings import Comparison, ProcessFindings
@@ -60,7 +58,7 @@ def force_around_workpiece(run: RunData, found: ProcessFindings) -> Figure:
     """Mean normal force by azimuth, ahead up."""
     edges, sums = found.azimuth.edges_rad, found.ahead_behind
     figure = new_figure(4.6, 5.7)
-    compass_bars(compass(figure), edges, bars_of(found.azimuth.force_n))
+    compass_bars(compass(figure), edges, found.azimuth.force_n)
     head(
         figure,
         "normal force on the workpiece by azimuth from the direction of motion,\n"
@@ -82,11 +80,11 @@ def force_depth(run: RunData, found: ProcessFindings) -> Figure:
     """The normal force of a contact, and of all contacts together, against depth."""
     depth, slope = found.depth, found.depth.slope_n_per_m.over(1e3)
     figure, (left, right) = new_panels(3.9, 2, sharey=True)
-    depth_bars(left, depth.edges_m, bars_of(depth.contact_n))
+    depth_bars(left, depth.edges_m, depth.contact_n)
     left.set(xlabel="mean normal force per contact (N)", ylabel="depth below the surface (mm)")
     interval = f"95 % CI {slope.ci95_low:.4f} to {slope.ci95_high:.4f}"
     left.set_title(f"slope {slope.value:.4f} N/mm\n({interval})")
-    depth_bars(right, depth.edges_m, bars_of(depth.line_load_n_per_m, 1e-3), GREEN)
+    depth_bars(right, depth.edges_m, depth.line_load_n_per_m, 1e-3)
     right.set(xlabel="total normal force per depth (N/mm)")
     right.set_title("deepest bin includes the contacts\non edge and end face")
     return figure
@@ -128,9 +126,7 @@ def _network(run: RunData, view: network_picture.View, side: str) -> Figure:
     figure, (axes,) = new_panels(height, width_in=6.9)
     show_network(axes, shown, view, image, extent)
     largest = float(shown.frame.normal_force.max(initial=0.0))
-    scale = ScalarMappable(Normalize(0.0, largest), network_picture.colour_map())
-    label = "normal force per contact (N); cylinder radius proportional"
-    figure.colorbar(scale, ax=axes, shrink=0.8, pad=0.02, label=label)
+    force_bar(figure, [axes], largest)
     title = (
         f"contact network {side}, process time {shown.process_time_s:.2f} s; "
         f"largest normal force {largest:.2f} N"
@@ -148,6 +144,10 @@ def _path_words(shown: network_picture.Scene) -> str:
         "outlined: dominant path from workpiece to bowl, "
         f"{len(shown.dominant.particles)} particles, bottleneck {forces.min():.2f} N"
     )
+
+
+DRAWN = (forces, network_xy, network_xz, force_around_workpiece, force_depth, chains_peaks)
+"""The figures of a process run in the order of the report, named after their functions."""
 
 
 def drag_of_cases(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +17,12 @@ from dragchain.run.case import load_case
 Draw = Callable[[RunData, Any], Figure | None]
 """Draws a figure of a run with its findings; None: it lacks an optional table."""
 
-FIGURES: Mapping[str, Mapping[str, Draw]] = {
-    "process": {
-        "forces": process_figures.forces,
-        "network_xy": process_figures.network_xy,
-        "network_xz": process_figures.network_xz,
-        "force_around_workpiece": process_figures.force_around_workpiece,
-        "force_depth": process_figures.force_depth,
-        "chains_peaks": process_figures.chains_peaks,
-    },
-    "filling": {"filling": upstream_figures.filling},
-    "drop_test": {"drop_test": upstream_figures.drop_test},
+_DRAWN: Mapping[str, Sequence[Draw]] = {
+    "process": process_figures.DRAWN,
+    "filling": (upstream_figures.filling,),
+    "drop_test": (upstream_figures.drop_test,),
 }
+FIGURES = {scene: {draw.__name__: draw for draw in drawn} for scene, drawn in _DRAWN.items()}
 """The figures of each scene by name, as the report shows them; it has their captions."""
 
 

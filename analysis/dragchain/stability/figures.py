@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.figures.marks import keys, log_ticks, row_names
+from dragchain.figures.marks import key, log_ticks, row_names
 from dragchain.figures.panels import head, legend_below, new_panels
 from dragchain.figures.style import BLUE, GREEN, GREY, INK, ORANGE, RED
 from dragchain.stability.classes import (
@@ -91,9 +91,11 @@ def _map(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> Figure:
     axes.tick_params(length=0)
     axes.tick_params("y", labelsize=7.5)
     _class_keys(axes, points, _LETTERS)
-    line_style = {"marker": "", "ls": "-", "color": INK, "lw": 1.6}
-    keys(axes, {"critical step of the contact network": line_style})
-    keys(axes, {"critical step, damped": {**line_style, "ls": ":"}})
+    for name, style in (
+        ("critical step of the contact network", "-"),
+        ("critical step, damped", ":"),
+    ):
+        key(axes, name, marker="", ls=style, color=INK, lw=1.6)
     return legend_below(figure)
 
 
@@ -101,7 +103,7 @@ def _class_keys(axes: Axes, points: pd.DataFrame, letters: Mapping[str, str]) ->
     """Name the colours of the classes that occur."""
     for kind in (one for one in CLASSES if (points["class"] == one).any()):
         name = f"{letters.get(kind, '')} {kind}".strip()
-        keys(axes, {name: {"color": _COLOURS[kind], "marker": "s", "ms": 8}})
+        key(axes, name, color=_COLOURS[kind], marker="s", ms=8)
 
 
 def _cell(axes: Axes, column: int, line: int, kind: str) -> None:

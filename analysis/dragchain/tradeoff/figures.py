@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.figures.marks import keys, log_ticks
+from dragchain.figures.marks import key, log_ticks
 from dragchain.figures.panels import legend_below, new_panels
 from dragchain.figures.style import BLUE, INK, LIGHT, MARKERS, SERIES, WIDE_IN
 from dragchain.tradeoff.changes import differing, hub, modulus_levels
@@ -112,6 +112,7 @@ def _pareto_panel(
 ) -> None:
     _log_log(axes)
     _tolerances(axes)
+    axes.margins(x=0.12)
     bounds = []
     for setting, error in errors.items():
         cost, shade = tradeoff.cost(setting), shades[setting.youngs_modulus_scale]
@@ -146,12 +147,13 @@ def _front(points: Sequence[tuple[float, float]]) -> Iterator[tuple[float, float
 
 
 def _pareto_keys(axes: Axes, shades: Mapping[float, Any], marks: Mapping[float, str]) -> None:
-    keys(axes, {f"E x {level:g}": {"color": shade} for level, shade in shades.items()})
-    steps = {f"step {100 * step:g} % of Rayleigh": {"marker": marks[step]} for step in marks}
-    keys(axes, steps)
-    bar = {"marker": "_", "color": INK, "ms": 8}
-    keys(axes, {"not significant": {"mfc": "white"}, "upper bound (95 %)": bar})
-    keys(axes, {"Pareto front": {"marker": "", "ls": "-", "color": INK, "lw": 0.9}})
+    for level, shade in shades.items():
+        key(axes, f"E x {level:g}", color=shade)
+    for step, mark in marks.items():
+        key(axes, f"step {100 * step:g} % of Rayleigh", marker=mark)
+    key(axes, "not significant", mfc="white")
+    key(axes, "upper bound (95 %)", marker="_", color=INK, ms=8)
+    key(axes, "Pareto front", marker="", ls="-", color=INK, lw=0.9)
 
 
 # --- contact forces ------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
-from dragchain.figures.marks import band, bars_of, compass, compass_bars, depth_bars, row, row_names
+from dragchain.figures.marks import band, compass, compass_bars, depth_bars, row, row_names
 from dragchain.figures.panels import legend_below, new_figure, new_panels
 from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
 from dragchain.run.kinematics import drag_start_s
@@ -134,9 +134,9 @@ def around(found: Statements) -> Figure:
     figure = new_figure(3.9)
     left, right = compass(figure, 1, 2, 1), figure.add_subplot(1, 2, 2)
     edges = found.azimuth.edges
-    compass_bars(left, edges, bars_of(found.azimuth.columns, 100.0))
+    compass_bars(left, edges, found.azimuth.columns, 100.0)
     left.set_title(f"normal force\n(% per {np.degrees(edges[1] - edges[0]):.0f}°)")
-    depth_bars(right, found.depth.edges, bars_of(found.depth.columns))
+    depth_bars(right, found.depth.edges, found.depth.columns)
     right.set(xlabel="mean normal force per contact (N)", ylabel="depth (mm)")
     right.set_title("bars: 95 % CI over packings")
     return figure

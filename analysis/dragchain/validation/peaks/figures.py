@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from dragchain.arrays import Floats
-from dragchain.figures.marks import compass, keys, row, row_names
+from dragchain.figures.marks import compass, key, row, row_names
 from dragchain.figures.panels import head, legend_below, new_figure, new_panels
 from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
 from dragchain.validation.peaks.averages import Lifetimes
@@ -99,8 +99,9 @@ def _effects(tests: Sequence[PeakTest]) -> Figure:
     row_names(panels[0], names, places)
     for tick, setting in zip(panels[0].get_yticklabels(), SETTINGS, strict=True):
         tick.set_color(_COLOURS[setting.definition])
-    keys(panels[0], {DEFINITIONS[name]: {"color": _COLOURS[name]} for name in _COLOURS})
-    keys(panels[0], {"unadjusted p ≥ 0.05": {"mfc": "white"}})
+    for name, colour in _COLOURS.items():
+        key(panels[0], DEFINITIONS[name], color=colour)
+    key(panels[0], "unadjusted p ≥ 0.05", mfc="white")
     head(
         figure,
         "peaks minus all times (standard deviations); "
