@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from dragchain.arrays import Floats
+from dragchain.figures.marks import log_ticks
 from dragchain.figures.panels import legend_below, new_panels
 from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN
 from dragchain.report.notation import MINUS
@@ -105,10 +105,6 @@ def _ticks(axes: Axes, found: ScalingFile, factor: float) -> None:
     stretch = max(1.0, math.sqrt(_LEAST_SPAN * low / high))
     low, high = low / stretch, high * stretch
     axes.set_ylim(low, high)
-    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    steps = (1.0, 2.0, 5.0) if high > 12.0 * low else _TICKS
-    round_numbers = [step * 10.0**decade for decade in decades for step in steps]
-    for axis, places in ((axes.xaxis, levels), (axes.yaxis, round_numbers)):
-        axis.set_major_locator(FixedLocator(places))
-        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axis.set_minor_locator(NullLocator())
+    log_ticks(axes.yaxis, steps=(1.0, 2.0, 5.0) if high > 12.0 * low else _TICKS)
+    axes.set_xticks(levels, [f"{level:g}" for level in levels])
+    axes.minorticks_off()

@@ -64,7 +64,7 @@ _OTHERS: Mapping[str, tuple[str, ...]] = {
 def draw(test: str, runs: Sequence[Recording]) -> Figure:
     """The figure of a test from all its runs."""
     draw_on, count = _FIGURES[test]
-    figure, panels = new_panels(3.5, count, 3.7 * max(count, 2))
+    figure, panels = new_panels(3.7, count, 3.7 * max(count, 2))
     draw_on(runs, *panels)
     return legend_below(figure)
 
