@@ -46,7 +46,7 @@ def _columns(letters: Ints, width_in: float) -> int:
     """The most columns in which labels of so many letters fit into a width, each with a mark."""
     counts = range(2, len(letters) + 1)
     parts = {count: np.array_split(letters, count) for count in counts}
-    widths = {count: sum(0.5 + 0.063 * part.max() for part in parts[count]) for count in counts}
+    widths = {count: sum(0.54 + 0.068 * part.max() for part in parts[count]) for count in counts}
     return max((count for count in counts if widths[count] < width_in), default=1)
 
 
