@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 import pandas as pd
 
-from dragchain.figures.style import STYLE, png
+from dragchain.figures.style import drawing, png
 from dragchain.files import write_bytes, write_text
 from dragchain.report.page import page_environment
 from dragchain.run.completeness import RunRecord
@@ -192,7 +191,7 @@ def write_scaling(
         If the runs do not make a scaling.
     """
     found = find(run_dirs, field, expected, commands)
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         picture = png(draw_scaling(found))
     found.write(out_dir / "scaling.json")
     rows = table(found).to_csv(index=False, float_format="%.6g", lineterminator="\n")

@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-import matplotlib
 import pandas as pd
 
-from dragchain.figures.style import STYLE, png
+from dragchain.figures.style import drawing, png
 from dragchain.report.bundle import write_bundle
 from dragchain.report.page import data_uri, render_page
 from dragchain.stability.bed import REST_FLOOR, measure_resting, measure_settled
@@ -77,7 +76,7 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
     by_condition = conditions(points)
     document = _summarise(points, by_condition, runs)
     sizes = _run_sizes(runs)
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         drawn = draw(points, by_condition, document.restitution_error, sizes)
         pictures = {name: png(figure) for name, figure in drawn.items()}
     write_bundle(

@@ -7,9 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib
-
-from dragchain.figures.style import STYLE, png
+from dragchain.figures.style import drawing, png
 from dragchain.report.bundle import write_bundle
 from dragchain.report.page import data_uri, render_page
 from dragchain.statistics.estimate import CONFIDENCE
@@ -108,7 +106,7 @@ def write_tradeoff(
     commands = [command] if command else []
     record = record_of(tradeoff, dropped, priced, kept, plan, commands)
     findings = Findings(tradeoff, reaches(tradeoff), dropped, priced, kept, record)
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         drawn = draw(tradeoff, findings.reaches, dropped)
         figures = {name: png(figure) for name, figure in drawn.items()}
     write_bundle(

@@ -105,9 +105,7 @@ class _Design:
 
     def base(self, point: Point) -> Point:
         """What a point is to be compared with."""
-        alike = (
-            one for one in self.points if one.parameters == point.parameters and not one.changed
-        )
+        alike = (one for one in self.points if one.fidelity == point.fidelity and not one.changed)
         return next(alike, self.points[0]) if point.changed else self.points[0]
 
 
@@ -120,14 +118,11 @@ def _of_quantity(points: Points, quantity: str, sizes: Sequence[float]) -> Itera
         field, value = next(iter(point.changed.items()), ("", None))
         before = base.measures.inputs.get(field)
         logarithm = fit.estimate(design.indicator(point) - design.indicator(base))
-        change = Estimate(*(math.expm1(edge) for edge in vars(logarithm).values()))
+        change = logarithm.mapped(math.expm1)
         exponent = _exponent(logarithm, value, before) if len(point.changed) == 1 else None
-        modulus, step, speed = point.parameters
         yield Effect(
             quantity=quantity,
-            youngs_modulus_scale=modulus,
-            timestep_fraction=step,
-            speed_factor=speed,
+            **point.fidelity.parameters(),
             runs=len(own),
             field=field,
             value=value,
@@ -143,10 +138,6 @@ def _of_quantity(points: Points, quantity: str, sizes: Sequence[float]) -> Itera
 
 def _exponent(change: Estimate, new: JsonValue, old: JsonValue) -> Estimate | None:
     """Exponent of a change, in logarithms, over that of its input; None without a ratio of both."""
-    if not (isinstance(new, int | float) and isinstance(old, int | float)):
+    if not (isinstance(new, int | float) and isinstance(old, int | float) and min(new, old) > 0):
         return None
-    if new <= 0 or old <= 0:
-        return None
-    scale = math.log(new / old)
-    low, high = sorted((change.ci95_low / scale, change.ci95_high / scale))
-    return Estimate(change.value / scale, low, high)
+    return change.over(math.log(new / old))

@@ -48,8 +48,6 @@ class RunRow(Part):
     label: str
     frames: int
     interval_s: float
-    from_s: float
-    to_s: float
     peaks: int
     distinct_peaks: int
     slow_peaks: int
@@ -132,16 +130,7 @@ def study_of(runs: Sequence[RunSeries], count: int = SHIFTS) -> Study:
 
 
 def _run_row(run: RunSeries) -> RunRow:
-    return RunRow(
-        run=run.run,
-        label=run.label,
-        frames=len(run.time_s),
-        interval_s=run.interval_s,
-        from_s=float(run.time_s[0]),
-        to_s=float(run.time_s[-1]),
-        peaks=len(run.peaks),
-        distinct_peaks=int(run.peaks["distinct"].sum()),
-        slow_peaks=len(run.slow),
-        separation_s=run.separation_s,
-        sense=run.sense,
-    )
+    peaks = {"peaks": len(run.peaks), "slow_peaks": len(run.slow)}
+    distinct = int(run.peaks["distinct"].sum())
+    frames = {"frames": len(run.time_s), "interval_s": run.interval_s}
+    return RunRow.model_validate({**vars(run), **frames, **peaks, "distinct_peaks": distinct})

@@ -196,23 +196,19 @@ def _test(
     if descriptor.bounded:
         low, high = np.clip([low, high], 0.0, 1.0).tolist()
     claimed = {1: result.p_greater, -1: result.p_less, 0: result.p_two_sided}[descriptor.claim]
-    return PeakTest(
-        peaks=rule,
-        definition=setting.definition,
-        thresholds=setting.label,
-        default=setting.default,
-        statement=descriptor.statement,
-        descriptor=descriptor.name,
-        label=descriptor.label,
-        built_in=descriptor.built_in[setting.definition],
-        claim=descriptor.claim,
-        effect=result.value,
-        ci95_low=low,
-        ci95_high=high,
-        p_claimed=claimed,
-        p_two_sided=result.p_two_sided,
-        **more,
-    )
+    about = {
+        "peaks": rule,
+        "thresholds": setting.label,
+        "default": setting.default,
+        "descriptor": descriptor.name,
+        "built_in": descriptor.built_in[setting.definition],
+        "effect": result.value,
+        "ci95_low": low,
+        "ci95_high": high,
+        "p_claimed": claimed,
+    }
+    known = {**vars(setting), **vars(descriptor), **vars(result)}
+    return PeakTest.model_validate({**known, **about, **more})
 
 
 def _descriptor_test(
