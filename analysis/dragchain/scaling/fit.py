@@ -130,8 +130,7 @@ def _fitted(law: PowerLaw) -> FittedLaw:
         highest=float(levels[-1]),
         runs=len(law.runs.x),
         degrees=law.line.degrees,
-        spread=law.scatter.spread,
-        bed_fraction=law.scatter.bed_fraction,
+        **vars(law.scatter),
         lack_of_fit=law.lack_of_fit,
         curve=tuple(BandPoint(x=x, **asdict(law.at(x))) for x in _curve(law)),
     )

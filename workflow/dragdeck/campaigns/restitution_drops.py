@@ -17,7 +17,6 @@ import numpy as np
 
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
-from dragdeck.decks.case_file import CaseFile
 from dragdeck.decks.render import environment
 from dragdeck.documents import Document, Part
 from dragdeck.engine.batch import Batch
@@ -241,13 +240,9 @@ def full(study: Study, fraction: float) -> DropFidelity:
 
 def _height(study: Study, fidelity: DropFidelity, phase: float) -> float:
     """The study's height, less or more by up to half of a step's path at the plate, m."""
-    return study.drop_test.height_m + (phase - 0.5) * _step_path(study, fidelity)
-
-
-def _step_path(study: Study, fidelity: DropFidelity) -> float:
-    """How far the particle falls in the step in which it meets the plate, m."""
-    speed = fall_speed(study.drop_test.height_m, study.gravity_m_s2)
-    return speed * (fidelity.timestep_s or 0.0)
+    height = study.drop_test.height_m
+    step_path = fall_speed(height, study.gravity_m_s2) * (fidelity.timestep_s or 0.0)
+    return height + (phase - 0.5) * step_path
 
 
 def drop_case(case: Case, drop: Drop) -> Case:
@@ -294,25 +289,15 @@ def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -
     for number, drop in enumerate(drops, start=1):
         scene = drop_scene(drop_case(case, drop), drop.fidelity)
         batch.result(drop.name, scene)
-        rows.append(_row(drop, scene.case))
+        step = scene.case.timestep_s
+        steps = {"timestep_s": step, "timestep_fraction": step / scene.case.rayleigh_time_s}
+        known = {**vars(drop), **vars(drop.fidelity), **steps, "folder": drop.name}
+        rows.append(DropOfList.model_validate({n: known[n] for n in DropOfList.model_fields}))
         if number % 20 == 0 or number == len(drops):
             report(f"{number} of {len(drops)} drops done")
     file = batch.folder / _DROPS_FILE
     _listed(case, rows).write(file)
     return file
-
-
-def _row(drop: Drop, case: CaseFile) -> DropOfList:
-    return DropOfList(
-        folder=drop.name,
-        purpose=drop.purpose,
-        restitution=drop.restitution,
-        limit_force=drop.limit_force,
-        height_m=drop.height_m,
-        youngs_modulus_scale=drop.fidelity.youngs_modulus_scale,
-        timestep_s=case.timestep_s,
-        timestep_fraction=case.timestep_s / case.rayleigh_time_s,
-    )
 
 
 def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
