@@ -17,21 +17,8 @@ import pandas as pd
 from dragchain.contact_law.impact import elastic_time, hertz_force, hertz_overlap, largest_overlap
 from dragchain.errors import TableError
 from dragchain.run.kinematics import needed
+from dragchain.verification import quantities
 from dragchain.verification.published import published
-from dragchain.verification.quantities import (
-    QUANTITIES,
-    abscissa,
-    column_loads,
-    convergence,
-    fitted_order,
-    flight_energy,
-    incline_reference,
-    incline_slopes,
-    last_fifth,
-    momentum_changes,
-    second_half,
-    series_name,
-)
 from dragchain.verification.recording import RecordedContact, Recording
 
 _NORMAL = 1.0
@@ -106,7 +93,7 @@ def compare(
         {
             "number": run.case.number,
             "test": run.case.test,
-            "series": series_name(run),
+            "series": quantities.series_name(run),
             "quantity": quantity,
             "x_name": run.case.vary,
             "x": x,
@@ -181,7 +168,7 @@ def _oblique(run: Recording) -> Iterator[pd.DataFrame]:
     tolerance = _OBLIQUE / case.steps_per_contact
     arm = max(_arm(impact) for impact in impacts)
     yield from _rebounds(run)
-    for quantity, derive in QUANTITIES[case.test].items():
+    for quantity, derive in quantities.QUANTITIES[case.test].items():
         curve = published(case.test, case.series, quantity)
         same, sliding, drawn = [], [], []
         for impact in impacts:
@@ -190,7 +177,7 @@ def _oblique(run: Recording) -> Iterator[pd.DataFrame]:
             same.append((x, derive(contact, before, impact.integrated), engine))
             if impact.slid is not None:
                 sliding.append((x, derive(contact, before, impact.slid), engine))
-            if curve.spans(at := abscissa(impact, quantity)):
+            if curve.spans(at := quantities.abscissa(impact, quantity)):
                 drawn.append((x, curve.at(at), engine))
         yield compare(run, quantity, _INTEGRATED, same, tolerance)
         scale = max(abs(reference) for _, reference, _ in same)
@@ -215,14 +202,14 @@ def _order_of_convergence(runs: Sequence[Recording]) -> list[pd.DataFrame]:
     limited = [run for run in runs if run.case.limit_force]
     if len(limited) < 3:
         return []
-    row = (math.nan, 1.0, fitted_order(convergence(limited)[True]))
+    row = (math.nan, 1.0, quantities.fitted_order(quantities.convergence(limited)[True]))
     checks = compare(limited[-1], "order_of_convergence", EXACT, [row], _ORDER, 1.0)
     name = f"{limited[-1].case.series}, limitForce on, all steps"
     return [checks.assign(series=name)]
 
 
 def _bounce(run: Recording) -> Iterator[pd.DataFrame]:
-    impacts, energy = flight_energy(run)
+    impacts, energy = quantities.flight_energy(run)
     least = needed(run.case.impacts, "impacts")
     enough = float(min(int(impacts[-1]), least))
     yield compare(run, "impacts", EXACT, [(math.nan, float(least), enough)], 0.0)
@@ -233,15 +220,19 @@ def _bounce(run: Recording) -> Iterator[pd.DataFrame]:
 def _momentum(run: Recording) -> Iterator[pd.DataFrame]:
     for at, quantity in enumerate(("linear_momentum_change", "angular_momentum_change")):
         rows = [
-            (contact.value, 0.0, float(np.linalg.norm(momentum_changes(contact)[at], axis=1).max()))
+            (
+                contact.value,
+                0.0,
+                float(np.linalg.norm(quantities.momentum_changes(contact)[at], axis=1).max()),
+            )
             for contact in run.contacts
         ]
         yield compare(run, quantity, EXACT, rows, _CONSERVED, 1.0)
 
 
 def _column(run: Recording) -> Iterator[pd.DataFrame]:
-    loads = column_loads(run)
-    floor = float(run.wall_force_n["plane"][last_fifth(run), 0, 2].mean())
+    loads = quantities.column_loads(run)
+    floor = float(run.wall_force_n["plane"][quantities.last_fifth(run), 0, 2].mean())
     yield compare(run, "floor_force_n", EXACT, [(math.nan, loads[0][1], floor)], _AT_REST)
     rows = [
         (float(at), hertz_overlap(contact, weight), overlap)
@@ -253,13 +244,17 @@ def _column(run: Recording) -> Iterator[pd.DataFrame]:
 def _incline(run: Recording) -> Iterator[pd.DataFrame]:
     for at, quantity in enumerate(("acceleration_m_s2", "spin_up_rad_s2")):
         rows = [
-            (contact.value, incline_reference(contact)[at], incline_slopes(contact)[at])
+            (
+                contact.value,
+                quantities.incline_reference(contact)[at],
+                quantities.incline_slopes(contact)[at],
+            )
             for contact in run.contacts
         ]
         yield compare(run, quantity, EXACT, rows, _FITTED)
     angle = math.radians(needed(run.case.angle_deg, "angle_deg"))
     gravity = math.hypot(*run.case.gravity_m_s2) * math.cos(angle)
-    force = run.wall_force_n["plane"][second_half(run)]
+    force = run.wall_force_n["plane"][quantities.second_half(run)]
     weights = [
         (
             contact.value,
@@ -275,7 +270,7 @@ CHECKS: Mapping[str, Callable[[Recording], Iterator[pd.DataFrame]]] = {
     "elastic_pair": _elastic,
     "elastic_plane": _elastic,
     "restitution": _restitution,
-    **dict.fromkeys(QUANTITIES, _oblique),
+    **dict.fromkeys(quantities.QUANTITIES, _oblique),
     "time_step": _time_step,
     "bounce": _bounce,
     "momentum": _momentum,

@@ -22,13 +22,7 @@ from dragdeck.documents import Document, Part
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report, say
 from dragdeck.errors import InputError
-from dragdeck.physics.contact_mechanics import (
-    effective_modulus,
-    fall_speed,
-    hertz_contact_time,
-    particle_mass,
-    rayleigh_time,
-)
+from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.rounding import timestep
 from dragdeck.project import find_project, study_templates
 from dragdeck.scenes.drop_test import DropFidelity, drop_scene
@@ -234,14 +228,14 @@ def trials(study: Study, count: int, seed: int) -> Iterator[Drop]:
 
 def full(study: Study, fraction: float) -> DropFidelity:
     """Full modulus, and a step that is a share of the mean particle's Rayleigh time."""
-    rayleigh = rayleigh_time(particle_material(study), study.media.radius_mean_m)
+    rayleigh = mechanics.rayleigh_time(particle_material(study), study.media.radius_mean_m)
     return DropFidelity(1.0, timestep(rayleigh, fraction))
 
 
 def _height(study: Study, fidelity: DropFidelity, phase: float) -> float:
     """The study's height, less or more by up to half of a step's path at the plate, m."""
     height = study.drop_test.height_m
-    step_path = fall_speed(height, study.gravity_m_s2) * (fidelity.timestep_s or 0.0)
+    step_path = mechanics.fall_speed(height, study.gravity_m_s2) * (fidelity.timestep_s or 0.0)
     return height + (phase - 0.5) * step_path
 
 
@@ -304,9 +298,9 @@ def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
     study, section = case.study, settings(case)
     particle, plate = study.media.material, study.workpiece.material
     material, radius = particle_material(study), study.media.radius_mean_m
-    modulus = effective_modulus(material, study.materials[plate])
+    modulus = mechanics.effective_modulus(material, study.materials[plate])
     height, gravity = study.drop_test.height_m, study.gravity_m_s2
-    mass, speed = particle_mass(material, radius), fall_speed(height, gravity)
+    mass, speed = mechanics.particle_mass(material, radius), mechanics.fall_speed(height, gravity)
     return DropsFile(
         study=case.study_name,
         title=study.title,
@@ -320,7 +314,7 @@ def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
         limit_force=study.contact.limit_force,
         restitution_now=study.pair(particle, plate).restitution,
         fall_time_s=math.sqrt(2 * height / gravity),
-        contact_time_s=hertz_contact_time(mass, radius, modulus, speed),
+        contact_time_s=mechanics.hertz_contact_time(mass, radius, modulus, speed),
         drops=rows,
     )
 
