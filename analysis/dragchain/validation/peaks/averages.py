@@ -98,8 +98,7 @@ def ranks(runs: Sequence[RunSeries], at: int, rule: PeakRule = "all") -> Ranks:
 
 def geometry(runs: Sequence[RunSeries], at: int) -> Geometry:
     """Orientation and altitude for a place in `SETTINGS`."""
-    at_peaks, at_all_times = (_directions(runs, at, peaks) for peaks in (True, False))
-    return Geometry(at_peaks=at_peaks, at_all_times=at_all_times)
+    return Geometry(at_peaks=_directions(runs, at, True), at_all_times=_directions(runs, at, False))
 
 
 def _directions(runs: Sequence[RunSeries], at: int, at_peaks: bool) -> Directions:
