@@ -1,7 +1,5 @@
 """What the commands of ``dragdeck`` do, and some of its steps."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Iterable

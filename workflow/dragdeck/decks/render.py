@@ -1,7 +1,5 @@
 """From a scene to the files of its run folder."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import replace
 from pathlib import Path

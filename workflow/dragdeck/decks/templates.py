@@ -4,8 +4,6 @@ A template is data: it runs in Jinja's sandbox, within limits of time and memory
 that it inserts passes `quoted`.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import resource

@@ -1,7 +1,5 @@
 """What no single field of a study shows: names that do not exist, values that contradict."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from itertools import product
