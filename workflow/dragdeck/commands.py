@@ -94,9 +94,9 @@ def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
         It cannot be built, or has more ranks than there are cores; the error knows its line.
     """
     try:
-        scene = kind.build(case, bed)
         if not kind.single_particle and LAUNCHER_VARIABLE not in os.environ:
             check_ranks(case.ranks, case.file)
+        scene = kind.build(case, bed)
     except InputError as error:
         error.file = error.file or case.file
         raise located(error) from None

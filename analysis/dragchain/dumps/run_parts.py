@@ -165,6 +165,8 @@ class _Schedule:
         last = self.output.last_step
         if last is not None and self.next <= last:
             self._fail(self.file, f"ends before step {self.next}", f"frames up to step {last}")
+        if self.next == self.output.first_step:
+            self._fail(self.file, "has no frame at all", f"one from step {self.next} on")
 
     def _fail(self, file: Path, problem: str, expected: str) -> None:
         raise DumpError(

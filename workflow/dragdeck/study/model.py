@@ -34,7 +34,8 @@ STUDY_FILE = "study.yaml"
 
 
 Ranks = Annotated[
-    Annotated[Literal["auto"], Tag("a-word")] | Annotated[Whole, Field(ge=1), Tag("a-number")],
+    Annotated[Literal["auto"], Tag("a-word")]
+    | Annotated[Whole, Field(ge=1, le=1024), Tag("a-number")],
     Discriminator(lambda value: "a-word" if value == "auto" else "a-number"),
 ]
 
