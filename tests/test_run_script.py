@@ -21,6 +21,7 @@ SYSTEM_TOOLS = [
     "cat",
     "cksum",
     "cp",
+    "df",
     "chmod",
     "dirname",
     "find",
@@ -29,6 +30,7 @@ SYSTEM_TOOLS = [
     "mkdir",
     "readlink",
     "rm",
+    "sed",
     "sleep",
     "touch",
 ]

@@ -38,7 +38,8 @@ rule write_report:
 
 onerror:
     # Not after Ctrl-C. The mark that the report is whole goes, so that the next call makes it anew.
-    stopped = "user request" in Path(log).read_text(errors="replace")
+    file = Path(log[0] if isinstance(log, list) else log)
+    stopped = "user request" in file.read_text(errors="replace")
     wanted = any(job.rule.name == "write_report" for job in workflow.dag.needrun_jobs())
     if wanted and not stopped:
         runs = " ".join(folder for name in SCENES for folder in every_folder(name))

@@ -115,14 +115,14 @@ def test_a_template_without_end_is_stopped(case: Case, project: Project) -> None
     scene = replace(scene, deck=replace(scene.deck, title=_Alarm("slow")))
     with pytest.raises(InputError, match="takes longer than"):
         deck_text(scene, templates)
-    assert signal.getitimer(signal.ITIMER_REAL)[0] == 0
+    assert signal.getitimer(signal.ITIMER_VIRTUAL)[0] == 0
 
 
 class _Alarm(Markup):
     """A text that leaves a moment only once it is inserted."""
 
     def __html__(self) -> str:
-        signal.setitimer(signal.ITIMER_REAL, 0.05)
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.05)
         return ""
 
 
