@@ -1,0 +1,126 @@
+"""The table in which the suite of attacks ends: attack, expected, got."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from paths import ROOT
+
+from attack.case import SEED, Attack, Row, sample
+
+FILE = ROOT / "results" / "attacks" / "table.md"
+"""Where the table stands after a run of the suite, unless --attack-table says otherwise."""
+
+_PROPERTY = "attack"
+_STATES = ("as expected", "unexpected", "not run")
+
+
+def add_options(parser: pytest.Parser) -> None:
+    parser.addoption("--attacks", action="store_true", help="all attacks instead of a sample")
+    parser.addoption("--attack-seed", type=int, default=SEED, help="seed of the attacks")
+    parser.addoption("--attack-table", type=Path, default=FILE, help="file of their table")
+
+
+class AttackTable:
+    """A plug-in that leaves out what is not in the sample, and writes the table at the end."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self.config = config
+        self.seed: int = config.getoption("--attack-seed")
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        if self.config.getoption("--attacks"):
+            return
+        attacks = {item: attack for item in items if (attack := _attack_of(item))}
+        wanted = {id(attack) for attack in sample(attacks.values(), self.seed)}
+        left_out = [item for item, attack in attacks.items() if id(attack) not in wanted]
+        if len(attacks) > 1 and left_out:  # one that is named on the command line is run
+            self.config.hook.pytest_deselected(items=left_out)
+            gone = set(left_out)
+            items[:] = [item for item in items if item not in gone]
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        rows = [
+            Row(**value)
+            for reports in terminalreporter.stats.values()
+            for report in reports
+            if getattr(report, "when", None) == "call"
+            for name, value in report.user_properties
+            if name == _PROPERTY
+        ]
+        if not rows:
+            return
+        file: Path = self.config.getoption("--attack-table")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(as_page(rows, self.seed), encoding="utf-8")
+        terminalreporter.section(f"attacks (seed {self.seed})")
+        for line in [*_counts(rows), "", *_unexpected(rows), f"table: {file}"]:
+            terminalreporter.write_line(line)
+
+
+def _attack_of(item: pytest.Item) -> Attack | None:
+    callspec = getattr(item, "callspec", None)
+    found = callspec.params.get("attack") if callspec else None
+    return found if isinstance(found, Attack) else None
+
+
+def note(row: Row, request: pytest.FixtureRequest) -> None:
+    """Hand a row to the process that writes the table."""
+    request.node.user_properties.append((_PROPERTY, dataclasses.asdict(row)))
+
+
+def _counts(rows: list[Row]) -> list[str]:
+    """A line per kind, and one for all."""
+    count = Counter((row.kind, row.state) for row in rows)
+    kinds = sorted({row.kind for row in rows})
+    lines = ["{:<12}{:>8}{:>14}{:>12}{:>10}".format("kind", "attacks", *_STATES)]
+    for kind in (*kinds, "all"):
+        of_kind = [
+            sum(number for (each, found), number in count.items()
+                if kind in (each, "all") and found == state)
+            for state in _STATES
+        ]  # fmt: skip
+        lines.append("{:<12}{:>8}{:>14}{:>12}{:>10}".format(kind, sum(of_kind), *of_kind))
+    return lines
+
+
+def _unexpected(rows: list[Row]) -> list[str]:
+    lines = []
+    for row in sorted(rows, key=lambda row: (row.kind, row.name)):
+        if row.state == "unexpected":
+            lines += [
+                f"unexpected: {row.kind}: {row.name}",
+                f"  expected: {row.expected}",
+                f"  got:      {row.got}",
+                *(f"            {line}" for line in row.seen.strip().splitlines()[-6:]),
+            ]
+    return lines
+
+
+def as_page(rows: list[Row], seed: int) -> str:
+    """The table as a page."""
+    lines = [f"# Attacks (seed {seed})", "", "```", *_counts(rows), "```", ""]
+    lines += ["| | attack | expected | got |", "| --- | --- | --- | --- |"]
+    order = {state: place for place, state in enumerate(("unexpected", "not run", "as expected"))}
+    for row in sorted(rows, key=lambda row: (order[row.state], row.kind, row.name)):
+        cells = (row.state, f"{row.kind}: {row.name}", row.expected, row.got)
+        lines.append("| " + " | ".join(_cell(cell) for cell in cells) + " |")
+    seen = [row for row in rows if row.state == "unexpected"]
+    for row in seen:
+        lines += [
+            "",
+            f"## {_cell(row.kind)}: {_cell(row.name)}",
+            "",
+            "```",
+            row.seen[-3000:],
+            "```",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _cell(text: str) -> str:
+    """Text that no table and no terminal stumbles over."""
+    return text.encode("unicode_escape").decode("ascii").replace("|", "/")
