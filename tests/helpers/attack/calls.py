@@ -29,7 +29,7 @@ MOST_MEMORY = 6 * 2**30
 """Address space of a command that is attacked, bytes."""
 
 PATIENCE_S = 120.0
-_POLL_S = 0.01
+_POLL_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -96,23 +96,24 @@ class Call:
 
     def tree(self) -> list[psutil.Process]:
         """The command and all that it started and that still runs."""
-        with contextlib.suppress(psutil.NoSuchProcess):
-            top = psutil.Process(self.process.pid)
-            return [top, *top.children(recursive=True)]
-        return []
+        found = []
+        for number in [self.process.pid, *_below(self.process.pid)]:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                found.append(psutil.Process(number))
+        return found
 
     def spent_s(self) -> float:
         """Processor time of the command and all that it started, s."""
         return sum(_spent_s(each) for each in self.tree())
 
-    def wait_until(self, condition: Callable[[], bool]) -> bool:
+    def wait_until(self, condition: Callable[[], bool], poll_s: float = _POLL_S) -> bool:
         """Wait until something is so while the command runs; whether it came to that."""
         while self.running:
             if condition():
                 return True
             if time.monotonic() - self._begun > PATIENCE_S:
                 return False
-            time.sleep(_POLL_S)
+            time.sleep(poll_s)
         return False
 
     def wait(self, patience_s: float = PATIENCE_S) -> Said:
@@ -139,6 +140,16 @@ def kill(processes: Sequence[psutil.Process]) -> None:
             process.send_signal(signal.SIGKILL)
 
 
+def _below(number: int) -> Iterator[int]:
+    """Numbers of all processes that a process started, and that those did."""
+    with contextlib.suppress(OSError):
+        for task in os.listdir(f"/proc/{number}/task"):
+            children = Path(f"/proc/{number}/task/{task}/children").read_text().split()
+            for child in map(int, children):
+                yield child
+                yield from _below(child)
+
+
 def _spent_s(process: psutil.Process) -> float:
     with contextlib.suppress(psutil.NoSuchProcess):
         times = process.cpu_times()
@@ -152,9 +163,12 @@ def engines(folder: Path) -> list[psutil.Process]:
 
 
 def _engines(folder: str) -> Iterator[psutil.Process]:
-    for process in psutil.process_iter():
+    for number in filter(str.isdigit, os.listdir("/proc")):
         with contextlib.suppress(psutil.Error, OSError):
-            if not is_engine(process) or process.status() == psutil.STATUS_ZOMBIE:
+            if not _is_engine(int(number)):
+                continue
+            process = psutil.Process(int(number))
+            if process.status() == psutil.STATUS_ZOMBIE:
                 continue
             if (process.cwd() + os.sep).startswith(folder + os.sep):
                 yield process
@@ -162,8 +176,12 @@ def _engines(folder: str) -> Iterator[psutil.Process]:
 
 def is_engine(process: psutil.Process) -> bool:
     """Whether a process is LIGGGHTS itself, and no launcher or supervisor of one."""
-    with contextlib.suppress(psutil.Error):
-        return "liggghts" in process.name() or "lmp_" in process.name()
+    return _is_engine(process.pid)
+
+
+def _is_engine(number: int) -> bool:
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{number}/comm").read_text().startswith("liggghts")
     return False
 
 

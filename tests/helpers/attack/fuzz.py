@@ -8,6 +8,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -29,12 +30,15 @@ RIGHT = "right values, or refused"
 FEW, MANY = 150, 3000
 """Examples of each fuzz in the sample, and in the whole suite."""
 
-_TOKENS = [b"nan", b"-1", b"1e999", b"-0", b"9" * 40, b"0x10", b"1_000", b"1.5", b"--1", b"+", b"e5",
-           b"1e", b".", b"infinity", b"\xd9\xa1", b"\x00", b"\n", b" ", b"\r\n", b"ITEM: TIMESTEP\n",
-           b"\xff" * 8, b"\x00" * 8, b"\x7f" + b"\xff" * 7, b"1/9/9", b"f 1 2 99", b"vertex",
-           b"solid", b"endsolid", b"18446744073709551616", b"2147483648"]  # fmt: skip
+_TOKENS = [
+    *(b"nan", b"-1", b"1e999", b"-0", b"9" * 40, b"0x10", b"1_000", b"1.5", b"--1", b"+", b"e5"),
+    *(b"1e", b".", b"infinity", b"\xd9\xa1", b"\x00", b"\n", b" ", b"\r\n", b"ITEM: TIMESTEP\n"),
+    *(b"\xff" * 8, b"\x00" * 8, b"\x7f" + b"\xff" * 7, b"1/9/9", b"f 1 2 99", b"vertex"),
+    *(b"solid", b"endsolid", b"18446744073709551616", b"2147483648"),
+]
 
-Frames = list[tuple[int, dict[str, list[float]]]]
+WholeFrame = tuple[int, dict[str, list[float]]]
+Frames = list[WholeFrame]
 
 
 @st.composite
@@ -63,15 +67,15 @@ def spoilt(draw: st.DrawFn, wholes: list[bytes]) -> bytes:
 # --- what a file says, by a reader that knows no shortcut ----------------------------
 
 
-def text_frames(content: bytes) -> Iterator[tuple[int, dict[str, list[float]]]]:
+def text_frames(content: bytes) -> Iterator[WholeFrame]:
     """Frames of a text dump, as far as they are whole; `ValueError` where they are not."""
-    lines = content.decode("ascii").split("\n")
+    lines = content.split(b"\n")
     place = 0
-    while place < len(lines) and lines[place:] != [""]:
-        if lines[place].split() != ["ITEM:", "TIMESTEP"]:
+    while place < len(lines) and lines[place:] != [b""]:
+        if not lines[place].startswith(b"ITEM: TIMESTEP"):
             raise ValueError(lines[place])
         step, count = int(lines[place + 1]), int(lines[place + 3])
-        names = lines[place + 8].split()[2:]
+        names = [name.decode("latin-1") for name in lines[place + 8].split()[2:]]
         rows = [line.split() for line in lines[place + 9 : place + 9 + count]]
         if len(rows) < count or any(len(row) != len(names) for row in rows):
             raise ValueError("rows")
@@ -82,9 +86,9 @@ def text_frames(content: bytes) -> Iterator[tuple[int, dict[str, list[float]]]]:
         yield step, values
 
 
-def _number(word: str) -> float:
+def _number(word: bytes) -> float:
     value = float(word)
-    if "_" in word or not np.isfinite(value):
+    if b"_" in word or not np.isfinite(value):
         raise ValueError(word)
     return value
 
@@ -109,7 +113,7 @@ def binary_frames(
         yield step, {name: numbers[n::width] for n, name in enumerate(names)}
 
 
-def prefix(frames: Iterator[tuple[int, dict[str, list[float]]]]) -> tuple[Frames, bool]:
+def prefix(frames: Iterator[WholeFrame]) -> tuple[Frames, bool]:
     """The frames before the first error, and whether there was none."""
     found: Frames = []
     try:
@@ -214,7 +218,7 @@ def _try_print_file(folder: Path, content: bytes) -> None:
     numbers = [[float(word) for word in row] for row in rows[: len(steps)]]
     assert steps == [row[0] for row in numbers], "other steps"
     assert values == [row[2] for row in numbers], "other values"
-    assert all(before < after for before, after in zip(steps, steps[1:], strict=False))
+    assert all(before < after for before, after in pairwise(steps))
 
 
 def _meshes(kind: str) -> list[bytes]:
@@ -263,10 +267,9 @@ def _fuzz(name: str, number: int, folder: Path, whole: bool) -> Got:
     """In a process of its own: what ends the interpreter is seen too."""
     examples = MANY if whole else FEW
     said = run_function(fuzzed, (name, number, examples), folder, 600.0)
-    lines = said.text.strip().splitlines()
-    if said.status == 0 and lines and lines[-1].startswith("{"):
-        got = Got(**json.loads(lines[-1]))
-        return got
+    results = [line for line in said.text.splitlines() if line.startswith('{"outcome"')]
+    if said.status == 0 and results:
+        return Got(**json.loads(results[-1]))
     ended = "no answer" if said.status is None else f"died: status {said.status}"
     return Got(ended, said.tail)
 
@@ -278,8 +281,13 @@ def fuzzed(name: str, number: int, examples: int) -> None:
     tried = 0
 
     @seed(number)
-    @settings(max_examples=examples, deadline=None, database=None,
-              phases=[Phase.generate, Phase.shrink], suppress_health_check=list(HealthCheck))  # fmt: skip
+    @settings(
+        max_examples=examples,
+        deadline=None,
+        database=None,
+        phases=[Phase.generate, Phase.shrink],
+        suppress_health_check=list(HealthCheck),
+    )
     @given(content=spoilt(known))
     def each(content: bytes) -> None:
         nonlocal tried

@@ -88,7 +88,7 @@ def finish(arena: Arena, phase: Phase, project: Path, said_before: str = "") -> 
         most = max(most, len(engines(project)))
         return most > 1
 
-    if phase.engine and running.wait_until(count):
+    if phase.engine and running.wait_until(count, poll_s=0.1):
         kill([*running.tree(), *engines(project)])
         running.wait()
         return Got("two engines in one folder", said_before)

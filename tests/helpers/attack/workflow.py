@@ -140,7 +140,9 @@ def _same_study(arena: Arena, project: Path) -> Got:
         found = [
             problem
             for problem in differences(run / "tables", wanted)
-            if not re.match(r"(chains|network|clusters|facets|contact_events|loading|figures)", problem)
+            if not re.match(
+                r"(chains|network|clusters|facets|contact_events|loading|figures)", problem
+            )
         ]
         problems += [f"{place} resumed at {steps}: {problem}" for problem in found]
     for name in ("summary.csv", "summary.parquet", "report.html"):
@@ -162,7 +164,9 @@ def _with_this_bed(arena: Arena, project: Path):  # type: ignore[no-untyped-def]
         or Path(name).name in ("in.liggghts", "case.json", "columns.json")
         or Path(name).suffix == ".stl"
     ]
-    phase = type(process)(process.name, process.words, str(run.relative_to(project)), True, before=own)
+    phase = type(process)(
+        process.name, process.words, str(run.relative_to(project)), True, before=own
+    )
     return Ground(project, {**arena.ground.phases, "process": phase})
 
 
