@@ -34,17 +34,17 @@ from cost_variants import (
 )
 from dragdeck import __version__
 from dragdeck.cases.case import Case
-from dragdeck.decks import DECK_FILE
+from dragdeck.decks import CASE_FILE, DECK_FILE
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.render import deck_text, environment
+from dragdeck.decks.render import deck_text, environment, write_run
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.log import engine_errors, loops
 from dragdeck.engine.process import Engine, command, execute, find_engine
+from dragdeck.engine.record import RunInputs
+from dragdeck.engine.reports import Report
 from dragdeck.engine.run_folder import fingerprint
-from dragdeck.engine.watch import Report
 from dragdeck.errors import EngineError, InputError
 from dragdeck.files import replace_text
-from dragdeck.mesh import write_stl
 from dragdeck.project import study_templates
 from dragdeck.scenes.process import process_scene
 
@@ -249,12 +249,9 @@ class _Bench:
         place.mkdir(parents=True, exist_ok=True)
         for old in place.iterdir():
             old.unlink()
-        texts = {DECK_FILE: deck_text(deck.whole, templates), **deck.whole.files}
-        for file, text in {**texts, _START_FILE: deck_text(deck.start, templates)}.items():
-            replace_text(place / file, text)
-        for file, mesh in deck.whole.meshes.items():
-            write_stl(mesh, place / file)
-        return fingerprint(place)
+        write_run(deck.whole, place, templates)
+        replace_text(place / _START_FILE, deck_text(deck.start, templates))
+        return fingerprint(place, RunInputs.read(place / CASE_FILE))
 
     def rounds(self, count: int) -> list[TimedVariant]:
         """Time what was not timed yet; the rows of all rounds."""

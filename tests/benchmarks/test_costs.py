@@ -37,7 +37,7 @@ from cost_variants import (
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import deck_text, environment
-from dragdeck.engine.batch import silent
+from dragdeck.engine.reports import silent
 from dragdeck.errors import DragdeckError, InputError
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import drop_scene

@@ -27,7 +27,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.deck import StudyScene
 from dragdeck.decks.render import deck_text, environment, write_run
 from dragdeck.engine.process import find_engine
-from dragdeck.engine.watch import say
+from dragdeck.engine.reports import say
 from dragdeck.errors import InputError
 from dragdeck.outlook import bed as bed_outlook
 from dragdeck.outlook import timestep as timestep_outlook

@@ -32,7 +32,8 @@ from dragdeck.campaigns.restitution_drops import (
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
 from dragdeck.decks.render import environment
-from dragdeck.engine.batch import Batch, silent
+from dragdeck.engine.batch import Batch
+from dragdeck.engine.reports import silent
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import hertz_contact_time, rayleigh_time
 from dragdeck.project import Project

@@ -11,8 +11,8 @@ import pytest
 from dragdeck.decks.case_file import CountOfRun, RanksOfRun, SettlingCriterion
 from dragdeck.decks.outputs import Kind, OutputOfRun
 from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.frames import last_frame
-from dragdeck.engine.record import RunInputs
+from dragdeck.engine.frames import whole_frames
+from dragdeck.engine.record import RunInputs, RunPart
 
 
 def written(kind: Kind, name: str, columns: Sequence[str], last_step: int | None) -> OutputOfRun:
@@ -25,6 +25,7 @@ def written(kind: Kind, name: str, columns: Sequence[str], last_step: int | None
         period_steps=1,
         first_step=0,
         last_step=last_step,
+        rows_per_particle=1.0,
     )
 
 
@@ -71,21 +72,29 @@ def test_the_last_frame_counts_only_if_whole(
 ) -> None:
     file = tmp_path / "output"
     file.write_bytes(content)
-    assert last_frame(file, output) == step
+    frames = whole_frames(file, output)
+    assert (frames.steps[-1] if frames.steps and not frames.damaged else None) == step
 
 
 INPUTS = RunInputs(
-    scene="process", run="a", fidelity=RanksOfRun(ranks=1), media=CountOfRun(count=2)
+    scene="process",
+    run="a",
+    fidelity=RanksOfRun(ranks=1),
+    media=CountOfRun(count=2),
+    files={},
 )
 HEAD = "step time_s n_particles kinetic_energy_j rotational_energy_j fastest_particle_m_s\n"
-THERMO = written("print", "thermo", HEAD.split(), 20)
+THERMO = written("print", "thermo", HEAD.split(), 20).model_copy(
+    update={"period_steps": 10, "first_step": 10}
+)
 GRID = "  1 by 1 by 1 MPI processor grid\n"
 GOOD = HEAD + "10 0.1 2 1e-9 0 0.1\n20 0.2 2 1e-9 0 0.1\n"
 
 
 def failed(folder: Path, inputs: RunInputs, status: int = 0, parts: int = 1) -> set[str]:
     """Codes of the checks that did not pass."""
-    checks = check_run(folder, inputs, {"thermo": THERMO}, status, parts, ranks=1)
+    run_parts = [RunPart(part=k + 1, checkpoint=None, from_step=10 * k) for k in range(parts)]
+    checks = check_run(folder, inputs, {"thermo": THERMO}, status, run_parts, ranks=1)
     return {check.code for check in checks if not check.passed}
 
 
@@ -115,7 +124,7 @@ def test_a_bed_that_did_not_settle_fails(tmp_path: Path) -> None:
     (tmp_path / "screen.1.txt").write_text(GRID + "DRAGDECK NOT SETTLED: energy ratio 0.1\n")
     (tmp_path / "thermo.1.txt").write_text(GOOD)
     filling = INPUTS.model_copy(update={"settled": SettlingCriterion(energy_ratio=1e-6)})
-    assert failed(tmp_path, filling) == {"ended", "at_rest"}
+    assert failed(tmp_path, filling) == {"ended", "at_rest", "packing_whole"}
 
 
 def test_a_row_that_the_interruption_cut_short_does_not_fail_a_resumed_run(tmp_path: Path) -> None:
@@ -129,13 +138,6 @@ def test_a_row_that_the_interruption_cut_short_does_not_fail_a_resumed_run(tmp_p
 def test_a_lost_particle_has_its_own_reason(tmp_path: Path) -> None:
     for words, reason in (("Lost atoms: 299 of 300", "lost_particles"), ("Bad", "other")):
         (tmp_path / "screen.1.txt").write_text(f"ERROR: {words}\n")
-        checks = check_run(tmp_path, INPUTS, {}, 1, 1, ranks=1)
+        part = RunPart(part=1, checkpoint=None, from_step=0)
+        checks = check_run(tmp_path, INPUTS, {}, 1, [part], ranks=1)
         assert [check.reason for check in checks if check.code == "no_engine_error"] == [reason]
-
-
-@pytest.mark.parametrize("cut", [0, 1, 30])
-def test_a_frame_longer_than_the_first_look_is_found(tmp_path: Path, cut: int) -> None:
-    content = (text_frame(5, ["1 2"]) + text_frame(9, ["3 4"] * 50)).encode()
-    file = tmp_path / "output"
-    file.write_bytes(content[: len(content) - cut])
-    assert last_frame(file, LOCAL, tail_bytes=16) == (None if cut else 9)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from run_files import rewrite
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import environment, write_run
@@ -96,7 +97,7 @@ def unstable(small: dict[str, Any], write_study: Callable[..., Path], project: P
     step = f"timestep {scene.deck.timestep_s!r}\n"
     assert step in deck.read_text()
     unstable = f"timestep {3 * scene.case.rayleigh_time_s!r}\n"
-    deck.write_text(deck.read_text().replace(step, unstable))
+    rewrite(deck, deck.read_text().replace(step, unstable))
     return folder
 
 
@@ -114,7 +115,7 @@ def test_an_unstable_run_is_stopped_early_with_the_reason(unstable: Path) -> Non
     """LIGGGHTS is told to ignore lost particles: it would go on to the end."""
     deck = unstable / "in.liggghts"
     assert "thermo_modify lost error" in deck.read_text()
-    deck.write_text(deck.read_text().replace("lost error", "lost ignore"))
+    rewrite(deck, deck.read_text().replace("lost error", "lost ignore"))
     with pytest.raises(RejectedRunError, match=r"within its limits: .* at step .*limit: "):
         run(unstable, lambda line: None)
     assert state(unstable).state == "failed"

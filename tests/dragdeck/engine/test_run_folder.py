@@ -14,12 +14,15 @@ from typing import Any
 
 import psutil
 import pytest
+from run_files import rewrite
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import environment, write_run
-from dragdeck.engine.record import RunRecord
+from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
+from dragdeck.engine.record import RunInputs, RunRecord
+from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import fingerprint, run
-from dragdeck.engine.watch import Progress, Watcher
+from dragdeck.engine.watch import EngineEnded, Progress, Watcher, cut_screen
 from dragdeck.errors import EngineError, InputError, RejectedRunError
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DROP_TEST, drop_scene
@@ -27,10 +30,6 @@ from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.sweep.cases import load_cases
 
 pytestmark = pytest.mark.engine
-
-
-def silent(line: str) -> None:
-    """Report nothing."""
 
 
 @pytest.fixture
@@ -63,12 +62,13 @@ def test_a_complete_run_is_not_repeated(filling: Path) -> None:
 
 
 def test_a_comment_in_the_deck_changes_nothing(filling: Path) -> None:
-    before = fingerprint(filling)
+    inputs = RunInputs.read(filling / "case.json")
+    before = fingerprint(filling, inputs)
     deck = filling / "in.liggghts"
     deck.write_text("# another title\n" + deck.read_text())
-    assert fingerprint(filling) == before
+    assert fingerprint(filling, inputs) == before
     deck.write_text(deck.read_text().replace("timestep ", "timestep 0"))
-    assert fingerprint(filling) != before
+    assert fingerprint(filling, inputs) != before
 
 
 def test_a_changed_deck_moves_the_old_run_aside(
@@ -77,13 +77,25 @@ def test_a_changed_deck_moves_the_old_run_aside(
     run(filling, silent)
     old = (filling / "particles.1.bin").read_bytes()
     deck = filling / "in.liggghts"
-    deck.write_text(deck.read_text().replace("9.81", "9.80"))
+    rewrite(deck, deck.read_text().replace("9.81", "9.80"))
     lines: list[str] = []
     run(filling, lines.append)
     (kept,) = (filling / "archive").iterdir()
     assert (kept / "particles.1.bin").read_bytes() == old
     assert "9.81" in (kept / "as_run/in.liggghts").read_text()
     assert any(str(kept) in line for line in lines)
+
+
+def slow_filling(
+    small: dict[str, Any], write_study: Callable[..., Path], project: Project, ranks: int
+) -> Path:
+    """A rendered fill of a few seconds, not yet run."""
+    small["fidelities"]["quick"].update(ranks=ranks, filling_timestep_fraction=0.1)
+    small["media"]["count"] = 150
+    (case,) = load_cases(write_study(small))
+    folder = project.run_folder(case, FILLING)
+    write_run(filling_scene(case), folder, environment(project.templates))
+    return folder
 
 
 def start(folder: Path) -> subprocess.Popen[bytes]:
@@ -103,8 +115,7 @@ def has_checkpoint(folder: Path) -> Callable[[], bool]:
     return lambda: len(list(folder.glob("checkpoint.*"))) > 1
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("ranks", "number"), [(1, signal.SIGINT), (2, signal.SIGTERM)])
 def test_a_stop_leaves_a_checkpoint_and_the_run_goes_on(
     small: dict[str, Any],
     write_study: Callable[..., Path],
@@ -112,10 +123,7 @@ def test_a_stop_leaves_a_checkpoint_and_the_run_goes_on(
     ranks: int,
     number: signal.Signals,
 ) -> None:
-    small["fidelities"]["quick"].update(ranks=ranks, filling_timestep_fraction=0.05)
-    (case,) = load_cases(write_study(small))
-    folder = project.run_folder(case, FILLING)
-    write_run(filling_scene(case), folder, environment(project.templates))
+    folder = slow_filling(small, write_study, project, ranks)
     process = start(folder)
     wait_for(has_checkpoint(folder))
     process.send_signal(number)
@@ -135,10 +143,7 @@ def test_a_stop_leaves_a_checkpoint_and_the_run_goes_on(
 def test_a_killed_engine_is_never_a_result(
     small: dict[str, Any], write_study: Callable[..., Path], project: Project
 ) -> None:
-    small["fidelities"]["quick"].update(filling_timestep_fraction=0.05)
-    (case,) = load_cases(write_study(small))
-    folder = project.run_folder(case, FILLING)
-    write_run(filling_scene(case), folder, environment(project.templates))
+    folder = slow_filling(small, write_study, project, 1)
     process = start(folder)
     wait_for(has_checkpoint(folder))
     for child in psutil.Process(process.pid).children(recursive=True):
@@ -150,13 +155,41 @@ def test_a_killed_engine_is_never_a_result(
     assert run(folder, silent).state == "complete"
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_after_a_kill_and_damage_the_run_goes_on_from_what_is_whole(
+    small: dict[str, Any], write_study: Callable[..., Path], project: Project, ranks: int
+) -> None:
+    folder = slow_filling(small, write_study, project, ranks)
+    process = start(folder)
+    wait_for(lambda: len(list(folder.glob("checkpoint.*.*.restart"))) > 1)
+    family = psutil.Process(process.pid).children(recursive=True)
+    process.kill()
+    process.communicate()
+    assert psutil.wait_procs(family, timeout=20)[1] == []
+
+    *_, older, newest = checkpoint_files(folder)
+    content = bytearray(newest.read_bytes())
+    content[len(content) // 2] ^= 1
+    newest.write_bytes(content)
+    lines: list[str] = []
+    result = run(folder, lines.append)
+    assert result.state == "complete"
+    assert result.parts[1].from_step == checkpoint_step(older)
+    assert [file.name for file in (folder / "damaged").iterdir()] == [newest.name]
+
+
+def test_a_changed_input_is_refused(filling: Path) -> None:
+    data = filling / "particles.data"
+    data.write_text(data.read_text()[:-200])
+    with pytest.raises(InputError, match=r"particles\.data: the file has changed since"):
+        run(filling, silent)
+    assert not (filling / "state.json").exists()
+
+
 def test_a_queue_that_signals_the_engine_too_stops_the_run(
     small: dict[str, Any], write_study: Callable[..., Path], project: Project
 ) -> None:
-    small["fidelities"]["quick"].update(filling_timestep_fraction=0.05)
-    (case,) = load_cases(write_study(small))
-    folder = project.run_folder(case, FILLING)
-    write_run(filling_scene(case), folder, environment(project.templates))
+    folder = slow_filling(small, write_study, project, 1)
     process = start(folder)
     wait_for(has_checkpoint(folder))
     (engine,) = psutil.Process(process.pid).children()
@@ -174,7 +207,7 @@ def test_a_queue_that_signals_the_engine_too_stops_the_run(
 def test_the_engines_error_reaches_the_user_and_is_not_retried(filling: Path) -> None:
     deck = filling / "in.liggghts"
     good = deck.read_text()
-    deck.write_text(good.replace(" 0.86 ", " 0.01 "))
+    rewrite(deck, good.replace(" 0.86 ", " 0.01 "))
     with pytest.raises(RejectedRunError, match=r"ERROR.*[Rr]estitution"):
         run(filling, silent)
     assert not (filling / "run.json").exists()
@@ -182,21 +215,25 @@ def test_the_engines_error_reaches_the_user_and_is_not_retried(filling: Path) ->
     with pytest.raises(RejectedRunError, match="--again"):
         run(filling, silent)
     assert state(filling).started == begun
-    deck.write_text(good)
+    rewrite(deck, good)
     run(filling, silent)
     assert (filling / "run.json").is_file()
 
 
 def test_a_truncated_output_fails_its_check(filling: Path) -> None:
     deck = filling / "in.liggghts"
-    deck.write_text(
+    rewrite(
+        deck,
         deck.read_text().replace(
             "write_restart packing.restart",
-            "undump write_particles\nshell truncate -s -5 particles.1.bin\nwrite_restart "
+            "undump write_particles\nshell truncate -s -5 particles.${part}.bin\nwrite_restart "
             "packing.restart",
-        )
+        ),
     )
-    with pytest.raises(RejectedRunError, match=r"particles whole: particles\.1\.bin is cut short"):
+    with pytest.raises(EngineError, match=r"(?s)particles\.1\.bin is cut short.*disk has space"):
+        run(filling, silent)
+    assert not (filling / "run.json").exists()
+    with pytest.raises(RejectedRunError, match=r"particles whole: particles\.2\.bin is cut short"):
         run(filling, silent)
 
 
@@ -205,7 +242,7 @@ def test_a_lost_particle_fails(filling: Path) -> None:
     lines = data.read_text().splitlines()
     first = lines.index("Velocities") + 2
     lines[first] = "1 0 0 50.0 0 0 0"  # straight up and out
-    data.write_text("\n".join(lines) + "\n")
+    rewrite(data, "\n".join(lines) + "\n")
     # whoever sees it first: the engine, or the watcher of the run's limits
     with pytest.raises(RejectedRunError, match=r"Lost atoms|299 particles at step"):
         run(filling, silent)
@@ -235,16 +272,60 @@ def test_a_drop_has_three_impacts(case: Case, project: Project) -> None:
     assert starts == 3
 
 
+def watcher(folder: Path, lines: list[str], **changed: Any) -> Watcher:
+    """The watch over a run of one output."""
+    usual: dict[str, Any] = {
+        "folder": folder,
+        "screen": folder / "screen.1.txt",
+        "files": [folder / "thermo.1.txt"],
+        "thermo": folder / "thermo.1.txt",
+        "columns": HEAD.split(),
+        "first": 0,
+        "last": 100,
+        "particles": 9,
+        "ranks": 1,
+        "limits": None,
+        "report": lines.append,
+        "every_s": 1.0,
+        "patience_s": 60.0,
+    }
+    return Watcher(**{**usual, **changed})
+
+
+HEAD = "step time_s n_particles kinetic_energy_j rotational_energy_j fastest_particle_m_s\n"
+
+
 def test_progress_waits_for_the_first_row(tmp_path: Path) -> None:
     """The engine opens its file before it writes to it."""
     lines: list[str] = []
-    file = tmp_path / "thermo.1.txt"
-    watch = Watcher(file, ["step", "time_s"], 0, 100, None, lines.append, 1.0)
-    for seconds, text in ((1.0, ""), (2.0, "step time_s\n"), (3.0, "step time_s\n50 0.1 9 0 0\n")):
-        file.write_text(text)
+    watch = watcher(tmp_path, lines)
+    for seconds, text in ((1.0, ""), (2.0, HEAD), (3.0, HEAD + "50 0.1 9 0 0 0\n")):
+        (tmp_path / "thermo.1.txt").write_text(text)
         watch(seconds)
     assert len(lines) == 1
     assert lines[0].startswith("step 50 of 100 (50 %)")
+
+
+def test_an_engine_that_writes_nothing_is_ended(tmp_path: Path) -> None:
+    watch = watcher(tmp_path, [])
+    (tmp_path / "screen.1.txt").write_text("setting up\n")
+    watch(50.0)
+    watch(109.0)
+    with pytest.raises(EngineEnded, match="wrote nothing for 61 s"):
+        watch(111.0)
+
+
+def test_output_without_end_is_cut(tmp_path: Path) -> None:
+    screen = tmp_path / "screen.1.txt"
+    with screen.open("wb") as stream:
+        stream.write(b"Invalid flag in header\n")
+        stream.truncate(20_000_000)
+    with pytest.raises(EngineEnded, match="20 MB"):
+        watcher(tmp_path, [])(0.1)
+    cut_screen(screen)
+    kept = screen.read_bytes()
+    assert len(kept) < 200_000
+    assert kept.startswith(b"Invalid flag") and kept.endswith(b"printed without end]\n")
 
 
 def test_progress_says_how_long() -> None:

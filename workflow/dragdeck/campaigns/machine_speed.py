@@ -19,7 +19,7 @@ from dragdeck.cases.case import Case
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.log import loops
 from dragdeck.engine.record import RunRecord
-from dragdeck.engine.watch import Report
+from dragdeck.engine.reports import Report
 from dragdeck.errors import EngineError, RejectedRunError
 from dragdeck.physics.rounding import timestep
 from dragdeck.physics.similarity import softest_scale

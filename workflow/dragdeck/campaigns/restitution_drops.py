@@ -21,7 +21,7 @@ from dragdeck.decks.case_file import CaseFile
 from dragdeck.decks.render import environment
 from dragdeck.documents import Document, Part
 from dragdeck.engine.batch import Batch
-from dragdeck.engine.watch import Report, say
+from dragdeck.engine.reports import Report, say
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import (
     effective_modulus,

@@ -18,7 +18,7 @@ from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import environment
 from dragdeck.documents import Document, Part
 from dragdeck.engine.batch import Batch
-from dragdeck.engine.watch import Report, say
+from dragdeck.engine.reports import Report, say
 from dragdeck.errors import InputError
 from dragdeck.project import find_project
 from dragdeck.scenes.column import Packing, column_scene

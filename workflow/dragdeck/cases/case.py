@@ -125,11 +125,6 @@ def digest(content: Json) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
-def file_digest(file: Path) -> str:
-    """SHA-256 of a file's bytes."""
-    return hashlib.sha256(file.read_bytes()).hexdigest()
-
-
 def slug(text: str) -> str:
     """A text as a part of a folder's name."""
     return re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.")

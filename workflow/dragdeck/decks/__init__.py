@@ -4,3 +4,6 @@ DECK_FILE = "in.liggghts"
 CASE_FILE = "case.json"
 COLUMNS_FILE = "columns.json"
 """Files of a run's folder, beside its particles and meshes."""
+
+PACKING_FILE = "packing.restart"
+"""What a filling leaves for the runs that start from its bed."""

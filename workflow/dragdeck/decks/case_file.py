@@ -82,6 +82,8 @@ class CaseFile(Document):
         The run id, and the name of the run's folder.
     inputs : mapping
         The values that the run depends on, by dotted name; of a process all of the study.
+    files : mapping
+        SHA-256 of every file that the run starts from, as they were written.
     """
 
     study: str
@@ -92,6 +94,7 @@ class CaseFile(Document):
     rayleigh_time_s: float
     versions: Mapping[str, str]
     phases: Sequence[Phase] = ()
+    files: Mapping[str, str] = {}
 
 
 class CaseOfStudy(CaseFile):

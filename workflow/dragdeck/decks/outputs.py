@@ -28,6 +28,8 @@ class OutputOfRun(Part):
         Our name of each column, and the engine's where the file has it in its header.
     period_steps, first_step, last_step : int
         When frames are written. `last_step` is None where the engine decides.
+    rows_per_particle : float
+        Rows to expect in a frame, for each particle of the run; a frame has at least one.
     """
 
     kind: Kind
@@ -38,6 +40,7 @@ class OutputOfRun(Part):
     period_steps: int
     first_step: int
     last_step: int | None
+    rows_per_particle: float
 
 
 class ColumnsFile(Document):
@@ -82,6 +85,8 @@ class Output:
     period_steps, first_step, last_step : int
         When frames are written. `last_step` is None where the engine decides.
     binary : bool
+    rows_per_particle : float
+        Rows to expect in a frame, for each particle of the run; a frame has at least one.
     """
 
     name: str
@@ -91,6 +96,7 @@ class Output:
     first_step: int
     last_step: int | None
     binary: bool = False
+    rows_per_particle: float = 0.0
 
     @property
     def pattern(self) -> str:
@@ -120,6 +126,7 @@ class Output:
             period_steps=self.period_steps,
             first_step=self.first_step,
             last_step=self.last_step,
+            rows_per_particle=self.rows_per_particle,
         )
 
 
@@ -136,6 +143,9 @@ _ID = Column("particle_id", "id", whole=True)
 _RADIUS = Column("radius_m", "radius")
 _STEP = Column("step", "step", whole=True)
 _TIME = Column("time_s", "step*dt")
+
+_CONTACTS_PER_PARTICLE = 3.0
+"""A settled bed of spheres with friction has five to six neighbours a particle."""
 
 
 def thermo(period: int, last: int | None) -> Output:
@@ -154,7 +164,7 @@ def thermo(period: int, last: int | None) -> Output:
 def settled_particles() -> Output:
     """Every particle of the settled bed, one frame."""
     columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS)
-    return Output("particles", "custom", columns, 1, 0, None, binary=True)
+    return Output("particles", "custom", columns, 1, 0, None, True, 1.0)
 
 
 def workpiece_force(period: int, last: int) -> Output:
@@ -201,7 +211,9 @@ def contacts(period: int, first: int, last: int) -> Output:
         *_vector("force", "n", "c_particle_contacts", 4),
         Column("overlap_m", "c_particle_contacts[7]"),
     )
-    return Output("contacts", "local", columns, period, first, last)
+    return Output(
+        "contacts", "local", columns, period, first, last, rows_per_particle=_CONTACTS_PER_PARTICLE
+    )
 
 
 def particles(period: int, first: int, last: int, bowl_facets: bool) -> Output:
@@ -211,7 +223,7 @@ def particles(period: int, first: int, last: int, bowl_facets: bool) -> Output:
         *_vector("side_force", "n", "f_force_side"),
     )
     columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *(() if bowl_facets else bowl))
-    return Output("particles", "custom", columns, period, first, last, binary=True)
+    return Output("particles", "custom", columns, period, first, last, True, 1.0)
 
 
 def bodies(period: int, last: int, walls: Sequence[str]) -> Output:
@@ -222,7 +234,7 @@ def bodies(period: int, last: int, walls: Sequence[str]) -> Output:
         *(Column(f"torque_{axis}_n_m", f"tq{axis}") for axis in "xyz"),
         *(column for wall in walls for column in _vector(f"{wall}_force", "n", f"f_force_{wall}")),
     )
-    return Output("bodies", "custom", columns, period, 0, last, binary=True)
+    return Output("bodies", "custom", columns, period, 0, last, True, 1.0)
 
 
 def impacts() -> Output:
@@ -241,4 +253,4 @@ def particles_and_forces(period: int, last: int) -> Output:
     """Every particle with the total force on it, as applied."""
     force = tuple(Column(f"force_{axis}_n", f"f{axis}") for axis in "xyz")
     columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *force)
-    return Output("particles", "custom", columns, period, 0, last, binary=True)
+    return Output("particles", "custom", columns, period, 0, last, True, 1.0)

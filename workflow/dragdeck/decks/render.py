@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,8 +15,8 @@ from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.errors import InputError
-from dragdeck.files import replace_text
-from dragdeck.mesh import write_stl
+from dragdeck.files import file_checksum, replace_text
+from dragdeck.mesh import stl_text
 
 
 def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
@@ -149,16 +150,19 @@ def write_run(scene: AnyScene, folder: Path, templates: jinja2.Environment) -> l
     columns = ColumnsFile(outputs={each.name: each.as_part() for each in scene.deck.outputs})
     texts = {
         DECK_FILE: deck_text(scene, templates),
-        CASE_FILE: scene.case.as_text(),
         COLUMNS_FILE: columns.as_text(),
         **scene.files,
+        **{name: stl_text(mesh) for name, mesh in scene.meshes.items()},
     }
+    checksums = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
+    source = folder / scene.deck.source
+    if scene.deck.source not in texts and source.is_file():
+        checksums[scene.deck.source] = file_checksum(source)
+    texts[CASE_FILE] = scene.case.model_copy(update={"files": checksums}).as_text()
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         replace_text(folder / name, text)
-    for name, mesh in scene.meshes.items():
-        write_stl(mesh, folder / name)
-    return [folder / name for name in (*texts, *scene.meshes)]
+    return [folder / name for name in texts]
 
 
 def template_files(templates: jinja2.Environment, scene: str) -> list[Path]:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from dragdeck.decks import PACKING_FILE
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine import log
-from dragdeck.engine.frames import last_frame
+from dragdeck.engine.checkpoints import is_whole
+from dragdeck.engine.completeness import coverage, part_files
+from dragdeck.engine.frames import whole_frames
 from dragdeck.engine.limits import breach, within
-from dragdeck.engine.record import AcceptanceCheck, CheckCode, CheckReason, RunInputs
+from dragdeck.engine.record import AcceptanceCheck, CheckCode, CheckReason, RunInputs, RunPart
 
 
 def check_run(
@@ -18,7 +21,7 @@ def check_run(
     inputs: RunInputs,
     outputs: Mapping[str, OutputOfRun],
     exit_status: int,
-    parts: int,
+    parts: Sequence[RunPart],
     ranks: int,
 ) -> list[AcceptanceCheck]:
     """Look at all that a run left.
@@ -33,12 +36,12 @@ def check_run(
         From ``columns.json``.
     exit_status : int
         Of the last part.
-    parts : int
-        Number of parts; the last one has the end.
+    parts : sequence of RunPart
+        The last one has the end.
     ranks : int
         That were asked for.
     """
-    screens = [_text(folder / f"screen.{part}.txt") for part in range(1, parts + 1)]
+    screens = [_text(folder / f"screen.{part.part}.txt") for part in parts]
     checks = [
         _ended(screens[-1], exit_status),
         _no_errors(screens[-1]),
@@ -46,6 +49,7 @@ def check_run(
     ]
     if inputs.settled is not None:
         checks.append(_at_rest(screens[-1]))
+        checks.append(_packing(folder / PACKING_FILE, inputs.media.count, ranks))
     if "thermo" in outputs:
         samples = _samples(folder, outputs["thermo"], parts)
         checks += _thermo(samples, inputs.media.count)
@@ -103,9 +107,15 @@ def _at_rest(screen: str) -> AcceptanceCheck:
     return _check("at_rest", "bed at rest", rests, seen, "SETTLED")
 
 
-def _samples(folder: Path, output: OutputOfRun, parts: int) -> list[log.Sample]:
+def _packing(file: Path, particles: int, ranks: int) -> AcceptanceCheck:
+    whole = file.is_file() and is_whole(file, particles, ranks)
+    seen = "every particle in it" if whole else f"{file.name} is missing or cut short"
+    return _check("packing_whole", "packing whole", whole, seen, f"{particles} particles")
+
+
+def _samples(folder: Path, output: OutputOfRun, parts: Sequence[RunPart]) -> list[log.Sample]:
     """All whole rows of all parts."""
-    texts = [_text(folder / output.pattern.format(part=part)) for part in range(1, parts + 1)]
+    texts = [_text(folder / output.pattern.format(part=part.part)) for part in parts]
     return [
         sample for text in texts for sample in log.read_samples(text.splitlines(), output.columns)
     ]
@@ -121,16 +131,22 @@ def _thermo(samples: list[log.Sample], count: int) -> list[AcceptanceCheck]:
     ]
 
 
-def _complete(folder: Path, name: str, output: OutputOfRun, parts: int) -> AcceptanceCheck:
-    limit = "last frame whole" if output.last_step is None else f"to step {output.last_step}"
-    file = folder / output.pattern.format(part=parts)
-    step = last_frame(file, output) if file.is_file() else None
+def _complete(
+    folder: Path, name: str, output: OutputOfRun, parts: Sequence[RunPart]
+) -> AcceptanceCheck:
+    """Whether every promised step is there, in whichever part, and nothing else."""
+    found = coverage(folder, output, parts)
+    (file,) = part_files(folder, {name: output}, parts[-1:])
+    passed, seen = False, f"to step {found.last}"
     if not file.is_file():
-        passed, seen = False, f"no {file.name}"
-    elif step is None:
-        passed, seen = False, f"{file.name} is cut short or empty"
+        seen = f"no {file.name}"
+    elif not found.steps or whole_frames(file, output).damaged:
+        seen = f"{file.name} is cut short or empty"
+    elif found.gap is not None:
+        seen = f"step {found.gap} is missing"
     else:
-        passed, seen = output.last_step in (None, step), f"to step {step}"
+        passed = True
+    limit = "every frame whole" if output.last_step is None else f"to step {output.last_step}"
     return _check("output_complete", f"{name} whole", passed, seen, limit)
 
 

@@ -9,14 +9,11 @@ import jinja2
 
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import write_run
+from dragdeck.engine.part import STATE_FILE
 from dragdeck.engine.record import RunRecord
-from dragdeck.engine.run_folder import STATE_FILE, run
-from dragdeck.engine.watch import Report
+from dragdeck.engine.reports import Report, silent
+from dragdeck.engine.run_folder import run
 from dragdeck.errors import RejectedRunError
-
-
-def silent(line: str) -> None:
-    """Report nothing: runs of a second or two."""
 
 
 @dataclass(frozen=True)

@@ -1,87 +1,123 @@
-"""Whether the last frame of an output file is whole."""
+"""Which frames of an output file are whole."""
 
 from __future__ import annotations
 
+import mmap
 import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from dragdeck.decks.outputs import OutputOfRun
 
-_TAIL_BYTES = 4_000_000
-"""How much of a text output's end is looked at first; a dump's frame can be longer."""
-
 _HEADER = struct.Struct("<qqi6i6d2i")
 _CHUNK = struct.Struct("<i")
+_MARK = b"ITEM: TIMESTEP\n"
+_HEAD_LINES = 8
+"""Lines of a text frame between its mark and its rows."""
 
 
-def last_frame(file: Path, output: OutputOfRun, *, tail_bytes: int = _TAIL_BYTES) -> int | None:
-    """Step of a file's last frame, or None where that frame is not whole.
+@dataclass(frozen=True)
+class WholeFrames:
+    """The frames of an output file up to the first that is not whole.
+
+    Attributes
+    ----------
+    steps : tuple of int
+        Their steps, in the order of the file.
+    length : int
+        Where the last of them ends, bytes.
+    size : int
+        Of the file, bytes: larger than `length` where it was cut short or has a hole.
+    """
+
+    steps: tuple[int, ...]
+    length: int
+    size: int
+
+    @property
+    def damaged(self) -> bool:
+        """Whether something stands in the file that is no whole frame."""
+        return self.length < self.size
+
+
+def whole_frames(file: Path, output: OutputOfRun) -> WholeFrames:
+    """Look at every frame of an output file.
 
     Parameters
     ----------
     file : Path
     output : OutputOfRun
         Its entry in ``columns.json``.
-    tail_bytes : int
-        How much of the file's end is looked at first.
     """
-    if output.kind == "print":
-        return _last_row(_tail(file, tail_bytes), len(output.columns))
-    if output.binary:
-        return _last_binary(file)
-    return _last_text(_from_last(file, b"ITEM: TIMESTEP\n", tail_bytes), len(output.columns))
-
-
-def _from_last(file: Path, mark: bytes, length: int) -> bytes | None:
-    """What follows the last mark in a file; None where there is none."""
     size = file.stat().st_size
-    with file.open("rb") as stream:
-        while True:
-            stream.seek(max(0, size - length))
-            _, mark_read, rest = stream.read().rpartition(mark)
-            if mark_read:
-                return rest
-            if length >= size:
-                return None
-            length *= 4
+    if size == 0:
+        return WholeFrames((), 0, 0)
+    with file.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as text:
+        if output.kind == "print":
+            found = _rows(text, output)
+        elif output.binary:
+            found = _binary(text)
+        else:
+            found = _text(text, len(output.columns))
+        ends = list(found)
+    steps = tuple(step for step, _ in ends if step is not None)
+    return WholeFrames(steps, ends[-1][1] if ends else 0, size)
 
 
-def _tail(file: Path, length: int) -> str:
-    with file.open("rb") as stream:
-        stream.seek(max(0, file.stat().st_size - length))
-        return stream.read().decode("ascii", errors="replace")
+def _rows(text: mmap.mmap, output: OutputOfRun) -> Iterator[tuple[int | None, int]]:
+    """Step and end of each row; None for the line of titles."""
+    titles = " ".join(output.columns).encode()
+    for line in iter(text.readline, b""):
+        words = line.split()
+        if line.rstrip() == titles and line.endswith(b"\n"):
+            yield None, text.tell()
+        elif line.endswith(b"\n") and len(words) == len(output.columns) and _numbers(words):
+            yield int(words[0]), text.tell()
+        else:
+            return
 
 
-def _last_row(text: str, width: int) -> int | None:
-    if not text.endswith("\n"):
-        return None
-    words = text.splitlines()[-1].split()
-    return int(words[0]) if len(words) == width and words[0].isdigit() else None
+def _numbers(words: list[bytes]) -> bool:
+    try:
+        [float(word) for word in words]
+    except ValueError:
+        return False
+    return words[0].isdigit()
 
 
-def _last_text(frame: bytes | None, width: int) -> int | None:
-    if frame is None or not frame.endswith(b"\n"):
-        return None
-    lines = frame.count(b"\n")
-    head = frame.split(b"\n", 3)
-    if lines < 8 or lines != 8 + int(head[2]):
-        return None
-    last_row = frame[:-1].rpartition(b"\n")[2]
-    return int(head[0]) if lines == 8 or len(last_row.split()) == width else None
+def _text(text: mmap.mmap, width: int) -> Iterator[tuple[int, int]]:
+    """Step and end of each frame of a text dump."""
+    place = 0
+    while text[place : place + len(_MARK)] == _MARK:
+        begin = place + len(_MARK)
+        place = text.find(_MARK, begin)
+        place = len(text) if place < 0 else place
+        frame = text[begin:place]
+        head = frame.split(b"\n", 3)
+        if len(head) < 4 or not (head[0].isdigit() and head[2].isdigit()):
+            return
+        rows = int(head[2])
+        if not frame.endswith(b"\n") or frame.count(b"\n") != _HEAD_LINES + rows:
+            return
+        if rows and len(frame[:-1].rpartition(b"\n")[2].split()) != width:
+            return
+        yield int(head[0]), place
 
 
-def _last_binary(file: Path) -> int | None:
-    size, place, step = file.stat().st_size, 0, None
-    with file.open("rb") as stream:
-        while place < size:
-            header = stream.read(_HEADER.size)
-            if len(header) < _HEADER.size:
-                return None
-            step, *_, processes = _HEADER.unpack(header)
-            for _ in range(processes):
-                chunk = stream.read(_CHUNK.size)
-                if len(chunk) < _CHUNK.size:
-                    return None
-                stream.seek(8 * _CHUNK.unpack(chunk)[0], 1)
-            place = stream.tell()
-    return step if place == size else None
+def _binary(text: mmap.mmap) -> Iterator[tuple[int, int]]:
+    """Step and end of each frame of a binary dump."""
+    place = 0
+    while place + _HEADER.size <= len(text):
+        step, *_, width, ranks = _HEADER.unpack_from(text, place)
+        place += _HEADER.size
+        for _ in range(ranks):
+            if place + _CHUNK.size > len(text):
+                return
+            (values,) = _CHUNK.unpack_from(text, place)
+            if values < 0 or values % width:
+                return
+            place += _CHUNK.size + 8 * values
+        if place > len(text):
+            return
+        yield step, place

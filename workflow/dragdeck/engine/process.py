@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import re
 import shlex
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -17,6 +19,7 @@ from pathlib import Path
 
 import psutil
 
+from dragdeck.engine.lock import end_tree
 from dragdeck.errors import EngineError
 
 ENGINE_VARIABLE = "DRAGDECK_ENGINE"
@@ -32,6 +35,7 @@ OLDEST_VERSION = (3, 8, 0)
 """Oldest engine that the decks were run on."""
 
 _POLL_S = 0.2
+_PR_SET_PDEATHSIG = 1
 Watch = Callable[[float], None]
 
 
@@ -126,7 +130,7 @@ def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | Non
     source : Path, optional
         The checkpoint to go on from.
     """
-    words = [engine.path, "-in", deck, "-log", f"engine.{part}.log", "-var", "part", str(part)]
+    words = [engine.path, "-in", deck, "-log", "none", "-var", "part", str(part)]
     if source is not None:
         words += ["-var", "resume", "1", "-var", "from", source.name]
     if ranks == 1:
@@ -183,6 +187,7 @@ def execute(words: Sequence[str], folder: Path, screen: Path, watch: Watch) -> E
             stderr=subprocess.STDOUT,
             env=_environment(list(words)),
             start_new_session=True,  # a Ctrl-C reaches us, not the engine
+            preexec_fn=_ends_with_us(signal.SIGKILL if words[1] == "-in" else signal.SIGTERM),
         )
         with _heeding_signals() as asked:
             try:
@@ -191,7 +196,7 @@ def execute(words: Sequence[str], folder: Path, screen: Path, watch: Watch) -> E
                     time.sleep(_POLL_S if time.monotonic() - begun > 1 else 0.02)
             finally:
                 if process.returncode is None:
-                    _end_all(process.pid)
+                    end_tree(psutil.Process(process.pid))
                     cpu_time_s = _ended(process, options=0)
     assert cpu_time_s is not None
     return Ending(process.returncode, bool(asked), time.monotonic() - begun, cpu_time_s)
@@ -235,10 +240,19 @@ def _heeding_signals() -> Iterator[list[int]]:
             signal.signal(number, handler)
 
 
-def _end_all(pid: int) -> None:
-    """Kill a process and all that it started: mpirun's ranks have groups of their own."""
-    with contextlib.suppress(psutil.NoSuchProcess):
-        top = psutil.Process(pid)
-        for process in (*top.children(recursive=True), top):
-            with contextlib.suppress(psutil.NoSuchProcess):
-                process.kill()
+def _ends_with_us(number: signal.Signals) -> Callable[[], None] | None:
+    """What the engine does before it starts: ask Linux for a signal when this process dies.
+
+    So even ``kill -9`` leaves no engine behind. A launcher gets one that it can heed, and ends
+    its ranks.
+    """
+    if sys.platform != "linux":
+        return None
+    us, system = os.getpid(), ctypes.CDLL(None)
+
+    def ask() -> None:
+        system.prctl(_PR_SET_PDEATHSIG, number)
+        if os.getppid() != us:  # died meanwhile
+            os.kill(os.getpid(), number)
+
+    return ask

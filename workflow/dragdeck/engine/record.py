@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from pydantic import Field
@@ -22,6 +22,7 @@ CheckCode = Literal[
     "finite_numbers",
     "within_limits",
     "output_complete",
+    "packing_whole",
     "ranks",
 ]
 CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", "energy", "speed"]
@@ -49,7 +50,13 @@ class AcceptanceCheck(Part):
 
 
 class RunPart(Part):
-    """A part of a run: from its start or a checkpoint to its end or the next interruption."""
+    """A part of a run: from its start or a checkpoint to its end or the next interruption.
+
+    Attributes
+    ----------
+    gap : int or None
+        The first step that some output lacks after a part that came to its end.
+    """
 
     part: int
     checkpoint: str | None = Field(alias="from")
@@ -58,6 +65,7 @@ class RunPart(Part):
     cpu_time_s: float | None = None
     exit_status: int | None = None
     to_step: int | None = None
+    gap: int | None = None
 
 
 class RunRecord(Document):
@@ -76,6 +84,8 @@ class RunRecord(Document):
     stopped_early : bool
         Whether it was stopped because it passed a limit.
     """
+
+    remedy = "delete it: the run starts anew, and what is there moves to archive/"
 
     state: State
     inputs: str
@@ -115,5 +125,6 @@ class RunInputs(Document):
     fidelity: RanksOfRun
     media: CountOfRun
     phases: Sequence[Phase] = ()
+    files: Mapping[str, str]
     settled: SettlingCriterion | None = None
     limits: RunLimits | None = None

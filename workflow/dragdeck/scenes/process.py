@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from trimesh import Trimesh
 
 from dragdeck.cases.bed import bed_radii, bed_rayleigh_time, particle_material, skin
-from dragdeck.cases.case import Case, file_digest, materials_content, mesh_file
+from dragdeck.cases.case import Case, materials_content, mesh_file
 from dragdeck.decks import outputs
 from dragdeck.decks.case_file import (
     CircleOfRun,
@@ -22,6 +22,7 @@ from dragdeck.decks.case_file import (
 from dragdeck.decks.deck import Deck, LeftOut, Scene
 from dragdeck.decks.outputs import Output
 from dragdeck.errors import InputError
+from dragdeck.files import file_checksum
 from dragdeck.mesh import bowl
 from dragdeck.physics.contact_mechanics import effective_modulus, hertz_contact_time, particle_mass
 from dragdeck.physics.domain_split import warnings as rank_warnings
@@ -451,7 +452,7 @@ def _content(case: Case) -> Json:
     """What a process depends on."""
     study = case.study
     shape = study.workpiece.shape
-    mesh = {"mesh": file_digest(mesh_file(case, shape))} if isinstance(shape, MeshShape) else {}
+    mesh = {"mesh": file_checksum(mesh_file(case, shape))} if isinstance(shape, MeshShape) else {}
     return {
         "filling": dict(filling_content(case)),
         "materials": materials_content(study, study.workpiece.material),

@@ -1,0 +1,51 @@
+"""One runner a folder, and engines that lost theirs."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+import pytest
+
+from dragdeck.engine.lock import only_runner
+from dragdeck.engine.reports import silent
+from dragdeck.errors import EngineError
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from dragdeck.engine.lock import only_runner
+with only_runner(Path(sys.argv[1]), print):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_the_lock_names_its_holder_and_dies_with_it(tmp_path: Path) -> None:
+    words = [sys.executable, "-c", HOLD, str(tmp_path)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout is not None and holder.stdout.readline() == "held\n"
+        with (
+            pytest.raises(EngineError, match=f"process {holder.pid} on "),
+            only_runner(tmp_path, silent),
+        ):
+            pass
+        holder.kill()
+    with only_runner(tmp_path, silent):
+        assert f"process {os.getpid()}" in (tmp_path / ".lock").read_text()
+
+
+def test_an_engine_without_a_runner_is_ended(tmp_path: Path) -> None:
+    words = [sys.executable, "-c", "import time; time.sleep(60)", "-in", "in.liggghts"]
+    lines: list[str] = []
+    with subprocess.Popen(words, cwd=tmp_path) as left:
+        elsewhere = tmp_path / "elsewhere"
+        elsewhere.mkdir()
+        with only_runner(elsewhere, lines.append):
+            assert psutil.Process(left.pid).status() != psutil.STATUS_ZOMBIE and lines == []
+        with only_runner(tmp_path, lines.append):
+            assert lines == [f"ended an engine that had lost its runner: process {left.pid}"]
+        assert not psutil.pid_exists(left.pid)

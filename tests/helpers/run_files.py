@@ -1,0 +1,18 @@
+"""Rendered run folders that a test changes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from dragdeck.decks import CASE_FILE
+from dragdeck.files import file_checksum
+
+
+def rewrite(file: Path, text: str) -> None:
+    """Replace an input file of a run as if it had been written so."""
+    file.write_text(text)
+    case = file.with_name(CASE_FILE)
+    content = json.loads(case.read_text())
+    content["files"][file.name] = file_checksum(file)
+    case.write_text(json.dumps(content))

@@ -1,0 +1,69 @@
+"""One runner at a time in a run folder, and no engine without one."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+
+from dragdeck.decks import DECK_FILE
+from dragdeck.engine.reports import Report
+from dragdeck.errors import EngineError
+
+LOCK_FILE = ".lock"
+
+
+@contextlib.contextmanager
+def only_runner(folder: Path, report: Report) -> Iterator[None]:
+    """Hold the lock of a run folder, and end an engine that was left alone in it.
+
+    The system frees the lock when its holder dies, in whatever way.
+
+    Raises
+    ------
+    EngineError
+        Another process holds it: names that.
+    """
+    with (folder / LOCK_FILE).open("a+", encoding="utf-8") as stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            stream.seek(0)
+            raise EngineError(
+                f"{folder}: another process runs this folder\n"
+                f"  value:  {stream.read().strip() or 'it does not say which'}\n"
+                "  remedy: wait for it, or end it"
+            ) from None
+        stream.truncate(0)
+        stream.write(f"process {os.getpid()} on {socket.gethostname()}\n")
+        stream.flush()
+        for orphan in _engines_in(folder):
+            report(f"ended an engine that had lost its runner: process {orphan.pid}")
+            end_tree(orphan)
+            psutil.wait_procs([orphan], timeout=10)
+        yield
+
+
+def _engines_in(folder: Path) -> list[psutil.Process]:
+    """Processes of this machine that run the deck of a folder."""
+    found = []
+    for process in psutil.process_iter():
+        with contextlib.suppress(psutil.Error, OSError):
+            if DECK_FILE in process.cmdline() and Path(process.cwd()).samefile(folder):
+                found.append(process)
+    return found
+
+
+def end_tree(top: psutil.Process) -> None:
+    """Kill a process and all that it started: mpirun's ranks have groups of their own."""
+    with contextlib.suppress(psutil.NoSuchProcess):
+        family = [*top.children(recursive=True), top]
+        for process in family:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                process.kill()
+        psutil.wait_procs([process for process in family if process != top], timeout=10)
