@@ -198,9 +198,11 @@ def gone_within(folder: Path, seconds: float) -> bool:
 # --- commands as functions, in a process that has imported them -------------------------
 
 
-_PRELOADED = ("attack.calls", "dragdeck.commands", "dragdeck.engine.run_folder",
-              "dragchain.tables.write", "dragchain.network.write",
-              "dragchain.report.run_figures", "dragchain.report.study_report")  # fmt: skip
+_PRELOADED = (
+    *("attack.calls", "dragdeck.commands", "dragdeck.engine.run_folder", "dragchain.tables.write"),
+    *("dragchain.network.write", "dragchain.loading.write", "dragchain.report.run_figures"),
+    *("dragchain.report.study_report", "pyvista", "meshio", "trimesh", "hypothesis"),
+)
 
 
 def _server() -> ForkServerContext:

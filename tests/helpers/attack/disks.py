@@ -23,6 +23,7 @@ ROOMY = 256 * 2**20
 """Bytes of a disk with room for everything."""
 
 _PAGE = 4096
+_SPARE = 2_000_000
 
 
 class Disk:
@@ -83,7 +84,7 @@ def disk_attacks(seed: int, sizes: int = 10) -> Iterator[Attack]:
         seconds = 12.0 if phase in ENGINE_PHASES else 5.0
         for number in range(sizes):
             fraction = round((number + chance.uniform(0.0, 0.95)) / sizes, 3)
-            name = f"{phase}: room for {fraction:.1%} of what it writes"
+            name = f"{phase}: room for {fraction:.1%} of what it wants"
             act = partial(_small, phase, fraction)
             yield Attack("disk", name, act, wanted, seconds)
         for number in range(sizes // 2 if phase in ENGINE_PHASES else 0):
@@ -100,7 +101,7 @@ def _small(phase_name: str, fraction: float, arena: Arena) -> Got:
         if disk is None:
             return Got(NO_ROOT)
         project = arena.ground.copy_before(phase, disk.folder / "project")
-        disk.hold(disk.used() + int(fraction * _written(phase)))
+        disk.hold(disk.used() + int(fraction * _wanted(phase)))
         running = Call(phase.words, project, arena.folder / "first.log")
         return _with_room_again(arena, phase, project, disk, running.wait())
 
@@ -118,8 +119,9 @@ def _filling_up(phase_name: str, fraction: float, arena: Arena) -> Got:
         return _with_room_again(arena, phase, project, disk, running.wait())
 
 
-def _written(phase: Phase) -> int:
-    return max(phase.bytes, 10 * _PAGE)
+def _wanted(phase: Phase) -> int:
+    """About what a phase wants of a disk: what it writes, and what a run leaves free."""
+    return max(phase.bytes, 10 * _PAGE) + (_SPARE if phase.engine else 0)
 
 
 _NAMES_THE_DISK = r"no space left|disk|free space"
