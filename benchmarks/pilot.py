@@ -30,9 +30,9 @@ from machine import machine
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import environment, write_run
 from dragdeck.documents import Part
-from dragdeck.engine.log import ParticlesPerRank, decomposition
+from dragdeck.engine.decomposition import decomposition
 from dragdeck.engine.process import Ending, command, execute, find_engine
-from dragdeck.engine.record import RunRecord
+from dragdeck.engine.record import ParticlesPerRank, RunRecord
 from dragdeck.engine.run_folder import run
 from dragdeck.files import replace_text
 from dragdeck.project import Project, find_project, study_templates

@@ -13,7 +13,11 @@ from dragdeck.errors import DragdeckError
 from dragdeck.outlook.timestep import largest_of_case
 from dragdeck.project import PLACES, POINTS, Project, by_run, run_path, study_templates
 from dragdeck.scenes.registry import SCENES
+from dragdeck.engine.reports import say
+from dragdeck.snakemake_lock import clear_stale_locks
 from dragdeck.source_hash import source_hash
+
+clear_stale_locks(Path(".snakemake"), say)
 
 PROJECT = Project(Path(workflow.basedir))
 STUDY = config.get("study", "uhlmann2015")

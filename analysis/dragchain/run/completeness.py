@@ -20,6 +20,7 @@ CheckCode = Literal[
     "finite_numbers",
     "within_limits",
     "output_complete",
+    "packing_whole",
     "ranks",
 ]
 CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", "energy", "speed"]

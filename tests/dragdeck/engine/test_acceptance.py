@@ -11,8 +11,9 @@ import pytest
 from dragdeck.decks.case_file import CountOfRun, RanksOfRun, SettlingCriterion
 from dragdeck.decks.outputs import Kind, OutputOfRun
 from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.frames import whole_frames
-from dragdeck.engine.record import RunInputs, RunPart
+from dragdeck.engine.completeness import whole_frames
+from dragdeck.engine.inputs import RunInputs
+from dragdeck.engine.record import RunPart
 
 
 def written(kind: Kind, name: str, columns: Sequence[str], last_step: int | None) -> OutputOfRun:

@@ -11,8 +11,8 @@ import pytest
 
 from dragdeck.cases.ranks import CORES_VARIABLE, FEWEST_PARTICLES_A_RANK, auto_ranks
 from dragdeck.decks.render import deck_text, environment
-from dragdeck.engine.acceptance import ranks_check
-from dragdeck.engine.log import Decomposition, ParticlesPerRank, decomposition
+from dragdeck.engine.decomposition import decomposition, ranks_check
+from dragdeck.engine.record import Decomposition, ParticlesPerRank
 from dragdeck.errors import InputError
 from dragdeck.outlook.bed import notes
 from dragdeck.physics.domain_split import FilledBowl, split, warnings

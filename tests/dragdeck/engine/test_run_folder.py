@@ -19,7 +19,8 @@ from run_files import rewrite
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import environment, write_run
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
-from dragdeck.engine.record import RunInputs, RunRecord
+from dragdeck.engine.inputs import RunInputs
+from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import fingerprint, run
 from dragdeck.engine.watch import EngineEnded, Progress, Watcher, cut_screen

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -10,10 +9,11 @@ from dragdeck.decks import PACKING_FILE
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
-from dragdeck.engine.completeness import coverage, part_files
-from dragdeck.engine.frames import whole_frames
+from dragdeck.engine.completeness import coverage, part_files, whole_frames
+from dragdeck.engine.decomposition import decomposition, ranks_check
+from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.limits import breach, within
-from dragdeck.engine.record import AcceptanceCheck, CheckCode, CheckReason, RunInputs, RunPart
+from dragdeck.engine.record import AcceptanceCheck, CheckCode, CheckReason, RunPart
 
 
 def check_run(
@@ -54,7 +54,7 @@ def check_run(
         samples = _samples(folder, outputs["thermo"], parts)
         checks += _thermo(samples, inputs.media.count)
     checks += [_complete(folder, name, output, parts) for name, output in outputs.items()]
-    checks.append(ranks_check(log.decomposition(screens[-1]), ranks))
+    checks.append(ranks_check(decomposition(screens[-1]), ranks))
     if inputs.limits is not None and "thermo" in outputs:
         # once more on all rows: the watch may not have looked at the last ones
         checks.append(breach(samples, inputs.limits) or within(inputs.limits))
@@ -148,19 +148,3 @@ def _complete(
         passed = True
     limit = "every frame whole" if output.last_step is None else f"to step {output.last_step}"
     return _check("output_complete", f"{name} whole", passed, seen, limit)
-
-
-def ranks_check(decomposition: log.Decomposition | None, ranks: int) -> AcceptanceCheck:
-    """Whether LIGGGHTS ran on the ranks that were asked for.
-
-    A LIGGGHTS that was built for another MPI than its launcher's runs once per rank, each
-    with all particles, and all write the same files.
-    """
-    name, limit = "split as asked", f"{ranks} rank{'s' if ranks > 1 else ''}"
-    if decomposition is None:
-        return _check("ranks", name, False, "LIGGGHTS names no processor grid", limit)
-    seen = " by ".join(map(str, decomposition.grid))
-    if decomposition.particles:
-        least, most = decomposition.particles.least, decomposition.particles.most
-        seen += f", {least:,} to {most:,} particles per rank"
-    return _check("ranks", name, math.prod(decomposition.grid) == ranks, seen, limit)

@@ -7,45 +7,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dragdeck.documents import Part
-
-
-class ParticlesPerRank(Part):
-    """Mean, largest and smallest number of particles on a rank."""
-
-    mean: float
-    most: int
-    least: int
-
-
-class Decomposition(Part):
-    """The split that LIGGGHTS made of the simulation box.
-
-    Attributes
-    ----------
-    grid : (int, int, int)
-        Ranks along x, y and z.
-    particles : ParticlesPerRank or None
-        At the end of the last ``run`` command; None before one has ended.
-    """
-
-    grid: tuple[int, int, int]
-    particles: ParticlesPerRank | None
-
-
-def decomposition(screen: str) -> Decomposition | None:
-    """The split that LIGGGHTS printed; None where it printed none."""
-    grids = re.findall(r"^ *(\d+) by (\d+) by (\d+) MPI processor grid$", screen, re.MULTILINE)
-    if not grids:
-        return None
-    loads = re.findall(r"^Nlocal: +(\S+) ave (\d+) max (\d+) min$", screen, re.MULTILINE)
-    particles = None
-    if loads:
-        mean, most, least = loads[-1]
-        particles = ParticlesPerRank(mean=float(mean), most=int(most), least=int(least))
-    x, y, z = (int(count) for count in grids[-1])
-    return Decomposition(grid=(x, y, z), particles=particles)
-
 
 def engine_errors(screen: str) -> list[str]:
     """The ERROR lines of LIGGGHTS, once each, in order."""

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 from pydantic import Field
 
-from dragdeck.decks.case_file import CountOfRun, Phase, RanksOfRun, SettlingCriterion
 from dragdeck.documents import Document, Part
-from dragdeck.engine.log import Decomposition
-from dragdeck.physics.run_limits import RunLimits
 
 State = Literal["running", "stopped", "failed", "complete"]
 CheckCode = Literal[
@@ -26,6 +23,29 @@ CheckCode = Literal[
     "ranks",
 ]
 CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", "energy", "speed"]
+
+
+class ParticlesPerRank(Part):
+    """Mean, largest and smallest number of particles on a rank."""
+
+    mean: float
+    most: int
+    least: int
+
+
+class Decomposition(Part):
+    """The split that LIGGGHTS made of the simulation box.
+
+    Attributes
+    ----------
+    grid : (int, int, int)
+        Ranks along x, y and z.
+    particles : ParticlesPerRank or None
+        At the end of the last ``run`` command; None before one has ended.
+    """
+
+    grid: tuple[int, int, int]
+    particles: ParticlesPerRank | None
 
 
 class AcceptanceCheck(Part):
@@ -105,26 +125,3 @@ class RunRecord(Document):
     def last_part(self) -> RunPart:
         """The part that runs or ran last."""
         return self.parts[-1]
-
-
-class RunInputs(Document):
-    """What the runner reads of ``case.json``.
-
-    Attributes
-    ----------
-    settled : SettlingCriterion or None
-        Of a run that must end with a bed at rest.
-    limits : RunLimits or None
-        Of a run that is watched.
-    """
-
-    remedy = "write it with: dragdeck step render"
-
-    scene: str
-    run: str
-    fidelity: RanksOfRun
-    media: CountOfRun
-    phases: Sequence[Phase] = ()
-    files: Mapping[str, str]
-    settled: SettlingCriterion | None = None
-    limits: RunLimits | None = None

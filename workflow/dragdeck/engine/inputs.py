@@ -1,0 +1,32 @@
+"""What the runner reads of a run's ``case.json``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from dragdeck.decks.case_file import CountOfRun, Phase, RanksOfRun, SettlingCriterion
+from dragdeck.documents import Document
+from dragdeck.physics.run_limits import RunLimits
+
+
+class RunInputs(Document):
+    """What the runner reads of ``case.json``.
+
+    Attributes
+    ----------
+    settled : SettlingCriterion or None
+        Of a run that must end with a bed at rest.
+    limits : RunLimits or None
+        Of a run that is watched.
+    """
+
+    remedy = "write it with: dragdeck step render"
+
+    scene: str
+    run: str
+    fidelity: RanksOfRun
+    media: CountOfRun
+    phases: Sequence[Phase] = ()
+    files: Mapping[str, str]
+    settled: SettlingCriterion | None = None
+    limits: RunLimits | None = None
