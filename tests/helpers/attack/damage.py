@@ -433,8 +433,7 @@ def _read(place: str, name: str, damage: Damage, reader: str, seed: int, arena: 
     if got.outcome != SAME:
         return got
     wanted = arena.ground.root / run
-    problems = differences(project / run, wanted)
-    problems = [problem for problem in problems if name not in problem]
+    problems = differences(project / run, wanted, but=name)
     return Got("accepted: other tables", "\n".join(problems)) if problems else got
 
 

@@ -116,10 +116,25 @@ def _injections() -> Iterator[Hostile]:
         yield Hostile(f"study name {name[:20]!a}", put(), ("name|study|usage",), study=name)
 
 
-_LEAVES = {"a list": "[1, 2]", "a mapping": "{a: 1}", "null": "null", "text": "'word'", "NaN": ".nan",
-           "infinity": ".inf", "1e999": "1e999", "a date": "2020-01-01", "bytes": "!!binary aGVsbG8=",
-           "a truth value": "true", "5000 digits": "9" * 5000, "1:30": "1:30", "0300": "0300",
-           "0x10": "0x10", "-1": "-1", "zero": "0", "1_000": "1_000"}  # fmt: skip
+_LEAVES = {
+    "a list": "[1, 2]",
+    "a mapping": "{a: 1}",
+    "null": "null",
+    "text": "'word'",
+    "NaN": ".nan",
+    "infinity": ".inf",
+    "1e999": "1e999",
+    "a date": "2020-01-01",
+    "bytes": "!!binary aGVsbG8=",
+    "a truth value": "true",
+    "5000 digits": "9" * 5000,
+    "1:30": "1:30",
+    "0300": "0300",
+    "0x10": "0x10",
+    "-1": "-1",
+    "zero": "0",
+    "1_000": "1_000",
+}
 _FIELDS = {
     "media.count": "count: 120",
     "bowl.radius_m": "radius_m: 0.022",
@@ -231,7 +246,8 @@ _SLIPS: tuple[tuple[str, Change, tuple[str, ...]], ...] = (
     ("workpiece of radius 5 for mm", put(workpiece__shape__radius_m=5), ("radius_m", r"\bmm\b")),
     ("bowl of radius 40 for mm", put(bowl__radius_m=40), ("radius_m", r"\bmm\b")),
     ("bowl 100 high for mm", put(bowl__height_m=100), ("height_m", r"\bmm\b")),
-    ("particles of radius 3.27 for mm", put(media__radius_mean_m=3.27), ("radius_mean_m", r"\bmm\b")),
+    ("particles of radius 3.27 for mm", put(media__radius_mean_m=3.27),
+     ("radius_mean_m", r"\bmm\b")),
     ("modulus 77 for GPa", put(materials__ceramic__youngs_modulus_pa=77),
      ("youngs_modulus_pa", "GPa")),
     ("density 2.656 for g/cm3", put(materials__ceramic__density_kg_m3=2.656),

@@ -1,4 +1,4 @@
-"""Attacks on ./run: Snakemake killed, locked, called wrongly, or on a disk that cannot be written."""
+"""Attacks on ./run: killed, called twice or wrongly, on disks that cannot be written."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from functools import partial
 from pathlib import Path
 
 import pandas as pd
+from paths import ROOT
+
 from attack.calls import (
     REFUSED,
     UNNAMED,
@@ -33,6 +35,7 @@ from attack.ground import (
     PLACES,
     STUDY,
     CleanRuns,
+    Ground,
     differences,
     files_of,
     new_project,
@@ -41,7 +44,6 @@ from attack.ground import (
     write_study,
 )
 from attack.kills import ENDS_WITHIN_S, SAME, Arena
-from paths import ROOT
 
 WHOLE_S = 90.0
 """About how long ``./run all`` takes, s."""
@@ -151,10 +153,8 @@ def _same_study(arena: Arena, project: Path) -> Got:
     return Got("other tables", "\n".join(problems)) if problems else Got(SAME)
 
 
-def _with_this_bed(arena: Arena, project: Path):  # type: ignore[no-untyped-def]
+def _with_this_bed(arena: Arena, project: Path) -> Ground:
     """The ground with the attacked project in place of the undisturbed one."""
-    from attack.ground import Ground
-
     (run,) = (project / "results" / STUDY / "process").iterdir()
     process = arena.ground.phases["process"]
     own = [
