@@ -112,8 +112,10 @@ def _injections() -> Iterator[Hostile]:
         "\N{GREEK SMALL LETTER MU}",
     ):
         yield Hostile(f"material {name!a}", _renamed("steel", name), ("material",))
-    for name in ("../tiny", "/etc", ".", "tiny/../tiny", "a b", "--help-me", "x" * 250):
-        yield Hostile(f"study name {name[:20]!a}", put(), ("name|study|usage",), study=name)
+    for name in ("../studies/tiny", "tiny/../tiny", "./tiny", "tiny/", "tiny/.", ".", ""):
+        yield Hostile(f"study name {name!a}", put(), ("name|study",), study=name)
+    for name in ("a b", "--help-me", "x" * 250, "#", ".hidden"):
+        yield Hostile(f"study folder {name[:20]!a}", put(), ("name|study|usage",), study=name)
 
 
 _LEAVES = {
@@ -196,8 +198,6 @@ _REFUSED_FIELDS: tuple[tuple[str, Change, tuple[str, ...]], ...] = (
     ("a near miss of a key", put(motion__speed_ms=1), ("speed_ms", "speed_m_s")),
     ("a pair twice", put(**{"pairs__steel-ceramic": {"restitution": 0.1, "friction": 0.9}}),
      ("steel-ceramic", "ceramic-steel")),
-    ("a pair of nothing", put(**{"pairs__ceramic-glass": {"restitution": 0.5, "friction": 0.1}}),
-     ("glass",)),
     ("the transient is the path", put(motion__transient_m=0.005026548245743669), ("transient_m",)),
     ("the transient is beyond the path", put(motion__transient_m=1.0), ("transient_m",)),
     ("an energy ratio above 1", put(filling__energy_ratio=1.5), ("energy_ratio",)),
@@ -235,8 +235,6 @@ _REFUSED_FIELDS: tuple[tuple[str, Change, tuple[str, ...]], ...] = (
      "file": "/dev/zero"}}), ("zero|file",)),
     ("a mesh that is a folder", put(**{_SHAPE: {"kind": "mesh", "unit": "mm", "file": "."}}),
      ("file",)),
-    ("a record out of the project", put(calibration={"record": "/etc/passwd"}),
-     ("record|passwd",)),
     ("three mistakes", _merge(put(bowl__radius_m=-1), put(media__count="many"),
      put(motion__speed_m_s=0)), ("radius_m", "count", "speed_m_s", "line")),
 )  # fmt: skip
@@ -273,7 +271,8 @@ def study_attacks(seed: int) -> Iterator[Attack]:
     for what, change_text, key in _leaves():
         act = partial(_text_study, change_text, key)
         plain = what.endswith((" is 0x10", " is 1_000"))
-        yield Attack("study", what, act, (REFUSED, "accepted") if plain else (REFUSED,), 1.5)
+        numbers = (REFUSED, UNNAMED, WARNED, "accepted")  # they are numbers, if odd ones
+        yield Attack("study", what, act, numbers if plain else (REFUSED,), 1.5)
     for what, (content, named) in _TEXTS.items():
         yield Attack("study", what, partial(_bytes_study, content, named), (REFUSED,), 1.5)
     for encoding in ("utf-16", "utf-32", "latin-1", "cp037"):
@@ -289,10 +288,9 @@ def _study(hostile: Hostile, folder: Path) -> Got:
     data = tiny_study()
     assert callable(hostile.change)
     hostile.change(data)
-    try:
-        write_study(project, data, hostile.study)
-    except OSError:
-        write_study(project, data)  # no such name is possible; it can still be asked for
+    write_study(project, data)
+    if hostile.study not in ("", ".") and "/" not in hostile.study:
+        (project / "studies" / STUDY).rename(project / "studies" / hostile.study)
     return checked(project, hostile.named, hostile.study)
 
 

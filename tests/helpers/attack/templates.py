@@ -64,6 +64,8 @@ _EXPRESSIONS = {
     "deeply nested tags": "{% if true %}" * 2000 + "{% endif %}" * 2000,
 }
 
+_NAMED = {"it includes a study": r"study\.yaml", "it includes the password file": "passwd"}
+
 _FILES: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
     "it extends itself": (
         "process.in.j2",
@@ -98,7 +100,8 @@ _FILES: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
 def template_attacks(seed: int) -> Iterator[Attack]:
     """Every hostile template; the seed changes nothing."""
     for what, text in _EXPRESSIONS.items():
-        act = partial(_template, "process.in.j2", _in_extra(text), (r"\.j2",))
+        named = _NAMED.get(what, r"\.j2")
+        act = partial(_template, "process.in.j2", _in_extra(text), (named,))
         yield Attack("template", what, act, (REFUSED,), 1.5)
     for what, (name, content, named) in _FILES.items():
         act = partial(_template, name, content, named)

@@ -330,15 +330,18 @@ _WRONG_CALLS: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("a study that is a number", ("study=17",), ("17", STUDY)),
     ("a study that is nothing", ("study=",), ("study",)),
     ("an unknown plan", (f"study={STUDY}", "plan=nothing"), ("nothing",)),
+    ("a record out of the project", (f"study={STUDY}", "record"), ("passwd|record",)),
     ("a plan that is no plan", (f"study={STUDY}", "plan=/etc/passwd"), ("passwd|plan",)),
 )
 
 
 def _wrong(config: tuple[str, ...], named: tuple[str, ...], arena: Arena) -> Got:
     project = entry(arena.folder / "project")
-    words = [str(project / "run"), "all", "--dry-run", "--config", *config]
-    if "plan=" in config[-1]:
-        words[1] = "tradeoff"
+    target = "tradeoff" if "plan=" in config[-1] else "all"
+    if config[-1] == "record":
+        write_study(project, {**tiny_study(), "calibration": {"record": "/etc/passwd"}})
+        config, target = config[:-1], "calibrate"
+    words = [str(project / "run"), target, "--dry-run", "--config", *config]
     said = call(words, project, arena.folder / "first.log", 60.0)
     if list(project.rglob("pwned")):
         return Got("an input became code", said.tail)
