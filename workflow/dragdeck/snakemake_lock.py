@@ -21,8 +21,11 @@ def clear_stale_locks(folder: Path, report: Callable[[str], None]) -> None:
     report : callable
         Is told of locks that were deleted.
     """
-    folder.mkdir(exist_ok=True)
-    stream = (folder / "dragdeck.lock").open("a")
+    try:
+        folder.mkdir(exist_ok=True)
+        stream = (folder / "dragdeck.lock").open("a")
+    except OSError:  # Snakemake will say that it may not write here
+        return
     _held.append(stream)
     try:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)

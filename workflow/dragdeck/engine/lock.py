@@ -13,7 +13,6 @@ import psutil
 
 from dragdeck.decks import DECK_FILE
 from dragdeck.engine.reports import Report
-from dragdeck.errors import EngineError
 
 LOCK_FILE = ".lock"
 
@@ -22,23 +21,17 @@ LOCK_FILE = ".lock"
 def only_runner(folder: Path, report: Report) -> Iterator[None]:
     """Hold the lock of a run folder, and end an engine that was left alone in it.
 
-    The system frees the lock when its holder dies, in whatever way.
-
-    Raises
-    ------
-    EngineError
-        Another process holds it: names that.
+    The system frees the lock when its holder dies, in whatever way. A living holder is named,
+    and waited for: it brings the run to its end.
     """
     with (folder / LOCK_FILE).open("a+", encoding="utf-8") as stream:
         try:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             stream.seek(0)
-            raise EngineError(
-                f"{folder}: another process runs this folder\n"
-                f"  value:  {stream.read().strip() or 'it does not say which'}\n"
-                "  remedy: wait for it, or end it"
-            ) from None
+            holder = stream.read().strip() or "one that does not say which"
+            report(f"waiting for another process that runs this folder: {holder}")
+            fcntl.flock(stream, fcntl.LOCK_EX)
         stream.truncate(0)
         stream.write(f"process {os.getpid()} on {socket.gethostname()}\n")
         stream.flush()
