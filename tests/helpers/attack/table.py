@@ -30,6 +30,8 @@ class AttackTable:
     def __init__(self, config: pytest.Config) -> None:
         self.config = config
         self.seed: int = config.getoption("--attack-seed")
+        self.file: Path = config.getoption("--attack-table")
+        self.rows: list[Row] = []
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         if self.config.getoption("--attacks"):
@@ -42,23 +44,33 @@ class AttackTable:
             gone = set(left_out)
             items[:] = [item for item in items if item not in gone]
 
-    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        rows = [
-            Row(**value)
-            for reports in terminalreporter.stats.values()
-            for report in reports
-            if getattr(report, "when", None) == "call"
-            for name, value in report.user_properties
-            if name == _PROPERTY
-        ]
-        if not rows:
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Write the table anew with every row: the whole suite takes an hour."""
+        if report.when != "call" or hasattr(self.config, "workerinput"):
             return
-        file: Path = self.config.getoption("--attack-table")
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(as_page(rows, self.seed), encoding="utf-8")
-        terminalreporter.section(f"attacks (seed {self.seed})")
-        for line in [*_counts(rows), "", *_unexpected(rows), f"table: {file}"]:
-            terminalreporter.write_line(line)
+        rows = [Row(**value) for name, value in report.user_properties if name == _PROPERTY]
+        if rows:
+            self.rows += rows
+            self.file.parent.mkdir(parents=True, exist_ok=True)
+            self.file.write_text(as_page(self.rows, self.seed), encoding="utf-8")
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        if self.rows:
+            terminalreporter.section(f"attacks (seed {self.seed})")
+            rows = [
+                f"{row.state}: {row.kind}: {row.name} | {row.expected} | {row.got}"
+                for row in _in_order(self.rows)
+            ]
+            lines = [
+                "attack | expected | got",
+                *rows,
+                "",
+                *_unexpected(self.rows),
+                *_counts(self.rows),
+                f"table: {self.file}",
+            ]
+            for line in lines:
+                terminalreporter.write_line(_cell(line))
 
 
 def _attack_of(item: pytest.Item) -> Attack | None:
@@ -104,10 +116,9 @@ def as_page(rows: list[Row], seed: int) -> str:
     """The table as a page."""
     lines = [f"# Attacks (seed {seed})", "", "```", *_counts(rows), "```", ""]
     lines += ["| | attack | expected | got |", "| --- | --- | --- | --- |"]
-    order = {state: place for place, state in enumerate(("unexpected", "not run", "as expected"))}
-    for row in sorted(rows, key=lambda row: (order[row.state], row.kind, row.name)):
+    for row in _in_order(rows):
         cells = (row.state, f"{row.kind}: {row.name}", row.expected, row.got)
-        lines.append("| " + " | ".join(_cell(cell) for cell in cells) + " |")
+        lines.append("| " + " | ".join(_cell(cell).replace("|", "or") for cell in cells) + " |")
     seen = [row for row in rows if row.state == "unexpected"]
     for row in seen:
         lines += [
@@ -121,6 +132,12 @@ def as_page(rows: list[Row], seed: int) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _in_order(rows: list[Row]) -> list[Row]:
+    """What is unexpected first, then what was not run."""
+    order = ("unexpected", "not run", "as expected")
+    return sorted(rows, key=lambda row: (order.index(row.state), row.kind, row.name))
+
+
 def _cell(text: str) -> str:
     """Text that no table and no terminal stumbles over."""
-    return text.encode("unicode_escape").decode("ascii").replace("|", "/")
+    return text.encode("unicode_escape").decode("ascii")
