@@ -72,11 +72,11 @@ class Row:
 
 
 SECONDS = {
-    "kill": 30.0,
-    "disk": 20.0,
-    "checkpoint": 12.0,
-    "input": 5.0,
-    "result": 10.0,
+    "kill": 24.0,
+    "disk": 17.0,
+    "checkpoint": 8.0,
+    "input": 4.0,
+    "result": 8.0,
     "study": 6.0,
     "template": 4.0,
     "dump": 6.0,
