@@ -150,7 +150,8 @@ def _leaves() -> Iterator[Hostile | tuple[str, Callable[[str], str], str]]:
     for field, stands in _FIELDS.items():
         key = stands.partition(":")[0]
         for what, value in _LEAVES.items():
-            yield f"{field} is {what}", _text(stands, f"{key}: {value}"), re.escape(key)
+            named = rf"{re.escape(key)}|line \d|yaml:\d"
+            yield f"{field} is {what}", _text(stands, f"{key}: {value}"), named
 
 
 _TEXTS: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
@@ -218,7 +219,7 @@ _REFUSED_FIELDS: tuple[tuple[str, Change, tuple[str, ...]], ...] = (
     ("a step in which a particle crosses its radius", put(motion__speed_m_s=500.0), ("speed",)),
     ("a workpiece shorter than its immersion",
      put(bowl__height_m=0.03, motion__immersion_depth_m=0.029), ("immersion|height|floor",)),
-    ("a gap below a diameter", put(motion__path__radius_m=0.017), ("gap|radius_m",)),
+    ("a gap below a diameter", put(motion__path__radius_m=0.017), (r"gap|motion\.path",)),
     ("a path out of the bowl", put(motion__path__radius_m=0.1), ("radius_m|bowl|wall",)),
     ("more particles than the bowl takes", put(media__count=1_000_000), ("count|height",)),
     ("1e15 particles", put(media__count=10**15), ("count",)),
@@ -236,7 +237,7 @@ _REFUSED_FIELDS: tuple[tuple[str, Change, tuple[str, ...]], ...] = (
     ("a mesh that is a folder", put(**{_SHAPE: {"kind": "mesh", "unit": "mm", "file": "."}}),
      ("file",)),
     ("three mistakes", _merge(put(bowl__radius_m=-1), put(media__count="many"),
-     put(motion__speed_m_s=0)), ("radius_m", "count", "speed_m_s", "line")),
+     put(motion__speed_m_s=0)), ("radius_m", "count", "speed_m_s", r"line \d|yaml:\d")),
 )  # fmt: skip
 
 _SLIPS: tuple[tuple[str, Change, tuple[str, ...]], ...] = (
