@@ -266,7 +266,7 @@ def fuzz_attacks(number: int) -> Iterator[Attack]:
 def _fuzz(name: str, number: int, folder: Path, whole: bool) -> Got:
     """In a process of its own: what ends the interpreter is seen too."""
     examples = MANY if whole else FEW
-    said = run_function(fuzzed, (name, number, examples), folder, 600.0)
+    said = run_function(fuzzed, (name, number, examples), folder, 300.0)
     results = [line for line in said.text.splitlines() if line.startswith('{"outcome"')]
     if said.status == 0 and results:
         return Got(**json.loads(results[-1]))

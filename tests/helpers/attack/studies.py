@@ -16,8 +16,8 @@ from attack.ground import STUDY, new_project, tiny_study, write_study
 HARMLESS = "harmless: the same commands"
 WARNED = "warned, and named"
 CODE = "an input became code"
-ANSWERED_IN_S = 10.0
-"""A study is answered in 5 s; a busy machine gets twice as much."""
+ANSWERED_IN_S = 5.0
+"""A study is answered in 5 s; processor time that is allowed."""
 
 _SHELL = "shell touch pwned"
 _INJECTIONS = {
