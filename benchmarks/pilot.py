@@ -28,7 +28,8 @@ import psutil
 from machine import machine
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import environment, write_run
+from dragdeck.decks.render import write_run
+from dragdeck.decks.templates import environment
 from dragdeck.documents import Part
 from dragdeck.engine.decomposition import decomposition
 from dragdeck.engine.process import Ending, command, execute, find_engine

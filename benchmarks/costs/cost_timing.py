@@ -36,7 +36,8 @@ from dragdeck import __version__
 from dragdeck.cases.case import Case
 from dragdeck.decks import CASE_FILE, DECK_FILE
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.render import deck_text, environment, write_run
+from dragdeck.decks.render import deck_text, write_run
+from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.log import engine_errors, loops

@@ -36,7 +36,8 @@ from cost_variants import (
 )
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.render import deck_text, environment
+from dragdeck.decks.render import deck_text
+from dragdeck.decks.templates import environment
 from dragdeck.engine.reports import silent
 from dragdeck.errors import DragdeckError, InputError
 from dragdeck.project import Project

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from dragdeck.cases.case import Case
+from dragdeck.cases.ranks import CORES_VARIABLE
 from dragdeck.cli import main
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
@@ -81,3 +83,52 @@ def test_outside_a_project(
     monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
     assert main(["cases", "small"]) == 1
     assert "not inside a dragdeck project" in capsys.readouterr().err
+
+
+def edited(case: Case, **changes: Any) -> None:
+    data = {**yaml.safe_load(case.file.read_text()), **changes}
+    case.file.write_text(yaml.safe_dump(data, sort_keys=False))
+
+
+def test_check_names_the_problems_of_all_scenes_with_their_lines(
+    case: Case, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = yaml.safe_load(case.file.read_text())
+    edited(case, media={**data["media"], "count": 5000}, motion={**data["motion"], "path": WIDE})
+    assert main(["check", "small"]) == 1
+    said = capsys.readouterr().err
+    lines = case.file.read_text().splitlines()
+    for field, problem in (("  count:", "more particles"), ("  path:", "does not fit between")):
+        line = 1 + next(n for n, text in enumerate(lines) if text.startswith(field))
+        assert any(f"study.yaml:{line}: " in row and problem in row for row in said.splitlines())
+
+
+WIDE = {"kind": "circle", "radius_m": 0.0215, "revolutions": 0.1}
+
+
+def test_a_step_that_broke_needs_a_reason(
+    case: Case, project: Project, capsys: pytest.CaptureFixture[str]
+) -> None:
+    unsafe = {"youngs_modulus_scale": 1e-3, "timestep_fraction": 1.2, "ranks": 1}
+    edited(case, fidelity=unsafe)
+    assert main(["check", "small"]) == 1
+    said = capsys.readouterr().err
+    assert "fidelity.timestep_fraction: the time step is not safe with E x 0.001" in said
+    assert "below 100 %, where the drag was wrong" in said
+    assert "accepted.unsafe_timestep" in said
+    edited(case, accepted={"unsafe_timestep": "to see it break"})
+    (accepted,) = project.cases("small")
+    assumptions = PROCESS.build(accepted, None).case.assumptions
+    assert [(one.field, one.value) for one in assumptions] == [("fidelity.timestep_fraction", 1.2)]
+    assert "to see it break" in assumptions[0].why
+
+
+def test_more_ranks_than_cores_are_refused(
+    case: Case, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(CORES_VARIABLE, "3")
+    edited(case, fidelity={"youngs_modulus_scale": 1e-3, "ranks": 4})
+    assert main(["check", "small"]) == 1
+    assert "at most 3 here" in capsys.readouterr().err
+    monkeypatch.setenv(CORES_VARIABLE, "4")
+    assert main(["check", "small"]) == 0

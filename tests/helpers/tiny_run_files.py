@@ -49,6 +49,7 @@ DENSITY_KG_M3 = 2500.0
 RADIUS_M = 8.76e-3
 WEIGHT_N = 4 / 3 * np.pi * RADIUS_M**3 * DENSITY_KG_M3 * GRAVITY_M_S2
 STIFFNESS_N_M = 1e5
+FRICTION = 0.3
 WORKPIECE_RADIUS_M = 5e-3
 BOWL_RADIUS_M = 40e-3
 CHAIN_Z_M = 0.03
@@ -194,7 +195,13 @@ def case_json() -> dict[str, Any]:
             "skin_m": 0.001,
             "ranks": 2,
         },
-        "inputs": {"media.count": 4, "motion.speed_m_s": SPEED_M_S},
+        "inputs": {
+            "media.count": 4,
+            "motion.speed_m_s": SPEED_M_S,
+            "media.material": "stone",
+            **dict.fromkeys(("bowl.material", "workpiece.material"), "steel"),
+            **dict.fromkeys(("pairs.stone-stone.friction", "pairs.steel-stone.friction"), FRICTION),
+        },
         "media": {
             "count": 4,
             "radius_mean_m": RADIUS_M,

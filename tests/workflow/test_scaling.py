@@ -53,3 +53,19 @@ def test_a_study_without_the_block_says_so(project: Path) -> None:
     done = snakemake(project, "scaling", "--dry-run", "--config", "study=plain")
     assert done.returncode != 0
     assert "scaling: a required key is missing" in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("studdy=small", "did you mean 'study'?"),
+        ("study=a b;touch hacked", "not a name"),
+        ("plan=defult", "did you mean 'default'?"),
+    ],
+)
+def test_a_wrong_setting_is_refused(project: Path, setting: str, words: str) -> None:
+    done = snakemake(project, "scaling", "--dry-run", "--config", setting)
+    assert done.returncode != 0
+    assert words in done.stdout + done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
+    assert not list(project.glob("hacked*"))

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 import pyvista as pv
@@ -18,10 +19,20 @@ from pages import stands_alone
 from paths import ROOT, SMALL_STUDY
 from snakemake_calls import jobs, snakemake
 
-from dragchain import write_tables
+from dragchain import read_dump, write_tables
 from dragchain.network.write import write_chains
+from dragchain.tables.network_contacts import contact_rows
+from dragchain.tables.run_folder import Run
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+
+TOTAL_FORCES = """{% extends "base/process.in.j2" %}
+{% block extra %}
+dump total_forces all custom {{ deck.thermo_steps }} total_forces.${part}.dump id fx fy fz
+{% endblock %}
+"""
+"""Writes the force that moves each particle, weight included, with every network frame."""
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +44,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(ROOT / "templates", folder / "templates")
     data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
     data["sweep"] = {"motion.immersion_depth_m": [0.012, 0.016]}
-    (folder / "studies/small").mkdir(parents=True)
+    (folder / "studies/small/templates").mkdir(parents=True)
+    (folder / "studies/small/templates/process.in.j2").write_text(TOTAL_FORCES)
     (folder / "studies/small/study.yaml").write_text(yaml.safe_dump(data))
     done = snakemake(folder, "all", "--config", "study=small")
     assert done.returncode == 0, done.stdout + done.stderr
@@ -94,6 +106,39 @@ def test_particles_that_stick_to_the_workpiece_move_with_it(finished: Path) -> N
         assert sticks.sum() > 30
         assert slip[sticks].median() < 0.1 * slip[slides].median()
         assert (run / "tables/workpiece.vtp").is_file()
+
+
+def unbalanced(folder: Path, friction: float) -> np.ndarray:
+    """Contact forces and weight minus inertia of every particle over the frame's mean contact."""
+    run = Run.open(folder)
+    names = ("fx", "fy", "fz")
+    moving = {
+        frame.step: frame.vectors(*names)[np.argsort(frame.ids("id"))]
+        for frame in read_dump(folder / "total_forces.1.dump")
+    }
+    beside = {pair.step: pair for pair in run.workpiece_pairs()}
+    found = []
+    for contacts, particles in zip(run.frames("contacts"), run.frames("particles"), strict=True):
+        if contacts.opening:  # evaluated before the first step of the drag
+            continue
+        particles = particles.take(np.argsort(particles.ids("particle_id")))
+        touching = beside[contacts.step].join()
+        rows = contact_rows(particles, contacts, touching.workpiece, touching.bowl, 0.025, friction)
+        weight = 2656 * 4 / 3 * np.pi * particles.columns["radius_m"] ** 3 * 9.81
+        force = np.column_stack([0 * weight, 0 * weight, -weight]) - moving[contacts.step]
+        between = rows.b_id > 0
+        np.add.at(force, rows.a_id - 1, rows.force_n)
+        np.add.at(force, rows.b_id[between] - 1, -rows.force_n[between])
+        found.append(np.linalg.norm(force, axis=1) / rows.normal_force_n.mean())
+    return np.concatenate(found)
+
+
+def test_contact_forces_weight_and_inertia_of_every_particle_balance(finished: Path) -> None:
+    """What is left is the damping of half a step; the dumped forces alone miss by far more."""
+    (folder,) = (finished / "results/small/process").glob("*0.016*")
+    cut, written = (np.quantile(unbalanced(folder, mu), 0.9) for mu in (0.34, 1e9))
+    assert cut < 0.02
+    assert cut < 0.25 * written
 
 
 def test_all_contact_columns_would_give_the_same_tables(finished: Path, tmp_path: Path) -> None:

@@ -12,7 +12,8 @@ from pages import stands_alone
 from dragchain.cli import main
 from dragdeck.campaigns.verification.suite import suite_of
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import environment, write_run
+from dragdeck.decks.render import write_run
+from dragdeck.decks.templates import environment
 from dragdeck.engine.run_folder import run
 from dragdeck.project import Project
 from dragdeck.scenes.collide import collide_scene

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,11 +26,13 @@ from dragdeck.advice.options import with_option
 from dragdeck.advice.speed import Speed
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
+from dragdeck.cases.ranks import check_ranks
 from dragdeck.decks.deck import StudyScene
-from dragdeck.decks.render import deck_text, environment, write_run
-from dragdeck.engine.process import find_engine
+from dragdeck.decks.render import deck_text, write_run
+from dragdeck.decks.templates import environment
+from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
-from dragdeck.errors import InputError
+from dragdeck.errors import InputError, together
 from dragdeck.outlook import bed as bed_outlook
 from dragdeck.outlook import timestep as timestep_outlook
 from dragdeck.outlook.explain import expected_cost, explanation, show
@@ -36,7 +40,7 @@ from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_m
 from dragdeck.project import Project, by_run, find_project, study_templates
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import Bed, SceneType, read_bed
-from dragdeck.study.yaml import explained
+from dragdeck.study.yaml import explained, located, warnings
 
 
 def _scene_type(name: str) -> SceneType:
@@ -57,18 +61,48 @@ def check(study: str, fidelity: str | None) -> None:
     project = find_project(Path.cwd())
     every = project.cases(study, fidelity)
     templates = environment(project.templates, study_templates(every[0]))
-    warnings: dict[str, None] = {}
+    notes: dict[str, None] = {}
+    errors: list[InputError] = []
     for kind in SCENES.values():
-        for run_id, case in by_run(every, kind).items():
-            scene = kind.build(case, None)
-            deck_text(scene, templates)
+        for run_id, case in by_run(_but_for_the_seed(every), kind).items():
+            try:
+                scene = _built(kind, case, None)
+                deck_text(scene, templates)
+            except InputError as error:
+                errors.append(error)
+                continue
             print(f"{kind.name} {run_id}: time step {scene.deck.timestep_s:.3g} s")
             for what, text in _expectations(case, kind, scene):
                 print(f"  {what}: {text}")
-            warnings.update(dict.fromkeys(f"{case.name}: {text}" for text in scene.warnings))
-    for warning in warnings:
-        print(f"warning: {warning}")
+            notes.update(dict.fromkeys(f"{case.name}: {text}" for text in scene.warnings))
+    for note in notes:
+        print(f"warning: {note}")
+    if errors:
+        raise together(errors)
     print(f"{study}: {len(every)} case(s) can be run; LIGGGHTS {find_engine().version}")
+
+
+def _but_for_the_seed(cases: list[Case]) -> Iterable[Case]:
+    """The first of all cases that differ in the seed alone: nothing to check depends on it."""
+    return {str({**case.settings, "seed": 0}): case for case in reversed(cases)}.values()
+
+
+def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
+    """The scene of a case, with warnings about the study itself.
+
+    Raises
+    ------
+    InputError
+        It cannot be built, or has more ranks than there are cores; the error knows its line.
+    """
+    try:
+        scene = kind.build(case, bed)
+        if not kind.single_particle and LAUNCHER_VARIABLE not in os.environ:
+            check_ranks(case.ranks, case.file)
+    except InputError as error:
+        error.file = error.file or case.file
+        raise located(error) from None
+    return replace(scene, warnings=[*warnings(case.study), *scene.warnings])
 
 
 def explain(study: str, fidelity: str | None, scene: str | None) -> None:
@@ -78,7 +112,7 @@ def explain(study: str, fidelity: str | None, scene: str | None) -> None:
     results = project.results(study)
     kinds = [_scene_type(scene)] if scene else list(SCENES.values())
     runs = ((kind, case) for kind in kinds for case in by_run(every, kind).values())
-    built = ((kind, case, kind.build(case, None)) for kind, case in runs)
+    built = ((kind, case, _built(kind, case, None)) for kind, case in runs)
     show(
         explanation(
             one,
@@ -181,7 +215,7 @@ def render(
             remedy="list them with: dragdeck cases",
         )
     case = runs[run]
-    built = kind.build(case, _bed(kind, packing))
+    built = _built(kind, case, _bed(kind, packing))
     for warning in built.warnings:
         say(f"warning: {warning}")
     folder = project.run_folder(case, kind, of_plan=plan is not None)

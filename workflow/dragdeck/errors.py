@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 
 
@@ -26,6 +28,13 @@ class InputError(DragdeckError):
         What would be accepted.
     remedy : str, optional
         What the user can do.
+
+    Attributes
+    ----------
+    line : int or None
+        Line of the field in the file, where it is known.
+    more : sequence of InputError
+        Further problems of the same input; the message contains them all.
     """
 
     def __init__(
@@ -44,10 +53,16 @@ class InputError(DragdeckError):
         self.value = value
         self.limit = limit
         self.remedy = remedy
-        super().__init__(self._message())
+        self.line: int | None = None
+        self.more: Sequence[InputError] = ()
+        super().__init__(problem)
+
+    def __str__(self) -> str:
+        return "\n".join([self._message(), *map(str, self.more)])
 
     def _message(self) -> str:
-        where = ": ".join(str(part) for part in (self.file, self.field) if part is not None)
+        file = self.file if self.line is None else f"{self.file}:{self.line}"
+        where = ": ".join(str(part) for part in (file, self.field) if part is not None)
         lines = [f"{where}: {self.problem}" if where else self.problem]
         if self.value is not None:
             lines.append(f"  value:  {self.value}")
@@ -56,6 +71,27 @@ class InputError(DragdeckError):
         if self.remedy is not None:
             lines.append(f"  remedy: {self.remedy}")
         return "\n".join(lines)
+
+
+def together(errors: Iterable[InputError]) -> InputError:
+    """Several errors as one that names them all, each once; it has the fields of the first."""
+    every = {one._message(): one for error in errors for one in (error, *error.more)}
+    first, *more = every.values()
+    first.more = more
+    for one in more:
+        one.more = ()
+    return first
+
+
+def near(word: str, known: Iterable[str]) -> str:
+    """A question about the known word that a wrong one resembles; empty where none does."""
+    return "".join(f"did you mean {name!r}? " for name in get_close_matches(word, list(known), 1))
+
+
+def choices(word: str, known: Iterable[str]) -> str:
+    """What may stand in place of a wrong word, as a limit."""
+    names = list(known)
+    return f"{near(word, names)}one of: {', '.join(names) or 'none here'}"
 
 
 class EngineError(DragdeckError):

@@ -10,13 +10,15 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from dragdeck.advice.advise import resolve
+from dragdeck.advice.advise import check_timestep, resolve
 from dragdeck.cases.case import Case
-from dragdeck.errors import InputError
-from dragdeck.outlook.measured import Tradeoff
+from dragdeck.errors import InputError, choices
+from dragdeck.outlook.measured import Tradeoff, tradeoff_if_measured
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import SceneType
+from dragdeck.study.base import NAME, NAME_LIMIT
+from dragdeck.study.yaml import located
 from dragdeck.sweep.cases import load_cases, study_file
 from dragdeck.sweep.plan import Points, plan_points, read_plan
 
@@ -63,9 +65,33 @@ class Project:
         InputError
             No such study, or its file cannot be used.
         """
-        return load_cases(
-            study_file(self.studies, study), fidelity, partial(resolve, tradeoff=tradeoff)
-        )
+        file = study_file(self.studies, study)
+        try:
+            found = load_cases(file, fidelity, partial(resolve, tradeoff=tradeoff))
+            for case in found:
+                check_timestep(case, tradeoff or tradeoff_if_measured())
+        except InputError as error:
+            raise located(error) from None
+        return found
+
+    def plan_file(self, plan: str) -> Path:
+        """The file of a plan, which is known by its name or its path.
+
+        Raises
+        ------
+        InputError
+            There is no such plan.
+        """
+        file = Path(plan) if plan.endswith(".yaml") else self.plans / f"{plan}.yaml"
+        if not NAME.fullmatch(file.stem) or not file.is_file():
+            known = sorted(found.stem for found in self.plans.glob("*.yaml"))
+            raise InputError(
+                f"no such plan: {plan!a}",
+                file=self.plans,
+                limit=f"{choices(plan, known)}; or the path of a .yaml file",
+                remedy=f"choose one of these, or write one; its name has {NAME_LIMIT}",
+            )
+        return file
 
     def points(self, study: str, plan: str) -> Points:
         """The points of a plan for a study, both by name; a plan may be a path too.
@@ -75,15 +101,7 @@ class Project:
         InputError
             There is no such plan or study, or they do not fit together.
         """
-        file = Path(plan) if plan.endswith(".yaml") else self.plans / f"{plan}.yaml"
-        if not file.is_file():
-            known = sorted(found.stem for found in self.plans.glob("*.yaml"))
-            raise InputError(
-                "no such plan",
-                file=file,
-                limit=f"one of: {', '.join(known)}; or the path of a .yaml file",
-                remedy="choose one of these, or write one",
-            )
+        file = self.plan_file(plan)
         return plan_points(read_plan(file), file, self.cases(study)[0])
 
     def results(self, study: str) -> Path:

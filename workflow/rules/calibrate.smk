@@ -17,7 +17,7 @@ rule read_drop_record:
         fall_time=fall_time,
         source=source_hash("dragchain.calibration.measured_impacts"),
     shell:
-        "dragchain step record {input} --fall-time {params.fall_time} --out {output} 2>&1 | tee -i {log}"
+        "dragchain step record {input:q} --fall-time {params.fall_time} --out {output} 2>&1 | tee -i {log}"
 
 
 rule sweep_drops:
@@ -58,7 +58,7 @@ rule fit_restitution:
     params:
         source=source_hash("dragchain.calibration.results"),
     shell:
-        "dragchain step calibrate {input.record} --drops {input.drops}"
+        "dragchain step calibrate {input.record:q} --drops {input.drops}"
         " --out $(dirname {output.result}) 2>&1 | tee -i {log}"
 
 
@@ -152,4 +152,4 @@ rule write_calibration_report:
     params:
         source=source_hash("dragchain.calibration.report"),
     shell:
-        "dragchain step calibration-report {input.record} $(dirname {output.page}) 2>&1 | tee -i {log}"
+        "dragchain step calibration-report {input.record:q} $(dirname {output.page}) 2>&1 | tee -i {log}"

@@ -1,4 +1,5 @@
 # What the rules share: the study, its cases, the paths of its runs.
+import re
 from functools import cache
 from pathlib import Path
 from shlex import quote
@@ -8,22 +9,25 @@ from snakemake.exceptions import WorkflowError
 from dragdeck.campaigns.restitution_drops import record_file
 from dragdeck.campaigns.stability_map import bed_names
 from dragdeck.campaigns.verification.suite import suite_of
-from dragdeck.decks.render import environment, template_files
-from dragdeck.errors import DragdeckError
+from dragdeck.decks.templates import environment, template_files
+from dragdeck.errors import DragdeckError, choices
 from dragdeck.outlook.timestep import largest_of_case
-from dragdeck.project import PLACES, POINTS, Project, by_run, run_path, study_templates
+from dragdeck.project import (
+    PLACES,
+    POINTS,
+    Project,
+    by_run,
+    run_path,
+    study_templates,
+)
 from dragdeck.scenes.registry import SCENES
 from dragdeck.engine.reports import say
 from dragdeck.snakemake_lock import clear_stale_locks
 from dragdeck.source_hash import source_hash
+from dragdeck.study.base import NAME, NAME_LIMIT
+from dragdeck.study.yaml import warnings
 
 clear_stale_locks(Path(".snakemake"), say)
-
-PROJECT = Project(Path(workflow.basedir))
-STUDY = config.get("study", "uhlmann2015")
-FIDELITY = config.get("fidelity")
-PLAN = config.get("plan", "default")
-VALIDATION = config.get("plan", "paper")
 
 
 def explained(function, *arguments):
@@ -34,7 +38,43 @@ def explained(function, *arguments):
         raise WorkflowError(str(error))
 
 
-CASES = explained(PROJECT.cases, STUDY, FIDELITY)
+# What --config may set; without a plan, each target has its own.
+DEFAULTS = {
+    "study": "uhlmann2015",
+    "fidelity": "",
+    "plan": "",
+    "stability_map": "studies/stability/map.yaml",
+}
+
+
+def refuse_setting(key, problem, limit):
+    """End the workflow because of a key or value of --config."""
+    raise WorkflowError(f"--config {key}={config[key]}: {problem}\n  limit:  {limit}")
+
+
+def check_settings():
+    """Refuse keys of --config that nothing reads, and values that no path or command can hold."""
+    for key, value in config.items():
+        if key not in DEFAULTS:
+            refuse_setting(key, "unknown key", choices(str(key), DEFAULTS))
+        file = key == "stability_map" or (key == "plan" and str(value).endswith(".yaml"))
+        if file and not re.fullmatch("[A-Za-z0-9._/-]+", str(value)):
+            refuse_setting(
+                key, "not the path of a file", "letters (a-z), digits, '.', '_', '-', '/'"
+            )
+        if not file and not NAME.fullmatch(str(value)):
+            refuse_setting(key, "not a name", NAME_LIMIT)
+
+
+check_settings()
+PROJECT = Project(Path(workflow.basedir))
+STUDY, FIDELITY, PLAN, STABILITY_MAP = (str(config.get(*item)) for item in DEFAULTS.items())
+PLAN, VALIDATION = PLAN or "default", PLAN or "paper"
+explained(PROJECT.plan_file, PLAN)
+CASES = explained(PROJECT.cases, STUDY, FIDELITY or None)
+
+for WARNING in dict.fromkeys(text for case in CASES for text in warnings(case.study)):
+    logger.warning(f"warning: {STUDY}: {WARNING}")
 
 
 wildcard_constraints:
@@ -82,7 +122,7 @@ def relative(file):
 
 def templates_of(scene):
     """Every template that a scene's deck is made of."""
-    templates = environment(PROJECT.templates, study_templates(CASES[0]))
+    templates = explained(environment, PROJECT.templates, study_templates(CASES[0]))
     return [str(relative(file)) for file in explained(template_files, templates, scene)]
 
 
@@ -200,7 +240,7 @@ def advice_option(wildcards):
 
 def drop_record(wildcards):
     """The measured drop test of the study."""
-    return str(explained(record_file, CASES[0]).relative_to(PROJECT.root))
+    return str(relative(explained(record_file, CASES[0])))
 
 
 def fall_time(wildcards):
@@ -223,8 +263,6 @@ def of_experiment(run, file):
 
 
 # --- stability map ----------------------------------------------------------------
-
-STABILITY_MAP = config.get("stability_map", "studies/stability/map.yaml")
 
 
 def stability_templates():

@@ -25,4 +25,4 @@ rule write_scaling:
         source=source_hash("dragchain.scaling.fit"),
     shell:
         "dragchain step scaling --out $(dirname {output.figure}) {params.options}"
-        " --command '{params.command}' -- {params.runs} 2>&1 | tee -i {log}"
+        " --command {params.command:q} -- {params.runs} 2>&1 | tee -i {log}"

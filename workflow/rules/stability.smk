@@ -27,7 +27,7 @@ rule settle_beds:
     params:
         source=source_hash("dragdeck.campaigns.stability_map"),
     shell:
-        "dragdeck step stability beds --map {input.points} 2>&1 | tee -i {log}"
+        "dragdeck step stability beds --map {input.points:q} 2>&1 | tee -i {log}"
 
 
 rule run_regime:
@@ -49,7 +49,7 @@ rule run_regime:
     params:
         source=source_hash("dragdeck.campaigns.stability_map"),
     shell:
-        "dragdeck step stability {wildcards.regime} --map {input.points} 2>&1 | tee -i {log}"
+        "dragdeck step stability {wildcards.regime} --map {input.points:q} 2>&1 | tee -i {log}"
 
 
 rule write_stability:

@@ -62,7 +62,7 @@ rule write_tradeoff:
         source=source_hash("dragchain.tradeoff.report"),
     shell:
         "dragchain step tradeoff --out $(dirname {output.page}) --plan {params.plan}"
-        " --command '{params.command}' --largest-step {params.largest_step}"
+        " --command {params.command:q} --largest-step {params.largest_step}"
         " --reference {params.reference} {params.costs} {params.promises} --drops {params.drops}"
         " -- {input.measures} > {log} 2>&1"
 

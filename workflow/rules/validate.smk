@@ -34,5 +34,5 @@ rule write_validation:
         runs=lambda wildcards, input: [str(Path(file).parent) for file in input.measures],
         source=source_hash("dragchain.validation.report"),
     shell:
-        "dragchain step validate --out $(dirname {output.page}) --command '{params.command}'"
+        "dragchain step validate --out $(dirname {output.page}) --command {params.command:q}"
         " {params.runs} > {log} 2>&1"

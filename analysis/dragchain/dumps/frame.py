@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -68,6 +69,11 @@ class Frame:
     def take(self, order: NDArray[np.int64]) -> Frame:
         """The rows `order` in that order."""
         columns: Columns = {name: values[order] for name, values in self.columns.items()}
+        return Frame(self.step, columns, self.opening)
+
+    def replaced(self, names: Sequence[str], vectors: NDArray[np.float64]) -> Frame:
+        """The same rows with other values in some columns, (N, len(names))."""
+        columns = self.columns | dict(zip(names, vectors.T, strict=True))
         return Frame(self.step, columns, self.opening)
 
 

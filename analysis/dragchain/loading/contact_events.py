@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.contact_law.hertz import Elastic, contact_time, effective_modulus
-from dragchain.errors import TableError
-from dragchain.run.case import Case
+from dragchain.run.case import Case, friction_with, input_of, number_of
 from dragchain.run.kinematics import motion_of
 
 IMPACT, SLIDING, ROLLING, RESTING = TYPES = ("impact", "sliding", "rolling", "resting")
@@ -96,40 +95,18 @@ def surfaces(case: Case) -> Surfaces:
     TableError
         If ``case.json`` does not give the materials.
     """
-    particle, workpiece = (_input(case, f"{body}.material") for body in ("media", "workpiece"))
-    friction = next(
-        (
-            case.inputs[name]
-            for pair in (f"{particle}-{workpiece}", f"{workpiece}-{particle}")
-            if (name := f"pairs.{pair}.friction") in case.inputs
-        ),
-        None,
-    )
-    if not isinstance(friction, int | float):
-        raise TableError(f"case.json has no inputs.pairs.{particle}-{workpiece}.friction")
+    friction = friction_with(case, "workpiece")
+    bodies = [input_of(case, f"{body}.material") for body in ("media", "workpiece")]
     names = ("youngs_modulus_pa", "poissons_ratio")
     materials = [
-        Elastic(*(_number(case, f"materials.{material}.{name}") for name in names))
-        for material in (particle, workpiece)
+        Elastic(*(number_of(case, f"materials.{material}.{name}") for name in names))
+        for material in bodies
     ]
     modulus = case.fidelity.youngs_modulus_scale * effective_modulus(*materials)
     radius = case.media.radius_mean_m
     mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * radius**3
     time_s = contact_time(mass, radius, modulus, motion_of(case).axis_speed_m_s)
-    return Surfaces(float(friction), float(time_s))
-
-
-def _input(case: Case, name: str) -> object:
-    if name not in case.inputs:
-        raise TableError(f"case.json has no inputs.{name}, which the types of contact need")
-    return case.inputs[name]
-
-
-def _number(case: Case, name: str) -> float:
-    value = _input(case, name)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TableError(f"case.json: inputs.{name} is {value!r}, not a number")
-    return float(value)
+    return Surfaces(friction, float(time_s))
 
 
 def find_events(rows: pd.DataFrame, frames: int, interval_s: float) -> tuple[pd.DataFrame, Ints]:

@@ -31,6 +31,7 @@ from dragchain.report.runs import ReportedRun, StudyRuns, read_study
 from dragchain.report.summary import summary
 from dragchain.run.case import Assumption, load_case
 from dragchain.statistics.correlated import RELIABLE_TIMES
+from dragchain.tables.corrections import Corrections
 
 _SHOWN = 6
 """Cases that the head of the page names; more are in its first table alone."""
@@ -55,6 +56,7 @@ class Section:
     assumptions: list[Assumption]
     pictures: list[Picture]
     loading: Loading | None
+    corrections: Corrections | None
     interval: RunInterval | None
     costs: list[CostRow]
     cost_source: str | None
@@ -96,11 +98,13 @@ def _section(study: StudyRuns, options: Sequence[Option]) -> Section:
     expected = prediction_for(process.case, options)
     records = {str(run.case.scene): run.record for run in study.runs}
     measured = (process.folder / LOADING).is_file()
+    corrections = process.folder / "tables" / "corrections.json"
     return Section(
         study=study,
         assumptions=_assumptions(study),
         pictures=[picture for run in study.runs for picture in _pictures(run)],
         loading=read_loading(process.folder) if measured else None,
+        corrections=Corrections.read(corrections) if corrections.is_file() else None,
         interval=actual_interval(process.case.asked, process.findings.forces),
         costs=list(cost_rows(expected, records)) if expected else [],
         cost_source=expected.source if expected else None,

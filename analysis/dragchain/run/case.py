@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, JsonValue, PositiveFloat, PositiveInt, model_validator
 
 from dragchain.documents import Document, Part
+from dragchain.errors import TableError
 
 Scene = Literal["drop_test", "filling", "process", "impact", "column"]
 OutputKind = Literal["print", "custom", "local"]
@@ -242,6 +243,40 @@ def changed_inputs(
     """
     names = sorted({*own, *other})
     return {name: own.get(name) for name in names if own.get(name) != other.get(name)}
+
+
+def input_of(case: Case, name: str) -> JsonValue:
+    """An input of a run by its dotted name.
+
+    Raises
+    ------
+    TableError
+        If ``case.json`` does not give it.
+    """
+    if name not in case.inputs:
+        raise TableError(f"{case.run}: case.json has no inputs.{name}; render the run again")
+    return case.inputs[name]
+
+
+def number_of(case: Case, name: str) -> float:
+    """An input of a run that must be a number; see `input_of`."""
+    value = input_of(case, name)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TableError(f"{case.run}: case.json: inputs.{name} is {value!r}, not a number")
+    return float(value)
+
+
+def friction_with(case: Case, body: str) -> float:
+    """Coefficient of friction of a particle with ``media``, ``bowl`` or ``workpiece``.
+
+    Raises
+    ------
+    TableError
+        If the inputs of ``case.json`` do not give it.
+    """
+    particle, other = (input_of(case, f"{name}.material") for name in ("media", body))
+    names = [f"pairs.{pair}.friction" for pair in (f"{particle}-{other}", f"{other}-{particle}")]
+    return number_of(case, next((name for name in names if name in case.inputs), names[0]))
 
 
 class Output(Part):

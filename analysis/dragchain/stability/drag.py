@@ -11,7 +11,7 @@ import numpy as np
 
 from dragchain.contact_law.hertz import sphere_mass
 from dragchain.dumps.frame import Frame
-from dragchain.run.case import Case
+from dragchain.run.case import Case, friction_with
 from dragchain.run.kinematics import drag_phase, needed
 from dragchain.stability.contacts import (
     BOWL,
@@ -115,9 +115,10 @@ def _contacts(point: PointRun, run: Run) -> tuple[float, float]:
     every = steps[np.linspace(0, len(steps) - 1, min(len(steps), _NETWORK_FRAMES)).astype(int)]
     some = set(every.tolist() if point.point.reference else every[:1].tolist())
     largest = frequency = 0.0
-    for workpiece in run.workpiece_frames():
-        if workpiece.step not in pairs:
+    for on_workpiece in run.workpiece_pairs():
+        if on_workpiece.step not in pairs:
             continue
+        workpiece = on_workpiece.join(merge=False)  # both stiffnesses of an edge act
         frame = in_id_order(particles[workpiece.step])
         contacts = _engine_contacts(frame, pairs[workpiece.step], workpiece, run.case)
         largest = max(largest, contacts.overlap_ratio(radii(frame)))
@@ -130,7 +131,9 @@ def _contacts(point: PointRun, run: Run) -> tuple[float, float]:
 def _engine_contacts(frame: Frame, pairs: Frame, workpiece: WorkpieceFrame, case: Case) -> Contacts:
     """The contacts of one frame as the engine wrote them, with bowl and workpiece."""
     bowl_radius = needed(case.bowl, "bowl").radius_m
-    rows = contact_rows(frame, pairs, workpiece.workpiece, workpiece.bowl, bowl_radius)
+    friction = friction_with(case, "media")
+    walls = workpiece.workpiece, workpiece.bowl
+    rows = contact_rows(frame, pairs, *walls, bowl_radius, friction)
     ids = np.asarray(frame.columns["particle_id"], dtype=np.int64)
     a = np.searchsorted(ids, rows.a_id)
     b = np.where(rows.b_id > 0, np.searchsorted(ids, rows.b_id), -1)

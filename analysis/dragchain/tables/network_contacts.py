@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints, places
+from dragchain.contact_law.coulomb import within_friction
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
 from dragchain.tables.columns import CENTRE, FLOOR_FORCES, FORCES, SIDE_FORCES
@@ -35,6 +36,8 @@ class ContactRows:
     normal_force_n, tangential_force_n, overlap_m : (N,) ndarray
         Normal part of the force, positive in compression; magnitude of the
         rest; overlap.
+    removed_n : (N,) ndarray
+        What was cut off the tangential force as written; see `within_friction`.
     """
 
     kind: NDArray[np.int8]
@@ -45,6 +48,7 @@ class ContactRows:
     normal_force_n: Floats
     tangential_force_n: Floats
     overlap_m: Floats
+    removed_n: Floats
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,7 @@ def contact_rows(
     workpiece: WallContacts,
     bowl: WallContacts,
     bowl_radius_m: float,
+    friction: float,
 ) -> ContactRows:
     """Bring the contacts of one step into one form.
 
@@ -88,6 +93,8 @@ def contact_rows(
         Contacts on the workpiece and on a meshed bowl at the same step.
     bowl_radius_m : float
         Inner radius of the bowl, about the z axis.
+    friction : float
+        Coefficient of friction between particles, to which their forces are cut.
 
     Returns
     -------
@@ -117,7 +124,7 @@ def contact_rows(
             f"step {particles.step}: particles has particle {int(known.ids[twice[0]])} twice"
         )
     groups = [
-        _particle_particle(known, contacts),
+        _particle_particle(known, contacts, friction),
         _mesh(workpiece.select(~workpiece.silent), "particle-workpiece"),
         *_meshed_bowl(bowl.select(~bowl.silent), float(known.radii.min(initial=np.inf))),
     ]
@@ -128,7 +135,7 @@ def contact_rows(
     return _joined(groups)
 
 
-def _particle_particle(particles: _Particles, contacts: Frame) -> ContactRows:
+def _particle_particle(particles: _Particles, contacts: Frame, friction: float) -> ContactRows:
     """Contact point: centre 1 + (R1 - overlap / 2) n, with n from particle 1 to particle 2."""
     first, second = contacts.ids("particle1_id"), contacts.ids("particle2_id")
     at_first, at_second = particles.rows_of(first), particles.rows_of(second)
@@ -137,9 +144,9 @@ def _particle_particle(particles: _Particles, contacts: Frame) -> ContactRows:
     away = between / np.linalg.norm(between, axis=1, keepdims=True)
     overlap = np.asarray(contacts.columns["overlap_m"], dtype=np.float64)
     point = centre + (particles.radii[at_first] - 0.5 * overlap)[:, None] * away
-    return _rows(
-        "particle-particle", first, second, point, contacts.vectors(*FORCES), -away, overlap
-    )
+    force, removed = within_friction(contacts.vectors(*FORCES), away, friction)
+    rows = _rows("particle-particle", first, second, point, force, -away, overlap)
+    return replace(rows, removed_n=removed)
 
 
 def _floor(particles: _Particles, force_n: Floats) -> ContactRows:
@@ -209,6 +216,7 @@ def _rows(
         normal_force_n=np.asarray(np.einsum("ij,ij->i", force_n, normal)),
         tangential_force_n=tangential_force(force_n, normal),
         overlap_m=overlap_m,
+        removed_n=np.zeros(len(a_id)),
     )
 
 

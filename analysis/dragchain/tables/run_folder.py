@@ -10,7 +10,7 @@ from pathlib import Path
 from dragchain.dumps.frame import Columns, Frame
 from dragchain.dumps.run_parts import iter_frames, iter_prints
 from dragchain.errors import TableError
-from dragchain.run.case import Case, Output, load_case, load_outputs
+from dragchain.run.case import Case, Output, friction_with, load_case, load_outputs
 from dragchain.tables.workpiece_contacts import WorkpieceFrame, join_workpiece_frame
 
 
@@ -20,15 +20,16 @@ class WorkpiecePair:
 
     particles: Frame
     contacts: Frame
+    friction: tuple[float, float]
 
     @property
     def step(self) -> int:
         """The step."""
         return self.particles.step
 
-    def join(self) -> WorkpieceFrame:
+    def join(self, *, merge: bool = True) -> WorkpieceFrame:
         """Give every contact the force that its particle received; see `join_workpiece_frame`."""
-        return join_workpiece_frame(self.particles, self.contacts)
+        return join_workpiece_frame(self.particles, self.contacts, self.friction, merge=merge)
 
 
 @dataclass(frozen=True)
@@ -72,13 +73,14 @@ class Run:
 
     def workpiece_pairs(self) -> Iterator[WorkpiecePair]:
         """What `workpiece_frames` joins, for those who need some steps only."""
+        friction = friction_with(self.case, "workpiece"), friction_with(self.case, "bowl")
         pairs = zip_longest(self.frames("workpiece_particles"), self.frames("workpiece_contacts"))
         for particles, contacts in pairs:
             if particles is None or contacts is None:
                 raise TableError(
                     "one of workpiece_particles and workpiece_contacts ends before the other"
                 )
-            yield WorkpiecePair(particles, contacts)
+            yield WorkpiecePair(particles, contacts, friction)
 
     def workpiece_frames(self) -> Iterator[WorkpieceFrame]:
         """Contacts on the workpiece, step by step.

@@ -3,6 +3,9 @@
 ``workpiece_contacts`` says where the particles touch the workpiece, but its forces are
 evaluated a second time for output; ``workpiece_particles`` says what force each particle
 received. One `WorkpieceFrame` joins the two for one step.
+
+LIGGGHTS counts a particle over a convex edge twice, once for each facet. `_merged` makes one
+contact of those of a particle that lie within one contact patch.
 """
 
 from __future__ import annotations
@@ -13,9 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
+from dragchain.contact_law.coulomb import within_friction
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
 from dragchain.tables.columns import CENTRE, FORCES, POINT, SPIN, VELOCITY
+
+_NORMAL = ("normal_x", "normal_y", "normal_z")
 
 _BOWL_MESH = 1
 """``mesh_id`` of a contact when the bowl is a mesh too."""
@@ -32,10 +38,11 @@ class WallContacts:
     point_m : (N, 3) ndarray
         Contact point.
     force_n, evaluated_n : (N, 3) ndarray
-        Force on the particle as applied, and as the engine evaluated it for output.
+        Force on the particle as applied, and as the engine evaluated it for output, its
+        tangential part within the limit of friction.
     normal : (N, 3) ndarray
-        Unit vector from the contact point to the particle's centre; zero where the
-        particle received no force, because no centre is written then.
+        Unit vector from the contact point to the particle's centre, the mean of several merged
+        contacts; zero where the particle received no force, because no centre is written then.
     surface_m_s : (N, 3) ndarray
         Velocity of the particle's surface at the contact point, v + w x r with r
         from the particle's centre; NaN where the particle received no force, and
@@ -88,6 +95,8 @@ class WorkpieceFrame:
         Forces applied to particles for which no contact was written.
     opening : bool
         Whether its forces may have been evaluated anew; see `Frame`.
+    merged : int
+        Contacts on the workpiece that were made part of another one of their particle.
     """
 
     step: int
@@ -95,6 +104,7 @@ class WorkpieceFrame:
     bowl: WallContacts
     unplaced_n: Floats
     opening: bool
+    merged: int = 0
 
 
 def tangential_force(force_n: Floats, normal: Floats) -> Floats:
@@ -103,11 +113,14 @@ def tangential_force(force_n: Floats, normal: Floats) -> Floats:
     return np.asarray(np.linalg.norm(force_n - along, axis=1))
 
 
-def join_workpiece_frame(particles: Frame, contacts: Frame) -> WorkpieceFrame:
+def join_workpiece_frame(
+    particles: Frame, contacts: Frame, friction: tuple[float, float], *, merge: bool = True
+) -> WorkpieceFrame:
     """Give every contact the force that its particle received.
 
-    The force of a particle with one contact is that contact's. A particle with k
-    contacts received A in all while E_1 ... E_k were evaluated for output:
+    The evaluated forces are cut to the limit of friction, and the contacts of a particle within
+    one contact patch become one. The force of a particle with one contact is that contact's. A
+    particle with k contacts received A in all while E_1 ... E_k were evaluated for output:
     contact i gets E_i + (A - sum of E) / k, so that the contacts of a particle add
     up to what moved it.
 
@@ -115,6 +128,10 @@ def join_workpiece_frame(particles: Frame, contacts: Frame) -> WorkpieceFrame:
     ----------
     particles, contacts : Frame
         ``workpiece_particles`` and ``workpiece_contacts`` of one step.
+    friction : (float, float)
+        Coefficients of friction of a particle with workpiece and bowl.
+    merge : bool
+        False for the contacts as LIGGGHTS counts them.
 
     Returns
     -------
@@ -139,55 +156,127 @@ def join_workpiece_frame(particles: Frame, contacts: Frame) -> WorkpieceFrame:
         raise TableError(
             f"step {particles.step}: workpiece_particles holds a particle more than once"
         )
+    written = int(np.count_nonzero(~_on_bowl(contacts)))
+    contacts = _within_friction(contacts, pushed, friction)
+    if merge:
+        contacts = _merged(contacts, pushed)
     contacts = contacts.take(np.lexsort((contacts.ids("facet_id"), contacts.ids("particle_id"))))
     all_contacts = _place(contacts, pushed)
     unplaced = np.ones(len(known), dtype=np.bool_)
     unplaced[np.searchsorted(known, all_contacts.particle_id[~all_contacts.silent])] = False
-    on_bowl = contacts.columns.get("mesh_id", np.zeros(contacts.rows)) == _BOWL_MESH
+    on_bowl = _on_bowl(contacts)
     return WorkpieceFrame(
         particles.step,
         all_contacts.select(~on_bowl),
         all_contacts.select(on_bowl),
         pushed.vectors(*FORCES)[unplaced],
         particles.opening,
+        written - int(np.count_nonzero(~on_bowl)),
     )
+
+
+def _on_bowl(contacts: Frame) -> NDArray[np.bool_]:
+    return np.asarray(contacts.columns.get("mesh_id", np.zeros(contacts.rows)) == _BOWL_MESH)
+
+
+def _rows_of(contacts: Frame, particles: Frame) -> tuple[NDArray[np.bool_], Ints]:
+    """Which contacts (N,) are of particles that received a force, and the rows of those."""
+    known, ids = particles.ids("particle_id"), contacts.ids("particle_id")
+    at = np.searchsorted(known, ids)
+    loud = np.append(known, 0)[at] == ids
+    return loud, at[loud]
+
+
+def _within_friction(contacts: Frame, particles: Frame, friction: tuple[float, float]) -> Frame:
+    """Add the normals, and cut the evaluated forces on particles that received one."""
+    loud, at = _rows_of(contacts, particles)
+    forces, points = contacts.vectors(*FORCES), contacts.vectors(*POINT)
+    normal = np.zeros_like(points)
+    normal[loud] = _unit(particles.vectors(*CENTRE)[at] - points[loud])
+    limit = np.array(friction)[_on_bowl(contacts)[loud].astype(int)]
+    forces[loud], _ = within_friction(forces[loud], normal[loud], limit)
+    return contacts.replaced((*FORCES, *_NORMAL), np.column_stack([forces, normal]))
+
+
+def _merged(contacts: Frame, particles: Frame) -> Frame:
+    """Make one contact of those of a particle that lie within one contact patch.
+
+    A sphere of radius R that overlaps a plane by d meets it in a circle of radius sqrt(2 R d).
+    Over a convex edge LIGGGHTS finds a second contact in this circle: the point of the edge next
+    to the sphere. The deepest contact keeps point, facet and overlap and gets the sum of the
+    forces. Its normal is the mean of the normals, weighted by d^(3/2) as Hertz's forces are.
+    Contacts farther apart, as in a groove, stay separate.
+    """
+    depth, body = contacts.columns["overlap_m"], _on_bowl(contacts)
+    contacts = contacts.take(np.lexsort((-depth, body, contacts.ids("particle_id"))))
+    loud, at = _rows_of(contacts, particles)
+    overlap = np.maximum(contacts.columns["overlap_m"], 0.0)
+    patch = np.full(contacts.rows, -1.0)
+    patch[loud] = 2.0 * particles.columns["radius_m"][at] * overlap[loud]
+    points = contacts.vectors(*POINT)
+    head = _heads(contacts.ids("particle_id"), _on_bowl(contacts), points, patch)
+    kept, slot = np.unique(head, return_inverse=True)
+    several = np.bincount(slot) > 1
+    forces, normals = contacts.vectors(*FORCES), contacts.vectors(*_NORMAL)
+    mean = _sums(slot, overlap[:, None] ** 1.5 * normals, len(kept))
+    normal = normals[kept]
+    normal[several] = _unit(mean[several])
+    both = np.column_stack([_sums(slot, forces, len(kept)), normal])
+    return contacts.take(kept).replaced((*FORCES, *_NORMAL), both)
+
+
+def _heads(particle_id: Ints, body: NDArray[np.bool_], points: Floats, patch_m2: Floats) -> Ints:
+    """The contact whose patch each of (N,) contacts lies in, itself if in none.
+
+    The contacts of a particle with a body follow each other, deepest first.
+    """
+    own = np.arange(len(points))
+    new = np.r_[True, (np.diff(particle_id) != 0) | np.diff(body)][: len(points)]
+    rank = own - np.maximum.accumulate(np.where(new, own, 0))
+    head = own.copy()
+    for place in range(1, rank.max(initial=0) + 1):
+        for ahead in range(place, 0, -1):
+            rows = np.flatnonzero((rank == place) & (head == own))
+            others = rows - ahead
+            apart = np.square(points[rows] - points[others]).sum(axis=1)
+            inside = (head[others] == others) & (apart <= patch_m2[others])
+            head[rows[inside]] = others[inside]
+    return head
 
 
 def _place(contacts: Frame, particles: Frame) -> WallContacts:
     """Join contacts with the particles that received a force, sorted by their ids."""
-    known, ids = particles.ids("particle_id"), contacts.ids("particle_id")
-    at = np.searchsorted(known, ids)
-    silent = np.append(known, 0)[at] != ids
-    loud = ~silent
-    at = at[loud]
+    loud, at = _rows_of(contacts, particles)
     evaluated, points = contacts.vectors(*FORCES), contacts.vectors(*POINT)
-    force, normal = np.zeros_like(evaluated), np.zeros_like(evaluated)
+    force = np.zeros_like(evaluated)
     surface = np.full_like(evaluated, np.nan)
     centre = particles.vectors(*CENTRE)[at]
     force[loud] = _fraction(evaluated[loud], at, particles.vectors(*FORCES))
-    normal[loud] = _unit(centre - points[loud])
     if {*VELOCITY, *SPIN} <= particles.columns.keys():
         turning = np.cross(particles.vectors(*SPIN)[at], points[loud] - centre)
         surface[loud] = particles.vectors(*VELOCITY)[at] + turning
     return WallContacts(
-        particle_id=ids,
+        particle_id=contacts.ids("particle_id"),
         facet_id=contacts.ids("facet_id"),
         point_m=points,
         force_n=force,
         evaluated_n=evaluated,
-        normal=normal,
+        normal=contacts.vectors(*_NORMAL),
         surface_m_s=surface,
         overlap_m=np.asarray(contacts.columns["overlap_m"], dtype=np.float64),
-        silent=silent,
+        silent=~loud,
     )
+
+
+def _sums(at: Ints, vectors: Floats, count: int) -> Floats:
+    """Sums of (N, 3) vectors by row, (count, 3)."""
+    return np.column_stack([np.bincount(at, column, count) for column in vectors.T])
 
 
 def _fraction(evaluated: Floats, at: Ints, applied: Floats) -> Floats:
     """Correct (N, 3) evaluated forces to add up to (K, 3) applied ones, particle by particle."""
     count = np.bincount(at, minlength=len(applied))
-    total = np.column_stack(
-        [np.bincount(at, weights=evaluated[:, k], minlength=len(applied)) for k in range(3)]
-    )
+    total = _sums(at, evaluated, len(applied))
     missing = (applied - total)[at] / count[at][:, None]
     return np.where(count[at][:, None] == 1, applied[at], evaluated + missing)
 

@@ -14,7 +14,7 @@ import pyarrow as pa
 from dragchain.arrays import Floats, Ints
 from dragchain.dumps.frame import Columns
 from dragchain.errors import RejectedRunError, TableError
-from dragchain.run.case import Case, Scene
+from dragchain.run.case import Case, Scene, friction_with
 from dragchain.run.kinematics import (
     counted_mask,
     directions,
@@ -37,6 +37,7 @@ from dragchain.tables.columns import (
     WORKPIECE_CONTACTS,
     WORKPIECE_FORCE,
 )
+from dragchain.tables.corrections import Corrections, count_corrections
 from dragchain.tables.impacts import find_impacts
 from dragchain.tables.network_contacts import KINDS, ContactRows, contact_rows
 from dragchain.tables.parquet import Rows, category, table_writer
@@ -278,12 +279,16 @@ def _write_particles(run: Run, file: Path) -> None:
 def _write_contacts(run: Run, file: Path) -> None:
     bowl_radius = needed(run.case.bowl, "bowl").radius_m
     particles, pairs = run.frames("particles"), run.workpiece_pairs()
+    friction, corrected = friction_with(run.case, "media"), np.zeros(8)
     with table_writer(file, CONTACTS) as table:
         for frame in run.frames("contacts"):
             workpiece = _frame_at(pairs, frame.step, "workpiece_contacts").join()
             beside = _frame_at(particles, frame.step, "particles")
-            rows = contact_rows(beside, frame, workpiece.workpiece, workpiece.bowl, bowl_radius)
+            touching = workpiece.workpiece, workpiece.bowl
+            rows = contact_rows(beside, frame, *touching, bowl_radius, friction)
+            corrected += count_corrections(rows, workpiece.merged)
             table.write(_contact_columns(frame.step, rows, run.case))
+    Corrections.of(friction, corrected).write(run.table("corrections.json"))
 
 
 class _Stepped(Protocol):

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 from loading_files import made_contacts, write_run
@@ -29,6 +30,7 @@ from dragchain.report.run_figures import FIGURES
 from dragchain.report.study_report import write_report
 from dragchain.report.summary import input_column
 from dragchain.run.completeness import RunRecord, refusal
+from dragchain.tables.corrections import Corrections
 
 
 @pytest.fixture
@@ -101,6 +103,18 @@ def test_page_shows_the_contacts_on_the_workpiece_if_they_are_known(
     assert "resting 1 17 % (" in words
     assert "normal impulse (N s) 0.856" in words
     assert "friction work (J) 0.00200" in words
+
+
+def test_page_says_how_many_contacts_were_corrected(process: Path, tmp_path: Path) -> None:
+    write_report(tmp_path / "without", [process])
+    assert "Corrected contact forces" not in page_of(tmp_path / "without").words
+    counts = np.array([1000, 171, 250, 10, 96, 4, 0.02, 1.0])
+    Corrections.of(0.34, counts).write(process / "tables/corrections.json")
+    write_report(tmp_path / "with", [process])
+    words = page_of(tmp_path / "with").words
+    assert "cut to the limit in 17 % of the contacts between particles (4.0 % of those" in words
+    assert "removes 2.0 % of the sum" in words
+    assert "for the workpiece, 4.0 % were the second contact" in words
 
 
 def test_page_says_what_counts(process: Path, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ import pytest
 
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
+from dragchain.tables.corrections import Corrections, count_corrections
 from dragchain.tables.network_contacts import KINDS, contact_rows
 from dragchain.tables.workpiece_contacts import WallContacts
 
@@ -36,13 +37,14 @@ def wall(points=(), forces=(), normals=(), silent=()):
     )
 
 
-def rows_of(particles, contacts=(), workpiece=None, bowl=None, radius=10.0):
+def rows_of(particles, contacts=(), workpiece=None, bowl=None, radius=10.0, friction=10.0):
     return contact_rows(
         frame(PARTICLES, particles),
         frame(CONTACTS, contacts),
         workpiece or wall(),
         bowl or wall(),
         radius,
+        friction,
     )
 
 
@@ -55,6 +57,39 @@ def test_two_unequal_particles_along_x() -> None:
     np.testing.assert_allclose(rows.normal_force_n, [3])
     np.testing.assert_allclose(rows.tangential_force_n, [4])
     np.testing.assert_array_equal(rows.force_n, [[-3, 0, 4]])
+
+
+def test_the_force_between_particles_is_cut_to_the_limit_of_friction() -> None:
+    """The pull of the second contact has a limit too: that of its magnitude."""
+    particles = [[1, 0, 0, 5, 2, *CALM], [2, 2.9, 0, 5, 1, *CALM], [3, 5.8, 0, 5, 2, *CALM]]
+    rows = rows_of(particles, [[1, 2, -3, 0, 4, 0.1], [2, 3, 2, 0.6, 0.8, 0.1]], friction=0.4)
+    np.testing.assert_allclose(rows.force_n, [[-3, 0, 1.2], [2, 0.48, 0.64]])
+    np.testing.assert_allclose(rows.normal_force_n, [3, -2])
+    np.testing.assert_allclose(rows.tangential_force_n, [1.2, 0.8])
+    np.testing.assert_allclose(rows.removed_n, [2.8, 0.2])
+
+
+def test_the_applied_force_of_a_wall_is_not_cut() -> None:
+    rows = rows_of([[7, 1, 2, 0.8, 1, 5, 0, 6, 0, 0, 0]], friction=0.1)
+    np.testing.assert_array_equal(rows.force_n, [[5, 0, 6]])
+    assert rows.removed_n.tolist() == [0]
+
+
+def test_corrections_count_what_was_cut() -> None:
+    """Normal forces 3 and 1: the mean is 2; the first is above it and cut, the second neither."""
+    particles = [[1, 0, 0, 5, 2, *CALM], [2, 2.9, 0, 5, 1, *CALM], [3, 5.8, 0, 5, 2, *CALM]]
+    contacts = [[1, 2, -3, 0, 4, 0.1], [2, 3, -1, 0, 0.5, 0.1]]
+    on_rod = wall([[1, 0, 5]], [[2, 0, 1]], [[1, 0, 0]], [False])
+    rows = rows_of(particles, contacts, workpiece=on_rod, friction=0.5)
+    found = Corrections.of(0.5, 2 * count_corrections(rows, 3))
+    assert (found.particle_contacts, found.cut) == (4, 2)
+    assert (found.strong_contacts, found.strong_cut) == (2, 2)
+    assert found.removed_fraction == pytest.approx(2.5 / 4.5)
+    assert (found.workpiece_contacts, found.merged) == (2, 6)
+
+
+def test_a_frame_without_contacts_corrects_nothing() -> None:
+    assert Corrections.of(0.5, count_corrections(rows_of([]), 0)).removed_fraction == 0
 
 
 def test_a_contact_seen_from_the_other_particle_is_the_same() -> None:
@@ -142,7 +177,7 @@ def test_a_contact_of_an_unknown_particle_is_an_error(particles) -> None:
 
 def test_frames_of_different_steps_are_an_error() -> None:
     with pytest.raises(TableError, match="contacts has step 9 where particles has step 100"):
-        contact_rows(frame(PARTICLES, []), frame(CONTACTS, [], step=9), wall(), wall(), 10.0)
+        contact_rows(frame(PARTICLES, []), frame(CONTACTS, [], step=9), wall(), wall(), 10.0, 0.3)
 
 
 def test_a_particle_that_is_there_twice_is_refused() -> None:

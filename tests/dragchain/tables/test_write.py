@@ -67,7 +67,7 @@ def test_the_tables_have_the_columns_of_the_contract(tables) -> None:
 def test_it_says_what_it_made_and_leaves_nothing_else(tiny_run: Path) -> None:
     made = write_tables(tiny_run)
     assert sorted(path.name for path in (tiny_run / "tables").iterdir()) == sorted(
-        [*(path.name for path in made), "closure.json"]
+        [*(path.name for path in made), "closure.json", "corrections.json"]
     )
 
 

@@ -19,7 +19,7 @@ from dragdeck.campaigns.machine_speed import (
     short_case,
 )
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import environment
+from dragdeck.decks.templates import environment
 from dragdeck.errors import EngineError
 from dragdeck.project import Project
 from dragdeck.scenes.filling import filling_scene

@@ -31,7 +31,7 @@ from dragdeck.campaigns.restitution_drops import (
 )
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
-from dragdeck.decks.render import environment
+from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import silent
 from dragdeck.errors import InputError

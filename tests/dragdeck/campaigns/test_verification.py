@@ -15,7 +15,8 @@ from dragdeck.campaigns.verification.lab import contact_time
 from dragdeck.campaigns.verification.suite import suite_file, suite_of
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
-from dragdeck.decks.render import deck_text, environment
+from dragdeck.decks.render import deck_text
+from dragdeck.decks.templates import environment
 from dragdeck.project import Project
 from dragdeck.scenes.collide import Experiment, collide_scene, frame_period
 from dragdeck.study.model import Study
@@ -127,7 +128,7 @@ def test_gravity_is_a_vector_that_hangs_down_by_default(
 
 def test_no_particle_of_the_suite_can_leave_its_box(experiments: dict[str, Experiment]) -> None:
     for experiment in experiments.values():
-        text = collide_scene(experiment).files["bodies.data"]
+        text = collide_scene(experiment).files["bodies.data"]()
         bounds = {
             line.split()[2][0]: [float(word) for word in line.split()[:2]]
             for line in text.splitlines()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,8 @@ import pytest
 from paths import ROOT
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import deck_text, environment, write_run
+from dragdeck.decks.render import deck_text, write_run
+from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
 from dragdeck.project import Project
 from dragdeck.scenes.process import PROCESS, process_scene
@@ -63,6 +65,17 @@ def test_the_outputs_of_the_deck_are_those_of_columns_json(
         assert output["pattern"].replace("{part}", "${part}") in deck
         if output["engine_columns"]:
             assert " ".join(output["engine_columns"]) in deck
+
+
+def test_contacts_are_written_after_all_that_reads_stored_forces(
+    case: Case, project: Project
+) -> None:
+    """In whatever order a scene lists its outputs, see `in_writing_order`."""
+    scene = process_scene(case, BED)
+    turned = replace(scene, deck=replace(scene.deck, outputs=scene.deck.outputs[::-1]))
+    deck = deck_text(turned, environment(project.templates))
+    dumps = [line.split()[3] for line in deck.splitlines() if line.startswith("dump ")]
+    assert dumps == ["custom", "custom", "local", "local"]
 
 
 def own_template(case: Case, text: str) -> None:
@@ -160,6 +173,7 @@ def test_the_tip_ends_at_the_asked_depth(case: Case) -> None:
             {"kind": "circle", "radius_m": 0.0215},
             "between its path and the bowl",
         ),
+        (("motion", "path"), {"kind": "circle", "radius_m": 0.016}, "no particle fits"),
         (("motion", "immersion_depth_m"), 0.05, "below the floor"),
         (("motion", "immersion_depth_m"), 0.035, "crush particles"),
         (("media", "count"), 5000, "more particles than the bowl holds"),
@@ -186,7 +200,29 @@ def test_an_impossible_scene_is_refused(
     assert caught.value.remedy
 
 
+def test_a_workpiece_never_crosses_a_radius_in_a_step(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    small["fidelities"]["quick"]["speed_factor"] = 100
+    small["motion"]["plunge_speed_m_s"] = 29
+    (case,) = load_cases(write_study(small))
+    with pytest.raises(InputError, match="crosses a particle's radius in one step") as caught:
+        process_scene(case, BED)
+    assert caught.value.field == "motion.speed_m_s"
+
+
+def test_all_that_does_not_fit_is_named(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    small["motion"] |= {"immersion_depth_m": 0.05, "path": {"kind": "circle", "radius_m": 0.0215}}
+    (case,) = load_cases(write_study(small))
+    with pytest.raises(InputError) as caught:
+        process_scene(case, BED)
+    fields = [error.field for error in (caught.value, *caught.value.more)]
+    assert fields == ["motion.path", "motion.immersion_depth_m"]
+
+
 def test_a_narrow_gap_is_a_warning(small: dict[str, Any], write_study: Callable[..., Path]) -> None:
-    small["motion"]["path"]["radius_m"] = 0.016
+    small["motion"]["path"]["radius_m"] = 0.012
     (case,) = load_cases(write_study(small))
     assert any("jam" in warning for warning in process_scene(case, BED).warnings)

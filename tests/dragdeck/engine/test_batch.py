@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import environment
+from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.errors import RejectedRunError
 from dragdeck.project import Project

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from dragdeck.cases.ranks import CORES_VARIABLE, FEWEST_PARTICLES_A_RANK, auto_ranks
-from dragdeck.decks.render import deck_text, environment
+from dragdeck.decks.render import deck_text
+from dragdeck.decks.templates import environment
 from dragdeck.engine.decomposition import decomposition, ranks_check
 from dragdeck.engine.record import Decomposition, ParticlesPerRank
 from dragdeck.errors import InputError

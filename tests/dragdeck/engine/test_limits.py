@@ -10,7 +10,8 @@ import pytest
 from run_files import rewrite
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import environment, write_run
+from dragdeck.decks.render import write_run
+from dragdeck.decks.templates import environment
 from dragdeck.engine.limits import breach, within
 from dragdeck.engine.log import Sample, read_samples
 from dragdeck.engine.record import RunRecord

@@ -13,7 +13,8 @@ from paths import ROOT
 from scipy.spatial import cKDTree
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import deck_text, environment
+from dragdeck.decks.render import deck_text
+from dragdeck.decks.templates import environment
 from dragdeck.outlook.bed import notes
 from dragdeck.project import Project
 from dragdeck.scenes.filling import expected_surface, filling_scene, first_particles
@@ -53,7 +54,7 @@ def test_the_decks_are_written_without_a_warning(pilot: Case) -> None:
     templates = environment(Project(ROOT).templates)
     filling, process = filling_scene(pilot), process_scene(pilot)
     assert list(filling.warnings) == list(process.warnings) == []
-    assert f"\n{COUNT} atoms\n" in filling.files["particles.data"]
+    assert f"\n{COUNT} atoms\n" in filling.files["particles.data"]()
     assert "processors * * 1" in deck_text(filling, templates)
     assert "fix move_drag" in deck_text(process, templates)
     assert "within" in dict(notes(pilot))["overlap"]

@@ -17,7 +17,8 @@ import pytest
 from run_files import rewrite
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import environment, write_run
+from dragdeck.decks.render import write_run
+from dragdeck.decks.templates import environment
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
 from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.record import RunRecord

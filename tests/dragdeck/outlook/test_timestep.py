@@ -218,7 +218,7 @@ def test_a_large_particle_is_almost_a_plate() -> None:
 def test_impacts_begin_at_different_moments_of_a_step(base: Case) -> None:
     settings = {"youngs_modulus_pa": 77e9, "restitution": 0.86, "friction": 0.34}
     scene = impact_scene(point_case(base, settings, 0.2), "a-run", Impact(0.5, 0.0, 0.0), 0.2)
-    rows = scene.files["particles.data"].split("Atoms\n\n")[1].split("\n\n")[0].splitlines()
+    rows = scene.files["particles.data"]().split("Atoms\n\n")[1].split("\n\n")[0].splitlines()
     radius = base.study.media.radius_mean_m
     gaps = [float(row.split()[-1]) - radius for row in rows]
     step = 0.5 * scene.deck.timestep_s

@@ -12,7 +12,8 @@ import pytest
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.outputs import ColumnsFile
-from dragdeck.decks.render import deck_text, environment, write_run
+from dragdeck.decks.render import deck_text, write_run
+from dragdeck.decks.templates import environment
 from dragdeck.engine.log import read_samples
 from dragdeck.engine.run_folder import run
 from dragdeck.project import Project

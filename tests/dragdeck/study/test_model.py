@@ -56,7 +56,7 @@ def test_a_value_beyond_its_limit_is_named(
         ("media.count", True, "truth value"),
         ("media.count", 10.5, "integer"),
         ("media.colour", "red", "unknown key"),
-        ("bowl.material", "tin", "'tin' is not among materials"),
+        ("bowl.material", "tin", "no such material 'tin'"),
         ("fidelity", "perfect", "unknown fidelity 'perfect'"),
         ("media.radius_std_m", 2e-3, "0.3 of radius_mean_m"),
         ("motion.path.kind", "zigzag", "'zigzag'"),

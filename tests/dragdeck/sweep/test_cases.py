@@ -96,6 +96,14 @@ def test_a_matrix_makes_every_combination(
         ({"seed": [1, 1]}, "given twice"),
         ({"bowl.radius_m.deeper": [1]}, "leads through a value"),
         ({"motion.speed_m_s": [0.01, -1]}, "motion.speed_m_s"),
+        ({"motion.speed_m_s": [0.01, "1e-2"]}, "given twice"),
+        ({"seed": [1, 1.0]}, "given twice"),
+        ({"sweep": [{"seed": [1, 2]}]}, "sweep.sweep: no run depends on it"),
+        ({"sweep.seed": [1, 2]}, "sweep.sweep.seed: no run depends on it"),
+        ({"title": ["a", "b"]}, "sweep.title: no run depends on it"),
+        ({"seed": [[1, 2], [3]]}, "seed"),
+        ({"seed": list(range(201))}, "makes 201 cases, more than are accepted"),
+        ({"seed": list(range(9999)), "media.count": list(range(9999))}, "makes 99980001 cases"),
     ],
 )
 def test_a_wrong_matrix_is_explained(
@@ -105,6 +113,30 @@ def test_a_wrong_matrix_is_explained(
     with pytest.raises(InputError) as caught:
         load_cases(write_study(small))
     assert words in str(caught.value)
+
+
+def test_many_cases_need_a_confirmation(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    small["sweep"] = {"seed": list(range(201))}
+    small["accepted"] = {"cases": 201}
+    assert len(load_cases(write_study(small))) == 201
+
+
+def test_problems_of_all_cases_are_named_together(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    small["sweep"] = {"motion.speed_m_s": [0.01, -1, -2], "seed": [1, -3]}
+    with pytest.raises(InputError) as caught:
+        load_cases(write_study(small))
+    values = [error.value for error in (caught.value, *caught.value.more)]
+    assert sorted(map(str, values)) == ["-1", "-2", "-3"]
+
+
+@pytest.mark.parametrize("name", ["../small", "a b", "x;date", "$(date)", "", "small\n"])
+def test_a_study_has_a_plain_name(project: Project, case: Case, name: str) -> None:
+    with pytest.raises(InputError, match="its name has up to 64 letters"):
+        study_file(project.studies, name)
 
 
 def test_the_fidelity_of_the_command_line_goes_first(

@@ -24,7 +24,6 @@ from dragdeck.errors import InputError
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
 from dragdeck.physics.similarity import SAME_NUMBER
 from dragdeck.scenes.dimensionless import describe
-from dragdeck.scenes.motion import path_length
 from dragdeck.study.contact_law import compared_labels
 from dragdeck.study.model import Study, Tolerance
 
@@ -224,32 +223,54 @@ def _check_quantity(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> None:
         )
 
 
-def breaking_note(case: Case, tradeoff: Tradeoff | None) -> list[tuple[str, str]]:
-    """What ``check`` and ``explain`` say of the step at which soft particles were seen to break.
+def _breaking_step(case: Case, tradeoff: Tradeoff | None) -> tuple[float, str]:
+    """The step over the Rayleigh time at which soft particles were seen to break, and where.
 
-    Soft particles break at shorter steps, as shares of the Rayleigh time: the next
-    softer level that was measured counts. Nothing is said where nothing was
-    measured.
+    Soft particles break at shorter steps, as shares of the Rayleigh time: the next softer level
+    that was measured counts. Infinite where nothing was measured.
     """
-    if tradeoff is None:
-        return []
-    chosen = case.study.chosen_fidelity()
-    limit = chosen.youngs_modulus_scale * (1 + 1e-9)
+    limit = case.study.chosen_fidelity().youngs_modulus_scale * (1 + 1e-9)
     broken = [
-        (one.youngs_modulus_scale, one.timestep_fraction)
-        for one in tradeoff.settings
+        (-one.youngs_modulus_scale, one.timestep_fraction)
+        for one in (tradeoff.settings if tradeoff else ())
         if one.breaks and one.speed_factor == 1 and one.youngs_modulus_scale <= limit
     ]
-    if not broken:
-        return []
-    level = max(scale for scale, _ in broken)
-    fraction = min(fraction for scale, fraction in broken if scale == level)
-    verdict = "below" if chosen.timestep_fraction < fraction else "NOT BELOW"
-    text = (
-        f"{100 * chosen.timestep_fraction:.3g} % is {verdict} {100 * fraction:.3g} %, where the "
-        f"drag was wrong or a run failed with E x {level:g} ({tradeoff.study}, {tradeoff.measured})"
+    if tradeoff is None or not broken:
+        return math.inf, ""
+    level, fraction = min(broken)
+    return fraction, (
+        f"{100 * fraction:.3g} %, where the drag was wrong or a run failed with E x {-level:g} "
+        f"({tradeoff.study}, {tradeoff.measured})"
     )
-    return [("breaking step", text)]
+
+
+def breaking_note(case: Case, tradeoff: Tradeoff | None) -> list[tuple[str, str]]:
+    """What ``check`` and ``explain`` say of the breaking step; nothing if none was measured."""
+    fraction, where = _breaking_step(case, tradeoff)
+    own = case.study.chosen_fidelity().timestep_fraction
+    verdict = "below" if own < fraction else "NOT BELOW"
+    return [("breaking step", f"{100 * own:.3g} % is {verdict} {where}")] if where else []
+
+
+def check_timestep(case: Case, tradeoff: Tradeoff | None) -> None:
+    """Refuse a step of the process that was measured to be too long, unless the study accepts it.
+
+    Raises
+    ------
+    InputError
+        The step is not below the breaking step, and the study gives no reason for that.
+    """
+    fraction, where = _breaking_step(case, tradeoff)
+    chosen = case.study.chosen_fidelity()
+    if chosen.timestep_fraction >= fraction and not case.study.accepted.unsafe_timestep:
+        raise InputError(
+            f"the time step is not safe with E x {chosen.youngs_modulus_scale:g}",
+            file=case.file,
+            field="fidelity.timestep_fraction",
+            value=chosen.timestep_fraction,
+            limit=f"below {where}",
+            remedy="choose a smaller one; or, if you mean it, say why in accepted.unsafe_timestep",
+        )
 
 
 def _outside_of(
@@ -332,7 +353,7 @@ def _fallback(
 def _spread(study: Study, asked: Tolerance, tradeoff: Tradeoff) -> Spread | None:
     """Chance in one run's value, from the spread of measured runs; falls with the root of path."""
     quantity = tradeoff.quantities[asked.quantity]
-    counted = path_length(study.motion) - study.motion.transient_m
+    counted = study.motion.path_length_m - study.motion.transient_m
     if quantity.run_std is None or counted <= 0:
         return None
     alone = _NORMAL_95 * quantity.run_std

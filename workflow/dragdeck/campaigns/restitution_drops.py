@@ -18,7 +18,7 @@ import numpy as np
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
 from dragdeck.decks.case_file import CaseFile
-from dragdeck.decks.render import environment
+from dragdeck.decks.templates import environment
 from dragdeck.documents import Document, Part
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report, say

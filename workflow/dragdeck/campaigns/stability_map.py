@@ -15,7 +15,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.render import environment
+from dragdeck.decks.templates import environment
 from dragdeck.documents import Document, Part
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report, say

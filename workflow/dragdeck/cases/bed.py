@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.packing import Array, radii
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.material import Material
-from dragdeck.study.model import Study
+from dragdeck.study.model import Media, Study
 
 
 def bed_radii(study: Study) -> Array:
     """Radii of a study's particles in ascending order, (count,), m."""
-    media = study.media
+    return media_radii(study.media)
+
+
+@lru_cache(maxsize=2)
+def media_radii(media: Media) -> Array:
+    """`bed_radii` of the media alone; not to be changed."""
     return radii(media.count, media.radius_mean_m, media.radius_std_m)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 from dragdeck.errors import InputError
 
@@ -31,6 +32,26 @@ def auto_ranks(particles: int, cases: int, cores: int) -> int:
         Of the machine.
     """
     return max(1, min(cores // cases, particles // FEWEST_PARTICLES_A_RANK))
+
+
+def check_ranks(ranks: int, file: Path) -> None:
+    """Refuse more ranks than this machine has cores; the default of two runs everywhere.
+
+    Raises
+    ------
+    InputError
+        Names `CORES_VARIABLE`, for runs that are on another machine.
+    """
+    cores = max(cores_here(), 2)
+    if ranks > cores:
+        raise InputError(
+            "more ranks than cores: they would wait for each other",
+            file=file,
+            field="fidelity.ranks",
+            value=ranks,
+            limit=f"at most {cores} here",
+            remedy=f"use fewer, or auto; or set {CORES_VARIABLE} to the cores of another machine",
+        )
 
 
 def cores_here() -> int:

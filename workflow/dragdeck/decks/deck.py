@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
@@ -141,8 +141,8 @@ class Scene(Generic[K]):
     case : CaseFile
     steps : int
         Steps expected; an estimate where the engine decides.
-    files : mapping of str to str
-        Other input files: name to content.
+    files : mapping of str to callable
+        Other input files: their text by name, made when it is wanted.
     meshes : mapping of str to Trimesh
         Mesh files, by name.
     models : mapping of str to str
@@ -158,7 +158,7 @@ class Scene(Generic[K]):
     deck: Deck
     case: K
     steps: int
-    files: Mapping[str, str] = field(default_factory=dict)
+    files: Mapping[str, Callable[[], str]] = field(default_factory=dict)
     meshes: Mapping[str, Trimesh] = field(default_factory=dict)
     models: Mapping[str, str] = field(default_factory=dict)
     leaves_out: Mapping[str, LeftOut] = field(default_factory=dict)
@@ -169,6 +169,10 @@ class Scene(Generic[K]):
     def template(self) -> str:
         """The template of the input script: the scene's own unless another overrides it."""
         return self.override or f"{self.deck.scene}.in.j2"
+
+    def texts(self) -> dict[str, str]:
+        """The text of each of `files`."""
+        return {name: text() for name, text in self.files.items()}
 
 
 StudyScene = Scene[CaseOfStudy]

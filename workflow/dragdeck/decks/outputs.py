@@ -6,9 +6,11 @@ definitions, so that no reader has to guess a column.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
+
+from markupsafe import Markup
 
 from dragdeck.documents import Document, Part
 
@@ -105,9 +107,9 @@ class Output:
         return f"{self.name}.{{part}}.{ending[self.kind]}"
 
     @property
-    def file(self) -> str:
+    def file(self) -> Markup:
         """File name as a deck writes it, with the engine's variable for the part."""
-        return self.pattern.replace("{part}", "${part}")
+        return Markup(self.pattern.replace("{part}", "${part}"))
 
     @property
     def text_format(self) -> str:
@@ -128,6 +130,15 @@ class Output:
             last_step=self.last_step,
             rows_per_particle=self.rows_per_particle,
         )
+
+
+def in_writing_order(outputs: Iterable[Output]) -> tuple[Output, ...]:
+    """The outputs in the order in which a deck writes them: contacts, ``local``, come last.
+
+    LIGGGHTS evaluates the contacts of a mesh again for ``compute wall/gran/local``, and leaves
+    ``store_force`` of that wall at zero: whatever reads it later in the same step gets zeros.
+    """
+    return tuple(sorted(outputs, key=lambda output: output.kind == "local"))
 
 
 def _vector(name: str, unit: str, source: str, first: int = 1) -> tuple[Column, ...]:

@@ -120,9 +120,13 @@ def _sites(count: int, bowl_radius_m: float, largest_m: float) -> Array:
             remedy="use smaller particles or a wider bowl",
         )
     line = np.arange(-np.floor(reach / step), np.floor(reach / step) + 1) * step
-    x, y = (grid.ravel() for grid in np.meshgrid(line, line))
-    inside = x**2 + y**2 <= reach**2
-    layer = np.column_stack([x[inside], y[inside]])
+    rows: list[Array] = []
+    for y in line:  # no more rows of the lowest layer than there are particles for
+        x = line[line**2 + y**2 <= reach**2]
+        rows.append(np.column_stack([x, np.full(len(x), y)]))
+        if sum(map(len, rows)) >= count:
+            break
+    layer = np.concatenate(rows)
     layers = -(-count // len(layer))
     heights = np.repeat(_SPACING * largest_m + step * np.arange(layers), len(layer))
     return np.column_stack([np.tile(layer, (layers, 1)), heights])[:count]

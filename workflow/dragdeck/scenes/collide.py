@@ -181,7 +181,7 @@ def collide_scene(experiment: Experiment) -> Scene[CollideCase]:
         deck=deck,
         case=_case(experiment),
         steps=experiment.steps,
-        files={"bodies.data": _bodies_data(experiment)},
+        files={"bodies.data": lambda: _bodies_data(experiment)},
         models={"every particle": "placed and set in motion by hand", "exact walls": "planes"},
         leaves_out={
             "output of pairs": LeftOut("forces on so few particles say all"),

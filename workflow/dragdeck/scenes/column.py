@@ -154,7 +154,9 @@ def column_scene(
             limits=run_limits(count, mass, gravity, top, 0.0),
         ),
         steps=math.ceil(_LOAD_S / load_dt) + _TEST_STEPS,
-        files={"particles.data": _stack(case, radius, tube, top, len(types))} if stack else {},
+        files={"particles.data": lambda: _stack(case, radius, tube, top, len(types))}
+        if stack
+        else {},
     )
 
 

@@ -109,7 +109,7 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene[DropTe
             youngs_modulus_scale=scale,
         ),
         steps=round(_duration(study) / dt),
-        files={"particle.data": _particle_data(study, len(names))},
+        files={"particle.data": lambda: _particle_data(study, len(names))},
         models={
             "particle against plate": "the only contact there is",
             **_modulus(scale),

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from dragdeck.cases.bed import (
     bed_radii,
     bed_rayleigh_time,
+    media_radii,
     particle_material,
     skin,
     smallest_radius,
@@ -38,7 +40,7 @@ from dragdeck.physics.run_limits import RunLimits, run_limits
 from dragdeck.physics.similarity import rounded
 from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
-from dragdeck.study.model import Study
+from dragdeck.study.model import Media, Study
 
 _CHECK_INTERVAL_S = 0.02
 """Time between two looks at the kinetic energy, about the fall over one particle."""
@@ -122,7 +124,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             ),
         ),
         steps=round(_expected_time(study, particles) / dt),
-        files={"particles.data": _particles_data(particles, study, top, len(types))},
+        files={"particles.data": lambda: _particles_data(particles, study, top, len(types))},
         models={
             "every particle by name": "exactly the asked number, mean and spread of radii",
             "rest by a criterion": f"kinetic energy below {study.filling.energy_ratio:g} m "
@@ -153,7 +155,12 @@ def _filling_types(study: Study) -> list[str]:
 
 def first_particles(study: Study) -> Particles:
     """The particles of a study before they fall."""
-    return pour(bed_radii(study), study.bowl.radius_m, study.seed)
+    return _first_particles(study.media, study.bowl.radius_m, study.seed)
+
+
+@lru_cache(maxsize=1)
+def _first_particles(media: Media, bowl_radius_m: float, seed: int) -> Particles:
+    return pour(media_radii(media), bowl_radius_m, seed)
 
 
 def _check_capacity(case: Case) -> None:

@@ -168,7 +168,7 @@ def impact_scene(case: Case, run: str, impact: Impact, fraction: float) -> Scene
         ),
         steps=frames * period,
         files={
-            "particles.data": data_file(
+            "particles.data": lambda: data_file(
                 "impacts", 1, ((-side, side), (-side, side), (-height, height)), bodies
             )
         },

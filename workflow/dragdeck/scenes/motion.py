@@ -60,14 +60,6 @@ def start_direction(motion: Motion) -> float:
     return math.radians(path.direction_deg)
 
 
-def path_length(motion: Motion) -> float:
-    """Length of the drag, m."""
-    path = motion.path
-    if isinstance(path, CirclePath):
-        return 2 * math.pi * path.radius_m * path.revolutions
-    return path.length_m
-
-
 def farthest_reach(motion: Motion) -> float:
     """Largest distance of the workpiece's axis from the bowl's, m."""
     points = [plunge_point(motion), start_point(motion)]
@@ -113,7 +105,7 @@ def _approach(motion: Motion, speed_factor: float) -> Leg | None:
 def _drag(motion: Motion, speed: float) -> Leg:
     heading = start_direction(motion)
     velocity = (speed * math.cos(heading), speed * math.sin(heading), 0.0)
-    duration = path_length(motion) / speed
+    duration = motion.path_length_m / speed
     if isinstance(motion.path, LinePath):
         return Leg("drag", "linear", duration, velocity)
     angular = motion.path.sign * speed / motion.path.radius_m

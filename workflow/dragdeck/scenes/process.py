@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from trimesh import Trimesh
 
-from dragdeck.cases.bed import bed_radii, bed_rayleigh_time, particle_material, skin
+from dragdeck.cases.bed import bed_rayleigh_time, particle_material, skin
 from dragdeck.cases.case import Case, materials_content, mesh_file
 from dragdeck.decks import outputs
 from dragdeck.decks.case_file import (
@@ -21,7 +21,6 @@ from dragdeck.decks.case_file import (
 )
 from dragdeck.decks.deck import Deck, LeftOut, Scene
 from dragdeck.decks.outputs import Output
-from dragdeck.errors import InputError
 from dragdeck.files import file_checksum
 from dragdeck.mesh import bowl
 from dragdeck.physics.contact_mechanics import effective_modulus, hertz_contact_time, particle_mass
@@ -39,6 +38,7 @@ from dragdeck.scenes.filling import (
     partners_in_bed,
     rank_split,
 )
+from dragdeck.scenes.fit import check_fit, check_headroom, fastest_motion
 from dragdeck.scenes.motion import Leg, farthest_reach, legs, plunge_point, start_direction
 from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
 from dragdeck.scenes.workpiece import workpiece_length, workpiece_mesh, workpiece_radius
@@ -129,9 +129,9 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     fidelity = study.chosen_fidelity()
     bed = bed or _expected_bed(study)
     surface = bed.surface_m
-    _check_fit(case, surface)
     rayleigh = bed_rayleigh_time(study)
     dt = timestep(rayleigh, fidelity.timestep_fraction)
+    check_fit(case, surface, dt)
     periods = _output_periods(study, dt)
     clear = round_to(bed.top_m + study.media.radius_mean_m, 6)
     start = (*plunge_point(study.motion), clear)
@@ -140,7 +140,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     drag, last = timed[-1], timed[-1].end_step
     types = study.type_names()
     top = box_top(study, first_particles(study))
-    _check_headroom(case, clear, top)
+    check_headroom(case, clear, top)
     parts = rank_split(case, top)
     deck = ProcessDeck(
         title=study.title,
@@ -179,62 +179,6 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
 def _expected_bed(study: Study) -> Bed:
     surface = expected_surface(study)
     return Bed(surface, surface + 2 * study.media.radius_mean_m)
-
-
-def _check_fit(case: Case, surface_m: float) -> None:
-    """Refuse a workpiece that leaves the bowl or goes through its floor.
-
-    Raises
-    ------
-    InputError
-        Names the field that has to change.
-    """
-    study = case.study
-    radius, reach = workpiece_radius(case), farthest_reach(study.motion)
-    gap = study.bowl.radius_m - reach - radius
-    if gap <= 0:
-        raise InputError(
-            "the workpiece does not fit between its path and the bowl",
-            file=case.file,
-            field="motion.path",
-            value=f"axis up to {reach:.4g} m from the bowl's axis, workpiece radius {radius:.4g} m",
-            limit=f"together below the bowl's radius {study.bowl.radius_m:g} m",
-            remedy="use a smaller path or workpiece, or a wider bowl",
-        )
-    deepest = surface_m - 2 * float(bed_radii(study).max())
-    if study.motion.immersion_depth_m > deepest:
-        below = study.motion.immersion_depth_m > surface_m
-        raise InputError(
-            "the workpiece would reach below the floor"
-            if below
-            else "the workpiece would crush particles between its tip and the floor",
-            file=case.file,
-            field="motion.immersion_depth_m",
-            value=study.motion.immersion_depth_m,
-            limit=f"at most {deepest:.4g} m: a bed {surface_m:.4g} m high minus one "
-            f"largest particle",
-            remedy="submerge the workpiece less, or fill in more particles",
-        )
-
-
-def _check_headroom(case: Case, tip_m: float, top_m: float) -> None:
-    """Refuse a workpiece that would stick out of the simulation box before it goes in.
-
-    Raises
-    ------
-    InputError
-        The workpiece is too long.
-    """
-    longest = top_m - tip_m - 0.001
-    if workpiece_length(case) > longest:
-        raise InputError(
-            "the workpiece is longer than the simulation box above the bed",
-            file=case.file,
-            field="workpiece.shape",
-            value=f"length {workpiece_length(case):.4g} m",
-            limit=f"at most {longest:.4g} m",
-            remedy="cut the mesh off higher up, or state a higher bowl (bowl.height_m)",
-        )
 
 
 def _output_periods(study: Study, timestep_s: float) -> Periods:
@@ -437,12 +381,6 @@ def _contact_steps(study: Study, timestep_s: float) -> float:
     return hertz_contact_time(particle_mass(particle, radius), radius, modulus, speed) / timestep_s
 
 
-def _impact_speed(case: Case) -> float:
-    """Speed of the fastest motion of the workpiece, m/s."""
-    motion, factor = case.study.motion, case.study.chosen_fidelity().speed_factor
-    return factor * max(motion.speed_m_s, motion.plunge_speed_m_s, motion.approach_speed_m_s)
-
-
 def _partners(case: Case) -> list[tuple[str, str, float]]:
     workpiece = ("workpiece", case.study.workpiece.material, workpiece_radius(case))
     return [*partners_in_bed(case), workpiece]
@@ -479,6 +417,7 @@ PROCESS = SceneType(
         "particles.parquet",
         "contacts.parquet",
         "closure.json",
+        "corrections.json",
     ),
     network=("network.parquet", "chains.parquet", "clusters.parquet"),
     loading=("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp"),
@@ -491,7 +430,7 @@ PROCESS = SceneType(
         "chains_peaks",
     ),
     regime="drag",
-    impact_speed=_impact_speed,
+    impact_speed=fastest_motion,
     partners=_partners,
     particle_steps_per_s=7e6,
     needs_bed=True,

@@ -24,7 +24,7 @@ from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
 from dragdeck.physics.rounding import round_to
-from dragdeck.study.base import Json
+from dragdeck.study.base import Json, flat
 from dragdeck.study.model import Study
 
 C = TypeVar("C", bound=CaseOfStudy)
@@ -129,7 +129,10 @@ class SceneType:
         Two cases that share a run have the same digest, and an edit of the study that does not
         concern the scene does not change it.
         """
-        remarks = case.study.model_dump(mode="json", include={"title", "assumptions", "reference"})
+        include = {"title", "assumptions", "reference"}
+        if case.study.accepted.unsafe_timestep:
+            include.add("accepted")
+        remarks = case.study.model_dump(mode="json", include=include)
         asked = case.advised.model_dump(mode="json") if case.advised and self.needs_bed else None
         return digest({"study": remarks, "content": dict(self.content(case)), "asked": asked})
 
@@ -211,21 +214,15 @@ def _contact_moduli(study: Study) -> dict[str, ContactModuli]:
 
 def _assumptions(study: Study) -> list[AssumptionOfRun]:
     values = flat(study.plain())
-    return [
+    found = [
         AssumptionOfRun(field=entry.field, value=values.get(entry.field), why=entry.why)
         for entry in study.assumptions
     ]
-
-
-def flat(data: Json, prefix: str = "") -> Json:
-    """Nested mappings as one mapping of dotted names."""
-    values: dict[str, Any] = {}
-    for key, value in data.items():
-        if isinstance(value, dict):
-            values.update(flat(value, f"{prefix}{key}."))
-        else:
-            values[f"{prefix}{key}"] = value
-    return values
+    if reason := study.accepted.unsafe_timestep:
+        step = study.chosen_fidelity().timestep_fraction
+        why = f"a step that may be too long, accepted on purpose: {reason}"
+        found.append(AssumptionOfRun(field="fidelity.timestep_fraction", value=step, why=why))
+    return found
 
 
 def material_table(study: Study, names: Sequence[str], scale: float, case: Case) -> Materials:

@@ -2,25 +2,63 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, JsonValue
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, JsonValue
 
 Json = Mapping[str, JsonValue]
 """Plain data, as JSON has it."""
 
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
+"""Names of studies, plans, materials and fidelities: they become parts of paths and commands."""
+
+NAME_LIMIT = "up to 64 letters (a-z), digits, '.', '_' and '-', the first a letter or digit"
+
+DECIMAL = re.compile(r"[-+]?((0|[1-9]\d*)(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+"""How a number may be written."""
+
+_LONGEST_LINE = 300
+
 
 def _number(value: object) -> object:
-    """Accept ``5e6``, which YAML 1.1 reads as text; refuse truth values."""
+    """Accept ``5e6``, which YAML 1.1 reads as text; refuse truth values, ``0300`` and ``1:30``."""
     if isinstance(value, bool):
         raise ValueError("a truth value stands where a number belongs")
     if isinstance(value, str):
-        try:
-            return float(value)
-        except ValueError:
-            raise ValueError(f"{value!r} is text, not a number") from None
+        if not DECIMAL.fullmatch(value):
+            raise ValueError(f"{value!r} is text, not a number: write it as 300, 0.5 or 5e6")
+        return float(value)
     return value
+
+
+def _one_line(text: str) -> str:
+    if len(text) > _LONGEST_LINE or not text.isprintable():
+        raise ValueError(
+            f"must be one line of at most {_LONGEST_LINE} characters, none of them a control "
+            "character"
+        )
+    return text
+
+
+def _name(text: str) -> str:
+    if not NAME.fullmatch(text):
+        raise ValueError(f"a name has {NAME_LIMIT}")
+    return text
+
+
+def _material_name(text: str) -> str:
+    if "-" in text:
+        raise ValueError("the name of a material has no '-', which joins a pair of them")
+    return _name(text)
+
+
+Line = Annotated[str, AfterValidator(_one_line)]
+"""Free text in one line."""
+
+Name = Annotated[str, AfterValidator(_name)]
+MaterialName = Annotated[str, AfterValidator(_material_name)]
 
 
 def _whole(value: object) -> object:
@@ -52,6 +90,17 @@ class Model(BaseModel):
     def absent(self) -> set[str]:
         """Fields whose value says that there is nothing: None, unless a model says more."""
         return {name for name in type(self).model_fields if getattr(self, name) is None}
+
+
+def flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as one mapping of dotted names."""
+    values: dict[str, Any] = {}
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            values.update(flat(value, f"{prefix}{key}."))
+        else:
+            values[f"{prefix}{key}"] = value
+    return values
 
 
 def _plain(value: Any) -> JsonValue:

@@ -15,10 +15,12 @@ from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
 
 _INTRODUCTION = """# The study file
 
-`studies/<name>/study.yaml` is a YAML file. All values are in SI units. Numbers may be
-written as `5e6`. A key that is not listed here is refused. `*` stands for a name of
-your choice. Error messages, `sweep` and `assumptions` refer to a field by its dotted
-name, such as `motion.speed_m_s`. Coefficients, fractions and multipliers are
+`studies/<name>/study.yaml` is a YAML file. All values are in SI units; a value that is hardly
+meant in them gives a warning or is refused. Numbers are decimal and may be written as `5e6`;
+`0300` and `1:30` are refused. A key that is not listed here is refused. `*` stands for a name of
+your choice. Names of studies, materials and fidelities have up to 64 letters (a-z), digits, `.`,
+`_` and `-`, those of materials no `-`. Error messages, `sweep` and `assumptions` refer to a
+field by its dotted name, such as `motion.speed_m_s`. Coefficients, fractions and multipliers are
 dimensionless.
 
 This page is generated from the model: `./run dragdeck step fields > docs/study.md`.
@@ -48,7 +50,8 @@ def _rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, 
 
 def _also_plain(annotation: Any) -> bool:
     """Whether a plain value may stand where a model may."""
-    return any(get_args(part)[:1] == (str,) for part in get_args(annotation))
+    parts = get_args(annotation) if _is_union(annotation) else ()
+    return any(get_args(part)[:1] == (str,) for part in parts)
 
 
 def _kind(model: type[BaseModel]) -> str:

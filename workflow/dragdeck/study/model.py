@@ -6,6 +6,7 @@ than the study itself, or of how a scene is run.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -13,11 +14,19 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
-    field_validator,
     model_validator,
 )
 
-from dragdeck.study.base import Model, NonNegative, Number, Positive, Whole
+from dragdeck.study.base import (
+    Line,
+    MaterialName,
+    Model,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    Whole,
+)
 from dragdeck.study.contact_law import Contact, Pair
 from dragdeck.study.material import Material
 from dragdeck.study.reference import Reference
@@ -76,7 +85,7 @@ class MeshShape(Model):
     """A workpiece from a mesh file, its axis along z, its lowest point the tip."""
 
     kind: Literal["mesh"] = Field(description="a mesh from a file")
-    file: str = Field(description="STL, OBJ, PLY or VTK; relative to the study or to meshes/")
+    file: Line = Field(description="STL, OBJ, PLY or VTK; relative to the study or to meshes/")
     unit: Literal["m", "cm", "mm", "um", "in"] = Field(description="unit of the file's numbers")
 
 
@@ -135,6 +144,13 @@ class Motion(Model):
         description="initial path length excluded from all statistics, m"
     )
 
+    @property
+    def path_length_m(self) -> float:
+        """Length of the drag, m."""
+        if isinstance(self.path, CirclePath):
+            return 2 * math.pi * self.path.radius_m * self.path.revolutions
+        return self.path.length_m
+
 
 class DropTest(Model):
     """The drop test: one mean particle on a plate of the workpiece's material."""
@@ -151,7 +167,9 @@ class DropTest(Model):
 class Calibration(Model):
     """A measured drop test, to find the restitution of particle on workpiece material."""
 
-    record: str = Field(description="CSV of force against time; relative to the study's folder")
+    record: Line = Field(
+        pattern=r"^[^{}]*$", description="CSV of force against time; relative to the study's folder"
+    )
     height_std_m: Positive = Field(
         default=1e-4, description="standard uncertainty of drop_test.height_m in the test, m"
     )
@@ -164,7 +182,7 @@ class Calibration(Model):
 class Filling(Model):
     """When a bed counts as settled."""
 
-    energy_ratio: Positive = Field(
+    energy_ratio: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=1e-5,
         description="settling criterion: mean kinetic energy per particle / (m g d)",
     )
@@ -272,6 +290,19 @@ class Assumption(Model):
     why: str = Field(description="what the source reports, and the reason for the value")
 
 
+class Accepted(Model):
+    """Limits that a study goes beyond on purpose."""
+
+    unsafe_timestep: Line | None = Field(
+        default=None,
+        description="reason for a process time step at or beyond the measured breaking step; "
+        "shown among the assumptions of the report",
+    )
+    cases: Annotated[Whole, Field(ge=1)] = Field(
+        default=200, description="largest number of cases that sweep may have"
+    )
+
+
 class Scaling(Model):
     """A power law to look for in the mean drag over the levels of one sweep field."""
 
@@ -308,9 +339,9 @@ BUILT_IN_FIDELITIES: Mapping[str, Fidelity] = {
 class Study(Model):
     """A whole study file."""
 
-    title: str = Field(description="title, for headings")
+    title: Line = Field(description="title in one line, for headings")
     gravity_m_s2: Positive = Field(default=9.81, description="gravity along -z, m/s2")
-    materials: dict[str, Material]
+    materials: dict[MaterialName, Material]
     pairs: dict[str, Pair] = Field(
         description="'a-b': coefficients of the contact of materials a and b"
     )
@@ -327,7 +358,7 @@ class Study(Model):
         default="standard",
         description="name of a fidelity, or settings, or a tolerance that selects settings",
     )
-    fidelities: dict[str, Fidelity] = Field(default_factory=dict)
+    fidelities: dict[Name, Fidelity] = Field(default_factory=dict)
     seed: Annotated[Whole, Field(ge=0, lt=2**32)] = Field(
         default=1,
         description="random seed of the initial positions and velocities (one seed = one packing)",
@@ -337,30 +368,9 @@ class Study(Model):
         description="dotted field: list of values; every combination is a case",
     )
     scaling: Scaling | None = None
+    accepted: Accepted = Accepted()
     assumptions: list[Assumption] = Field(default_factory=list)
     reference: Reference | None = None
-
-    @field_validator("materials")
-    @classmethod
-    def _plain_names(cls, materials: dict[str, Material]) -> dict[str, Material]:
-        for name in materials:
-            if "-" in name or not name:
-                raise ValueError(f"material name {name!r} must not be empty or hold a dash")
-        return materials
-
-    @model_validator(mode="after")
-    def _names_exist(self) -> Study:
-        for owner in ("media", "bowl", "workpiece"):
-            name = getattr(self, owner).material
-            if name not in self.materials:
-                raise ValueError(
-                    f"{owner}.material {name!r} is not among materials: {', '.join(self.materials)}"
-                )
-        for other in self.type_names():
-            self.pair(self.media.material, other)
-        if not isinstance(self.fidelity, Tolerance):
-            self.chosen_fidelity()
-        return self
 
     def type_names(self) -> list[str]:
         """Materials in the order of the engine's types: particle, bowl, workpiece, each once."""

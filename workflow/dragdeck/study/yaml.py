@@ -1,24 +1,30 @@
-"""Study files as YAML: reading, and errors that name field, value and limit."""
+"""Study files as YAML: reading, and errors that name file, line, field, value and limit."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import yaml
-from pydantic import (
-    BaseModel,
-    ValidationError,
-)
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
-from dragdeck.errors import InputError
+from dragdeck.errors import InputError, near, together
+from dragdeck.study.base import DECIMAL, Model
+from dragdeck.study.consistency import contradictions
 from dragdeck.study.model import STUDY_FILE, Study
+from dragdeck.study.plausible import implausible
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML that refuses a key given twice."""
+    """YAML that refuses a key given twice, and whose numbers are decimal.
+
+    ``1:30``, ``0300``, ``0x1F``, dates, and ``yes`` or ``on`` are text, as in YAML 1.2.
+    """
 
 
 def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
@@ -34,6 +40,19 @@ def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
 
 
 _Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
+
+
+_PLAIN = re.compile(rf"{DECIMAL.pattern}|[-+]?\.(inf|nan)|true|false", re.ASCII | re.IGNORECASE)
+
+
+def _scalar(loader: _Loader, node: yaml.ScalarNode) -> Any:
+    """A decimal number or a truth value; whatever else YAML 1.1 has a type for is text."""
+    read = yaml.SafeLoader.yaml_constructors[node.tag]
+    return read(loader, node) if _PLAIN.fullmatch(node.value) else node.value
+
+
+for _tag in ("bool", "float", "int", "timestamp"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}", _scalar)
 
 
 def read_yaml(file: Path) -> dict[str, Any]:
@@ -63,21 +82,88 @@ def _studies_nearby(file: Path) -> str:
     return f"choose one of: {', '.join(names)}" if names else "check the path"
 
 
-def validate(data: Mapping[str, Any], file: Path | str) -> Study:
-    """Check plain data against the study model.
+def located(error: InputError) -> InputError:
+    """The error with the line of its field in the file, where both are known."""
+    file = error.file
+    if error.line is None and error.field and isinstance(file, Path) and file.is_file():
+        lines = _line_table(file.read_text(encoding="utf-8"))
+        field = error.field
+        while field and not {f"sweep.{field}", field} & set(lines):
+            field = field.rpartition(".")[0]
+        error.line = lines.get(f"sweep.{field}", lines.get(field))
+    for other in error.more:
+        located(other)
+    return error
+
+
+@lru_cache(maxsize=4)
+def _line_table(text: str) -> Mapping[str, int]:
+    return dict(_lines(yaml.compose(text, Loader=_Loader), ""))
+
+
+def _lines(node: yaml.Node | None, prefix: str) -> Iterator[tuple[str, int]]:
+    """The line of every dotted field, counted from 1."""
+    items: list[tuple[str, yaml.Node, yaml.Node]] = []
+    if isinstance(node, yaml.MappingNode):
+        items = [(str(key.value), key, value) for key, value in node.value]
+    elif isinstance(node, yaml.SequenceNode):
+        items = [(str(index), item, item) for index, item in enumerate(node.value)]
+    for name, place, value in items:
+        yield f"{prefix}{name}", place.start_mark.line + 1
+        yield from _lines(value, f"{prefix}{name}.")
+
+
+def validate(data: Mapping[str, Any], file: Path | str, *, whole: bool = False) -> Study:
+    """Check plain data against the study model, and its values against each other.
+
+    Parameters
+    ----------
+    data : mapping
+    file : Path or str
+        For error messages.
+    whole : bool
+        Whether it is a study with its sweep, and not a case of it.
 
     Raises
     ------
     InputError
-        Names the first field that is wrong, its value, its limit and a remedy.
+        Names every problem with its line, field, value, limit and a remedy.
     """
+    found, study = [], None
     try:
-        return Study.model_validate(data)
+        study = Study.model_validate(data)
     except ValidationError as error:
-        raise explained(error, file) from None
+        found = _problems(error)
+    wrong = {error.field for error in found}
+    doubts = [row for row in implausible(data) if row[0].field not in wrong]
+    found += [error for error, _ in doubts]
+    doubtful = {error.field for error in found}
+    others = contradictions(study, whole) if study else iter(())
+    more = [error for error in others if error.field not in doubtful]
+    if study is None or more or any(refused for _, refused in doubts):
+        raise _of_file([*found, *more], file)
+    return study
 
 
-_FORMS = ("cylinder", "circle", "line", "a-name", "a-number", "a-word", "settings", "a-tolerance")
+def warnings(study: Study) -> list[str]:
+    """Values of a valid study that are hardly meant, one line each."""
+    return [
+        f"{error.field} {error.value:g} {error.problem}; {error.remedy}; {error.limit}"
+        for error, _ in implausible(study.plain())
+    ]
+
+
+_FORMS = (
+    "cylinder",
+    "circle",
+    "line",
+    "a-name",
+    "a-number",
+    "a-word",
+    "settings",
+    "a-tolerance",
+    "[key]",
+)
 """Names of alternatives, which are no part of a field's dotted name."""
 
 _LIMITS = {
@@ -90,26 +176,41 @@ _LIMITS = {
 
 
 def explained(error: ValidationError, file: Path | str) -> InputError:
-    """The first problem that a model found in a file, as an error for the user."""
-    issues = error.errors()
-    first = issues[0]
-    kind = first["type"]
-    field = ".".join(str(part) for part in first["loc"] if part not in _FORMS)
-    limit = _LIMITS[kind].format(**first.get("ctx", {})) if kind in _LIMITS else None
-    problem, remedy = first["msg"].removeprefix("Value error, "), None
-    value: object = first["input"]
+    """What a model found in a file, as one error for the user."""
+    return _of_file(_problems(error), file)
+
+
+def _of_file(found: list[InputError], file: Path | str) -> InputError:
+    for error in found:
+        error.file = file
+    return located(together(found))
+
+
+def _problems(error: ValidationError) -> list[InputError]:
+    return [_problem(issue) for issue in error.errors()]
+
+
+def _problem(issue: ErrorDetails) -> InputError:
+    """One problem that a model found."""
+    kind = issue["type"]
+    field = ".".join(str(part) for part in issue["loc"] if part not in _FORMS)
+    limit = _LIMITS[kind].format(**issue.get("ctx", {})) if kind in _LIMITS else None
+    problem, remedy = issue["msg"].removeprefix("Value error, "), None
+    value: object = issue["input"]
     if kind == "extra_forbidden":
-        problem, remedy = "unknown key", "remove it, or check its spelling against docs/study.md"
+        hint = near(str(issue["loc"][-1]), _every_key())
+        problem, remedy = "unknown key", f"{hint}remove it, or see docs/study.md for its spelling"
     elif kind == "missing":
         problem, remedy, value = "a required key is missing", "add it", None
-    elif isinstance(value, Mapping | BaseModel):
+    if isinstance(value, Mapping | BaseModel):
         value = None
-    if len(issues) > 1:
-        more = f"{len(issues) - 1} more problem(s) stand in this file"
-        remedy = f"{remedy}; {more}" if remedy else more
-    return InputError(
-        problem, file=file, field=field or None, value=_shown(value), limit=limit, remedy=remedy
-    )
+    return InputError(problem, field=field or None, value=_shown(value), limit=limit, remedy=remedy)
+
+
+def _every_key(model: type[Model] = Model) -> set[str]:
+    """Every key that some part of a study may have."""
+    inner = (_every_key(part) for part in model.__subclasses__())
+    return set(model.model_fields).union(*inner)
 
 
 def _shown(value: object) -> str | None:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import copy
 import itertools
-import json
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from dragdeck.cases.case import Case
-from dragdeck.errors import InputError
-from dragdeck.study.model import STUDY_FILE, Scaling, Tolerance
+from dragdeck.errors import InputError, choices, together
+from dragdeck.study.base import NAME, NAME_LIMIT
+from dragdeck.study.model import STUDY_FILE, Tolerance
 from dragdeck.study.yaml import read_yaml, validate
 
 Resolve = Callable[[Case, Tolerance], Case]
@@ -42,87 +41,36 @@ def load_cases(
     data = read_yaml(file)
     if fidelity is not None:
         data["fidelity"] = fidelity
-    validate({**data, "sweep": {}}, file)
-    study = validate(data, file)
-    sweep = study.sweep
-    if study.scaling is not None:
-        _check_scaling(study.scaling, sweep, file)
-    plain = {**data, "sweep": {}}
-    return beside_each_other(
-        [
-            settle_case(file, plain, settings, resolve=resolve)
-            for settings in _combinations(sweep, file)
-        ]
-    )
+    plain, found, errors = {**data, "sweep": {}}, [], []
+    for settings in _combinations(validate(data, file, whole=True).sweep):
+        try:
+            found.append(settle_case(file, plain, settings, resolve=resolve))
+        except InputError as error:
+            errors.append(error)
+    if errors:
+        raise together(errors)
+    _check_doubles(found)
+    return beside_each_other(found)
+
+
+def _check_doubles(found: list[Case]) -> None:
+    """Refuse two cases of the same content: a value is given twice, perhaps written otherwise."""
+    first: dict[str, Case] = {}
+    for case in found:
+        same = first.setdefault(f"{case.asked} {case.study.model_dump_json()}", case)
+        if same is not case:
+            raise InputError(
+                f"a value is given twice: the cases {same.name} and {case.name} are the same",
+                file=case.file,
+                field="sweep",
+                remedy="remove one",
+            )
 
 
 def beside_each_other(cases: Iterable[Case]) -> list[Case]:
     """The same cases, each knowing how many there are."""
     known = list(cases)
     return [replace(case, beside=len(known)) for case in known]
-
-
-_LEAST_LEVELS = 3
-"""Levels that a power law is fitted to: two would fit any."""
-
-
-def _check_scaling(scaling: Scaling, sweep: Mapping[str, list[Any]], file: Path) -> None:
-    """Refuse a scaling that the sweep cannot tell.
-
-    Raises
-    ------
-    InputError
-        Its field is not in the sweep, is not alone there but for the seed, or has
-        a level that is no number above zero; or too few levels are within its range.
-    """
-    field = scaling.field
-    if field not in sweep:
-        raise InputError(
-            "not a field of sweep",
-            file=file,
-            field="scaling.field",
-            value=field,
-            limit=f"one of: {', '.join(name for name in sweep if name != 'seed') or 'none here'}",
-            remedy="add its levels to sweep, or name a field that is there",
-        )
-    others = [name for name in sweep if name not in (field, "seed")]
-    if others:
-        raise InputError(
-            "another field varies too, so that the drag is no function of one",
-            file=file,
-            field="sweep",
-            value=", ".join(others),
-            limit=f"{field} and seed",
-            remedy="give each field a study of its own, or leave out scaling",
-        )
-    levels = [_level(value, field, file) for value in sweep[field]]
-    low, high = scaling.fit_range or (min(levels), max(levels))
-    if sum(low <= level <= high for level in levels) < _LEAST_LEVELS:
-        raise InputError(
-            f"too few levels from {low:g} to {high:g} for a power law",
-            file=file,
-            field=f"sweep.{field}",
-            value=sweep[field],
-            limit=f"{_LEAST_LEVELS} levels or more",
-            remedy="add levels" + (", or widen scaling.fit_range" if scaling.fit_range else ""),
-        )
-
-
-def _level(value: Any, field: str, file: Path) -> float:
-    """A level of a scaling as a number."""
-    try:
-        level = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError):
-        level = math.nan
-    if not (math.isfinite(level) and level > 0):
-        raise InputError(
-            "a power law needs numbers above 0",
-            file=file,
-            field=f"sweep.{field}",
-            value=value,
-            remedy="remove this level, or leave out scaling",
-        )
-    return level
 
 
 def settle_case(
@@ -184,29 +132,18 @@ def study_file(studies: Path, name: str) -> Path:
         No such study; lists those there are.
     """
     file = studies / name / STUDY_FILE
-    if not file.is_file():
+    if not NAME.fullmatch(name) or not file.is_file():
         known = sorted(found.parent.name for found in studies.glob(f"*/{STUDY_FILE}"))
         raise InputError(
-            f"unknown study {name!r}",
+            f"unknown study {name!a}",
             file=studies,
-            limit=f"one of: {', '.join(known) or 'none here'}",
-            remedy=f"choose one of these, or make {file}",
+            limit=choices(name, filter(NAME.fullmatch, known)),
+            remedy=f"choose one of these, or make a folder; its name has {NAME_LIMIT}",
         )
     return file
 
 
-def _combinations(sweep: Mapping[str, list[Any]], file: Path) -> Iterator[dict[str, Any]]:
-    for field, values in sweep.items():
-        if not values:
-            raise InputError("no values", file=file, field=f"sweep.{field}", remedy="give some")
-        if len({json.dumps(value, sort_keys=True) for value in values}) < len(values):
-            raise InputError(
-                "a value is given twice",
-                file=file,
-                field=f"sweep.{field}",
-                value=values,
-                remedy="remove one",
-            )
+def _combinations(sweep: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
     for combination in itertools.product(*sweep.values()):
         yield dict(zip(sweep, combination, strict=True))
 

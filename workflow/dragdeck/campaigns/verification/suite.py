@@ -14,7 +14,8 @@ from dragdeck.campaigns.verification.impacts import Impacts
 from dragdeck.campaigns.verification.lab import Lab, Substance
 from dragdeck.campaigns.verification.momentum import Momentum
 from dragdeck.campaigns.verification.resting import Column, Incline
-from dragdeck.decks.render import environment, write_run
+from dragdeck.decks.render import write_run
+from dragdeck.decks.templates import environment
 from dragdeck.project import find_project, study_templates
 from dragdeck.scenes.collide import Experiment, collide_scene
 from dragdeck.study.base import Model, Whole

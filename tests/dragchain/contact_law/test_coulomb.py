@@ -1,0 +1,44 @@
+"""The limit of friction."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from dragchain.contact_law.coulomb import within_friction
+
+Z = np.array([[0.0, 0.0, 1.0]])
+
+
+def test_a_force_below_the_limit_is_left_to_the_last_bit() -> None:
+    force = np.array([[0.1, 0.2, 1.0]])
+    cut, removed = within_friction(force, Z, 0.3)
+    np.testing.assert_array_equal(cut, force)
+    assert removed.tolist() == [0.0]
+
+
+def test_only_the_tangential_part_is_cut_and_keeps_its_direction() -> None:
+    force = np.array([[3.0, 4.0, -2.0]])
+    cut, removed = within_friction(force, Z, 0.5)
+    np.testing.assert_allclose(cut, [[0.6, 0.8, -2.0]])
+    np.testing.assert_allclose(removed, [4.0])
+
+
+def test_every_contact_may_have_its_own_coefficient() -> None:
+    force = np.array([[1.0, 0.0, 1.0]] * 2)
+    cut, _ = within_friction(force, np.repeat(Z, 2, axis=0), np.array([0.25, 0.5]))
+    np.testing.assert_allclose(cut[:, 0], [0.25, 0.5])
+
+
+@given(
+    force=arrays.arrays(np.float64, (5, 3), elements=st.floats(-1e3, 1e3)),
+    friction=st.floats(0.0, 2.0),
+)
+def test_no_force_is_above_the_limit_and_the_normal_part_stays(force, friction) -> None:
+    cut, removed = within_friction(force, np.repeat(Z, 5, axis=0), friction)
+    np.testing.assert_allclose(cut[:, 2], force[:, 2], rtol=1e-12)
+    size = np.linalg.norm(cut[:, :2], axis=1)
+    assert (size <= friction * np.abs(force[:, 2]) * (1 + 1e-9) + 1e-9).all()
+    np.testing.assert_allclose(size + removed, np.linalg.norm(force[:, :2], axis=1), atol=1e-9)

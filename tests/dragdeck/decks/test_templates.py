@@ -1,0 +1,171 @@
+"""What a template may do, and what a value may bring into an input script."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from markupsafe import Markup
+
+from dragdeck.cases.case import Case
+from dragdeck.decks.render import deck_text
+from dragdeck.decks.templates import comment, environment, number, quoted, template_files
+from dragdeck.errors import InputError
+from dragdeck.project import Project
+from dragdeck.scenes.process import process_scene
+from dragdeck.scenes.scene import Bed
+from dragdeck.sweep.cases import load_cases
+
+BED = Bed(surface_m=0.038, top_m=0.0446)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["a\nshell date", "a\rb", "a & b", "$x", "${x}", "a # b", 'a "b', "it's", "a\\b", "a\u2028b"],
+)
+def test_a_text_that_the_engine_would_read_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="cannot stand in an input script"):
+        quoted(text)
+
+
+@pytest.mark.parametrize("value", [None, True, [1], {"a": 1}, float("nan"), float("inf")])
+def test_what_is_neither_text_nor_number_is_refused(value: object) -> None:
+    with pytest.raises(TypeError, match="is not a number"):
+        quoted(value)
+
+
+def test_plain_values_stay_as_they_are() -> None:
+    assert quoted("hertz tangential history") == "hertz tangential history"
+    assert quoted(0.1) == "0.1"
+    assert quoted(3) == "3"
+    assert quoted(Markup("${part}")) == "${part}"
+    assert number(1e-300) == "1e-300"
+
+
+def test_a_title_stays_in_its_comment(
+    project: Project, small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    small["title"] = 'R&D of "Müller" # $x &'
+    (case,) = load_cases(write_study(small))
+    text = deck_text(process_scene(case, BED), environment(project.templates))
+    assert text.splitlines()[0] == "# RD of Müller  x "
+    assert comment("a\nb") == "ab"
+
+
+def own(case: Case, text: str, name: str = "process.in.j2") -> Path:
+    file = case.file.parent / "templates" / name
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(text)
+    return file
+
+
+def in_block(text: str) -> str:
+    return f'{{% extends "base/process.in.j2" %}}\n{{% block extra %}}\n{text}\n{{% endblock %}}\n'
+
+
+def render(case: Case, project: Project) -> str:
+    templates = environment(project.templates, case.file.parent / "templates")
+    return deck_text(process_scene(case, BED), templates)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{{ ''.__class__.__mro__ }}", "not allowed"),
+        ("{{ deck.outputs.append(1) }}", "not allowed"),
+        ("{{ 'a'.upper() }}", "not allowed"),
+        ("{{ lipsum() }}", "not allowed"),
+        ("{{ 'shell' | safe }}", "No filter named 'safe'"),
+        ("{{ 9 ** 9999999 }}", "math range error"),
+        ("{% for i in range(1000000) %}{% endfor %}", "Range too big"),
+        ("{{ 'a\\nb' }}", "cannot stand in an input script"),
+        ("{{ none }}", "is not a number"),
+        ("{{ 1 / 0 }}", "division by zero"),
+        ("{{ 'x' * 99999999999 }}", "memory"),
+    ],
+)
+def test_a_template_is_data(case: Case, project: Project, text: str, words: str) -> None:
+    own(case, in_block(text))
+    with pytest.raises(InputError, match=words) as caught:
+        render(case, project)
+    assert "process.in.j2" in str(caught.value.file)
+
+
+def test_a_template_that_extends_itself_is_explained(case: Case, project: Project) -> None:
+    own(case, '{% extends "process.in.j2" %}')
+    with pytest.raises(InputError, match="extends or calls itself") as caught:
+        render(case, project)
+    assert 'extend "base/' in str(caught.value.remedy)
+
+
+def test_a_macro_that_calls_itself_is_explained(case: Case, project: Project) -> None:
+    own(case, in_block("{% macro again() %}{{ again() }}{% endmacro %}{{ again() }}"))
+    with pytest.raises(InputError, match="calls itself"):
+        render(case, project)
+
+
+def test_a_template_without_end_is_stopped(case: Case, project: Project) -> None:
+    """Loops within loops: the timer goes off early, so that nobody waits."""
+    loops = "{% for i in range(99999) %}" * 3 + "{% endfor %}" * 3
+    own(case, in_block("{{ deck.title }}" + loops))
+    templates = environment(project.templates, case.file.parent / "templates")
+    scene = process_scene(case, BED)
+    scene = replace(scene, deck=replace(scene.deck, title=_Alarm("slow")))
+    with pytest.raises(InputError, match="takes longer than"):
+        deck_text(scene, templates)
+    assert signal.getitimer(signal.ITIMER_REAL)[0] == 0
+
+
+class _Alarm(Markup):
+    """A text that leaves a moment only once it is inserted."""
+
+    def __html__(self) -> str:
+        signal.setitimer(signal.ITIMER_REAL, 0.05)
+        return ""
+
+
+def test_a_misspelt_block_is_named(case: Case, project: Project) -> None:
+    file = own(case, '{% extends "base/process.in.j2" %}\n\n{% block exta %}{% endblock %}\n')
+    with pytest.raises(
+        InputError, match="no template that it extends has a block 'exta'"
+    ) as caught:
+        environment(project.templates, file.parent)
+    assert caught.value.field == "line 3"
+    assert "did you mean 'extra'" in str(caught.value)
+    assert caught.value.file == file
+
+
+def test_a_new_block_within_a_known_one_is_fine(case: Case, project: Project) -> None:
+    own(case, in_block("{% block mine %}# mine{% endblock %}"))
+    assert "# mine" in render(case, project)
+
+
+def test_files_that_no_input_script_uses_are_named_together(case: Case, project: Project) -> None:
+    file = own(case, "", "proces.in.j2")
+    own(case, "", "notes.txt")
+    own(case, "", ".hidden")
+    with pytest.raises(InputError) as caught:
+        environment(project.templates, file.parent)
+    assert "did you mean 'process.in.j2'" in str(caught.value)
+    assert "notes.txt" in str(caught.value)
+    assert "hidden" not in str(caught.value)
+
+
+def test_a_file_that_an_own_template_imports_is_used(case: Case, project: Project) -> None:
+    own(case, "{% macro hello() %}# hello{% endmacro %}", "mine.j2")
+    text = '{% from "mine.j2" import hello %}{{ hello() }}'
+    file = own(case, in_block(text))
+    assert "# hello" in render(case, project)
+    templates = environment(project.templates, file.parent)
+    assert file.parent / "mine.j2" in template_files(templates, "process")
+
+
+def test_a_command_that_leaves_the_run_is_refused(case: Case, project: Project) -> None:
+    own(case, in_block("shell date"))
+    with pytest.raises(InputError, match="start another program") as caught:
+        render(case, project)
+    assert caught.value.value == "'shell date'"

@@ -1,0 +1,272 @@
+"""The templates of input scripts: what they may use, and whether a study's own fit the project's.
+
+A template is data: it runs in Jinja's sandbox, within limits of time and memory, and each value
+that it inserts passes `quoted`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import resource
+import signal
+import traceback
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import psutil
+from jinja2 import nodes
+from jinja2.exceptions import SecurityError
+from jinja2.meta import find_referenced_templates
+from jinja2.runtime import BlockReference, Context, Macro
+from jinja2.sandbox import ImmutableSandboxedEnvironment, safe_range
+from markupsafe import Markup
+
+from dragdeck.errors import InputError, choices, together
+
+_NOT_IN_A_VALUE = set("$&#\"'\\")
+"""What LIGGGHTS reads as a variable, a continued line, a comment or a quotation."""
+
+_TRUSTING = ("e", "escape", "forceescape", "random", "safe", "tojson", "urlize", "xmlattr")
+"""Filters of Jinja that would pass text by `quoted`, or give another script each time."""
+
+_MOST_SECONDS, _MOST_BYTES = 10.0, 2**30
+"""What rendering a script may take."""
+
+
+_FAILURES: Mapping[type[BaseException], tuple[str, str]] = {
+    RecursionError: ("extends or calls itself without end", 'extend "base/<name>" instead'),
+    MemoryError: ("needs more memory than a template may have", "make it smaller"),
+    TimeoutError: (f"takes longer than {_MOST_SECONDS:g} s", "make it smaller"),
+    SecurityError: ("is not allowed: ", "docs/templates.md lists what a template may use"),
+    jinja2.TemplateNotFound: ("no such template: ", "put it into templates/, or correct the name"),
+    jinja2.TemplateSyntaxError: ("template syntax: ", "see docs/templates.md"),
+    jinja2.UndefinedError: ("a value is missing: ", "docs/templates.md lists the values"),
+    Exception: ("a value cannot be used: ", "docs/templates.md lists the values"),
+}
+"""What a template may raise: the problem, which goes on with the exception if it ends with a space,
+and the remedy."""
+
+
+class _Sandbox(ImmutableSandboxedEnvironment):
+    """Macros, blocks and ``range`` may be called, and nothing else."""
+
+    intercepted_binops = frozenset(["**"])
+
+    def is_safe_callable(self, obj: Any) -> bool:
+        return isinstance(obj, Macro | BlockReference) or obj is safe_range
+
+    def call_binop(self, context: Context, operator: str, left: Any, right: Any) -> Any:
+        return math.pow(left, right)  # never a number of a million digits
+
+
+def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
+    """The Jinja environment: a study's own templates first, then the project's.
+
+    Parameters
+    ----------
+    project : Path
+        The project's folder of templates. Its files are also known as
+        ``base/<name>``, so that a study's template of the same name can extend
+        the one it replaces.
+    study : Path, optional
+        The study's folder of templates.
+
+    Raises
+    ------
+    InputError
+        A template of the study is used by no input script, or overrides no block.
+    """
+    folders = [str(study)] if study is not None and study.is_dir() else []
+    loader = jinja2.ChoiceLoader(
+        [
+            jinja2.FileSystemLoader([*folders, str(project)]),
+            jinja2.PrefixLoader({"base": jinja2.FileSystemLoader(str(project))}),
+        ]
+    )
+    found = _Sandbox(
+        loader=loader,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=True,  # tells the text of templates from values; `quoted` does the rest
+        finalize=_inserted,
+    )
+    for name in _TRUSTING:
+        del found.filters[name]
+    found.filters.update(num=number, nums=numbers, comment=comment)
+    if folders and study is not None:
+        with explained():
+            _check_own(found, study, project)
+    return found
+
+
+def number(value: float) -> str:
+    """A number that reads back exactly."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise TypeError(f"{value!r} is not a number")
+    return repr(value if isinstance(value, int) else float(value))
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Numbers that read back exactly, with spaces between."""
+    return " ".join(number(value) for value in values)
+
+
+def comment(text: str) -> str:
+    """Free text as LIGGGHTS can have it in a comment: without the characters that it reads."""
+    return "".join(char for char in text if char.isprintable() and char not in _NOT_IN_A_VALUE)
+
+
+def quoted(value: object) -> Markup:
+    """A value as it may stand in an input script.
+
+    Raises
+    ------
+    ValueError
+        A text has a character that LIGGGHTS would read as more than a part of a word.
+    TypeError
+        Neither text nor number.
+    """
+    if isinstance(value, Markup):
+        return value  # the text of a template
+    if not isinstance(value, str):
+        return Markup(number(value))  # type: ignore[arg-type]
+    bad = {char for char in value if char in _NOT_IN_A_VALUE or not char.isprintable()}
+    if bad:
+        shown = " ".join(ascii(char) for char in sorted(bad))
+        raise ValueError(f"{value[:80]!a} cannot stand in an input script: it has {shown}")
+    return Markup(value)
+
+
+@jinja2.pass_context
+def _inserted(context: Context, value: object) -> Markup:
+    """`quoted`; with the context, Jinja leaves constants for it too."""
+    return quoted(str(value) if isinstance(value, jinja2.Undefined) else value)
+
+
+@contextlib.contextmanager
+def explained() -> Iterator[None]:
+    """Limit what templates take, and turn what they raise into an error with file and line.
+
+    Raises
+    ------
+    InputError
+        Whatever went wrong in the template.
+    """
+    try:
+        with _limited():
+            yield
+    except InputError:
+        raise
+    except Exception as error:
+        problem, remedy = next(
+            texts for kind, texts in _FAILURES.items() if isinstance(error, kind)
+        )
+        file, line = _place(error)
+        text = f"{problem}{error}" if problem.endswith(" ") else problem
+        raise InputError(text, file=file, field=f"line {line}", remedy=remedy) from None
+
+
+def _place(error: Exception) -> tuple[str, int | str]:
+    """Template file and line where an error arose."""
+    if isinstance(error, jinja2.TemplateSyntaxError):
+        return error.filename or "template", error.lineno
+    place: tuple[str, int | str] = ("template", "?")
+    for frame, line in traceback.walk_tb(error.__traceback__):
+        if frame.f_code.co_filename.endswith(".j2"):
+            place = (frame.f_code.co_filename, line)
+    return place
+
+
+@contextlib.contextmanager
+def _limited() -> Iterator[None]:
+    """Let no template run for ever or fill the memory."""
+
+    def stop(number: int, frame: object) -> None:
+        raise TimeoutError
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    most = psutil.Process().memory_info().vms + _MOST_BYTES
+    before = signal.signal(signal.SIGALRM, stop)
+    try:
+        resource.setrlimit(resource.RLIMIT_AS, (most if soft < 0 else min(soft, most), hard))
+        signal.setitimer(signal.ITIMER_REAL, _MOST_SECONDS, 1.0)
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def used(templates: jinja2.Environment, *names: str) -> list[str]:
+    """Names of the templates that some templates are made of, themselves first."""
+    found: list[str] = []
+    waiting = list(names)
+    while waiting:
+        current = waiting.pop(0)
+        if current not in found:
+            found.append(current)
+            referenced = find_referenced_templates(_parsed(templates, current))
+            waiting.extend(name for name in referenced if name is not None)
+    return found
+
+
+def file_of(templates: jinja2.Environment, name: str) -> Path:
+    """The file of a template."""
+    assert templates.loader is not None
+    _, file, _ = templates.loader.get_source(templates, name)
+    return Path(str(file))
+
+
+def _parsed(templates: jinja2.Environment, name: str) -> nodes.Template:
+    assert templates.loader is not None
+    source, file, _ = templates.loader.get_source(templates, name)
+    return _tree(templates, source, name, file)
+
+
+@lru_cache(maxsize=64)
+def _tree(env: jinja2.Environment, source: str, name: str, file: str | None) -> nodes.Template:
+    return env.parse(source, name, file)
+
+
+def template_files(templates: jinja2.Environment, scene: str) -> list[Path]:
+    """The template files that a scene's deck is made of, in no order that matters.
+
+    Raises
+    ------
+    InputError
+        One of them is missing or cannot be parsed.
+    """
+    with explained():
+        return sorted({file_of(templates, name) for name in used(templates, f"{scene}.in.j2")})
+
+
+def _check_own(templates: jinja2.Environment, study: Path, project: Path) -> None:
+    """Refuse files of a study that no input script uses, and blocks that override nothing."""
+    files = {str(file.relative_to(study)) for file in study.rglob("[!.]*") if file.is_file()}
+    known = {str(file.relative_to(project)) for file in project.rglob("*.j2")}
+    reached = set(used(templates, *sorted(files & known)))
+    found = [
+        InputError("no input script uses it", file=study / name, limit=choices(name, known))
+        for name in sorted(files - reached)
+    ]
+    for name in sorted(files & reached):
+        found += _idle_blocks(templates, name)
+    if found:
+        raise together(found)
+
+
+def _idle_blocks(templates: jinja2.Environment, name: str) -> Iterator[InputError]:
+    """What an extending template has outside of the blocks of the templates it extends."""
+    tree, *others = (_parsed(templates, each) for each in used(templates, name))
+    known = {block.name for other in others for block in other.find_all(nodes.Block)}
+    for node in tree.body if tree.find(nodes.Extends) else ():
+        if isinstance(node, nodes.Block) and node.name not in known:
+            file, line = file_of(templates, name), f"line {node.lineno}"
+            problem = f"no template that it extends has a block {node.name!r}"
+            yield InputError(problem, file=file, field=line, limit=choices(node.name, known))

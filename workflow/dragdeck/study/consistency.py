@@ -1,0 +1,106 @@
+"""What no single field of a study shows: names that do not exist, values that contradict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from itertools import product
+
+from dragdeck.errors import InputError, choices
+from dragdeck.study.base import flat
+from dragdeck.study.model import BUILT_IN_FIDELITIES, Scaling, Study
+
+_NO_SWEEP = ("accepted", "assumptions", "reference", "scaling", "sweep", "title")
+"""Blocks that no run depends on: cases that differ in them would be the same."""
+
+_LEAST_LEVELS = 3
+"""Levels that a power law is fitted to: two would fit any."""
+
+_Found = Iterator[tuple[str, str, str]]
+"""Field, what is wrong with it, and what would be accepted."""
+
+
+def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
+    """Every contradiction within a whole study, or one of its cases; the errors name no file."""
+    values = flat(study.plain())
+    for check in (_names, _pairs, _motion, *([_sweep] if whole else [])):
+        for field, problem, limit in check(study):
+            yield InputError(problem, field=field, value=values.get(field), limit=limit)
+
+
+def _names(study: Study) -> _Found:
+    for owner in ("media", "bowl", "workpiece"):
+        name = getattr(study, owner).material
+        yield from _known(f"{owner}.material", name, study.materials, "no such material")
+    if isinstance(study.fidelity, str):
+        known = {**BUILT_IN_FIDELITIES, **study.fidelities}
+        yield from _known("fidelity", study.fidelity, known, "unknown fidelity")
+
+
+def _known(field: str, name: str, known: Iterable[str], problem: str) -> _Found:
+    if name not in known:
+        yield field, f"{problem} {name!r}", choices(name, known)
+
+
+def _pairs(study: Study) -> _Found:
+    every = ["-".join(both) for both in product(study.materials, repeat=2)]
+    for key, pair in study.pairs.items():
+        back = "-".join(key.split("-")[::-1])
+        yield from _known(f"pairs.{key}", key, every, "no pair of two materials:")
+        if key < back and study.pairs.get(back, pair) != pair:
+            yield f"pairs.{back}", f"differs from {key}, which is the same pair", "one of them"
+    for other in study.type_names():
+        key, back = f"{study.media.material}-{other}", f"{other}-{study.media.material}"
+        if key in every and not {key, back} & set(study.pairs):
+            yield "pairs", f"has no entry {key!r}, and these two will touch", "all that touch"
+
+
+def _motion(study: Study) -> _Found:
+    length = study.motion.path_length_m
+    if study.motion.transient_m >= length:
+        limit = f"below the length of the path, {length:.4g} m"
+        yield "motion.transient_m", "no path is left for the statistics", limit
+    rate = study.motion.speed_m_s / length
+    if study.outputs.network_hz < rate:
+        problem = "not one frame of the contact network is written during the drag"
+        yield "outputs.network_hz", problem, f"at least {rate:.3g} Hz; or use a longer path"
+
+
+def _sweep(study: Study) -> _Found:
+    for field, values in study.sweep.items():
+        if not values:
+            yield f"sweep.{field}", "no values", "one value or more"
+        if field.split(".")[0] in _NO_SWEEP:
+            yield f"sweep.{field}", "no run depends on it", "a field that the runs depend on"
+    count, most = math.prod(map(len, study.sweep.values())), study.accepted.cases
+    if count > most:
+        limit = f"{most}; if you mean it, set accepted.cases: {count}"
+        yield "sweep", f"makes {count} cases, more than are accepted", limit
+    if study.scaling is not None:
+        yield from _scaling(study.scaling, study)
+
+
+def _scaling(scaling: Scaling, study: Study) -> _Found:
+    """Why the sweep cannot tell the power law."""
+    field, others = scaling.field, [name for name in study.sweep if name != "seed"]
+    if field not in others:
+        yield "scaling.field", f"{field} is not a field of sweep", choices(field, others)
+        return
+    if len(others) > 1:
+        problem = "another field varies too, so that the drag is no function of one"
+        yield "sweep", problem, f"{field} and seed"
+    levels = [_level(value) for value in study.sweep[field]]
+    low, high = scaling.fit_range or (0.0, math.inf)
+    if not all(level > 0 for level in levels):
+        yield f"sweep.{field}", "a power law needs numbers above 0", "numbers above 0"
+    elif sum(low <= level <= high for level in levels) < _LEAST_LEVELS:
+        problem = f"too few levels from {low:g} to {high:g} for a power law"
+        yield f"sweep.{field}", problem, f"{_LEAST_LEVELS} levels or more"
+
+
+def _level(value: object) -> float:
+    """A level of a scaling as a number, NaN if it is none."""
+    try:
+        return math.nan if isinstance(value, bool) else float(str(value))
+    except ValueError:
+        return math.nan

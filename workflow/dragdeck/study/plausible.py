@@ -1,0 +1,98 @@
+"""Which values are plausible: slips of a unit are named before anything is computed."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from typing import Any
+
+from dragdeck.errors import InputError
+from dragdeck.study.base import flat
+
+_LENGTH = {"mm": 1e-3, "um": 1e-6, "cm": 1e-2}
+_SPEED = {"mm/s": 1e-3, "m/min": 1 / 60}
+_MODULUS = {"GPa": 1e9, "MPa": 1e6}
+_RATE = {"kHz": 1e3}
+
+
+@dataclass(frozen=True)
+class _Range:
+    """What is plausible in a drag finishing process.
+
+    Attributes
+    ----------
+    least, most : float
+        A value beyond them is refused.
+    low, high : float
+        A value beyond them gives a warning.
+    slips : mapping of str to float
+        Other units that such a number may be in, in the unit of the field.
+    """
+
+    least: float
+    low: float
+    high: float
+    most: float
+    slips: Mapping[str, float]
+
+    def hint(self, value: float) -> str:
+        """The unit in which the value would be plausible, if there is one."""
+        for unit, factor in self.slips.items():
+            if self.low <= value * factor <= self.high:
+                return f"did you mean {value:g} {unit}? That is {value * factor:.6g}"
+        return "check the value and its unit"
+
+
+_RANGES = {
+    "media.count": _Range(1, 1, 1e6, 4e6, {}),
+    "media.radius_mean_m": _Range(1e-5, 1e-4, 0.02, 0.1, _LENGTH),
+    "bowl.radius_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
+    "bowl.height_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
+    "workpiece.shape.radius_m": _Range(1e-5, 2e-4, 0.3, 2, _LENGTH),
+    "*.facet_*_m": _Range(1e-6, 5e-5, 0.1, 1, _LENGTH),
+    "motion.path.radius_m": _Range(1e-5, 1e-3, 2, 10, _LENGTH),
+    "motion.path.length_m": _Range(1e-5, 1e-3, 50, 1e4, _LENGTH),
+    "motion.path.start_m.*": _Range(-10, -2, 2, 10, _LENGTH),
+    "motion.path.revolutions": _Range(1e-5, 1e-3, 1e3, 1e5, {}),
+    "motion.plunge_at_m.*": _Range(-10, -2, 2, 10, _LENGTH),
+    "motion.immersion_depth_m": _Range(1e-5, 1e-3, 1, 5, _LENGTH),
+    "motion.transient_m": _Range(0, 0, 2, 1e3, _LENGTH),
+    "motion.*speed_m_s": _Range(1e-6, 1e-4, 3, 30, _SPEED),
+    "drop_test.height_m": _Range(1e-5, 5e-4, 1, 20, _LENGTH),
+    "materials.*.youngs_modulus_pa": _Range(1e6, 5e6, 1.3e12, 1e13, _MODULUS),
+    "materials.*.density_kg_m3": _Range(50, 300, 2.3e4, 3e4, {"g/cm3": 1e3}),
+    "gravity_m_s2": _Range(0.01, 1, 30, 500, {"cm/s2": 0.01, "mm/s2": 1e-3}),
+    "outputs.*_hz": _Range(1e-3, 0.1, 2e5, 1e8, _RATE),
+    "filling.max_time_s": _Range(1e-3, 0.1, 200, 1e5, {"ms": 1e-3}),
+    "fidel*.skin_m": _Range(1e-7, 5e-6, 0.02, 1, _LENGTH),
+}
+"""By dotted field. Assumptions: they span laboratory and industrial processes, and more."""
+
+
+def implausible(data: Mapping[str, Any]) -> Iterator[tuple[InputError, bool]]:
+    """Every value of a study's plain data that is hardly meant, and whether it is refused.
+
+    Parameters
+    ----------
+    data : mapping
+        Numbers may be text, as YAML 1.1 reads ``5e6``; what is no number is passed by.
+    """
+    for field, value in _numbers(flat(data)):
+        known = next((row for name, row in _RANGES.items() if fnmatch(field, name)), None)
+        if known is None or known.low <= value <= known.high:
+            continue
+        refused = not known.least <= value <= known.most
+        limit = f"{known.least:g} to {known.most:g}; usual: {known.low:g} to {known.high:g}"
+        problem, remedy = "is not plausible", known.hint(value)
+        yield InputError(problem, field=field, value=value, limit=limit, remedy=remedy), refused
+
+
+def _numbers(values: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    for field, value in values.items():
+        if isinstance(value, list | tuple):
+            yield from _numbers({f"{field}.{index}": item for index, item in enumerate(value)})
+        elif isinstance(value, int | float | str) and not isinstance(value, bool):
+            with contextlib.suppress(ValueError, OverflowError):
+                yield field, float(value)
