@@ -174,7 +174,8 @@ def _engines(folder: str) -> Iterator[psutil.Process]:
             process = psutil.Process(int(number))
             if process.status() == psutil.STATUS_ZOMBIE:
                 continue
-            if (process.cwd() + os.sep).startswith(folder + os.sep):
+            below = (process.cwd() + os.sep).startswith(folder + os.sep)
+            if below and "-in" in process.cmdline():  # and not one that is asked for its version
                 yield process
 
 

@@ -32,7 +32,7 @@ from attack.calls import (
 from attack.case import Attack, Got
 from attack.disks import small_disk
 from attack.ground import PLACES, STUDY, Phase, differences, locked
-from attack.kills import SAME, Arena, finish
+from attack.kills import SAME, Arena, finish, same_tables
 
 Damage = Callable[[Path, random.Random], None]
 
@@ -389,6 +389,8 @@ def result_attacks(seed: int) -> Iterator[Attack]:
         kinds = _JSON if name.endswith(".json") else _PARQUET
         for what, damage in kinds.items():
             reader = chance.choice(readers)
+            if (what, name) == ("no rows", "tables/chains.parquet"):
+                continue  # there may be none
             act = partial(_read, "process", name, damage, reader, seed)
             seconds = 2.0 if reader in ("tables", "run") else 4.0
             yield Attack("result", f"process {name}: {what}, then {reader}", act, wanted, seconds)
@@ -429,9 +431,12 @@ def _read(place: str, name: str, damage: Damage, reader: str, seed: int, arena: 
     damage(file, random.Random(f"results {seed} {name}"))
     said = _call_reader(arena, reader, place, project)
     kill(engines(project))
-    got = endless(project) or judged(said, re.escape(Path(name).name), accepted=SAME)
+    named = re.escape(Path(name).name).replace(r"\.1\.", r"\.(1|\{part\})\.")
+    got = endless(project) or judged(said, named, accepted=SAME)
     if got.outcome != SAME:
         return got
+    if reader == "run":
+        return same_tables(arena, arena.ground.phases[place.replace("_", " ")], project)
     wanted = arena.ground.root / run
     problems = differences(project / run, wanted, but=name)
     return Got("accepted: other tables", "\n".join(problems)) if problems else got

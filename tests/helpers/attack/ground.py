@@ -330,6 +330,8 @@ class CleanRuns:
         for part, step in enumerate(steps, 2):
             self._resume(folder, kept, part, step)
             kept = folder
+            if place == "filling":  # only the part that ends writes the settled particles
+                (folder / f"particles.{part - 1}.bin").unlink()
         self._analyse(project, run)
 
     def _checkpoints(self, place: str) -> Path:

@@ -81,14 +81,16 @@ def _after_kill(
 def finish(arena: Arena, phase: Phase, project: Path, said_before: str = "") -> Got:
     """The same call again, and whether it gives the tables that nobody disturbed."""
     running = Call(phase.words, project, arena.folder / "again.log")
-    most = 0
+    before: set[int] = set()
 
-    def count() -> bool:
-        nonlocal most
-        most = max(most, len(engines(project)))
-        return most > 1
+    def doubled() -> bool:
+        """Two of them at two looks: one look takes longer than an engine takes to follow."""
+        nonlocal before
+        found = {engine.pid for engine in engines(project)}
+        both, before = found & before, found
+        return len(both) > 1
 
-    if phase.engine and running.wait_until(count, poll_s=0.1):
+    if phase.engine and running.wait_until(doubled, poll_s=0.1):
         kill([*running.tree(), *engines(project)])
         running.wait()
         return Got("two engines in one folder", said_before)
