@@ -27,7 +27,9 @@ SYSTEM_TOOLS = [
     "dirname",
     "find",
     "flock",
+    "ln",
     "mkdir",
+    "readlink",
     "rm",
     "sleep",
     "touch",
@@ -166,6 +168,13 @@ def test_arguments_reach_snakemake_whole_and_from_anywhere(machine: Machine, tmp
     assert machine.done()[-1].startswith(
         f"snakemake [all] [--config] [study=two words] in {machine.clone} "
     )
+
+
+def test_a_symbolic_link_leads_to_the_clone(machine: Machine, tmp_path: Path):
+    (tmp_path / "link").symlink_to(machine.clone / "run")
+    ended = machine.run("all", cwd=tmp_path, script="../link")
+    assert ended.returncode == 0
+    assert machine.done()[-1].startswith(f"snakemake [all] in {machine.clone} ")
 
 
 @pytest.mark.parametrize("name", ["dragdeck", "dragchain"])

@@ -53,7 +53,7 @@ class Document(Part):
         except FileNotFoundError:
             remedy = f"run `{cls.made_by}`"
             raise DocumentError(file, None, "there is no such file", remedy=remedy) from None
-        except (ValueError, AttributeError) as error:
+        except (ValueError, AttributeError, RecursionError) as error:
             remedy = f"delete it and run `{cls.made_by}` again"
             raise DocumentError(
                 file, None, f"is not a JSON object: {error}", remedy=remedy

@@ -117,6 +117,10 @@ class RejectedRunError(DragchainError):
     """A run whose outputs are whole but cannot be trusted."""
 
 
+class MissingRunsError(DragchainError):
+    """Runs of a study that have no result; the report shows the others."""
+
+
 class RecordError(DragchainError):
     """A measured record that cannot be used.
 

@@ -205,6 +205,28 @@ def test_a_new_case_runs_alone(finished: Path) -> None:
     assert wanted == {"render_process", "run_process", "tabulate_process", "process"}
 
 
+def test_a_failed_case_is_listed_and_the_others_are_reported(finished: Path) -> None:
+    file = finished / "studies/small/study.yaml"
+    data = yaml.safe_load(file.read_text())
+    data["sweep"]["motion.immersion_depth_m"] = [0.012, 0.016, 0.013]
+    file.write_text(yaml.safe_dump(data))
+    template = finished / "studies/small/templates/process.in.j2"
+    template.parent.mkdir()
+    template.write_text(
+        '{% extends "base/process.in.j2" %}{% block run %}'
+        '{% if "0.013" in deck.run %}{{ "\\nquit\\n" }}{% endif %}{{ super() }}{% endblock %}'
+    )
+    done = snakemake(finished, *STUDY)
+    assert done.returncode != 0
+    assert "1 run(s) have no result" in done.stderr
+    report = finished / "results/small/report"
+    assert len(pd.read_parquet(report / "summary.parquet")) == 2
+    assert "ended by itself" in (report / "report.html").read_text()
+    data["sweep"]["motion.immersion_depth_m"] = [0.012, 0.016]
+    file.write_text(yaml.safe_dump(data))
+    assert "write_report" in jobs(finished, *STUDY)
+
+
 def test_an_unknown_study_stops_before_anything_runs(finished: Path) -> None:
     done = snakemake(finished, "all", "--config", "study=large")
     assert done.returncode != 0

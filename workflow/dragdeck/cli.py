@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import os
+import platform
+import shlex
 import sys
-from collections.abc import Sequence
+import tempfile
+import traceback
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -93,15 +99,64 @@ STEPS = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; errors of the user's go to standard error without a traceback."""
+    """Run the command and return its exit status; see `guarded`."""
     options = vars(_parser().parse_args(arguments))
     command = options.pop("_command")
+    return guarded(lambda: command.run(options))
+
+
+def guarded(call: Callable[[], None]) -> int:
+    """Call a function; whatever goes wrong becomes one message on standard error.
+
+    What nobody expected goes to a log file with its traceback, and the message names the file.
+
+    Returns
+    -------
+    int
+        The exit status: 0, 1 after an error, 130 if the user interrupted it.
+    """
     try:
-        command.run(options)
-    except DragdeckError as error:
-        print(f"dragdeck: {error}", file=sys.stderr)
+        call()
+        sys.stdout.flush()
+    except BrokenPipeError:  # who reads the output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except KeyboardInterrupt:
+        print("dragdeck: interrupted", file=sys.stderr)
+        return 130
+    except Exception as error:
+        print(f"dragdeck: {_told(error)}", file=sys.stderr)
         return 1
     return 0
+
+
+def _told(error: Exception) -> str:
+    """What the user is told of an error."""
+    if isinstance(error, DragdeckError):
+        return str(error)
+    if isinstance(error, OSError) and error.strerror:
+        where = f"{error.filename}: " if error.filename else ""
+        remedy = "check that the place is there, who may read and write it, and its free space"
+        return f"{where}{error.strerror}\n  remedy: {remedy}"
+    if isinstance(error, MemoryError):
+        return f"there is not enough memory: {error}\n  remedy: use a machine with more memory"
+    return (
+        f"unexpected error: {type(error).__name__}: {str(error)[:300]}\n  log:    {_kept(error)}\n"
+        "  remedy: if an input file was damaged, make it again; else report this with the log,"
+        " see README.md, section Reporting a problem"
+    )
+
+
+def _kept(error: Exception) -> str:
+    """Write an error with its traceback to a new file here, or where temporary files go."""
+    said = "".join(traceback.format_exception(error))
+    about = f"dragdeck {__version__}, Python {sys.version}, {platform.platform()}"
+    for folder in (".", tempfile.gettempdir()):
+        with contextlib.suppress(OSError):
+            number, name = tempfile.mkstemp(".log", "dragdeck-error-", folder)
+            with open(number, "w", encoding="utf-8", errors="replace") as stream:
+                stream.write(f"{about}\n{shlex.join(sys.argv)}\n\n{said}")
+            return name
+    return f"none could be written\n{said}"
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -47,7 +47,7 @@ class Document(Part):
             version = json.loads(text).get("schema")
         except FileNotFoundError:
             raise InputError("there is no such file", file=file, remedy=cls.remedy) from None
-        except (ValueError, AttributeError):
+        except (ValueError, AttributeError, RecursionError):
             raise InputError("is not a JSON object", file=file, remedy=cls.remedy) from None
         if version != SCHEMA:
             raise InputError(

@@ -1,4 +1,5 @@
-# The report on the study.
+# The report on the study. A run that fails takes only what is made from it along: the report on
+# the others is written all the same and lists it, and the call ends with an error.
 
 
 rule write_report:
@@ -14,6 +15,7 @@ rule write_report:
     output:
         csv=of_study("report", "summary.csv"),
         parquet=of_study("report", "summary.parquet"),
+        complete=touch(of_study("report", "complete")),
         page=report(
             of_study("report", "report.html"),
             caption="../report/report.rst",
@@ -32,3 +34,16 @@ rule write_report:
         source=source_hash("dragchain.report.study_report"),
     shell:
         "dragchain report --out $(dirname {output.csv}) {params.runs} {params.advice} > {log} 2>&1"
+
+
+onerror:
+    # Not after Ctrl-C. The mark that the report is whole goes, so that the next call makes it anew.
+    stopped = "user request" in Path(log).read_text(errors="replace")
+    wanted = any(job.rule.name == "write_report" for job in workflow.dag.needrun_jobs())
+    if wanted and not stopped:
+        runs = " ".join(folder for name in SCENES for folder in every_folder(name))
+        advice = f"--advice {ADVICE}" if Path(ADVICE).is_file() else ""
+        shell(
+            "rm -f results/{STUDY}/report/complete;"
+            " dragchain report --out results/{STUDY}/report {runs} {advice} || true"
+        )

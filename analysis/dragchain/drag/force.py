@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean
-from dragchain.tables.by_step import needed_table
+from dragchain.tables.by_step import intact
 
 
 def read_counted(run_dir: Path | str, columns: Sequence[str] | None = None) -> pd.DataFrame:
@@ -29,13 +29,12 @@ def read_counted(run_dir: Path | str, columns: Sequence[str] | None = None) -> p
     Raises
     ------
     TableError
-        If the table is not there.
+        If the table is not there or damaged.
     """
     file = Path(run_dir) / "tables" / "workpiece_force.parquet"
     wanted = None if columns is None else list(columns)
-    return pd.read_parquet(
-        needed_table(file), columns=wanted, filters=[("in_statistics", "==", True)]
-    )
+    with intact(file):
+        return pd.read_parquet(file, columns=wanted, filters=[("in_statistics", "==", True)])
 
 
 def summarise_forces(run_dir: Path | str) -> dict[str, MeanEstimate]:

@@ -25,6 +25,10 @@ from dragchain.errors import DumpError, TruncatedDumpError
 _BLOCK_ROWS = 20_000
 """Rows of a ``fix print`` file that are read at once."""
 
+_PIECE_BYTES = 1 << 24
+_MOST_DIGITS = 18
+"""Digits of a count or a step that fits into 64 bits, whatever they are."""
+
 MAX_RANKS = 1_000_000
 """A binary frame that claims to come from more ranks is none."""
 
@@ -128,10 +132,13 @@ class _Cursor:
         )
 
     def take(self, count: int, what: str) -> bytes:
-        data = self.stream.read(count)
+        """The next bytes; what a damaged file claims to hold is never allocated at once."""
+        data = bytearray()
+        while piece := self.stream.read(min(count - len(data), _PIECE_BYTES)):
+            data += piece
         if len(data) < count:
             self.cut_short(what)
-        return data
+        return bytes(data)
 
     def line(self, what: str) -> str:
         data = self.stream.readline()
@@ -150,7 +157,7 @@ class _Cursor:
 
     def whole_number(self, what: str) -> int:
         line = self.line(what)
-        if not line.isdigit():
+        if not line.isdigit() or len(line) > _MOST_DIGITS:
             self.fail(f"found {line[:60]!r}", what)
         return int(line)
 

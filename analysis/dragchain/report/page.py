@@ -15,6 +15,7 @@ from pathlib import Path
 import jinja2
 from PIL import Image
 
+from dragchain.errors import TableError
 from dragchain.report import notation
 
 LARGE_PICTURE = 200_000
@@ -77,7 +78,16 @@ def data_uri(picture: bytes, kind: str = "png") -> str:
 
 
 def file_uri(picture: Path) -> str | None:
-    """A PNG or GIF file as a data URI, None if there is no such file."""
+    """A PNG or GIF file as a data URI, None if there is no such file.
+
+    Raises
+    ------
+    TableError
+        If it is damaged.
+    """
     if not picture.is_file():
         return None
-    return data_uri(picture.read_bytes(), picture.suffix.removeprefix("."))
+    try:
+        return data_uri(picture.read_bytes(), picture.suffix.removeprefix("."))
+    except (OSError, ValueError) as error:
+        raise TableError(f"{picture} is damaged ({error}); draw the figures again") from error

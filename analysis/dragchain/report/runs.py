@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
+from dragchain.errors import DocumentError, RejectedRunError
 from dragchain.report.findings import (
     FILE,
     DropFindings,
@@ -47,24 +49,35 @@ class StudyRuns:
 def read_study(run_dir: Path) -> StudyRuns:
     """Read a process run with its filling and drop test.
 
+    A drop test without a result is left out: the process does not start from it.
+
     Raises
     ------
     RejectedRunError
-        If a run is not complete, or did not pass an acceptance check.
+        If the process or its filling is not complete, or did not pass an acceptance check.
     DocumentError
-        If a document of a run is missing or cannot be used.
+        If a document of one of them is missing or cannot be used.
     """
     process = _read(run_dir, ProcessFindings)
-    upstream, results = process.case.upstream, run_dir.resolve().parent.parent
-    return StudyRuns(
-        process,
-        _read(results / "filling" / upstream["filling"], FillingFindings)
-        if "filling" in upstream
-        else None,
-        _read(results / "drop_test" / upstream["drop_test"], DropFindings)
-        if "drop_test" in upstream
-        else None,
-    )
+    upstream = upstream_folders(run_dir, process.case)
+    filling = drop_test = None
+    if "filling" in upstream:
+        filling = _read(upstream["filling"], FillingFindings)
+    with suppress(RejectedRunError, DocumentError):
+        if "drop_test" in upstream:
+            drop_test = _read(upstream["drop_test"], DropFindings)
+    return StudyRuns(process, filling, drop_test)
+
+
+def read_upstream(run_dir: Path) -> ReportedRun[Findings]:
+    """Read a filling or a drop test; errors are those of `read_study`."""
+    return _read(run_dir, Findings)
+
+
+def upstream_folders(run_dir: Path, case: Case) -> dict[str, Path]:
+    """Folders of the filling and the drop test that a process run names, by scene."""
+    results = run_dir.resolve().parent.parent
+    return {scene: results / scene / run for scene, run in case.upstream.items()}
 
 
 def _read(run_dir: Path, findings: type[F]) -> ReportedRun[F]:

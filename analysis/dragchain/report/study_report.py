@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
-from dragchain.errors import TableError
+from dragchain.errors import DragchainError, MissingRunsError, TableError
 from dragchain.figures.style import drawing, png
 from dragchain.loading.document import Loading
 from dragchain.loading.write import FILE as LOADING
@@ -24,10 +25,17 @@ from dragchain.report.cost_check import (
     read_advice,
 )
 from dragchain.report.findings import Findings
+from dragchain.report.missing import MissingRun, missing_run, scene_of
 from dragchain.report.page import data_uri, file_uri, render_page
 from dragchain.report.process_figures import drag_of_cases
 from dragchain.report.run_figures import FIGURES
-from dragchain.report.runs import ReportedRun, StudyRuns, read_study
+from dragchain.report.runs import (
+    ReportedRun,
+    StudyRuns,
+    read_study,
+    read_upstream,
+    upstream_folders,
+)
 from dragchain.report.summary import summary
 from dragchain.run.case import Assumption, load_case
 from dragchain.statistics.correlated import RELIABLE_TIMES
@@ -71,26 +79,60 @@ def write_report(out_dir: Path, run_dirs: Sequence[Path], advice: Path | None = 
         Where they go; made if need be.
     run_dirs : sequence of Path
         Folders of process runs, ``results/<study>/<scene>/<run id>``. The filling and the drop
-        test that a run names are looked up beside it; their folders may be given too and are then
-        used only that way.
+        test that a run names are looked up beside it; their folders may be given too, to say why
+        a run that starts from one of them is not there.
     advice : Path, optional
         ``advice.json`` of the study.
 
     Raises
     ------
-    RejectedRunError
-        If a run is not complete or an acceptance check of it failed: no report is written at all.
-    DocumentError, TableError
-        If no process run is given, or the findings or figures of a run are missing.
+    MissingRunsError
+        If a run has no result: it is not there, not complete, failed an acceptance check, or its
+        findings or figures are missing. The report on the others, if any, is written before,
+        and lists it.
+    TableError
+        If no process run is given.
+    DocumentError
+        If the advice cannot be used.
     """
-    processes = [folder for folder in run_dirs if load_case(folder).scene == "process"]
-    if not processes:
-        raise TableError("no folder of a process run is given, so there is nothing to report")
-    studies = [read_study(folder) for folder in processes]
     options = read_advice(advice) if advice is not None else []
-    table = summary(studies)
-    page = _render([_section(study, options) for study in studies], table)
-    write_bundle(out_dir, tables={"summary": table}, pages={"report": page})
+    sections, missing = _read(_with_upstream(run_dirs), options)
+    if sections:
+        studies = [section.study for section in sections]
+        table = summary(studies)
+        page = _render(sections, table, missing)
+        write_bundle(out_dir, tables={"summary": table}, pages={"report": page})
+    elif not any(run.scene == "process" for run in missing):
+        raise TableError("no folder of a process run is given, so there is nothing to report")
+    if missing:
+        shown = f"{out_dir / 'report.html'} shows the others" if sections else "there is no report"
+        lines = [f"{len(missing)} run(s) have no result; {shown}", *map(str, missing)]
+        raise MissingRunsError("\n  ".join(lines))
+
+
+def _with_upstream(run_dirs: Sequence[Path]) -> list[Path]:
+    """The folders of runs and of the runs that these name, each once, in the order of scenes."""
+    folders = [folder.resolve() for folder in run_dirs]
+    for folder in tuple(folders):
+        with suppress(DragchainError):
+            folders += upstream_folders(folder, load_case(folder)).values()
+    return sorted(dict.fromkeys(folders), key=lambda folder: scene_of(folder) == "process")
+
+
+def _read(
+    run_dirs: Sequence[Path], options: Sequence[Option]
+) -> tuple[list[Section], list[MissingRun]]:
+    """What the page shows of the process runs, and the runs without a result."""
+    sections, missing = [], []
+    for folder in run_dirs:
+        try:
+            if scene_of(folder) == "process":
+                sections.append(_section(read_study(folder), options))
+            else:
+                read_upstream(folder)
+        except DragchainError as error:
+            missing.append(missing_run(folder, error))
+    return sections, missing
 
 
 def _section(study: StudyRuns, options: Sequence[Option]) -> Section:
@@ -132,13 +174,14 @@ def _pictures(run: ReportedRun[Findings]) -> list[Picture]:
     return found
 
 
-def _render(sections: Sequence[Section], table: pd.DataFrame) -> str:
+def _render(sections: Sequence[Section], table: pd.DataFrame, missing: Sequence[MissingRun]) -> str:
     """The page: HTML that needs no other file and no network."""
     studies = [section.study for section in sections]
     return render_page(
         "report/report.html.j2",
         title=", ".join(dict.fromkeys(study.process.case.study for study in studies)),
         sections=sections,
+        missing=missing,
         overview=_overview(studies) if len(studies) > 1 else None,
         columns={str(name): table[name].tolist() for name in table},
         shown=_SHOWN,

@@ -20,11 +20,13 @@ def workpiece_mesh(run_dir: Path, case: Case) -> Any:
     Raises
     ------
     TableError
-        If the file is not there.
+        If the file is not there or damaged.
     """
     import pyvista as pv
 
-    return pv.read(_mesh_file(run_dir, case))
+    file = _mesh_file(run_dir, case)
+    _corners(file)  # VTK's reader fills a file that was cut short with whatever the memory holds
+    return pv.read(file)
 
 
 def _mesh_file(run_dir: Path, case: Case) -> Path:
@@ -97,16 +99,24 @@ def read_surface(run_dir: Path, case: Case) -> Surface:
     Raises
     ------
     TableError
-        If the file is not there.
+        If the file is not there or damaged.
     """
-    import meshio
-
-    with np.errstate(over="ignore"):
-        mesh = meshio.read(_mesh_file(run_dir, case))
-    corners = np.asarray(mesh.points[mesh.cells_dict["triangle"]], dtype=np.float64)
+    corners = _corners(_mesh_file(run_dir, case))
     if needed(case.workpiece, "workpiece").kind == "cylinder":
         corners = turned(corners, -path_of(case).start_direction_rad)
     return Surface(corners)
+
+
+def _corners(file: Path) -> Floats:
+    """Corners of the facets of an STL file, (M, 3, 3)."""
+    import meshio
+
+    try:
+        with np.errstate(over="ignore"):
+            mesh = meshio.stl.read(file)
+        return np.asarray(mesh.points[mesh.cells_dict["triangle"]], dtype=np.float64)
+    except Exception as error:  # its parser lets any error out
+        raise TableError(f"{file} is damaged ({error}); render and run it again") from error
 
 
 def off_facet(point_m: Floats, corners: Floats) -> Floats:

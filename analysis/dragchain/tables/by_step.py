@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from itertools import groupby, pairwise
 from operator import itemgetter
 from pathlib import Path
@@ -23,17 +24,23 @@ Steps = tuple[int, int] | Ints
 """What to read: the first and the last step of a stretch, or rising steps, (N,)."""
 
 
-def needed_table(path: Path) -> Path:
-    """The path of a table that is there, or say which command makes it.
+@contextmanager
+def intact(path: Path) -> Iterator[None]:
+    """A table to be read within the block, or say which command makes it.
 
     Raises
     ------
     TableError
-        If the file is not there.
+        If the file is not there or is damaged, or lacks a column that is asked for.
     """
     if not path.is_file():
         raise TableError(f"{path} is not there: run `{_command(path)}`")
-    return path
+    try:
+        yield
+    except (pa.ArrowException, OSError) as error:
+        raise TableError(
+            f"{path} is damaged or older than this ({error}): make it again: `{_command(path)}`"
+        ) from error
 
 
 def _command(path: Path) -> str:
@@ -79,7 +86,7 @@ def read_groups(
 
 def _groups(path: Path, columns: Sequence[str], steps: Steps | None) -> Iterator[pa.Table]:
     """Yield the row groups that may hold rows of the steps; none is held here."""
-    with pq.ParquetFile(needed_table(path)) as file:
+    with intact(path), pq.ParquetFile(path) as file:
         if missing := [name for name in columns if name not in file.schema_arrow.names]:
             raise TableError(
                 f"{path}: has no column {missing[0]}: it is older than this; make the tables"
@@ -168,7 +175,9 @@ class RisingSteps:
     def __init__(self, path: Path, columns: Sequence[str], steps: Steps | None = None) -> None:
         self._frames = read_steps(path, columns, steps)
         self._next = next(self._frames, None)
-        self._none: pd.DataFrame = pq.read_schema(path).empty_table().select(columns).to_pandas()
+        with intact(path):
+            none = pq.read_schema(path).empty_table().select(columns)
+        self._none: pd.DataFrame = none.to_pandas()
 
     def at(self, step: int) -> pd.DataFrame:
         """Rows of a step above the last one asked for; maybe none."""
@@ -189,6 +198,7 @@ def read_table(path: Path, columns: list[str] | None = None) -> pd.DataFrame:
     Raises
     ------
     TableError
-        If the file is not there.
+        If the file is not there or damaged.
     """
-    return pd.read_parquet(needed_table(path), columns=columns)
+    with intact(path):
+        return pd.read_parquet(path, columns=columns)

@@ -24,7 +24,7 @@ from report_files import (
     run_json,
 )
 
-from dragchain.errors import DocumentError, RejectedRunError, TableError
+from dragchain.errors import MissingRunsError, TableError
 from dragchain.loading.write import write_loading
 from dragchain.report.run_figures import FIGURES
 from dragchain.report.study_report import write_report
@@ -154,18 +154,83 @@ def test_no_process_run_is_no_report(process: Path, tmp_path: Path) -> None:
         write_report(tmp_path / "report", [process.parent.parent / "filling" / "filling-1"])
 
 
-@pytest.mark.parametrize("scene", ["process/workpiece-1", "filling/filling-1", "drop_test/drop-1"])
-def test_a_run_that_failed_a_check_is_refused_with_what_it_saw(
-    process: Path, tmp_path: Path, scene: str
+@pytest.fixture
+def other(process: Path) -> Path:
+    """Return a second process run, which names no filling and no drop test."""
+    case = case_json("process", "workpiece-2", case="second")
+    return make_run(process.parents[2], case, process_findings(-3.0), PICTURES)
+
+
+@pytest.mark.parametrize("scene", ["process/workpiece-1", "filling/filling-1"])
+def test_a_run_that_failed_a_check_is_listed_and_the_others_are_reported(
+    process: Path, other: Path, tmp_path: Path, scene: str
 ) -> None:
-    file = process.parent.parent / scene / "run.json"
-    file.write_text(json.dumps(run_json(checks=[particles_kept(1421)])))
-    out = tmp_path / "report"
-    with pytest.raises(
-        RejectedRunError, match=rf"{scene} is refused.*every particle kept.*1421.*1422"
-    ):
-        write_report(out, [process])
-    assert not out.exists()
+    file = process.parent.parent / scene / "state.json"
+    file.write_text(json.dumps(run_json(state="failed", checks=[particles_kept(1421)])))
+    (file.parent / "run.json").unlink()
+    with pytest.raises(MissingRunsError, match=r"(?s)every particle kept: 1421.*timestep_fraction"):
+        write_report(tmp_path / "report", [process, other])
+    table = pd.read_parquet(tmp_path / "report" / "summary.parquet")
+    assert table["drag_mean_n"].tolist() == [-3.0]
+    words = page_of(tmp_path / "report").words
+    assert "every particle kept: 1421 (limit: 1422)" in words
+    assert "smaller timestep_fraction" in words
+    assert "without a result" in words
+
+
+def test_a_drop_test_without_a_result_takes_no_process_along(process: Path, tmp_path: Path) -> None:
+    (process.parent.parent / "drop_test/drop-1/run.json").unlink()
+    with pytest.raises(MissingRunsError, match=r"1 run\(s\) have no result.*\n  drop_test"):
+        write_report(tmp_path / "report", [process])
+    table = pd.read_parquet(tmp_path / "report" / "summary.parquet")
+    assert table["restitution_effective"].isna().all()
+
+
+def test_a_run_that_was_never_written_points_to_the_run_before_it(
+    process: Path, other: Path, tmp_path: Path
+) -> None:
+    filling, never = process.parents[1] / "filling/filling-2", process.parent / "third-0123"
+    (filling / "logs").mkdir(parents=True)
+    (filling / "logs/run.log").write_text(
+        "step 5\ndragdeck: results: no engine\n  remedy: install it\n"
+    )
+    with pytest.raises(MissingRunsError) as caught:
+        write_report(tmp_path / "report", [process, never, filling])
+    assert str(caught.value).splitlines()[1:] == [
+        "  filling filling-2: results: no engine",
+        "    remedy: install it",
+        "  process third-0123: not run, since a run before it has no result",
+        "    remedy: see that run",
+    ]
+
+
+def test_an_interrupted_run_goes_on(process: Path, other: Path, tmp_path: Path) -> None:
+    (process / "run.json").unlink()
+    (process / "state.json").write_text(json.dumps(run_json(state="stopped", checks=[])))
+    with pytest.raises(MissingRunsError, match=r"(?s)interrupted.*goes on"):
+        write_report(tmp_path / "report", [process, other])
+
+
+@pytest.mark.parametrize(("log", "said"), [
+    ("render.log", "would reach below the floor"), ("tables.log", "ends inside a frame"),
+])  # fmt: skip
+def test_the_step_that_failed_says_why(
+    process: Path, other: Path, tmp_path: Path, log: str, said: str
+) -> None:
+    (process / "tables" / "figures.json").unlink()
+    (process / "logs").mkdir()
+    (process / "logs" / log).write_text(
+        f"line\ndragchain: it {said}\n  value: 3\n  remedy: do so\n"
+    )
+    with pytest.raises(MissingRunsError, match=rf"it {said} value: 3\n    remedy: do so"):
+        write_report(tmp_path / "report", [process, other])
+
+
+def test_without_any_result_there_is_no_report(process: Path, tmp_path: Path) -> None:
+    (process / "run.json").unlink()
+    with pytest.raises(MissingRunsError, match="there is no report"):
+        write_report(tmp_path / "report", [process])
+    assert not (tmp_path / "report").exists()
 
 
 @pytest.mark.parametrize(
@@ -181,21 +246,15 @@ def test_refusal_gives_its_reason(change: dict[str, Any], reason: str) -> None:
     assert refusal(RunRecord.model_validate(run_json())) is None
 
 
-def test_a_run_without_record_is_refused(process: Path, tmp_path: Path) -> None:
-    (process / "run.json").unlink()
-    with pytest.raises(RejectedRunError, match=r"run\.json"):
-        write_report(tmp_path / "report", [process])
-
-
 def test_a_missing_picture_names_the_command(process: Path, tmp_path: Path) -> None:
     (process / "figures" / "forces.png").unlink()
-    with pytest.raises(TableError, match=r"forces\.png.*dragchain figures"):
+    with pytest.raises(MissingRunsError, match=r"forces\.png.*dragchain figures"):
         write_report(tmp_path / "report", [process])
 
 
 def test_missing_findings_name_the_command(process: Path, tmp_path: Path) -> None:
     (process / "tables" / "figures.json").unlink()
-    with pytest.raises(DocumentError, match=r"(?s)figures\.json.*dragchain figures"):
+    with pytest.raises(MissingRunsError, match=r"(?s)figures\.json.*dragchain figures"):
         write_report(tmp_path / "report", [process])
 
 

@@ -7,6 +7,7 @@ import os
 import runpy
 import shutil
 import subprocess
+import time
 from pathlib import Path
 
 import meshio
@@ -222,12 +223,81 @@ def test_an_open_surface_is_fine_where_no_body_is_needed():
     assert m.check(with_facets([0, 2, 1], [0, 1, 3], [1, 2, 3]), workpiece=False) == []
 
 
-def test_normals_are_only_a_warning():
-    inside_out = m.surface(TETRAHEDRON.vertices, TETRAHEDRON.faces[:, ::-1])
-    one_turned = with_facets([0, 1, 2], *TETRAHEDRON.faces[1:].tolist())
-    for body in (inside_out, one_turned):
-        (finding,) = m.check(body)
-        assert (finding.severity, finding.problem[:11]) == ("warning", "the normals")
+def turned(mesh: Trimesh, which: list[int]) -> Trimesh:
+    """The same surface with the corners of some facets in the other order."""
+    faces = mesh.faces.copy()
+    faces[which] = faces[which, ::-1]
+    return m.surface(mesh.vertices, faces)
+
+
+@pytest.mark.parametrize("which", [[0], [0, 2], [0, 1, 2, 3]])
+def test_turned_normals_are_said_and_turned_outwards(which: list[int]):
+    body = turned(TETRAHEDRON, which)
+    (finding,) = m.check(body)
+    assert (finding.severity, finding.problem[:11]) == ("warning", "the normals")
+    repaired = m.facing_out(body)
+    assert repaired is not None
+    assert problems(repaired) == []
+    assert repaired.volume == pytest.approx(TETRAHEDRON.volume)
+
+
+@settings(max_examples=20)
+@given(st.sets(st.integers(0, 203)))
+def test_whichever_facets_are_turned_the_same_body_comes_back(which: set[int]):
+    bar = m.prism(6, 0.005, 0.08, 0.005, 0.005)
+    repaired = m.facing_out(turned(bar, sorted(which)))
+    assert repaired is not None
+    assert repaired.face_normals == pytest.approx(bar.face_normals)
+
+
+def test_a_body_whose_normals_are_right_is_left_as_it_is():
+    assert m.facing_out(TETRAHEDRON) is TETRAHEDRON
+
+
+def klein_bottle(rows: int = 8) -> Trimesh:
+    """A closed surface with one side: in four dimensions, of which three are kept."""
+    u, v = (math.tau * np.arange(rows) / rows for _ in range(2))
+    u, v = np.meshgrid(u, v, indexing="ij")
+    ring = 2.0 + np.cos(v)
+    points = [ring * np.cos(u), ring * np.sin(u), np.sin(v) * (np.cos(u / 2) + 0.3)]
+    node = np.arange(rows * rows).reshape(rows, rows)
+    mirrored = node[0, (-np.arange(rows)) % rows]
+    node = np.vstack([node, mirrored])
+    a, b, c, d = node[:-1], node[1:], np.roll(node[1:], -1, 1), np.roll(node[:-1], -1, 1)
+    faces = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
+    return m.surface(0.01 * np.stack(points, -1).reshape(-1, 3), faces)
+
+
+def test_a_surface_with_one_side_is_refused():
+    assert m.facing_out(klein_bottle()) is None
+    assert "the surface has one side only" in problems(klein_bottle())
+
+
+def beside(*meshes: Trimesh) -> Trimesh:
+    """Several surfaces in one mesh, side by side."""
+    shifted = [
+        m.surface(mesh.vertices + np.array([0.02 * number, 0, 0]), mesh.faces)
+        for number, mesh in enumerate(meshes)
+    ]
+    return m.surface(
+        np.vstack([mesh.vertices for mesh in shifted]),
+        np.vstack([mesh.faces + 4 * number for number, mesh in enumerate(shifted)]),
+    )
+
+
+def test_several_bodies_are_refused():
+    with pytest.raises(InputError, match="several bodies") as caught:
+        m.check(beside(TETRAHEDRON, TETRAHEDRON))
+    assert str(caught.value.value).startswith("2 bodies; the largest has 4 of 8 facets")
+
+
+def test_a_hollow_body_is_refused():
+    void = m.surface(0.1 * TETRAHEDRON.vertices + 0.001, TETRAHEDRON.faces[:, ::-1])
+    hollow = m.surface(
+        np.vstack([TETRAHEDRON.vertices, void.vertices]),
+        np.vstack([TETRAHEDRON.faces, void.faces + 4]),
+    )
+    assert problems(hollow) == ["the mesh holds several bodies"]
 
 
 def test_sharp_angles():
@@ -304,6 +374,14 @@ def test_formats_come_back_in_metres(tmp_path: Path, name: str, options: dict[st
     assert again.bounds == pytest.approx(workpiece.bounds, abs=1e-9)
 
 
+@pytest.mark.parametrize("face", ["f 1 2 9", "f 1 2 3 9", "f 0 1 2", "f -9 1 2"])
+def test_an_obj_facet_that_names_a_missing_node_is_damage(tmp_path: Path, face: str):
+    file = tmp_path / "body.obj"
+    file.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n{face}\n")
+    with pytest.raises(InputError, match="damaged"):
+        m.read(file, "mm")
+
+
 def test_vtk_polygon_data_is_refused_with_a_way_out(tmp_path: Path):
     import pyvista
 
@@ -371,14 +449,42 @@ def test_missing_file_and_unknown_unit(tmp_path: Path):
     assert "mm" in str(caught.value.limit)
 
 
-CUT_SHORT = b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvert"
-
-
-@pytest.mark.parametrize("content", [b"", b"solid x\nendsolid x\n", CUT_SHORT])
+@pytest.mark.parametrize("content", [b"", b"solid x\nendsolid x\n"])
 def test_file_without_facets_is_an_empty_mesh(tmp_path: Path, content: bytes):
     (tmp_path / "empty.stl").write_bytes(content)
     with pytest.raises(InputError, match="the mesh is empty"):
         m.check(m.read(tmp_path / "empty.stl", "m"))
+
+
+def test_a_text_that_ends_inside_a_solid_is_damaged(tmp_path: Path):
+    (tmp_path / "cut.stl").write_text("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvert")
+    with pytest.raises(InputError, match="damaged"):
+        m.read(tmp_path / "cut.stl", "m")
+
+
+def test_words_in_capitals_and_names_of_solids_are_no_trouble(tmp_path: Path):
+    m.write_stl(TETRAHEDRON, tmp_path / "body.stl")
+    text = (tmp_path / "body.stl").read_text().replace("solid mesh", "solid vertex facet 1 2 3")
+    (tmp_path / "body.stl").write_text(text.upper())
+    assert m.read(tmp_path / "body.stl", "m").volume == pytest.approx(TETRAHEDRON.volume)
+
+
+def test_a_fine_workpiece_is_checked_in_seconds(tmp_path: Path):
+    """A hub of 60,000 facets at one node took minutes: all pairs of its copies were listed."""
+    fan = 60_000
+    angle = math.tau * np.arange(fan) / fan
+    rim = 0.01 * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(fan)])
+    points, ring = np.vstack([rim, [[0, 0, 0], [0, 0, 0.01]]]), np.arange(fan)
+    beside = np.roll(ring, -1)
+    faces = [np.column_stack(rows) for rows in (
+        (beside, ring, np.full(fan, fan)), (ring, beside, np.full(fan, fan + 1))
+    )]  # fmt: skip
+    m.write_stl(m.surface(points, np.vstack(faces)), tmp_path / "fan.stl")
+    begun = time.process_time()
+    read = m.read(tmp_path / "fan.stl", "m")
+    assert len(read.vertices) == fan + 2
+    assert "the angle of a facet is too sharp for the engine" in problems(read)
+    assert time.process_time() - begun < 10.0
 
 
 def test_write_stl_is_exact_deterministic_and_replaces(tmp_path: Path):

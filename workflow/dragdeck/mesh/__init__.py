@@ -9,7 +9,7 @@ stand so; `place` moves a user's mesh there.
 from dragdeck.mesh.checks import Finding, Surroundings, check, findings
 from dragdeck.mesh.files import UNITS, read, stl_text, write_stl
 from dragdeck.mesh.shapes import bowl, cylinder, polygon_radius, polygon_sides, prism
-from dragdeck.mesh.surface import Envelope, envelope, place, surface, weld
+from dragdeck.mesh.surface import Envelope, envelope, facing_out, place, surface, weld
 
 __all__ = [
     "UNITS",
@@ -20,6 +20,7 @@ __all__ = [
     "check",
     "cylinder",
     "envelope",
+    "facing_out",
     "findings",
     "place",
     "polygon_radius",

@@ -12,10 +12,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from trimesh import Trimesh
-from trimesh.util import unitize
+from trimesh.graph import connected_component_labels
 
 from dragdeck.errors import InputError
-from dragdeck.mesh.surface import NODE_PRECISION_M, Integers, place
+from dragdeck.mesh.surface import NODE_PRECISION_M, Floats, Integers, facing_out
 
 _CURVATURE_DEG = 0.256235
 """Default of the engine's `curvature`; no facet may have a smaller angle."""
@@ -119,7 +119,7 @@ def findings(
     found += useless or _sharp_angles(mesh) + _overlaps(mesh)
     found += _crowded_edges(mesh)
     if workpiece:
-        found += _open_edges(mesh) or _turned_normals(mesh)
+        found += _open_edges(mesh) or _several_bodies(mesh) or _turned_normals(mesh)
     return sorted(found, key=lambda finding: finding.severity)
 
 
@@ -204,14 +204,25 @@ def _sharp_angles(mesh: Trimesh) -> list[Finding]:
 def _overlaps(mesh: Trimesh) -> list[Finding]:
     """Find facets of one plane on the same side of the edge that they share."""
     start, end = mesh.vertices[mesh.face_adjacency_edges].swapaxes(0, 1)
-    apex = mesh.vertices[mesh.face_adjacency_unshared]
-    turn = unitize(np.cross((end - start)[:, None], apex - start[:, None]).reshape(-1, 3))
-    cosine = np.einsum("kc,kc->k", turn[::2], turn[1::2])
+    one, other = mesh.vertices[mesh.face_adjacency_unshared].swapaxes(0, 1)
+    edge, one, other = end - start, one - start, other - start
+    # the cosine between edge x one and edge x other, by Lagrange's identity
+    length = _dot(edge, edge)
+    along_one, along_other = _dot(edge, one), _dot(edge, other)
+    product = length * _dot(one, other) - along_one * along_other
+    squares = (length * _dot(one, one) - along_one**2) * (
+        length * _dot(other, other) - along_other**2
+    )
+    cosine = product / np.sqrt(squares)
     bad = np.zeros(len(mesh.faces), dtype=np.bool_)
     bad[mesh.face_adjacency[cosine >= np.cos(np.radians(_CURVATURE_DEG)), 0]] = True
     problem = "two facets of one plane lie on top of each other"
     limit = "facets that share an edge lie on both sides of it"
     return _facets(bad, problem, limit, "repair the mesh: one surface, without folds")
+
+
+def _dot(one: Floats, other: Floats) -> Floats:
+    return np.asarray(np.einsum("kc,kc->k", one, other))
 
 
 def _edge_use(mesh: Trimesh) -> Integers:
@@ -237,13 +248,25 @@ def _open_edges(mesh: Trimesh) -> list[Finding]:
     return [Finding("the mesh is not closed", value, limit, remedy)]
 
 
-def _turned_normals(mesh: Trimesh) -> list[Finding]:
-    volume_m3 = place(mesh).volume
-    oriented = mesh.is_winding_consistent
-    if oriented and volume_m3 > 0.0:
+def _several_bodies(mesh: Trimesh) -> list[Finding]:
+    body = connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
+    facets = np.bincount(body)
+    if len(facets) == 1:
         return []
+    value = f"{len(facets)} bodies; the largest has {facets.max()} of {len(mesh.faces)} facets"
+    remedy = "join them to one body, or remove all others, and inner walls, then export again"
+    limit = "one body: the surface leads from every facet to every other"
+    return [Finding("the mesh holds several bodies", value, limit, remedy)]
+
+
+def _turned_normals(mesh: Trimesh) -> list[Finding]:
+    turned, limit = facing_out(mesh), "corners counter-clockwise, seen from outside"
+    if turned is mesh:
+        return []
+    if turned is None:
+        remedy = "repair the mesh: a body has an inside and an outside"
+        return [Finding("the surface has one side only", "no way to turn it", limit, remedy)]
     problem = "the normals do not all point out of the body"
-    value = f"enclosed volume {volume_m3:.4g} m3" if oriented else "mixed directions"
-    limit = "corners counter-clockwise, seen from outside"
-    remedy = "make the normals of the mesh consistent and outward"
+    value = "all point inwards" if mesh.is_winding_consistent else "mixed directions"
+    remedy = "they are turned outwards for the run; turn them in the file too"
     return [Finding(problem, value, limit, remedy, "warning")]

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from trimesh import Trimesh
-from trimesh.exchange.stl import load_stl
+from trimesh.exchange.stl import HeaderError, load_stl_binary
 
 from dragdeck.errors import InputError
 from dragdeck.files import replace_text
@@ -17,6 +20,9 @@ from dragdeck.mesh.surface import Floats, Integers, surface, weld
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 """Length units that a mesh file may be declared in, in metres."""
+
+_NAME = re.compile(rb"solid.*")
+_VERTEX = re.compile(rb"vertex\s(.*)")
 
 
 def read(path: Path | str, unit: str) -> Trimesh:
@@ -51,9 +57,10 @@ def read(path: Path | str, unit: str) -> Trimesh:
             "unknown length unit", file=path, field="unit", value=unit, limit=", ".join(UNITS)
         )
     points, blocks = _load(path)
-    triangles = [_triangles(block.type, block.data, points, path) for block in blocks]
-    joined = np.concatenate([np.empty((0, 3), dtype=np.int64), *triangles])
-    return weld(surface(points * UNITS[unit], joined))
+    with _damage(path):
+        triangles = [_triangles(block.type, block.data, points, path) for block in blocks]
+        joined = np.concatenate([np.empty((0, 3), dtype=np.int64), *triangles])
+        return weld(surface(points * UNITS[unit], joined))
 
 
 def _load(path: Path) -> tuple[Floats, list[Any]]:
@@ -77,13 +84,22 @@ def _load(path: Path) -> tuple[Floats, list[Any]]:
         )
     if not path.is_file():
         raise InputError("there is no such mesh file", file=path)
-    try:
+    with _damage(path):
         content = readers[suffix](path)
         points = np.asarray(content.points, dtype=np.float64)
         return points.reshape(len(points), 3), content.cells
-    except Exception as error:  # both libraries let any parser error out
+
+
+@contextmanager
+def _damage(path: Path) -> Iterator[None]:
+    """What is wrong in a file as an error for the user: both libraries let any error out."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
         raise InputError(
-            f"the mesh file is damaged, or not the {suffix[1:].upper()} that is read",
+            f"the mesh file is damaged, or not the {path.suffix[1:].upper()} that is read",
             file=path,
             value=str(error).strip() or type(error).__name__,
             remedy="export it again; VTK polygon data as STL or as an unstructured grid",
@@ -94,12 +110,24 @@ def _read_stl(path: Path) -> Any:
     """Read STL, every solid of the file; a text that was cut short holds none."""
     import meshio
 
-    with path.open("rb") as stream, warnings.catch_warnings():
-        warnings.filterwarnings("error", "string or file could not be read", DeprecationWarning)
-        content = load_stl(stream)
-    solids = content.get("geometry", {"": content}).values()
-    corners = np.concatenate([np.empty((0, 3)), *(solid["vertices"] for solid in solids)])
+    with path.open("rb") as stream:
+        try:
+            corners = load_stl_binary(stream)["vertices"]
+        except HeaderError:
+            corners = _corners(path.read_bytes().lower())
     return meshio.Mesh(corners, [("triangle", np.arange(len(corners)).reshape(-1, 3))])
+
+
+def _corners(text: bytes) -> Floats:
+    """(3 M, 3) array: the corners of M facets in the text of an STL file."""
+    rows = _VERTEX.findall(_NAME.sub(b"", text))
+    ended = not rows or b"endsolid" in text[text.rfind(b"endfacet") :]
+    if not ended or 3 * text.count(b"endfacet") != len(rows):
+        raise ValueError("the text ends inside a solid")
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", "string or file could not be read", DeprecationWarning)
+        numbers = np.fromstring(b" ".join(rows).decode("ascii"), sep=" ")
+    return numbers.reshape(len(rows), 3)
 
 
 def _read_ply(path: Path) -> Any:

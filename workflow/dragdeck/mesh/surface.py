@@ -6,14 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import KDTree
 from trimesh import Trimesh
 from trimesh.graph import connected_component_labels
+from trimesh.grouping import group_rows
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 NODE_PRECISION_M = 1e-8
 """Nodes closer than this are one node to the engine (its `precision`)."""
+
+_KEY_FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 
 
 def surface(points: ArrayLike, triangles: ArrayLike) -> Trimesh:
@@ -50,15 +54,73 @@ def weld(mesh: Trimesh, precision_m: float = NODE_PRECISION_M) -> Trimesh:
     if mesh.is_empty or not np.isfinite(mesh.vertices).all():
         return mesh
     used = surface(mesh.vertices[mesh.referenced_vertices], _renumbered(mesh))
-    close = used.kdtree.query_pairs(precision_m, output_type="ndarray")
-    label = connected_component_labels(close, node_count=len(used.vertices))
+    places, same = _distinct(used.vertices)
+    close = KDTree(places).query_pairs(precision_m, output_type="ndarray")
+    label = connected_component_labels(close, node_count=len(places))[same]
     _, kept = np.unique(label, return_index=True)
     return surface(used.vertices[kept], label[used.faces])
+
+
+def _distinct(points: Floats) -> tuple[Floats, Integers]:
+    """Places of (N, 3) points, and for each point the row of its place, (N,).
+
+    Points of one place have one key. Those of two that share a key may come apart: what is left
+    together is joined by its distance.
+    """
+    key = (points.view(np.uint64) * _KEY_FACTORS).sum(axis=1)
+    order = np.argsort(key)
+    ordered = points[order]
+    new = np.append(True, (ordered[1:] != ordered[:-1]).any(axis=1))
+    place_of = np.empty(len(points), dtype=np.int64)
+    place_of[order] = np.cumsum(new) - 1
+    return ordered[new], place_of
 
 
 def _renumbered(mesh: Trimesh) -> Integers:
     """(M, 3) array: the facets' nodes counted without those that no facet uses."""
     return np.asarray((np.cumsum(mesh.referenced_vertices) - 1)[mesh.faces])
+
+
+def facing_out(mesh: Trimesh) -> Trimesh | None:
+    """The same body with the corners of every facet counter-clockwise seen from outside.
+
+    Parameters
+    ----------
+    mesh : Trimesh
+        One closed body; if its corners run as they should, it is returned as it is.
+
+    Returns
+    -------
+    Trimesh or None
+        None if the surface has one side only, as Klein's bottle.
+    """
+    if not mesh.is_winding_consistent:
+        one_side = _one_side(mesh)
+        return None if one_side is None else facing_out(one_side)
+    centre = mesh.bounds.mean(axis=0)
+    if np.einsum("fc,fc->", mesh.triangles[:, 0] - centre, mesh.triangles_cross) > 0.0:
+        return mesh
+    return surface(mesh.vertices, mesh.faces[:, ::-1])
+
+
+def _one_side(mesh: Trimesh) -> Trimesh | None:
+    """The same body with all facets facing out, or all in.
+
+    Every facet stands here twice, as it is and turned. Two of them belong together if they run
+    through their common edge in opposite directions; what belongs together with the first facet
+    is one side of the body.
+    """
+    edges = group_rows(mesh.edges_sorted, require_count=2)
+    one, other = mesh.edges_face[edges].T
+    count = len(mesh.faces)
+    turned = count * (mesh.edges[edges[:, 0], 0] == mesh.edges[edges[:, 1], 0])
+    pairs = np.column_stack([one, other + turned, one + count, other + count - turned])
+    label = connected_component_labels(pairs.reshape(-1, 2), node_count=2 * count)
+    as_is, other_way = label.reshape(2, -1)
+    if as_is[0] == other_way[0]:
+        return None
+    flipped = (as_is != as_is[0])[:, None]
+    return surface(mesh.vertices, np.where(flipped, mesh.faces[:, ::-1], mesh.faces))
 
 
 def place(mesh: Trimesh) -> Trimesh:

@@ -51,7 +51,16 @@ def _beside(case: Case) -> Iterator[InputError]:
 
 
 def _below(case: Case, surface_m: float) -> Iterator[InputError]:
-    depth = case.study.motion.immersion_depth_m
+    depth, length = case.study.motion.immersion_depth_m, workpiece_length(case)
+    if length < depth:
+        yield InputError(
+            "the workpiece is shorter than its immersion: particles would close above it",
+            file=case.file,
+            field="motion.immersion_depth_m",
+            value=depth,
+            limit=f"at most the length of the workpiece, {length:.4g} m",
+            remedy="submerge the workpiece less, or model it with the shaft that holds it",
+        )
     deepest = surface_m - 2 * float(bed_radii(case.study).max())
     if depth > deepest:
         yield InputError(

@@ -41,7 +41,12 @@ from dragdeck.scenes.filling import (
 from dragdeck.scenes.fit import check_fit, check_headroom, fastest_motion
 from dragdeck.scenes.motion import Leg, farthest_reach, legs, plunge_point, start_direction
 from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
-from dragdeck.scenes.workpiece import workpiece_length, workpiece_mesh, workpiece_radius
+from dragdeck.scenes.workpiece import (
+    workpiece_length,
+    workpiece_mesh,
+    workpiece_radius,
+    workpiece_warnings,
+)
 from dragdeck.study.base import Json
 from dragdeck.study.contact_law import explained
 from dragdeck.study.model import CirclePath, CylinderShape, MeshShape, Study
@@ -354,7 +359,7 @@ def _leaves_out(study: Study) -> dict[str, LeftOut]:
 def _warnings(case: Case, timestep_s: float) -> list[str]:
     study = case.study
     diameter = 2 * study.media.radius_mean_m
-    found = []
+    found = workpiece_warnings(case)
     gap = study.bowl.radius_m - farthest_reach(study.motion) - workpiece_radius(case)
     if gap < _JAMMING_GAP * diameter:
         found.append(

@@ -29,6 +29,9 @@ from dragdeck.study.model import Study
 
 C = TypeVar("C", bound=CaseOfStudy)
 
+_LONGEST_SLUG = 160
+"""Characters of a run id's readable part: a folder's name has 255 bytes at most."""
+
 Regime = Literal["impact", "settle", "column", "drag"]
 """What the stability map tells apart: each has its own limit of the time step."""
 
@@ -121,7 +124,7 @@ class SceneType:
 
     def run_id(self, case: Case) -> str:
         """Run id of a case: a readable slug and 8 hex digits of what the run depends on."""
-        return f"{slug(self.slug(case))}-{digest(self.content(case))}"
+        return f"{slug(self.slug(case))[:_LONGEST_SLUG]}-{digest(self.content(case))}"
 
     def digest(self, case: Case) -> str:
         """Hash of all that the run's files say, remarks included.

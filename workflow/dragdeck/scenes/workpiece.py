@@ -8,7 +8,16 @@ from pathlib import Path
 from trimesh import Trimesh
 
 from dragdeck.cases.case import Case, mesh_file
-from dragdeck.mesh import Surroundings, check, cylinder, envelope, place, read
+from dragdeck.mesh import (
+    Finding,
+    Surroundings,
+    check,
+    cylinder,
+    envelope,
+    facing_out,
+    place,
+    read,
+)
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.model import CylinderShape, MeshShape
 
@@ -27,8 +36,21 @@ def workpiece_mesh(case: Case) -> Trimesh:
     shape = case.study.workpiece.shape
     if isinstance(shape, CylinderShape):
         return _workpiece(shape, workpiece_length(case))
-    media = case.study.media
-    surroundings = Surroundings(case.study.bowl.radius_m, media.radius_mean_m)
+    mesh, _ = _of_case(case, shape)
+    return mesh
+
+
+def workpiece_warnings(case: Case) -> list[str]:
+    """What is doubtful in the mesh of the user's, and what was repaired."""
+    shape = case.study.workpiece.shape
+    if isinstance(shape, CylinderShape):
+        return []
+    _, found = _of_case(case, shape)
+    return [f"{shape.file}: {one.problem}: {one.value} ({one.remedy})" for one in found]
+
+
+def _of_case(case: Case, shape: MeshShape) -> tuple[Trimesh, list[Finding]]:
+    surroundings = Surroundings(case.study.bowl.radius_m, case.study.media.radius_mean_m)
     return _from_file(mesh_file(case, shape), shape.unit, surroundings)
 
 
@@ -52,7 +74,9 @@ def _workpiece(shape: CylinderShape, length_m: float) -> Trimesh:
 
 
 @lru_cache(maxsize=8)
-def _from_file(file: Path, unit: str, surroundings: Surroundings) -> Trimesh:
+def _from_file(file: Path, unit: str, surroundings: Surroundings) -> tuple[Trimesh, list[Finding]]:
     mesh = read(file, unit)
-    check(mesh, file=file, field="workpiece.shape", surroundings=surroundings)
-    return place(mesh)
+    found = check(mesh, file=file, field="workpiece.shape", surroundings=surroundings)
+    turned = facing_out(mesh)
+    assert turned is not None, "the check refuses a surface with one side"
+    return place(turned), found

@@ -39,7 +39,16 @@ def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
     return loader.construct_mapping(node, deep=True)
 
 
+def _refused(_: _Loader, node: yaml.Node) -> None:
+    kind = node.tag.rpartition(":")[2]
+    raise yaml.constructor.ConstructorError(
+        None, None, f"a {kind} is no plain value; put text in quotes", node.start_mark
+    )
+
+
 _Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
+for _kind in ("binary", "set", "omap", "pairs"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _refused)
 
 
 _PLAIN = re.compile(rf"{DECIMAL.pattern}|[-+]?\.(inf|nan)|true|false", re.ASCII | re.IGNORECASE)
@@ -64,14 +73,23 @@ def read_yaml(file: Path) -> dict[str, Any]:
         The file is missing, is not YAML, or is not a mapping.
     """
     try:
-        text = file.read_text(encoding="utf-8")
+        data = yaml.load(file.read_text(encoding="utf-8"), Loader=_Loader)
     except FileNotFoundError:
         raise InputError("no such study file", file=file, remedy=_studies_nearby(file)) from None
-    try:
-        data = yaml.load(text, Loader=_Loader)
+    except UnicodeDecodeError as error:
+        raise InputError(
+            "not UTF-8 text",
+            file=file,
+            value=f"byte {error.object[error.start]:#04x} at byte {error.start}",
+            remedy="save it in the encoding UTF-8",
+        ) from None
+    except RecursionError:
+        raise InputError("nested too deeply", file=file, remedy="remove a level") from None
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else "?"
         raise InputError(f"not YAML: {error.problem}", file=file, field=f"line {line}") from None
+    except (yaml.YAMLError, ValueError, TypeError) as error:
+        raise InputError(f"not YAML of plain values: {error}", file=file) from None
     if not isinstance(data, dict):
         raise InputError("a study is a mapping of fields", file=file, value=type(data).__name__)
     return data
