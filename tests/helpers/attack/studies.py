@@ -138,8 +138,8 @@ _LEAVES = {
     "1_000": "1_000",
 }
 _FIELDS = {
-    "media.count": "count: 120",
-    "bowl.radius_m": "radius_m: 0.022",
+    "media.count": "count: 140",
+    "bowl.radius_m": "radius_m: 0.024",
     "motion.speed_m_s": "speed_m_s: 0.04",
     "outputs.network_hz": "network_hz: 100",
     "fidelities.quick.ranks": "ranks: 1",
