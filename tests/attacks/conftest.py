@@ -16,7 +16,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Parametrise a test by the attacks that its module makes from the seed."""
     if "attack" in metafunc.fixturenames:
         attacks = metafunc.module.attacks(metafunc.config.getoption("--attack-seed"))
-        metafunc.parametrize("attack", attacks, ids=[str(number) for number in range(len(attacks))])
+        ids = [f"{attack.kind}-{number}" for number, attack in enumerate(attacks)]
+        metafunc.parametrize("attack", attacks, ids=ids)
 
 
 @pytest.fixture(scope="session")
