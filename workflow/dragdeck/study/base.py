@@ -92,7 +92,7 @@ class Model(BaseModel):
         return {name for name in type(self).model_fields if getattr(self, name) is None}
 
 
-def flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def flat(data: Mapping[str, Any], prefix: str = "") -> Mapping[str, Any]:
     """Nested mappings as one mapping of dotted names."""
     values: dict[str, Any] = {}
     for key, value in data.items():

@@ -30,6 +30,7 @@ from dragdeck.study.base import (
 from dragdeck.study.contact_law import Contact, Pair
 from dragdeck.study.material import Material
 from dragdeck.study.reference import Reference
+from dragdeck.study.remarks import Accepted, Assumption
 
 STUDY_FILE = "study.yaml"
 
@@ -281,26 +282,6 @@ AnyFidelity = Annotated[
     | Annotated[Tolerance, Tag("a-tolerance")],
     Discriminator(_form),
 ]
-
-
-class Assumption(Model):
-    """A value that the source of the study does not give."""
-
-    field: str = Field(description="dotted name of the assumed value")
-    why: str = Field(description="what the source reports, and the reason for the value")
-
-
-class Accepted(Model):
-    """Limits that a study goes beyond on purpose."""
-
-    unsafe_timestep: Line | None = Field(
-        default=None,
-        description="reason for a process time step at or beyond the measured breaking step; "
-        "shown among the assumptions of the report",
-    )
-    cases: Annotated[Whole, Field(ge=1)] = Field(
-        default=200, description="largest number of cases that sweep may have"
-    )
 
 
 class Scaling(Model):

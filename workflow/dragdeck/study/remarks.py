@@ -1,0 +1,29 @@
+"""What a study says about its own values: what it assumes, and what it accepts on purpose."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from dragdeck.study.base import Line, Model, Whole
+
+
+class Assumption(Model):
+    """A value that the source of the study does not give."""
+
+    field: str = Field(description="dotted name of the assumed value")
+    why: str = Field(description="what the source reports, and the reason for the value")
+
+
+class Accepted(Model):
+    """Limits that a study goes beyond on purpose."""
+
+    unsafe_timestep: Line | None = Field(
+        default=None,
+        description="reason for a process time step at or beyond the measured breaking step; "
+        "shown among the assumptions of the report",
+    )
+    cases: Annotated[Whole, Field(ge=1)] = Field(
+        default=200, description="largest number of cases that sweep may have"
+    )
