@@ -183,9 +183,15 @@ def _render(root: Path, place: str, filling: str | None) -> str:
     return f"results/{STUDY}/{place}/{name}"
 
 
+_COMPILED = ("tables", "chains")
+"""Phases that compile code when they are called for the first time, and take longer then."""
+
+
 def _made(root: Path, phase: Phase) -> Phase:
     before = files_of(root)
     size = size_of(root)
+    if phase.name in _COMPILED:
+        call(phase.words, root, root / "said.log")
     spent = _children_s()
     said = call(phase.words, root, root / "said.log")
     assert said.status == 0, f"{phase.name}: {said.text}"
