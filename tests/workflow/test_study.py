@@ -211,10 +211,10 @@ def test_a_failed_case_is_listed_and_the_others_are_reported(finished: Path) -> 
     data["sweep"]["motion.immersion_depth_m"] = [0.012, 0.016, 0.013]
     file.write_text(yaml.safe_dump(data))
     template = finished / "studies/small/templates/process.in.j2"
-    template.parent.mkdir()
     template.write_text(
-        '{% extends "base/process.in.j2" %}{% block run %}'
-        '{% if "0.013" in deck.run %}{{ "\\nquit\\n" }}{% endif %}{{ super() }}{% endblock %}'
+        template.read_text()
+        + "{% block run %}\n{% if '0.013' in deck.run %}\nquit\n{% endif %}\n{{ super() }}"
+        "{% endblock %}\n"
     )
     done = snakemake(finished, *STUDY)
     assert done.returncode != 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -12,43 +14,40 @@ from dragchain.calibration.fit import Calibration
 from dragchain.calibration.force_record import Record
 from dragchain.calibration.results import PURPOSES, CalibrationFile
 from dragchain.calibration.simulated_drops import DropRun, Drops
-from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED, WIDTH_IN
+from dragchain.figures.marks import row_names
+from dragchain.figures.panels import legend_below, new_figure, new_panels
+from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
 
 
 def draw_impacts(record: Record, found: Calibration, confirm: Drops) -> Figure:
     """The record, and each impact measured and simulated."""
     measured, time = found.measured, record.time_s
     force = record.force_n - measured.baseline(time, float(time[0]))
-    figure = Figure(figsize=(WIDTH_IN, 5.2), layout="constrained")
-    grid = figure.add_gridspec(2, len(measured.impacts), height_ratios=(1, 1.35))
-    _whole(figure.add_subplot(grid[0, :]), time, force, found)
+    figure = new_figure(5.2)
+    parts: Any = figure.subfigures(2, 1, height_ratios=(1, 1.35))
+    _whole(parts[0].subplots(), time, force, found)
     drops = confirm.select("reference")[0], confirm.select("confirm")[0]
-    first: Axes | None = None
-    for place, (impact, sampling) in enumerate(zip(measured.impacts, found.samplings, strict=True)):
-        axes = figure.add_subplot(grid[1, place], sharey=first)
-        first = first or axes
+    panels = parts[1].subplots(1, len(measured.impacts), sharey=True, squeeze=False)[0]
+    for place, axes in enumerate(panels):
+        impact, sampling = measured.impacts[place], found.samplings[place]
         centre = impact.centroid_s - sampling.time_bias_s
         _one_impact(axes, time - centre, force, place, drops)
-        axes.set_title(f"impact {impact.impact}: {impact.samples} samples", fontsize=8.5)
-        axes.tick_params(labelleft=place == 0)
-    assert first is not None
-    first.set_ylabel("force (N)")
-    figure.legend(*first.get_legend_handles_labels(), loc="outside lower left", ncols=3)
-    return figure
+        axes.set_title(f"impact {impact.impact}: {impact.samples} samples")
+    panels[0].set_ylabel("force (N)")
+    return legend_below(figure)
 
 
 def _whole(axes: Axes, time: Floats, force: Floats, found: Calibration) -> None:
+    measured = found.measured
     axes.plot((time - time[0]) * 1e3, force, color=BLUE, linewidth=0.7)
-    for impact in found.measured.impacts:
-        at = (impact.peak_time_s - time[0]) * 1e3
-        label = f"{impact.impact}"
-        axes.annotate(label, (at, impact.peak_n), (5, -3), textcoords="offset points", color=RED)
-        axes.plot(at, impact.peak_n, "v", color=RED, markersize=4)
+    for impact in measured.impacts:
+        place = (impact.peak_time_s - time[0]) * 1e3, impact.peak_n
+        axes.annotate(str(impact.impact), place, (5, -3), textcoords="offset points", color=RED)
+        axes.plot(*place, "v", color=RED)
     axes.set(xlabel="time (ms)", ylabel="force (N)")
     axes.set_title(
-        f"{1e-3 / found.measured.interval_s:.0f} kHz, noise {found.measured.noise_n:.3g} N, "
-        f"offset {found.measured.offset_n:.3g} N and drift {found.measured.drift_n_per_s:.2g} N/s "
-        "removed"
+        f"{1e-3 / measured.interval_s:.0f} kHz, noise {measured.noise_n:.3g} N, offset "
+        f"{measured.offset_n:.3g} N and drift {measured.drift_n_per_s:.2g} N/s removed"
     )
 
 
@@ -69,8 +68,7 @@ def _one_impact(
 
 def draw_fit(found: Calibration) -> Figure:
     """Misfit over the deck's restitution, and the residuals."""
-    figure = Figure(figsize=(WIDTH_IN, 3.0), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=(1.4, 1))
+    figure, (left, right) = new_panels(3.0, 2, width_ratios=(1.4, 1))
     _misfit(left, found)
     _residuals(right, found)
     return figure
@@ -79,9 +77,8 @@ def draw_fit(found: Calibration) -> Figure:
 def _misfit(axes: Axes, found: Calibration) -> None:
     fit, model = found.fit, found.sweep.production
     best, low, high = fit.restitution, fit.ci95_low, fit.ci95_high
-    half = max(high - best, best - low)
-    ends = max(best - 2.2 * half, model.low), min(best + 2.2 * half, model.high)
-    values = np.linspace(*ends, 201)
+    half = 2.2 * max(high - best, best - low)
+    values = np.linspace(max(best - half, model.low), min(best + half, model.high), 201)
     axes.plot(values, [found.misfit(value) - fit.chi2 for value in values], color=BLUE)
     axes.axhline(fit.rise, color=GREY, linestyle="--", linewidth=0.9)
     axes.axvspan(low, high, color=BLUE, alpha=0.12, linewidth=0)
@@ -94,21 +91,18 @@ def _residuals(axes: Axes, found: Calibration) -> None:
     fit = found.fit
     names = [f"time of impact {k + 2}" for k in range(len(found.observed.times_s))]
     names += [f"peak {k + 2} / peak 1" for k in range(len(found.observed.log_peaks))]
-    place = np.arange(len(names))
-    axes.barh(place, fit.residuals, color=GREEN, height=0.5)
+    axes.barh(range(len(names)), fit.residuals, color=GREEN, height=0.5)
     axes.axvline(0.0, color="black", linewidth=0.8)
-    axes.set_yticks(place, names)
+    row_names(axes, names)
     limit = max(2.5, 1.1 * float(np.abs(fit.residuals).max()))
     axes.set(xlabel="measured minus simulated\n(standard uncertainties)", xlim=(-limit, limit))
-    axes.invert_yaxis()
     p_value = "no test possible" if fit.p_value is None else f"p = {fit.p_value:.2g}"
     axes.set_title(f"chi² {fit.chi2:.2g}, {fit.degrees} degrees of freedom, {p_value}")
 
 
 def draw_bias(bias: pd.DataFrame, result: CalibrationFile) -> Figure:
     """Effective against deck restitution, and their difference."""
-    figure = Figure(figsize=(WIDTH_IN, 3.9), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = new_panels(3.9, 2)
     for purpose, colour in zip(PURPOSES, (BLUE, ORANGE), strict=True):
         settings = result.settings[purpose]
         made = f"modulus x {settings.youngs_modulus_scale:g}"
@@ -124,18 +118,15 @@ def draw_bias(bias: pd.DataFrame, result: CalibrationFile) -> Figure:
     right.axhline(0.0, color="black", linewidth=0.8)
     left.set(xlabel="input restitution", ylabel="effective restitution")
     right.set(xlabel="input restitution", ylabel="effective minus input restitution")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=2)
-    return figure
+    return legend_below(figure)
 
 
 def _measured_lines(axes: Axes, rebound: float, deck: float) -> None:
     ends = axes.get_xlim()
     axes.plot(ends, ends, color="black", linewidth=0.6, zorder=0)
     axes.plot([ends[0], deck, deck], [rebound, rebound, ends[0]], ":", color=RED)
-    for label, place in (
-        (f"measured {rebound:.3f}", (ends[0], rebound)),
-        (f"set {deck:.3f}", (deck, ends[0])),
-    ):
+    labels = {f"measured {rebound:.3f}": (ends[0], rebound), f"set {deck:.3f}": (deck, ends[0])}
+    for label, place in labels.items():
         axes.annotate(label, place, (3, 3), textcoords="offset points", color=RED)
     axes.set(xlim=ends, ylim=ends)
 
@@ -143,25 +134,16 @@ def _measured_lines(axes: Axes, rebound: float, deck: float) -> None:
 def draw_trials(trials: pd.DataFrame) -> Figure:
     """Recovered less known value with its interval, trial by trial."""
     shown = trials[trials["refused"].isna()].reset_index(drop=True)
-    figure = Figure(figsize=(WIDTH_IN, 3.0), layout="constrained")
-    panels = (("deck", "input value"), ("effective", "rebound, production settings"))
-    for axes, (name, title) in zip(figure.subplots(1, 2), panels, strict=True):
-        error, low, high = (
-            (shown[f"{name}{end}"] - shown[f"{name}_known"]).to_numpy(np.float64)
-            for end in ("", "_ci95_low", "_ci95_high")
-        )
-        held = shown[f"{name}_held"].to_numpy(bool)
-        place = np.arange(1, len(shown) + 1)
+    figure, panels = new_panels(3.0, 2)
+    names = (("deck", "input value"), ("effective", "rebound, production settings"))
+    for axes, (name, title) in zip(panels, names, strict=True):
+        value, low, high = (shown[f"{name}{end}"] for end in ("", "_ci95_low", "_ci95_high"))
+        error = value - shown[f"{name}_known"]
+        held = shown[f"{name}_held"].astype(bool)
         for mask, colour in ((held, BLUE), (~held, RED)):
-            axes.errorbar(
-                place[mask],
-                error[mask],
-                [(error - low)[mask], (high - error)[mask]],
-                fmt="o",
-                ms=3,
-                color=colour,
-                capsize=2,
-            )
+            reach = [(value - low)[mask], (high - value)[mask]]
+            place = shown.index[mask] + 1
+            axes.errorbar(place, error[mask], reach, fmt="o", ms=3, color=colour, capsize=2)
         axes.axhline(0.0, color="black", linewidth=0.8)
         axes.set(xlabel="trial", ylabel="recovered minus true")
         axes.set_title(f"{title}: {int(held.sum())} of {len(trials)} within CI")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib
 import pandas as pd
 
 from dragchain.calibration.figures import draw_bias, draw_fit, draw_impacts, draw_trials
@@ -14,7 +13,7 @@ from dragchain.calibration.results import CalibrationFile, confirmed
 from dragchain.calibration.simulated_drops import read_drops
 from dragchain.calibration.trials import TrialsFile
 from dragchain.errors import TableError
-from dragchain.figures.style import STYLE, png
+from dragchain.figures.style import drawing, png
 from dragchain.report.bundle import write_bundle
 from dragchain.report.page import data_uri, render_page
 
@@ -39,7 +38,7 @@ def write_report(record: Path, folder: Path) -> None:
     sweep, confirm = (read_drops(folder / name / "drops.json") for name in ("sweep", "confirm"))
     found = calibrate_file(record, sweep)
     impacts, bias, trials = (_csv(folder / f"{name}.csv") for name in ("impacts", "bias", "trials"))
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         figures = {
             "impacts": png(draw_impacts(read_record(record), found, confirm)),
             "fit": png(draw_fit(found)),

@@ -199,19 +199,10 @@ def _put_for(
 ) -> PutFor:
     """The fit for the setting of the study, a reading off the curve for another."""
     used = purpose == "production" and limit_force == drops.known.limit_force
-    value, low, high = (
-        (fit.restitution, fit.ci95_low, fit.ci95_high)
-        if used
-        else read_off(emulator_of(drops, purpose, limit_force), measured)
-    )
-    return PutFor(
-        purpose=purpose,
-        limit_force=limit_force,
-        used=used,
-        value=value,
-        ci95_low=low,
-        ci95_high=high,
-    )
+    model = emulator_of(drops, purpose, limit_force)
+    ends = (fit.restitution, fit.ci95_low, fit.ci95_high) if used else read_off(model, measured)
+    known = dict(zip(("value", "ci95_low", "ci95_high"), ends, strict=True))
+    return PutFor(purpose=purpose, limit_force=limit_force, used=used, **known)
 
 
 def bias_table(drops: Drops) -> pd.DataFrame:

@@ -227,13 +227,10 @@ def coverage(held: Sequence[bool]) -> Coverage:
 
 def _table(trials: Sequence[Trial]) -> pd.DataFrame:
     """Trials as a table, one row each: intervals as ``<name>_ci95_low``, ``<name>_ci95_high``."""
-    rows = []
-    for trial in trials:
-        row = flattened(vars(trial))
-        row |= {"deck_held": trial.deck_held, "effective_held": trial.effective_held}
-        row["refused"] = row.pop("refused")
-        rows.append(row)
-    return pd.DataFrame(rows)
+    table = pd.DataFrame([flattened(vars(trial)) for trial in trials])
+    for name in ("deck_held", "effective_held"):
+        table.insert(len(table.columns) - 1, name, [getattr(trial, name) for trial in trials])
+    return table
 
 
 def write_trials(drops_file: Path, trials_file: Path, seed: int, records: int, out: Path) -> None:

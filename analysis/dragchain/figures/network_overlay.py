@@ -6,11 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
 from dragchain.arrays import Floats
-from dragchain.figures.network_picture import Scene, View
+from dragchain.figures.network_picture import Scene, View, colour_map
 from dragchain.figures.rendering import Image
 from dragchain.figures.style import CHAIN
 
@@ -40,25 +43,25 @@ def show_network(
     _mark_motion(axes, shown, view)
 
 
-def _mark_chain(
-    axes: Axes, shown: Scene, pick: Sequence[int], width: float = 1.6, halo: float = 3.0
-) -> None:
+def force_bar(figure: Figure, panels: Sequence[Axes], largest_n: float) -> None:
+    """Put the colours of the normal force beside panels."""
+    scale = ScalarMappable(Normalize(0.0, largest_n), colour_map())
+    label = "normal force per contact (N);\ncylinder radius proportional"
+    figure.colorbar(scale, ax=list(panels), shrink=0.8, pad=0.02, aspect=28, label=label)
+
+
+def _mark_chain(axes: Axes, shown: Scene, pick: Sequence[int], width: float, halo: float) -> None:
     """Outline the dominant path on axes in mm; `pick` names the two coordinates."""
     if shown.dominant is None:
         return
     frame, path = shown.frame, shown.dominant
-    particles = list(path.particles)
     ends = frame.point[[path.contacts[0], path.contacts[-1]]]
-    line = np.vstack([ends[:1], frame.centre[particles], ends[1:]])[:, pick] * 1e3
-    axes.plot(*line.T, color="white", linewidth=halo, alpha=0.9)
-    axes.plot(*line.T, color=CHAIN, linewidth=width)
-    for centre, radius in zip(
-        frame.centre[particles][:, pick], frame.radius[particles], strict=True
-    ):
-        for colour, thick in (("white", halo), (CHAIN, width)):
-            axes.add_patch(
-                Circle(centre * 1e3, radius * 1e3, fill=False, edgecolor=colour, linewidth=thick)
-            )
+    centres, radii = frame.centre[list(path.particles)], frame.radius[list(path.particles)] * 1e3
+    line = np.vstack([ends[:1], centres, ends[1:]])[:, pick] * 1e3
+    for colour, thick in (("white", halo), (CHAIN, width)):
+        axes.plot(*line.T, color=colour, linewidth=thick)
+        for centre, radius in zip(line[1:-1], radii, strict=True):
+            axes.add_patch(Circle(centre, radius, fill=False, edgecolor=colour, linewidth=thick))
 
 
 def _mark_motion(axes: Axes, shown: Scene, view: View) -> None:
@@ -67,23 +70,21 @@ def _mark_motion(axes: Axes, shown: Scene, view: View) -> None:
     Behind the workpiece, or above the bed.
     """
     heading = shown.frame.direction_rad
-    direction = np.array([np.cos(heading), np.sin(heading)]) * 11.0
+    ahead, left = np.array(
+        [[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]]
+    )
     workpiece = shown.workpiece_m[:2] * 1e3
     if view == "xy":
-        start, end = workpiece - 1.6 * direction, workpiece - 0.6 * direction
-        away = 12.0 * np.array([-np.sin(heading), np.cos(heading)])
-        away *= -1.0 if away @ workpiece > 0.0 else 1.0  # towards the middle of the bowl
+        start, end = workpiece - 17.6 * ahead, workpiece - 6.6 * ahead
+        away = left * (-12.0 if left @ workpiece > 0.0 else 12.0)  # towards the middle of the bowl
     else:
-        away = np.array([0.0, -11.0])
-        level = axes.get_ylim()[1] - 3.0
-        start, end = np.array([workpiece[0], level]), np.array([workpiece[0] + direction[0], level])
-        if abs(direction[0]) < 1.0:
+        start = np.array([workpiece[0], axes.get_ylim()[1] - 3.0])
+        end, away = start + np.array([11.0 * ahead[0], 0.0]), np.array([0.0, -11.0])
+        if abs(ahead[0]) < 1.0 / 11.0:
             return
     arrow = {"arrowstyle": "-|>", "color": "black", "linewidth": 2.0, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=arrow)
+    label = axes.annotate("motion", tuple(start), tuple(away), textcoords="offset points")
     side = "center" if abs(away[0]) < 6.0 else "left" if away[0] > 0.0 else "right"
-    label = axes.annotate(
-        "motion", tuple(start), tuple(away), textcoords="offset points", ha=side, va="center",
-        weight="bold",
-    )  # fmt: skip
+    label.set(ha=side, va="center", weight="bold")
     label.set_path_effects([withStroke(linewidth=3, foreground="white")])

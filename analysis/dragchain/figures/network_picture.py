@@ -8,11 +8,13 @@ radius at the largest.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from matplotlib.colors import Colormap, LinearSegmentedColormap
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
@@ -119,25 +121,22 @@ def load_scene(run_dir: Path, case: Case, wanted_s: float = _PICTURE_TIME_S) -> 
     TableError
         If a table is missing or holds no counted network frame.
     """
-    tables = run_dir / "tables"
-    network = read_table(tables / "network.parquet", ["step", "time_s"])
+    network = read_table(run_dir / "tables" / "network.parquet", ["step", "time_s"])
     start_s = drag_start_s(case)
-    step = picture_step(
-        network["step"].to_numpy(np.float64),
-        network["time_s"].to_numpy(np.float64) - start_s,
-        wanted_s,
-    )
+    times = network["time_s"].to_numpy(np.float64) - start_s
+    step = picture_step(network["step"].to_numpy(np.float64), times, wanted_s)
     frame = next(read_frames(run_dir, (step, step)), None)
     if frame is None:
         raise TableError(f"particles.parquet lacks step {step}, which network.parquet has")
-    workpiece_m, workpiece_turn_rad = workpiece_places(run_dir, case)(step)
-    return Scene(
-        frame=frame,
-        workpiece_m=workpiece_m,
-        workpiece_turn_rad=workpiece_turn_rad,
-        dominant=dominant_path(frame, widest_paths(frame)),
-        process_time_s=frame.time_s - start_s,
-    )
+    return scene_of(frame, workpiece_places(run_dir, case), start_s)
+
+
+def scene_of(
+    frame: NetworkFrame, place: Callable[[int], tuple[Floats, float]], start_s: float
+) -> Scene:
+    """What the picture of a frame shows, from the workpiece's place and turn at each step."""
+    path = dominant_path(frame, widest_paths(frame))
+    return Scene(frame, *place(frame.step), path, frame.time_s - start_s)
 
 
 @dataclass(frozen=True)
@@ -165,22 +164,18 @@ def window(case: Case, scene: Scene, view: View) -> Window:
     """
     bowl_m = needed(case.bowl, "bowl").radius_m + _MARGIN_M
     floor = (-_MARGIN_M, 1.25 * needed(case.surface_m, "surface_m"))
-    diameter = 2.0 * case.media.radius_mean_m
-    half = WINDOW_DIAMETERS * diameter
-    whole = _shows_all(case)
+    diameter, whole = 2.0 * case.media.radius_mean_m, _shows_all(case)
     middle = np.zeros(2) if whole else scene.workpiece_m[:2]
-    low = np.full(2, -bowl_m) if whole else np.maximum(middle - half, -bowl_m)
-    high = np.full(2, bowl_m) if whole else np.minimum(middle + half, bowl_m)
-    corners = (low, high)
-    if view == "xz":
-        corners = (np.array([low[0], floor[0]]), np.array([high[0], floor[1]]))
-    if whole:
-        return Window(*corners)
+    half = np.inf if whole else WINDOW_DIAMETERS * diameter
+    low, high = np.maximum(middle - half, -bowl_m), np.minimum(middle + half, bowl_m)
     point = scene.frame.point[:, :2]
-    near = np.logical_and(point >= low, point <= high).all(axis=1)
+    near = np.asarray(np.logical_and(point >= low, point <= high).all(axis=1))
     if view == "xz":
-        near &= np.abs(point[:, 1] - middle[1]) <= DEPTH_DIAMETERS * diameter
-    return Window(*corners, np.asarray(near))
+        near = near & (np.abs(point[:, 1] - middle[1]) <= DEPTH_DIAMETERS * diameter)
+        low, high = (
+            np.array([end[0], level]) for end, level in zip((low, high), floor, strict=True)
+        )
+    return Window(low, high, None if whole else near)
 
 
 def _shows_all(case: Case) -> bool:
@@ -194,9 +189,7 @@ def cut_words(case: Case, view: View) -> str:
     if _shows_all(case):
         return ""
     words = f"section: up to {WINDOW_DIAMETERS:g} particle diameters beside the workpiece"
-    if view == "xy":
-        return words
-    return words + f", {DEPTH_DIAMETERS:g} in front of and behind it"
+    return words + (f", {DEPTH_DIAMETERS:g} in front of and behind it" if view == "xz" else "")
 
 
 @dataclass(frozen=True)
@@ -231,15 +224,15 @@ def render(
     extent : (4,) array
         Its left, right, lower and upper edge in mm along the axes of `view`.
     """
-    look = Look() if look is None else look
-    part = window(case, scene, view)
+    look, part = look or Look(), window(case, scene, view)
     low, high = part.low, part.high
-    pixels_per_mm = min(look.pixels_per_mm, _MOST_PIXELS / float((high - low).max() * 1e3))
-    size = np.ceil((high - low) * 1e3 * pixels_per_mm).astype(int)
-    plotter = new_plotter(*size.tolist())
+    size_mm = (high - low) * 1e3
+    pixels_per_mm = min(look.pixels_per_mm, _MOST_PIXELS / float(size_mm.max()))
+    plotter = new_plotter(*np.ceil(size_mm * pixels_per_mm).astype(int).tolist())
     plotter.enable_depth_peeling(number_of_peels=8)
     _add_bowl(plotter, case, view)
-    plotter.add_mesh(_workpiece(run_dir, case, scene), color="#59636e", opacity=0.45)
+    workpiece = placed(workpiece_mesh(run_dir, case), scene.workpiece_m, scene.workpiece_turn_rad)
+    plotter.add_mesh(workpiece, color="#59636e", opacity=0.45)
     _add_contacts(plotter, scene.frame, case.media.radius_mean_m, look, part.contacts)
     image = photograph(plotter, _camera((low + high) / 2, view, case), float(high[1] - low[1]))
     return image, np.array([low[0], high[0], low[1], high[1]]) * 1e3
@@ -256,25 +249,16 @@ def _camera(middle: Floats, view: View, case: Case) -> Camera:
 def _add_bowl(plotter: Any, case: Case, view: View) -> None:
     import pyvista as pv
 
-    radius = needed(case.bowl, "bowl").radius_m
-    height = 1.2 * needed(case.surface_m, "surface_m")
+    radius, height = needed(case.bowl, "bowl").radius_m, 1.2 * needed(case.surface_m, "surface_m")
     wall = pv.Cylinder(
-        center=(0, 0, height / 2),
-        direction=(0, 0, 1),
-        radius=radius,
-        height=height,
-        resolution=120,
-        capping=False,
-    )
+        center=(0, 0, height / 2), direction=(0, 0, 1), radius=radius, height=height,
+        resolution=120, capping=False,
+    )  # fmt: skip
     floor = pv.Disc(inner=0.0, outer=radius, c_res=120)
+    ring = pv.Disc(inner=radius, outer=radius + 0.0006, c_res=120)
     plotter.add_mesh(wall, color="#7a8694", opacity=0.04)
     plotter.add_mesh(floor, color="#7a8694", opacity=0.06 if view == "xy" else 0.5)
-    ring = pv.Disc(inner=radius, outer=radius + 0.0006, c_res=120)
     plotter.add_mesh(ring, color="#4a5561")
-
-
-def _workpiece(run_dir: Path, case: Case, scene: Scene) -> Any:
-    return placed(workpiece_mesh(run_dir, case), scene.workpiece_m, scene.workpiece_turn_rad)
 
 
 def _add_contacts(
@@ -286,48 +270,27 @@ def _add_contacts(
 ) -> None:
     force = frame.normal_force
     largest = float(force.max(initial=0.0)) if look.largest_n is None else look.largest_n
+    radius = cylinder_radii(force, radius_mean_m, largest)
     shown = force > 0.0 if within is None else (force > 0.0) & within
-    if look.kept is None:
-        _add_tubes(plotter, frame, np.flatnonzero(shown), radius_mean_m, largest, 1.0)
-        return
-    kept = np.isin(np.arange(force.size), look.kept)
-    _add_tubes(plotter, frame, np.flatnonzero(shown & ~kept), radius_mean_m, largest, _FADED)
-    _add_tubes(plotter, frame, np.flatnonzero(shown & kept), radius_mean_m, largest, 1.0)
+    kept = shown if look.kept is None else np.isin(np.arange(force.size), look.kept)
+    colours = {"scalars": "force", "cmap": colour_map(), "clim": (0.0, largest)}
+    for part, opacity in ((shown & ~kept, _FADED), (shown & kept, 1.0)):
+        if part.any():
+            light = {"opacity": opacity, "ambient": 0.35, "diffuse": 0.7}
+            tubes = _tubes(segments(frame)[part], force[part], radius[part])
+            plotter.add_mesh(tubes, **colours, **light, show_scalar_bar=False)
 
 
-def _add_tubes(
-    plotter: Any,
-    frame: NetworkFrame,
-    shown: Ints,
-    radius_mean_m: float,
-    largest_n: float,
-    opacity: float,
-) -> None:
+def _tubes(axis: Floats, force: Floats, radius: Floats) -> Any:
+    """Cylinders about axes, (M, 2, 3) in m, with their forces and radii."""
     import pyvista as pv
 
-    if not shown.size:
-        return
-    force = frame.normal_force[shown]
-    axis = segments(frame)[shown]
-    lines = np.arange(2 * shown.size).reshape(-1, 2)
-    mesh = pv.PolyData(axis.reshape(-1, 3), lines=np.insert(lines, 0, 2, axis=1).ravel())
-    mesh["force"] = np.repeat(force, 2)
-    mesh["radius"] = np.repeat(cylinder_radii(force, radius_mean_m, largest_n), 2)
-    tubes = mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES, capping=True)
-    plotter.add_mesh(
-        tubes,
-        scalars="force",
-        cmap=colour_map(),
-        clim=(0.0, largest_n),
-        opacity=opacity,
-        ambient=0.35,
-        diffuse=0.7,
-        show_scalar_bar=False,
-    )
+    lines = np.insert(np.arange(2 * len(axis)).reshape(-1, 2), 0, 2, axis=1)
+    mesh = pv.PolyData(axis.reshape(-1, 3), lines=lines.ravel())
+    mesh["force"], mesh["radius"] = np.repeat(force, 2), np.repeat(radius, 2)
+    return mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES, capping=True)
 
 
-def colour_map() -> Any:
+def colour_map() -> Colormap:
     """The colour map of the pictures, green over yellow to red."""
-    from matplotlib.colors import LinearSegmentedColormap
-
     return LinearSegmentedColormap.from_list("network", list(_COLOURS))

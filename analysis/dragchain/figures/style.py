@@ -1,4 +1,4 @@
-"""Colours and style of all figures."""
+"""Colours and style of all figures, and how they become PNG files."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.typing import RcKeyType
@@ -20,45 +19,37 @@ from dragchain.files import write_bytes
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#6b7480"
 """After Okabe and Ito (2008): told apart with any kind of colour vision."""
 
-CHAIN = "#1f4fa3"
+INK, LIGHT, CHAIN = "#1d2733", "#c8ced6", "#1f4fa3"
+SERIES = (BLUE, ORANGE, GREEN, RED, "#7a4fa3", "#5b8a99")
+"""Colours of series that stand side by side."""
+
+MARKERS = "os^vDPX*<p>d"
+"""Their marks."""
 
 STYLE: dict[RcKeyType, Any] = {
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.titlesize": 9.5,
+    "axes.titlesize": 8.5,
     "axes.titlelocation": "left",
     "axes.grid": True,
     "grid.color": "#e3e6ea",
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
     "lines.linewidth": 1.2,
+    "lines.markersize": 4,
+    "figure.titlesize": 9.5,
     "legend.frameon": False,
     "legend.fontsize": 8,
 }
 WIDTH_IN = 7.6
+WIDE_IN = 9.5
 _DPI = 150
 
 
 def drawing() -> AbstractContextManager[None]:
     """A block in which figures are drawn and saved in the style of all figures."""
     return matplotlib.rc_context(STYLE)
-
-
-def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
-    """A figure without a window: Agg draws it wherever it is saved."""
-    return Figure(figsize=(width_in, height_in), layout="constrained")
-
-
-def legend_below(figure: Figure, axes: Axes, columns: int = 2) -> None:
-    """Put the legend of the axes below the figure."""
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=columns)
-
-
-def head(figure: Figure, text: str, size: float = 9.5) -> None:
-    """Write the heading of a figure with several axes, at its left edge."""
-    figure.suptitle(text, fontsize=size, x=0.02, ha="left")
 
 
 def png(figure: Figure) -> bytes:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +14,10 @@ from matplotlib.ticker import MaxNLocator
 
 from dragchain.drag.around import AZIMUTH_BINS
 from dragchain.drag.azimuth import circumference, parts
-from dragchain.figures.bars import bars_of, depth_bars
+from dragchain.figures.marks import depth_bars
+from dragchain.figures.panels import head, new_panels
 from dragchain.figures.rendering import Camera, Image, check_rendering, new_plotter, photograph
-from dragchain.figures.style import BLUE, GREY, WIDTH_IN, drawing, head, new_figure, save
+from dragchain.figures.style import GREY, WIDTH_IN, drawing, save
 from dragchain.loading.document import Loading, Profile
 from dragchain.loading.facets import as_polydata
 from dragchain.loading.samples import Sampled
@@ -31,25 +31,13 @@ _QUANTITY = "force_slide_pa"
 _LABEL = "normal force times sliding distance, per area of the workpiece\nand path length (N/m²)"
 
 
-@dataclass(frozen=True)
-class _Eye:
-    """A side of the workpiece.
-
-    Where the eye is in the workpiece's frame, and what the view is called.
-    """
-
-    x: float
-    y: float
-    label: str
-    motion: str
-
-
 _VIEWS = {
-    "front": _Eye(1.0, 0.0, "front", "⊙ motion"),
-    "left": _Eye(0.0, 1.0, "left", "← motion"),
-    "rear": _Eye(-1.0, 0.0, "rear", "⊗ motion"),
-    "right": _Eye(0.0, -1.0, "right", "motion →"),
+    "front": ((1.0, 0.0), "⊙ motion"),
+    "left": ((0.0, 1.0), "← motion"),
+    "rear": ((-1.0, 0.0), "⊗ motion"),
+    "right": ((0.0, -1.0), "motion →"),
 }
+"""Sides of the workpiece: where the eye is in its frame (x, y), and where it then moves to."""
 
 _PIXELS = 900
 _BESIDE_IN, _AROUND_IN, _TALLEST_IN = 1.3, 2.3, 3.5
@@ -82,20 +70,17 @@ def draw_workpiece(
     mesh = as_polydata(surface)
     mesh.cell_data[_QUANTITY] = facets[_QUANTITY].to_numpy()
     with drawing():
-        figure = new_figure(_height_in(case, widths[0] / sum(widths)))
-        panels = figure.subplots(1, len(widths), sharey=True, width_ratios=widths)
+        height = _height_in(case, widths[0] / sum(widths))
+        figure, panels = new_panels(height, len(widths), sharey=True, width_ratios=widths)
         for axes, name in zip(panels, names, strict=False):
-            _view(axes, mesh, _VIEWS[name], scale, case)
+            _view(axes, mesh, name, scale, case)
         if cylinder:
             _unrolled(panels[2], sampled, scale, case)
         _profile(panels[-1], loading.profiles["depth"])
-        panels[0].set_ylabel("depth (mm)")
-        panels[0].set_ylim(_depths(case)[::-1])
-        bar = figure.colorbar(
-            ScalarMappable(scale, _COLOURS), ax=panels.tolist(), location="bottom", extend="max",
-            shrink=0.6, aspect=40,
-        )  # fmt: skip
-        bar.set_label(_LABEL)
+        panels[0].set(ylabel="depth (mm)", ylim=_depths(case)[::-1])
+        colours = ScalarMappable(scale, _COLOURS)
+        style: dict[str, Any] = {"location": "bottom", "extend": "max", "shrink": 0.6, "aspect": 40}
+        figure.colorbar(colours, ax=panels, label=_LABEL, **style)
         head(figure, _title(loading, case))
         return save(figure, run_dir / "figures" / "workpiece.png")
 
@@ -128,18 +113,18 @@ def _depths(case: Case) -> tuple[float, float]:
     return -0.25 * deepest, 1.06 * deepest
 
 
-def _view(axes: Axes, mesh: Any, eye: _Eye, scale: Normalize, case: Case) -> None:
+def _view(axes: Axes, mesh: Any, name: str, scale: Normalize, case: Case) -> None:
     """Set a rendered side of the workpiece on axes of width and depth (mm)."""
+    eye, motion = _VIEWS[name]
     image, half = _render(mesh, eye, scale, case), 1e3 * _half_width(case)
     high, low = _depths(case)
     axes.imshow(image, extent=(-half, half, low, high), interpolation="antialiased")
     axes.set_aspect("equal", adjustable="datalim")
     axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle="--")
     axes.grid(False)
-    axes.set(xlabel="width (mm)")
     axes.xaxis.set_major_locator(MaxNLocator(2, integer=True))
-    when = eye.motion if _keeps_direction(case) else "(at the start)"
-    axes.set_title(f"{eye.label}\n{when}", fontsize=8.5)
+    when = motion if _keeps_direction(case) else "(at the start)"
+    axes.set(xlabel="width (mm)", title=f"{name}\n{when}")
 
 
 def _keeps_direction(case: Case) -> bool:
@@ -148,17 +133,16 @@ def _keeps_direction(case: Case) -> bool:
     return not isinstance(motion, Circle) or motion.orientation == "follow_path"
 
 
-def _render(mesh: Any, eye: _Eye, scale: Normalize, case: Case) -> Image:
+def _render(mesh: Any, eye: tuple[float, float], scale: Normalize, case: Case) -> Image:
     """A side of the workpiece in parallel projection."""
     high, low = _depths(case)
     height = (low - high) * 1e-3
     plotter = new_plotter(max(8, round(_PIXELS * 2 * _half_width(case) / height)), _PIXELS)
-    plotter.add_mesh(
-        mesh, scalars=_QUANTITY, cmap=_COLOURS, clim=(scale.vmin, scale.vmax), lighting=False,
-        show_edges=True, edge_color="#c9ced6", line_width=0.5, show_scalar_bar=False,
-    )  # fmt: skip
+    colours = {"scalars": _QUANTITY, "cmap": _COLOURS, "clim": (scale.vmin, scale.vmax)}
+    edges = {"show_edges": True, "edge_color": "#c9ced6", "line_width": 0.5}
+    plotter.add_mesh(mesh, **colours, **edges, lighting=False, show_scalar_bar=False)
     middle = needed(case.workpiece, "workpiece").immersion_depth_m - 0.5e-3 * (high + low)
-    return photograph(plotter, Camera((eye.x, eye.y, middle), (0.0, 0.0, middle)), height)
+    return photograph(plotter, Camera((*eye, middle), (0.0, 0.0, middle)), height)
 
 
 def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> None:
@@ -180,17 +164,15 @@ def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> Non
     axes.axhline(workpiece.immersion_depth_m * 1e3, color=GREY, linewidth=0.8)
     axes.set_xticks(np.arange(-180, 181, 90), ["back", "right", "ahead", "left", "back"])
     axes.grid(False)
-    axes.set(xlabel="azimuth from direction of motion")
-    axes.set_title("lateral surface, unrolled\n(dashed: bed surface at rest)", fontsize=8.5)
+    axes.set_xlabel("azimuth from direction of motion")
+    axes.set_title("lateral surface, unrolled\n(dashed: bed surface at rest)")
 
 
 def _profile(axes: Axes, profile: Profile) -> None:
     """Draw force times sliding distance against depth with its interval."""
-    depth_bars(axes, profile.edges, bars_of(profile.force_slide, 1e-3), BLUE)
-    axes.set(
-        xlabel="force times sliding distance per\npath and depth (N m/(m mm))", xlim=(0.0, None)
-    )
-    axes.set_title("by depth, incl. end face\n(bars: 95 % CI)", fontsize=8.5)
+    depth_bars(axes, profile.edges, profile.force_slide, 1e-3)
+    axes.set(xlim=(0.0, None), title="by depth, incl. end face\n(bars: 95 % CI)")
+    axes.set_xlabel("force times sliding\ndistance per path and\ndepth (N m/(m mm))")
 
 
 def _title(loading: Loading, case: Case) -> str:

@@ -1,35 +1,271 @@
-"""The figures of a run, as PNG files."""
+"""The figures of a run, as PNG files, and that of all cases."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dragchain.figures.style import drawing, save
-from dragchain.report import process_figures, upstream_figures
+from dragchain.arrays import Floats
+from dragchain.dumps.run_parts import iter_prints
+from dragchain.figures import network_picture
+from dragchain.figures.marks import compass, compass_bars, depth_bars, row, row_names
+from dragchain.figures.network_overlay import force_bar, show_network
+from dragchain.figures.panels import head, legend_below, new_figure, new_panels
+from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED, drawing, save
 from dragchain.report.collect import write_findings
+from dragchain.report.findings import (
+    Comparison,
+    DropFindings,
+    DropImpacts,
+    FillingFindings,
+    ProcessFindings,
+)
 from dragchain.report.run_data import RunData
-from dragchain.run.case import load_case
+from dragchain.run.case import Case, load_case, load_outputs
+from dragchain.run.kinematics import drag_start_s
+from dragchain.statistics.correlated import MeanEstimate
+from dragchain.statistics.estimate import Estimate
 
-Draw = Callable[[RunData, Any], Figure | None]
+_RUN_IN = "#d9dde2"
+_REFERENCES = (RED, GREEN, GREY)
+
+
+def forces(run: RunData, found: ProcessFindings) -> Figure:
+    """Drag and lateral force over process time, as Fig. 4a of Uhlmann et al. (2015)."""
+    trace, ours = run.drag, found.forces["drag_n"]
+    time_s = trace.process_time_s
+    span = [float(time_s[trace.counted][0]), float(time_s[-1])]
+    figure, (axes,) = new_panels(3.6)
+    axes.plot(time_s, trace.lateral_n, color=ORANGE, lw=0.7, label="lateral force (left of motion)")
+    axes.plot(time_s, trace.drag_n, color=BLUE, lw=0.8, label="drag force (along motion)")
+    axes.axvspan(float(time_s[0]), span[0], color=_RUN_IN, alpha=0.6, lw=0, label="transient")
+    axes.fill_between(span, ours.ci95_low, ours.ci95_high, color="black", alpha=0.15, lw=0)
+    interval = f"{ours.ci95_low:.2f} to {ours.ci95_high:.2f}"
+    label = f"mean drag {ours.mean:.2f} N (95 % CI {interval} N)"
+    axes.plot(span, [ours.mean] * 2, color="black", label=label)
+    for one, colour in zip(found.comparison, cycle(_REFERENCES), strict=False):
+        label = f"{one.label} mean {one.mean_n:.2f} N" + _spread(one)
+        axes.plot(span, [one.mean_n] * 2, linestyle="--", color=colour, label=label)
+    axes.set(xlabel="process time (s)", ylabel="force on the workpiece (N)", xlim=(0, time_s[-1]))
+    axes.set_title(_reliability(ours))
+    return legend_below(figure)
+
+
+def _spread(row: Comparison) -> str:
+    source = f" ({row.source})" if row.source else ""
+    return source if row.std_n is None else f" ± {row.std_n:.2f} N{source}"
+
+
+def _reliability(ours: MeanEstimate) -> str:
+    text = f"drag {ours.mean:.2f} ± {ours.std:.2f} N (± standard deviation)"
+    doubt = "" if ours.reliable else " (too few for a reliable CI)"
+    return f"{text}, {ours.effective_samples:.0f} effective samples{doubt}"
+
+
+def force_around_workpiece(run: RunData, found: ProcessFindings) -> Figure:
+    """Mean normal force by azimuth, ahead up."""
+    edges, sums = found.azimuth.edges_rad, found.ahead_behind
+    figure = new_figure(4.6, 5.7)
+    compass_bars(compass(figure), edges, found.azimuth.force_n)
+    head(
+        figure,
+        "normal force on the workpiece by azimuth from the direction of motion,\n"
+        f"mean over frames (N per {np.degrees(edges[1] - edges[0]):.0f}°); bars: 95 % CI\n"
+        f"ahead {sums.ahead_n.value:.2f} N, behind {sums.behind_n.value:.2f} N, "
+        + _ratio(sums.ratio),
+    )
+    return figure
+
+
+def _ratio(ratio: Estimate) -> str:
+    if not np.isfinite(ratio.value):
+        return "no contact behind"
+    high = f"{ratio.ci95_high:.1f}" if np.isfinite(ratio.ci95_high) else "unbounded"
+    return f"ratio {ratio.value:.1f} (95 % CI {ratio.ci95_low:.1f} to {high})"
+
+
+def force_depth(run: RunData, found: ProcessFindings) -> Figure:
+    """The normal force of a contact, and of all contacts together, against depth."""
+    depth, slope = found.depth, found.depth.slope_n_per_m.over(1e3)
+    figure, (left, right) = new_panels(3.9, 2, sharey=True)
+    depth_bars(left, depth.edges_m, depth.contact_n)
+    left.set(xlabel="mean normal force per contact (N)", ylabel="depth below the surface (mm)")
+    interval = f"95 % CI {slope.ci95_low:.4f} to {slope.ci95_high:.4f}"
+    left.set_title(f"slope {slope.value:.4f} N/mm\n({interval})")
+    depth_bars(right, depth.edges_m, depth.line_load_n_per_m, 1e-3)
+    right.set(xlabel="total normal force per depth (N/mm)")
+    right.set_title("deepest bin includes the contacts\non edge and end face")
+    return figure
+
+
+def chains_peaks(run: RunData, found: ProcessFindings) -> Figure:
+    """Resistance with its peaks over the bottleneck of the dominant workpiece path."""
+    trace, peaks, counted = run.drag, found.peaks, run.drag.counted
+    figure, (upper, lower) = new_panels(4.4, 2, columns=1, sharex=True)
+    upper.plot(trace.process_time_s[counted], -trace.drag_n[counted], color=BLUE, linewidth=0.8)
+    upper.plot(peaks.process_time_s, -np.array(peaks.drag_n), "v", color=RED, ms=6)
+    upper.set(ylabel="drag force\n(magnitude, N)")
+    upper.set_title(f"{peaks.count} peaks (marked), at least {peaks.separation_s:.2f} s apart")
+    frame_s = run.network["time_s"].to_numpy(np.float64) - drag_start_s(run.case)
+    lower.plot(frame_s, run.bottlenecks_n, ".-", color=GREEN)
+    lower.set(xlabel="process time (s)", ylabel="bottleneck force of the\ndominant path (N)")
+    lower.set_ylim(bottom=0)
+    for axes in (upper, lower):
+        for moment in peaks.process_time_s:
+            axes.axvline(moment, color=RED, linewidth=0.7, linestyle=":")
+    return figure
+
+
+def network_xy(run: RunData, found: ProcessFindings) -> Figure:
+    """The contact network from above."""
+    return _network(run, "xy", "from above")
+
+
+def network_xz(run: RunData, found: ProcessFindings) -> Figure:
+    """The contact network from the side."""
+    return _network(run, "xz", "from the side")
+
+
+def _network(run: RunData, view: network_picture.View, side: str) -> Figure:
+    """A rendered view on axes in mm, with what it shows named."""
+    shown = run.scene
+    image, extent = network_picture.render(run.folder, run.case, shown, view)
+    height = 5.6 * (extent[3] - extent[2]) / (extent[1] - extent[0]) + 0.9
+    figure, (axes,) = new_panels(height, width_in=6.9)
+    show_network(axes, shown, view, image, extent)
+    largest = float(shown.frame.normal_force.max(initial=0.0))
+    force_bar(figure, [axes], largest)
+    title = (
+        f"contact network {side}, process time {shown.process_time_s:.2f} s; "
+        f"largest normal force {largest:.2f} N"
+    )
+    cut = network_picture.cut_words(run.case, view)
+    axes.set_title("\n".join(filter(None, (title, _path_words(shown), cut))))
+    return figure
+
+
+def _path_words(shown: network_picture.Scene) -> str:
+    if shown.dominant is None:
+        return "no path of strong contacts from workpiece to bowl"
+    forces = shown.frame.normal_force[list(shown.dominant.contacts)]
+    return (
+        "outlined: dominant path from workpiece to bowl, "
+        f"{len(shown.dominant.particles)} particles, bottleneck {forces.min():.2f} N"
+    )
+
+
+# --- filling and drop test -----------------------------------------------------------------------
+
+
+def energy_ratio(energy_j: Floats, particles: Floats, case: Case) -> Floats:
+    """The mean energy of a particle over m g d, (N,): what the mean particle gains falling by d.
+
+    Parameters
+    ----------
+    energy_j : (N,) array
+        Kinetic energy of all particles in J, spin included.
+    particles : (N,) array
+        Number of particles.
+    case : Case
+        The filling; mass and diameter are those of its mean particle.
+    """
+    radius = case.media.radius_mean_m
+    mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * radius**3
+    return np.asarray(energy_j / particles / (mass * case.gravity_m_s2 * 2.0 * radius))
+
+
+def filling(run: RunData, found: FillingFindings) -> Figure | None:
+    """Energy ratio over time, with the level below which the bed is at rest; needs thermo."""
+    if not (run.folder / "tables" / "thermo.parquet").is_file():
+        return None
+    table = run.table("thermo")
+    table = table[table["n_particles"] > 0]
+    energy = (table["kinetic_energy_j"] + table["rotational_energy_j"]).to_numpy(np.float64)
+    ratio = energy_ratio(energy, table["n_particles"].to_numpy(np.float64), run.case)
+    figure, (axes,) = new_panels(3.2)
+    axes.semilogy(table["time_s"], ratio, color=BLUE)
+    rest, bed = found.rest_energy_ratio, found.bed
+    if rest is not None:
+        axes.axhline(rest, color=RED, linestyle="--", label=f"settling criterion: {rest:g}")
+        axes.legend(loc="upper right")
+    axes.set(xlabel="simulated time (s)", ylabel="mean kinetic energy per particle\n/ (m g d)")
+    axes.set_title(
+        f"{bed['n_particles']} particles, bed height {bed['bed_height_m'] * 1e3:.1f} mm, "
+        f"solid fraction {bed['solid_fraction']:.3f}"
+    )
+    return figure
+
+
+def drop_test(run: RunData, found: DropFindings) -> Figure:
+    """Force and speed over time of each impact."""
+    blocks = list(iter_prints(run.folder, load_outputs(run.folder)["impacts"]))
+    time_s, speed_m_s, force_n = (
+        np.concatenate([np.asarray(block[name], dtype=np.float64) for block in blocks])
+        for name in ("time_s", "vz_m_s", "force_n")
+    )
+    impacts, ratio = found.impacts, found.restitution
+    figure, panels = new_panels(3.2, len(impacts.start_time_s), sharey=True)
+    limit = 1.1 * float(np.abs(speed_m_s).max())
+    for number, axes in enumerate(panels):
+        start, duration = impacts.start_time_s[number], impacts.duration_s[number]
+        near = (time_s >= start - 0.3 * duration) & (time_s <= start + 1.3 * duration)
+        time_us = (time_s[near] - start) * 1e6
+        axes.plot(time_us, force_n[near], color=BLUE)
+        axes.set(xlabel="time (µs)", title=_impact_words(number, impacts))
+        right = _speed_axes(axes, limit)
+        right.plot(time_us, speed_m_s[near], color=RED, linewidth=1.0)
+        right.tick_params(labelright=axes is panels[-1], colors=RED)
+    right.set_ylabel("upward velocity (m/s)", color=RED)
+    panels[0].set_ylabel("force on the particle (N)", color=BLUE)
+    head(
+        figure,
+        f"effective coefficient of restitution {ratio.mean:.3f} "
+        f"(range {ratio.lowest:.3f} to {ratio.highest:.3f}); input value {ratio.input:.3f}",
+    )
+    return figure
+
+
+def _impact_words(number: int, impacts: DropImpacts) -> str:
+    return (
+        f"impact {number + 1}: peak {impacts.peak_force_n[number]:.2f} N\n"
+        f"{impacts.time_since_first_s[number] * 1e3:.1f} ms after the first, "
+        f"e = {impacts.restitution[number]:.3f}"
+    )
+
+
+def _speed_axes(axes: Axes, limit_m_s: float) -> Axes:
+    """A second vertical axis, for speeds, at the right."""
+    right = axes.twinx()
+    right.grid(False)
+    right.spines["right"].set_visible(True)
+    right.set_ylim(-limit_m_s, limit_m_s)
+    return right
+
+
+# --- all figures ---------------------------------------------------------------------------------
+
+_Draw = Callable[[RunData, Any], Figure | None]
 """Draws a figure of a run with its findings; None: it lacks an optional table."""
 
-FIGURES: Mapping[str, Mapping[str, Draw]] = {
-    "process": {
-        "forces": process_figures.forces,
-        "network_xy": process_figures.network_xy,
-        "network_xz": process_figures.network_xz,
-        "force_around_workpiece": process_figures.force_around_workpiece,
-        "force_depth": process_figures.force_depth,
-        "chains_peaks": process_figures.chains_peaks,
-    },
-    "filling": {"filling": upstream_figures.filling},
-    "drop_test": {"drop_test": upstream_figures.drop_test},
+
+def _named(*functions: _Draw) -> dict[str, _Draw]:
+    return {draw.__name__: draw for draw in functions}
+
+
+FIGURES: Mapping[str, Mapping[str, _Draw]] = {
+    "process": _named(
+        forces, network_xy, network_xz, force_around_workpiece, force_depth, chains_peaks
+    ),
+    "filling": _named(filling),
+    "drop_test": _named(drop_test),
 }
-"""The figures of each scene by name, as the report shows them; it has their captions."""
+"""The figures of each scene in the order of the report; it has their captions."""
 
 
 def write_figures(run_dir: Path) -> list[Path]:
@@ -59,3 +295,25 @@ def write_figures(run_dir: Path) -> list[Path]:
             if (figure := draw(run, findings)) is not None:
                 written.append(save(figure, run_dir / "figures" / f"{name}.png"))
     return written
+
+
+def drag_of_cases(
+    names: list[str], forces: list[MeanEstimate], references: list[tuple[str, float]]
+) -> Figure:
+    """The mean drag of each case with its interval, beside reference means.
+
+    Parameters
+    ----------
+    names, forces : list
+        Name and mean drag of each case.
+    references : list of (str, float)
+        Label and mean in N of each figure to compare with.
+    """
+    figure, (axes,) = new_panels(1.2 + 0.32 * len(names))
+    for place, force in enumerate(forces):
+        row(axes, place, force.mean, force, BLUE)
+    for (label, value), colour in zip(references, cycle(_REFERENCES), strict=False):
+        axes.axvline(value, color=colour, linestyle="--", label=f"{label} {value:.2f} N")
+    row_names(axes, names)
+    axes.set(xlabel="mean drag (N); bars: 95 % confidence interval")
+    return legend_below(figure)

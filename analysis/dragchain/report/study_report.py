@@ -27,8 +27,7 @@ from dragchain.report.cost_check import (
 from dragchain.report.findings import Findings
 from dragchain.report.missing import MissingRun, missing_run, scene_of
 from dragchain.report.page import data_uri, file_uri, render_page
-from dragchain.report.process_figures import drag_of_cases
-from dragchain.report.run_figures import FIGURES
+from dragchain.report.run_figures import FIGURES, drag_of_cases
 from dragchain.report.runs import (
     ReportedRun,
     StudyRuns,

@@ -8,34 +8,18 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 import pandas as pd
 
-from dragchain.figures.style import STYLE, png
+from dragchain.figures.style import drawing, png
 from dragchain.files import write_bytes, write_text
 from dragchain.report.page import page_environment
 from dragchain.run.completeness import RunRecord
-from dragchain.scaling.document import (
-    BandPoint,
-    CurvePoint,
-    Expectation,
-    FittedLaw,
-    Level,
-    ScalingFile,
-    ShiftedLaw,
-    Verdict,
-)
+from dragchain.scaling import document
 from dragchain.scaling.figures import draw_scaling
 from dragchain.scaling.runs import Run, read_runs
+from dragchain.statistics import power_law
 from dragchain.statistics.estimate import Estimate, flattened
-from dragchain.statistics.power_law import (
-    PowerLaw,
-    Runs,
-    estimate_scatter,
-    fit_power_law,
-    solve,
-)
 from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
 
 _STORED = Path(__file__).parent / "data"
@@ -51,8 +35,11 @@ _CURVE_POINTS = 41
 
 
 def find(
-    run_dirs: Sequence[Path], field: str, expected: Expectation, commands: Sequence[str] = ()
-) -> ScalingFile:
+    run_dirs: Sequence[Path],
+    field: str,
+    expected: document.Expectation,
+    commands: Sequence[str] = (),
+) -> document.ScalingFile:
     """Everything that runs say of a field.
 
     Parameters
@@ -71,17 +58,17 @@ def find(
         If the runs do not make a scaling.
     """
     runs = read_runs(run_dirs, field)
-    law = fit_power_law(_sample(runs))
+    law = power_law.fit_power_law(_sample(runs))
     inner = None
     if expected.within is not None:
-        inner = fit_power_law(law.runs.within(*expected.within))
+        inner = power_law.fit_power_law(law.runs.within(*expected.within))
     judged = inner or law
     shaped = expected.exponent is not None and expected.exponent >= 1.0
     power = expected.exponent or 0.0
     first = runs[0].case
     files = [folder / "run.json" for folder in run_dirs]
     records = [RunRecord.read(file) for file in files if file.is_file()]
-    return ScalingFile(
+    return document.ScalingFile(
         study=first.study,
         field=field,
         expected=expected,
@@ -107,22 +94,24 @@ def find(
     )
 
 
-def _sample(runs: Sequence[Run]) -> Runs:
+def _sample(runs: Sequence[Run]) -> power_law.Runs:
     rows = [run.row for run in runs]
     drag = np.array([row.drag_n for row in rows])
     errors = np.array([row.standard_error_n for row in rows]) / drag
-    return Runs(np.array([row.level for row in rows]), drag, errors, [row.bed for row in rows])
+    return power_law.Runs(
+        np.array([row.level for row in rows]), drag, errors, [row.bed for row in rows]
+    )
 
 
-def _verdict(exponent: Estimate, expected: float | None) -> Verdict:
+def _verdict(exponent: Estimate, expected: float | None) -> document.Verdict:
     if expected is None:
         return "no expectation"
     return "agrees" if exponent.contains(expected) else "deviates"
 
 
-def _fitted(law: PowerLaw) -> FittedLaw:
+def _fitted(law: power_law.PowerLaw) -> document.FittedLaw:
     levels = law.runs.levels
-    return FittedLaw(
+    return document.FittedLaw(
         exponent=law.exponent,
         change_per_decade=law.exponent.exp(factor=math.log(10.0), minus=1.0),
         centre=law.runs.centre,
@@ -131,40 +120,39 @@ def _fitted(law: PowerLaw) -> FittedLaw:
         highest=float(levels[-1]),
         runs=len(law.runs.x),
         degrees=law.line.degrees,
-        spread=law.scatter.spread,
-        bed_fraction=law.scatter.bed_fraction,
+        **vars(law.scatter),
         lack_of_fit=law.lack_of_fit,
-        curve=tuple(BandPoint(x=x, **asdict(law.at(x))) for x in _curve(law)),
+        curve=tuple(document.BandPoint(x=x, **asdict(law.at(x))) for x in _curve(law)),
     )
 
 
-def _curve(law: PowerLaw) -> list[float]:
+def _curve(law: power_law.PowerLaw) -> list[float]:
     """Levels at which a curve is drawn."""
     levels = law.runs.levels
     return [float(x) for x in np.geomspace(levels[0], levels[-1], _CURVE_POINTS)]
 
 
-def _shifted(law: PowerLaw, power: float) -> ShiftedLaw:
+def _shifted(law: power_law.PowerLaw, power: float) -> document.ShiftedLaw:
     """The expected power of a shifted level."""
     found = fit_shifted(law, power)
-    curve = tuple(CurvePoint(x=x, value=found.at(x)) for x in _curve(law))
-    return ShiftedLaw(**vars(found), curve=curve)
+    curve = tuple(document.CurvePoint(x=x, value=found.at(x)) for x in _curve(law))
+    return document.ShiftedLaw(**vars(found), curve=curve)
 
 
-def _mean_eta(runs: Sequence[Run], law: PowerLaw) -> Estimate:
+def _mean_eta(runs: Sequence[Run], law: power_law.PowerLaw) -> Estimate:
     """Geometric mean of eta over the runs of a law; a trend in it widens the interval."""
     known = [run.row.eta for run in runs if run.row.level in law.runs.levels]
     etas = replace(law.runs, values=np.array(known))
     constant = np.ones((len(known), 1))
-    covariance = etas.covariance(estimate_scatter(etas, constant))
-    fit = solve(constant, etas.logarithms, covariance, etas.degrees(1))
+    covariance = etas.covariance(power_law.estimate_scatter(etas, constant))
+    fit = power_law.solve(constant, etas.logarithms, covariance, etas.degrees(1))
     return fit.estimate([1.0]).exp()
 
 
-def _level(law: PowerLaw, number: int, runs: Sequence[Run]) -> Level:
+def _level(law: power_law.PowerLaw, number: int, runs: Sequence[Run]) -> document.Level:
     x = float(law.runs.levels[number])
     here = [run for run in runs if run.row.level == x]
-    return Level(
+    return document.Level(
         x=x,
         runs=len(here),
         eta=float(np.exp(np.mean([math.log(run.row.eta) for run in here]))),
@@ -181,9 +169,9 @@ def write_scaling(
     out_dir: Path,
     run_dirs: Sequence[Path],
     field: str,
-    expected: Expectation,
+    expected: document.Expectation,
     commands: Sequence[str] = (),
-) -> ScalingFile:
+) -> document.ScalingFile:
     """Write ``scaling.json``, ``scaling.csv`` (one row per level) and ``scaling.png``.
 
     Raises
@@ -192,7 +180,7 @@ def write_scaling(
         If the runs do not make a scaling.
     """
     found = find(run_dirs, field, expected, commands)
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         picture = png(draw_scaling(found))
     found.write(out_dir / "scaling.json")
     rows = table(found).to_csv(index=False, float_format="%.6g", lineterminator="\n")
@@ -201,7 +189,7 @@ def write_scaling(
     return found
 
 
-def table(found: ScalingFile) -> pd.DataFrame:
+def table(found: document.ScalingFile) -> pd.DataFrame:
     """The levels of a scaling, one row each, intervals as ``*_ci95_low`` and ``*_ci95_high``."""
     exponents = (*found.local_exponents, None)
     rows = [
@@ -211,9 +199,9 @@ def table(found: ScalingFile) -> pd.DataFrame:
     return pd.DataFrame(rows).rename(columns={"x": found.field})
 
 
-def read_scalings() -> list[ScalingFile]:
+def read_scalings() -> list[document.ScalingFile]:
     """The scalings that come with the package, those of slow drag first."""
-    found = [ScalingFile.read(file) for file in _STORED.glob("*.json")]
+    found = [document.ScalingFile.read(file) for file in _STORED.glob("*.json")]
     place = {name: number for number, name in enumerate(_ORDER)}
     return sorted(found, key=lambda one: (place.get(one.study, len(_ORDER)), one.study))
 
@@ -229,11 +217,11 @@ def scaling_command(
 ) -> str:
     """Fit a scaling as the command line asks for; what it says, in words."""
     within = (fit_range[0], fit_range[1]) if fit_range else None
-    asked = Expectation(exponent=expected, source=source, within=within)
+    asked = document.Expectation(exponent=expected, source=source, within=within)
     return said(write_scaling(out_dir, run_dirs, field, asked, [command] if command else []))
 
 
-def said(found: ScalingFile) -> str:
+def said(found: document.ScalingFile) -> str:
     """What a scaling says in words, one remark per line."""
     template = page_environment().get_template("scaling/said.txt.j2")
     return html.unescape(template.render(found=found)).rstrip()

@@ -13,16 +13,7 @@ from dragchain.contact_law.hertz import sphere_mass
 from dragchain.dumps.frame import Frame
 from dragchain.run.case import Case, friction_with
 from dragchain.run.kinematics import drag_phase, needed
-from dragchain.stability.contacts import (
-    BOWL,
-    PARTICLE,
-    WORKPIECE,
-    Contacts,
-    centres,
-    in_id_order,
-    network_frequency,
-    radii,
-)
+from dragchain.stability import contacts as network
 from dragchain.stability.measured import NORMAL_95, Measured
 from dragchain.stability.points import PointRun
 from dragchain.statistics.correlated import estimate_mean
@@ -36,10 +27,10 @@ _NETWORK_FRAMES = 8
 """Frames of a reference whose networks are looked at; the stiffest counts."""
 
 _PARTNER = {
-    "particle-particle": PARTICLE,
-    "particle-workpiece": WORKPIECE,
-    "particle-floor": BOWL,
-    "particle-side": BOWL,
+    "particle-particle": network.PARTICLE,
+    "particle-workpiece": network.WORKPIECE,
+    "particle-floor": network.BOWL,
+    "particle-side": network.BOWL,
 }
 
 
@@ -119,16 +110,18 @@ def _contacts(point: PointRun, run: Run) -> tuple[float, float]:
         if on_workpiece.step not in pairs:
             continue
         workpiece = on_workpiece.join(merge=False)  # both stiffnesses of an edge act
-        frame = in_id_order(particles[workpiece.step])
+        frame = network.in_id_order(particles[workpiece.step])
         contacts = _engine_contacts(frame, pairs[workpiece.step], workpiece, run.case)
-        largest = max(largest, contacts.overlap_ratio(radii(frame)))
+        largest = max(largest, contacts.overlap_ratio(network.radii(frame)))
         if workpiece.step in some:
-            own = network_frequency(run.case, point.sticks, radii(frame), contacts)
+            own = network.network_frequency(run.case, point.sticks, network.radii(frame), contacts)
             frequency = max(frequency, own)
     return largest, frequency
 
 
-def _engine_contacts(frame: Frame, pairs: Frame, workpiece: WorkpieceFrame, case: Case) -> Contacts:
+def _engine_contacts(
+    frame: Frame, pairs: Frame, workpiece: WorkpieceFrame, case: Case
+) -> network.Contacts:
     """The contacts of one frame as the engine wrote them, with bowl and workpiece."""
     bowl_radius = needed(case.bowl, "bowl").radius_m
     friction = friction_with(case, "media")
@@ -138,7 +131,7 @@ def _engine_contacts(frame: Frame, pairs: Frame, workpiece: WorkpieceFrame, case
     a = np.searchsorted(ids, rows.a_id)
     b = np.where(rows.b_id > 0, np.searchsorted(ids, rows.b_id), -1)
     partner = np.array([_PARTNER[kind] for kind in KINDS])[rows.kind]
-    towards = rows.point_m - centres(frame)[a]
+    towards = rows.point_m - network.centres(frame)[a]
     normal = towards / np.linalg.norm(towards, axis=1, keepdims=True)
     hit = rows.overlap_m > 0.0
-    return Contacts(a[hit], b[hit], partner[hit], normal[hit], rows.overlap_m[hit])
+    return network.Contacts(a[hit], b[hit], partner[hit], normal[hit], rows.overlap_m[hit])

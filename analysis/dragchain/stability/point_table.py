@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
 from dragchain.network.critical_timestep import critical_step, damped_fraction
-from dragchain.stability.bed import Bed
 from dragchain.stability.classes import Seen, Verdict, classify
-from dragchain.stability.measured import COLUMNS, Measure, Measured
+from dragchain.stability.drag import measure_drag
+from dragchain.stability.measured import (
+    COLUMNS,
+    Bed,
+    Measured,
+    measure_impacts,
+    measure_resting,
+    measure_settled,
+)
 from dragchain.stability.points import PointRun, Settings
+from dragchain.statistics.estimate import flattened
+from dragchain.tables.run_folder import Run
 
 _SMALL_STEP = 0.4
 """Steps over the Rayleigh time up to which the heights of settled beds differ by chance."""
 
-_ERRORS = ("restitution", "peak force", "tangential speed", "height", "mean drag")
+_ERRORS = (
+    *("restitution_error", "peak_force_error", "tangential_speed_error", "height_error"),
+    *("mean_drag_error", "mean_drag_error_ci95_low", "mean_drag_error_ci95_high"),
+)
 
 
 @dataclass(frozen=True)
@@ -48,17 +60,17 @@ class ClassifiedPoint:
     rayleigh_time_s: float
 
 
-def classify_points(
-    runs: Sequence[PointRun], measures: Mapping[str, Measure]
-) -> list[ClassifiedPoint]:
-    """Measure and classify all points, condition by condition.
+_MEASURES: Mapping[str, Callable[[PointRun, Run], Measured]] = {
+    "impact": measure_impacts,
+    "settle": measure_settled,
+    "column": measure_resting,
+    "drag": measure_drag,
+}
+"""By regime, what measures a run that came to its end."""
 
-    Parameters
-    ----------
-    runs : sequence of PointRun
-    measures : mapping of str to Measure
-        By regime.
-    """
+
+def classify_points(runs: Sequence[PointRun]) -> list[ClassifiedPoint]:
+    """Measure and classify all points, condition by condition."""
     conditions: dict[str, list[PointRun]] = {}
     for run in runs:
         conditions.setdefault(run.point.condition, []).append(run)
@@ -66,16 +78,14 @@ def classify_points(
     return [
         point
         for group in conditions.values()
-        for point in _condition(group, measures, bases.get(group[0].point.regime))
+        for point in _condition(group, bases.get(group[0].point.regime))
     ]
 
 
-def _condition(
-    group: Sequence[PointRun], measures: Mapping[str, Measure], base: Settings | None
-) -> list[ClassifiedPoint]:
+def _condition(group: Sequence[PointRun], base: Settings | None) -> list[ClassifiedPoint]:
     """The points of one condition; its reference comes first."""
     runs = sorted(group, key=lambda run: not run.point.reference)
-    measured = [_measure(run, measures) for run in runs]
+    measured = [_measure(run) for run in runs]
     fine = measured[0]
     if isinstance(fine, Bed) and runs[0].point.regime == "settle":
         fine = replace(fine, height_scatter=_height_scatter(runs, measured))
@@ -98,10 +108,10 @@ def _condition(
     return points
 
 
-def _measure(run: PointRun, measures: Mapping[str, Measure]) -> Measured | None:
+def _measure(run: PointRun) -> Measured | None:
     if run.run is None or not run.measurable:
         return None
-    return measures[run.point.regime](run, run.run)
+    return _MEASURES[run.point.regime](run, run.run)
 
 
 def _height_scatter(runs: Sequence[PointRun], measured: Sequence[Measured | None]) -> float:
@@ -165,14 +175,7 @@ def _row(point: ClassifiedPoint) -> dict[str, object]:
     }
 
 
-def _error_columns(seen: Seen) -> dict[str, float]:
-    columns = {f"{name.replace(' ', '_')}_error": math.nan for name in _ERRORS}
-    columns |= {"mean_drag_error_ci95_low": math.nan, "mean_drag_error_ci95_high": math.nan}
-    for name, error in seen.errors.items():
-        columns[f"{name.replace(' ', '_')}_error"] = error.value
-    if (drag := seen.errors.get("mean drag")) is not None:
-        columns |= {
-            "mean_drag_error_ci95_low": drag.ci95_low,
-            "mean_drag_error_ci95_high": drag.ci95_high,
-        }
-    return columns
+def _error_columns(seen: Seen) -> dict[str, object]:
+    found = {f"{name.replace(' ', '_')}_error": error for name, error in seen.errors.items()}
+    columns = flattened(found)
+    return {name: columns.get(name, math.nan) for name in _ERRORS}

@@ -7,43 +7,18 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-import matplotlib
 import pandas as pd
 
-from dragchain.figures.style import STYLE, png
+from dragchain.figures.style import drawing, png
 from dragchain.report.bundle import write_bundle
 from dragchain.report.page import data_uri, render_page
-from dragchain.stability.bed import REST_FLOOR, measure_resting, measure_settled
-from dragchain.stability.classes import (
-    CLASSES,
-    ENERGY_LIMITS,
-    OVERLAP_LIMIT,
-    REFUSED,
-    TOLERANCE,
-)
+from dragchain.stability import safe_steps
+from dragchain.stability.classes import CLASSES, ENERGY_LIMITS, OVERLAP_LIMIT, REFUSED, TOLERANCE
 from dragchain.stability.document import Criteria, StabilityFile
-from dragchain.stability.drag import measure_drag
 from dragchain.stability.figures import draw
-from dragchain.stability.impact import measure_impacts
-from dragchain.stability.measured import Measure
+from dragchain.stability.measured import REST_FLOOR
 from dragchain.stability.point_table import ClassifiedPoint, classify_points, point_table
 from dragchain.stability.points import PointRun, read_points
-from dragchain.stability.safe_steps import (
-    REGIMES,
-    RULE,
-    SAFETY_FACTOR,
-    conditions,
-    error_table,
-    regimes,
-)
-
-_MEASURES: Mapping[str, Measure] = {
-    "impact": measure_impacts,
-    "settle": measure_settled,
-    "column": measure_resting,
-    "drag": measure_drag,
-}
-"""How a run of each regime is measured."""
 
 _CRITERIA = Criteria(
     tolerance=TOLERANCE,
@@ -72,12 +47,12 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
         A run was interrupted.
     """
     runs = read_points(lists)
-    classified = classify_points(runs, _MEASURES)
+    classified = classify_points(runs)
     points = point_table(classified)
-    by_condition = conditions(points)
+    by_condition = safe_steps.conditions(points)
     document = _summarise(points, by_condition, runs)
     sizes = _run_sizes(runs)
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         drawn = draw(points, by_condition, document.restitution_error, sizes)
         pictures = {name: png(figure) for name, figure in drawn.items()}
     write_bundle(
@@ -103,10 +78,10 @@ def _summarise(
         measured=started[:10],
         points=len(points),
         engine_wall_time_s=round(sum(record.wall_time_s for record in records), 1),
-        safety_factor=SAFETY_FACTOR,
+        safety_factor=safe_steps.SAFETY_FACTOR,
         criteria=_CRITERIA,
-        regimes=regimes(by_condition),
-        restitution_error=error_table(points),
+        regimes=safe_steps.regimes(by_condition),
+        restitution_error=safe_steps.error_table(points),
     )
 
 
@@ -138,7 +113,7 @@ def render(
         class_names=CLASSES,
         classes={
             regime: Counter(tested.loc[tested["regime"] == regime, "class"])
-            for regime in REGIMES
+            for regime in safe_steps.REGIMES
             if (tested["regime"] == regime).any()
         },
         axes=[(*names, list(dict.fromkeys(group)), len(group)) for names, group in axes],
@@ -146,5 +121,5 @@ def render(
         refusals=list(dict.fromkeys(points.loc[points["class"] == REFUSED, "why"])),
         past_limits=sum(point.verdict.check == "within_limits" for point in classified),
         pictures={name: data_uri(picture) for name, picture in pictures.items()},
-        rule=RULE,
+        rule=safe_steps.RULE,
     )

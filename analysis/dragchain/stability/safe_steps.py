@@ -73,10 +73,7 @@ def _condition(points: pd.DataFrame) -> dict[str, object]:
     stable = safe_fraction(points, (*UNSTABLE, REFUSED))
     per_rayleigh = reference["rayleigh_time_s"] / reference["critical_step_s"]
     return {
-        "regime": reference["regime"],
-        "condition": reference["condition"],
-        "axis": reference["axis"],
-        "label": reference["label"],
+        **{name: reference[name] for name in ("regime", "condition", "axis", "label")},
         "usable": usable,
         "reference_class": reference["class"],
         "reference_why": reference["why"],

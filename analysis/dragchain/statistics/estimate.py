@@ -54,8 +54,9 @@ class Estimate:
         return self.ci95_low <= value <= self.ci95_high
 
     def over(self, size: float) -> Estimate:
-        """The estimate divided by a positive number."""
-        return Estimate(self.value / size, self.ci95_low / size, self.ci95_high / size)
+        """The estimate divided by a number, which may be negative."""
+        low, high = sorted((self.ci95_low / size, self.ci95_high / size))
+        return Estimate(self.value / size, low, high)
 
     def exp(self, factor: float = 1.0, minus: float = 0.0) -> Estimate:
         """The estimate of ``exp(factor * x) - minus``, for a positive factor."""
@@ -108,8 +109,12 @@ def t_interval(value: float, se: float, degrees: float) -> Estimate:
 
 
 def mean_of(values: ArrayLike) -> Estimate:
-    """The mean of independent values with Student's t interval; NaN for fewer than two."""
+    """The mean of the finite ones of independent values with Student's t interval.
+
+    The interval is NaN for fewer than two, as the mean is for none.
+    """
     known = np.asarray(values, dtype=np.float64)
+    known = known[np.isfinite(known)]
     mean = float(known.mean()) if known.size else math.nan
     if known.size < 2:
         return Estimate(mean, math.nan, math.nan)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dragchain.arrays import Floats, Ints
-from dragchain.statistics.estimate import CONFIDENCE, Estimate, student_quantile
+from dragchain.statistics.estimate import CONFIDENCE, Estimate, mean_of
 
 SHIFTS = 19_999
 """Random shifts of the joint null distribution: the smallest p-value is 1 in 20,000."""
@@ -37,7 +37,7 @@ class ShiftTest(Estimate):
     """A statistic at the events against its null distribution.
 
     Its value is the mean over the runs, NaN if no run has one; its interval comes from the spread
-    over the runs (`mean_over_runs`).
+    over the runs (`mean_of`).
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ def shift_test(
     null = reduce(joint(by_shift, shifts))
     if not np.isfinite(value):
         return ShiftTest(*[np.nan] * 6)
-    over_runs = mean_over_runs([float(reduce(run[:1])[0]) for run in by_shift])
+    over_runs = mean_of([float(reduce(run[:1])[0]) for run in by_shift])
     null = null[np.isfinite(null)]
     middle = null.mean()
     return ShiftTest(
@@ -152,21 +152,6 @@ def shift_test(
 
 def _p_value(reached: np.typing.NDArray[np.bool_]) -> float:
     return float((1 + reached.sum()) / (1 + len(reached)))
-
-
-def mean_over_runs(values: ArrayLike) -> Estimate:
-    """The mean of one number per run with Student's t interval; runs without a number are left out.
-
-    The interval is NaN for fewer than two runs, the mean for none.
-    """
-    numbers = np.asarray(values, dtype=np.float64)
-    numbers = numbers[np.isfinite(numbers)]
-    count = numbers.size
-    mean = float(numbers.mean()) if count else np.nan
-    if count < 2:
-        return Estimate(mean, np.nan, np.nan)
-    half = student_quantile(count - 1) * numbers.std(ddof=1) / np.sqrt(count)
-    return Estimate.around(mean, float(half))
 
 
 def band(by_shift: Sequence[Floats], shifts: Ints, lags: Ints) -> float:

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from scipy import stats
 
-from dragchain.statistics.estimate import student_quantile
+from dragchain.statistics.estimate import Estimate, student_quantile
 from dragchain.tradeoff.compare import Comparison, Error
 from dragchain.tradeoff.outcome import Tradeoff
 from dragchain.tradeoff.quantities import MAIN
@@ -37,34 +37,21 @@ def hub(tradeoff: Tradeoff) -> Setting:
     return max(settings, key=neighbours)
 
 
-@dataclass(frozen=True)
-class SpeedUp:
-    """Processor time of one setting over another's.
+def speed_up(tradeoff: Tradeoff, setting: Setting, base: Setting) -> Estimate:
+    """How many times cheaper a metre of path is; the medians of the runs, as `Tradeoff.cost`.
 
-    Attributes
-    ----------
-    ratio : float
-    low, high : float
-        Limits of the interval of `CONFIDENCE` from the scatter between runs;
-        NaN where either has a single run, or where steps were timed side by side.
+    The interval comes from the scatter between runs; it is NaN where either has a single run, or
+    where steps were timed side by side.
     """
-
-    ratio: float
-    ci95_low: float
-    ci95_high: float
-
-
-def speed_up(tradeoff: Tradeoff, setting: Setting, base: Setting) -> SpeedUp:
-    """How many times cheaper a metre of path is; the medians of the runs, as `Tradeoff.cost`."""
     ratio = tradeoff.cost(base) / tradeoff.cost(setting)
     logs = [
         np.log([run.measures.cost.cpu_per_m for run in tradeoff.of(one)]) for one in (setting, base)
     ]
     if min(map(len, logs)) < 2 or tradeoff.step_costs is not None:
-        return SpeedUp(ratio, math.nan, math.nan)
+        return Estimate(ratio, math.nan, math.nan)
     error = math.hypot(*(float(stats.sem(values)) for values in logs))
     shift = error * student_quantile(sum(map(len, logs)) - 2)
-    return SpeedUp(ratio, ratio * math.exp(-shift), ratio * math.exp(shift))
+    return Estimate(ratio, ratio * math.exp(-shift), ratio * math.exp(shift))
 
 
 @dataclass(frozen=True)
@@ -154,7 +141,7 @@ class Gain:
     setting, base : Setting
     factors : list of str
         In which they differ.
-    speed_up : SpeedUp
+    speed_up : Estimate
     errors : dict of str to Error
         Main quantity to what the change does to it.
     product : float
@@ -164,7 +151,7 @@ class Gain:
     setting: Setting
     base: Setting
     factors: list[str]
-    speed_up: SpeedUp
+    speed_up: Estimate
     errors: Mapping[str, Error]
     product: float
 
@@ -218,5 +205,5 @@ def _gain(
     }
     product = math.nan
     if len(factors) > 1 and all(map(tradeoff.of, singles)):
-        product = math.prod(speed_up(tradeoff, one, base).ratio for one in singles)
+        product = math.prod(speed_up(tradeoff, one, base).value for one in singles)
     return Gain(setting, base, factors, speed_up(tradeoff, setting, base), errors, product)

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.network.write import write_chains
 from dragchain.run.case import Case, load_case
 from dragchain.run.completeness import RunRecord
-from dragchain.statistics.estimate import finite
 from dragchain.tables.bed import Packing
 from dragchain.tables.write import write_tables
-from dragchain.tradeoff.measures import FILE, Asked, Measures, RunCost
+from dragchain.tradeoff.measures import FILE, Measures, RunCost
 from dragchain.tradeoff.path_blocks import quantities_along
 
 
@@ -38,18 +36,16 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
     if not file.is_file():
         raise TableError(f"{file} is not there: `dragdeck run --outcome` writes it")
     outcome, case = RunRecord.read(file), load_case(run_dir)
-    measures = Measures(
-        study=case.study,
-        run=case.run,
-        bed=case.upstream.get("filling"),
-        inputs=case.inputs,
-        fidelity=case.fidelity,
-        numbers=case.numbers,
-        asked=case.asked and Asked.model_validate(case.asked.model_dump()),
-        complete=outcome.complete,
-        cost=_cost(case, outcome),
-        versions={**case.versions, "engine": outcome.engine_version},
-        started=outcome.started,
+    measures = Measures.model_validate(
+        {
+            **dict(case),
+            "bed": case.upstream.get("filling"),
+            "asked": case.asked and case.asked.model_dump(),
+            "complete": outcome.complete,
+            "cost": _cost(case, outcome),
+            "versions": {**case.versions, "engine": outcome.engine_version},
+            "started": outcome.started,
+        }
     )
     if measures.complete:
         write_tables(run_dir)
@@ -63,20 +59,8 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
 
 def measured(measures: Measures, run_dir: Path, case: Case, bed: Packing) -> Measures:
     """The measures of a complete run with its quantities, from its tables."""
-    along = quantities_along(run_dir, case)
-    return measures.model_copy(
-        update={
-            "arc_m": along.length_m,
-            "block_m": along.block_m,
-            "blocks": {name: _listed(values) for name, values in along.blocks.items()},
-            "single": {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction},
-            "force_histogram": tuple(along.force_histogram.tolist()),
-        }
-    )
-
-
-def _listed(values: Floats) -> tuple[float | None, ...]:
-    return tuple(map(finite, values))
+    single = {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction}
+    return measures.model_copy(update={**quantities_along(run_dir, case), "single": single})
 
 
 def _cost(case: Case, outcome: RunRecord) -> RunCost:

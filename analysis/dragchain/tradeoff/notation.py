@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 
 from dragchain.report.notation import DASH, MINUS, number
-from dragchain.tradeoff.changes import SpeedUp
+from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.compare import Error
 
 _FOLD = 2.0
@@ -53,7 +53,7 @@ def cheaper(ratio: float) -> str:
     return f"{times(1.0 / ratio)} times dearer"
 
 
-def span(gain: SpeedUp) -> str:
+def span(gain: Estimate) -> str:
     """The interval of a ratio of costs; "one run" where there is none."""
     if math.isnan(gain.ci95_low):
         return "one run"

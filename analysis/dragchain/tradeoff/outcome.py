@@ -175,33 +175,6 @@ def largest_bound(tradeoff: Tradeoff, quantities: Sequence[str], setting: Settin
     )
 
 
-def recommend(
-    tradeoff: Tradeoff, quantity: str | Sequence[str], tolerance: float
-) -> Setting | None:
-    """The cheapest setting whose error is below a tolerance with confidence.
-
-    Parameters
-    ----------
-    trade : Trade
-    quantity : str or sequence of str
-        If several, each of them has to be within the tolerance.
-    tolerance : float
-        Relative.
-
-    Returns
-    -------
-    Setting or None
-        One of the `_candidates`; None if there is none but the reference.
-    """
-    names = [quantity] if isinstance(quantity, str) else list(quantity)
-    able = [
-        setting
-        for setting in _candidates(tradeoff, names)
-        if largest_bound(tradeoff, names, setting) <= tolerance
-    ]
-    return min(able, key=tradeoff.cost, default=None)
-
-
 @dataclass(frozen=True)
 class Choice:
     """What to run for some quantities and a tolerance.
@@ -232,15 +205,19 @@ class Choice:
 
 
 def choose(tradeoff: Tradeoff, names: Sequence[str], tolerance: float) -> Choice:
-    """What to run so that each of some quantities is within a tolerance."""
-    setting = recommend(tradeoff, names, tolerance)
-    able = _candidates(tradeoff, names)
-    nearest = min(able, key=lambda one: largest_bound(tradeoff, names, one), default=None)
+    """The cheapest setting at which each of some quantities is within a tolerance.
+
+    It is one of the `_candidates`, and its error is below the tolerance with confidence.
+    """
+    bounds = {one: largest_bound(tradeoff, names, one) for one in _candidates(tradeoff, names)}
+    able = [one for one, bound in bounds.items() if bound <= tolerance]
+    setting = min(able, key=tradeoff.cost, default=None)
+    nearest = min(bounds, key=bounds.__getitem__, default=None)
     shown = setting or nearest
     if shown is None:
         return Choice(tolerance, None, None, math.nan, [])
     errors = [tradeoff.comparisons[name].errors[shown] for name in names]
-    return Choice(tolerance, setting, nearest, largest_bound(tradeoff, names, shown), errors)
+    return Choice(tolerance, setting, nearest, bounds[shown], errors)
 
 
 def run_table(tradeoff: Tradeoff) -> pd.DataFrame:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from dragchain.arrays import Floats, Ints
 from dragchain.drag.force import read_counted
 from dragchain.run.case import Case, load_outputs
 from dragchain.run.kinematics import drag_phase
+from dragchain.statistics.estimate import finite
 from dragchain.tables.by_step import read_groups, read_table
 
 LONG_WAVE, SHORT_WAVE = 2.0, 0.25
@@ -85,33 +86,18 @@ class CountedPath:
             yield last, np.concatenate(held)
 
 
-@dataclass(frozen=True)
-class PathBlocks:
-    """The quantities along the counted path.
-
-    Attributes
-    ----------
-    length_m, block_m : float
-        Of the path and of a block, m.
-    blocks : mapping of str to (B,) ndarray
-        Quantity to its values, NaN where a block has none.
-    force_histogram : (70,) ndarray
-        Counts of contacts on the workpiece between `FORCE_BINS`.
-    """
-
-    length_m: float
-    block_m: float
-    blocks: Mapping[str, Floats]
-    force_histogram: Ints
-
-
-def quantities_along(run_dir: Path, case: Case) -> PathBlocks:
-    """The quantities of a complete run with tables and chains."""
+def quantities_along(run_dir: Path, case: Case) -> dict[str, object]:
+    """The quantities of a complete run with tables and chains, by their fields of `Measures`."""
     force = read_counted(run_dir, ("step", "drag_n", "lateral_n", "vertical_n"))
     path = CountedPath.of(case, force["step"].to_numpy(np.int64))
     on_workpiece, counts = _of_workpiece_contacts(run_dir, path)
     blocks = {**_of_force(force, path), **on_workpiece, **_of_network(run_dir, path)}
-    return PathBlocks(path.length_m, path.length_m / path.blocks, blocks, counts)
+    return {
+        "arc_m": path.length_m,
+        "block_m": path.length_m / path.blocks,
+        "blocks": {name: tuple(map(finite, values)) for name, values in blocks.items()},
+        "force_histogram": tuple(counts.tolist()),
+    }
 
 
 def _of_force(force: pd.DataFrame, path: CountedPath) -> dict[str, Floats]:

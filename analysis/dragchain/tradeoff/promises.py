@@ -206,13 +206,8 @@ def failures(runs: Sequence[Measures]) -> list[FailedRun]:
 
 
 def _scene(measures: Measures) -> _Scene:
-    return tuple(
-        sorted(
-            (name, str(value))
-            for name, value in measures.inputs.items()
-            if name not in SILENT and value is not None
-        )
-    )
+    inputs = {name: measures.inputs[name] for name in sorted(measures.inputs) if name not in SILENT}
+    return tuple((name, str(value)) for name, value in inputs.items() if value is not None)
 
 
 def _promise_of(pair: _Pair, scatter: float, degrees: int) -> Promise:

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from dragchain.documents import Document, Part
-from dragchain.tradeoff.compare import Comparison
 from dragchain.tradeoff.costs import CostEntry, Costs
 from dragchain.tradeoff.drops import Drop
 from dragchain.tradeoff.outcome import Tradeoff, breaks
@@ -137,17 +136,16 @@ def record_of(
         scene=_scene_numbers(tradeoff),
         reference=FidelityParameters(**tradeoff.reference.parameters()),
         quantities={
-            name: _quantity_entry(own, tradeoff.arc_m) for name, own in tradeoff.comparisons.items()
+            name: QuantityEntry.model_validate(
+                {**vars(own.quantity), **vars(own), "arc_m": tradeoff.arc_m}
+            )
+            for name, own in tradeoff.comparisons.items()
         },
         settings=tuple(
             _setting_entry(tradeoff, one) for one in tradeoff.settings() if not one.other
         ),
         drop_test=tuple(
-            DropEntry(
-                timestep_fraction=drop.timestep_fraction,
-                restitution_error=drop.bound,
-                relative_cost=drop.relative_cost,
-            )
+            DropEntry.model_validate({**vars(drop), "restitution_error": drop.bound})
             for drop in drops
             if not drop.other
         ),
@@ -171,18 +169,6 @@ def _scene_numbers(tradeoff: Tradeoff) -> Mapping[str, float]:
     """Dimensionless numbers of the scene, as the runs at the reference have them."""
     numbers = [run.measures.numbers for run in tradeoff.of(tradeoff.reference)]
     return next((own for own in numbers if own), {})
-
-
-def _quantity_entry(comparison: Comparison, arc_m: float) -> QuantityEntry:
-    return QuantityEntry(
-        label=comparison.quantity.label,
-        unit=comparison.quantity.unit,
-        signed=comparison.quantity.signed,
-        reference=comparison.reference,
-        se=comparison.se,
-        run_std=comparison.run_std,
-        arc_m=arc_m,
-    )
 
 
 def _setting_entry(tradeoff: Tradeoff, setting: Setting) -> SettingEntry:

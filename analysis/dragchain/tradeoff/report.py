@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib
-
-from dragchain.figures.style import STYLE, png
+from dragchain.figures.style import drawing, png
 from dragchain.report.bundle import write_bundle
 from dragchain.report.page import data_uri, render_page
 from dragchain.statistics.estimate import CONFIDENCE
 from dragchain.tradeoff.changes import RUINED, gains, modulus_levels, softness, verdicts
 from dragchain.tradeoff.compare import ADDITIVE_LEVEL
-from dragchain.tradeoff.costs import Costs, read_costs, step_costs
+from dragchain.tradeoff.costs import read_costs, step_costs
 from dragchain.tradeoff.drops import Drop, choose_drop, read_drops
 from dragchain.tradeoff.figures import draw
 from dragchain.tradeoff.notation import FILTERS
 from dragchain.tradeoff.outcome import TOLERANCES, Tradeoff, choose, compare, error_table, run_table
 from dragchain.tradeoff.path_blocks import LONG_WAVE, SHORT_WAVE
 from dragchain.tradeoff.path_length import TRIALS, Reach, along, chance, reaches
-from dragchain.tradeoff.promises import Promise, PromisesFile
+from dragchain.tradeoff.promises import PromisesFile
 from dragchain.tradeoff.quantities import MAIN
-from dragchain.tradeoff.record import TradeoffRecord, record_of
+from dragchain.tradeoff.record import record_of
 from dragchain.tradeoff.runs import read_runs
 
 _TOGETHER = ("contact_force_mean", "contact_force_p90")
@@ -36,28 +33,6 @@ _CHOSEN = (
     *((name,) for name in ("coordination_number", "chain_count", "chain_length")),
 )
 """The quantities, or the two together, that the page names settings for."""
-
-
-@dataclass(frozen=True)
-class Findings:
-    """All that tables, figures and page are made of.
-
-    Attributes
-    ----------
-    tradeoff : Tradeoff
-    reaches : sequence of Reach
-    drops : sequence of Drop
-    costs : Costs
-    promises : sequence of Promise
-    record : TradeoffRecord
-    """
-
-    tradeoff: Tradeoff
-    reaches: Sequence[Reach]
-    drops: Sequence[Drop]
-    costs: Costs
-    promises: Sequence[Promise]
-    record: TradeoffRecord
 
 
 def write_tradeoff(
@@ -107,35 +82,38 @@ def write_tradeoff(
     tradeoff = compare(*read_runs(measures, reference_run), step_costs(priced), largest_step)
     commands = [command] if command else []
     record = record_of(tradeoff, dropped, priced, kept, plan, commands)
-    findings = Findings(tradeoff, reaches(tradeoff), dropped, priced, kept, record)
-    with matplotlib.rc_context(STYLE):
-        drawn = draw(tradeoff, findings.reaches, dropped)
-        figures = {name: png(figure) for name, figure in drawn.items()}
+    known = reaches(tradeoff)
+    with drawing():
+        figures = {name: png(drawn) for name, drawn in draw(tradeoff, known, dropped).items()}
+    page = render(tradeoff, known, dropped, figures, record=record, costs=priced, promises=kept)
     write_bundle(
         out_dir,
         tables={"runs": run_table(tradeoff), "errors": error_table(tradeoff)},
         figures=figures,
         documents={"tradeoff": record},
-        pages={"report": render(findings, figures)},
+        pages={"report": page},
     )
 
 
-def render(findings: Findings, figures: Mapping[str, bytes]) -> str:
+def render(
+    tradeoff: Tradeoff,
+    known: Sequence[Reach],
+    drops: Sequence[Drop],
+    figures: Mapping[str, bytes],
+    **content: object,
+) -> str:
     """The page: HTML that needs no other file and no network."""
-    tradeoff, comparisons = findings.tradeoff, findings.tradeoff.comparisons
-    levels = modulus_levels(tradeoff)
+    comparisons, levels = tradeoff.comparisons, modulus_levels(tradeoff)
     named = [names for names in _CHOSEN if all(name in comparisons for name in names)]
     return render_page(
         "tradeoff/tradeoff.html.j2",
         FILTERS,
         tradeoff=tradeoff,
-        record=findings.record,
-        costs=findings.costs,
-        drops=findings.drops,
-        promises=findings.promises,
+        **content,
+        drops=drops,
         main=[comparisons[name] for name in MAIN if name in comparisons],
         choices=[(names, [choose(tradeoff, names, one) for one in TOLERANCES]) for names in named],
-        drop_choices=[choose_drop(findings.drops, one) for one in TOLERANCES],
+        drop_choices=[choose_drop(drops, one) for one in TOLERANCES],
         levels=levels,
         softness={
             name: [softness(tradeoff, own, level) for level in levels]
@@ -143,7 +121,7 @@ def render(findings: Findings, figures: Mapping[str, bytes]) -> str:
         },
         verdicts=verdicts(tradeoff),
         gains=gains(tradeoff),
-        paths=[(reach, along(tradeoff, reach.quantity)) for reach in findings.reaches],
+        paths=[(reach, along(tradeoff, reach.quantity)) for reach in known],
         chance=chance(tradeoff),
         trials=TRIALS,
         figures={name: data_uri(picture) for name, picture in figures.items()},

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from scipy.stats import binned_statistic
 
-from dragchain.arrays import Floats, Ints
+from dragchain.arrays import Floats
 from dragchain.documents import Part
 from dragchain.drag.force import read_counted
 from dragchain.errors import TableError
@@ -139,7 +139,7 @@ def corridor(point: Point) -> Corridor:
     wall = (np.sqrt(case.bowl.radius_m**2 - case.motion.radius_m**2) - radius) / diameter
     edges = np.arange(0.0, wall + 1e-9, _BIN)
     tip = case.surface_m - workpiece.immersion_depth_m
-    ahead, behind = _Bins.of(edges), _Bins.of(edges)
+    places: list[Floats] = []
     far: list[Floats] = []
     for contacts in _inner_contacts(point):
         z = contacts["point_z_m"].to_numpy(np.float64)
@@ -147,15 +147,18 @@ def corridor(point: Point) -> Corridor:
         force = contacts["normal_force_n"].to_numpy(np.float64)
         along, across, turned = relative_places(contacts)
         near = inside & (np.abs(across) <= radius + _WIDTH * diameter)
-        distance = (np.abs(along) - radius) / diameter
-        ahead.add(distance, force, near & (along > 0.0))
-        behind.add(distance, force, near & (along < 0.0))
+        places.append(np.stack([along[near], force[near]]))
         far.append(force[inside & (np.abs(turned) > _FAR_SIDE)])
-    beyond = np.concatenate(far)
+    beyond, (along, force) = np.concatenate(far), np.concatenate(places, axis=1)
+    distance = (np.abs(along) - radius) / diameter
+    ahead, behind = (
+        np.asarray(binned_statistic(distance[side], force[side], "mean", edges).statistic, float)
+        for side in (along > 0.0, along < 0.0)
+    )
     return Corridor(
         edges=edges,
-        ahead=ahead.means(),
-        behind=behind.means(),
+        ahead=ahead,
+        behind=behind,
         far=float(beyond.mean()) if beyond.size else np.nan,
         wall=float(wall),
     )
@@ -182,28 +185,3 @@ def relative_places(contacts: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
     dx, dy = x - ref_x, y - ref_y
     turned = np.angle(np.exp(1j * (np.arctan2(y, x) - np.arctan2(ref_y, ref_x))))
     return dx * cos + dy * sin, dy * cos - dx * sin, turned
-
-
-@dataclass(frozen=True)
-class _Bins:
-    """Sums and numbers of forces between edges, gathered piece by piece."""
-
-    edges: Floats
-    sums: Floats
-    counts: Ints
-
-    @classmethod
-    def of(cls, edges: Floats) -> _Bins:
-        return cls(edges, np.zeros(len(edges) - 1), np.zeros(len(edges) - 1, dtype=np.int64))
-
-    def add(self, distance: Floats, force: Floats, chosen: NDArray[np.bool_]) -> None:
-        """Add the chosen forces, one after the other."""
-        number: Ints = np.digitize(distance[chosen], self.edges) - 1
-        inside = (number >= 0) & (number < len(self.sums))
-        np.add.at(self.sums, number[inside], force[chosen][inside])
-        np.add.at(self.counts, number[inside], 1)
-
-    def means(self) -> Floats:
-        """Mean force between the edges, NaN where there is none."""
-        with np.errstate(invalid="ignore"):
-            return np.asarray(self.sums / self.counts)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from pydantic import JsonValue
 
-from dragchain.arrays import Floats
 from dragchain.documents import Part
 from dragchain.drag.force import read_counted
-from dragchain.statistics.bed_effects import Fit, fit_effects
+from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.estimate import Estimate
 from dragchain.validation.runs_by_bed import Point, Points
 
@@ -82,52 +80,30 @@ def effect_table(rows: Sequence[Effect]) -> pd.DataFrame:
     return pd.DataFrame([dict(row) for row in rows], columns=list(Effect.model_fields))
 
 
-@dataclass(frozen=True)
-class _Design:
-    """The runs, with a mean of its own for every setting."""
-
-    points: list[Point]
-
-    @property
-    def settings(self) -> list[tuple[object, ...]]:
-        return list(dict.fromkeys(point.setting for point in self.points))
-
-    def indicator(self, point: Point) -> Floats:
-        return np.array([float(point.setting == other) for other in self.settings])
-
-    def fit(self, sizes: Sequence[float]) -> Fit:
-        """Fit the logarithms of a quantity."""
-        design = np.array([self.indicator(point) for point in self.points])
-        weights = np.sqrt([point.measures.arc_m for point in self.points])
-        weights /= weights.max()
-        runs = range(len(self.points))
-        return fit_effects(weights[:, None] * design, weights * np.log(sizes), runs)
-
-    def base(self, point: Point) -> Point:
-        """What a point is to be compared with."""
-        alike = (
-            one for one in self.points if one.parameters == point.parameters and not one.changed
-        )
-        return next(alike, self.points[0]) if point.changed else self.points[0]
+def _base(points: Points, point: Point) -> Point:
+    """What a point is to be compared with."""
+    alike = (one for one in points.all if one.fidelity == point.fidelity and not one.changed)
+    return next(alike, points.all[0]) if point.changed else points.all[0]
 
 
 def _of_quantity(points: Points, quantity: str, sizes: Sequence[float]) -> Iterator[Effect]:
-    design = _Design(points.all)
-    fit = design.fit(sizes)
-    for setting in design.settings[1:]:
+    settings = list(dict.fromkeys(point.setting for point in points.all))
+    units = dict(zip(settings, np.eye(len(settings)), strict=True))
+    design = np.array([units[point.setting] for point in points.all])
+    weights = np.sqrt([point.measures.arc_m for point in points.all])
+    weights /= weights.max()
+    fit = fit_effects(weights[:, None] * design, weights * np.log(sizes), range(len(weights)))
+    for setting in settings[1:]:
         own = [point for point in points.all if point.setting == setting]
-        point, base = own[0], design.base(own[0])
+        point, base = own[0], _base(points, own[0])
         field, value = next(iter(point.changed.items()), ("", None))
         before = base.measures.inputs.get(field)
-        logarithm = fit.estimate(design.indicator(point) - design.indicator(base))
-        change = Estimate(*(math.expm1(edge) for edge in vars(logarithm).values()))
+        logarithm = fit.estimate(units[point.setting] - units[base.setting])
+        change = logarithm.mapped(math.expm1)
         exponent = _exponent(logarithm, value, before) if len(point.changed) == 1 else None
-        modulus, step, speed = point.parameters
         yield Effect(
             quantity=quantity,
-            youngs_modulus_scale=modulus,
-            timestep_fraction=step,
-            speed_factor=speed,
+            **point.fidelity.parameters(),
             runs=len(own),
             field=field,
             value=value,
@@ -143,10 +119,6 @@ def _of_quantity(points: Points, quantity: str, sizes: Sequence[float]) -> Itera
 
 def _exponent(change: Estimate, new: JsonValue, old: JsonValue) -> Estimate | None:
     """Exponent of a change, in logarithms, over that of its input; None without a ratio of both."""
-    if not (isinstance(new, int | float) and isinstance(old, int | float)):
+    if not (isinstance(new, int | float) and isinstance(old, int | float) and min(new, old) > 0):
         return None
-    if new <= 0 or old <= 0:
-        return None
-    scale = math.log(new / old)
-    low, high = sorted((change.ci95_low / scale, change.ci95_high / scale))
-    return Estimate(change.value / scale, low, high)
+    return change.over(math.log(new / old))

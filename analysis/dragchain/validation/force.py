@@ -14,7 +14,7 @@ from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
 from dragchain.run.case import Case
 from dragchain.run.kinematics import drag_start_s
-from dragchain.run.reference import ReferenceDrag, reference_drags
+from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.statistics.estimate import Estimate, Real
 from dragchain.validation.runs_by_bed import Point, over_packings
@@ -148,18 +148,9 @@ def of_packings(packings: Sequence[Point]) -> Force:
 
 def _packing_force(point: Point) -> PackingForce:
     samples, own = read_counted(point.folder, _COMPONENTS), point.measures
-    drag, lateral, vertical = (estimate_mean(samples[name].to_numpy()) for name in _COMPONENTS)
-    return PackingForce(
-        run=point.case.run,
-        seed=point.seed,
-        bed_height_m=own.single["bed_height"],
-        arc_m=own.arc_m,
-        steps=own.cost.steps,
-        cpu_time_s=own.cost.cpu_time_s,
-        drag_n=drag,
-        lateral_n=lateral,
-        vertical_n=vertical,
-    )
+    forces = {name: estimate_mean(samples[name].to_numpy()) for name in _COMPONENTS}
+    numbers = {"seed": point.seed, "bed_height_m": own.single["bed_height"]}
+    return PackingForce.model_validate({**dict(own), **dict(own.cost), **numbers, **forces})
 
 
 def _together(means: Sequence[MeanEstimate]) -> Together:
@@ -247,14 +238,13 @@ def _half_wave(waves: Floats, density: Floats) -> float:
 
 def compare(drag: Together, case: Case) -> tuple[Compared, ...]:
     """Mean and standard deviation of the drag beside every reference figure of the study."""
-    return tuple(_against(drag, reference) for reference in reference_drags(case.reference))
-
-
-def _against(drag: Together, reference: ReferenceDrag) -> Compared:
-    return Compared(
-        label=reference.label,
-        mean_n=reference.mean_n,
-        std_n=reference.std_n,
-        difference=reference.difference(drag.mean),
-        std_ratio=drag.std.over(reference.std_n) if reference.std_n else None,
+    return tuple(
+        Compared(
+            label=reference.label,
+            mean_n=reference.mean_n,
+            std_n=reference.std_n,
+            difference=reference.difference(drag.mean),
+            std_ratio=drag.std.over(reference.std_n) if reference.std_n else None,
+        )
+        for reference in reference_drags(case.reference)
     )

@@ -15,7 +15,7 @@ from dragchain.errors import SeriesError, TableError
 from dragchain.run.case import Case, load_case
 from dragchain.statistics.estimate import Estimate, mean_of
 from dragchain.tradeoff.measures import FILE, Measures
-from dragchain.tradeoff.runs import changed_settings
+from dragchain.tradeoff.runs import Setting, changed_settings
 
 _FEWEST = 2
 """Packings below which nothing is known of the differences between them."""
@@ -40,10 +40,9 @@ class Point:
     changed: Mapping[str, JsonValue]
 
     @property
-    def parameters(self) -> tuple[float, float, float]:
+    def fidelity(self) -> Setting:
         """Modulus scale, time step over the Rayleigh time, and speed factor."""
-        own = self.measures.fidelity
-        return own.youngs_modulus_scale, own.timestep_fraction, own.speed_factor
+        return Setting.of(self.measures.fidelity)
 
     @property
     def seed(self) -> int:
@@ -53,7 +52,7 @@ class Point:
     @property
     def setting(self) -> tuple[object, ...]:
         """What runs that differ in their bed alone have in common."""
-        return (*self.parameters, json.dumps(self.changed, sort_keys=True))
+        return (self.fidelity, json.dumps(self.changed, sort_keys=True))
 
 
 @dataclass(frozen=True)
@@ -140,4 +139,4 @@ def over_packings(values: Sequence[float], *, ratio: bool = False) -> Estimate:
     if not np.isfinite(numbers).all():
         return Estimate(math.nan, math.nan, math.nan)
     mean = mean_of(numbers)
-    return Estimate(*(math.exp(edge) for edge in vars(mean).values())) if ratio else mean
+    return mean.mapped(math.exp) if ratio else mean

@@ -9,29 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import pandas as pd
 
 from dragchain.contact_law.impact import elastic_time, hertz_force, hertz_overlap, largest_overlap
 from dragchain.errors import TableError
 from dragchain.run.kinematics import needed
+from dragchain.verification import quantities
 from dragchain.verification.published import published
-from dragchain.verification.quantities import (
-    QUANTITIES,
-    abscissa,
-    column_loads,
-    convergence,
-    fitted_order,
-    flight_energy,
-    incline_reference,
-    incline_slopes,
-    last_fifth,
-    momentum_changes,
-    second_half,
-    series_name,
-)
 from dragchain.verification.recording import RecordedContact, Recording
 
 _NORMAL = 1.0
@@ -77,45 +64,6 @@ Verdict = Literal["pass", "fail", "agrees", "differs"]
 """``pass`` or ``fail`` against the same law, ``agrees`` or ``differs`` against another one."""
 
 
-@dataclass(frozen=True)
-class Check:
-    """One comparison.
-
-    Attributes
-    ----------
-    number, test, series : int, str, str
-        Which test.
-    quantity : str
-        With its unit at the end.
-    x_name, x : str, float
-        What varies in the test and its value; NaN if nothing does.
-    against : str
-        What the engine is compared with.
-    reference, engine : float
-    scale : float
-        Largest absolute reference of the series, or 1 for a ratio.
-    error : float
-        Of the engine, over `scale`.
-    tolerance : float
-        Allowed error.
-    verdict : str
-    """
-
-    number: int
-    test: str
-    series: str
-    quantity: str
-    x_name: str
-    x: float
-    against: str
-    reference: float
-    engine: float
-    scale: float
-    error: float
-    tolerance: float
-    verdict: Verdict
-
-
 Values = Sequence[tuple[float, float, float]]
 """Rows of x, reference and engine."""
 
@@ -127,37 +75,41 @@ def compare(
     values: Values,
     tolerance: float,
     scale: float | None = None,
-) -> list[Check]:
-    """Compare a quantity over a series; the scale is its largest reference unless given."""
-    size = scale or max((abs(reference) for _, reference, _ in values), default=0.0) or 1.0
-    verdicts: tuple[Verdict, Verdict] = ("agrees", "differs")
-    if against in JUDGED:
-        verdicts = ("pass", "fail")
-    checks = []
-    for x, reference, engine in values:
-        error = abs(engine - reference) / size
-        checks.append(
-            Check(
-                number=run.case.number,
-                test=run.case.test,
-                series=series_name(run),
-                quantity=quantity,
-                x_name=run.case.vary,
-                x=x,
-                against=against,
-                reference=reference,
-                engine=engine,
-                scale=size,
-                error=error,
-                tolerance=tolerance,
-                verdict=verdicts[0] if error <= tolerance else verdicts[1],
-            )
-        )
-    return checks
+) -> pd.DataFrame:
+    """Compare a quantity over a series; the scale is its largest reference unless given.
+
+    Returns
+    -------
+    DataFrame
+        One row per value. ``x_name`` and ``x`` are what varies in the test and its value (NaN if
+        nothing does), ``scale`` is the largest absolute reference of the series, or 1 for a
+        ratio, and ``error`` is that of the engine divided by it.
+    """
+    x, reference, engine = np.array(values, dtype=np.float64).reshape(-1, 3).T
+    size = scale or float(np.abs(reference).max(initial=0.0)) or 1.0
+    error = np.abs(engine - reference) / size
+    verdicts = ("pass", "fail") if against in JUDGED else ("agrees", "differs")
+    return pd.DataFrame(
+        {
+            "number": run.case.number,
+            "test": run.case.test,
+            "series": quantities.series_name(run),
+            "quantity": quantity,
+            "x_name": run.case.vary,
+            "x": x,
+            "against": against,
+            "reference": reference,
+            "engine": engine,
+            "scale": size,
+            "error": error,
+            "tolerance": tolerance,
+            "verdict": np.where(error <= tolerance, *verdicts),
+        }
+    )
 
 
-def judge(runs: Sequence[Recording]) -> list[Check]:
-    """All checks of all runs, in the order of the tests.
+def judge(runs: Sequence[Recording]) -> pd.DataFrame:
+    """All comparisons of all runs, one per row, in the order of the tests.
 
     Raises
     ------
@@ -167,12 +119,13 @@ def judge(runs: Sequence[Recording]) -> list[Check]:
     for run in runs:
         if run.case.test not in CHECKS:
             raise TableError(f"{run.case.run}: the suite has no test {run.case.test!r}")
-    checks = [check for run in runs for check in CHECKS[run.case.test](run)]
+    checks = [rows for run in runs for rows in CHECKS[run.case.test](run)]
     checks += _order_of_convergence([run for run in runs if run.case.test == "time_step"])
-    return sorted(checks, key=lambda check: check.number)
+    table = pd.concat([rows for rows in checks if len(rows)])
+    return table.sort_values("number", kind="stable", ignore_index=True)
 
 
-def _elastic(run: Recording) -> Iterator[Check]:
+def _elastic(run: Recording) -> Iterator[pd.DataFrame]:
     impact, contact = run.contact, run.contact.constants
     overlap = np.maximum(impact.overlap_m, 0.0)
     force = np.abs(run.force_n[:, impact.at, 2])
@@ -186,36 +139,36 @@ def _elastic(run: Recording) -> Iterator[Check]:
         ("rebound_over_approach", 1.0, impact.rebound),
     ):
         tolerance = _SECOND_ORDER / run.case.steps_per_contact
-        yield from compare(run, quantity, EXACT, [(math.nan, reference, engine)], tolerance)
+        yield compare(run, quantity, EXACT, [(math.nan, reference, engine)], tolerance)
     worst = float(np.abs(force - hertz_force(contact, overlap)).max())
-    yield from compare(
+    yield compare(
         run, "force_at_any_overlap_n", EXACT, [(math.nan, 0.0, worst)], _SAME_NUMBERS, strongest
     )
     for value in published(run.case.test, run.case.series, "force_n").y:
         row = (math.nan, float(value), float(force.max()))
-        yield from compare(run, "force_n", _PUBLISHED, [row], READ_OFF)
+        yield compare(run, "force_n", _PUBLISHED, [row], READ_OFF)
 
 
-def _rebounds(run: Recording) -> Iterator[Check]:
+def _rebounds(run: Recording) -> Iterator[pd.DataFrame]:
     rows = [(impact.value, impact.constants.rebound, impact.rebound) for impact in run.contacts]
     tolerance = _NORMAL / run.case.steps_per_contact
-    yield from compare(run, "rebound_over_approach", EXACT, rows, tolerance, 1.0)
+    yield compare(run, "rebound_over_approach", EXACT, rows, tolerance, 1.0)
 
 
-def _restitution(run: Recording) -> Iterator[Check]:
+def _restitution(run: Recording) -> Iterator[pd.DataFrame]:
     yield from _rebounds(run)
     if run.case.limit_force:
         rows = [(each.value, each.constants.restitution, each.rebound) for each in run.contacts]
         tolerance = _NORMAL / run.case.steps_per_contact
-        yield from compare(run, "rebound_over_approach", _INPUT, rows, tolerance, 1.0)
+        yield compare(run, "rebound_over_approach", _INPUT, rows, tolerance, 1.0)
 
 
-def _oblique(run: Recording) -> Iterator[Check]:
+def _oblique(run: Recording) -> Iterator[pd.DataFrame]:
     case, impacts = run.case, run.contacts
     tolerance = _OBLIQUE / case.steps_per_contact
     arm = max(_arm(impact) for impact in impacts)
     yield from _rebounds(run)
-    for quantity, derive in QUANTITIES[case.test].items():
+    for quantity, derive in quantities.QUANTITIES[case.test].items():
         curve = published(case.test, case.series, quantity)
         same, sliding, drawn = [], [], []
         for impact in impacts:
@@ -224,12 +177,12 @@ def _oblique(run: Recording) -> Iterator[Check]:
             same.append((x, derive(contact, before, impact.integrated), engine))
             if impact.slid is not None:
                 sliding.append((x, derive(contact, before, impact.slid), engine))
-            if curve.spans(at := abscissa(impact, quantity)):
+            if curve.spans(at := quantities.abscissa(impact, quantity)):
                 drawn.append((x, curve.at(at), engine))
-        yield from compare(run, quantity, _INTEGRATED, same, tolerance)
+        yield compare(run, quantity, _INTEGRATED, same, tolerance)
         scale = max(abs(reference) for _, reference, _ in same)
-        yield from compare(run, quantity, COULOMB, sliding, tolerance + arm, scale)
-        yield from compare(run, quantity, _PUBLISHED, drawn, READ_OFF_CURVE, scale)
+        yield compare(run, quantity, COULOMB, sliding, tolerance + arm, scale)
+        yield compare(run, quantity, _PUBLISHED, drawn, READ_OFF_CURVE, scale)
 
 
 def _arm(impact: RecordedContact) -> float:
@@ -238,62 +191,70 @@ def _arm(impact: RecordedContact) -> float:
     return largest_overlap(contact, impact.before.normal_m_s) / contact.particle.radius_m
 
 
-def _time_step(run: Recording) -> Iterator[Check]:
+def _time_step(run: Recording) -> Iterator[pd.DataFrame]:
     row = (math.nan, run.contact.constants.rebound, run.contact.rebound)
     tolerance = _NORMAL / run.case.steps_per_contact
-    yield from compare(run, "rebound_over_approach", EXACT, [row], tolerance, 1.0)
+    yield compare(run, "rebound_over_approach", EXACT, [row], tolerance, 1.0)
 
 
-def _order_of_convergence(runs: Sequence[Recording]) -> list[Check]:
+def _order_of_convergence(runs: Sequence[Recording]) -> list[pd.DataFrame]:
     """The order at which the rebound with limited force approaches its exact value."""
     limited = [run for run in runs if run.case.limit_force]
     if len(limited) < 3:
         return []
-    row = (math.nan, 1.0, fitted_order(convergence(limited)[True]))
+    row = (math.nan, 1.0, quantities.fitted_order(quantities.convergence(limited)[True]))
     checks = compare(limited[-1], "order_of_convergence", EXACT, [row], _ORDER, 1.0)
     name = f"{limited[-1].case.series}, limitForce on, all steps"
-    return [replace(check, series=name) for check in checks]
+    return [checks.assign(series=name)]
 
 
-def _bounce(run: Recording) -> Iterator[Check]:
-    impacts, energy = flight_energy(run)
+def _bounce(run: Recording) -> Iterator[pd.DataFrame]:
+    impacts, energy = quantities.flight_energy(run)
     least = needed(run.case.impacts, "impacts")
     enough = float(min(int(impacts[-1]), least))
-    yield from compare(run, "impacts", EXACT, [(math.nan, float(least), enough)], 0.0)
+    yield compare(run, "impacts", EXACT, [(math.nan, float(least), enough)], 0.0)
     worst = float(np.abs(energy - 1).max())
-    yield from compare(run, "energy_change", EXACT, [(math.nan, 0.0, worst)], _BOUNCES, 1.0)
+    yield compare(run, "energy_change", EXACT, [(math.nan, 0.0, worst)], _BOUNCES, 1.0)
 
 
-def _momentum(run: Recording) -> Iterator[Check]:
+def _momentum(run: Recording) -> Iterator[pd.DataFrame]:
     for at, quantity in enumerate(("linear_momentum_change", "angular_momentum_change")):
         rows = [
-            (contact.value, 0.0, float(np.linalg.norm(momentum_changes(contact)[at], axis=1).max()))
+            (
+                contact.value,
+                0.0,
+                float(np.linalg.norm(quantities.momentum_changes(contact)[at], axis=1).max()),
+            )
             for contact in run.contacts
         ]
-        yield from compare(run, quantity, EXACT, rows, _CONSERVED, 1.0)
+        yield compare(run, quantity, EXACT, rows, _CONSERVED, 1.0)
 
 
-def _column(run: Recording) -> Iterator[Check]:
-    loads = column_loads(run)
-    floor = float(run.wall_force_n["plane"][last_fifth(run), 0, 2].mean())
-    yield from compare(run, "floor_force_n", EXACT, [(math.nan, loads[0][1], floor)], _AT_REST)
+def _column(run: Recording) -> Iterator[pd.DataFrame]:
+    loads = quantities.column_loads(run)
+    floor = float(run.wall_force_n["plane"][quantities.last_fifth(run), 0, 2].mean())
+    yield compare(run, "floor_force_n", EXACT, [(math.nan, loads[0][1], floor)], _AT_REST)
     rows = [
         (float(at), hertz_overlap(contact, weight), overlap)
         for at, (contact, weight, overlap) in enumerate(loads, start=1)
     ]
-    yield from compare(run, "overlap_m", EXACT, rows, _AT_REST)
+    yield compare(run, "overlap_m", EXACT, rows, _AT_REST)
 
 
-def _incline(run: Recording) -> Iterator[Check]:
+def _incline(run: Recording) -> Iterator[pd.DataFrame]:
     for at, quantity in enumerate(("acceleration_m_s2", "spin_up_rad_s2")):
         rows = [
-            (contact.value, incline_reference(contact)[at], incline_slopes(contact)[at])
+            (
+                contact.value,
+                quantities.incline_reference(contact)[at],
+                quantities.incline_slopes(contact)[at],
+            )
             for contact in run.contacts
         ]
-        yield from compare(run, quantity, EXACT, rows, _FITTED)
+        yield compare(run, quantity, EXACT, rows, _FITTED)
     angle = math.radians(needed(run.case.angle_deg, "angle_deg"))
     gravity = math.hypot(*run.case.gravity_m_s2) * math.cos(angle)
-    force = run.wall_force_n["plane"][second_half(run)]
+    force = run.wall_force_n["plane"][quantities.second_half(run)]
     weights = [
         (
             contact.value,
@@ -302,14 +263,14 @@ def _incline(run: Recording) -> Iterator[Check]:
         )
         for contact in run.contacts
     ]
-    yield from compare(run, "normal_force_n", EXACT, weights, _FITTED)
+    yield compare(run, "normal_force_n", EXACT, weights, _FITTED)
 
 
-CHECKS: Mapping[str, Callable[[Recording], Iterator[Check]]] = {
+CHECKS: Mapping[str, Callable[[Recording], Iterator[pd.DataFrame]]] = {
     "elastic_pair": _elastic,
     "elastic_plane": _elastic,
     "restitution": _restitution,
-    **dict.fromkeys(QUANTITIES, _oblique),
+    **dict.fromkeys(quantities.QUANTITIES, _oblique),
     "time_step": _time_step,
     "bounce": _bounce,
     "momentum": _momentum,

@@ -29,51 +29,36 @@ def series_name(run: Recording) -> str:
     return f"{name}, {case.steps_per_contact} steps a contact" if steps else name
 
 
-def _spin(contact: Contact, before: Motion, after: Motion) -> float:
-    return after.spin_rad_s
-
-
-def _tangential(contact: Contact, before: Motion, after: Motion) -> float:
-    return after.tangential_m_s
-
-
-def _tangential_ratio(contact: Contact, before: Motion, after: Motion) -> float:
-    return after.tangential_m_s / before.tangential_m_s
-
-
-def _rebound_angle(contact: Contact, before: Motion, after: Motion) -> float:
-    return math.degrees(math.atan2(after.patch_m_s(contact), after.normal_m_s))
-
-
-def _scaled_patch(contact: Contact, before: Motion, after: Motion) -> float:
-    return after.patch_m_s(contact) / (contact.friction * after.normal_m_s)
-
-
-def _scaled_spin(contact: Contact, before: Motion, after: Motion) -> float:
-    surface = contact.particle.radius_m * after.spin_rad_s
-    return surface / (contact.friction * before.normal_m_s)
-
-
-def _patch_ratio(contact: Contact, before: Motion, after: Motion) -> float:
-    return -after.patch_m_s(contact) / before.patch_m_s(contact)
-
-
-def _recoil(contact: Contact, before: Motion, after: Motion) -> float:
-    return after.patch_m_s(contact) / after.normal_m_s
-
-
 _OBLIQUE: Mapping[str, Derived] = {
-    "tangential_restitution": _tangential_ratio,
-    "spin_rad_s": _spin,
-    "rebound_angle_deg": _rebound_angle,
+    "tangential_restitution": lambda _, before, after: after.tangential_m_s / before.tangential_m_s,
+    "spin_rad_s": lambda _, before, after: after.spin_rad_s,
+    "rebound_angle_deg": lambda contact, _, after: math.degrees(
+        math.atan2(after.patch_m_s(contact), after.normal_m_s)
+    ),
 }
-_SPUN: Mapping[str, Derived] = {"patch_restitution": _patch_ratio, "recoil_tangent": _recoil}
-_SPUN_PAIR: Mapping[str, Derived] = {"tangential_m_s": _tangential, "spin_rad_s": _spin}
+_SCALED: Mapping[str, Derived] = {
+    "scaled_patch": lambda contact, _, after: (
+        after.patch_m_s(contact) / (contact.friction * after.normal_m_s)
+    ),
+    "scaled_spin": lambda contact, before, after: (
+        contact.particle.radius_m * after.spin_rad_s / (contact.friction * before.normal_m_s)
+    ),
+}
+_SPUN: Mapping[str, Derived] = {
+    "patch_restitution": lambda contact, before, after: (
+        -after.patch_m_s(contact) / before.patch_m_s(contact)
+    ),
+    "recoil_tangent": lambda contact, _, after: after.patch_m_s(contact) / after.normal_m_s,
+}
+_SPUN_PAIR: Mapping[str, Derived] = {
+    "tangential_m_s": lambda _, before, after: after.tangential_m_s,
+    "spin_rad_s": lambda _, before, after: after.spin_rad_s,
+}
 
 QUANTITIES: Mapping[str, Mapping[str, Derived]] = {
     "oblique_angle": _OBLIQUE,
     "oblique_study": _OBLIQUE,
-    "oblique_tangential": {"scaled_patch": _scaled_patch, "scaled_spin": _scaled_spin},
+    "oblique_tangential": _SCALED,
     "spin_plane": _SPUN,
     "spin_pair": _SPUN_PAIR,
     "spin_pair_same": _SPUN_PAIR,

@@ -9,17 +9,16 @@ from itertools import groupby
 from pathlib import Path
 from typing import get_args
 
-import matplotlib
 import pandas as pd
 
 from dragchain.contact_law.hertz import tangential_damping_ratio
 from dragchain.contact_law.impact import limited_restitution
 from dragchain.errors import RejectedRunError, TableError
-from dragchain.figures.style import STYLE, png
+from dragchain.figures.style import drawing, png
 from dragchain.report.bundle import write_bundle
 from dragchain.report.page import data_uri, render_page
 from dragchain.tables.by_step import read_table
-from dragchain.verification.checks import CHECKS, JUDGED, Check, Verdict, judge
+from dragchain.verification.checks import CHECKS, JUDGED, Verdict, judge
 from dragchain.verification.experiment import Experiment
 from dragchain.verification.figures import draw
 from dragchain.verification.published import published
@@ -86,18 +85,13 @@ def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> None:
     if not run_dirs:
         raise TableError("no folder of a run is given, so there is nothing to verify")
     runs = [read_recording(folder) for folder in run_dirs]
-    checks = check_table(judge(runs))
+    checks = judge(runs)
     summary = summarise(checks)
     write_bundle(
         out_dir,
         tables={"checks": checks, "verification": summary},
         pages={"verification": render(runs, summary)},
     )
-
-
-def check_table(checks: Sequence[Check]) -> pd.DataFrame:
-    """One row per comparison."""
-    return pd.DataFrame([vars(check) for check in checks])
 
 
 def summarise(checks: pd.DataFrame) -> pd.DataFrame:
@@ -161,7 +155,7 @@ def render(runs: Sequence[Recording], summary: pd.DataFrame) -> str:
 def _section(test: str, runs: Sequence[Recording], summary: pd.DataFrame) -> Section:
     rows = summary[summary["test"] == test]
     judged = rows["against"].isin(JUDGED)
-    with matplotlib.rc_context(STYLE):
+    with drawing():
         picture = data_uri(png(draw(test, runs)))
     return Section(
         case=runs[0].case,

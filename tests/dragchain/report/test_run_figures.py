@@ -33,10 +33,8 @@ from dragchain.network.frame import NetworkFrame
 from dragchain.network.write import write_chains
 from dragchain.report.collect import compare
 from dragchain.report.findings import FILE, DropFindings, FillingFindings, ProcessFindings
-from dragchain.report.process_figures import drag_of_cases
 from dragchain.report.run_data import dominant_bottlenecks
-from dragchain.report.run_figures import FIGURES, write_figures
-from dragchain.report.upstream_figures import energy_ratio
+from dragchain.report.run_figures import FIGURES, drag_of_cases, energy_ratio, write_figures
 from dragchain.run.case import Case, PublishedDrag, Reference, load_case
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean

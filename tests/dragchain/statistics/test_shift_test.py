@@ -16,7 +16,6 @@ from dragchain.statistics.shift_test import (
     draw_shifts,
     holm,
     joint,
-    mean_over_runs,
     shift_test,
     shifted_means,
     standardised,
@@ -90,14 +89,6 @@ def test_the_band_holds_for_95_percent_of_shifts() -> None:
     # several shifts share one maximum, so that more than 95 % can be inside
     assert np.mean(np.array(largest) <= width) >= 0.95
     assert np.mean(np.array(largest) < 0.999 * width) < 0.95
-
-
-def test_the_mean_over_runs_leaves_out_runs_without_a_number() -> None:
-    both = mean_over_runs([1.0, float("nan"), 3.0])
-    assert both.value == 2.0
-    assert both.ci95_high - both.value == pytest.approx(12.706, rel=1e-4)  # t of 1 degree, s.e. 1
-    assert mean_over_runs([1.0]).value == 1.0 and not mean_over_runs([1.0]).known
-    assert math.isnan(mean_over_runs([]).value)
 
 
 def test_false_positives_are_as_many_as_the_level_says() -> None:

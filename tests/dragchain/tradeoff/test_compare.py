@@ -29,7 +29,6 @@ from dragchain.tradeoff.outcome import (
     choose,
     error_table,
     largest_bound,
-    recommend,
     run_table,
 )
 from dragchain.tradeoff.runs import Setting, read_runs
@@ -70,20 +69,20 @@ def test_a_signed_quantity_counts_in_mean_drags(tradeoff: Tradeoff) -> None:
 
 def test_costs_and_the_certified_choice(tradeoff: Tradeoff) -> None:
     assert tradeoff.cost(Setting(*SOFT)) == pytest.approx(0.1)
-    assert recommend(tradeoff, "workpiece_contacts", 0.05) == Setting(*BOTH)
-    assert recommend(tradeoff, "drag_mean", 0.05) == Setting(*COARSE)
-    assert recommend(tradeoff, "drag_mean", 0.2) == Setting(*BOTH)
-    assert recommend(tradeoff, "drag_mean", 1e-6) is None
-    assert recommend(tradeoff, "no such quantity", 1.0) is None
-    assert recommend(tradeoff, ["workpiece_contacts", "drag_mean"], 0.05) == Setting(*COARSE)
+    assert choose(tradeoff, ["workpiece_contacts"], 0.05).setting == Setting(*BOTH)
+    assert choose(tradeoff, ["drag_mean"], 0.05).setting == Setting(*COARSE)
+    assert choose(tradeoff, ["drag_mean"], 0.2).setting == Setting(*BOTH)
+    assert choose(tradeoff, ["drag_mean"], 1e-6).setting is None
+    assert choose(tradeoff, ["no such quantity"], 1.0).setting is None
+    assert choose(tradeoff, ["workpiece_contacts", "drag_mean"], 0.05).setting == Setting(*COARSE)
 
 
 def test_a_tolerance_is_compared_with_the_bound(tradeoff: Tradeoff) -> None:
     bound = largest_bound(tradeoff, ["drag_mean"], Setting(*COARSE))
     error = tradeoff.comparisons["drag_mean"].errors[Setting(*COARSE)].value
     between = 0.5 * (abs(error) + bound)
-    assert recommend(tradeoff, "drag_mean", between) is None
-    assert recommend(tradeoff, "drag_mean", bound) == Setting(*COARSE)
+    assert choose(tradeoff, ["drag_mean"], between).setting is None
+    assert choose(tradeoff, ["drag_mean"], bound).setting == Setting(*COARSE)
     choice = choose(tradeoff, ["drag_mean"], between)
     assert choice.setting is None and choice.nearest == Setting(*COARSE)
     assert choice.bound == bound
@@ -97,7 +96,7 @@ def test_a_setting_with_one_run_or_a_failed_one_is_not_offered(tmp_path: Path) -
         measures(BOTH, 4, rng, cpu_time_s=5.0, failure=FAILURE),
     ]
     tradeoff = made(tmp_path, found)
-    assert recommend(tradeoff, "workpiece_contacts", 0.2) == Setting(*SOFT)
+    assert choose(tradeoff, ["workpiece_contacts"], 0.2).setting == Setting(*SOFT)
     table = run_table(tradeoff)
     assert table["failure"].tolist()[-1] == "every particle kept: 12 particles"
     assert table["complete"].sum() == len(found) - 1
@@ -135,7 +134,7 @@ def test_a_quantity_that_is_missing_or_changes_sign_is_skipped(tmp_path: Path) -
     assert set(tradeoff.skipped) == {"chain_length", "chain_count"}
     assert "no run at the reference" in tradeoff.skipped["chain_length"]
     assert "changes its sign" in tradeoff.skipped["chain_count"]
-    assert recommend(tradeoff, "chain_length", 1.0) is None
+    assert choose(tradeoff, ["chain_length"], 1.0).setting is None
 
 
 def test_a_combination_that_breaks_additivity_gets_an_error_of_its_own(tmp_path: Path) -> None:
@@ -167,7 +166,7 @@ def test_a_step_that_changes_the_drag_breaks(tmp_path: Path) -> None:
     tradeoff = made(tmp_path, found)
     assert breaks(tradeoff, Setting(*COARSE))
     assert not breaks(tradeoff, Setting(*SOFT)) and not breaks(tradeoff, Setting(*REFERENCE))
-    assert recommend(tradeoff, "workpiece_contacts", 0.5) != Setting(*COARSE)
+    assert choose(tradeoff, ["workpiece_contacts"], 0.5).setting != Setting(*COARSE)
 
 
 def test_files_that_cannot_be_used_are_refused(tmp_path: Path) -> None:

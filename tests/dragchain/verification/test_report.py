@@ -10,19 +10,13 @@ from recordings import recording
 
 from dragchain.errors import RejectedRunError
 from dragchain.verification import checks
-from dragchain.verification.report import (
-    check_table,
-    published_spins,
-    quantity,
-    summarise,
-    verdict,
-)
+from dragchain.verification.report import published_spins, quantity, summarise, verdict
 
 
 def test_the_summary_keeps_the_worst_point_and_a_failure_is_named(tmp_path: Path) -> None:
     rows = [(0.0, 2.0, 2.0), (7.0, 2.0, 2.2)]
     found = checks.compare(recording([[1.0]]), "force_n", checks.EXACT, rows, 0.02)
-    summary = summarise(check_table(found))
+    summary = summarise(found)
     assert summary[["x", "points", "verdict"]].values.tolist() == [[7.0, 2, "fail"]]
     summary.to_parquet(tmp_path / "verification.parquet")
     with pytest.raises(RejectedRunError, match=r"elastic_plane, s on s, force_n: error 0\.1"):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dragdeck.decks.outputs import OutputOfRun
-from dragdeck.engine.completeness import coverage, cut_damage, first_gap
+from dragdeck.engine.completeness import coverage, cut_outputs, first_gap
 from dragdeck.engine.record import RunPart
 
 FORCE = OutputOfRun(
@@ -64,9 +64,18 @@ def test_the_first_missing_step_is_found(
 def test_what_follows_a_hole_is_cut(tmp_path: Path) -> None:
     file = tmp_path / "force.1.txt"
     file.write_text(rows(10, 20) + "30 1.\x00\x00\n40 1.5\n")
-    assert cut_damage(tmp_path, {"force": FORCE}, parts(0)) == [file]
+    assert cut_outputs(tmp_path, {"force": FORCE}, parts(0), 60) == [file.name]
     assert file.read_text() == rows(10, 20)
-    assert cut_damage(tmp_path, {"force": FORCE}, parts(0)) == []
+    assert cut_outputs(tmp_path, {"force": FORCE}, parts(0), 60) == []
+
+
+def test_what_the_next_part_writes_again_is_cut(tmp_path: Path) -> None:
+    file = tmp_path / "force.1.txt"
+    file.write_text(rows(10, 20) + rows(30))
+    assert cut_outputs(tmp_path, {"force": FORCE}, parts(0), 20) == []
+    assert file.read_text() == rows(10, 20) + HEAD
+    cut_outputs(tmp_path, {"force": FORCE}, parts(0), -1)
+    assert file.read_text() == HEAD
 
 
 def test_an_output_that_the_engine_decides_on_has_no_gap(tmp_path: Path) -> None:

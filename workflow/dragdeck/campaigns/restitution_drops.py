@@ -17,19 +17,12 @@ import numpy as np
 
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
-from dragdeck.decks.case_file import CaseFile
 from dragdeck.decks.templates import environment
 from dragdeck.documents import Document, Part
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report, say
 from dragdeck.errors import InputError
-from dragdeck.physics.contact_mechanics import (
-    effective_modulus,
-    fall_speed,
-    hertz_contact_time,
-    particle_mass,
-    rayleigh_time,
-)
+from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.physics.rounding import timestep
 from dragdeck.project import find_project, study_templates
 from dragdeck.scenes.drop_test import DropFidelity, drop_scene
@@ -235,19 +228,15 @@ def trials(study: Study, count: int, seed: int) -> Iterator[Drop]:
 
 def full(study: Study, fraction: float) -> DropFidelity:
     """Full modulus, and a step that is a share of the mean particle's Rayleigh time."""
-    rayleigh = rayleigh_time(particle_material(study), study.media.radius_mean_m)
+    rayleigh = mechanics.rayleigh_time(particle_material(study), study.media.radius_mean_m)
     return DropFidelity(1.0, timestep(rayleigh, fraction))
 
 
 def _height(study: Study, fidelity: DropFidelity, phase: float) -> float:
     """The study's height, less or more by up to half of a step's path at the plate, m."""
-    return study.drop_test.height_m + (phase - 0.5) * _step_path(study, fidelity)
-
-
-def _step_path(study: Study, fidelity: DropFidelity) -> float:
-    """How far the particle falls in the step in which it meets the plate, m."""
-    speed = fall_speed(study.drop_test.height_m, study.gravity_m_s2)
-    return speed * (fidelity.timestep_s or 0.0)
+    height = study.drop_test.height_m
+    step_path = mechanics.fall_speed(height, study.gravity_m_s2) * (fidelity.timestep_s or 0.0)
+    return height + (phase - 0.5) * step_path
 
 
 def drop_case(case: Case, drop: Drop) -> Case:
@@ -294,7 +283,10 @@ def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -
     for number, drop in enumerate(drops, start=1):
         scene = drop_scene(drop_case(case, drop), drop.fidelity)
         batch.result(drop.name, scene)
-        rows.append(_row(drop, scene.case))
+        step = scene.case.timestep_s
+        steps = {"timestep_s": step, "timestep_fraction": step / scene.case.rayleigh_time_s}
+        known = {**vars(drop), **vars(drop.fidelity), **steps, "folder": drop.name}
+        rows.append(DropOfList.model_validate({n: known[n] for n in DropOfList.model_fields}))
         if number % 20 == 0 or number == len(drops):
             report(f"{number} of {len(drops)} drops done")
     file = batch.folder / _DROPS_FILE
@@ -302,26 +294,13 @@ def run_drops(case: Case, drops: Sequence[Drop], batch: Batch, report: Report) -
     return file
 
 
-def _row(drop: Drop, case: CaseFile) -> DropOfList:
-    return DropOfList(
-        folder=drop.name,
-        purpose=drop.purpose,
-        restitution=drop.restitution,
-        limit_force=drop.limit_force,
-        height_m=drop.height_m,
-        youngs_modulus_scale=drop.fidelity.youngs_modulus_scale,
-        timestep_s=case.timestep_s,
-        timestep_fraction=case.timestep_s / case.rayleigh_time_s,
-    )
-
-
 def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
     study, section = case.study, settings(case)
     particle, plate = study.media.material, study.workpiece.material
     material, radius = particle_material(study), study.media.radius_mean_m
-    modulus = effective_modulus(material, study.materials[plate])
+    modulus = mechanics.effective_modulus(material, study.materials[plate])
     height, gravity = study.drop_test.height_m, study.gravity_m_s2
-    mass, speed = particle_mass(material, radius), fall_speed(height, gravity)
+    mass, speed = mechanics.particle_mass(material, radius), mechanics.fall_speed(height, gravity)
     return DropsFile(
         study=case.study_name,
         title=study.title,
@@ -335,7 +314,7 @@ def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
         limit_force=study.contact.limit_force,
         restitution_now=study.pair(particle, plate).restitution,
         fall_time_s=math.sqrt(2 * height / gravity),
-        contact_time_s=hertz_contact_time(mass, radius, modulus, speed),
+        contact_time_s=mechanics.hertz_contact_time(mass, radius, modulus, speed),
         drops=rows,
     )
 

@@ -61,11 +61,11 @@ def write_run(scene: AnyScene, folder: Path, templates: jinja2.Environment) -> l
         **{name: stl_text(mesh) for name, mesh in scene.meshes.items()},
     }
     checksums = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
+    folder.mkdir(parents=True, exist_ok=True)  # the source's path may lead through it
     source = folder / scene.deck.source
     if scene.deck.source not in texts and source.is_file():
         checksums[scene.deck.source] = file_checksum(source)
     texts[CASE_FILE] = scene.case.model_copy(update={"files": checksums}).as_text()
-    folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         replace_text(folder / name, text)
     return [folder / name for name in texts]

@@ -8,6 +8,7 @@ import os
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 
 from dragdeck.decks.outputs import OutputOfRun
@@ -26,22 +27,29 @@ class WholeFrames:
 
     Attributes
     ----------
-    steps : tuple of int
-        Their steps, in the order of the file.
-    length : int
-        Where the last of them ends, bytes.
+    ends : tuple of (int or None, int)
+        The step of each and where it ends, bytes; None for a line of titles.
     size : int
-        Of the file, bytes: larger than `length` where it was cut short or has a hole.
+        Of the file, bytes.
     """
 
-    steps: tuple[int, ...]
-    length: int
+    ends: tuple[tuple[int | None, int], ...]
     size: int
 
     @property
+    def steps(self) -> list[int]:
+        """Their steps, in the order of the file."""
+        return [step for step, _ in self.ends if step is not None]
+
+    @property
     def damaged(self) -> bool:
-        """Whether something stands in the file that is no whole frame."""
-        return self.length < self.size
+        """Whether something else follows them: the file was cut short, or has a hole."""
+        return self.length_to(math.inf) < self.size
+
+    def length_to(self, last: float) -> int:
+        """Where the frames up to a step end, bytes."""
+        kept = takewhile(lambda end: end[0] is None or end[0] <= last, self.ends)
+        return max((end for _, end in kept), default=0)
 
 
 def whole_frames(file: Path, output: OutputOfRun) -> WholeFrames:
@@ -55,7 +63,7 @@ def whole_frames(file: Path, output: OutputOfRun) -> WholeFrames:
     """
     size = file.stat().st_size
     if size == 0:
-        return WholeFrames((), 0, 0)
+        return WholeFrames((), 0)
     with file.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as text:
         if output.kind == "print":
             found = _rows(text, output)
@@ -63,9 +71,7 @@ def whole_frames(file: Path, output: OutputOfRun) -> WholeFrames:
             found = _binary(text)
         else:
             found = _text(text, len(output.columns))
-        ends = list(found)
-    steps = tuple(step for step, _ in ends if step is not None)
-    return WholeFrames(steps, ends[-1][1] if ends else 0, size)
+        return WholeFrames(tuple(found), size)
 
 
 def _rows(text: mmap.mmap, output: OutputOfRun) -> Iterator[tuple[int | None, int]]:
@@ -187,23 +193,22 @@ def first_gap(folder: Path, outputs: Mapping[str, OutputOfRun], parts: Sequence[
     return min((gap for gap in gaps if gap is not None), default=math.inf)
 
 
-def cut_damage(
-    folder: Path, outputs: Mapping[str, OutputOfRun], parts: Sequence[RunPart]
-) -> list[Path]:
-    """Cut from each output what follows its last whole frame: the next part writes it again.
+def cut_outputs(
+    folder: Path, outputs: Mapping[str, OutputOfRun], parts: Sequence[RunPart], last: int
+) -> list[str]:
+    """Cut from each output what the next part will write again: all after a step, and damage.
 
     Returns
     -------
-    list of Path
-        The files that were cut.
+    list of str
+        The files that were damaged.
     """
-    found: dict[Path, WholeFrames] = {}
+    damaged = []
     for output in outputs.values():
         for part in parts:
             file = _file(folder, output, part)
             if file.is_file():
-                found[file] = whole_frames(file, output)
-    for file, frames in found.items():
-        if frames.damaged:
-            os.truncate(file, frames.length)
-    return [file for file, frames in found.items() if frames.damaged]
+                frames = whole_frames(file, output)
+                os.truncate(file, frames.length_to(last))
+                damaged += [file.name] if frames.damaged else []
+    return damaged

@@ -17,7 +17,7 @@ from dragdeck.engine.checkpoints import (
     newest_checkpoint,
     take_forced_restarts,
 )
-from dragdeck.engine.completeness import cut_damage, first_gap, part_files
+from dragdeck.engine.completeness import cut_outputs, first_gap, part_files
 from dragdeck.engine.decomposition import decomposition
 from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.process import Ending, Engine, command, execute
@@ -108,15 +108,13 @@ class PartOfRun:
         count, ranks = self.inputs.media.count, self.inputs.fidelity.ranks
         written = sum(size_of(file) for file in part_files(self.folder, outputs, parts))
         check_space(self.folder, outputs, count, written)
-        for file in cut_damage(self.folder, outputs, parts):
-            self.report(f"{file.name} was cut after its last whole frame")
         gap = first_gap(self.folder, outputs, parts) if parts else -1
         newest = newest_checkpoint(self.folder, count, ranks, gap, self.report)
-        part = RunPart(
-            part=len(parts) + 1,
-            checkpoint=newest.name if newest else None,
-            from_step=checkpoint_step(newest) if newest else 0,
-        )
+        first = checkpoint_step(newest) if newest else 0
+        for name in cut_outputs(self.folder, outputs, parts, first if newest else -1):
+            self.report(f"{name} was cut short or has a hole: it is written again from there")
+        checkpoint = newest.name if newest else None
+        part = RunPart(part=len(parts) + 1, checkpoint=checkpoint, from_step=first)
         self.record = RunRecord(
             state="running",
             inputs=digest,

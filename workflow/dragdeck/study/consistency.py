@@ -57,7 +57,7 @@ def _pairs(study: Study) -> _Found:
 
 def _motion(study: Study) -> _Found:
     length = study.motion.path_length_m
-    if study.motion.transient_m >= length:
+    if study.motion.transient_m >= length * (1 - 1e-9):
         limit = f"below the length of the path, {length:.4g} m"
         yield "motion.transient_m", "no path is left for the statistics", limit
     rate = study.motion.speed_m_s / length

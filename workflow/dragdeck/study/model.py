@@ -205,7 +205,7 @@ class Outputs(Model):
     network_hz: Positive = Field(
         default=20.0, description="minimum sampling rate of all contacts and particles, Hz"
     )
-    n_checkpoints: Annotated[Whole, Field(ge=0)] = Field(
+    n_checkpoints: Annotated[Whole, Field(ge=0, le=1000)] = Field(
         default=50, description="number of restart points per run"
     )
 

@@ -23,8 +23,16 @@ from dragdeck.study.plausible import implausible
 class _Loader(yaml.SafeLoader):
     """YAML that refuses a key given twice, and whose numbers are decimal.
 
-    ``1:30``, ``0300``, ``0x1F``, dates, and ``yes`` or ``on`` are text, as in YAML 1.2.
+    ``1:30``, ``0300``, ``0x1F``, dates, and ``yes`` or ``on`` are text, as in YAML 1.2. There are
+    no aliases: a few lines of them hold more values than any memory.
     """
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """A node of the file, if it stands there itself."""
+        if self.check_event(yaml.AliasEvent):
+            problem = "aliases are not read; write the value again"
+            raise yaml.composer.ComposerError(None, None, problem, self.peek_event().start_mark)
+        return super().compose_node(parent, index)
 
 
 def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
@@ -51,13 +59,15 @@ for _kind in ("binary", "set", "omap", "pairs"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _refused)
 
 
+_LONGEST_NUMBER, _LONGEST_SHOWN = 40, 200
 _PLAIN = re.compile(rf"{DECIMAL.pattern}|[-+]?\.(inf|nan)|true|false", re.ASCII | re.IGNORECASE)
 
 
 def _scalar(loader: _Loader, node: yaml.ScalarNode) -> Any:
     """A decimal number or a truth value; whatever else YAML 1.1 has a type for is text."""
     read = yaml.SafeLoader.yaml_constructors[node.tag]
-    return read(loader, node) if _PLAIN.fullmatch(node.value) else node.value
+    plain = len(node.value) <= _LONGEST_NUMBER and _PLAIN.fullmatch(node.value)
+    return read(loader, node) if plain else node.value
 
 
 for _tag in ("bool", "float", "int", "timestamp"):
@@ -104,8 +114,7 @@ def located(error: InputError) -> InputError:
     """The error with the line of its field in the file, where both are known."""
     file = error.file
     if error.line is None and error.field and isinstance(file, Path) and file.is_file():
-        lines = _line_table(file.read_text(encoding="utf-8"))
-        field = error.field
+        lines, field = _line_table(file.read_bytes()), error.field
         while field and not {f"sweep.{field}", field} & set(lines):
             field = field.rpartition(".")[0]
         error.line = lines.get(f"sweep.{field}", lines.get(field))
@@ -115,8 +124,12 @@ def located(error: InputError) -> InputError:
 
 
 @lru_cache(maxsize=4)
-def _line_table(text: str) -> Mapping[str, int]:
-    return dict(_lines(yaml.compose(text, Loader=_Loader), ""))
+def _line_table(content: bytes) -> Mapping[str, int]:
+    """The lines of a study's fields; none of a file that is no study."""
+    try:
+        return dict(_lines(yaml.compose(content.decode(), Loader=_Loader), ""))
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError):
+        return {}
 
 
 def _lines(node: yaml.Node | None, prefix: str) -> Iterator[tuple[str, int]]:
@@ -236,4 +249,4 @@ def _shown(value: object) -> str | None:
         return None
     if isinstance(value, float) and math.isnan(value):
         return "NaN"
-    return repr(value)
+    return repr(value)[:_LONGEST_SHOWN]

@@ -10,8 +10,7 @@ from scipy.stats import CensoredData, ecdf
 
 from dragchain.arrays import Floats
 from dragchain.documents import Part
-from dragchain.statistics.estimate import Estimate, Real
-from dragchain.statistics.shift_test import mean_over_runs
+from dragchain.statistics.estimate import Estimate, Real, mean_of
 from dragchain.validation.peaks.run_series import PeakRule, RunSeries
 from dragchain.validation.peaks.tests import mean_of_known
 
@@ -48,12 +47,10 @@ class Directions(Part):
     frames: int
     azimuth_mean_rad: Real
     resultant: Estimate
-    within_45_deg: Estimate
     inclination_mean_rad: Estimate
     inclination_std_rad: Estimate
     altitude_mean_m: Estimate
     altitude_std_m: Estimate
-    altitude_range_m: tuple[tuple[float, float], ...]
 
 
 class Geometry(Part):
@@ -82,14 +79,10 @@ class Lifetimes(Part):
     lives: int
     truncated: int
     median_s: Real
-    mean_s: Real
     longest_s: float
     survival: Survival
     seen_at_peaks_s: Estimate
     seen_at_all_times_s: Estimate
-    left_at_peaks_s: Estimate
-    left_at_all_times_s: Estimate
-    age_at_peaks_s: Estimate
 
 
 def ranks(runs: Sequence[RunSeries], at: int, rule: PeakRule = "all") -> Ranks:
@@ -105,8 +98,7 @@ def ranks(runs: Sequence[RunSeries], at: int, rule: PeakRule = "all") -> Ranks:
 
 def geometry(runs: Sequence[RunSeries], at: int) -> Geometry:
     """Orientation and altitude for a place in `SETTINGS`."""
-    at_peaks, at_all_times = (_directions(runs, at, peaks) for peaks in (True, False))
-    return Geometry(at_peaks=at_peaks, at_all_times=at_all_times)
+    return Geometry(at_peaks=_directions(runs, at, True), at_all_times=_directions(runs, at, False))
 
 
 def _directions(runs: Sequence[RunSeries], at: int, at_peaks: bool) -> Directions:
@@ -119,13 +111,11 @@ def _directions(runs: Sequence[RunSeries], at: int, at_peaks: bool) -> Direction
     return Directions(
         frames=len(all_turns),
         azimuth_mean_rad=float(np.angle(all_turns.mean())) if len(all_turns) else np.nan,
-        resultant=mean_over_runs([abs(t.mean()) if len(t) else np.nan for t in turns]),
-        within_45_deg=mean_over_runs([mean_of_known(abs(np.angle(t)) < np.pi / 4) for t in turns]),
+        resultant=mean_of([abs(t.mean()) if len(t) else np.nan for t in turns]),
         inclination_mean_rad=_over_runs(mean_of_known, slopes),
         inclination_std_rad=_over_runs(_std, slopes),
         altitude_mean_m=_over_runs(mean_of_known, heights),
         altitude_std_m=_over_runs(_std, heights),
-        altitude_range_m=tuple((float(h.min()), float(h.max())) for h in heights if len(h)),
     )
 
 
@@ -138,7 +128,7 @@ def _chosen(run: RunSeries, at: int, name: str, at_peaks: bool) -> Floats:
 
 
 def _over_runs(statistic: Callable[[Floats], float], parts: Sequence[Floats]) -> Estimate:
-    return mean_over_runs([statistic(part) for part in parts])
+    return mean_of([statistic(part) for part in parts])
 
 
 def _std(values: Floats) -> float:
@@ -150,21 +140,17 @@ def lifetimes(runs: Sequence[RunSeries], at: int) -> Lifetimes:
     durations, truncated = _each_life(runs, at)
     survival = _kaplan_meier(durations, truncated)
 
-    def seen(name: str, at_peaks: bool) -> Estimate:
-        return _over_runs(mean_of_known, [_chosen(run, at, name, at_peaks) for run in runs])
+    def seen(at_peaks: bool) -> Estimate:
+        return _over_runs(mean_of_known, [_chosen(run, at, "life_s", at_peaks) for run in runs])
 
     return Lifetimes(
         lives=len(durations),
         truncated=int(truncated.sum()),
         median_s=survival.median_s,
-        mean_s=mean_of_known(durations),
         longest_s=float(durations.max(initial=0.0)),
         survival=survival,
-        seen_at_peaks_s=seen("life_s", True),
-        seen_at_all_times_s=seen("life_s", False),
-        left_at_peaks_s=seen("left_s", True),
-        left_at_all_times_s=seen("left_s", False),
-        age_at_peaks_s=seen("age_s", True),
+        seen_at_peaks_s=seen(True),
+        seen_at_all_times_s=seen(False),
     )
 
 

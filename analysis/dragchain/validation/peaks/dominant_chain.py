@@ -15,14 +15,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats, Ints
-from dragchain.network.chains import (
-    ChainRows,
-    dominant_path,
-    major_stress,
-    particle_stress,
-    peters_rows,
-    widest_paths,
-)
+from dragchain.network import chains as network_chains
 from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame, read_frames
 from dragchain.run.kinematics import wrap_angle
 from dragchain.validation.peaks.lifetimes import lives
@@ -66,8 +59,8 @@ def path_chain(frame: NetworkFrame, *, with_workpiece: bool) -> Chain | None:
     At a higher factor the dominant path is the same, as long as its bottleneck is above it: all
     its contacts then are strong, and no path with a stronger bottleneck is lost.
     """
-    paths = widest_paths(frame, min(FORCE_FACTORS), with_workpiece=with_workpiece)
-    path = dominant_path(frame, paths, with_workpiece=with_workpiece)
+    paths = network_chains.widest_paths(frame, min(FORCE_FACTORS), with_workpiece=with_workpiece)
+    path = network_chains.dominant_path(frame, paths, with_workpiece=with_workpiece)
     if path is None:
         return None
     contacts = np.array(path.contacts)
@@ -261,14 +254,14 @@ def _paths(frame: NetworkFrame, around: Around) -> Iterator[ChainNumbers]:
 
 
 def _peters_chains(frame: NetworkFrame, around: Around) -> Iterator[ChainNumbers]:
-    major = major_stress(particle_stress(frame))
-    by_limits: dict[tuple[float, float], ChainRows] = {}
+    major = network_chains.major_stress(network_chains.particle_stress(frame))
+    by_limits: dict[tuple[float, float], network_chains.ChainRows] = {}
     for setting in SETTINGS:
         if setting.is_path:
             continue
         limits = (setting.alpha_rad, setting.stress_factor)
         if limits not in by_limits:
-            by_limits[limits] = peters_rows(frame, *limits, major)
+            by_limits[limits] = network_chains.peters_rows(frame, *limits, major)
         rows, on_bowl = by_limits[limits], setting.definition == "peters"
         contacts = _contacts_of(frame, rows.contacts)
         yield describe(

@@ -12,7 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from dragchain.arrays import Floats
-from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED, legend_below, new_figure
+from dragchain.figures.marks import compass, key, row, row_names
+from dragchain.figures.panels import head, legend_below, new_figure, new_panels
+from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
 from dragchain.validation.peaks.averages import Lifetimes
 from dragchain.validation.peaks.findings import Study
 from dragchain.validation.peaks.lags import LagCurves
@@ -47,22 +49,16 @@ def draw(study: Study) -> dict[str, Figure]:
 
 def _around_peaks(lags: LagCurves) -> Figure:
     """Event-triggered averages with the band that chance keeps."""
-    figure = new_figure(5.0)
-    grid = figure.subplots(len(_LAGGED), len(_FAMILIES), sharex=True, sharey=True)
-    for row, (name, label) in zip(grid, _LAGGED.items(), strict=True):
-        for axes, (family, definitions) in zip(row, _FAMILIES.items(), strict=True):
-            _lag_panel(axes, lags, name, definitions)
-            axes.set_title(family)
-        row[0].set_ylabel(f"{label}\n(standard deviations)", fontsize=8.5)
-    for axes in grid[-1]:
+    grid = [(label, family) for label in _LAGGED for family in _FAMILIES]
+    figure, panels = new_panels(5.0, len(grid), columns=2, sharex=True, sharey=True)
+    for axes, (name, family) in zip(panels, grid, strict=True):
+        _lag_panel(axes, lags, name, _FAMILIES[family])
+        axes.set_title(family)
+    for axes, label in zip(panels[::2], _LAGGED.values(), strict=True):
+        axes.set_ylabel(f"{label}\n(standard deviations)", fontsize=8.5)
+    for axes in panels[-2:]:
         axes.set_xlabel("time after the peak (s)")
-    handles = {
-        label: handle
-        for axes in grid[-1]
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
-    figure.legend(handles.values(), handles.keys(), loc="outside lower left", ncols=3)
-    return figure
+    return legend_below(figure)
 
 
 def _lag_panel(axes: Axes, lags: LagCurves, name: str, definitions: tuple[Definition, ...]) -> None:
@@ -87,44 +83,31 @@ def _effects(tests: Sequence[PeakTest]) -> Figure:
         for test in tests
         if test.peaks == "all"
     }
-    figure = new_figure(6.4)
-    grid = figure.subplots(1, len(_FOREST), sharey=True)
-    for axes, descriptor in zip(grid, _FOREST, strict=True):
-        for place, setting in enumerate(SETTINGS):
+    figure, panels = new_panels(6.4, len(_FOREST), sharey=True)
+    gaps = {name: 0.8 * number for number, name in enumerate(DEFINITIONS)}
+    places = [place + gaps[one.definition] for place, one in enumerate(SETTINGS)]
+    for axes, descriptor in zip(panels, _FOREST, strict=True):
+        for place, setting in zip(places, SETTINGS, strict=True):
             test = of_setting[descriptor.name, setting.definition, setting.label]
-            _effect(axes, -place - _gap(place), test)
+            colour, filled = _COLOURS[test.definition], test.p_claimed < LEVEL
+            row(axes, place, test.effect, test, colour, filled)
         axes.axvline(0.0, color="black", linewidth=0.8)
         axes.set_title(fill(descriptor.label, 16), fontsize=7.5)
-        axes.tick_params(axis="x", labelsize=7.5)
+        axes.tick_params(labelsize=7.5)
         axes.grid(axis="y", visible=False)
-    places = [-place - _gap(place) for place in range(len(SETTINGS))]
     names = [setting.label + ("  *" if setting.default else "") for setting in SETTINGS]
-    grid[0].set_yticks(places, names, fontsize=7.5)
-    for tick, setting in zip(grid[0].get_yticklabels(), SETTINGS, strict=True):
+    row_names(panels[0], names, places)
+    for tick, setting in zip(panels[0].get_yticklabels(), SETTINGS, strict=True):
         tick.set_color(_COLOURS[setting.definition])
-    for definition, colour in _COLOURS.items():
-        grid[0].plot([], [], "o", color=colour, label=DEFINITIONS[definition])
-    grid[0].plot([], [], "o", color=GREY, mfc="white", label="unadjusted p ≥ 0.05")
-    figure.suptitle(
+    for name, colour in _COLOURS.items():
+        key(panels[0], DEFINITIONS[name], color=colour)
+    key(panels[0], "unadjusted p ≥ 0.05", mfc="white")
+    head(
+        figure,
         "peaks minus all times (standard deviations); "
         "bars: 95 % CI over the packings; *: default thresholds",
-        fontsize=8.5, x=0.02, ha="left",
-    )  # fmt: skip
-    legend_below(figure, grid[0], columns=3)
-    return figure
-
-
-def _gap(place: int) -> float:
-    """Leave room between definitions."""
-    names = list(DEFINITIONS)
-    return 0.8 * names.index(SETTINGS[place].definition)
-
-
-def _effect(axes: Axes, height: float, test: PeakTest) -> None:
-    colour = _COLOURS[test.definition]
-    axes.plot([test.ci95_low, test.ci95_high], [height, height], color=colour, linewidth=1.0)
-    inside = colour if test.p_claimed < LEVEL else "white"
-    axes.plot([test.effect], [height], "o", color=colour, markersize=4.5, markerfacecolor=inside)
+    )
+    return legend_below(figure)
 
 
 # --- orientation, altitude, lifetime ---------------------------------------------------------
@@ -134,15 +117,13 @@ def _geometry(runs: Sequence[RunSeries], lifetimes: Mapping[Definition, Lifetime
     """Azimuth, altitude and lifetime of the dominant chains, at peaks and at all times."""
     figure = new_figure(6.0)
     shown: tuple[Definition, ...] = ("widest_path", "peters")
-    for row, name in enumerate(shown):
-        rose: Any = figure.add_subplot(2, 3, 3 * row + 1, projection="polar")
+    for first, name in zip((1, 4), shown, strict=True):
+        rose = compass(figure, 2, 3, first)
         _rose(rose, runs, DEFAULTS[name])
-        rose.set_title(f"{DEFINITIONS[name]}:\nazimuth, ahead up", fontsize=8.5, pad=14)
-        heights, lives = (figure.add_subplot(2, 3, 3 * row + place) for place in (2, 3))
-        _altitude(heights, runs, DEFAULTS[name])
-        _survival(lives, lifetimes[name])
-    legend_below(figure, heights)
-    return figure
+        rose.set_title(f"{DEFINITIONS[name]}:\nazimuth", pad=14)
+        _altitude(figure.add_subplot(2, 3, first + 1), runs, DEFAULTS[name])
+        _survival(figure.add_subplot(2, 3, first + 2), lifetimes[name])
+    return legend_below(figure)
 
 
 _OUTLINE: dict[str, Any] = {"color": RED, "linewidth": 1.4}
@@ -165,13 +146,10 @@ def _percentages(values: Floats, edges: Floats) -> Floats:
 
 
 def _rose(axes: Any, runs: Sequence[RunSeries], at: int) -> None:
-    axes.set_theta_zero_location("N")
     edges = np.linspace(-np.pi, np.pi, 25)
     for _, azimuth, style in _at_all_and_peaks(runs, at, "azimuth_rad"):
         axes.stairs(_percentages(azimuth, edges), edges, **style)
-    axes.set_thetagrids(np.arange(0, 360, 90), ["ahead", "left", "behind", "right"], fontsize=7.5)
-    axes.set_rlabel_position(157.5)
-    axes.tick_params(axis="y", labelsize=7)
+    axes.tick_params(labelsize=7)
     axes.yaxis.set_major_locator(MaxNLocator(3))
     axes.yaxis.set_major_formatter("{x:.0f} %")
 
@@ -181,11 +159,11 @@ def _altitude(axes: Axes, runs: Sequence[RunSeries], at: int) -> None:
     top = 1e3 * max(height.max(initial=0.01) for _, height, _ in groups)
     edges = np.arange(0.0, top + 5.0, 5.0)
     for name, height, style in groups:
-        label = f"{name} ({len(height)} frames)"
         fractions = _percentages(height * 1e3, edges)
-        axes.stairs(fractions, edges, orientation="horizontal", label=label, **style)
+        axes.stairs(fractions, edges, orientation="horizontal", label=name, **style)
     axes.set(xlabel="frames (%)", ylabel="mean height of the chain\nabove the floor (mm)")
-    axes.set_title("height", fontsize=8.5)
+    all_times, at_peaks = (len(height) for _, height, _ in groups)
+    axes.set_title(f"height: {all_times} frames,\n{at_peaks} at peaks")
 
 
 def _survival(axes: Axes, lifetime: Lifetimes) -> None:
@@ -193,7 +171,5 @@ def _survival(axes: Axes, lifetime: Lifetimes) -> None:
     axes.step([0.0, *survival.time_s], [1.0, *survival.fraction], where="post", color=BLUE)
     axes.set(xlabel="lifetime (s)", ylabel="fraction surviving", yscale="log")
     median = f"{median_s * 1e3:.0f} ms" if np.isfinite(median_s) else "unknown"
-    axes.set_title(
-        f"lifetime: median {median},\n{lifetime.lives} chains, {lifetime.truncated} censored",
-        fontsize=8.5,
-    )
+    counts = f"{lifetime.lives} chains, {lifetime.truncated} censored"
+    axes.set_title(f"lifetime: median {median},\n{counts}")

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize, to_rgb
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -19,11 +18,11 @@ from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
 from dragchain.errors import TableError
 from dragchain.figures import network_picture as scene
-from dragchain.figures.network_overlay import show_network
+from dragchain.figures.network_overlay import force_bar, show_network
 from dragchain.figures.network_picture import Look, Scene, View
+from dragchain.figures.panels import new_figure
 from dragchain.figures.rendering import check_rendering
-from dragchain.figures.style import BLUE, CHAIN, RED, drawing, new_figure, png
-from dragchain.network.chains import dominant_path, widest_paths
+from dragchain.figures.style import BLUE, CHAIN, RED, drawing, png
 from dragchain.network.frame import read_frames
 from dragchain.run.case import Case, load_case
 from dragchain.run.kinematics import drag_start_s
@@ -143,9 +142,7 @@ def _side_by_side(moments: PeakAndQuiet, pair: Sequence[Scene], view: View) -> F
     axes = [figure.add_subplot(grid[0, column]) for column in (0, 1)]
     for name, place, shown in zip(("highest peak", "lowest drag"), axes, pair, strict=True):
         _network(place, moments, shown, view, look, f"{name}, ")
-    scale = ScalarMappable(Normalize(0.0, look.largest_n), scene.colour_map())
-    bar = figure.colorbar(scale, ax=axes, shrink=0.75, pad=0.01, aspect=28)
-    bar.set_label("normal force per contact (N);\ncylinder radius proportional", fontsize=8)
+    force_bar(figure, axes, _largest_force(pair))
     _trace(figure.add_subplot(grid[1, :]), moments, [shown.process_time_s for shown in pair])
     return figure
 
@@ -160,7 +157,7 @@ def _network(
     image, extent = scene.render(moments.run_dir, moments.case, shown, view, look)
     show_network(axes, shown, view, image, extent, width=1.2, halo=2.0)
     words = f"{name}process time {shown.process_time_s:.2f} s\n{_chain_words(shown)}"
-    axes.set_title(words, fontsize=8.5)
+    axes.set_title(words)
 
 
 def _chain_words(shown: Scene) -> str:
@@ -215,16 +212,8 @@ def _scenes(moments: PeakAndQuiet, pictures: int) -> list[Scene]:
         )
     wanted, place = set(steps.tolist()), workpiece_places(run_dir, moments.case)
     frames = read_frames(run_dir, (int(steps[0]), int(steps[-1])))
-    return [
-        Scene(
-            frame,
-            *place(frame.step),
-            dominant_path(frame, widest_paths(frame)),
-            frame.time_s - start_s,
-        )
-        for frame in frames
-        if frame.step in wanted
-    ]
+    chosen = (frame for frame in frames if frame.step in wanted)
+    return [scene.scene_of(frame, place, start_s) for frame in chosen]
 
 
 def _picture(moments: PeakAndQuiet, shown: Scene, largest_n: float) -> Image.Image:

@@ -17,24 +17,8 @@ import numpy as np
 from dragchain.documents import Document, Part
 from dragchain.errors import TableError
 from dragchain.statistics.shift_test import SHIFTS, draw_shifts
-from dragchain.validation.peaks.averages import (
-    TOP,
-    Geometry,
-    Lifetimes,
-    Ranks,
-    geometry,
-    lifetimes,
-    ranks,
-)
+from dragchain.validation.peaks import averages, run_series
 from dragchain.validation.peaks.lags import LagCurves, lag_curves
-from dragchain.validation.peaks.run_series import (
-    AVERAGED_S,
-    DISTINCT_STDS,
-    REACH_S,
-    PeakRule,
-    RunSeries,
-    rules_of,
-)
 from dragchain.validation.peaks.runs import read_run
 from dragchain.validation.peaks.settings import DEFAULTS, DEFINITIONS, Definition
 from dragchain.validation.peaks.tests import ASIDE_S, NEAR_S, STRONG_STDS, PeakTest, tests_of
@@ -48,8 +32,6 @@ class RunRow(Part):
     label: str
     frames: int
     interval_s: float
-    from_s: float
-    to_s: float
     peaks: int
     distinct_peaks: int
     slow_peaks: int
@@ -60,13 +42,13 @@ class RunRow(Part):
 class Thresholds(Part):
     """Choices that the findings rest on; ``family`` counts the tests that Holm adjusts for."""
 
-    reach_s: float = REACH_S
+    reach_s: float = run_series.REACH_S
     aside_s: tuple[float, float] = ASIDE_S
     near_s: float = NEAR_S
     strong_stds: float = STRONG_STDS
-    top: float = TOP
-    distinct_stds: float = DISTINCT_STDS
-    averaged_s: float = AVERAGED_S
+    top: float = averages.TOP
+    distinct_stds: float = run_series.DISTINCT_STDS
+    averaged_s: float = run_series.AVERAGED_S
     level: float = LEVEL
     small_stds: float = SMALL
     shifts: int
@@ -82,16 +64,16 @@ class Findings(Document):
     statements: tuple[StatementVerdict, ...]
     tests: tuple[PeakTest, ...]
     lags: LagCurves
-    ranks: Mapping[PeakRule, Mapping[Definition, Ranks]]
-    geometry: Mapping[Definition, Geometry]
-    lifetimes: Mapping[Definition, Lifetimes]
+    ranks: Mapping[run_series.PeakRule, Mapping[Definition, averages.Ranks]]
+    geometry: Mapping[Definition, averages.Geometry]
+    lifetimes: Mapping[Definition, averages.Lifetimes]
 
 
 @dataclass(frozen=True)
 class Study:
     """What tables, figures and page are made of."""
 
-    runs: tuple[RunSeries, ...]
+    runs: tuple[run_series.RunSeries, ...]
     findings: Findings
 
 
@@ -108,7 +90,7 @@ def study(run_dirs: Sequence[Path]) -> Study:
     return study_of([read_run(Path(folder)) for folder in run_dirs])
 
 
-def study_of(runs: Sequence[RunSeries], count: int = SHIFTS) -> Study:
+def study_of(runs: Sequence[run_series.RunSeries], count: int = SHIFTS) -> Study:
     """Make all tests of runs that are read, each with so many shifts, and judge them."""
     shifts = draw_shifts([len(run.time_s) for run in runs], count)
     tests = tests_of(runs, shifts)
@@ -122,26 +104,17 @@ def study_of(runs: Sequence[RunSeries], count: int = SHIFTS) -> Study:
         tests=tuple(tests),
         lags=lag_curves(runs, shifts),
         ranks={
-            rule: {name: ranks(runs, at, rule) for name, at in DEFAULTS.items()}
-            for rule in rules_of(runs)
+            rule: {name: averages.ranks(runs, at, rule) for name, at in DEFAULTS.items()}
+            for rule in run_series.rules_of(runs)
         },
-        geometry={name: geometry(runs, at) for name, at in DEFAULTS.items()},
-        lifetimes={name: lifetimes(runs, at) for name, at in DEFAULTS.items()},
+        geometry={name: averages.geometry(runs, at) for name, at in DEFAULTS.items()},
+        lifetimes={name: averages.lifetimes(runs, at) for name, at in DEFAULTS.items()},
     )
     return Study(tuple(runs), findings)
 
 
-def _run_row(run: RunSeries) -> RunRow:
-    return RunRow(
-        run=run.run,
-        label=run.label,
-        frames=len(run.time_s),
-        interval_s=run.interval_s,
-        from_s=float(run.time_s[0]),
-        to_s=float(run.time_s[-1]),
-        peaks=len(run.peaks),
-        distinct_peaks=int(run.peaks["distinct"].sum()),
-        slow_peaks=len(run.slow),
-        separation_s=run.separation_s,
-        sense=run.sense,
-    )
+def _run_row(run: run_series.RunSeries) -> RunRow:
+    peaks = {"peaks": len(run.peaks), "slow_peaks": len(run.slow)}
+    distinct = int(run.peaks["distinct"].sum())
+    frames = {"frames": len(run.time_s), "interval_s": run.interval_s}
+    return RunRow.model_validate({**vars(run), **frames, **peaks, "distinct_peaks": distinct})

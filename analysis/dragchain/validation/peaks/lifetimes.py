@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
@@ -63,21 +64,13 @@ def lives(particle_ids: Sequence[Sequence[int]], time_s: Floats) -> Lives:
     begins = there & ~np.concatenate([[False], kept])
     life = np.where(there, np.cumsum(begins) - 1, -1)
     interval = float(np.median(np.diff(time_s))) if count > 1 else 0.0
-    numbers = life[there]
-    frames = np.bincount(numbers, minlength=1)
-    place = np.arange(count)
-    first = np.full(len(frames), count)
-    np.minimum.at(first, numbers, place[there])
-    last = first + frames - 1
-    ends = (first == 0) | (last == count - 1)
-
-    def times(frames: Ints) -> Floats:
-        return np.where(there, interval * frames.astype(np.float64), np.nan)
-
+    place = pd.Series(np.arange(count, dtype=np.float64)).where(there)
+    of_life = place.groupby(life)
+    first, last = of_life.transform("min"), of_life.transform("max")
     return Lives(
         life=life,
-        life_s=times(frames[life]),
-        age_s=times(place - first[life]),
-        left_s=times(last[life] - place),
-        truncated=there & ends[life],
+        life_s=(interval * (last - first + 1.0)).to_numpy(),
+        age_s=(interval * (place - first)).to_numpy(),
+        left_s=(interval * (last - place)).to_numpy(),
+        truncated=((first == 0.0) | (last == count - 1.0)).to_numpy(),
     )

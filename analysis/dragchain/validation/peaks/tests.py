@@ -17,16 +17,8 @@ from scipy.signal import find_peaks
 
 from dragchain.arrays import Floats, Ints
 from dragchain.documents import Part
+from dragchain.statistics import shift_test
 from dragchain.statistics.estimate import Real
-from dragchain.statistics.shift_test import (
-    ShiftTest,
-    Window,
-    holm,
-    joint,
-    shift_test,
-    shifted_means,
-    standardised,
-)
 from dragchain.validation.peaks.run_series import PeakRule, RunSeries, rules_of
 from dragchain.validation.peaks.settings import SETTINGS, Definition
 
@@ -176,7 +168,7 @@ def tests_of(runs: Sequence[RunSeries], shifts: Ints) -> list[PeakTest]:
     ]
     tests += [test for rule in rules for at in places for test in _events(runs, shifts, at, rule)]
     family = [test for test in tests if test.in_family]
-    adjusted = iter(holm([test.p_claimed for test in family]).tolist())
+    adjusted = iter(shift_test.holm([test.p_claimed for test in family]).tolist())
     return [
         test.model_copy(update={"p_holm": next(adjusted)}) if test.in_family else test
         for test in tests
@@ -189,30 +181,26 @@ def test_table(tests: Sequence[PeakTest]) -> pd.DataFrame:
 
 
 def _test(
-    at: int, rule: PeakRule, descriptor: Descriptor, result: ShiftTest, **more: float
+    at: int, rule: PeakRule, descriptor: Descriptor, result: shift_test.ShiftTest, **more: float
 ) -> PeakTest:
     setting = SETTINGS[at]
     low, high = result.ci95_low, result.ci95_high
     if descriptor.bounded:
         low, high = np.clip([low, high], 0.0, 1.0).tolist()
     claimed = {1: result.p_greater, -1: result.p_less, 0: result.p_two_sided}[descriptor.claim]
-    return PeakTest(
-        peaks=rule,
-        definition=setting.definition,
-        thresholds=setting.label,
-        default=setting.default,
-        statement=descriptor.statement,
-        descriptor=descriptor.name,
-        label=descriptor.label,
-        built_in=descriptor.built_in[setting.definition],
-        claim=descriptor.claim,
-        effect=result.value,
-        ci95_low=low,
-        ci95_high=high,
-        p_claimed=claimed,
-        p_two_sided=result.p_two_sided,
-        **more,
-    )
+    about = {
+        "peaks": rule,
+        "thresholds": setting.label,
+        "default": setting.default,
+        "descriptor": descriptor.name,
+        "built_in": descriptor.built_in[setting.definition],
+        "effect": result.value,
+        "ci95_low": low,
+        "ci95_high": high,
+        "p_claimed": claimed,
+    }
+    known = {**vars(setting), **vars(descriptor), **vars(result)}
+    return PeakTest.model_validate({**known, **about, **more})
 
 
 def _descriptor_test(
@@ -220,8 +208,9 @@ def _descriptor_test(
 ) -> PeakTest:
     series = [run.chain(at, descriptor.name) for run in runs]
     means = [run.around_peaks(one, rule) for run, one in zip(runs, series, strict=True)]
-    result = shift_test(
-        [standardised(one, mean) for one, mean in zip(series, means, strict=True)], shifts
+    result = shift_test.shift_test(
+        [shift_test.standardised(one, mean) for one, mean in zip(series, means, strict=True)],
+        shifts,
     )
     near, everywhere = mean_of_known([mean[0] for mean in means]), _mean_of_means(series)
     odds = _odds_ratio(near, everywhere) if descriptor.name == "exists" else np.nan
@@ -252,7 +241,7 @@ def _odds_ratio(first: float, second: float) -> float:
 
 def _events(runs: Sequence[RunSeries], shifts: Ints, at: int, rule: PeakRule) -> Iterator[PeakTest]:
     peaks = [run.events(rule) for run in runs]
-    yield _test(at, rule, _ORDER, shift_test(_asymmetry(runs, at, rule), shifts))
+    yield _test(at, rule, _ORDER, shift_test.shift_test(_asymmetry(runs, at, rule), shifts))
     pairs = (
         (_COVERAGE, peaks, [_strong_frames(run, at) for run in runs]),
         (_REVERSE, [strongest(run, at) for run in runs], peaks),
@@ -260,10 +249,10 @@ def _events(runs: Sequence[RunSeries], shifts: Ints, at: int, rule: PeakRule) ->
     for descriptor, events, others in pairs:
         shared = _together(runs, events, others)
         expected = _mean_of_means(shared)
-        yield _test(at, rule, descriptor, shift_test(shared, shifts), expected=expected)
+        yield _test(at, rule, descriptor, shift_test.shift_test(shared, shifts), expected=expected)
     directions = _directions(runs, at, rule)
-    by_chance = float(_resultant(joint(directions, shifts)).mean())
-    turned = shift_test(directions, shifts, _resultant)
+    by_chance = float(_resultant(shift_test.joint(directions, shifts)).mean())
+    turned = shift_test.shift_test(directions, shifts, _resultant)
     yield _test(at, rule, ORIENTATION, turned, expected=by_chance)
 
 
@@ -286,8 +275,10 @@ def _together(
 ) -> list[Floats]:
     """Fraction of the events with one of the others near, by shift."""
     return [
-        shifted_means(
-            near_any(run.time_s, run.time_s[other], NEAR_S).astype(float), event, Window(0, 0)
+        shift_test.shifted_means(
+            near_any(run.time_s, run.time_s[other], NEAR_S).astype(float),
+            event,
+            shift_test.Window(0, 0),
         )
         for run, event, other in zip(runs, events, others, strict=True)
     ]
@@ -304,7 +295,7 @@ def near_any(time_s: Floats, events_s: Floats, reach_s: float) -> NDArray[np.boo
 def _asymmetry(runs: Sequence[RunSeries], at: int, rule: PeakRule) -> list[Floats]:
     def aside(run: RunSeries, first_s: float, last_s: float) -> Floats:
         values = run.chain(at, "bottleneck_over_mean")
-        return standardised(values, run.around_peaks(values, rule, first_s, last_s))
+        return shift_test.standardised(values, run.around_peaks(values, rule, first_s, last_s))
 
     near, far = ASIDE_S
     return [aside(run, -far, -near) - aside(run, near, far) for run in runs]

@@ -125,15 +125,11 @@ def _outcome(test: PeakTest, judged: Sequence[PeakTest]) -> Outcome:
     zero = 0.5 if fraction else test.expected
     low, high = sorted((edge - zero) * test.claim for edge in (test.ci95_low, test.ci95_high))
     small = 0.0 if fraction or test.descriptor == ORIENTATION.name else SMALL
-    return Outcome(
-        descriptor=test.descriptor,
-        label=test.label,
-        built_in=test.built_in,
-        effect=test.effect,
-        p_holm=test.p_holm,
-        as_claimed=as_claimed,
-        thresholds=len(like),
-        supports=supports,
-        proves=supports and as_claimed == len(like) and low > 0.0,
-        refutes=not supports and high < small,
-    )
+    numbers = {
+        "as_claimed": as_claimed,
+        "thresholds": len(like),
+        "supports": supports,
+        "proves": supports and as_claimed == len(like) and low > 0.0,
+        "refutes": not supports and high < small,
+    }
+    return Outcome.model_validate({**dict(test), **numbers})

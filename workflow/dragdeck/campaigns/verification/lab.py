@@ -9,12 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from dragdeck.cases.case import digest
-from dragdeck.physics.contact_mechanics import (
-    effective_modulus,
-    hertz_contact_time,
-    particle_mass,
-    rayleigh_time,
-)
+from dragdeck.physics import contact_mechanics as mechanics
 from dragdeck.scenes.collide import Body, ContactFacts, Experiment, ExperimentFacts, collide_scene
 from dragdeck.study.base import Model, Whole
 from dragdeck.study.contact_law import Pair
@@ -163,7 +158,7 @@ def experiment(
         bodies=bodies,
         pairs=pairs,
         timestep_s=timestep_s,
-        rayleigh_time_s=rayleigh_time(types[0][1], bodies[0].radius_m),
+        rayleigh_time_s=mechanics.rayleigh_time(types[0][1], bodies[0].radius_m),
         steps=steps,
         facts=facts,
     )
@@ -182,9 +177,11 @@ def contact_time(
     speed_m_s: float,
 ) -> float:
     """Hertz time of an impact on a plane (no other particle) or on another particle, s."""
-    mass, radius = particle_mass(particle, radius_m), radius_m
+    mass, radius = mechanics.particle_mass(particle, radius_m), radius_m
     if other is not None and other_radius_m is not None:
-        second = particle_mass(other, other_radius_m)
+        second = mechanics.particle_mass(other, other_radius_m)
         mass = mass * second / (mass + second)
         radius = radius_m * other_radius_m / (radius_m + other_radius_m)
-    return hertz_contact_time(mass, radius, effective_modulus(particle, surface), speed_m_s)
+    return mechanics.hertz_contact_time(
+        mass, radius, mechanics.effective_modulus(particle, surface), speed_m_s
+    )

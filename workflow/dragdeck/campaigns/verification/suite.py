@@ -9,11 +9,9 @@ from typing import Protocol
 
 import yaml
 
-from dragdeck.campaigns.verification.bounce import Bounce
 from dragdeck.campaigns.verification.impacts import Impacts
 from dragdeck.campaigns.verification.lab import Lab, Substance
-from dragdeck.campaigns.verification.momentum import Momentum
-from dragdeck.campaigns.verification.resting import Column, Incline
+from dragdeck.campaigns.verification.single import Bounce, Column, Incline, Momentum
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.project import find_project, study_templates

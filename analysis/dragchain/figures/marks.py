@@ -1,0 +1,102 @@
+"""What figures of several pages draw alike: intervals, bands, bars, compasses, log axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import ArrayLike
+
+from dragchain.arrays import Floats
+from dragchain.figures.style import BLUE, GREY, ORANGE
+from dragchain.statistics.estimate import EstimateColumns
+
+
+class _Interval(Protocol):
+    """One estimate, or columns of estimates."""
+
+    @property
+    def ci95_low(self) -> Any: ...
+
+    @property
+    def ci95_high(self) -> Any: ...
+
+
+def _with_reach(columns: EstimateColumns, unit: float) -> tuple[Floats, Floats]:
+    """Values times a unit, (n,), and how far their intervals reach below and above, (2, n)."""
+    value, low, high = (
+        np.array(getattr(columns, name)) * unit for name in ("value", "ci95_low", "ci95_high")
+    )
+    return value, np.clip([value - low, high - value], 0.0, None)
+
+
+def depth_bars(
+    axes: Axes, edges_m: Sequence[float], columns: EstimateColumns, unit: float = 1.0
+) -> None:
+    """Draw values in bins of depth (mm on the vertical axis, downwards) with their intervals."""
+    edges, (value, reach) = np.asarray(edges_m) * 1e3, _with_reach(columns, unit)
+    middle = (edges[:-1] + edges[1:]) / 2
+    axes.barh(middle, value, height=0.9 * np.diff(edges), color=BLUE, alpha=0.75)
+    axes.errorbar(value, middle, xerr=reach, fmt="none", ecolor="black")
+    axes.set_ylim(edges[-1], edges[0])
+
+
+def band(axes: Axes, x: ArrayLike, interval: _Interval, colour: str, label: str = "") -> None:
+    """Fill the interval about a curve."""
+    low, high = interval.ci95_low, interval.ci95_high
+    axes.fill_between(x, low, high, color=colour, alpha=0.17, lw=0, label=label)
+
+
+def compass(figure: Figure, *place: int) -> Any:
+    """Polar axes, ahead up and left at the left; `place` as for `Figure.add_subplot`."""
+    axes: Any = figure.add_subplot(*place, projection="polar")
+    axes.set_theta_zero_location("N")
+    axes.set_thetagrids(np.arange(0, 360, 45), ["ahead", "", "left", "", "behind", "", "right", ""])
+    axes.set_rlabel_position(157.5)
+    return axes
+
+
+def compass_bars(
+    axes: Any, edges_rad: Sequence[float], columns: EstimateColumns, unit: float = 1.0
+) -> None:
+    """Draw values by azimuth with their intervals, ahead in another colour than behind."""
+    edges, (value, reach) = np.array(edges_rad), _with_reach(columns, unit)
+    middle = (edges[:-1] + edges[1:]) / 2
+    colours = np.where(np.abs(middle) < np.pi / 2, BLUE, ORANGE)
+    axes.bar(middle, value, np.diff(edges), color=colours, edgecolor="white", linewidth=0.6)
+    reach[0] = np.minimum(reach[0], value)
+    axes.errorbar(middle, value, reach, fmt="none", ecolor="black", elinewidth=0.8)
+    axes.set_rmin(0.0)
+
+
+def row(
+    axes: Axes, place: float, value: float, interval: _Interval, colour: str, filled: bool = True
+) -> None:
+    """Draw a value with its interval in a row."""
+    span = [interval.ci95_low, interval.ci95_high]
+    axes.plot(span, [place, place], color=colour, linewidth=1.8, alpha=0.6)
+    axes.plot(value, place, "o", color=colour, mfc=colour if filled else "white")
+
+
+def row_names(axes: Axes, names: Sequence[str], places: Sequence[float] | None = None) -> None:
+    """Name rows, the first at the top; they lie at 0, 1, ... unless `places` are given."""
+    at = range(len(names)) if places is None else places
+    axes.set_yticks(at, names)
+    axes.set_ylim(at[-1] + 0.5, at[0] - 0.5)
+
+
+def key(axes: Axes, label: str, **style: Any) -> None:
+    """An entry of the legend that nothing drawn has: a grey dot, or another style of a line."""
+    axes.plot([], [], label=label, **{"color": GREY, "ls": "", "marker": "o", **style})
+
+
+def log_ticks(axis: Axis, unit: float = 1.0, steps: Sequence[float] = (1.0,)) -> None:
+    """Label decades, or these steps of each, in plain numbers times a unit."""
+    axis.set_major_locator(LogLocator(10.0, subs=tuple(steps), numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{unit * value:g}"))
+    axis.set_minor_formatter(NullFormatter())
