@@ -13,8 +13,6 @@ Without ``--run`` the real frame is the one of the tests. On networks of more co
 ``--plain`` the oracle is left out.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -25,12 +23,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
 from machine import machine
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PACKAGES = ("numpy", "numba", "scipy", "pandas")
 ROOT = Path(__file__).resolve().parent.parent

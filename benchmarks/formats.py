@@ -12,8 +12,6 @@ A radius it holds in 32 bits.
 OVITO is in the extra ``benchmarks``.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import platform

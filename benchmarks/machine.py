@@ -1,7 +1,5 @@
 """What a benchmark ran on, in a line."""
 
-from __future__ import annotations
-
 import os
 import platform
 from importlib.metadata import PackageNotFoundError, version

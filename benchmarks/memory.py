@@ -11,8 +11,6 @@ process held; processor time is that of all its threads.
 for beside it. Nothing is written there.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -10,8 +10,6 @@ a step: what is left is the steps alone. All cost is processor time, of all rank
     python benchmarks/pilot.py [--particles 1422 10000 100000] [--rounds 3] [--particle-steps 2e7]
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import json

@@ -11,8 +11,6 @@ counts; starting Python, importing and compiling do not, the first file being a 
 Without ``--run`` the frames are made: as many particles and contacts as a small bowl has.
 """
 
-from __future__ import annotations
-
 import argparse
 import io
 import json

@@ -1,7 +1,5 @@
 """What the tests of both packages share."""
 
-from __future__ import annotations
-
 import copy
 import os
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What is said of errors that a user can cause, and of those that nobody expected."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

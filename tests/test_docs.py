@@ -1,7 +1,5 @@
 """The pages say what is true."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

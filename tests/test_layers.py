@@ -1,7 +1,5 @@
 """The layers of both packages, as pyproject.toml states them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import grimp

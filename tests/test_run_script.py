@@ -1,7 +1,5 @@
 """The entry script against a machine made of fakes: no network, no real environment."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

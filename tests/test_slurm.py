@@ -3,8 +3,6 @@
 On demand: ./run test --slurm
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

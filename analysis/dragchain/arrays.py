@@ -1,7 +1,5 @@
 """Array types and operations that every package uses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

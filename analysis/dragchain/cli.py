@@ -1,7 +1,5 @@
 """The command ``dragchain``: a table of commands, each with the function that it calls."""
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import math
@@ -239,7 +237,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add(parsers: Parsers, commands: Sequence[Command]) -> None:
+def _add(parsers: "Parsers", commands: Sequence[Command]) -> None:
     for command in commands:
         parser = parsers.add_parser(command.name, help=command.help, description=command.help)
         for argument in command.arguments:

@@ -1,7 +1,5 @@
 """JSON documents: each is a model, checked when it is written and when it is read."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import ClassVar, Self

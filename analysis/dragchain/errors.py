@@ -1,7 +1,5 @@
 """The errors that reading and analysing a run can end in."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 

@@ -6,8 +6,6 @@ Run it inside the project, on a machine that does nothing else. What it keeps is
 beside the result; an interrupted measurement goes on from there.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The beds that timed decks start from, each filled or brought to rest once."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import subprocess

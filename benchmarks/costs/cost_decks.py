@@ -4,8 +4,6 @@ What no study field can say is said by the templates in ``templates/costs/`` and
 decks here.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

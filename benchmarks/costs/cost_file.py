@@ -1,7 +1,5 @@
 """What was timed and what it says: ``rounds.json`` and ``costs.json``, and their statistics."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 
@@ -21,14 +19,14 @@ class Timing(Part):
     wall_time_s: float
     steps: int
 
-    def __sub__(self, other: Timing) -> Timing:
+    def __sub__(self, other: "Timing") -> "Timing":
         return Timing(
             cpu_time_s=self.cpu_time_s - other.cpu_time_s,
             wall_time_s=self.wall_time_s - other.wall_time_s,
             steps=self.steps - other.steps,
         )
 
-    def over(self, base: Timing) -> tuple[float, float]:
+    def over(self, base: "Timing") -> tuple[float, float]:
         """Processor and wall time of a step over those of the base."""
         per_step = self.cpu_time_s / self.steps / (base.cpu_time_s / base.steps)
         return per_step, self.wall_time_s / self.steps / (base.wall_time_s / base.steps)
@@ -70,7 +68,7 @@ class Ratio(Part):
     ci95_low: float | None
     ci95_high: float | None
 
-    def times(self, factor: float) -> Ratio:
+    def times(self, factor: float) -> "Ratio":
         """The ratio in another unit."""
         values = {name: value and value * factor for name, value in dict(self).items()}
         return Ratio(**values)

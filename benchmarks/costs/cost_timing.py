@@ -1,7 +1,5 @@
 """Timing of the cost variants: the rounds and the result."""
 
-from __future__ import annotations
-
 import os
 import platform
 import re

@@ -4,8 +4,6 @@ A variant is the standard deck of a study with one thing changed. It is timed
 side by side with the deck it is compared with; `cost_timing` does the timing.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

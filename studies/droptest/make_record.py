@@ -3,8 +3,6 @@
 How ``record.csv`` was made stands in docs/calibration.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from pathlib import Path

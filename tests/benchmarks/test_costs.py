@@ -1,7 +1,5 @@
 """What things left out cost: statistics, the timed decks, two variants on the engine."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """The documents between the packages: their schemas, and that each is read as written."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

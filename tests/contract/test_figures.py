@@ -1,7 +1,5 @@
 """The figures that the rules expect of a run are those that are drawn."""
 
-from __future__ import annotations
-
 import pytest
 
 from dragchain.report.run_figures import FIGURES

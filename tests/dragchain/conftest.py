@@ -1,7 +1,5 @@
 """Fixtures: writers of raw outputs, and a run small enough to check by hand."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

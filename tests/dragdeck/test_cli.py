@@ -1,7 +1,5 @@
 """The command: what it prints, what it exits with, what it leaves alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

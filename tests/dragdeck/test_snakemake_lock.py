@@ -1,7 +1,5 @@
 """Locks of dead and of living Snakemakes."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

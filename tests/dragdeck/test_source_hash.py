@@ -1,7 +1,5 @@
 """Which modules stand behind a command."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A model with some of its values replaced."""
 
-from __future__ import annotations
-
 from typing import Any, TypeVar
 
 from pydantic import BaseModel

@@ -1,7 +1,5 @@
 """Every JSON document that crosses a file boundary: who writes it, who reads it elsewhere."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from typing import Any

@@ -1,7 +1,5 @@
 """A run's contacts as a plain deck would write them: every column, in another order."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence

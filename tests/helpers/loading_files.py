@@ -1,8 +1,6 @@
 """A run with four particles on a plate, made by hand: one slides, one rolls, one hits, one
 rests."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

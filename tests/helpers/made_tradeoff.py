@@ -1,7 +1,5 @@
 """A trade of speed against accuracy with made-up numbers, for tests of what reads one."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from dragdeck.cases.case import Case

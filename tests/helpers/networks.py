@@ -1,7 +1,5 @@
 """Network frames for tests: a real one, and random ones with and without equal forces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from paths import DATA

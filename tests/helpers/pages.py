@@ -1,7 +1,5 @@
 """What tests ask of a page."""
 
-from __future__ import annotations
-
 import re
 from html.parser import HTMLParser
 

@@ -1,7 +1,5 @@
 """Runs whose drag follows the strength of their chains as much as a test wants."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -4,8 +4,6 @@ This is how the package itself found them before it held arrays. Nothing but tes
 `benchmarks/chains.py` may use it.
 """
 
-from __future__ import annotations
-
 import heapq
 from collections import Counter
 from collections.abc import Iterator

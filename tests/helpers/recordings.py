@@ -1,7 +1,5 @@
 """Recordings of the verification suite, made by hand."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Shared by tests of several modules."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math

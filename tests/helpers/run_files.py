@@ -1,7 +1,5 @@
 """Rendered run folders that a test changes."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

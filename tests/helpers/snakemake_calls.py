@@ -1,7 +1,5 @@
 """Snakemake started on a copy of the project."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

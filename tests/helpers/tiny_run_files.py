@@ -1,7 +1,5 @@
 """What the engine writes, made by hand, and the files of a run small enough to check by hand."""
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Iterable, Mapping, Sequence

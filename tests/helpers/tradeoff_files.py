@@ -1,7 +1,5 @@
 """Measures of a trade that were never run: known effects, chance from a seed."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Shared by tests of several modules."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The synthetic record that comes with the study of a drop test."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

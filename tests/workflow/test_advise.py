@@ -1,7 +1,5 @@
 """The workflow of a study that asks for a tolerance, on a trade with made-up numbers."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

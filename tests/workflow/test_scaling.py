@@ -1,7 +1,5 @@
 """A small scaling through the workflow, on the real engine."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

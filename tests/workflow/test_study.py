@@ -1,7 +1,5 @@
 """The whole workflow on the real engine: a small study from its file to its report."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

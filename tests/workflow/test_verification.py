@@ -1,7 +1,5 @@
 """A few runs of the verification suite on the real engine, judged; and a wrong law, caught."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

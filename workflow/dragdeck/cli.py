@@ -1,7 +1,5 @@
 """The command ``dragdeck``: a table of commands, each with the function that it calls."""
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import os

@@ -1,7 +1,5 @@
 """What the commands of ``dragdeck`` do, and some of its steps."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Iterable
@@ -96,9 +94,9 @@ def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
         It cannot be built, or has more ranks than there are cores; the error knows its line.
     """
     try:
-        scene = kind.build(case, bed)
         if not kind.single_particle and LAUNCHER_VARIABLE not in os.environ:
             check_ranks(case.ranks, case.file)
+        scene = kind.build(case, bed)
     except InputError as error:
         error.file = error.file or case.file
         raise located(error) from None

@@ -1,7 +1,5 @@
 """The errors a user can meet before and after an engine run."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path

@@ -3,8 +3,6 @@
 The grammar of result paths stands here and nowhere else.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Snakemake's own locks survive a ``kill -9``; this one tells whether their holder lives."""
 
-from __future__ import annotations
-
 import fcntl
 from collections.abc import Callable
 from pathlib import Path

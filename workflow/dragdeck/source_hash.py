@@ -5,8 +5,6 @@ this hash as a parameter runs again when any module that its command imports
 was edited, and only then.
 """
 
-from __future__ import annotations
-
 import ast
 import hashlib
 from collections.abc import Iterator

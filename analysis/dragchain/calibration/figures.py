@@ -1,7 +1,5 @@
 """The figures of a calibration."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -6,8 +6,6 @@ restitution is measured in a sweep of drops at the production modulus, step and
 contact option, so that whatever these do to the rebound is corrected.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

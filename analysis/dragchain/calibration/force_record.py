@@ -1,7 +1,5 @@
 """A measured drop test as a CSV: force over time."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass

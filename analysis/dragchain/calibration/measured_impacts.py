@@ -1,7 +1,5 @@
 """The impacts in a measured drop test."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import groupby

@@ -1,7 +1,5 @@
 """The report on a calibration: figures and one self-contained page."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pandas as pd

@@ -1,7 +1,5 @@
 """The files of a calibration: record, result and tables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What a record's rate and noise do to an impact, and what is left to compare."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Drops of one particle on a plate, as the engine made them: impacts sample by sample."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

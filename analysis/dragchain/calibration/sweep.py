@@ -1,7 +1,5 @@
 """A sweep of drops as a smooth model: what the engine makes of a deck's restitution."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

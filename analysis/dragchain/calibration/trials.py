@@ -1,7 +1,5 @@
 """Trials of a calibration: records of simulated drops, and whether their answer is found."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

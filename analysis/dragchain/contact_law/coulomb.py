@@ -1,7 +1,5 @@
 """Coulomb's limit of friction, to which the forces in dumps of contacts are cut."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from dragchain.arrays import Floats

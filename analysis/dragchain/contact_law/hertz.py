@@ -1,7 +1,5 @@
 """The elastic contact of Hertz: the moduli that two bodies have together, how long they touch."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import TypeVar

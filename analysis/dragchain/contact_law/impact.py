@@ -5,8 +5,6 @@ T. Schwager, T. Poeschel 2007, Granular Matter 9, 465; A.H. Kharaz et al. 2001, 
 120, 281.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ Sources: Y. Tsuji et al. 1992, Powder Technology 71, 239; D. Antypov, J.A. Ellio
 50004; R.D. Mindlin 1949, J. Appl. Mech. 16, 259.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Normal force around the workpiece and over its depth."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from dragchain.arrays import Floats, Ints

@@ -6,8 +6,6 @@ digit of a written number would decide the side of such a contact; instead half 
 counts on either.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from dragchain.arrays import Floats, Ints

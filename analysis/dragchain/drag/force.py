@@ -1,7 +1,5 @@
 """The force on the workpiece: the samples that statistics use, and their means."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

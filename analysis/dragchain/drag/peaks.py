@@ -1,7 +1,5 @@
 """Peaks of the drag force."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

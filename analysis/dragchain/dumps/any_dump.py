@@ -1,7 +1,5 @@
 """The frames of any dump of LIGGGHTS, without a run folder and its ``columns.json``."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

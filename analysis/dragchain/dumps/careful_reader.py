@@ -4,8 +4,6 @@
 an output.
 """
 
-from __future__ import annotations
-
 import io
 import struct
 import warnings
@@ -83,7 +81,7 @@ class _Cursor:
     """An open file, and the frame or row in it that is being read."""
 
     file: Path
-    stream: io.BufferedReader[Any]
+    stream: "io.BufferedReader[Any]"
     content: Content
     output: Layout
     frame: int

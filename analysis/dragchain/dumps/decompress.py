@@ -1,7 +1,5 @@
 """What a file holds, compressed or not, as a stream of bytes."""
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import io

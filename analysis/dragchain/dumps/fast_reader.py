@@ -6,8 +6,6 @@ LIGGGHTS writes. From the first other frame on the rest of that file goes throug
 `careful_reader.read_carefully`, which reads whatever can be read, and says what cannot.
 """
 
-from __future__ import annotations
-
 import os
 import struct
 from abc import ABC, abstractmethod
@@ -64,7 +62,7 @@ class Batch:
     columns: Columns
 
     @classmethod
-    def of(cls, frame: Frame, number: int) -> Batch:
+    def of(cls, frame: Frame, number: int) -> "Batch":
         """A batch of one frame."""
         return cls(number, np.array([frame.step]), np.array([frame.rows]), frame.columns)
 
@@ -140,7 +138,7 @@ class _Parsed:
     cells: Cells
     size: int
 
-    def batch(self, block: Block, first: int, output: Layout) -> Batch:
+    def batch(self, block: "Block", first: int, output: Layout) -> Batch:
         assert block.form is not None
         steps, counts = self.frames.T
         rows = int(counts.sum())
@@ -201,7 +199,7 @@ class _Text(_Form):
         )
 
     @classmethod
-    def of(cls, output: Layout, buffer: Bytes) -> _Text | None:
+    def of(cls, output: Layout, buffer: Bytes) -> "_Text | None":
         """Form of a file that begins like this; None if it is not this output."""
         lines = buffer[:_HEAD_BYTES].tobytes().split(b"\n", 9)
         noun = b"ENTRIES" if output.kind == "local" else b"ATOMS"

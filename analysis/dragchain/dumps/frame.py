@@ -1,7 +1,5 @@
 """A frame of a dump, and how an output is laid out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -66,12 +64,12 @@ class Frame:
         """A column of ids, shape (N,)."""
         return np.asarray(self.columns[name], dtype=np.int64)
 
-    def take(self, order: NDArray[np.int64]) -> Frame:
+    def take(self, order: NDArray[np.int64]) -> "Frame":
         """The rows `order` in that order."""
         columns: Columns = {name: values[order] for name, values in self.columns.items()}
         return Frame(self.step, columns, self.opening)
 
-    def replaced(self, names: Sequence[str], vectors: NDArray[np.float64]) -> Frame:
+    def replaced(self, names: Sequence[str], vectors: NDArray[np.float64]) -> "Frame":
         """The same rows with other values in some columns, (N, len(names))."""
         columns = self.columns | dict(zip(names, vectors.T, strict=True))
         return Frame(self.step, columns, self.opening)

@@ -7,8 +7,6 @@ product of Lemire 2021, "Number parsing at a gigabyte per second" (doi:10.1002/s
 decides. What neither is sure of is left to the caller, who reads that frame with Python.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from llvmlite import ir
 from numba import njit, types

@@ -5,8 +5,6 @@ that an output consists of parts that overlap. Where they do, the later part
 counts.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -123,7 +121,7 @@ class _Piece:
     columns: Columns
     opening: bool = False
 
-    def before(self, limit: int | None) -> _Piece | None:
+    def before(self, limit: int | None) -> "_Piece | None":
         """Keep what comes before a step; None when nothing does."""
         if limit is None or self.last < limit:
             return self
@@ -167,6 +165,8 @@ class _Schedule:
         last = self.output.last_step
         if last is not None and self.next <= last:
             self._fail(self.file, f"ends before step {self.next}", f"frames up to step {last}")
+        if self.next == self.output.first_step:
+            self._fail(self.file, "has no frame at all", f"one from step {self.next} on")
 
     def _fail(self, file: Path, problem: str, expected: str) -> None:
         raise DumpError(

@@ -1,7 +1,5 @@
 """Which particles and contacts of a network frame are in the chains that its tables list."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -77,7 +75,7 @@ def _sizes(frame: NetworkFrame) -> tuple[int, int]:
     return frame.particle_id.size, frame.normal_force.size
 
 
-def _paths(links: _Links, paths: pd.DataFrame) -> Iterator[tuple[Ints, Ints, bool]]:
+def _paths(links: "_Links", paths: pd.DataFrame) -> Iterator[tuple[Ints, Ints, bool]]:
     """Yield particles and contacts of every workpiece path that reaches the bowl.
 
     A path has a row for each strong workpiece contact, by falling force: of several rows that

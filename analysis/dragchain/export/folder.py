@@ -1,7 +1,5 @@
 """The folder of an export: whole or not there, and nobody's file is lost."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Iterator

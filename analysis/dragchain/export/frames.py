@@ -3,8 +3,6 @@
 Nothing is held but the frame at hand, so memory does not grow with the length of a run.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,7 +88,7 @@ class FrameSeries:
     times_s: Floats
 
     @classmethod
-    def of(cls, run: Run, selection: Selection) -> FrameSeries:
+    def of(cls, run: Run, selection: Selection) -> "FrameSeries":
         """Find the frames of a selection.
 
         Raises

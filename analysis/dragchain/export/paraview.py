@@ -4,8 +4,6 @@ The files are not compressed and name what a particle has as LIGGGHTS does in it
 files (``id``, ``radius``, ``v``, ``omega``), so that OVITO opens the same series.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr

@@ -1,7 +1,5 @@
 """Export of a run: frame by frame, into a folder of its own."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass

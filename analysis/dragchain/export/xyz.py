@@ -5,8 +5,6 @@ column is and of which type, holds the time in s beside the step, and is read by
 programs too; a LAMMPS dump has neither types nor, in most readers, the time.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

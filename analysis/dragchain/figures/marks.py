@@ -1,7 +1,5 @@
 """What figures of several pages draw alike: intervals, bands, bars, compasses, log axes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """What is drawn over a picture of the contact network, on axes in mm."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

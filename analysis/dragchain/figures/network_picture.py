@@ -6,8 +6,6 @@ largest normal force), its radius is proportional to the normal force and reache
 radius at the largest.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

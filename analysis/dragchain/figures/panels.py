@@ -1,7 +1,5 @@
 """Figures, their panels, legends and headings."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ On a machine without a display that needs EGL with a software driver: on Debian 
 packages ``libegl1`` and ``libgl1-mesa-dri``.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

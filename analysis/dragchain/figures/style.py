@@ -1,7 +1,5 @@
 """Colours and style of all figures, and how they become PNG files."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 from io import BytesIO
 from pathlib import Path

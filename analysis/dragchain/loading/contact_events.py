@@ -7,8 +7,6 @@ and its passing from facet to facet does not end it. One sample without force
 ends it. What happens between two samples is not seen.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,7 +57,7 @@ class Thresholds:
     rest: float = 0.1
     slide_to_roll: float = 1.0
 
-    def varied(self) -> dict[str, Thresholds]:
+    def varied(self) -> "dict[str, Thresholds]":
         """Each limit of the types halved and doubled, and named."""
         names = ("impact_times", "rest", "slide_to_roll")
         return {

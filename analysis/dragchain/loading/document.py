@@ -1,7 +1,5 @@
 """The document of a run's loading, ``loading.json``; docs/loading.md explains its numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 

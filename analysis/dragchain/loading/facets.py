@@ -1,7 +1,5 @@
 """Load, sliding and friction work of each facet of the workpiece."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

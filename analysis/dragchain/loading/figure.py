@@ -1,7 +1,5 @@
 """The picture of a workpiece: where particles press and slide on it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The counted contacts on a workpiece, with what each adds to the sums."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ These are the quantities a law of wear starts from; no wear coefficient enters,
 so none of them is a removed volume. See docs/loading.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

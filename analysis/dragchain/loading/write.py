@@ -1,7 +1,5 @@
 """The files on a run's loading: tables, JSON, mesh and picture."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The force chains of a network frame as a table, by both definitions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

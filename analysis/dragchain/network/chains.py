@@ -12,8 +12,6 @@ or on the order of the contacts. Where equal forces leave a choice, the contact 
 first in the frame, which in ``contacts.parquet`` is the one with the lower ids.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise

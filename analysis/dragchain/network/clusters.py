@@ -7,8 +7,6 @@ and the force at which a cluster spans for the first time is known exactly. Equa
 rule: a threshold is below all of them or below none.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

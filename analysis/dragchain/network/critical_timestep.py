@@ -1,7 +1,5 @@
 """The critical time step of a loaded contact network."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

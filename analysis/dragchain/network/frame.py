@@ -1,7 +1,5 @@
 """The contact network frame by frame, as arrays that the network and chain measures share."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -9,8 +9,6 @@ it can: in a large network the time goes into memory that is not near.
 its tree.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

@@ -4,8 +4,6 @@ Only frames inside the counted stretch of the drag are used: those between the f
 sample that ``workpiece_force.parquet`` marks as ``counted``.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The tables of a run's contact network."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A report's files: all are made before the first is written, and each appears only whole."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

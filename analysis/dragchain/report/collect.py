@@ -1,7 +1,5 @@
 """Compute the findings of one run from its tables."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 
 import numpy as np

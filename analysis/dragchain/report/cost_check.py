@@ -4,8 +4,6 @@ The expectation is ``advice.json`` of `dragdeck advise`; docs/outputs.md
 describes it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

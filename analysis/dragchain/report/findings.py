@@ -1,7 +1,5 @@
 """The findings of one run: every number that its figures and the report show."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar, Literal

@@ -1,7 +1,5 @@
 """Runs of a study that have no result: what went wrong with each, and what to do."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from contextlib import suppress

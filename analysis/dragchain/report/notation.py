@@ -1,7 +1,5 @@
 """Numbers as text, for pages and pictures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

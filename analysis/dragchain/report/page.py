@@ -4,8 +4,6 @@ All pages extend ``page.html.j2``, which has the head, the style and the frame, 
 macros of ``macros.html.j2`` and the filters of `dragchain.notation`.
 """
 
-from __future__ import annotations
-
 import base64
 import io
 import re

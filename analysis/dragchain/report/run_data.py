@@ -1,7 +1,5 @@
 """What findings and figures need of a run: each table is read once, and only if it is needed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The figures of a run, as PNG files, and that of all cases."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from itertools import cycle
 from pathlib import Path

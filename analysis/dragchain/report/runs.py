@@ -1,7 +1,5 @@
 """The runs that a report is of, read once."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The report on a study's runs: a table and one self-contained page."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The summary of a study's runs: one row per process run, with what belongs to it."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """What a run models (``case.json``) and what its outputs hold (``columns.json``)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path

@@ -1,7 +1,5 @@
 """How a run ended, and whether it counts as a result: ``run.json`` and its like."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """How the workpiece moves: phases of a run, paths, the workpiece's frame, counted samples."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -136,7 +134,7 @@ class LinePath(WorkpiecePath):
     """A straight line, along which the workpiece moves without turning."""
 
     @classmethod
-    def of(cls, motion: Line) -> LinePath:
+    def of(cls, motion: Line) -> "LinePath":
         """The path of a motion."""
         return cls(motion.axis_speed_m_s, motion.direction_rad)
 
@@ -161,7 +159,7 @@ class CirclePath(WorkpiecePath):
     radius_m: float
 
     @classmethod
-    def of(cls, motion: Circle) -> CirclePath:
+    def of(cls, motion: Circle) -> "CirclePath":
         """The path of a motion."""
         kind = CirclePath if motion.orientation == "fixed" else _TurningCirclePath
         speed, start = motion.axis_speed_m_s, motion.start_direction_rad

@@ -1,7 +1,5 @@
 """Figures of a study's source, to set our own beside."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from dragchain.errors import TableError

@@ -1,7 +1,5 @@
 """The workpiece: its mesh, its frame and where it is at a step."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

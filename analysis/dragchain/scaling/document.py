@@ -1,7 +1,5 @@
 """The document of a scaling, ``scaling.json``: what the runs say of one field."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar, Literal, NamedTuple
 

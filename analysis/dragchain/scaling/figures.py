@@ -1,7 +1,5 @@
 """The figures of scalings of the mean drag."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

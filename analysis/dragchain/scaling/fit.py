@@ -1,7 +1,5 @@
 """How the mean drag depends on one field of a study: a power law and its test."""
 
-from __future__ import annotations
-
 import html
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Classes of a point: what each run showed, and what that makes of its step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The contacts of particles with each other, the bowl and the workpiece, as a network."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The document of a map, ``stability.json``: safe steps, errors of impacts, criteria."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar

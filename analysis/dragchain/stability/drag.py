@@ -1,7 +1,5 @@
 """A workpiece that is dragged through a bed: mean force, energy, contacts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

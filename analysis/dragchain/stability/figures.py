@@ -1,7 +1,5 @@
 """Figures of a stability map."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

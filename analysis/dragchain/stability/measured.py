@@ -3,8 +3,6 @@
 Here for beds without a workpiece and for impacts, in `drag` for a workpiece that moves.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -183,7 +181,7 @@ class Spread(NamedTuple):
         """The spread of values."""
         return cls(float(values.mean()), float(values.min()), float(values.max()))
 
-    def error(self, reference: Spread, scale: float = 1.0) -> Estimate:
+    def error(self, reference: "Spread", scale: float = 1.0) -> Estimate:
         """The worst deviation from the reference's mean, over a scale."""
         ends = [(end - reference.mean) / scale for end in (self.low, self.high)]
         return Estimate.around(max(ends, key=abs), 0.0)

@@ -1,7 +1,5 @@
 """The table of a map's points: numbers and class of each."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

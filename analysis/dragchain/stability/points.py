@@ -1,7 +1,5 @@
 """The points of a stability map, as ``dragdeck step stability`` listed them, with their runs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Tables, figures and page of the stability map."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime

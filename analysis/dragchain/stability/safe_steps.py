@@ -1,7 +1,5 @@
 """The largest safe steps of a map: of each condition, of each regime; and the errors of impacts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 
@@ -128,7 +126,7 @@ def _regime(found: pd.DataFrame) -> SafeSteps:
     )
 
 
-def _least(values: pd.Series[float]) -> float:
+def _least(values: "pd.Series[float]") -> float:
     """The smallest value; NaN for none."""
     return float(values.min())
 

@@ -5,8 +5,6 @@ chance. Runs that start from the same bed are alike to some degree; how much is
 estimated too, so that pairing counts exactly as much as it helps.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass

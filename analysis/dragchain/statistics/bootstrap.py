@@ -4,8 +4,6 @@ Whatever is sampled along the path is autocorrelated; resampling blocks of frame
 Romano 1992) does not take neighbouring frames for independent.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The mean of a correlated series, and how well it is known."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

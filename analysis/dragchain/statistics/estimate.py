@@ -1,7 +1,5 @@
 """A value with its confidence interval."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -40,7 +38,7 @@ class Estimate:
     ci95_high: Real
 
     @classmethod
-    def around(cls, value: float, half_width: float) -> Estimate:
+    def around(cls, value: float, half_width: float) -> "Estimate":
         """The value with an interval that is symmetric about it."""
         return cls(value, value - half_width, value + half_width)
 
@@ -53,19 +51,19 @@ class Estimate:
         """Whether a value is within the interval."""
         return self.ci95_low <= value <= self.ci95_high
 
-    def over(self, size: float) -> Estimate:
+    def over(self, size: float) -> "Estimate":
         """The estimate divided by a number, which may be negative."""
         low, high = sorted((self.ci95_low / size, self.ci95_high / size))
         return Estimate(self.value / size, low, high)
 
-    def exp(self, factor: float = 1.0, minus: float = 0.0) -> Estimate:
+    def exp(self, factor: float = 1.0, minus: float = 0.0) -> "Estimate":
         """The estimate of ``exp(factor * x) - minus``, for a positive factor."""
         low, value, high = (
             np.exp(factor * np.array([self.ci95_low, self.value, self.ci95_high])) - minus
         )
         return Estimate(float(value), float(low), float(high))
 
-    def mapped(self, function: Callable[[float], float]) -> Estimate:
+    def mapped(self, function: Callable[[float], float]) -> "Estimate":
         """The estimate of a rising function of the number."""
         return Estimate(*(float(function(number)) for number in vars(self).values()))
 
@@ -79,7 +77,7 @@ class EstimateColumns:
     ci95_high: tuple[Real, ...]
 
     @classmethod
-    def of(cls, estimates: Sequence[Estimate]) -> EstimateColumns:
+    def of(cls, estimates: Sequence[Estimate]) -> "EstimateColumns":
         """The columns of estimates."""
         names = ("value", "ci95_low", "ci95_high")
         return cls(*(tuple(getattr(one, name) for one in estimates) for name in names))

@@ -5,8 +5,6 @@ bring, and of the error of a mean over a finite path. The last is known for each
 run; how large the others are is estimated from all runs together.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -139,7 +137,7 @@ class Runs:
         between = alike(self.same_bed, scatter.bed_fraction)
         return np.asarray(scatter.spread**2 * between + np.diag(self.errors**2))
 
-    def within(self, low: float, high: float) -> Runs:
+    def within(self, low: float, high: float) -> "Runs":
         """The runs whose level is from `low` to `high`."""
         inside = (self.x >= low) & (self.x <= high)
         beds = [bed for bed, one in zip(self.beds, inside, strict=True) if one]

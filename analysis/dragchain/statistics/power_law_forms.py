@@ -1,7 +1,5 @@
 """Laws of two terms beside a power law: a sum of two powers, and a power of a shifted level."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ How much those have in common is estimated by the restricted likelihood (Patters
 variance of all runs, `power_law` what comes on top of each run's known error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -48,7 +46,7 @@ class Whitened:
     values: Floats
 
     @classmethod
-    def of(cls, design: Floats, values: Floats, covariance: Floats) -> Whitened:
+    def of(cls, design: Floats, values: Floats, covariance: Floats) -> "Whitened":
         """Whiten a design (N, P) and values (N,) by their covariance (N, N)."""
         root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
         left, right = (np.linalg.solve(root, one) for one in (design, values))

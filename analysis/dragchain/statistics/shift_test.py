@@ -6,8 +6,6 @@ one to the other. Runs are shifted independently
 of each other, so their joint null distribution is that of the mean over runs of one shift each.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The settled bed: how high it stands and how dense it is."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables read a row group at a time, so that memory does not grow with their length."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import groupby, pairwise

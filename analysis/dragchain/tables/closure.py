@@ -1,7 +1,5 @@
 """Whether the contacts on the workpiece add up to the force on the workpiece."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 

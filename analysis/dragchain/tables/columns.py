@@ -1,7 +1,5 @@
 """Names of the columns that several tables and raw outputs share."""
 
-from __future__ import annotations
-
 
 def vector(name: str, unit: str) -> tuple[str, str, str]:
     """The columns of a vector."""

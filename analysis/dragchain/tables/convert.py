@@ -1,7 +1,5 @@
 """Any dump of LIGGGHTS as a Parquet table."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

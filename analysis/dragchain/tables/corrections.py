@@ -1,7 +1,5 @@
 """How far the tables change the contacts that LIGGGHTS wrote."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Self
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Impacts of one particle that is dropped on a plate."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """All contacts of a network frame in one form: point, force on body a, normal part."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parquet tables that are either whole or not there."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -78,7 +76,7 @@ def write_parquet(table: pd.DataFrame, path: Path) -> None:
 @contextmanager
 def table_writer(
     file: Path, columns: Sequence[str] = (), *, group_rows: int = GROUP_ROWS
-) -> Iterator[TableWriter]:
+) -> "Iterator[TableWriter]":
     """A table that is written part by part and appears under its name only once it is whole.
 
     If the block ends in an exception, nothing is left behind, and an older table of that name

@@ -1,7 +1,5 @@
 """A run folder: its case, its raw outputs and its tables."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import zip_longest
@@ -51,7 +49,7 @@ class Run:
     outputs: Mapping[str, Output]
 
     @classmethod
-    def open(cls, run_dir: Path | str) -> Run:
+    def open(cls, run_dir: Path | str) -> "Run":
         """Read ``case.json`` and ``columns.json`` of a run folder."""
         return cls(Path(run_dir), load_case(run_dir), load_outputs(run_dir))
 

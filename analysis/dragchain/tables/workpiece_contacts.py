@@ -8,8 +8,6 @@ LIGGGHTS counts a particle over a convex edge twice, once for each facet. `_merg
 contact of those of a particle that lie within one contact patch.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +66,7 @@ class WallContacts:
         """The number of contacts N."""
         return len(self.particle_id)
 
-    def select(self, mask: NDArray[np.bool_]) -> WallContacts:
+    def select(self, mask: NDArray[np.bool_]) -> "WallContacts":
         """Keep the contacts of a mask of shape (N,)."""
         return WallContacts(*(getattr(self, name)[mask] for name in self.__dataclass_fields__))
 

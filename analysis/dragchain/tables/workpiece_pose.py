@@ -1,7 +1,5 @@
 """Where the workpiece is at a step, from its table of forces."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

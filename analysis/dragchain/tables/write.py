@@ -1,7 +1,5 @@
 """Parquet tables of one run, made from its raw outputs."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

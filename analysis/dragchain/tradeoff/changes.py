@@ -1,7 +1,5 @@
 """What a change of a fidelity parameter does: softness by itself, and gains in cost."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -7,8 +7,6 @@ time step, speed and everything else are estimated together
 every combination by itself where they do.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """What things that a deck leaves out would cost, and what a step costs at other settings."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

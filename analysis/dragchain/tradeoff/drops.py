@@ -1,7 +1,5 @@
 """Drop tests against the one with the finest step."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

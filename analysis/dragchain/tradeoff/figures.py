@@ -1,7 +1,5 @@
 """The figures of the report on a trade."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle

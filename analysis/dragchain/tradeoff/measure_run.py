@@ -1,7 +1,5 @@
 """Measure a process run of a trade-off: its cost, and its quantities along the path."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from dragchain.errors import TableError

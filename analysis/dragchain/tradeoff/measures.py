@@ -4,8 +4,6 @@ The counted path is cut into blocks of about one mean particle diameter; each
 quantity has one value a block. A run's value is the mean over its blocks.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 
@@ -47,7 +45,7 @@ class Asked(Part):
     tolerance: float
     held_to: float | None = None
 
-    def same(self, other: Asked) -> bool:
+    def same(self, other: "Asked") -> bool:
         """Whether the same is asked, however well it can be held."""
         return (self.quantity, self.tolerance) == (other.quantity, other.tolerance)
 

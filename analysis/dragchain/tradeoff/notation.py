@@ -1,7 +1,5 @@
 """Numbers of a trade-off as text."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 

@@ -1,7 +1,5 @@
 """The outcome of a plan: what settings cost, which may be used, and which to choose."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

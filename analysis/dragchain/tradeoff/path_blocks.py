@@ -1,7 +1,5 @@
 """The quantities of a process run, block by block along its counted path, from its tables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -39,7 +37,7 @@ class CountedPath:
     blocks: int
 
     @classmethod
-    def of(cls, case: Case, counted_steps: Ints) -> CountedPath:
+    def of(cls, case: Case, counted_steps: Ints) -> "CountedPath":
         """The path of a process, from the steps at which its force is counted, (N,)."""
         motion = case.motion
         assert motion is not None

@@ -1,7 +1,5 @@
 """How long to drag: what a run knows of a quantity, drifts, and how often intervals are right."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -5,8 +5,6 @@ runs at full stiffness. A promise is kept if the whole interval of the error
 lies within the tolerance, broken if it lies outside, and open otherwise.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

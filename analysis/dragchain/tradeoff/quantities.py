@@ -1,7 +1,5 @@
 """What a trade-off compares."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

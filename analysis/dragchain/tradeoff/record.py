@@ -1,7 +1,5 @@
 """The record of a trade-off, ``tradeoff.json``, which the advisor reads."""
 
-from __future__ import annotations
-
 import os
 import platform
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Tables, figures, ``tradeoff.json`` and page of the trade-off of speed against accuracy."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The runs of a trade-off: the setting of each, and its values over the path that all have."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,7 +40,7 @@ class Setting:
         return {**self.parameters(), OTHER: self.other}
 
     @classmethod
-    def of(cls, parameters: object, other: str = "") -> Setting:
+    def of(cls, parameters: object, other: str = "") -> "Setting":
         """The setting of what has the parameters as attributes."""
         modulus, step, speed = (float(getattr(parameters, name)) for name in _PARAMETERS)
         return cls(modulus, step, speed, other)

@@ -1,7 +1,5 @@
 """Numbers as ``tradeoff.json`` has them."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

@@ -5,8 +5,6 @@ ahead of the workpiece are above those behind; contact forces grow with depth; c
 intense at the front; surfaces that point to the bowl's boundary carry marks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The source's statements, each with its number, its interval and a verdict by one rule."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import pandas as pd

@@ -4,8 +4,6 @@ The statements of Uhlmann et al. (2015), section 5, that it tests: forces ahead 
 above those behind, and the active zone reaches far ahead.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What every other setting of a validation does to the drag."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

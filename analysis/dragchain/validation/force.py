@@ -1,7 +1,5 @@
 """The force on the workpiece over several packings, against measured and published figures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

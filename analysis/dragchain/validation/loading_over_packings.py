@@ -1,7 +1,5 @@
 """Load, sliding and friction on the workpiece over several packings."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import pandas as pd

@@ -1,7 +1,5 @@
 """Tables, figures and page of a validation."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """The runs of a validation, and what several packings say together."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping, Sequence

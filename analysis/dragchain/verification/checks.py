@@ -5,8 +5,6 @@ written down after a first look at its numbers; none was widened to make a row p
 the normal rebound was narrowed afterwards, from 5 to 1 over the steps.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Literal

@@ -1,7 +1,5 @@
 """What a run of the `collide` scene models: its ``case.json``."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 from pydantic import PositiveFloat, PositiveInt

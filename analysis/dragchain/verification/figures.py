@@ -1,7 +1,5 @@
 """One figure a test: the engine's points over the references."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np

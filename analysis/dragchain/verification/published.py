@@ -6,8 +6,6 @@ authors of Kratos Multiphysics digitised for their own benchmarks (its
 not be compared with the paper here, so they are shown and never judged.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources

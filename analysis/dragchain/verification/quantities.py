@@ -1,7 +1,5 @@
 """What is taken from recordings, for the checks and for the figures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 

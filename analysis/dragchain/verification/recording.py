@@ -1,7 +1,5 @@
 """A run of the `collide` scene as arrays, with its contacts as the references see them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -56,12 +54,12 @@ class Recording:
         return Particle(sphere_mass(body.radius_m, density), body.radius_m)
 
     @cached_property
-    def contacts(self) -> tuple[RecordedContact, ...]:
+    def contacts(self) -> "tuple[RecordedContact, ...]":
         """The contacts of the run."""
         return tuple(RecordedContact(self, meeting) for meeting in self.case.contacts)
 
     @property
-    def contact(self) -> RecordedContact:
+    def contact(self) -> "RecordedContact":
         """The only contact of the run."""
         (contact,) = self.contacts
         return contact

@@ -1,7 +1,5 @@
 """Tables and page of the verification suite."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass

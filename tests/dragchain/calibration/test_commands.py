@@ -1,7 +1,5 @@
 """The commands of a calibration that need no engine."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The fit of the restitution, on drops whose answer is known on paper."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Literal

@@ -1,7 +1,5 @@
 """A measured drop test: what is read, what is found, what is refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Effective moduli, masses and the contact time of Hertz."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

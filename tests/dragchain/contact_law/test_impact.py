@@ -1,7 +1,5 @@
 """The exact formulae of an impact against oracles of their own."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The integrated contact law against oracles of its own."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Contacts on a limit of the circumference, as edges of facets make them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

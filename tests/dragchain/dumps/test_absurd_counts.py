@@ -1,7 +1,5 @@
 """Headers that promise more than any file holds: named at once, and nothing is allocated."""
 
-from __future__ import annotations
-
 import gzip
 import struct
 import tracemalloc

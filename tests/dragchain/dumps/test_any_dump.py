@@ -1,7 +1,5 @@
 """Dumps without a run folder: every form of file, every way in which one can be spoilt."""
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import math

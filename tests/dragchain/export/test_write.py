@@ -1,7 +1,5 @@
 """What other programs' readers find in an export is what the tables hold."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Load, sliding and friction work on a workpiece, on contacts made by hand."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The critical step: networks whose frequencies are known in closed form."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

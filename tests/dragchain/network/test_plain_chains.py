@@ -1,7 +1,5 @@
 """The arrays and compiled loops against the plain oracle: the same to the last bit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

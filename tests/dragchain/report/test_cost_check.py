@@ -1,7 +1,5 @@
 """What a run was expected to cost, beside what it did."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The frame, the style and the pieces that all pages share."""
 
-from __future__ import annotations
-
 import base64
 import io
 from pathlib import Path

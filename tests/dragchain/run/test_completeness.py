@@ -1,7 +1,5 @@
 """How a run ended, read from what dragdeck writes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, get_args
 

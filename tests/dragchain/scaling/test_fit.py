@@ -1,7 +1,5 @@
 """Scalings from run folders whose drag follows a law that is known."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

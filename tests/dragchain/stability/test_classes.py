@@ -1,7 +1,5 @@
 """Classes of points, by the codes and reasons of acceptance checks and by numbers."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Contacts of particles, bowl and workpiece, and their network."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

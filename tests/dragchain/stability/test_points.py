@@ -1,7 +1,5 @@
 """Lists of points, and the runs that they name."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

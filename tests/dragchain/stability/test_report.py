@@ -1,7 +1,5 @@
 """A coarse map on the real engine."""
 
-from __future__ import annotations
-
 import json
 import math
 import shutil

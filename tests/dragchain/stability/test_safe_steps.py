@@ -1,7 +1,5 @@
 """The largest safe steps of conditions and regimes."""
 
-from __future__ import annotations
-
 import math
 
 import pandas as pd

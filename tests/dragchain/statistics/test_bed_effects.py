@@ -1,7 +1,5 @@
 """Effects of settings with a random bed: known effects, coverage of intervals, pairing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

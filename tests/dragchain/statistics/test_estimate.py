@@ -1,7 +1,5 @@
 """Numbers with their intervals."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

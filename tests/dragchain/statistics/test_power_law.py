@@ -1,7 +1,5 @@
 """Power laws with noise that is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

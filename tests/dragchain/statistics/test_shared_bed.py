@@ -1,7 +1,5 @@
 """Generalised least squares against its textbook form."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

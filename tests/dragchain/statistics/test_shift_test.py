@@ -1,7 +1,5 @@
 """Circular shifts of events against series."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables read a row group at a time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

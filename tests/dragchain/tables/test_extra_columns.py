@@ -1,7 +1,5 @@
 """What a deck leaves out of its contacts changes nothing that the analysis gives."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pandas as pd

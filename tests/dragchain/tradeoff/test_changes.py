@@ -1,7 +1,5 @@
 """Softness by itself, and gains, on measures whose effects are known."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The comparison of a trade on measures whose effects are known."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The distribution of contact forces as it is drawn."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

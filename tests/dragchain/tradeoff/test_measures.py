@@ -1,7 +1,5 @@
 """What a run says of the quantities of a trade: bands of the drag, blocks, a run by hand."""
 
-from __future__ import annotations
-
 import json
 import math
 from itertools import pairwise

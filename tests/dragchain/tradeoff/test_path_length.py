@@ -1,7 +1,5 @@
 """What a run knows along its path, on measures whose effects are known."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Promises on other scenes: known errors, known scatter."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

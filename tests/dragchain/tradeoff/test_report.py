@@ -1,7 +1,5 @@
 """The page of a trade on measures whose effects are known."""
 
-from __future__ import annotations
-
 import json
 import re
 from html.parser import HTMLParser

@@ -1,7 +1,5 @@
 """A validation on runs whose forces are known."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from pathlib import Path

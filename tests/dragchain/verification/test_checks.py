@@ -1,7 +1,5 @@
 """Comparisons with the references, and what is taken from recordings for them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The published points."""
 
-from __future__ import annotations
-
 from importlib import resources
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reading runs of the verification suite, on motions made by hand."""
 
-from __future__ import annotations
-
 import pytest
 from recordings import ON_PARTICLE, ON_PLANE, recording
 

@@ -1,7 +1,5 @@
 """Tables of the verification suite."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

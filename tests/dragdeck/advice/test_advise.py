@@ -1,7 +1,5 @@
 """From a tolerance to settings, on a trade with made-up numbers."""
 
-from __future__ import annotations
-
 import copy
 import json
 from collections.abc import Callable

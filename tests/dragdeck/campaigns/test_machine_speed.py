@@ -1,7 +1,5 @@
 """The short run that tells how fast this machine is."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

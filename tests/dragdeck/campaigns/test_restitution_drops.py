@@ -1,7 +1,5 @@
 """The drops of a calibration, and the recovery of a known restitution on the real engine."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The verification suite: what it asks the engine for."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any

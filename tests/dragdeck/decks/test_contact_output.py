@@ -1,7 +1,5 @@
 """What LIGGGHTS writes of a mesh wall: the reason for the order of the outputs in a deck."""
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path

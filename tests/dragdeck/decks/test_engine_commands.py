@@ -1,7 +1,5 @@
 """Commands that would leave the engine or the run's folder, as LIGGGHTS 3.8.0 takes them."""
 
-from __future__ import annotations
-
 import pytest
 
 from dragdeck.decks.engine_commands import leaving_folder

@@ -1,7 +1,5 @@
 """Decks: golden files, determinism, overridden blocks, errors in templates."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What a template may do, and what a value may bring into an input script."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What tells a whole output file from one that was cut short."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Runs side by side: each in a folder of its name, rejected ones with a record."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which checkpoints count, and which are kept aside."""
 
-from __future__ import annotations
-
 import os
 import struct
 from pathlib import Path

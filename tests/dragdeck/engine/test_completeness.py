@@ -1,7 +1,5 @@
 """Which steps the parts of a run hold."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """How many ranks a run gets, and what each of them gets."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Limits that a healthy run never meets, and what is said of a run that did."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """One runner a folder, and engines that lost theirs."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

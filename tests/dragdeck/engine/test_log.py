@@ -1,7 +1,5 @@
 """What is read of the screen and of the thermo rows of LIGGGHTS."""
 
-from __future__ import annotations
-
 import pytest
 
 from dragdeck.engine.log import dangerous_builds, engine_errors, last_step, loops, settling

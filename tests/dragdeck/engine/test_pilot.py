@@ -1,7 +1,5 @@
 """The study of 100,000 particles: all that can be said of it without running it."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from pathlib import Path

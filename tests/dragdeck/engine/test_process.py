@@ -1,7 +1,5 @@
 """Finding the engine, and what is said when it is not the right one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

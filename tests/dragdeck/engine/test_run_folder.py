@@ -1,7 +1,5 @@
 """Runs on the real engine: to the end, interrupted, killed, failed, changed."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import signal

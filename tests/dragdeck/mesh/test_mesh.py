@@ -1,7 +1,5 @@
 """Meshes against what geometry says they must be, and against the engine itself."""
 
-from __future__ import annotations
-
 import math
 import os
 import runpy

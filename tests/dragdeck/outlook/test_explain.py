@@ -1,7 +1,5 @@
 """What a run is expected to take, and what the things that it leaves out would."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

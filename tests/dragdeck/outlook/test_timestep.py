@@ -1,7 +1,5 @@
 """What is said of a time step before a run, and the points of the map."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

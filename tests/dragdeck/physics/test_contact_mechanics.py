@@ -1,7 +1,5 @@
 """Formulae against independent numbers."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

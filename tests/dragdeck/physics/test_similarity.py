@@ -1,7 +1,5 @@
 """Carrying settings from the measured scene to another."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Where the workpiece goes."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

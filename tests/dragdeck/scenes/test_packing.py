@@ -1,7 +1,5 @@
 """The particles before they fall."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

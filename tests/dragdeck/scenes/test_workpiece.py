@@ -1,7 +1,5 @@
 """A workpiece from the user's mesh: what is said of it, repaired and refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The contact law: each coefficient is one row, and absent where a study does not name it."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Files that are no YAML of plain values."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

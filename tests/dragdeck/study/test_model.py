@@ -1,7 +1,5 @@
 """What a study file may hold, and what a user is told when it does not."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

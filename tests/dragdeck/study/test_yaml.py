@@ -1,7 +1,5 @@
 """How a study file is read: its numbers, and every problem at once with its line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

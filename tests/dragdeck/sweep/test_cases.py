@@ -1,7 +1,5 @@
 """Cases, and what their runs are named by."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Plans: which points they make of a study."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

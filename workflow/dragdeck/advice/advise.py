@@ -4,8 +4,6 @@ Pure arithmetic on the measured trade-off (docs/tradeoff.md) and on a study. Not
 an engine.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

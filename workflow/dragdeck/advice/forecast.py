@@ -1,7 +1,5 @@
 """What a study's run will take and how far it may err: `dragdeck advise`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -61,7 +59,7 @@ class Forecast:
     wall_times_s: Mapping[str, float]
     source: str
 
-    def for_file(self) -> OptionEntry:
+    def for_file(self) -> "OptionEntry":
         """An entry of ``options`` in ``advice.json``."""
         error = self.option.error
         chosen = self.case.study.chosen_fidelity()

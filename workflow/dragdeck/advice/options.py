@@ -1,7 +1,5 @@
 """Measured settings as they are for a case: carried to its scene, within its stability limits."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

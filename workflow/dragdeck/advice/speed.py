@@ -1,7 +1,5 @@
 """How fast LIGGGHTS runs on this machine."""
 
-from __future__ import annotations
-
 from dragdeck.documents import Part
 
 SCALE = 1e-3
@@ -24,7 +22,7 @@ class Speed(Part):
     ranks: int
     engine_version: str
 
-    def of(self, particles: int) -> Speed:
+    def of(self, particles: int) -> "Speed":
         """The speed with another number of particles: a step takes a time a particle."""
         ratio = self.particles / particles
         filling, drag = ratio * self.filling_steps_per_s, ratio * self.drag_steps_per_s

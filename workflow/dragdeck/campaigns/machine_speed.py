@@ -6,8 +6,6 @@ dragged through it for some thousand of them. What happens in one step, the way
 of the workpiece and the share of steps with output, is that of the settings asked.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

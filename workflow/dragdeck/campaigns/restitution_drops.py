@@ -5,8 +5,6 @@ run as the process runs: same modulus, step and contact options. Which drops
 those are stands here; what they say is for dragchain to find out.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

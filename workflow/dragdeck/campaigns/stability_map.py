@@ -1,7 +1,5 @@
 """The stability map: its points, their scenes, and how a batch of them is run."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -74,7 +72,7 @@ class _Plan(Model):
     more: list[dict[str, Value]] = Field(default_factory=list)
 
     @model_validator(mode="after")
-    def _known(self) -> _Plan:
+    def _known(self) -> "_Plan":
         changes = {*self.axes, *(key for axis in self.axes.values() for key in axis.others)}
         unknown = changes.union(*self.more) - set(self.base)
         if unknown:

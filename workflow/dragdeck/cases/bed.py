@@ -1,7 +1,5 @@
 """The media of a study as numbers: radii, Rayleigh time, neighbour skin."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 from dragdeck.physics.contact_mechanics import rayleigh_time

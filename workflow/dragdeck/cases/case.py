@@ -1,7 +1,5 @@
 """A case: one combination of a study's sweep at one fidelity, and how its runs are named."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -1,7 +1,5 @@
 """How many MPI ranks a run gets."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

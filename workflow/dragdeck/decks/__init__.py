@@ -5,5 +5,8 @@ CASE_FILE = "case.json"
 COLUMNS_FILE = "columns.json"
 """Files of a run's folder, beside its particles and meshes."""
 
+END = "DRAGDECK END"
+"""What LIGGGHTS prints when it comes to the last line of a deck."""
+
 PACKING_FILE = "packing.restart"
 """What a filling leaves for the runs that start from its bed."""

@@ -1,7 +1,5 @@
 """``case.json``: what a run models, for whoever reads its output."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """LIGGGHTS's data file: the particles that a run starts with, one by one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

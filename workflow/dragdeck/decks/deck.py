@@ -1,7 +1,5 @@
 """A scene as data: what its input script and its ``case.json`` are made from."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar

@@ -1,7 +1,5 @@
 """Commands of LIGGGHTS that would leave the run's folder: start a program, read other scripts."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

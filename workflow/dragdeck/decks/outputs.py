@@ -4,8 +4,6 @@ A deck's dump lines and the ``columns.json`` beside it are both made from these
 definitions, so that no reader has to guess a column.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal

@@ -1,14 +1,12 @@
 """From a scene to the files of its run folder."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import replace
 from pathlib import Path
 
 import jinja2
 
-from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE
+from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, END
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.engine_commands import leaving_folder
 from dragdeck.decks.outputs import ColumnsFile, in_writing_order
@@ -32,6 +30,13 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
         names = "templates: " + ", ".join(used(templates, scene.template))
         outputs = in_writing_order(scene.deck.outputs)
         text = template.render(deck=replace(scene.deck, templates=names, outputs=outputs))
+    if f'\nprint "{END}"\n' not in text or not all(c.isprintable() or c in "\n\t" for c in text):
+        raise InputError(
+            "the input script is no text that ends as it should",
+            file=file_of(templates, scene.template),
+            limit=f"printable characters, and the last command of base.in.j2: print {END}",
+            remedy="extend the project's template, and override blocks of it",
+        )
     for command, why in leaving_folder(text, scene.deck.source):
         raise InputError(
             f"the input script would {why}",

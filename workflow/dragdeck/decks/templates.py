@@ -4,8 +4,6 @@ A template is data: it runs in Jinja's sandbox, within limits of time and memory
 that it inserts passes `quoted`.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import resource
@@ -225,8 +223,14 @@ def file_of(templates: jinja2.Environment, name: str) -> Path:
 
 def _parsed(templates: jinja2.Environment, name: str) -> nodes.Template:
     assert templates.loader is not None
-    source, file, _ = templates.loader.get_source(templates, name)
-    return _tree(templates, source, name, file)
+    file = name
+    try:
+        source, found, _ = templates.loader.get_source(templates, name)
+        file = found or name
+        return _tree(templates, source, name, found)
+    except (RecursionError, UnicodeDecodeError) as error:
+        problem = "not UTF-8 text" if isinstance(error, ValueError) else "nested too deeply"
+        raise InputError(problem, file=file, remedy="see docs/templates.md") from None
 
 
 @lru_cache(maxsize=64)
@@ -255,6 +259,9 @@ def _check_own(templates: jinja2.Environment, study: Path, project: Path) -> Non
         InputError("no input script uses it", file=study / name, limit=choices(name, known))
         for name in sorted(files - reached)
     ]
+    for name in sorted(known):
+        if (study / name).is_dir() or ((study / name).is_symlink() and not (study / name).exists()):
+            found.append(InputError("is not a file", file=study / name))
     for name in sorted(files & reached):
         found += _idle_blocks(templates, name)
     if found:

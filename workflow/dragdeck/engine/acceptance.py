@@ -1,7 +1,5 @@
 """The acceptance checks that a finished run must pass before it counts as a result."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Many runs in one folder: written, run, and not run again."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

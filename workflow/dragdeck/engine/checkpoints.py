@@ -6,8 +6,6 @@ loop. So a checkpoint counts once it was read back, found to hold every particle
 byte, and renamed to hold its own checksum: ``checkpoint.<step>.<checksum>.restart``.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterator

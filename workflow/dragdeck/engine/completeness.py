@@ -1,7 +1,5 @@
 """Which frames of an output are whole, and whether all parts together hold every promised step."""
 
-from __future__ import annotations
-
 import math
 import mmap
 import os

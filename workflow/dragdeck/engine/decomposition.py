@@ -1,7 +1,5 @@
 """How LIGGGHTS split the simulation box between its ranks."""
 
-from __future__ import annotations
-
 import math
 import re
 

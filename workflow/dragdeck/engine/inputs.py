@@ -1,7 +1,5 @@
 """What the runner reads of a run's ``case.json``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from dragdeck.decks.case_file import CountOfRun, Phase, RanksOfRun, SettlingCriterion

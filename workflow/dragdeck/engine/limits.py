@@ -1,7 +1,5 @@
 """Whether a run is within the limits of its scene: past one of them it is stopped."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

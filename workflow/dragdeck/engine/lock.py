@@ -1,7 +1,5 @@
 """One runner at a time in a run folder, and no engine without one."""
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import os

@@ -1,7 +1,5 @@
 """What LIGGGHTS prints on its screen, and the rows of its ``thermo`` output."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

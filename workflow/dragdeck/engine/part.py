@@ -1,7 +1,5 @@
 """A part of a run: LIGGGHTS from its start or a checkpoint to an end, good or bad."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """The engine as a process: find it, start it, watch it, stop it."""
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import os

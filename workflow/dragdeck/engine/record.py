@@ -1,7 +1,5 @@
 """What is known of a run: the documents beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """What is said while a run is on its way."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 

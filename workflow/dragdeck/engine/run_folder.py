@@ -5,8 +5,6 @@ content and exists only for a run that is complete and passed every acceptance c
 that nothing unfinished can be taken for a result.
 """
 
-from __future__ import annotations
-
 import hashlib
 import shutil
 from pathlib import Path

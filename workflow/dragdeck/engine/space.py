@@ -1,7 +1,5 @@
 """How much of a disk a run takes."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Mapping
 from pathlib import Path

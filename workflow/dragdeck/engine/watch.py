@@ -1,7 +1,5 @@
 """The watch over a running engine: what ends it, and what is done meanwhile."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -3,8 +3,6 @@
 The limits are those of LIGGGHTS 3.8.0, fix mesh/surface; the geometry is trimesh's.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, NamedTuple

@@ -1,7 +1,5 @@
 """Mesh files: a user's in many formats, the engine's in one."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Iterator

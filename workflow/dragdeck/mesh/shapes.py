@@ -1,7 +1,5 @@
 """Surfaces made from a few lengths: the round workpiece, a bar with edges, the bowl."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Triangle surfaces in space: trimesh's, made, welded, placed and measured as the engine needs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

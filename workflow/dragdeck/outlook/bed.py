@@ -1,7 +1,5 @@
 """What to expect of a bed before it is run: how soft it is, how it is split among ranks."""
 
-from __future__ import annotations
-
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import cores_here
 from dragdeck.scenes.filling import (

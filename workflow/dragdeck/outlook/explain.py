@@ -1,7 +1,5 @@
 """What a deck models, what it leaves out, and what it is expected to cost."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What was measured on the engine: ``data/tradeoff.json`` and ``data/stability.json``, as read."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources

@@ -4,8 +4,6 @@ The errors and the safe steps were measured on the engine by the stability map;
 ``data/stability.json`` holds them with engine version and date.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Every function is plain arithmetic on SI values.
 """
 
-from __future__ import annotations
-
 import math
 
 from dragdeck.study.material import Material

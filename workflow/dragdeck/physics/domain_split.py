@@ -1,7 +1,5 @@
 """How LIGGGHTS splits its box among ranks, and how many particles each gets."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product

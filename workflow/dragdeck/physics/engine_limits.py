@@ -1,7 +1,5 @@
 """Limits of LIGGGHTS itself."""
 
-from __future__ import annotations
-
 ENGINE_SOFTEST_PA = 5e6
 """The engine's `units si` refuses a softer Young's modulus."""
 

@@ -5,8 +5,6 @@ random: exactly the asked number with exactly the asked mean and spread, without
 a chance to fall short, at a cost that grows linearly.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

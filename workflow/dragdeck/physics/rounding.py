@@ -1,7 +1,5 @@
 """Rounded numbers, so that input scripts stay readable."""
 
-from __future__ import annotations
-
 import math
 
 

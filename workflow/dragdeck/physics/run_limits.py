@@ -1,7 +1,5 @@
 """Energies and speeds that no run of a scene can have."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

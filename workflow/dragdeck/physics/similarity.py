@@ -5,8 +5,6 @@ numbers, of the stiffness and of the inertia of the bed. The rest, lengths over
 the particle's diameter, frictions and restitution, is only compared.
 """
 
-from __future__ import annotations
-
 import math
 
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA

@@ -1,7 +1,5 @@
 """A few particles and plane walls, placed and set in motion one by one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Particles at rest under a load: a straight stack in a tube, or a settled bed."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """The dimensionless numbers of a process scene."""
 
-from __future__ import annotations
-
 from dragdeck.cases.bed import particle_material
 from dragdeck.cases.case import Case
 from dragdeck.physics.contact_mechanics import bed_pressure, inertial_number, stiffness_number

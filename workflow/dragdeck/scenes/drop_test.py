@@ -1,7 +1,5 @@
 """The drop test: one mean particle on a plate of the workpiece's material."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

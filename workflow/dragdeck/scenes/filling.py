@@ -1,7 +1,5 @@
 """The fill: the particles fall into the bowl and come to rest."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Whether the workpiece and its motion fit into the bowl, the bed and the time step."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from dragdeck.cases.bed import bed_radii, smallest_radius

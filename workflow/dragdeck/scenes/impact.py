@@ -1,7 +1,5 @@
 """Single impacts, many at once: particles on a plate, or small particles on large ones."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

@@ -3,8 +3,6 @@
 The workpiece's position is that of its reference point, the centre of its tip.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The process: the workpiece plunges into the settled bed and is dragged along its path."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The scenes that a study's case has: a new one is its module and a line here."""
 
-from __future__ import annotations
-
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS

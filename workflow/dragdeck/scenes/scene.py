@@ -1,7 +1,5 @@
 """What a scene is to the rest of the project, and what all scenes share."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The workpiece of a case, generated or from the user's mesh."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from pathlib import Path
 

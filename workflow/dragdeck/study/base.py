@@ -1,7 +1,5 @@
 """What the models of a study file share: numbers as YAML writes them, and plain values."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """What no single field of a study shows: names that do not exist, values that contradict."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from itertools import product
@@ -68,6 +66,8 @@ def _motion(study: Study) -> _Found:
 
 def _sweep(study: Study) -> _Found:
     for field, values in study.sweep.items():
+        if not all(field.split(".")):
+            yield "sweep", f"{field!r} is no field", "a dotted name, such as motion.speed_m_s"
         if not values:
             yield f"sweep.{field}", "no values", "one value or more"
         if field.split(".")[0] in _NO_SWEEP:

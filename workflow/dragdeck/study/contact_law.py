@@ -6,8 +6,6 @@ properties and model keywords for particles and walls alike, run ids, what `expl
 numbers that scenes are compared by, and the range of the advisor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache

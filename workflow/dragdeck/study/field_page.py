@@ -1,7 +1,5 @@
 """The fields of a study file as a page, made from the model itself."""
 
-from __future__ import annotations
-
 import types
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Union, get_args, get_origin

@@ -4,8 +4,6 @@ A study is plain data. Nothing here knows of the engine's syntax, of files other
 than the study itself, or of how a scene is run.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -36,7 +34,8 @@ STUDY_FILE = "study.yaml"
 
 
 Ranks = Annotated[
-    Annotated[Literal["auto"], Tag("a-word")] | Annotated[Whole, Field(ge=1), Tag("a-number")],
+    Annotated[Literal["auto"], Tag("a-word")]
+    | Annotated[Whole, Field(ge=1, le=1024), Tag("a-number")],
     Discriminator(lambda value: "a-word" if value == "auto" else "a-number"),
 ]
 
@@ -52,7 +51,7 @@ class Media(Model):
     )
 
     @model_validator(mode="after")
-    def _spread(self) -> Media:
+    def _spread(self) -> "Media":
         if self.radius_std_m > 0.3 * self.radius_mean_m:
             raise ValueError(
                 f"radius_std_m {self.radius_std_m} exceeds 0.3 of radius_mean_m "
@@ -210,7 +209,7 @@ class Outputs(Model):
     )
 
     @model_validator(mode="after")
-    def _order(self) -> Outputs:
+    def _order(self) -> "Outputs":
         if not self.workpiece_force_hz >= self.workpiece_contacts_hz >= self.network_hz:
             raise ValueError(
                 "rates must fall from workpiece_force_hz over workpiece_contacts_hz to "
@@ -298,7 +297,7 @@ class Scaling(Model):
     )
 
     @model_validator(mode="after")
-    def _order(self) -> Scaling:
+    def _order(self) -> "Scaling":
         if self.field == "seed":
             raise ValueError("the seed is no field to fit a power law over")
         if self.fit_range is not None and self.fit_range[0] >= self.fit_range[1]:

@@ -1,7 +1,5 @@
 """Which values are plausible: slips of a unit are named before anything is computed."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

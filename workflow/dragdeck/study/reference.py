@@ -1,7 +1,5 @@
 """Published figures to compare the results with."""
 
-from __future__ import annotations
-
 from pydantic import Field
 
 from dragdeck.study.base import Model, NonNegative, Number

@@ -1,7 +1,5 @@
 """What a study says about its own values: what it assumes, and what it accepts on purpose."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

@@ -1,13 +1,11 @@
 """Study files as YAML: reading, and errors that name file, line, field, value and limit."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -30,8 +28,8 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         """A node of the file, if it stands there itself."""
         if self.check_event(yaml.AliasEvent):
-            problem = "aliases are not read; write the value again"
-            raise yaml.composer.ComposerError(None, None, problem, self.peek_event().start_mark)
+            problem, events = "aliases are not read; write the value again", cast(Any, self)
+            raise yaml.composer.ComposerError(None, None, problem, events.peek_event().start_mark)
         return super().compose_node(parent, index)
 
 

@@ -1,7 +1,5 @@
 """The cases of a study file: one per combination of its sweep."""
 
-from __future__ import annotations
-
 import copy
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping

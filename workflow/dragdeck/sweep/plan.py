@@ -5,8 +5,6 @@ and the values each shall take, alone or together with others, and always holds
 the reference that errors are measured against.
 """
 
-from __future__ import annotations
-
 import copy
 import itertools
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Ranks, orientation, altitude and lifetime of the dominant chains, at peaks and at all times."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ In every frame one chain counts for each of `SETTINGS`: the one with the stronge
 (bottleneck), by mean force where two are equal.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Figures of peaks and chains."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from textwrap import fill
 from typing import Any

@@ -1,7 +1,5 @@
 """The contact network at a peak of the drag: beside a quiet moment, and as a short film."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO

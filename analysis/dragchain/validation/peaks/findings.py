@@ -6,8 +6,6 @@ a chain on the workpiece is a part of the drag, so it is high at a peak by const
 verdicts rest on tests free of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

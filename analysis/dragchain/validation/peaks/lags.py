@@ -1,7 +1,5 @@
 """Event-triggered averages: the strength of the dominant chain before and after the peaks."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

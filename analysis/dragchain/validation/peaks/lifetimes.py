@@ -1,7 +1,5 @@
 """How long the dominant chain stays the same."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

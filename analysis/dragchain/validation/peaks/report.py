@@ -1,7 +1,5 @@
 """Everything that the page shows on peaks and chains: tables, figures, pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Frames and peaks of a process run, with the dominant chain of every frame."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """Read a process run as the peaks of its drag and the dominant chains of its network frames."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

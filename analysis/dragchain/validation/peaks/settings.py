@@ -9,8 +9,6 @@
 - ``peters_workpiece``: such a chain with a particle on the workpiece, wherever it ends.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

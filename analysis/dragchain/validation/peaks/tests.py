@@ -4,8 +4,6 @@ The force of a chain on the workpiece is a part of the drag, so it is high at a 
 construction. Every test therefore says how much of that is in its number (`built_in`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal

@@ -20,8 +20,6 @@ A ratio with the drag below the line can support a statement, for it errs agains
 refute it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Literal, get_args

@@ -1,7 +1,5 @@
 """Dominant chains of frames made by hand or at random."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

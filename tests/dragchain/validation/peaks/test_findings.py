@@ -1,7 +1,5 @@
 """Findings on chains that cause peaks, and on chains that do not."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Lives of chains made by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Tables, figures, film and section of the page."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

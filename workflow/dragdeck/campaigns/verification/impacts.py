@@ -1,7 +1,5 @@
 """Impacts of single particles on a plane, or of pairs of particles, side by side in a run."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Annotated, Literal
@@ -50,7 +48,7 @@ class Impacts(Test):
     steps_per_contact: tuple[Annotated[Whole, Field(ge=10)], ...] = ()
 
     @model_validator(mode="after")
-    def _one_variable(self) -> Impacts:
+    def _one_variable(self) -> "Impacts":
         if len(self.vary) != 1:
             raise ValueError("vary names exactly one quantity")
         return self

@@ -1,7 +1,5 @@
 """What the experiments of the verification suite share: materials, times, names."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ of two particles in any direction that momentum is kept, and a column and an inc
 do at rest and in steady motion on a plane.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The suite as a whole: its file, and every experiment by its run id."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
