@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 import yaml
+from attack.table import AttackTable, add_options
 from hypothesis import settings
 from paths import ROOT, SMALL_STUDY
 
@@ -26,6 +27,11 @@ settings.load_profile("ci" if os.environ.get("CI") else "untimed")
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update", action="store_true", help="write golden decks and schemas anew")
     parser.addoption("--slurm", action="store_true", help="run the tests that start a Slurm too")
+    add_options(parser)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(AttackTable(config), "attacks")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -388,6 +388,15 @@ def test_a_quick_test_leaves_out_what_is_slow(machine: Machine):
     assert "[-m] [not engine and not slow] [-x]" in tested
 
 
+def test_all_attacks_are_made_when_asked_for(machine: Machine):
+    machine.run("setup")
+    machine.done()
+    assert machine.run("test", "--attacks", "-k", "kill").returncode == 0
+    (line,) = machine.done()
+    assert line.startswith("pytest [-n]")
+    assert "[--attacks] [-m] [attack] [-k] [kill]" in line
+
+
 def test_arguments_go_to_pytest_alone(machine: Machine):
     machine.run("setup")
     machine.done()

@@ -1,0 +1,1 @@
+"""What the suite of attacks is made of."""

@@ -1,0 +1,321 @@
+"""Fuzzed dumps and meshes: the right values, or an error that names the file."""
+
+from __future__ import annotations
+
+import json
+import struct
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import strategies as st
+from hypothesis.errors import HypothesisException
+
+from attack.calls import run_function
+from attack.case import Attack, Got
+from dragchain.dumps.any_dump import read_dump
+from dragchain.dumps.careful_reader import read_print_file
+from dragchain.errors import DragchainError
+from dragchain.run.case import Output
+from dragdeck.errors import DragdeckError
+from dragdeck.mesh.checks import findings
+from dragdeck.mesh.files import read
+
+RIGHT = "right values, or refused"
+FEW, MANY = 150, 3000
+"""Examples of each fuzz in the sample, and in the whole suite."""
+
+_TOKENS = [
+    *(b"nan", b"-1", b"1e999", b"-0", b"9" * 40, b"0x10", b"1_000", b"1.5", b"--1", b"+", b"e5"),
+    *(b"1e", b".", b"infinity", b"\xd9\xa1", b"\x00", b"\n", b" ", b"\r\n", b"ITEM: TIMESTEP\n"),
+    *(b"\xff" * 8, b"\x00" * 8, b"\x7f" + b"\xff" * 7, b"1/9/9", b"f 1 2 99", b"vertex"),
+    *(b"solid", b"endsolid", b"18446744073709551616", b"2147483648"),
+]
+
+WholeFrame = tuple[int, dict[str, list[float]]]
+Frames = list[WholeFrame]
+
+
+@st.composite
+def spoilt(draw: st.DrawFn, wholes: list[bytes]) -> bytes:
+    """A good file with up to four things done to it."""
+    content = draw(st.sampled_from(wholes))
+    for _ in range(draw(st.integers(1, 4))):
+        place = draw(st.integers(0, len(content)))
+        end = min(len(content), place + draw(st.integers(0, 40)))
+        what = draw(st.sampled_from(["cut", "delete", "insert", "replace", "double", "bytes"]))
+        if what == "cut":
+            content = content[:place]
+        elif what == "delete":
+            content = content[:place] + content[end:]
+        elif what == "insert":
+            content = content[:place] + draw(st.sampled_from(_TOKENS)) + content[place:]
+        elif what == "replace":
+            content = content[:place] + draw(st.sampled_from(_TOKENS)) + content[end:]
+        elif what == "double":
+            content = content[:end] + content[place:]
+        else:
+            content = content[:place] + draw(st.binary(max_size=8)) + content[end:]
+    return content
+
+
+# --- what a file says, by a reader that knows no shortcut ----------------------------
+
+
+def text_frames(content: bytes) -> Iterator[WholeFrame]:
+    """Frames of a text dump, as far as they are whole; `ValueError` where they are not."""
+    lines = content.split(b"\n")
+    place = 0
+    while place < len(lines) and lines[place:] != [b""]:
+        if not lines[place].startswith(b"ITEM: TIMESTEP"):
+            raise ValueError(lines[place])
+        step, count = int(lines[place + 1]), int(lines[place + 3])
+        names = [name.decode("latin-1") for name in lines[place + 8].split()[2:]]
+        rows = [line.split() for line in lines[place + 9 : place + 9 + count]]
+        if len(rows) < count or any(len(row) != len(names) for row in rows):
+            raise ValueError("rows")
+        if place + 9 + count >= len(lines):
+            raise ValueError("no end of the last line")
+        values = {name: [_number(row[n]) for row in rows] for n, name in enumerate(names)}
+        place += 9 + count
+        yield step, values
+
+
+def _number(word: bytes) -> float:
+    value = float(word)
+    if b"_" in word or not np.isfinite(value):
+        raise ValueError(word)
+    return value
+
+
+def binary_frames(
+    content: bytes, names: tuple[str, ...]
+) -> Iterator[tuple[int, dict[str, list[float]]]]:
+    """Frames of a binary dump, as far as they are whole."""
+    place = 0
+    while place < len(content):
+        step, rows, triclinic, *_ = struct.unpack_from("<qqi", content, place)
+        head = "<qqi6i6d" + ("3d" if triclinic else "") + "ii"
+        *_, width, ranks = struct.unpack_from(head, content, place)
+        place += struct.calcsize(head)
+        numbers: list[float] = []
+        for _ in range(ranks):
+            (count,) = struct.unpack_from("<i", content, place)
+            numbers += struct.unpack_from(f"<{count}d", content, place + 4)
+            place += 4 + 8 * count
+        if width != len(names) or len(numbers) != rows * width:
+            raise ValueError("rows")
+        yield step, {name: numbers[n::width] for n, name in enumerate(names)}
+
+
+def prefix(frames: Iterator[WholeFrame]) -> tuple[Frames, bool]:
+    """The frames before the first error, and whether there was none."""
+    found: Frames = []
+    try:
+        for frame in frames:
+            found.append(frame)
+    except (ValueError, IndexError, struct.error, OverflowError, MemoryError, UnicodeDecodeError):
+        return found, False
+    return found, True
+
+
+def _agree(found: Frames, whole: bool, wanted: Frames, wanted_whole: bool) -> None:
+    """What was read is what the file says, and what cannot be read was refused."""
+    assert len(found) <= len(wanted), f"{len(found)} frames of {len(wanted)}"
+    for one, other in zip(found, wanted, strict=False):
+        assert one[0] == other[0], f"step {one[0]} is {other[0]}"
+        assert list(one[1]) == list(other[1]), "other columns"
+        for name, values in one[1].items():
+            assert np.array_equal(values, other[1][name]), f"{name}: {values} is {other[1][name]}"
+    assert not whole or wanted_whole, "a file that is not whole was taken for whole"
+    assert not whole or len(found) == len(wanted), "frames were left out without a word"
+
+
+def _names_sorted(frames: Frames) -> Frames:
+    return [(step, {name: columns[name] for name in sorted(columns)}) for step, columns in frames]
+
+
+# --- the files ------------------------------------------------------------------------
+
+_NAMES = ("id", "x", "c_f[1]")
+_ROWS = {0: [[3, 0.5, -1e-30], [1, 1 / 3, 2e8], [2, -0.25, 5e-324]], 7: [], 14: [[1, 0.125, 4.0]]}
+
+
+def _text_dumps() -> list[bytes]:
+    from tiny_run_files import Raw
+
+    return [
+        b"".join(Raw.text(step, rows, _NAMES, kind) for step, rows in _ROWS.items())
+        for kind in ("custom", "local")
+    ]
+
+
+def _binary_dumps() -> list[bytes]:
+    from tiny_run_files import Raw
+
+    return [
+        b"".join(Raw.binary(step, rows, 3, ranks) for step, rows in _ROWS.items())
+        for ranks in (1, 2)
+    ]
+
+
+def _try_text_dump(folder: Path, content: bytes) -> None:
+    file = folder / "a.dump"
+    file.write_bytes(content)
+    _compare(lambda: read_dump(file), lambda: text_frames(content))
+
+
+def _try_binary_dump(folder: Path, content: bytes) -> None:
+    file = folder / "a.bin"
+    file.write_bytes(content)
+    _compare(lambda: read_dump(file, _NAMES), lambda: binary_frames(content, _NAMES))
+
+
+def _compare(reader: Callable, oracle: Callable) -> None:  # type: ignore[type-arg]
+    found: Frames = []
+    whole = True
+    try:
+        for frame in reader():
+            columns = {name: values.tolist() for name, values in frame.columns.items()}
+            found.append((frame.step, columns))
+    except DragchainError as error:
+        assert "a." in str(error), "the message does not name the file"
+        whole = False
+    wanted, wanted_whole = prefix(oracle())
+    _agree(_names_sorted(found), whole, _names_sorted(wanted), wanted_whole)
+
+
+_PRINTED = ("step", "time_s", "force_n")
+
+
+def _printed() -> list[bytes]:
+    from tiny_run_files import Raw
+
+    rows = [[10 * n, 1e-3 * n, -0.5 * n] for n in range(8)]
+    return [Raw.prints(rows, _PRINTED)]
+
+
+def _try_print_file(folder: Path, content: bytes) -> None:
+    file = folder / "a.1.txt"
+    file.write_bytes(content)
+    layout = Output(kind="print", binary=False, pattern="a.{part}.txt", columns=_PRINTED,
+                    engine_columns=None, period_steps=10, first_step=0, last_step=70)  # fmt: skip
+    steps: list[float] = []
+    values: list[float] = []
+    try:
+        for block in read_print_file(file, layout):
+            steps += block["step"].tolist()
+            values += block["force_n"].tolist()
+    except DragchainError as error:
+        assert "a.1.txt" in str(error), "the message does not name the file"
+    lines = content.decode("latin-1").split("\n")
+    rows = [line.split() for line in lines if line.split() != list(_PRINTED)]
+    numbers = [[float(word) for word in row] for row in rows[: len(steps)]]
+    assert steps == [row[0] for row in numbers], "other steps"
+    assert values == [row[2] for row in numbers], "other values"
+    assert all(before < after for before, after in pairwise(steps))
+
+
+def _meshes(kind: str) -> list[bytes]:
+    import trimesh
+
+    box = trimesh.creation.cylinder(radius=4.0, height=30.0, sections=6)
+    found = box.export(file_type={"ascii.stl": "stl_ascii", "stl": "stl"}.get(kind, kind))
+    return [found if isinstance(found, bytes) else found.encode()]
+
+
+def _try_mesh(suffix: str, folder: Path, content: bytes) -> None:
+    file = folder / f"a.{suffix}"
+    file.write_bytes(content)
+    try:
+        mesh = read(file, "mm")
+        problems = findings(mesh)
+    except DragdeckError as error:
+        assert "a." in str(error), "the message does not name the file"
+        return
+    if problems:
+        return
+    assert np.isfinite(mesh.vertices).all(), "a coordinate that is not a number"
+    assert len(mesh.faces) > 0, "no facet"
+    assert mesh.faces.max() < len(mesh.vertices), "a facet without its corner"
+    assert mesh.is_watertight, "an open body"
+
+
+_FUZZES: dict[str, tuple[str, Callable[[], list[bytes]], Callable[[Path, bytes], None]]] = {
+    "text dumps": ("dump", _text_dumps, _try_text_dump),
+    "binary dumps": ("dump", _binary_dumps, _try_binary_dump),
+    "print files": ("dump", _printed, _try_print_file),
+    "STL of text": ("mesh", partial(_meshes, "ascii.stl"), partial(_try_mesh, "stl")),
+    "binary STL": ("mesh", partial(_meshes, "stl"), partial(_try_mesh, "stl")),
+    "OBJ": ("mesh", partial(_meshes, "obj"), partial(_try_mesh, "obj")),
+    "PLY": ("mesh", partial(_meshes, "ply"), partial(_try_mesh, "ply")),
+}
+
+
+def fuzz_attacks(number: int) -> Iterator[Attack]:
+    """One attack for each kind of file."""
+    for name, (kind, _, _) in _FUZZES.items():
+        yield Attack(kind, f"fuzzed {name}", partial(_fuzz, name, number), (RIGHT,), 2.0)
+
+
+def _fuzz(name: str, number: int, folder: Path, whole: bool) -> Got:
+    """In a process of its own: what ends the interpreter is seen too."""
+    examples = MANY if whole else FEW
+    said = run_function(fuzzed, (name, number, examples), folder, 300.0)
+    results = [line for line in said.text.splitlines() if line.startswith('{"outcome"')]
+    if said.status == 0 and results:
+        return Got(**json.loads(results[-1]))
+    ended = "no answer" if said.status is None else f"died: status {said.status}"
+    return Got(ended, said.tail)
+
+
+def fuzzed(name: str, number: int, examples: int) -> None:
+    """Try many spoilt files, and print what came of them."""
+    _, wholes, act = _FUZZES[name]
+    known = wholes()
+    tried = 0
+
+    @seed(number)
+    @settings(
+        max_examples=examples,
+        deadline=None,
+        database=None,
+        phases=[Phase.generate, Phase.shrink],
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(content=spoilt(known))
+    def each(content: bytes) -> None:
+        nonlocal tried
+        tried += 1
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                act(Path(folder), content)
+            except Exception as error:
+                error.add_note(f"content: {content!r}")
+                raise
+
+    with tempfile.TemporaryDirectory() as folder:
+        for content in known:
+            act(Path(folder), content)
+    got = Got(RIGHT, f"{tried} files")
+    try:
+        each()
+        got = Got(RIGHT, f"{tried} files")
+    except AssertionError as error:
+        got = Got("a wrong value", _shown(error))
+    except HypothesisException as error:
+        got = Got("not reproducible", _shown(error))
+    except Exception as error:
+        got = Got(f"traceback: {type(error).__name__}", _shown(error))
+    sys.stdout.write("\n" + json.dumps({"outcome": got.outcome, "seen": got.seen}) + "\n")
+    sys.stdout.flush()
+
+
+def _shown(error: BaseException) -> str:
+    notes = [note for note in getattr(error, "__notes__", []) if note.startswith("content")]
+    return "\n".join([repr(error)[:800], *(note[:1500] for note in notes[-1:])])

@@ -1,0 +1,375 @@
+"""The study that is attacked: made once, copied for every attack, compared afterwards."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import resource
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import yaml
+from paths import DATA, ROOT
+
+from attack.calls import Said, call, command, main_of
+from dragdeck.project import Project
+from dragdeck.scenes.registry import SCENES
+
+STUDY = "tiny"
+TINY_STUDY = DATA / "tiny_study.yaml"
+PLACES = ("drop_test", "filling", "process")
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A command of the study, what it takes, and the files there are before it.
+
+    Attributes
+    ----------
+    name : str
+    words : sequence of str
+        The command, with paths from the project's folder.
+    run : str
+        The run folder that it works on, or the report's.
+    engine : bool
+        Whether it runs LIGGGHTS.
+    cpu_s : float
+        Processor time that it took undisturbed, s.
+    bytes : int
+        What it wrote.
+    before : sequence of str
+        Files of the project before it.
+    """
+
+    name: str
+    words: Sequence[str]
+    run: str
+    engine: bool
+    cpu_s: float = 0.0
+    bytes: int = 0
+    before: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A project in which the tiny study was made command by command, and nothing disturbed."""
+
+    root: Path
+    phases: Mapping[str, Phase]
+
+    def run(self, place: str) -> str:
+        """Path of the one run folder of a scene from the project's folder."""
+        (folder,) = (self.root / "results" / STUDY / place).iterdir()
+        return str(folder.relative_to(self.root))
+
+    def copy_before(self, phase: Phase, target: Path) -> Path:
+        """A copy of the project as it was before a phase."""
+        return _copied(self.root, phase.before, target)
+
+    def copy(self, target: Path) -> Path:
+        """A copy of the finished project."""
+        return _copied(self.root, files_of(self.root), target)
+
+
+def files_of(root: Path) -> list[str]:
+    """Files of the study's results and of the study, from the project's folder."""
+    found = [*(root / "results").rglob("*"), *(root / "studies").rglob("*")]
+    return sorted(str(file.relative_to(root)) for file in found if file.is_file())
+
+
+def _copied(root: Path, files: Sequence[str], target: Path) -> Path:
+    new_project(target)
+    for name in files:
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(root / name, target / name)
+    return target
+
+
+def new_project(folder: Path, *, whole: bool = False) -> Path:
+    """An empty project with the real templates and meshes; `whole`: with its workflow."""
+    folder.mkdir(parents=True, exist_ok=True)
+    names = ["templates", "meshes"]
+    if whole:
+        names += ["workflow", "analysis", "profiles", "Snakefile"]
+    for name in names:
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "studies").mkdir()
+    return folder
+
+
+def tiny_study() -> dict[str, Any]:
+    """The tiny study as plain data."""
+    data: dict[str, Any] = yaml.safe_load(TINY_STUDY.read_text(encoding="utf-8"))
+    return data
+
+
+def write_study(project: Path, data: object, name: str = STUDY) -> Path:
+    """Write a study into a project."""
+    file = project / "studies" / name / "study.yaml"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    text = data if isinstance(data, str) else yaml.safe_dump(data, sort_keys=False)
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+# --- making it ----------------------------------------------------------------------
+
+
+def shared_ground(base: Path, worker: str) -> Ground:
+    """The ground that all processes of one test session share; the first one makes it."""
+    folder = (base if worker == "master" else base.parent) / "attack-ground"
+    folder.mkdir(exist_ok=True)
+    with locked(folder / "lock"):
+        record = folder / "phases.json"
+        if not record.is_file():
+            phases = [asdict(phase) for phase in _make(folder / "project")]
+            record.write_text(json.dumps(phases))
+        known = [Phase(**phase) for phase in json.loads(record.read_text())]
+    return Ground(folder / "project", {phase.name: phase for phase in known})
+
+
+@contextmanager
+def locked(file: Path) -> Iterator[None]:
+    """One process at a time."""
+    with file.open("w") as stream:
+        fcntl.flock(stream, fcntl.LOCK_EX)
+        yield
+
+
+def _make(root: Path) -> Iterator[Phase]:
+    new_project(root)
+    write_study(root, TINY_STUDY.read_text(encoding="utf-8"))
+    runs = {}
+    for place in PLACES:
+        runs[place] = _render(root, place, runs.get("filling"))
+        name = place.replace("_", " ")
+        words = command("dragdeck", "run", runs[place], "--every", "1")
+        yield _made(root, Phase(name, words, runs[place], engine=True))
+        analyses = ["tables", "figures"]
+        if place == "process":
+            analyses = ["tables", "chains", "loading", "figures"]
+        for step in analyses:
+            if place == "process":
+                words = command("dragchain", step, runs[place])
+                yield _made(root, Phase(step, words, runs[place], engine=False))
+            else:
+                said = main_of("dragchain", [step, runs[place]], root)
+                assert said.status == 0, said.text
+    folder = f"results/{STUDY}/report"
+    words = command("dragchain", "report", "--out", folder, runs["process"])
+    yield _made(root, Phase("report", words, folder, engine=False))
+
+
+def render_words(place: str, run: str, filling: str | None) -> list[str]:
+    """The command that writes the input script of a run."""
+    bed = ["--packing", f"{filling}/tables/packing.json"] if place == "process" else []
+    return command("dragdeck", "step", "render", STUDY, place, run, *bed)
+
+
+def _render(root: Path, place: str, filling: str | None) -> str:
+    """Render the only run of a scene."""
+    (case,) = Project(root).cases(STUDY)
+    name = SCENES[place].run_id(case)
+    said = call(render_words(place, name, filling), root, root / "said.log")
+    assert said.status == 0, said.text
+    return f"results/{STUDY}/{place}/{name}"
+
+
+_COMPILED = ("tables", "chains")
+"""Phases that compile code when they are called for the first time, and take longer then."""
+
+
+def _made(root: Path, phase: Phase) -> Phase:
+    before = files_of(root)
+    size = size_of(root)
+    if phase.name in _COMPILED:
+        call(phase.words, root, root / "said.log")
+    spent = _children_s()
+    said = call(phase.words, root, root / "said.log")
+    assert said.status == 0, f"{phase.name}: {said.text}"
+    return Phase(
+        **{
+            **asdict(phase),
+            "cpu_s": _children_s() - spent,
+            "bytes": size_of(root) - size,
+            "before": before,
+        }
+    )
+
+
+def _children_s() -> float:
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+def size_of(folder: Path) -> int:
+    """Bytes of disk that the files below a folder take."""
+    return sum(512 * file.lstat().st_blocks for file in folder.rglob("*"))
+
+
+# --- the same tables ------------------------------------------------------------------
+
+_VOLATILE = {"started", "wall_time_s", "cpu_time_s", "steps_per_s", "versions", "made", "written"}
+
+
+def differences(found: Path, wanted: Path, but: str = "") -> list[str]:
+    """What is not the same in two folders of tables, to the last bit of every column.
+
+    `but`: a file that is left out, from the folder.
+    """
+    problems = []
+    for file in sorted(wanted.rglob("*")):
+        name = file.relative_to(wanted)
+        other = found / name
+        if str(name) == but:
+            continue
+        if file.suffix in (".parquet", ".json", ".csv") and not other.is_file():
+            problems.append(f"{name} is missing")
+        elif file.suffix == ".parquet":
+            problems += [f"{name}: {problem}" for problem in _of_tables(other, file)]
+        elif file.suffix == ".json":
+            problems += [f"{name}: {problem}" for problem in _of_documents(other, file)]
+    return problems
+
+
+def _of_tables(found: Path, wanted: Path) -> list[str]:
+    try:
+        one, other = pq.read_table(found), pq.read_table(wanted)
+    except (pa.ArrowException, OSError) as error:
+        return [f"cannot be read: {error}"]
+    if one.schema.names != other.schema.names:
+        return ["other columns"]
+    if one.num_rows != other.num_rows:
+        return [f"{one.num_rows} rows instead of {other.num_rows}"]
+    return [
+        f"column {name} differs"
+        for name in one.schema.names
+        if name not in _VOLATILE and _bits(one[name]) != _bits(other[name])
+    ]
+
+
+def _of_documents(found: Path, wanted: Path) -> list[str]:
+    try:
+        one = json.loads(found.read_text(encoding="utf-8"))
+    except (ValueError, OSError) as error:
+        return [f"cannot be read: {error}"]
+    return list(_of_values(_lasting(one), _lasting(json.loads(wanted.read_text()))))
+
+
+def _bits(column: pa.ChunkedArray) -> object:
+    if pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
+        mask = column.is_null().to_numpy().tobytes()
+        filled = column.fill_null(0) if column.null_count else column
+        return mask, np.ascontiguousarray(filled.to_numpy()).tobytes()
+    return repr(column.to_pylist())
+
+
+def _lasting(value: Any) -> Any:
+    """A document without what is never the same twice."""
+    if isinstance(value, dict):
+        return {name: _lasting(item) for name, item in value.items() if name not in _VOLATILE}
+    return [_lasting(item) for item in value] if isinstance(value, list) else value
+
+
+def _of_values(one: Any, other: Any, where: str = "") -> Iterator[str]:
+    if isinstance(one, dict) and isinstance(other, dict) and one.keys() == other.keys():
+        for name in one:
+            yield from _of_values(one[name], other[name], f"{where}.{name}")
+    elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+        for place, pair in enumerate(zip(one, other, strict=True)):
+            yield from _of_values(*pair, f"{where}[{place}]")
+    elif repr(one) != repr(other):
+        yield f"{where or 'value'} differs"
+
+
+# --- what a resumed run must give -----------------------------------------------------
+
+INPUTS = ("in.liggghts", "case.json", "columns.json", "*.data", "*.stl")
+"""What a run folder holds before its run."""
+
+
+def resumed_at(run_dir: Path) -> list[int]:
+    """Steps at which a finished run was resumed."""
+    parts = json.loads((run_dir / "run.json").read_text())["parts"]
+    steps = [part["from_step"] for part in parts]
+    while len(steps) > 1 and steps[1] == 0:  # a start that left no checkpoint was made again
+        steps.pop(0)
+    return steps[1:]
+
+
+class CleanRuns:
+    """The same runs by the engine alone: nobody kills it, and it keeps every checkpoint.
+
+    LIGGGHTS gives the same digits every time from the same start, and others after a resume.
+    What a killed run must give is therefore what the engine gives that is stopped and
+    resumed at the same steps.
+    """
+
+    def __init__(self, ground: Ground, cache: Path) -> None:
+        self.ground, self.cache = ground, cache
+
+    def tables(self, place: str, steps: Sequence[int]) -> Path:
+        """Folder of the tables of a run that was resumed at these steps."""
+        run = self.ground.run(place)
+        name = "-".join([place, "from", "0", *map(str, steps)])
+        project = self.cache / name
+        with locked(self.cache / f"{place}.lock"):
+            if not (project / "done").is_file():
+                shutil.rmtree(project, ignore_errors=True)
+                self._make(place, list(steps), project)
+                (project / "done").touch()
+        return project / run / "tables"
+
+    def _make(self, place: str, steps: list[int], project: Path) -> None:
+        run = self.ground.run(place)
+        folder = self.ground.copy(project) / run
+        shutil.rmtree(folder / "tables")
+        kept = self._checkpoints(place) if steps else folder
+        for part, step in enumerate(steps, 2):
+            self._resume(folder, kept, part, step)
+            kept = folder
+            if place == "filling":  # only the part that ends writes the settled particles
+                (folder / f"particles.{part - 1}.bin").unlink()
+        self._analyse(project, run)
+
+    def _checkpoints(self, place: str) -> Path:
+        """A run folder with every checkpoint of an undisturbed run."""
+        project = self.cache / f"{place}-checkpoints"
+        run = self.ground.run(place)
+        if not (project / "done").is_file():
+            shutil.rmtree(project, ignore_errors=True)
+            self.ground.copy_before(self.ground.phases[place.replace("_", " ")], project)
+            _engine(project / run, 1)
+            (project / "done").touch()
+        return project / run
+
+    @staticmethod
+    def _resume(folder: Path, kept: Path, part: int, step: int) -> None:
+        for file in kept.glob("checkpoint.*.restart"):
+            if kept != folder:
+                shutil.copy2(file, folder / file.name)
+        _engine(folder, part, f"checkpoint.{step}.restart")
+
+    @staticmethod
+    def _analyse(project: Path, run: str) -> None:
+        said = main_of("dragchain", ["tables", run], project)
+        assert said.status == 0, said.text
+
+
+def _engine(folder: Path, part: int, source: str | None = None) -> Said:
+    words = ["liggghts", "-in", "in.liggghts", "-log", f"engine.{part}.log"]
+    words[0] = os.environ.get("DRAGDECK_ENGINE", words[0])
+    words += ["-var", "part", str(part)]
+    if source is not None:
+        words += ["-var", "resume", "1", "-var", "from", source]
+    said = call(words, folder, folder / f"screen.{part}.txt")
+    assert said.status == 0, said.text
+    return said

@@ -1,0 +1,187 @@
+"""Hostile meshes of a workpiece."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from attack.calls import REFUSED
+from attack.case import Attack, Got
+from attack.ground import STUDY, new_project, tiny_study, write_study
+from attack.studies import WARNED, checked
+
+
+def _rod(sections: int = 12) -> trimesh.Trimesh:
+    rod = trimesh.creation.cylinder(radius=4.0, height=40.0, sections=sections)
+    rod.apply_translation([0, 0, 20])
+    return rod
+
+
+def _stl(mesh: trimesh.Trimesh) -> bytes:
+    content: bytes = mesh.export(file_type="stl")
+    return content
+
+
+def _changed(**parts: object) -> bytes:
+    rod = _rod()
+    vertices, faces = np.array(rod.vertices), np.array(rod.faces)
+    if "vertex" in parts:
+        vertices[3] = parts["vertex"]
+    if "faces" in parts:
+        faces = faces[parts["faces"]]
+    if "scale" in parts:
+        vertices = vertices * parts["scale"]
+    return _stl(trimesh.Trimesh(vertices, faces, process=False))
+
+
+def _joined(*meshes: trimesh.Trimesh) -> bytes:
+    return _stl(trimesh.util.concatenate(list(meshes)))
+
+
+def _moved(by: tuple[float, float, float]) -> trimesh.Trimesh:
+    rod = _rod()
+    rod.apply_translation(by)
+    return rod
+
+
+def _fine(facets: int) -> bytes:
+    """A rod of very many facets: rings of narrow quadrilaterals, each cut in two."""
+    around, along = 1000, facets // 2000
+    angle = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    height = np.linspace(0, 40, along + 1)
+    rings = np.array([[4 * np.cos(angle), 4 * np.sin(angle), np.full(around, z)] for z in height])
+    points = rings.transpose(0, 2, 1).reshape(-1, 3)
+    first = np.arange(around)
+    second = (first + 1) % around
+    low = (np.arange(along) * around)[:, None]
+    one = np.stack([low + first, low + second, low + around + second], axis=2)
+    two = np.stack([low + first, low + around + second, low + around + first], axis=2)
+    ends = len(points)
+    points = np.vstack([points, [0, 0, 0], [0, 0, 40]])
+    top = along * around
+    bottom_cap = np.stack([second, first, np.full(around, ends)], axis=1)
+    top_cap = np.stack([top + first, top + second, np.full(around, ends + 1)], axis=1)
+    faces = np.vstack([one.reshape(-1, 3), two.reshape(-1, 3), bottom_cap, top_cap])
+    return _stl(trimesh.Trimesh(points, faces, process=False))
+
+
+def _obj(*faces: str) -> bytes:
+    rod = _rod()
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in rod.vertices]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in rod.faces]
+    return "\n".join([*lines, *faces, ""]).encode()
+
+
+def _absurd_count() -> bytes:
+    content = bytearray(_stl(_rod()))
+    content[80:84] = b"\xff\xff\xff\xff"
+    return bytes(content)
+
+
+_FILE = r"hostile\.\w+"
+_HOSTILE = {
+    "inverted normals": ("stl", lambda: _stl(_inverted()), (_FILE, "normal|inward|inside")),
+    "one facet turned round": ("stl", lambda: _stl(_one_turned()), (_FILE,)),
+    "two bodies": ("stl", lambda: _joined(_rod(), _moved((12, 0, 0))), (_FILE, "bod|parts")),
+    "a body in a body": ("stl", lambda: _joined(_rod(), _smaller()), (_FILE, "bod|parts")),
+    "a body through a body": ("stl", lambda: _joined(_rod(), _moved((3, 0, 0))), (_FILE,)),
+    "the same body twice": ("stl", lambda: _joined(_rod(), _rod()), (_FILE,)),
+    "an open end": ("stl", lambda: _changed(faces=slice(2, None)), (_FILE,)),
+    "a corner that is NaN": ("stl", lambda: _changed(vertex=np.nan), (_FILE,)),
+    "a corner at infinity": ("stl", lambda: _changed(vertex=np.inf), (_FILE,)),
+    "a corner at 1e30": ("stl", lambda: _changed(vertex=1e30), (_FILE,)),
+    "all corners in one": ("stl", lambda: _changed(scale=0.0), (_FILE,)),
+    "flat": ("stl", lambda: _changed(scale=np.array([1, 1, 0])), (_FILE,)),
+    "metres as millimetres": ("stl", lambda: _changed(scale=1e-3), (_FILE, "unit")),
+    "micrometres as millimetres": ("stl", lambda: _changed(scale=1e3), (_FILE, "unit")),
+    "4 billion facets announced": ("stl", _absurd_count, (_FILE,)),
+    "empty": ("stl", lambda: b"", (_FILE,)),
+    "a header only": ("stl", lambda: _stl(_rod())[:84], (_FILE,)),
+    "cut to half": ("stl", lambda: _stl(_rod())[:1000], (_FILE,)),
+    "an OBJ in an STL": ("stl", _obj, (_FILE,)),
+    "another format": ("step", lambda: b"ISO-10303-21;", (_FILE,)),
+    "no suffix": ("", lambda: _stl(_rod()), ("hostile",)),
+    "an index beyond": ("obj", lambda: _obj("f 1 2 999"), (_FILE,)),
+    "an index of zero": ("obj", lambda: _obj("f 0 1 2"), (_FILE,)),
+    "an index below zero": ("obj", lambda: _obj("f -1 -2 -999"), (_FILE,)),
+    "an index of 1e30": ("obj", lambda: _obj(f"f 1 2 {10**30}"), (_FILE,)),
+    "a facet of two corners": ("obj", lambda: _obj("f 1 2"), (_FILE,)),
+    "a facet of 1000 corners": ("obj", lambda: _obj("f " + " ".join(["1", "2"] * 500)), (_FILE,)),
+    "a facet with a hole": ("obj", lambda: _obj("f 1 1 1"), (_FILE,)),
+    "text in a corner": ("obj", lambda: _obj("v a b c"), (_FILE,)),
+    "a corner of two numbers": ("obj", lambda: _obj("v 1 2"), (_FILE,)),
+    "a material from /etc/passwd": ("obj", lambda: _obj("mtllib /etc/passwd"), (_FILE,)),
+    "PLY that announces 1e12 corners": (
+        "ply",
+        lambda: (
+            b"ply\nformat ascii 1.0\nelement vertex 1000000000000\nproperty float x\n"
+            b"property float y\nproperty float z\nelement face 1\nproperty list uchar int "
+            b"vertex_indices\nend_header\n0 0 0\n"
+        ),
+        (_FILE,),
+    ),
+    "VTK that announces 1e12 points": (
+        "vtk",
+        lambda: (
+            b"# vtk DataFile Version 3.0\na\nASCII\nDATASET UNSTRUCTURED_GRID\n"
+            b"POINTS 1000000000000 float\n0 0 0\n"
+        ),
+        (_FILE,),
+    ),
+}
+
+
+def _inverted() -> trimesh.Trimesh:
+    rod = _rod()
+    return trimesh.Trimesh(rod.vertices, rod.faces[:, ::-1], process=False)
+
+
+def _one_turned() -> trimesh.Trimesh:
+    rod = _rod()
+    faces = np.array(rod.faces)
+    faces[5] = faces[5][::-1]
+    return trimesh.Trimesh(rod.vertices, faces, process=False)
+
+
+def _smaller() -> trimesh.Trimesh:
+    rod = trimesh.creation.cylinder(radius=2.0, height=20.0, sections=8)
+    rod.apply_translation([0, 0, 20])
+    return rod
+
+
+_HARMLESS = ("a material from /etc/passwd",)
+
+
+def mesh_attacks(seed: int) -> Iterator[Attack]:
+    """Every hostile mesh; the seed changes nothing."""
+    for what, (suffix, content, named) in _HOSTILE.items():
+        act = partial(_mesh, suffix, content, named)
+        wanted = (REFUSED, WARNED, "accepted") if what in _HARMLESS else (REFUSED, WARNED)
+        yield Attack("mesh", what, act, wanted, 1.5)
+    yield Attack("mesh", "1,000,000 facets in 10 s", _million, ("answered in time",), 20.0)
+
+
+def _place(suffix: str, content: bytes, folder: Path) -> Path:
+    project = new_project(folder / "project")
+    data = tiny_study()
+    name = f"hostile.{suffix}" if suffix else "hostile"
+    data["workpiece"]["shape"] = {"kind": "mesh", "file": name, "unit": "mm"}
+    write_study(project, data)
+    (project / "studies" / STUDY / name).write_bytes(content)
+    return project
+
+
+def _mesh(suffix: str, content, named: tuple[str, ...], folder: Path, whole: bool) -> Got:  # type: ignore[no-untyped-def]
+    return checked(_place(suffix, content(), folder), named)
+
+
+def _million(folder: Path, whole: bool) -> Got:
+    """Whether it is answered in 10 s of processor time, whatever the answer."""
+    project = _place("stl", _fine(1_000_000), folder)
+    got = checked(project, (), patience_s=10.0)
+    late = got.outcome.startswith(("no answer", "traceback", "died"))
+    return got if late else Got("answered in time", got.seen)
