@@ -1,7 +1,5 @@
 """What the attacks share: the study that is attacked, and how a result is noted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

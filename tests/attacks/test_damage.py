@@ -1,7 +1,5 @@
 """Damaged checkpoints, inputs and results: named, or made good; never taken for whole."""
 
-from __future__ import annotations
-
 import pytest
 from attack.case import Attack
 from attack.damage import checkpoint_attacks, input_attacks, result_attacks

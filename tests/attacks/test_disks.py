@@ -1,7 +1,5 @@
 """A disk that is full, then has room: the same tables, never a run with holes."""
 
-from __future__ import annotations
-
 import pytest
 from attack.case import Attack
 from attack.disks import disk_attacks

@@ -1,7 +1,5 @@
 """Fuzzed dumps and meshes, and meshes that are made to break something."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Hostile studies and templates: refused, and named; nothing of them becomes code."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Kill -9 in every phase: the same call goes on, and gives the same tables."""
 
-from __future__ import annotations
-
 import pytest
 from attack.case import Attack
 from attack.kills import Arena, kill_attacks

@@ -1,7 +1,5 @@
 """The suite itself: it sees what differs, and does not take one outcome for another."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

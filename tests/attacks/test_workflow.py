@@ -1,7 +1,5 @@
 """Attacks on the whole: ./run killed, locked, called wrongly, on disks that cannot be written."""
 
-from __future__ import annotations
-
 import pytest
 from attack.case import Attack
 from attack.kills import Arena

@@ -1,7 +1,5 @@
 """Commands under attack: called, limited, killed, and what they said."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import multiprocessing

@@ -1,7 +1,5 @@
 """An attack, what came of it, and which attacks are tried when time is short."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -62,7 +60,7 @@ class Row:
     state: str = field(default="as expected")
 
     @classmethod
-    def of(cls, attack: Attack, got: Got) -> Row:
+    def of(cls, attack: Attack, got: Got) -> "Row":
         if not got.was_run:
             state = NOT_RUN
         else:

@@ -1,7 +1,5 @@
 """Damaged checkpoints, inputs and results."""
 
-from __future__ import annotations
-
 import json
 import os
 import random

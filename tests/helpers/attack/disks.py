@@ -1,7 +1,5 @@
 """A disk that fills up in every phase, then has room again."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random

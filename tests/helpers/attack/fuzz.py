@@ -1,7 +1,5 @@
 """Fuzzed dumps and meshes: the right values, or an error that names the file."""
 
-from __future__ import annotations
-
 import json
 import struct
 import sys

@@ -1,7 +1,5 @@
 """The study that is attacked: made once, copied for every attack, compared afterwards."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import os

@@ -1,7 +1,5 @@
 """Kills at random times in every phase, then the same call again."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Hostile meshes of a workpiece."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path

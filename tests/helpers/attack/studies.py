@@ -1,7 +1,5 @@
 """Hostile studies: no input becomes code, and a mistake is named as what it is."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

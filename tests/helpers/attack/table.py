@@ -1,7 +1,5 @@
 """The table in which the suite of attacks ends: attack, expected, got."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import Counter
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Hostile templates: a template is data, not a program."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path

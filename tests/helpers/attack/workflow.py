@@ -1,7 +1,5 @@
 """Attacks on ./run: killed, called twice or wrongly, on disks that cannot be written."""
 
-from __future__ import annotations
-
 import json
 import os
 import random
