@@ -1,5 +1,6 @@
 """Tables read a row group at a time, so that memory does not grow with their length."""
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import groupby, pairwise
@@ -18,6 +19,9 @@ from dragchain.errors import TableError
 PIECE_ROWS = 32_768
 """Rows that come at once: what is computed of them is a multiple of their size."""
 
+_NUMBER = re.compile("^step$|_(n|m|s|j|id|pa|m_s|n_m|rad_s)$")
+"""Names of columns that hold numbers, by their units."""
+
 Steps = tuple[int, int] | Ints
 """What to read: the first and the last step of a stretch, or rising steps, (N,)."""
 
@@ -34,6 +38,9 @@ def intact(path: Path) -> Iterator[None]:
     if not path.is_file():
         raise TableError(f"{path} is not there: run `{_command(path)}`")
     try:
+        for field in pq.read_schema(path):
+            if field.type in (pa.string(), pa.large_string()) and _NUMBER.search(field.name):
+                raise pa.ArrowTypeError(f"column {field.name} holds text instead of numbers")
         yield
     except (pa.ArrowException, OSError) as error:
         raise TableError(

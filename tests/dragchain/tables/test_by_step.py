@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from dragchain.errors import TableError
-from dragchain.tables.by_step import RisingSteps, Steps, read_groups, read_steps
+from dragchain.tables.by_step import RisingSteps, Steps, read_groups, read_steps, read_table
 
 TABLE = pd.DataFrame({"x_m": np.arange(8.0), "step": [0, 0, 10, 10, 10, 30, 40, 40]})
 
@@ -119,3 +119,11 @@ def test_a_missing_table_or_column_is_named(tmp_path: Path) -> None:
         next(read_groups(tmp_path / "tables" / "t.parquet", ["step"]))
     with pytest.raises(TableError, match="no column y_m"):
         next(read_groups(written(tmp_path), ["step", "y_m"]))
+
+
+def test_text_instead_of_numbers_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "tables/contacts.parquet"
+    file.parent.mkdir()
+    pd.DataFrame({"step": [1], "phase": ["drag"], "force_n": ["a"]}).to_parquet(file)
+    with pytest.raises(TableError, match=r"contacts\.parquet .* column force_n holds text"):
+        read_table(file)
