@@ -125,5 +125,5 @@ def test_text_instead_of_numbers_is_named(tmp_path: Path) -> None:
     file = tmp_path / "tables/contacts.parquet"
     file.parent.mkdir()
     pd.DataFrame({"step": [1], "phase": ["drag"], "force_n": ["a"]}).to_parquet(file)
-    with pytest.raises(TableError, match=r"contacts\.parquet .* column force_n holds text"):
+    with pytest.raises(TableError, match=r"contacts\.parquet .*column force_n holds text"):
         read_table(file)
