@@ -22,6 +22,9 @@ PIECE_ROWS = 32_768
 _NUMBER = re.compile("^step$|_(n|m|s|j|id|pa|m_s|n_m|rad_s)$")
 """Names of columns that hold numbers, by their units."""
 
+_NEVER_EMPTY = ("network", "particles", "workpiece_contacts")
+"""Tables of a bed with a workpiece in it: they always have rows."""
+
 Steps = tuple[int, int] | Ints
 """What to read: the first and the last step of a stretch, or rising steps, (N,)."""
 
@@ -38,6 +41,8 @@ def intact(path: Path) -> Iterator[None]:
     if not path.is_file():
         raise TableError(f"{path} is not there: run `{_command(path)}`")
     try:
+        if path.stem in _NEVER_EMPTY and pq.read_metadata(path).num_rows == 0:
+            raise pa.ArrowInvalid("it has no rows")
         for field in pq.read_schema(path):
             if field.type in (pa.string(), pa.large_string()) and _NUMBER.search(field.name):
                 raise pa.ArrowTypeError(f"column {field.name} holds text instead of numbers")
