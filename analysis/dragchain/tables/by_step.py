@@ -41,9 +41,10 @@ def intact(path: Path) -> Iterator[None]:
     if not path.is_file():
         raise TableError(f"{path} is not there: run `{_command(path)}`")
     try:
-        if path.stem in _NEVER_EMPTY and pq.read_metadata(path).num_rows == 0:
+        found = pq.read_metadata(path)
+        if path.stem in _NEVER_EMPTY and found.num_rows == 0:
             raise pa.ArrowInvalid("it has no rows")
-        for field in pq.read_schema(path):
+        for field in found.schema.to_arrow_schema():
             if field.type in (pa.string(), pa.large_string()) and _NUMBER.search(field.name):
                 raise pa.ArrowTypeError(f"column {field.name} holds text instead of numbers")
         yield

@@ -12,6 +12,7 @@ import jinja2
 from pydantic import Field, ValidationError, model_validator
 
 from dragdeck.cases.case import Case
+from dragdeck.decks import PACKING_FILE
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.templates import environment
 from dragdeck.documents import Document, Part
@@ -374,7 +375,7 @@ class MapRuns:
             load = point.number("load_factor")
             return column_scene(case, point.name, packing, load, point.fraction, bed)
         scene = process_scene(case, settled)
-        source = f"../../filling/{bed}/packing.restart"
+        source = f"../../filling/{bed}/{PACKING_FILE}"
         return replace(scene, deck=replace(scene.deck, source=source))
 
 

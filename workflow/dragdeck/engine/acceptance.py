@@ -7,7 +7,7 @@ from dragdeck.decks import PACKING_FILE
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
-from dragdeck.engine.completeness import coverage, part_files, whole_frames
+from dragdeck.engine.completeness import coverage, part_files
 from dragdeck.engine.decomposition import decomposition, ranks_check
 from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.limits import breach, within
@@ -138,7 +138,7 @@ def _complete(
     passed, seen = False, f"to step {found.last}"
     if not file.is_file():
         seen = f"no {file.name}"
-    elif not found.steps or whole_frames(file, output).damaged:
+    elif not found.steps or found.damaged:
         seen = f"{file.name} is cut short or empty"
     elif found.gap is not None:
         seen = f"step {found.gap} is missing"

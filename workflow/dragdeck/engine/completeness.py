@@ -140,10 +140,13 @@ class Coverage:
         Of whole frames that count: no later part begins before them.
     gap : int or None
         The first promised step that is missing, of those up to the last one written or promised.
+    damaged : bool
+        Whether the file of the last part was cut short, or has a hole.
     """
 
     steps: frozenset[int]
     gap: int | None
+    damaged: bool
 
     @property
     def last(self) -> int | None:
@@ -165,12 +168,12 @@ def _file(folder: Path, output: OutputOfRun, part: RunPart) -> Path:
 def coverage(folder: Path, output: OutputOfRun, parts: Sequence[RunPart]) -> Coverage:
     """What the parts hold of an output; what a later part has written again counts once."""
     steps: set[int] = set()
+    frames = WholeFrames((), 0)
     for part in parts:
-        steps = {step for step in steps if step <= part.from_step}
         file = _file(folder, output, part)
-        if file.is_file():
-            steps |= set(whole_frames(file, output).steps)
-    return Coverage(frozenset(steps), _gap(steps, output))
+        frames = whole_frames(file, output) if file.is_file() else WholeFrames((), 0)
+        steps = {step for step in steps if step <= part.from_step}.union(frames.steps)
+    return Coverage(frozenset(steps), _gap(steps, output), frames.damaged)
 
 
 def _gap(steps: set[int], output: OutputOfRun) -> int | None:

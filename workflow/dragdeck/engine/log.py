@@ -5,6 +5,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from dragdeck.decks import END
+
 
 def engine_errors(screen: str) -> list[str]:
     """The ERROR lines of LIGGGHTS, once each, in order."""
@@ -13,7 +15,7 @@ def engine_errors(screen: str) -> list[str]:
 
 def reached_end(screen: str) -> bool:
     """Whether LIGGGHTS came to the last line of the input script."""
-    return re.search(r"^DRAGDECK END$", screen, flags=re.MULTILINE) is not None
+    return re.search(f"^{END}$", screen, flags=re.MULTILINE) is not None
 
 
 def dangerous_builds(screen: str) -> int:

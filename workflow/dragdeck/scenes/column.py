@@ -6,7 +6,7 @@ from typing import Literal
 
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material, skin
 from dragdeck.cases.case import Case
-from dragdeck.decks import outputs
+from dragdeck.decks import PACKING_FILE, outputs
 from dragdeck.decks.case_file import BowlOfRun, CaseOfStudy, MediaOfRun, Phase
 from dragdeck.decks.data_file import Body, data_file
 from dragdeck.decks.deck import Deck, Scene
@@ -110,7 +110,7 @@ def column_scene(
         study=case.study_name,
         scene="column",
         run=run,
-        source="particles.data" if stack else f"../../filling/{filling_run}/packing.restart",
+        source="particles.data" if stack else f"../../filling/{filling_run}/{PACKING_FILE}",
         materials=material_table(study, types, scale, case),
         limit_force=study.contact.limit_force,
         gravity_m_s2=gravity,

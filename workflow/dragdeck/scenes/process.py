@@ -8,7 +8,7 @@ from trimesh import Trimesh
 
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material, skin
 from dragdeck.cases.case import Case, materials_content, mesh_file
-from dragdeck.decks import outputs
+from dragdeck.decks import PACKING_FILE, outputs
 from dragdeck.decks.case_file import (
     CircleOfRun,
     LineOfRun,
@@ -150,7 +150,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         study=case.study_name,
         scene="process",
         run=PROCESS.run_id(case),
-        source=f"../../filling/{FILLING.run_id(case)}/packing.restart",
+        source=f"../../filling/{FILLING.run_id(case)}/{PACKING_FILE}",
         materials=material_table(study, types, fidelity.youngs_modulus_scale, case),
         limit_force=study.contact.limit_force,
         gravity_m_s2=study.gravity_m_s2,
