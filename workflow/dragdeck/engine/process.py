@@ -241,7 +241,7 @@ def _heeding_signals() -> Iterator[list[int]]:
 def _ends_with_us(number: signal.Signals) -> Callable[[], None] | None:
     """What the engine does before it starts: ask Linux for a signal when this process dies.
 
-    So even ``kill -9`` leaves no engine behind. A launcher gets one that it can heed, and ends
+    So even ``kill -9`` leaves no engine behind. A launcher gets one that it handles, and ends
     its ranks.
     """
     if sys.platform != "linux":
