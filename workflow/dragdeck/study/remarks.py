@@ -19,7 +19,7 @@ class Accepted(Model):
 
     unsafe_timestep: Line | None = Field(
         default=None,
-        description="reason for a process time step at or beyond the smallest unstable one measured; "
+        description="reason for a process time step at or beyond the smallest unstable one; "
         "shown among the assumptions of the report",
     )
     cases: Annotated[Whole, Field(ge=1)] = Field(
