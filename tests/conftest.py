@@ -1,7 +1,6 @@
 """What the tests of both packages share."""
 
 import copy
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,11 +16,11 @@ from dragdeck.project import Project
 from dragdeck.study.yaml import read_yaml
 from dragdeck.sweep.cases import load_cases
 
-# A build that nobody watches tries the same examples every time.
-settings.register_profile("ci", derandomize=True, deadline=None)
 # The first example may import scipy, and another process may have the core: no test is timed.
-settings.register_profile("untimed", deadline=None)
-settings.load_profile("ci" if os.environ.get("CI") else "untimed")
+settings.register_profile("explore", deadline=None)
+# The same examples every time; `pytest --hypothesis-profile explore` draws new ones.
+settings.register_profile("repeat", derandomize=True, deadline=None)
+settings.load_profile("repeat")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

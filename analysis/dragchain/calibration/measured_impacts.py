@@ -133,7 +133,8 @@ def measure(record: Record, *, fall_time_s: float) -> Measured:
     time = record.time_s - record.time_s[0]
     offset, drift, noise = _baseline(time, record.force_n, dead)
     force = record.force_n - offset - drift * time
-    threshold = _THRESHOLD_STDS * noise
+    # rounding to the sensor's resolution moves a sample by up to half of it
+    threshold = _THRESHOLD_STDS * noise + _quantum(record.force_n) / 2.0
     pulses = _pulses(force, threshold, dead)
     _check_count(pulses, force, noise)
     # at most three, the last of them whole
