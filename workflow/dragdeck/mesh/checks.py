@@ -201,9 +201,10 @@ def _sharp_angles(mesh: Trimesh) -> list[Finding]:
 
 def _overlaps(mesh: Trimesh) -> list[Finding]:
     """Find facets of one plane on the same side of the edge that they share."""
-    start, end = mesh.vertices[mesh.face_adjacency_edges].swapaxes(0, 1)
-    one, other = mesh.vertices[mesh.face_adjacency_unshared].swapaxes(0, 1)
-    edge, one, other = end - start, one - start, other - start
+    nodes = np.asarray(mesh.vertices)
+    start, end = (nodes[row] for row in mesh.face_adjacency_edges.T)
+    one, other = (nodes[row] - start for row in mesh.face_adjacency_unshared.T)
+    edge = end - start
     # the cosine between edge x one and edge x other, by Lagrange's identity
     length = _dot(edge, edge)
     along_one, along_other = _dot(edge, one), _dot(edge, other)
