@@ -100,7 +100,7 @@ class Project:
             There is no such plan or study, or they do not fit together.
         """
         file = self.plan_file(plan)
-        return plan_points(read_plan(file), file, self.cases(study)[0])
+        return plan_points(read_plan(file), file, self.cases(study)[0], resolve)
 
     def results(self, study: str) -> Path:
         """The results of a study."""

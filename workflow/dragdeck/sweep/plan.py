@@ -22,7 +22,7 @@ from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import Model, Positive, Whole
 from dragdeck.study.model import Study
 from dragdeck.study.yaml import explained, read_yaml
-from dragdeck.sweep.cases import beside_each_other, settle_case
+from dragdeck.sweep.cases import Resolve, beside_each_other, settle_case
 
 Settings = Mapping[str, Any]
 
@@ -106,7 +106,7 @@ def read_plan(file: Path) -> Plan:
         raise explained(error, file) from None
 
 
-def plan_points(plan: Plan, plan_file: Path, base: Case) -> Points:
+def plan_points(plan: Plan, plan_file: Path, base: Case, resolve: Resolve | None = None) -> Points:
     """The cases that a plan makes of a study.
 
     Parameters
@@ -116,6 +116,8 @@ def plan_points(plan: Plan, plan_file: Path, base: Case) -> Points:
         For error messages.
     base : Case
         A case of the study: its scene, its first seed and its path are kept.
+    resolve : callable, optional
+        Finds the settings of points that ask for a tolerance.
 
     Raises
     ------
@@ -129,14 +131,14 @@ def plan_points(plan: Plan, plan_file: Path, base: Case) -> Points:
     for scene, block in itertools.product(plan.scenes.values(), blocks):
         for settings in _settings(plan, block, base.study, scene.get("seed", base.study.seed)):
             shown = {**scene, **_unnamed(settings)}
-            case = _case(base, {**plan.base, **scene, **settings}, shown, plan_file)
+            case = _case(base, {**plan.base, **scene, **settings}, shown, plan_file, resolve)
             found.setdefault(PROCESS.run_id(case), case)
     drops: dict[str, Case] = {}
     for settings in [
         {},
         *({field: value} for field, all_ in plan.drop_test.items() for value in all_),
     ]:
-        case = _case(base, {**plan.base, **settings}, settings, plan_file)
+        case = _case(base, {**plan.base, **settings}, settings, plan_file, resolve)
         drops.setdefault(DROP_TEST.run_id(case), case)
     return Points(beside_each_other(found.values()), list(drops.values()), plan.cost_rounds)
 
@@ -181,8 +183,10 @@ def _path_length(study: Study) -> tuple[str, float]:
     return _PATH_LENGTH[1], path.length_m
 
 
-def _case(base: Case, values: Settings, shown: Settings, plan_file: Path) -> Case:
+def _case(
+    base: Case, values: Settings, shown: Settings, plan_file: Path, resolve: Resolve | None
+) -> Case:
     """The base case with other values; fields below ``fidelity`` replace its name."""
     data = copy.deepcopy(base.study.model_dump(mode="json", exclude_unset=True))
     data["fidelity"] = {}
-    return settle_case(base.file, data, values, shown, named_in=plan_file)
+    return settle_case(base.file, data, values, shown, named_in=plan_file, resolve=resolve)
