@@ -62,6 +62,7 @@ PLAN = {
             "vary": {
                 "fidelity.youngs_modulus_scale": list(SOFTENED),
                 "fidelity.timestep_fraction": [0.5],
+                "fidelity.filling_timestep_fraction": [0.1],  # particles fall through long steps
             }
         }
     ],
