@@ -199,6 +199,8 @@ def case_json() -> dict[str, Any]:
             "media.material": "stone",
             **dict.fromkeys(("bowl.material", "workpiece.material"), "steel"),
             **dict.fromkeys(("pairs.stone-stone.friction", "pairs.steel-stone.friction"), FRICTION),
+            **{f"materials.{m}.youngs_modulus_pa": 1e9 for m in ("stone", "steel")},
+            **{f"materials.{m}.poissons_ratio": 0.3 for m in ("stone", "steel")},
         },
         "media": {
             "count": 4,

@@ -67,6 +67,8 @@ class Measures(Document):
         The quantities of the bed.
     force_histogram : sequence of int
         Counts of contacts on the workpiece between `FORCE_BINS`.
+    load_map : sequence of float
+        Mean normal load by depth and azimuth, N, a depth after the other.
     """
 
     made_by = "dragchain step measure"
@@ -88,6 +90,7 @@ class Measures(Document):
     blocks: Mapping[str, tuple[float | None, ...]] = {}
     single: Mapping[str, float] = {}
     force_histogram: tuple[int, ...] = ()
+    load_map: tuple[float, ...] = ()
 
     @property
     def seed(self) -> int:

@@ -69,6 +69,9 @@ QUANTITIES = (
         "90th per\N{SOFT HYPHEN}centile of contact force",
     ),
     Quantity("contact_force_p99", "99th percentile of the contact forces on the workpiece", "N"),
+    Quantity("normal_load", "sum of the normal forces on the workpiece", "N"),
+    Quantity("sliding_distance", "sliding distance of all contacts over the path"),
+    Quantity("friction_work", "friction work on the workpiece for a metre of path", "J/m"),
     Quantity("workpiece_overlap", "mean relative overlap on the workpiece"),
     Quantity(
         "coordination_number",

@@ -124,6 +124,8 @@ def test_a_run_by_hand(tiny_run: Path) -> None:
     assert blocks["contact_force_p50"] == pytest.approx(1.5)
     assert blocks["contact_force_p90"] == pytest.approx(1.58)
     assert sum(found.force_histogram) == 7
+    assert blocks["normal_load"] == pytest.approx(1.5)
+    assert sum(found.load_map) == pytest.approx(1.5)
     assert blocks["chain_count"] == 0.0 and blocks["chain_length"] is None
     assert found.single == {"bed_height": 0.07, "solid_fraction": 0.6}
 
