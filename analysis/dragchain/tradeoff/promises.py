@@ -21,10 +21,9 @@ from dragchain.files import write_text
 from dragchain.tradeoff.compare import Error, relative_error
 from dragchain.tradeoff.measures import Asked, Measures
 from dragchain.tradeoff.quantities import QUANTITIES
-from dragchain.tradeoff.runs import SILENT, Setting, values_within
+from dragchain.tradeoff.runs import Setting, by_scene, values_within
 
 Verdict = Literal["kept", "broken", "open"]
-_Scene = tuple[tuple[str, str], ...]
 
 
 class Promise(Part):
@@ -156,7 +155,7 @@ def check_promises(runs: Sequence[Measures]) -> list[Promise]:
 
 def _pairs(runs: Sequence[Measures]) -> Iterator[_Pair]:
     signed = {quantity.name for quantity in QUANTITIES if quantity.signed}
-    for scene, everyone in _by_scene(runs):
+    for scene, everyone in by_scene(runs):
         if all(run.asked for run in everyone):
             raise TableError(f"scene {scene}: no run at full stiffness to compare with")
         references = [run for run in everyone if run.complete and not run.asked]
@@ -177,16 +176,6 @@ def _asked(runs: Iterable[Measures]) -> list[Asked]:
     return found
 
 
-def _by_scene(runs: Sequence[Measures]) -> Iterator[tuple[dict[str, str], list[Measures]]]:
-    """The inputs that tell a scene from the others, and its runs, failed ones included."""
-    scenes: dict[_Scene, list[Measures]] = {}
-    for run in runs:
-        scenes.setdefault(_scene(run), []).append(run)
-    common = set.intersection(*map(set, scenes)) if len(scenes) > 1 else set()
-    for key, own in scenes.items():
-        yield dict(item for item in key if item not in common), own
-
-
 def failures(runs: Sequence[Measures]) -> list[FailedRun]:
     """The runs that failed."""
     return [
@@ -197,15 +186,10 @@ def failures(runs: Sequence[Measures]) -> list[FailedRun]:
             check=run.failure[0].name,
             seen=run.failure[0].seen,
         )
-        for scene, everyone in _by_scene(runs)
+        for scene, everyone in by_scene(runs)
         for run in everyone
         if not run.complete
     ]
-
-
-def _scene(measures: Measures) -> _Scene:
-    inputs = {name: measures.inputs[name] for name in sorted(measures.inputs) if name not in SILENT}
-    return tuple((name, str(value)) for name, value in inputs.items() if value is not None)
 
 
 def _promise_of(pair: _Pair, scatter: float, degrees: int) -> Promise:

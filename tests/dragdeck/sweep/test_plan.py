@@ -6,8 +6,10 @@ from typing import Any
 
 import pytest
 import yaml
+from paths import ROOT
 
 from dragdeck.errors import InputError
+from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.study.model import Fidelity
@@ -121,3 +123,8 @@ def test_one_by_one_values_never_come_together(make: Callable[..., Points]) -> N
 def test_a_scene_may_name_the_seed_to_begin_with(make: Callable[..., Points]) -> None:
     points = make(scenes={"other beds": {"seed": 11}}, points=[{"vary": {}}]).processes
     assert [case.study.seed for case in points] == [11, 11, 12]
+
+
+@pytest.mark.parametrize("plan", sorted(file.stem for file in (ROOT / "workflow/plans").iterdir()))
+def test_shipped_plans_fit_the_study_that_they_were_made_for(plan: str) -> None:
+    assert Project(ROOT).points("uhlmann2015", plan).processes

@@ -1,0 +1,198 @@
+"""What reduced stiffness does to a quantity, fitted to runs in many scenes.
+
+The logarithm of a quantity Q follows the stiffness number kappa of the softened run::
+
+    ln Q = ln Q_full + A (kappa^-b - kappa_full^-b)
+
+which is what Richardson's extrapolation assumes of a discretisation error, with a rate b that is
+measured. The amplitude A of a scene scatters about a common mean: A ~ N(alpha, tau^2). With that
+prior one soft run is corrected, and several are extrapolated, by one and the same estimator: the
+best linear unbiased prediction of ln Q_full (Robinson 1991, Statistical Science 6, 15-32).
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from dragchain.arrays import Floats
+from dragchain.errors import SeriesError
+
+UNIT = 1e4
+"""Stiffness number at which kappa^-b is 1, so that amplitudes have a plain size."""
+
+_START = (math.log(0.3), math.log(0.1), math.log(0.05))
+"""Logarithms of rate, tau and sigma to begin the search with."""
+
+
+@dataclass(frozen=True)
+class SoftRuns:
+    """The runs of a scene, in one quantity.
+
+    Attributes
+    ----------
+    scene : str
+    stiffness_number : float
+        Of the scene at full stiffness.
+    numbers : (N,) ndarray
+        Stiffness number of each run.
+    logarithms : (N,) ndarray
+        Logarithm of the quantity in each run.
+    """
+
+    scene: str
+    stiffness_number: float
+    numbers: Floats
+    logarithms: Floats
+
+    def softness(self, rate: float) -> Floats:
+        """What the amplitude is multiplied with in each run, (N,); 0 at full stiffness."""
+        return _softness(self.numbers, self.stiffness_number, rate)
+
+
+@dataclass(frozen=True)
+class SoftnessLaw:
+    """The common law of a quantity.
+
+    Attributes
+    ----------
+    rate : float
+        Exponent b.
+    amplitude, amplitude_se : float
+        Mean amplitude alpha and its standard error.
+    amplitude_std : float
+        Standard deviation tau of the amplitude from scene to scene.
+    run_std : float
+        Standard deviation sigma of the logarithm in one run.
+    model_std : float
+        What the errors of scenes that were left out say beyond all that, as a standard deviation.
+    """
+
+    rate: float
+    amplitude: float
+    amplitude_se: float
+    amplitude_std: float
+    run_std: float
+    model_std: float = 0.0
+
+
+@dataclass(frozen=True)
+class Extrapolated:
+    """Logarithm of a quantity at full stiffness, with its standard error."""
+
+    logarithm: float
+    se: float
+
+
+def fit_softness(scenes: Sequence[SoftRuns]) -> SoftnessLaw:
+    """The law of a quantity by maximum likelihood, every scene with a level of its own.
+
+    Raises
+    ------
+    SeriesError
+        If there are fewer than three scenes, or none was run at two stiffnesses.
+    """
+    useful = [one for one in scenes if len(set(one.numbers.tolist())) > 1]
+    if len(useful) < 3:
+        raise SeriesError("fewer than three scenes were run at two stiffnesses")
+
+    def against(point: Floats) -> float:
+        return -_likelihood(useful, *np.exp(point))[0]
+
+    best = minimize(
+        against,
+        np.array(_START),
+        method="Nelder-Mead",
+        bounds=[(math.log(0.05), math.log(2.0)), (math.log(1e-4), 2.0), (math.log(1e-4), 2.0)],
+        options={"xatol": 1e-4, "fatol": 1e-6, "maxiter": 4000},
+    )
+    rate, amplitude_std, run_std = np.exp(best.x).tolist()
+    _, amplitude, variance = _likelihood(useful, rate, amplitude_std, run_std)
+    return SoftnessLaw(rate, amplitude, math.sqrt(variance), amplitude_std, run_std)
+
+
+def _likelihood(
+    scenes: Iterable[SoftRuns], rate: float, amplitude_std: float, run_std: float
+) -> tuple[float, float, float]:
+    """Logarithm of the likelihood, mean amplitude and its variance.
+
+    The levels of the scenes are integrated out (restricted likelihood), the mean amplitude is
+    estimated.
+    """
+    weight = moment = square = constant = 0.0
+    for one in scenes:
+        h, y, ones = one.softness(rate), one.logarithms, np.ones(len(one.numbers))
+        covariance = run_std**2 * np.eye(len(h)) + amplitude_std**2 * np.outer(h, h)
+        inverse = np.linalg.inv(covariance)
+        level = float(ones @ inverse @ ones)
+        projected = inverse - np.outer(inverse @ ones, ones @ inverse) / level
+        weight += float(h @ projected @ h)
+        moment += float(h @ projected @ y)
+        square += float(y @ projected @ y)
+        constant += float(np.linalg.slogdet(covariance)[1]) + math.log(level)
+    amplitude = moment / weight
+    return -0.5 * (constant + square - moment * amplitude), amplitude, 1.0 / weight
+
+
+def extrapolate(law: SoftnessLaw, runs: SoftRuns, run_stds: Floats | None = None) -> Extrapolated:
+    """The logarithm of a quantity at full stiffness from soft runs of a scene.
+
+    Parameters
+    ----------
+    law : SoftnessLaw
+    runs : SoftRuns
+        Any number of runs, at any stiffness.
+    run_stds : (N,) ndarray, optional
+        Standard deviation of the logarithm of each run; none: that of the law.
+    """
+    h = runs.softness(law.rate)
+    weight = (np.full(len(h), law.run_std) if run_stds is None else run_stds) ** -2.0
+    known = 1.0 / max(law.amplitude_std**2 + law.amplitude_se**2, 1e-12)
+    information = np.array([[weight.sum(), weight @ h], [weight @ h, weight @ h**2 + known]])
+    right = np.array(
+        [
+            weight @ runs.logarithms,
+            (weight * h) @ runs.logarithms + known * law.amplitude,
+        ]
+    )
+    covariance = np.linalg.inv(information)
+    level = float(covariance[0] @ right)
+    softest = float(h.max(initial=0.0) > 0.0)
+    return Extrapolated(level, math.hypot(math.sqrt(covariance[0, 0]), law.model_std * softest))
+
+
+def left_out(scenes: Sequence[SoftRuns], plan: Mapping[float, int]) -> list[tuple[float, float]]:
+    """Errors of the extrapolation in scenes that were left out of the fit.
+
+    Parameters
+    ----------
+    scenes : sequence of SoftRuns
+    plan : mapping of float to int
+        Runs at each modulus scale that the extrapolation may use.
+
+    Returns
+    -------
+    list of (float, float)
+        Extrapolated minus measured logarithm at full stiffness, and the standard error of that.
+    """
+    found = []
+    for one in scenes:
+        law = fit_softness([other for other in scenes if other is not one])
+        scale = (one.numbers / one.stiffness_number) ** 1.5
+        stiff = one.logarithms[np.isclose(scale, 1.0)]
+        chosen = np.concatenate(
+            [np.flatnonzero(np.isclose(scale, level))[:count] for level, count in plan.items()]
+        )
+        if len(stiff) < 2 or len(chosen) < sum(plan.values()):
+            continue
+        soft = replace(one, numbers=one.numbers[chosen], logarithms=one.logarithms[chosen])
+        guess = extrapolate(law, soft)
+        error = guess.logarithm - float(stiff.mean())
+        found.append((error, math.hypot(guess.se, law.run_std / math.sqrt(len(stiff)))))
+    return found
+
+
+def _softness(numbers: Floats, full: float, rate: float) -> Floats:
+    return np.asarray((numbers / UNIT) ** -rate - (full / UNIT) ** -rate)
