@@ -1,4 +1,4 @@
-"""The record of softness: a law for each quantity, and how well it extrapolates."""
+"""The record of reduced stiffness: a law for each quantity, and how well it extrapolates."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,14 +12,14 @@ from dragchain.tradeoff.measures import Measures
 from dragchain.tradeoff.quantities import QUANTITIES, Quantity
 from dragchain.tradeoff.runs import by_scene, values_within
 from dragchain.tradeoff.six_digits import SixDigits
-from dragchain.tradeoff.softness import SoftRuns, fit_softness, left_out
+from dragchain.tradeoff.stiffness_law import ScaledRuns, fit_stiffness_law, left_out
 
 _FEWEST_SCENES = 6
 """Scenes below which a law is not believed."""
 
 
 class LawEntry(Part):
-    """The law of a quantity; see `SoftnessLaw`. `scenes`: how many it was fitted to."""
+    """The law of a quantity; see `StiffnessLaw`. `scenes`: how many it was fitted to."""
 
     label: str
     scenes: int
@@ -45,7 +45,7 @@ class LeftOutEntry(Part):
     inside : int
         Scenes whose measured value lies within the predicted 95 % interval.
     raw_root_mean_square : float
-        Of the soft value as it is, at the stiffest level of the plan.
+        Of the value as it is, at the largest modulus of the plan.
     """
 
     quantity: str
@@ -66,10 +66,10 @@ class SceneEntry(Part):
     failed: int
 
 
-class SoftnessRecord(Document):
-    """The content of ``softness.json``."""
+class StiffnessRecord(Document):
+    """The content of ``stiffness.json``."""
 
-    made_by = "snakemake softness"
+    made_by = "snakemake stiffness"
 
     measured: str
     engine_versions: tuple[str, ...]
@@ -79,7 +79,7 @@ class SoftnessRecord(Document):
     without_law: Mapping[str, str]
 
 
-def soft_runs(everyone: Sequence[Measures], quantity: Quantity) -> SoftRuns | None:
+def scaled_runs(everyone: Sequence[Measures], quantity: Quantity) -> ScaledRuns | None:
     """The complete runs of a scene in a quantity; None if none has it or it changes its sign."""
     complete = [run for run in everyone if run.complete]
     arc = min((run.arc_m for run in complete), default=0.0)
@@ -89,7 +89,7 @@ def soft_runs(everyone: Sequence[Measures], quantity: Quantity) -> SoftRuns | No
         return None
     full = complete[0].numbers["stiffness_number"]
     scales = np.array([run.fidelity.youngs_modulus_scale for run, _ in rows])
-    return SoftRuns(
+    return ScaledRuns(
         scene=complete[0].run,
         stiffness_number=full,
         numbers=full * scales ** (2 / 3),
@@ -97,15 +97,15 @@ def soft_runs(everyone: Sequence[Measures], quantity: Quantity) -> SoftRuns | No
     )
 
 
-def softness_record(
+def stiffness_record(
     runs: Sequence[Measures], plans: Iterable[Mapping[float, int]]
-) -> SoftnessRecord:
+) -> StiffnessRecord:
     """Fit a law to each quantity, and leave each scene out once.
 
     Parameters
     ----------
     runs : sequence of Measures
-        Of many scenes, at full stiffness and softened.
+        Of many scenes, at the physical Young's modulus and at a reduced one.
     plans : iterable of mapping of float to int
         Runs at each modulus scale, for each way to extrapolate that is tried.
     """
@@ -114,12 +114,12 @@ def softness_record(
     without: dict[str, str] = {}
     errors: list[LeftOutEntry] = []
     for quantity in QUANTITIES:
-        found = [soft_runs(everyone, quantity) for everyone in scenes]
+        found = [scaled_runs(everyone, quantity) for everyone in scenes]
         known = [one for one in found if one is not None]
         try:
             if quantity.signed or len(known) < _FEWEST_SCENES:
                 raise SeriesError(f"{len(known)} of {len(scenes)} scenes have it with one sign")
-            law = fit_softness(known)
+            law = fit_stiffness_law(known)
         except SeriesError as error:
             without[quantity.name] = str(error)
             continue
@@ -129,7 +129,7 @@ def softness_record(
         laws[quantity.name] = LawEntry(
             label=quantity.label, scenes=len(known), **vars(law) | {"model_std": law_std}
         )
-    return SoftnessRecord(
+    return StiffnessRecord(
         measured=max(run.started for run in runs)[:10],
         engine_versions=tuple(sorted({run.versions["engine"] for run in runs})),
         scenes=tuple(map(_scene_entry, scenes)),
@@ -140,7 +140,7 @@ def softness_record(
 
 
 def _left_out_entry(
-    quantity: Quantity, scenes: Sequence[SoftRuns], plan: Mapping[float, int]
+    quantity: Quantity, scenes: Sequence[ScaledRuns], plan: Mapping[float, int]
 ) -> tuple[LeftOutEntry, float]:
     """Errors of a plan in scenes left out, and what they say beyond their standard errors."""
     found = np.array(left_out(scenes, plan))
@@ -159,8 +159,8 @@ def _left_out_entry(
     return entry, math.sqrt(max(0.0, float(np.mean(errors**2 - expected**2))))
 
 
-def _raw_error(runs: SoftRuns, level: float) -> float:
-    """Relative error of the soft values of a level as they are."""
+def _raw_error(runs: ScaledRuns, level: float) -> float:
+    """Relative error of the values of a level as they are."""
     scale = (runs.numbers / runs.stiffness_number) ** 1.5
     means = [runs.logarithms[np.isclose(scale, one)].mean() for one in (level, 1.0)]
     return math.expm1(float(means[0] - means[1]))
@@ -182,9 +182,9 @@ def _scene_entry(everyone: Sequence[Measures]) -> SceneEntry:
 _PLANS = ({1e-3: 4}, {1e-2: 4}, {1e-3: 4, 1e-2: 4}, {1e-3: 1}, {1e-3: 1, 1e-2: 1})
 
 
-def softness_command(out_file: Path, measures: Sequence[Path]) -> str:
-    """Write ``softness.json``; a line per quantity and plan."""
-    record = softness_record([Measures.read(file) for file in measures], _PLANS)
+def stiffness_command(out_file: Path, measures: Sequence[Path]) -> str:
+    """Write ``stiffness.json``; a line per quantity and plan."""
+    record = stiffness_record([Measures.read(file) for file in measures], _PLANS)
     record.write(out_file)
     return "\n".join(
         f"{row.quantity} from {dict(row.runs)}: rms error {100 * row.root_mean_square:.1f} %, "

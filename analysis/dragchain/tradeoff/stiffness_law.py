@@ -1,12 +1,12 @@
 """What reduced stiffness does to a quantity, fitted to runs in many scenes.
 
-The logarithm of a quantity Q follows the stiffness number kappa of the softened run::
+The logarithm of a quantity Q follows the stiffness number kappa of the run::
 
     ln Q = ln Q_full + A (kappa^-b - kappa_full^-b)
 
 which is what Richardson's extrapolation assumes of a discretisation error, with a rate b that is
 measured. The amplitude A of a scene scatters about a common mean: A ~ N(alpha, tau^2). With that
-prior one soft run is corrected, and several are extrapolated, by one and the same estimator: the
+prior one run is corrected, and several are extrapolated, by one and the same estimator: the
 best linear unbiased prediction of ln Q_full (Robinson 1991, Statistical Science 6, 15-32).
 """
 
@@ -28,14 +28,14 @@ _START = (math.log(0.3), math.log(0.1), math.log(0.05))
 
 
 @dataclass(frozen=True)
-class SoftRuns:
+class ScaledRuns:
     """The runs of a scene, in one quantity.
 
     Attributes
     ----------
     scene : str
     stiffness_number : float
-        Of the scene at full stiffness.
+        Of the scene at the physical Young's modulus.
     numbers : (N,) ndarray
         Stiffness number of each run.
     logarithms : (N,) ndarray
@@ -47,13 +47,13 @@ class SoftRuns:
     numbers: Floats
     logarithms: Floats
 
-    def softness(self, rate: float) -> Floats:
-        """What the amplitude is multiplied with in each run, (N,); 0 at full stiffness."""
-        return _softness(self.numbers, self.stiffness_number, rate)
+    def reduction(self, rate: float) -> Floats:
+        """What the amplitude is multiplied with, (N,): 0 at the physical Young's modulus."""
+        return _reduction(self.numbers, self.stiffness_number, rate)
 
 
 @dataclass(frozen=True)
-class SoftnessLaw:
+class StiffnessLaw:
     """The common law of a quantity.
 
     Attributes
@@ -80,23 +80,23 @@ class SoftnessLaw:
 
 @dataclass(frozen=True)
 class Extrapolated:
-    """Logarithm of a quantity at full stiffness, with its standard error."""
+    """Logarithm of a quantity at the physical Young's modulus, with its standard error."""
 
     logarithm: float
     se: float
 
 
-def fit_softness(scenes: Sequence[SoftRuns]) -> SoftnessLaw:
+def fit_stiffness_law(scenes: Sequence[ScaledRuns]) -> StiffnessLaw:
     """The law of a quantity by maximum likelihood, every scene with a level of its own.
 
     Raises
     ------
     SeriesError
-        If there are fewer than three scenes, or none was run at two stiffnesses.
+        If there are fewer than three scenes, or none was run at two stiffness numbers.
     """
     useful = [one for one in scenes if len(set(one.numbers.tolist())) > 1]
     if len(useful) < 3:
-        raise SeriesError("fewer than three scenes were run at two stiffnesses")
+        raise SeriesError("fewer than three scenes were run at two stiffness numbers")
 
     def against(point: Floats) -> float:
         return -_likelihood(useful, *np.exp(point))[0]
@@ -110,11 +110,11 @@ def fit_softness(scenes: Sequence[SoftRuns]) -> SoftnessLaw:
     )
     rate, amplitude_std, run_std = np.exp(best.x).tolist()
     _, amplitude, variance = _likelihood(useful, rate, amplitude_std, run_std)
-    return SoftnessLaw(rate, amplitude, math.sqrt(variance), amplitude_std, run_std)
+    return StiffnessLaw(rate, amplitude, math.sqrt(variance), amplitude_std, run_std)
 
 
 def _likelihood(
-    scenes: Iterable[SoftRuns], rate: float, amplitude_std: float, run_std: float
+    scenes: Iterable[ScaledRuns], rate: float, amplitude_std: float, run_std: float
 ) -> tuple[float, float, float]:
     """Logarithm of the likelihood, mean amplitude and its variance.
 
@@ -123,7 +123,7 @@ def _likelihood(
     """
     weight = moment = square = constant = 0.0
     for one in scenes:
-        h, y, ones = one.softness(rate), one.logarithms, np.ones(len(one.numbers))
+        h, y, ones = one.reduction(rate), one.logarithms, np.ones(len(one.numbers))
         covariance = run_std**2 * np.eye(len(h)) + amplitude_std**2 * np.outer(h, h)
         inverse = np.linalg.inv(covariance)
         level = float(ones @ inverse @ ones)
@@ -136,18 +136,20 @@ def _likelihood(
     return -0.5 * (constant + square - moment * amplitude), amplitude, 1.0 / weight
 
 
-def extrapolate(law: SoftnessLaw, runs: SoftRuns, run_stds: Floats | None = None) -> Extrapolated:
-    """The logarithm of a quantity at full stiffness from soft runs of a scene.
+def extrapolate(
+    law: StiffnessLaw, runs: ScaledRuns, run_stds: Floats | None = None
+) -> Extrapolated:
+    """The logarithm of a quantity at the physical Young's modulus from runs of a scene at reduced ones.
 
     Parameters
     ----------
-    law : SoftnessLaw
-    runs : SoftRuns
-        Any number of runs, at any stiffness.
+    law : StiffnessLaw
+    runs : ScaledRuns
+        Any number of runs, at any stiffness number.
     run_stds : (N,) ndarray, optional
         Standard deviation of the logarithm of each run; none: that of the law.
     """
-    h = runs.softness(law.rate)
+    h = runs.reduction(law.rate)
     weight = (np.full(len(h), law.run_std) if run_stds is None else run_stds) ** -2.0
     known = 1.0 / max(law.amplitude_std**2 + law.amplitude_se**2, 1e-12)
     information = np.array([[weight.sum(), weight @ h], [weight @ h, weight @ h**2 + known]])
@@ -159,27 +161,27 @@ def extrapolate(law: SoftnessLaw, runs: SoftRuns, run_stds: Floats | None = None
     )
     covariance = np.linalg.inv(information)
     level = float(covariance[0] @ right)
-    softest = float(h.max(initial=0.0) > 0.0)
-    return Extrapolated(level, math.hypot(math.sqrt(covariance[0, 0]), law.model_std * softest))
+    reduced = float(h.max(initial=0.0) > 0.0)
+    return Extrapolated(level, math.hypot(math.sqrt(covariance[0, 0]), law.model_std * reduced))
 
 
-def left_out(scenes: Sequence[SoftRuns], plan: Mapping[float, int]) -> list[tuple[float, float]]:
+def left_out(scenes: Sequence[ScaledRuns], plan: Mapping[float, int]) -> list[tuple[float, float]]:
     """Errors of the extrapolation in scenes that were left out of the fit.
 
     Parameters
     ----------
-    scenes : sequence of SoftRuns
+    scenes : sequence of ScaledRuns
     plan : mapping of float to int
         Runs at each modulus scale that the extrapolation may use.
 
     Returns
     -------
     list of (float, float)
-        Extrapolated minus measured logarithm at full stiffness, and the standard error of that.
+        Extrapolated minus measured logarithm, and the standard error of that difference.
     """
     found = []
     for one in scenes:
-        law = fit_softness([other for other in scenes if other is not one])
+        law = fit_stiffness_law([other for other in scenes if other is not one])
         scale = (one.numbers / one.stiffness_number) ** 1.5
         stiff = one.logarithms[np.isclose(scale, 1.0)]
         chosen = np.concatenate(
@@ -187,12 +189,12 @@ def left_out(scenes: Sequence[SoftRuns], plan: Mapping[float, int]) -> list[tupl
         )
         if len(stiff) < 2 or len(chosen) < sum(plan.values()):
             continue
-        soft = replace(one, numbers=one.numbers[chosen], logarithms=one.logarithms[chosen])
-        guess = extrapolate(law, soft)
+        reduced = replace(one, numbers=one.numbers[chosen], logarithms=one.logarithms[chosen])
+        guess = extrapolate(law, reduced)
         error = guess.logarithm - float(stiff.mean())
         found.append((error, math.hypot(guess.se, law.run_std / math.sqrt(len(stiff)))))
     return found
 
 
-def _softness(numbers: Floats, full: float, rate: float) -> Floats:
+def _reduction(numbers: Floats, full: float, rate: float) -> Floats:
     return np.asarray((numbers / UNIT) ** -rate - (full / UNIT) ** -rate)
