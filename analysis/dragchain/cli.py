@@ -109,6 +109,16 @@ STEPS = (
                   help="largest fraction of the Rayleigh time to recommend"))),
     Command("promises", "test the advisor's predictions on other scenes",
             "tradeoff.promises:promises_command", (OUT_DIR, MEASURES)),
+    Command("stiffness", "fit what a reduced Young's modulus does to each quantity",
+            "tradeoff.stiffness_record:stiffness_command", (
+                MEASURES,
+                _argument("--out", type=Path, required=True, metavar="FILE", dest="out_file",
+                          help="stiffness.json"))),
+    Command("extrapolate", "extrapolate a run's quantities to the physical Young's modulus",
+            "tradeoff.extrapolate:extrapolate_run", (
+                RUN_DIR,
+                _argument("--record", type=Path, required=True, metavar="FILE",
+                          help="stiffness.json"))),
     Command("scaling", "fit a power law of the mean drag over one field",
             "scaling.fit:scaling_command", (
         OUT_DIR, RUN_DIRS, MADE_BY,

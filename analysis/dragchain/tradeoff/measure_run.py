@@ -58,7 +58,7 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
 def measured(measures: Measures, run_dir: Path, case: Case, bed: Packing) -> Measures:
     """The measures of a complete run with its quantities, from its tables."""
     single = {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction}
-    return measures.model_copy(update={**quantities_along(run_dir, case), "single": single})
+    return measures.model_copy(update={**dict(quantities_along(run_dir, case)), "single": single})
 
 
 def _cost(case: Case, outcome: RunRecord) -> RunCost:

@@ -50,25 +50,43 @@ class Asked(Part):
         return (self.quantity, self.tolerance) == (other.quantity, other.tolerance)
 
 
-class Measures(Document):
-    """The content of ``measures.json``.
+class PathQuantities(Part):
+    """The quantities of a complete run along its counted path.
 
     Attributes
     ----------
-    failure : sequence of AcceptanceCheck
-        Why the run is not `complete`; it has none of what follows then.
     arc_m : float
         Counted path, m.
     block_m : float
         Length of a block, m.
     blocks : mapping
         Quantity to a sequence of B values, None where a block has none.
-    single : mapping
-        The quantities of the bed.
     force_histogram : sequence of int
         Counts of contacts on the workpiece between `FORCE_BINS`.
     load_map : sequence of float
         Mean normal load by depth and azimuth, N, a depth after the other.
+    """
+
+    arc_m: float = 0.0
+    block_m: float = 0.0
+    blocks: Mapping[str, tuple[float | None, ...]] = {}
+    force_histogram: tuple[int, ...] = ()
+    load_map: tuple[float, ...] = ()
+
+    def of_blocks(self, name: str) -> Floats:
+        """The values of a quantity, (B,), NaN where a block has none; (0,) if none has one."""
+        return np.array(self.blocks.get(name, ()), dtype=np.float64)
+
+
+class Measures(PathQuantities, Document):
+    """The content of ``measures.json``.
+
+    Attributes
+    ----------
+    failure : sequence of AcceptanceCheck
+        Why the run is not `complete`; it has none of what follows then.
+    single : mapping
+        The quantities of the bed.
     """
 
     made_by = "dragchain step measure"
@@ -85,12 +103,7 @@ class Measures(Document):
     versions: Mapping[str, str]
     started: str
     failure: tuple[AcceptanceCheck, ...] = ()
-    arc_m: float = 0.0
-    block_m: float = 0.0
-    blocks: Mapping[str, tuple[float | None, ...]] = {}
     single: Mapping[str, float] = {}
-    force_histogram: tuple[int, ...] = ()
-    load_map: tuple[float, ...] = ()
 
     @property
     def seed(self) -> int:
@@ -100,12 +113,15 @@ class Measures(Document):
         return seed
 
     @property
+    def particle_diameter_m(self) -> float:
+        """Mean diameter of a particle, m."""
+        radius = self.inputs["media.radius_mean_m"]
+        assert isinstance(radius, float)
+        return 2.0 * radius
+
+    @property
     def telling_failure(self) -> AcceptanceCheck | None:
         """The acceptance check that says most about why the run failed, None if it did not."""
         by_code = {check.code: check for check in self.failure}
         first = self.failure[0] if self.failure else None
         return next((by_code[code] for code in _TELLING_CHECKS if code in by_code), first)
-
-    def of_blocks(self, name: str) -> Floats:
-        """The values of a quantity, (B,), NaN where a block has none; (0,) if none has one."""
-        return np.array(self.blocks.get(name, ()), dtype=np.float64)

@@ -15,6 +15,7 @@ from dragchain.run.kinematics import drag_phase
 from dragchain.statistics.estimate import finite
 from dragchain.tables.by_step import read_groups, read_table
 from dragchain.tradeoff.loading_along import loading_along
+from dragchain.tradeoff.measures import PathQuantities
 
 LONG_WAVE, SHORT_WAVE = 2.0, 0.25
 """Wave lengths in mean particle diameters that part the spectrum of the drag in three bands."""
@@ -85,20 +86,20 @@ class CountedPath:
             yield last, np.concatenate(held)
 
 
-def quantities_along(run_dir: Path, case: Case) -> dict[str, object]:
-    """The quantities of a complete run with tables and chains, by their fields of `Measures`."""
+def quantities_along(run_dir: Path, case: Case) -> PathQuantities:
+    """The quantities of a complete run with tables and chains."""
     force = read_counted(run_dir, ("step", "drag_n", "lateral_n", "vertical_n"))
     path = CountedPath.of(case, force["step"].to_numpy(np.int64))
     on_workpiece, counts = _of_workpiece_contacts(run_dir, path)
     loading, load_map = loading_along(run_dir, case, path.blocks)
     blocks = {**_of_force(force, path), **on_workpiece, **loading, **_of_network(run_dir, path)}
-    return {
-        "arc_m": path.length_m,
-        "block_m": path.length_m / path.blocks,
-        "blocks": {name: tuple(map(finite, values)) for name, values in blocks.items()},
-        "force_histogram": tuple(counts.tolist()),
-        "load_map": tuple(load_map.ravel().tolist()),
-    }
+    return PathQuantities(
+        arc_m=path.length_m,
+        block_m=path.length_m / path.blocks,
+        blocks={name: tuple(map(finite, values)) for name, values in blocks.items()},
+        force_histogram=tuple(counts.tolist()),
+        load_map=tuple(load_map.ravel().tolist()),
+    )
 
 
 def _of_force(force: pd.DataFrame, path: CountedPath) -> dict[str, Floats]:

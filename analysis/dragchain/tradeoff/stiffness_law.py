@@ -19,6 +19,7 @@ from scipy.optimize import minimize
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
+from dragchain.tradeoff.six_digits import SixDigits
 
 UNIT = 1e4
 """Stiffness number at which kappa^-b is 1, so that amplitudes have a plain size."""
@@ -40,12 +41,15 @@ class ScaledRuns:
         Stiffness number of each run.
     logarithms : (N,) ndarray
         Logarithm of the quantity in each run.
+    path_to_particle : float
+        Path that each value covers over the mean diameter of a particle.
     """
 
     scene: str
     stiffness_number: float
     numbers: Floats
     logarithms: Floats
+    path_to_particle: float
 
     def reduction(self, rate: float) -> Floats:
         """What the amplitude is multiplied with, (N,): 0 at the physical Young's modulus."""
@@ -70,12 +74,12 @@ class StiffnessLaw:
         What the errors of scenes that were left out say beyond all that, as a standard deviation.
     """
 
-    rate: float
-    amplitude: float
-    amplitude_se: float
-    amplitude_std: float
-    run_std: float
-    model_std: float = 0.0
+    rate: SixDigits
+    amplitude: SixDigits
+    amplitude_se: SixDigits
+    amplitude_std: SixDigits
+    run_std: SixDigits
+    model_std: SixDigits = 0.0
 
 
 @dataclass(frozen=True)
@@ -139,7 +143,7 @@ def _likelihood(
 def extrapolate(
     law: StiffnessLaw, runs: ScaledRuns, run_stds: Floats | None = None
 ) -> Extrapolated:
-    """The logarithm of a quantity at the physical Young's modulus from runs of a scene at reduced ones.
+    """The logarithm of a quantity at the physical modulus, from runs at reduced ones.
 
     Parameters
     ----------

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,23 +13,27 @@ from dragchain.tradeoff.measures import Measures
 from dragchain.tradeoff.quantities import QUANTITIES, Quantity
 from dragchain.tradeoff.runs import by_scene, values_within
 from dragchain.tradeoff.six_digits import SixDigits
-from dragchain.tradeoff.stiffness_law import ScaledRuns, fit_stiffness_law, left_out
+from dragchain.tradeoff.stiffness_law import ScaledRuns, StiffnessLaw, fit_stiffness_law, left_out
 
 _FEWEST_SCENES = 6
 """Scenes below which a law is not believed."""
 
 
 class LawEntry(Part):
-    """The law of a quantity; see `StiffnessLaw`. `scenes`: how many it was fitted to."""
+    """The law of a quantity.
+
+    Attributes
+    ----------
+    scenes : int
+        How many it was fitted to.
+    path_to_particle : float
+        Mean path over particle diameter that `run_std` belongs to.
+    """
 
     label: str
     scenes: int
-    rate: SixDigits
-    amplitude: SixDigits
-    amplitude_se: SixDigits
-    amplitude_std: SixDigits
-    run_std: SixDigits
-    model_std: SixDigits
+    path_to_particle: SixDigits
+    law: StiffnessLaw
 
 
 class LeftOutEntry(Part):
@@ -94,6 +99,7 @@ def scaled_runs(everyone: Sequence[Measures], quantity: Quantity) -> ScaledRuns 
         stiffness_number=full,
         numbers=full * scales ** (2 / 3),
         logarithms=np.log(np.abs([value for _, value in rows])),
+        path_to_particle=arc / complete[0].particle_diameter_m,
     )
 
 
@@ -127,7 +133,10 @@ def stiffness_record(
         errors += [row for row, _ in rows]
         law_std = max(std for _, std in rows)
         laws[quantity.name] = LawEntry(
-            label=quantity.label, scenes=len(known), **vars(law) | {"model_std": law_std}
+            label=quantity.label,
+            scenes=len(known),
+            path_to_particle=float(np.mean([one.path_to_particle for one in known])),
+            law=replace(law, model_std=law_std),
         )
     return StiffnessRecord(
         measured=max(run.started for run in runs)[:10],

@@ -1,0 +1,92 @@
+"""Extrapolate the quantities of one run to the physical Young's modulus."""
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from dragchain.report.extrapolated import FILE, Extrapolated, ExtrapolatedQuantity
+from dragchain.run.case import load_case
+from dragchain.statistics.estimate import student_quantile
+from dragchain.tradeoff.path_blocks import quantities_along
+from dragchain.tradeoff.quantities import QUANTITIES
+from dragchain.tradeoff.stiffness_law import ScaledRuns, extrapolate
+from dragchain.tradeoff.stiffness_record import StiffnessRecord
+
+_WIDENING = 0.1
+"""How far beyond the scenes of the record a number of a scene still counts as measured."""
+
+_SCENE_SIZE = "particles"
+"""A number of a scene that no law depends on."""
+
+
+def extrapolate_run(run_dir: Path, record: Path) -> None:
+    """Write ``extrapolated.json`` of a run: every quantity that the record supports.
+
+    Parameters
+    ----------
+    run_dir : Path
+        A complete process run with tables and chains.
+    record : Path
+        ``stiffness.json``.
+
+    Raises
+    ------
+    DocumentError
+        If the record or the run's case cannot be used.
+    TableError
+        If a table is missing.
+    """
+    case, known = load_case(run_dir), StiffnessRecord.read(record)
+    scale = case.fidelity.youngs_modulus_scale
+    full = case.numbers["stiffness_number"]
+    along = quantities_along(run_dir, case)
+    diameters = along.arc_m / (2.0 * case.media.radius_mean_m)
+    found = []
+    for quantity in QUANTITIES:
+        entry = known.laws.get(quantity.name)
+        blocks = along.of_blocks(quantity.name)
+        if entry is None or not blocks.size or not np.isfinite(blocks).all():
+            continue
+        measured = quantity.of_blocks(blocks)
+        if measured == 0.0:
+            continue
+        run = ScaledRuns(
+            case.run,
+            full,
+            np.array([full * scale ** (2 / 3)]),
+            np.log(np.abs([measured])),
+            diameters,
+        )
+        run_std = entry.law.run_std * math.sqrt(entry.path_to_particle / diameters)
+        guess = extrapolate(entry.law, run, np.array([run_std]))
+        half = student_quantile(entry.scenes - 1) * guess.se
+        ends = [math.copysign(math.exp(guess.logarithm + s * half), measured) for s in (-1, 0, 1)]
+        low, value, high = sorted(ends)
+        found.append(
+            ExtrapolatedQuantity(
+                name=quantity.name,
+                label=quantity.label,
+                unit=quantity.unit,
+                measured=measured,
+                value=value,
+                ci95_low=low,
+                ci95_high=high,
+                amplitude_std=math.sqrt(max(0.0, guess.se**2 - run_std**2)),
+            )
+        )
+    Extrapolated(
+        youngs_modulus_scale=scale,
+        source=f"{len(known.scenes)} scenes, measured {known.measured}",
+        outside=tuple(_outside(case.numbers, known)),
+        quantities=tuple(found),
+    ).write(run_dir / FILE)
+
+
+def _outside(numbers: Mapping[str, float], record: StiffnessRecord) -> Iterator[str]:
+    for name in record.scenes[0].numbers:
+        values = [scene.numbers[name] for scene in record.scenes]
+        low, high = (1 - _WIDENING) * min(values), (1 + _WIDENING) * max(values)
+        if name != _SCENE_SIZE and not low <= numbers.get(name, 0.0) <= high:
+            yield f"{name} {numbers.get(name, 0.0):.3g} is outside of {low:.3g} to {high:.3g}"
