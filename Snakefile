@@ -32,6 +32,7 @@ localrules:
     report,
     scaling,
     stability,
+    stiffness,
     tradeoff,
     validate,
     verify,
@@ -107,6 +108,12 @@ rule tradeoff:
 rule promises:
     input:
         rules.write_promises.output,
+
+
+# What a reduced Young's modulus does to each quantity: --config plan=scenes
+rule stiffness:
+    input:
+        rules.write_stiffness.output,
 
 
 # The study beside its source: several fills, a control, what is assumed.

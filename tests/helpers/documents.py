@@ -25,6 +25,8 @@ WRITERS = {
     "measures": "dragchain.tradeoff.measures:Measures",
     "promises": "dragchain.tradeoff.promises:PromisesFile",
     "tradeoff": "dragchain.tradeoff.record:TradeoffRecord",
+    "stiffness": "dragchain.tradeoff.stiffness_record:StiffnessRecord",
+    "extrapolated": "dragchain.report.extrapolated:Extrapolated",
     "advice": "dragdeck.advice.forecast:AdviceFile",
     "loading": "dragchain.loading.document:Loading",
     "figures.drop_test": "dragchain.report.findings:DropFindings",

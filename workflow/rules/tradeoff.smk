@@ -84,3 +84,21 @@ rule write_promises:
         source=source_hash("dragchain.tradeoff.promises"),
     shell:
         "dragchain step promises --out $(dirname {output.promises}) {input} 2>&1 | tee -i {log}"
+
+
+# What a reduced Young's modulus does to each quantity, in designed scenes: plan=scenes.
+rule write_stiffness:
+    input:
+        lambda wildcards: every_point("measures.json"),
+    output:
+        of_tradeoff("stiffness.json"),
+    log:
+        of_tradeoff("logs/stiffness.log"),
+    benchmark:
+        of_tradeoff("benchmarks/stiffness.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        source=source_hash("dragchain.tradeoff.stiffness_record"),
+    shell:
+        "dragchain step stiffness --out {output} {input} 2>&1 | tee -i {log}"
