@@ -1,8 +1,10 @@
-"""The errors a user can meet before and after an engine run."""
+"""The errors and warnings a user can meet before and after an engine run."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Literal
 
 
 class DragdeckError(Exception):
@@ -98,3 +100,29 @@ class EngineError(DragdeckError):
 
 class RejectedRunError(DragdeckError):
     """A run ended, but what it left cannot be trusted."""
+
+
+CautionCode = Literal["gap", "implausible", "mesh", "overlap", "ranks", "skin", "steps_per_contact"]
+"""What a `Caution` is about."""
+
+
+@dataclass(frozen=True)
+class Caution:
+    """A warning before a run.
+
+    Attributes
+    ----------
+    code : CautionCode
+    text : str
+        One sentence with a remedy, for users.
+    settings : mapping of str to float
+        Fields of the fidelity and values that remove the cause, one warning at a time; empty
+        if no setting does, because the warning is about the scene itself.
+    """
+
+    code: CautionCode
+    text: str
+    settings: Mapping[str, float] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return self.text

@@ -26,7 +26,7 @@ from dragdeck.scenes.drop_test import drop_scene
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.registry import SCENES
-from dragdeck.study.model import Fidelity, Tolerance
+from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Tolerance
 from dragdeck.sweep.cases import load_cases
 
 Write = Callable[..., Path]
@@ -283,7 +283,7 @@ def test_too_much_chance_is_said_with_what_would_help(case: Case, tradeoff: Trad
 def test_a_tolerance_about_restitution_sets_the_drop_alone(case: Case, tradeoff: Tradeoff) -> None:
     found = resolve(case, asked(0.005, quantity="restitution"), tradeoff)
     assert found.study.drop_test.timestep_fraction == 0.1
-    assert found.study.fidelity == "standard"
+    assert found.study.fidelity == BUILT_IN_FIDELITIES["standard"]
     assert found.fidelity_name == "tolerance-0.005-restitution"
     strict = resolve(case, asked(1e-3, quantity="restitution"), tradeoff)
     assert strict.study.drop_test.timestep_fraction == 0.02

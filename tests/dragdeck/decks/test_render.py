@@ -223,4 +223,5 @@ def test_all_that_does_not_fit_is_named(
 def test_a_narrow_gap_is_a_warning(small: dict[str, Any], write_study: Callable[..., Path]) -> None:
     small["motion"]["path"]["radius_m"] = 0.012
     (case,) = load_cases(write_study(small))
-    assert any("jam" in warning for warning in process_scene(case, BED).warnings)
+    (gap,) = (one for one in process_scene(case, BED).warnings if one.code == "gap")
+    assert "jam" in gap.text and not gap.settings

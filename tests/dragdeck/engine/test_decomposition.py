@@ -85,17 +85,17 @@ def test_room_above_the_bed_speaks_against_a_split_along_the_height() -> None:
 
 def test_a_rank_without_particles_gets_a_warning() -> None:
     roomy = FilledBowl(**{**vars(BOWL), "half_width_m": 0.9})
-    (text,) = warnings(split(36, roomy))
-    assert "ranks would have no particle" in text and "fidelity.ranks" in text
+    (caution,) = warnings(split(36, roomy))
+    assert "ranks would have no particle" in caution.text and "fidelity.ranks" in caution.text
 
 
 def test_an_uneven_split_gets_a_warning() -> None:
     roomy = FilledBowl(**{**vars(BOWL), "half_width_m": 0.38})
     found = split(6, roomy)
     assert found.idle == 0
-    (text,) = warnings(found)
-    assert f"{found.most_over_mean:.2g} times the mean" in text
-    assert warnings(split(4, roomy)) == []
+    (caution,) = warnings(found)
+    assert f"{found.most_over_mean:.2g} times the mean" in caution.text
+    assert warnings(split(4, roomy)) == warnings(split(caution.settings["ranks"], roomy)) == []
 
 
 def test_the_expected_share_is_that_of_the_poured_particles() -> None:
@@ -201,12 +201,12 @@ def test_particles_too_soft_for_their_bed_get_a_warning_with_a_way_out(
     small["media"]["count"], small["bowl"]["height_m"] = 3000, 1.0
     small["fidelity"] = {"youngs_modulus_scale": 1e-4}
     (case,) = load_cases(write_study(small))
-    (text,) = [text for text in filling_scene(case).warnings if "weight of the bed" in text]
+    (caution,) = [one for one in filling_scene(case).warnings if one.code == "overlap"]
     assert "ABOVE" in dict(notes(case))["overlap"]
-    scale = float(text.rsplit("at least ", 1)[1])
-    small["fidelity"] = {"youngs_modulus_scale": scale}
+    small["fidelity"] |= caution.settings
+    assert f"at least {small['fidelity']['youngs_modulus_scale']:g}" in caution.text
     (case,) = load_cases(write_study(small))
-    assert not any("weight of the bed" in text for text in filling_scene(case).warnings)
+    assert "overlap" not in [one.code for one in filling_scene(case).warnings]
 
 
 def test_particles_that_outrun_their_neighbour_lists_get_a_warning_with_a_way_out(
@@ -214,8 +214,7 @@ def test_particles_that_outrun_their_neighbour_lists_get_a_warning_with_a_way_ou
 ) -> None:
     small["fidelity"] = {"youngs_modulus_scale": 1e-4, "filling_timestep_fraction": 0.8}
     (case,) = load_cases(write_study(small))
-    (text,) = [text for text in filling_scene(case).warnings if "neighbour skin" in text]
-    skin = float(text.split("at least ")[-1].split(",")[0])
-    small["fidelity"]["skin_m"] = skin
+    (caution,) = [one for one in filling_scene(case).warnings if one.code == "skin"]
+    small["fidelity"] |= caution.settings
     (case,) = load_cases(write_study(small))
-    assert not any("neighbour skin" in text for text in filling_scene(case).warnings)
+    assert "skin" not in [one.code for one in filling_scene(case).warnings]

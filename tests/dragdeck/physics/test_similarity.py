@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from dragdeck.cases.case import Case
 from dragdeck.physics.contact_mechanics import SOLID_FRACTION_ESTIMATE
-from dragdeck.physics.similarity import carried_scale, carried_speed, rounded, softest_scale
+from dragdeck.physics.rounding import rounded
+from dragdeck.physics.similarity import carried_scale, carried_speed, softest_scale
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.sweep.cases import load_cases
 

@@ -35,15 +35,15 @@ def dragged(small: dict[str, Any], write_study: Callable[..., Path]) -> Dragged:
 
 
 def test_a_mesh_as_it_should_be_gives_no_warning(dragged: Dragged) -> None:
-    assert not [text for text in process_scene(dragged()).warnings if "bar-" in text]
+    assert "mesh" not in [one.code for one in process_scene(dragged()).warnings]
 
 
 def test_turned_normals_are_repaired_with_a_word(dragged: Dragged) -> None:
     whole = process_scene(dragged()).meshes["workpiece.stl"]
     scene = process_scene(dragged(turned=(0, 7)))
-    (said,) = (text for text in scene.warnings if "bar-" in text)
-    assert "normals" in said
-    assert "turned outwards" in said
+    (said,) = (one for one in scene.warnings if one.code == "mesh")
+    assert "bar-" in said.text and "normals" in said.text and "turned outwards" in said.text
+    assert not said.settings
     assert scene.meshes["workpiece.stl"].face_normals == pytest.approx(whole.face_normals, abs=1e-6)
 
 

@@ -146,7 +146,7 @@ def test_an_unusual_value_is_a_warning(small: dict[str, Any]) -> None:
     small["outputs"] |= {"workpiece_force_hz": 1e3, "workpiece_contacts_hz": 1e3}
     small["motion"]["path"]["revolutions"] = 1
     (warning,) = warnings(validate(small, FILE))
-    assert "motion.speed_m_s 10 is not plausible; did you mean 10 mm/s?" in warning
+    assert "motion.speed_m_s 10 is not plausible; did you mean 10 mm/s?" in warning.text
 
 
 @pytest.mark.parametrize(

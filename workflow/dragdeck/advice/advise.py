@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from dragdeck.advice.options import (
     Option,
+    breaking_step,
     drop_options,
     finest_drop,
     process_options,
@@ -222,22 +223,12 @@ def _check_quantity(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> None:
 
 
 def _breaking_step(case: Case, tradeoff: Tradeoff | None) -> tuple[float, str]:
-    """The step over the Rayleigh time at which soft particles were seen to break, and where.
-
-    Soft particles break at shorter steps, as shares of the Rayleigh time: the next softer level
-    that was measured counts. Infinite where nothing was measured.
-    """
-    limit = case.study.chosen_fidelity().youngs_modulus_scale * (1 + 1e-9)
-    broken = [
-        (-one.youngs_modulus_scale, one.timestep_fraction)
-        for one in (tradeoff.settings if tradeoff else ())
-        if one.breaks and one.speed_factor == 1 and one.youngs_modulus_scale <= limit
-    ]
-    if tradeoff is None or not broken:
-        return math.inf, ""
-    level, fraction = min(broken)
+    """`breaking_step` of a case, and where it was measured; nothing said if it was not."""
+    fraction, level = breaking_step(case.study.chosen_fidelity().youngs_modulus_scale, tradeoff)
+    if tradeoff is None or math.isinf(fraction):
+        return fraction, ""
     return fraction, (
-        f"{100 * fraction:.3g} %, where the drag was wrong or a run failed with E x {-level:g} "
+        f"{100 * fraction:.3g} %, where the drag was wrong or a run failed with E x {level:g} "
         f"({tradeoff.study}, {tradeoff.measured})"
     )
 

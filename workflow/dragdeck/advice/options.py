@@ -1,8 +1,9 @@
-"""Measured settings as they are for a case: carried to its scene, within its stability limits."""
+"""Measured settings as they are for a case: carried to its scene, and passing every check."""
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain
 
 from dragdeck.cases.case import Case
 from dragdeck.outlook.measured import (
@@ -11,10 +12,13 @@ from dragdeck.outlook.measured import (
     MeasuredError,
     MeasuredSetting,
     Tradeoff,
+    stability_map,
 )
 from dragdeck.outlook.timestep import largest_fraction
 from dragdeck.physics.similarity import carried_scale, carried_speed, softest_scale
 from dragdeck.scenes.dimensionless import describe
+from dragdeck.scenes.filling import filling_cautions
+from dragdeck.scenes.fit import process_cautions
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance
 
 _FEWEST_RUNS = 2
@@ -34,7 +38,8 @@ class Option:
     error : MeasuredError or None
         None for the reference, which errors are measured against.
     relative_cost : float
-        Processor time against the reference's.
+        Processor time of the process against that of the measured reference: more if a case's
+        checks take a stiffer modulus or a shorter step.
     drop_timestep_fraction : float or None
         Step of the drop test over the Rayleigh time, if the option is about it.
     """
@@ -48,9 +53,10 @@ class Option:
         if self.drop_timestep_fraction is not None:
             return f"drop at {100 * self.drop_timestep_fraction:.3g} % of the Rayleigh time"
         chosen = self.fidelity
+        skin = "" if chosen.skin_m is None else f", skin {1e3 * chosen.skin_m:.3g} mm"
         return (
             f"E x {chosen.youngs_modulus_scale:g}, {100 * chosen.timestep_fraction:.3g} % of the "
-            f"Rayleigh time, speed x {chosen.speed_factor:g}"
+            f"Rayleigh time, speed x {chosen.speed_factor:g}{skin}"
         )
 
     def same_settings(self, fidelity: Fidelity | FidelityParameters) -> bool:
@@ -61,10 +67,65 @@ class Option:
 
 def with_option(study: Study, option: Option) -> Study:
     """A study with the settings of an option."""
-    if option.drop_timestep_fraction is None:
-        return study.model_copy(update={"fidelity": option.fidelity})
-    drop = study.drop_test.model_copy(update={"timestep_fraction": option.drop_timestep_fraction})
-    return study.model_copy(update={"fidelity": _PROCESS_OF_DROP, "drop_test": drop})
+    update: dict[str, object] = {"fidelity": option.fidelity}
+    if (fraction := option.drop_timestep_fraction) is not None:
+        update["drop_test"] = study.drop_test.model_copy(update={"timestep_fraction": fraction})
+    return study.model_copy(update=update)
+
+
+def breaking_step(scale: float, tradeoff: Tradeoff | None) -> tuple[float, float]:
+    """The step over the Rayleigh time at which soft particles were seen to break, and their scale.
+
+    Soft particles break at shorter steps, as shares of the Rayleigh time: the next softer level
+    that was measured counts. Infinite where nothing was measured.
+    """
+    broken = [
+        (-one.youngs_modulus_scale, one.timestep_fraction)
+        for one in (tradeoff.settings if tradeoff else ())
+        if one.breaks and one.speed_factor == 1 and one.youngs_modulus_scale <= scale * (1 + 1e-9)
+    ]
+    level, fraction = min(broken, default=(-scale, math.inf))
+    return fraction, -level
+
+
+def consistent(case: Case, fidelity: Fidelity, tradeoff: Tradeoff | None) -> Fidelity:
+    """Settings that pass every check of a case: the given ones, or the nearest to them.
+
+    Modulus and time step change only to the accurate side, so that a measured error still holds;
+    skin, filling step and ranks do not change the process. Warnings that remain are about the
+    scene itself.
+
+    Parameters
+    ----------
+    case : Case
+        Its own fidelity does not matter.
+    fidelity : Fidelity
+    tradeoff : Tradeoff or None
+        Steps that were seen to break.
+    """
+    lowest = describe(case)["lowest_restitution"]
+    filling = min(fidelity.filling_timestep_fraction, largest_fraction("settle", lowest))
+    remedy: Mapping[str, float] = {
+        "youngs_modulus_scale": max(fidelity.youngs_modulus_scale, softest_scale(case.study)),
+        "timestep_fraction": min(fidelity.timestep_fraction, largest_fraction("drag", lowest)),
+        "filling_timestep_fraction": filling,
+    }
+    while remedy:
+        fidelity = fidelity.model_copy(update=remedy)
+        study = case.study.model_copy(update={"fidelity": fidelity})
+        remedy = _remedy(replace(case, study=study), fidelity, tradeoff)
+    return fidelity
+
+
+def _remedy(case: Case, fidelity: Fidelity, tradeoff: Tradeoff | None) -> Mapping[str, float]:
+    """What the first check that a case's settings do not pass takes; nothing if they pass all."""
+    found = chain(filling_cautions(case), process_cautions(case))
+    if remedy := next((one.settings for one in found if one.settings), None):
+        return remedy
+    breaking, _ = breaking_step(fidelity.youngs_modulus_scale, tradeoff)
+    if fidelity.timestep_fraction < breaking:
+        return {}
+    return {"timestep_fraction": stability_map().safety_factor * breaking}
 
 
 def process_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterator[Option]:
@@ -74,70 +135,72 @@ def process_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterato
     behind, whose error was not measured, whose step is beyond the stability
     limit of the measured scene, or that cost as much as the reference.
     """
-    here, there = describe(case), tradeoff.scene
-    limit = largest_fraction("drag", there["lowest_restitution"])
+    reference = process_reference(case, tradeoff)
+    limit = largest_fraction("drag", tradeoff.scene["lowest_restitution"])
     for setting in tradeoff.settings:
         error, cost = setting.errors.get(asked.quantity), setting.relative_cost
         sound = setting.failed == 0 and not setting.breaks and setting.runs >= _FEWEST_RUNS
         stable = sound and setting.timestep_fraction <= limit * (1 + 1e-9)
         if error is None or cost is None or not stable:
             continue
-        fidelity, steps = _carried(case.study, setting, here, there)
-        option = Option(fidelity, error, cost * steps)
-        if option.relative_cost < 1 and not option.same_settings(tradeoff.reference):
+        fidelity = consistent(case, _carried(case, setting, tradeoff.scene), tradeoff)
+        option = Option(fidelity, error, cost * _steps(fidelity, setting))
+        dearest = option.relative_cost >= reference.relative_cost
+        if not dearest and not option.same_settings(reference.fidelity):
             yield option
 
 
-def _carried(
-    study: Study, setting: MeasuredSetting, here: Mapping[str, float], there: Mapping[str, float]
-) -> tuple[Fidelity, float]:
-    """A measured setting in another scene, and how many times as many steps it takes there."""
-    scale, fraction = setting.youngs_modulus_scale, setting.timestep_fraction
+def _carried(case: Case, setting: MeasuredSetting, there: Mapping[str, float]) -> Fidelity:
+    """A measured setting in another scene."""
+    here = describe(case)
     stiffer = here["stiffness_number"] / there["stiffness_number"]
     slower = there["inertial_number"] / here["inertial_number"]
-    fidelity = Fidelity(
-        youngs_modulus_scale=max(carried_scale(scale, stiffer), softest_scale(study)),
-        timestep_fraction=min(fraction, largest_fraction("drag", here["lowest_restitution"])),
-        filling_timestep_fraction=_filling_fraction(here),
+    return Fidelity(
+        youngs_modulus_scale=carried_scale(setting.youngs_modulus_scale, stiffer),
+        timestep_fraction=setting.timestep_fraction,
         speed_factor=carried_speed(setting.speed_factor, slower),
     )
-    steps = math.sqrt(fidelity.youngs_modulus_scale / scale)
-    steps *= fraction / fidelity.timestep_fraction * setting.speed_factor / fidelity.speed_factor
-    return fidelity, steps
 
 
-def _filling_fraction(here: Mapping[str, float]) -> float:
-    """Step of the filling over the Rayleigh time: the usual, less where damping is strong."""
-    usual = float(Fidelity().filling_timestep_fraction)
-    return min(usual, largest_fraction("settle", here["lowest_restitution"]))
+def _steps(fidelity: Fidelity, measured: FidelityParameters) -> float:
+    """How many times as many steps as the measured settings a metre of path takes."""
+    steps = math.sqrt(fidelity.youngs_modulus_scale / measured.youngs_modulus_scale)
+    steps *= measured.timestep_fraction / fidelity.timestep_fraction
+    return steps * measured.speed_factor / fidelity.speed_factor
 
 
 def process_reference(case: Case, tradeoff: Tradeoff) -> Option:
-    """The settings that errors are measured against."""
-    filling = _filling_fraction(describe(case))
-    fidelity = Fidelity(**tradeoff.reference.model_dump(), filling_timestep_fraction=filling)
-    return Option(fidelity, None, 1.0)
+    """The settings that errors are measured against, or the nearest that pass every check."""
+    fidelity = consistent(case, Fidelity(**tradeoff.reference.model_dump()), tradeoff)
+    return Option(fidelity, None, _steps(fidelity, tradeoff.reference))
 
 
 def drop_options(case: Case, tradeoff: Tradeoff) -> Iterator[Option]:
     """Every measured step of the drop test that is within the stability limit."""
-    limit = _drop_limit(case)
+    process, limit = _process_of_drop(case, tradeoff), _drop_limit(case)
     for drop in tradeoff.drop_test:
         if drop.timestep_fraction <= limit * (1 + 1e-9):
-            yield _drop_option(case, drop, drop.timestep_fraction)
+            yield _drop_option(process, drop, drop.timestep_fraction)
 
 
 def finest_drop(case: Case, tradeoff: Tradeoff) -> Option:
     """The drop test with the smallest measured step, or a smaller one where damping is strong."""
+    process, limit = _process_of_drop(case, tradeoff), _drop_limit(case)
     finest = min(tradeoff.drop_test, key=lambda drop: drop.timestep_fraction)
-    return _drop_option(case, finest, min(finest.timestep_fraction, _drop_limit(case)))
+    return _drop_option(process, finest, min(finest.timestep_fraction, limit))
+
+
+def _process_of_drop(case: Case, tradeoff: Tradeoff) -> Fidelity:
+    """Settings of the process in a study whose tolerance is about the drop test."""
+    named = {**BUILT_IN_FIDELITIES, **case.study.fidelities}[_PROCESS_OF_DROP]
+    return consistent(case, named, tradeoff)
 
 
 def _drop_limit(case: Case) -> float:
     return largest_fraction("impact", describe(case)["lowest_restitution"])
 
 
-def _drop_option(case: Case, drop: MeasuredDrop, fraction: float) -> Option:
+def _drop_option(process: Fidelity, drop: MeasuredDrop, fraction: float) -> Option:
     """A step of the drop test. The error has no chance in it: it is its own bound."""
     value = drop.restitution_error
     error = MeasuredError(
@@ -148,5 +211,4 @@ def _drop_option(case: Case, drop: MeasuredDrop, fraction: float) -> Option:
         bound=abs(value),
         single_parameter_error=0.0,
     )
-    process = {**BUILT_IN_FIDELITIES, **case.study.fidelities}[_PROCESS_OF_DROP]
     return Option(process, error, drop.relative_cost, fraction)

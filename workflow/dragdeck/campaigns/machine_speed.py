@@ -11,16 +11,15 @@ from pathlib import Path
 
 import jinja2
 
+from dragdeck.advice.options import consistent
 from dragdeck.advice.speed import SCALE, Speed
-from dragdeck.cases.bed import bed_rayleigh_time
+from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.log import loops
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import Report
 from dragdeck.errors import EngineError, RejectedRunError
-from dragdeck.physics.rounding import timestep
-from dragdeck.physics.similarity import softest_scale
 from dragdeck.scenes.filling import FILLING, expected_surface
 from dragdeck.scenes.motion import plunge_point, start_point
 from dragdeck.scenes.process import PROCESS
@@ -110,21 +109,17 @@ def short_case(case: Case) -> Case:
     study = case.study
     asked = study.chosen_fidelity()
     soft = Fidelity(
-        youngs_modulus_scale=max(SCALE, softest_scale(study)),
+        youngs_modulus_scale=SCALE,
         timestep_fraction=min(_TIMESTEP_FRACTION, asked.timestep_fraction),
         filling_timestep_fraction=asked.filling_timestep_fraction,
         skin_m=asked.skin_m,
         ranks=case.ranks,
     )
-    changed = study.model_copy(update={"fidelity": soft})
-    dt = _timestep(changed)
-    pace = asked.speed_factor * _timestep(study) / dt
+    changed = study.model_copy(update={"fidelity": consistent(case, soft, None)})
+    dt = bed_timestep(changed, "timestep_fraction")
+    pace = asked.speed_factor * bed_timestep(study, "timestep_fraction") / dt
     update = {"motion": _motion(changed, pace, dt), "outputs": _outputs(study.outputs, pace, dt)}
     return Case(case.file, {}, changed.model_copy(update=update))
-
-
-def _timestep(study: Study) -> float:
-    return timestep(bed_rayleigh_time(study), study.chosen_fidelity().timestep_fraction)
 
 
 def _motion(study: Study, pace: float, timestep_s: float) -> Motion:

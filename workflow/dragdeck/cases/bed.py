@@ -1,12 +1,27 @@
-"""The media of a study as numbers: radii, Rayleigh time, neighbour skin."""
+"""The media of a study as numbers: radii, Rayleigh time, time steps, neighbour skin."""
 
+from collections.abc import Iterator
 from functools import lru_cache
+from typing import Literal
 
+import numpy as np
+
+from dragdeck.errors import Caution
 from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.packing import Array, radii
-from dragdeck.physics.rounding import round_to
+from dragdeck.physics.rounding import round_to, rounded, timestep
 from dragdeck.study.material import Material
 from dragdeck.study.model import Media, Study
+
+_WIDEST_SKIN = 0.3
+"""Widest neighbour skin that a remedy names, over the mean radius. Up to it the cost of the process
+was measured: no significant change (docs/costs.md)."""
+
+JUST_BEYOND = 1 + 1e-6
+"""A limit counts as passed from this multiple of it on: a rounded remedy may meet it exactly."""
+
+StepField = Literal["timestep_fraction", "filling_timestep_fraction"]
+"""Field of the fidelity that sets the time step of the process or of the filling."""
 
 
 def bed_radii(study: Study) -> Array:
@@ -29,6 +44,47 @@ def bed_rayleigh_time(study: Study) -> float:
     """Rayleigh time of the bed's smallest particle at the fidelity's modulus, s."""
     scale = study.chosen_fidelity().youngs_modulus_scale
     return rayleigh_time(particle_material(study), smallest_radius(study), scale)
+
+
+@lru_cache(maxsize=2)
+def media_volume(media: Media) -> float:
+    """Total volume of the particles, m3."""
+    return float((4 / 3 * np.pi * media_radii(media) ** 3).sum())
+
+
+def bed_timestep(study: Study, field: StepField) -> float:
+    """Time step of the process or of the filling at the study's fidelity, s."""
+    return timestep(bed_rayleigh_time(study), getattr(study.chosen_fidelity(), field))
+
+
+def outrun(study: Study, field: StepField, who: str, speed_m_s: float) -> Iterator[Caution]:
+    """A warning where particles outrun the neighbour lists, which fails a run.
+
+    Parameters
+    ----------
+    study : Study
+    field : StepField
+        Of the scene's time step.
+    who : str
+        What moves, with its verb.
+    speed_m_s : float
+        How fast it moves at most.
+    """
+    needed, has = 2 * speed_m_s * bed_timestep(study, field), skin(study)
+    if needed <= has * JUST_BEYOND:
+        return
+    least, widest = rounded(needed, up=True), round_to(_WIDEST_SKIN * study.media.radius_mean_m, 3)
+    settings = {"skin_m": least}
+    if least > max(has, widest):
+        shorter = getattr(study.chosen_fidelity(), field) * max(has, widest) / needed
+        settings = {"skin_m": max(has, widest), field: rounded(shorter, up=False)}
+    yield Caution(
+        "skin",
+        f"{who} at up to {speed_m_s:.2g} m/s, more than half the neighbour skin of {has:.2g} m "
+        f"in a step: the run may fail for dangerous neighbour builds; take a fidelity.skin_m of "
+        f"at least {least:g}, or a smaller fidelity.{field}",
+        settings,
+    )
 
 
 def particle_material(study: Study) -> Material:

@@ -9,6 +9,7 @@ from trimesh import Trimesh
 from dragdeck import __version__
 from dragdeck.decks.case_file import CaseFile, CaseOfStudy
 from dragdeck.decks.outputs import Output
+from dragdeck.errors import Caution
 from dragdeck.physics.domain_split import ENGINE_CHOOSES
 from dragdeck.physics.engine_limits import ENGINE_HARD_PA
 from dragdeck.study.contact_law import Pair, contact_model, contact_settings, present
@@ -147,7 +148,7 @@ class Scene(Generic[K]):
         What the deck models, and why.
     leaves_out : mapping of str to LeftOut
         What it leaves out.
-    warnings : sequence of str
+    warnings : sequence of Caution
         What the user should know before the run.
     override : str, optional
         The template, if it is not the scene's own.
@@ -160,7 +161,7 @@ class Scene(Generic[K]):
     meshes: Mapping[str, Trimesh] = field(default_factory=dict)
     models: Mapping[str, str] = field(default_factory=dict)
     leaves_out: Mapping[str, LeftOut] = field(default_factory=dict)
-    warnings: Sequence[str] = ()
+    warnings: Sequence[Caution] = ()
     override: str | None = None
 
     @property

@@ -130,7 +130,7 @@ def explanation(
         table.add_row("expects", what, text)
     for warning in scene.warnings:
         table.add_section()
-        table.add_row("warning", warning, "", style="yellow")
+        table.add_row("warning", str(warning), "", style="yellow")
     return table
 
 

@@ -2,10 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dragdeck.errors import Caution
 
 _MOST_OVER_MEAN = 1.5
 """A warning is given where the fullest rank has more than this times the mean."""
@@ -94,6 +97,7 @@ class Split:
         )
 
 
+@lru_cache(maxsize=16)
 def split(ranks: int, filled: FilledBowl) -> Split:
     """The grid in which the busiest rank has the least to do.
 
@@ -151,18 +155,20 @@ def _edges(count: int, low: float, high: float) -> _Fractions:
     return np.linspace(low, high, count + 1)
 
 
-def warnings(found: Split) -> list[str]:
-    """What a user should know of a split before the run."""
+def warnings(found: Split) -> list[Caution]:
+    """What a user should know of a split before the run; a single rank has none."""
     ranks = len(found.particles)
     if found.idle:
-        return [
+        text = (
             f"{found.idle} of {ranks} ranks would have no particle, in a grid of "
             f"{' x '.join(map(str, found.grid))}: take another number (fidelity.ranks)"
-        ]
-    if found.most_over_mean > _MOST_OVER_MEAN:
-        return [
+        )
+    elif found.most_over_mean > _MOST_OVER_MEAN:
+        text = (
             f"the fullest of {ranks} ranks would have {found.most_over_mean:.2g} times the mean "
             f"number of particles, more than {_MOST_OVER_MEAN:g}: a number with more factors "
             "splits more evenly (fidelity.ranks)"
-        ]
-    return []
+        )
+    else:
+        return []
+    return [Caution("ranks", text, {"ranks": 1})]

@@ -7,6 +7,7 @@ a chance to fall short, at a cost that grows linearly.
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,15 +44,15 @@ class Particles:
     positions_m: Array
     velocities_m_s: Array
 
-    @property
+    @cached_property
     def top_m(self) -> float:
         """Height of the highest point, m."""
         return float((self.positions_m[:, 2] + self.radii_m).max())
 
-    @property
-    def volume_m3(self) -> float:
-        """Total volume of the particles, m3."""
-        return float((4 / 3 * np.pi * self.radii_m**3).sum())
+    @cached_property
+    def fastest_m_s(self) -> float:
+        """Largest first speed of a particle, m/s."""
+        return float(np.linalg.norm(self.velocities_m_s, axis=1).max())
 
 
 def radii(count: int, mean_m: float, std_m: float) -> Array:

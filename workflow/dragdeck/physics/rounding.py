@@ -8,6 +8,14 @@ def round_to(value: float, digits: int) -> float:
     return float(f"{value:.{digits}g}")
 
 
+def rounded(value: float, *, up: bool) -> float:
+    """Round a positive number up or down to two significant digits."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    digits = value / unit
+    whole = math.ceil(digits * (1 - 1e-9)) if up else math.floor(digits * (1 + 1e-9))
+    return round_to(whole * unit, 2)
+
+
 def timestep(rayleigh_s: float, fraction: float) -> float:
     """A share of the Rayleigh time, rounded down to four significant digits, s."""
     exact = rayleigh_s * fraction

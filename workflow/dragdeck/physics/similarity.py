@@ -5,10 +5,8 @@ numbers, of the stiffness and of the inertia of the bed. The rest, lengths over
 the particle's diameter, frictions and restitution, is only compared.
 """
 
-import math
-
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
-from dragdeck.physics.rounding import round_to
+from dragdeck.physics.rounding import rounded
 from dragdeck.study.model import Study
 
 SAME_NUMBER = 0.02
@@ -81,14 +79,6 @@ def softest_scale(study: Study) -> float:
     """The smallest modulus scale that the engine takes for a study's materials."""
     softest = min(study.materials[name].youngs_modulus_pa for name in study.type_names())
     return min(1.0, rounded(ENGINE_SOFTEST_PA / softest, up=True))
-
-
-def rounded(value: float, *, up: bool) -> float:
-    """Round a positive number up or down to two significant digits."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
-    digits = value / unit
-    whole = math.ceil(digits * (1 - 1e-9)) if up else math.floor(digits * (1 + 1e-9))
-    return round_to(whole * unit, 2)
 
 
 def _same(ratio: float) -> bool:

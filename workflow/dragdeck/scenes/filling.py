@@ -1,15 +1,18 @@
 """The fill: the particles fall into the bowl and come to rest."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numpy as np
-
 from dragdeck.cases.bed import (
+    JUST_BEYOND,
     bed_radii,
     bed_rayleigh_time,
+    bed_timestep,
     media_radii,
+    media_volume,
+    outrun,
     particle_material,
     skin,
     smallest_radius,
@@ -19,7 +22,7 @@ from dragdeck.decks import outputs
 from dragdeck.decks.case_file import FillingCase, SettlingCriterion
 from dragdeck.decks.data_file import Body, data_file
 from dragdeck.decks.deck import Deck, LeftOut, Scene
-from dragdeck.errors import InputError
+from dragdeck.errors import Caution, InputError
 from dragdeck.physics.contact_mechanics import (
     DENSEST_RANDOM_PACKING,
     SOLID_FRACTION_ESTIMATE,
@@ -32,10 +35,9 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.domain_split import FilledBowl, Split, split
 from dragdeck.physics.domain_split import warnings as rank_warnings
-from dragdeck.physics.packing import FIRST_SPEED_M_S, Particles, pour
-from dragdeck.physics.rounding import timestep
+from dragdeck.physics.packing import Particles, pour
+from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import RunLimits, run_limits
-from dragdeck.physics.similarity import rounded
 from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
 from dragdeck.study.model import Media, Study
@@ -77,7 +79,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     _check_capacity(case)
     fidelity = study.chosen_fidelity()
     rayleigh = bed_rayleigh_time(study)
-    dt = timestep(rayleigh, fidelity.filling_timestep_fraction)
+    dt = bed_timestep(study, "filling_timestep_fraction")
     check_steps = max(1, math.ceil(_CHECK_INTERVAL_S / dt))
     particles = first_particles(study)
     top = box_top(study, particles)
@@ -117,9 +119,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             dt,
             rayleigh,
             settled=SettlingCriterion(energy_ratio=study.filling.energy_ratio),
-            limits=bed_limits(
-                study, top, float(np.linalg.norm(particles.velocities_m_s, axis=1).max())
-            ),
+            limits=bed_limits(study, top, particles.fastest_m_s),
         ),
         steps=round(_expected_time(study, particles) / dt),
         files={"particles.data": lambda: _particles_data(particles, study, top, len(types))},
@@ -136,11 +136,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
                 "particles fall the same onto an exact plane and cylinder"
             ),
         },
-        warnings=[
-            *rank_warnings(parts),
-            *_overlap_warnings(study),
-            *_skin_warnings(study, particles, dt),
-        ],
+        warnings=list(filling_cautions(case)),
     )
 
 
@@ -192,8 +188,7 @@ def expected_surface(study: Study) -> float:
 
 def _height(study: Study, solid_fraction: float) -> float:
     """Height of the study's particles in its bowl at a solid fraction, m."""
-    volume = float((4 / 3 * np.pi * bed_radii(study) ** 3).sum())
-    return bed_height(volume, study.bowl.radius_m, solid_fraction)
+    return bed_height(media_volume(study.media), study.bowl.radius_m, solid_fraction)
 
 
 def box_top(study: Study, particles: Particles) -> float:
@@ -241,31 +236,31 @@ def floor_overlap(study: Study) -> float:
     return bed_overlap(effective_modulus(particle, particle, scale), pressure)
 
 
-def _overlap_warnings(study: Study) -> list[str]:
+def filling_cautions(case: Case) -> Iterator[Caution]:
+    """What a user should know of a filling before it runs."""
+    study = case.study
+    particles = first_particles(study)
+    yield from rank_warnings(rank_split(case, box_top(study, particles)))
+    yield from _overlap_caution(study)
+    fall = fall_speed(_free_fall(study, particles), study.gravity_m_s2)
+    speed = math.hypot(particles.fastest_m_s, fall)
+    yield from outrun(study, "filling_timestep_fraction", "particles fall", speed)
+
+
+def _overlap_caution(study: Study) -> Iterator[Caution]:
     """A warning where particles are too soft for the bed above them."""
-    overlap = floor_overlap(study)
-    if overlap <= MOST_OVERLAP:
-        return []
-    scale = study.chosen_fidelity().youngs_modulus_scale
-    stiffer = rounded(scale * (overlap / MOST_OVERLAP) ** 1.5, up=True)
-    return [
+    overlap, scale = floor_overlap(study), study.chosen_fidelity().youngs_modulus_scale
+    if overlap <= MOST_OVERLAP * JUST_BEYOND:
+        return
+    stiffer = min(1.0, rounded(scale * (overlap / MOST_OVERLAP) ** 1.5, up=True))
+    remedy = f"take a fidelity.youngs_modulus_scale of at least {stiffer:g}"
+    yield Caution(
+        "overlap",
         f"the weight of the bed presses particles at the floor {100 * overlap:.2g} % of a diameter "
-        f"into each other, more than {100 * MOST_OVERLAP:g} %: the bed is denser than a real one; "
-        f"take a fidelity.youngs_modulus_scale of at least {stiffer:g}"
-    ]
-
-
-def _skin_warnings(study: Study, particles: Particles, timestep_s: float) -> list[str]:
-    """A warning where a falling particle outruns the neighbour lists, which fails the run."""
-    speed = FIRST_SPEED_M_S + fall_speed(_free_fall(study, particles), study.gravity_m_s2)
-    least = rounded(2 * speed * timestep_s, up=True)
-    if skin(study) >= least:
-        return []
-    return [
-        f"particles fall at up to {speed:.2g} m/s, more than half the neighbour skin of "
-        f"{skin(study):.2g} m in a step: the run would fail for dangerous neighbour builds; take "
-        f"a fidelity.skin_m of at least {least:g}, or a smaller fidelity.filling_timestep_fraction"
-    ]
+        f"into each other, more than {100 * MOST_OVERLAP:g} %: "
+        + (f"the bed is denser than a real one; {remedy}" if scale < 1 else "Hertz assumes less"),
+        {"youngs_modulus_scale": stiffer} if scale < 1 else {},
+    )
 
 
 def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:
@@ -329,8 +324,8 @@ def filling_content(case: Case) -> Json:
 def _impact_speed(case: Case) -> float:
     """Speed of the highest particle that is thrown down and falls to the floor, m/s."""
     particles = first_particles(case.study)
-    first = float((particles.velocities_m_s**2).sum(axis=1).max())
-    return math.sqrt(first + fall_speed(particles.top_m, case.study.gravity_m_s2) ** 2)
+    fall = fall_speed(particles.top_m, case.study.gravity_m_s2)
+    return math.hypot(particles.fastest_m_s, fall)
 
 
 def partners_in_bed(case: Case) -> list[tuple[str, str, float]]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from trimesh import Trimesh
 
-from dragdeck.cases.bed import bed_rayleigh_time, particle_material, skin
+from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, skin
 from dragdeck.cases.case import Case, materials_content, mesh_file
 from dragdeck.decks import PACKING_FILE, outputs
 from dragdeck.decks.case_file import (
@@ -21,9 +21,8 @@ from dragdeck.decks.deck import Deck, LeftOut, Scene
 from dragdeck.decks.outputs import Output
 from dragdeck.files import file_checksum
 from dragdeck.mesh import bowl
-from dragdeck.physics.contact_mechanics import effective_modulus, hertz_contact_time, particle_mass
 from dragdeck.physics.domain_split import warnings as rank_warnings
-from dragdeck.physics.rounding import round_to, timestep
+from dragdeck.physics.rounding import round_to
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import (
@@ -36,27 +35,15 @@ from dragdeck.scenes.filling import (
     partners_in_bed,
     rank_split,
 )
-from dragdeck.scenes.fit import check_fit, check_headroom, fastest_motion
-from dragdeck.scenes.motion import Leg, farthest_reach, legs, plunge_point, start_direction
+from dragdeck.scenes.fit import check_fit, check_headroom, fastest_motion, process_cautions
+from dragdeck.scenes.motion import Leg, legs, plunge_point, start_direction
 from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
-from dragdeck.scenes.workpiece import (
-    workpiece_length,
-    workpiece_mesh,
-    workpiece_radius,
-    workpiece_warnings,
-)
+from dragdeck.scenes.workpiece import workpiece_length, workpiece_mesh, workpiece_radius
 from dragdeck.study.base import Json
 from dragdeck.study.contact_law import explained
 from dragdeck.study.model import CirclePath, CylinderShape, MeshShape, Study
 
 _WORKPIECE_MESH = "workpiece.stl"
-
-_FEWEST_STEPS_PER_CONTACT = 5
-"""Below this many steps in a contact at the workpiece's speed a warning is given."""
-
-_JAMMING_GAP = 2.0
-"""Particle diameters between workpiece and bowl below which a warning is given: an arch of two
-particles at 1.7 diameters held a workpiece until the force was 190 N, and then left the bowl."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +120,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     bed = bed or _expected_bed(study)
     surface = bed.surface_m
     rayleigh = bed_rayleigh_time(study)
-    dt = timestep(rayleigh, fidelity.timestep_fraction)
+    dt = bed_timestep(study, "timestep_fraction")
     check_fit(case, surface, dt)
     periods = _output_periods(study, dt)
     clear = round_to(bed.top_m + study.media.radius_mean_m, 6)
@@ -175,7 +162,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         meshes={_WORKPIECE_MESH: workpiece_mesh(case), **_bowl_meshes(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
-        warnings=[*_warnings(case, dt), *rank_warnings(parts)],
+        warnings=[*process_cautions(case), *rank_warnings(parts)],
     )
 
 
@@ -352,36 +339,6 @@ def _leaves_out(study: Study) -> dict[str, LeftOut]:
             "a straight side needs none", "workpiece_short_facets"
         )
     return found
-
-
-def _warnings(case: Case, timestep_s: float) -> list[str]:
-    study = case.study
-    diameter = 2 * study.media.radius_mean_m
-    found = workpiece_warnings(case)
-    gap = study.bowl.radius_m - farthest_reach(study.motion) - workpiece_radius(case)
-    if gap < _JAMMING_GAP * diameter:
-        found.append(
-            f"the gap between workpiece and bowl is {gap / diameter:.2g} particle "
-            f"diameters, less than "
-            f"{_JAMMING_GAP:g}: particles can jam in it, with forces far beyond those of the bed"
-        )
-    steps = _contact_steps(study, timestep_s)
-    if steps < _FEWEST_STEPS_PER_CONTACT:
-        found.append(
-            f"a contact at the workpiece's speed takes {steps:.1f} steps, fewer than "
-            f"{_FEWEST_STEPS_PER_CONTACT}: single impacts are not resolved"
-        )
-    return found
-
-
-def _contact_steps(study: Study, timestep_s: float) -> float:
-    """Steps of an elastic impact of a particle on the workpiece at the workpiece's speed."""
-    fidelity = study.chosen_fidelity()
-    particle, workpiece = particle_material(study), study.materials[study.workpiece.material]
-    radius = study.media.radius_mean_m
-    modulus = effective_modulus(particle, workpiece, fidelity.youngs_modulus_scale)
-    speed = study.motion.speed_m_s * fidelity.speed_factor
-    return hertz_contact_time(particle_mass(particle, radius), radius, modulus, speed) / timestep_s
 
 
 def _partners(case: Case) -> list[tuple[str, str, float]]:

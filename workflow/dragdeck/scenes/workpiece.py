@@ -6,6 +6,7 @@ from pathlib import Path
 from trimesh import Trimesh
 
 from dragdeck.cases.case import Case, mesh_file
+from dragdeck.errors import Caution
 from dragdeck.mesh import (
     Finding,
     Surroundings,
@@ -38,13 +39,15 @@ def workpiece_mesh(case: Case) -> Trimesh:
     return mesh
 
 
-def workpiece_warnings(case: Case) -> list[str]:
+def workpiece_warnings(case: Case) -> list[Caution]:
     """What is doubtful in the mesh of the user's, and what was repaired."""
     shape = case.study.workpiece.shape
     if isinstance(shape, CylinderShape):
         return []
     _, found = _of_case(case, shape)
-    return [f"{shape.file}: {one.problem}: {one.value} ({one.remedy})" for one in found]
+    return [
+        Caution("mesh", f"{shape.file}: {one.problem}: {one.value} ({one.remedy})") for one in found
+    ]
 
 
 def _of_case(case: Case, shape: MeshShape) -> tuple[Trimesh, list[Finding]]:

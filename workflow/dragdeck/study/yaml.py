@@ -11,7 +11,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from dragdeck.errors import InputError, near, together
+from dragdeck.errors import Caution, InputError, near, together
 from dragdeck.study.base import DECIMAL, Model
 from dragdeck.study.consistency import contradictions
 from dragdeck.study.model import STUDY_FILE, Study
@@ -174,10 +174,13 @@ def validate(data: Mapping[str, Any], file: Path | str, *, whole: bool = False) 
     return study
 
 
-def warnings(study: Study) -> list[str]:
+def warnings(study: Study) -> list[Caution]:
     """Values of a valid study that are hardly meant, one line each."""
     return [
-        f"{error.field} {error.value:g} {error.problem}; {error.remedy}; {error.limit}"
+        Caution(
+            "implausible",
+            f"{error.field} {error.value:g} {error.problem}; {error.remedy}; {error.limit}",
+        )
         for error, _ in implausible(study.plain())
     ]
 

@@ -1,0 +1,89 @@
+"""Random valid scenes of drag finishing: studies as plain data, for property tests."""
+
+import math
+from typing import Any
+
+from hypothesis import strategies as st
+
+_TALLEST = 40
+"""Height of the highest bed in particle diameters."""
+
+QUANTITIES = (
+    "drag_mean", "drag_std", "vertical_mean", "workpiece_contacts", "contact_force_mean",
+    "contact_force_p90", "coordination_number", "chain_count", "chain_length", "restitution",
+)  # fmt: skip
+
+
+def _between(low: float, high: float) -> st.SearchStrategy[float]:
+    """Numbers between two limits, of any size alike."""
+    return st.floats(math.log(low), math.log(high)).map(lambda x: float(f"{math.exp(x):.4g}"))
+
+
+def _linear(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.floats(low, high).map(lambda x: float(f"{x:.4g}"))
+
+
+@st.composite
+def random_scenes(draw: st.DrawFn) -> dict[str, Any]:
+    """A study that asks for a tolerance. Lengths of the scene follow from the diameter d."""
+    d = draw(_between(1e-3, 6e-3))
+    depth = draw(_between(1.5, _TALLEST - 5))
+    height = draw(_linear(depth + 2, _TALLEST))
+    gap, thick = draw(_linear(1.1, 6)), draw(_between(0.5, 4))
+    reach = draw(_between(1.5, 15))
+    outer = reach + gap + thick / 2
+    count = math.ceil(0.59 * 6 * outer**2 * height) + 5
+    speeds = [draw(_between(1e-3, 1.0)) for _ in range(3)]
+    turns = draw(_linear(0.1, 2))
+    circle = draw(st.booleans())
+    length = (2 * math.pi * turns if circle else 2) * reach * d
+    path: dict[str, Any] = {"kind": "circle", "radius_m": reach * d, "revolutions": turns}
+    if not circle:
+        path = {"kind": "line", "start_m": [-reach * d, 0.0], "length_m": length}
+    media, steel = (
+        {
+            "youngs_modulus_pa": draw(_between(1e9, 4e11)),
+            "poissons_ratio": draw(_linear(0.1, 0.4)),
+            "density_kg_m3": draw(_between(1000, 8000)),
+        }
+        for _ in range(2)
+    )
+    pairs = {
+        pair: {"restitution": draw(_linear(0.3, 0.95)), "friction": draw(_linear(0.05, 0.8))}
+        for pair in ("media-media", "media-steel")
+    }
+    force_hz = max(1000.0, 60 * speeds[0] / length)
+    return {
+        "title": "A random scene",
+        "materials": {"media": media, "steel": steel},
+        "pairs": pairs,
+        "media": {
+            "material": "media",
+            "count": count,
+            "radius_mean_m": d / 2,
+            "radius_std_m": draw(_linear(0, 0.1)) * d / 2,
+        },
+        "bowl": {"material": "steel", "radius_m": outer * d, "height_m": 1.5 * height * d},
+        "workpiece": {
+            "material": "steel",
+            "shape": {"kind": "cylinder", "radius_m": thick * d / 2, "facet_size_m": thick * d / 4},
+        },
+        "motion": {
+            "path": path,
+            "speed_m_s": speeds[0],
+            "immersion_depth_m": depth * d,
+            "plunge_speed_m_s": speeds[1],
+            "approach_speed_m_s": speeds[2],
+            "transient_m": 0.1 * length,
+        },
+        "outputs": {
+            "workpiece_force_hz": force_hz,
+            "workpiece_contacts_hz": force_hz / 5,
+            "network_hz": force_hz / 50,
+        },
+        "fidelity": {
+            "tolerance": draw(st.sampled_from([0.02, 0.05, 0.1, 0.2, 0.4, 0.6])),
+            "quantity": draw(st.sampled_from(["drag_mean", *QUANTITIES])),
+        },
+        "seed": draw(st.integers(0, 2**32 - 1)),
+    }
