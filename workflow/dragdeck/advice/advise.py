@@ -222,20 +222,9 @@ def _check_quantity(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> None:
         )
 
 
-def _breaking_step(case: Case, tradeoff: Tradeoff | None) -> tuple[float, str]:
-    """`breaking_step` of a case, and where it was measured; nothing said if it was not."""
-    fraction, level = breaking_step(case.study.chosen_fidelity().youngs_modulus_scale, tradeoff)
-    if tradeoff is None or math.isinf(fraction):
-        return fraction, ""
-    return fraction, (
-        f"{100 * fraction:.3g} %, where the drag was wrong or a run failed with E x {level:g} "
-        f"({tradeoff.study}, {tradeoff.measured})"
-    )
-
-
 def breaking_note(case: Case, tradeoff: Tradeoff | None) -> list[tuple[str, str]]:
     """What ``check`` and ``explain`` say of the breaking step; nothing if none was measured."""
-    fraction, where = _breaking_step(case, tradeoff)
+    fraction, where = breaking_step(case, tradeoff)
     own = case.study.chosen_fidelity().timestep_fraction
     verdict = "below" if own < fraction else "NOT BELOW"
     return [("breaking step", f"{100 * own:.3g} % is {verdict} {where}")] if where else []
@@ -249,7 +238,7 @@ def check_timestep(case: Case, tradeoff: Tradeoff | None) -> None:
     InputError
         The step is not below the breaking step, and the study gives no reason for that.
     """
-    fraction, where = _breaking_step(case, tradeoff)
+    fraction, where = breaking_step(case, tradeoff)
     chosen = case.study.chosen_fidelity()
     if chosen.timestep_fraction >= fraction and not case.study.accepted.unsafe_timestep:
         raise InputError(

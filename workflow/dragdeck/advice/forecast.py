@@ -291,6 +291,8 @@ def _about(
     case: Case, advice: Advice, advised: Forecast, own: Option | None
 ) -> Iterator[tuple[str, str]]:
     yield "cost", f"ratio of CPU time to that of the reference; advised: 1/{advice.speedup:.3g}"
+    if skin := advice.chosen.fidelity.skin_m:
+        yield "neighbour skin", f"{1e3 * skin:.3g} mm"
     yield "errors", f"relative to the reference settings, {advice.source}"
     yield "wall time", f"{' and '.join(advised.steps)}; speed: {advised.source}"
     if case.asked is None:

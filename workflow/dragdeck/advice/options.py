@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 
+from dragdeck.cases.bed import widest_skin
 from dragdeck.cases.case import Case
 from dragdeck.outlook.measured import (
     FidelityParameters,
@@ -53,10 +54,9 @@ class Option:
         if self.drop_timestep_fraction is not None:
             return f"drop at {100 * self.drop_timestep_fraction:.3g} % of the Rayleigh time"
         chosen = self.fidelity
-        skin = "" if chosen.skin_m is None else f", skin {1e3 * chosen.skin_m:.3g} mm"
         return (
             f"E x {chosen.youngs_modulus_scale:g}, {100 * chosen.timestep_fraction:.3g} % of the "
-            f"Rayleigh time, speed x {chosen.speed_factor:g}{skin}"
+            f"Rayleigh time, speed x {chosen.speed_factor:g}"
         )
 
     def same_settings(self, fidelity: Fidelity | FidelityParameters) -> bool:
@@ -73,19 +73,25 @@ def with_option(study: Study, option: Option) -> Study:
     return study.model_copy(update=update)
 
 
-def breaking_step(scale: float, tradeoff: Tradeoff | None) -> tuple[float, float]:
-    """The step over the Rayleigh time at which soft particles were seen to break, and their scale.
+def breaking_step(case: Case, tradeoff: Tradeoff | None) -> tuple[float, str]:
+    """The step over the Rayleigh time at which soft particles were seen to break, and where.
 
     Soft particles break at shorter steps, as shares of the Rayleigh time: the next softer level
     that was measured counts. Infinite where nothing was measured.
     """
+    limit = case.study.chosen_fidelity().youngs_modulus_scale * (1 + 1e-9)
     broken = [
         (-one.youngs_modulus_scale, one.timestep_fraction)
         for one in (tradeoff.settings if tradeoff else ())
-        if one.breaks and one.speed_factor == 1 and one.youngs_modulus_scale <= scale * (1 + 1e-9)
+        if one.breaks and one.speed_factor == 1 and one.youngs_modulus_scale <= limit
     ]
-    level, fraction = min(broken, default=(-scale, math.inf))
-    return fraction, -level
+    if tradeoff is None or not broken:
+        return math.inf, ""
+    level, fraction = min(broken)
+    return fraction, (
+        f"{100 * fraction:.3g} %, where the drag was wrong or a run failed with E x {-level:g} "
+        f"({tradeoff.study}, {tradeoff.measured})"
+    )
 
 
 def consistent(case: Case, fidelity: Fidelity, tradeoff: Tradeoff | None) -> Fidelity:
@@ -113,19 +119,17 @@ def consistent(case: Case, fidelity: Fidelity, tradeoff: Tradeoff | None) -> Fid
     while remedy:
         fidelity = fidelity.model_copy(update=remedy)
         study = case.study.model_copy(update={"fidelity": fidelity})
-        remedy = _remedy(replace(case, study=study), fidelity, tradeoff)
+        remedy = next(_remedies(replace(case, study=study), tradeoff), {})
     return fidelity
 
 
-def _remedy(case: Case, fidelity: Fidelity, tradeoff: Tradeoff | None) -> Mapping[str, float]:
-    """What the first check that a case's settings do not pass takes; nothing if they pass all."""
+def _remedies(case: Case, tradeoff: Tradeoff | None) -> Iterator[Mapping[str, float]]:
+    """What checks that a case's settings do not pass take; the next one may need less after it."""
     found = chain(filling_cautions(case), process_cautions(case))
-    if remedy := next((one.settings for one in found if one.settings), None):
-        return remedy
-    breaking, _ = breaking_step(fidelity.youngs_modulus_scale, tradeoff)
-    if fidelity.timestep_fraction < breaking:
-        return {}
-    return {"timestep_fraction": stability_map().safety_factor * breaking}
+    yield from (one.settings for one in found if one.settings)
+    breaking, _ = breaking_step(case, tradeoff)
+    if case.study.chosen_fidelity().timestep_fraction >= breaking:
+        yield {"timestep_fraction": stability_map().safety_factor * breaking}
 
 
 def process_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterator[Option]:
@@ -159,6 +163,7 @@ def _carried(case: Case, setting: MeasuredSetting, there: Mapping[str, float]) -
         youngs_modulus_scale=carried_scale(setting.youngs_modulus_scale, stiffer),
         timestep_fraction=setting.timestep_fraction,
         speed_factor=carried_speed(setting.speed_factor, slower),
+        skin_m=widest_skin(case.study),
     )
 
 
@@ -171,13 +176,14 @@ def _steps(fidelity: Fidelity, measured: FidelityParameters) -> float:
 
 def process_reference(case: Case, tradeoff: Tradeoff) -> Option:
     """The settings that errors are measured against, or the nearest that pass every check."""
-    fidelity = consistent(case, Fidelity(**tradeoff.reference.model_dump()), tradeoff)
+    plain = Fidelity(**tradeoff.reference.model_dump(), skin_m=widest_skin(case.study))
+    fidelity = consistent(case, plain, tradeoff)
     return Option(fidelity, None, _steps(fidelity, tradeoff.reference))
 
 
 def drop_options(case: Case, tradeoff: Tradeoff) -> Iterator[Option]:
     """Every measured step of the drop test that is within the stability limit."""
-    process, limit = _process_of_drop(case, tradeoff), _drop_limit(case)
+    process, limit = _beside_drop(case, tradeoff)
     for drop in tradeoff.drop_test:
         if drop.timestep_fraction <= limit * (1 + 1e-9):
             yield _drop_option(process, drop, drop.timestep_fraction)
@@ -185,19 +191,16 @@ def drop_options(case: Case, tradeoff: Tradeoff) -> Iterator[Option]:
 
 def finest_drop(case: Case, tradeoff: Tradeoff) -> Option:
     """The drop test with the smallest measured step, or a smaller one where damping is strong."""
-    process, limit = _process_of_drop(case, tradeoff), _drop_limit(case)
+    process, limit = _beside_drop(case, tradeoff)
     finest = min(tradeoff.drop_test, key=lambda drop: drop.timestep_fraction)
     return _drop_option(process, finest, min(finest.timestep_fraction, limit))
 
 
-def _process_of_drop(case: Case, tradeoff: Tradeoff) -> Fidelity:
-    """Settings of the process in a study whose tolerance is about the drop test."""
+def _beside_drop(case: Case, tradeoff: Tradeoff) -> tuple[Fidelity, float]:
+    """If the drop test is asked about: settings of the process, and largest step of the drop."""
     named = {**BUILT_IN_FIDELITIES, **case.study.fidelities}[_PROCESS_OF_DROP]
-    return consistent(case, named, tradeoff)
-
-
-def _drop_limit(case: Case) -> float:
-    return largest_fraction("impact", describe(case)["lowest_restitution"])
+    limit = largest_fraction("impact", describe(case)["lowest_restitution"])
+    return consistent(case, named, tradeoff), limit
 
 
 def _drop_option(process: Fidelity, drop: MeasuredDrop, fraction: float) -> Option:

@@ -2,26 +2,23 @@
 
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import Literal
 
 import numpy as np
 
 from dragdeck.errors import Caution
-from dragdeck.physics.contact_mechanics import rayleigh_time
+from dragdeck.physics.contact_mechanics import (
+    effective_modulus,
+    hertz_contact_time,
+    particle_mass,
+    rayleigh_time,
+)
 from dragdeck.physics.packing import Array, radii
 from dragdeck.physics.rounding import round_to, rounded, timestep
 from dragdeck.study.material import Material
 from dragdeck.study.model import Media, Study
 
-_WIDEST_SKIN = 0.3
-"""Widest neighbour skin that a remedy names, over the mean radius. Up to it the cost of the process
-was measured: no significant change (docs/costs.md)."""
-
 JUST_BEYOND = 1 + 1e-6
 """A limit counts as passed from this multiple of it on: a rounded remedy may meet it exactly."""
-
-StepField = Literal["timestep_fraction", "filling_timestep_fraction"]
-"""Field of the fidelity that sets the time step of the process or of the filling."""
 
 
 def bed_radii(study: Study) -> Array:
@@ -52,19 +49,34 @@ def media_volume(media: Media) -> float:
     return float((4 / 3 * np.pi * media_radii(media) ** 3).sum())
 
 
-def bed_timestep(study: Study, field: StepField) -> float:
-    """Time step of the process or of the filling at the study's fidelity, s."""
+def bed_timestep(study: Study, field: str) -> float:
+    """Time step of the process or of the filling, by its field of the fidelity, s."""
     return timestep(bed_rayleigh_time(study), getattr(study.chosen_fidelity(), field))
 
 
-def outrun(study: Study, field: StepField, who: str, speed_m_s: float) -> Iterator[Caution]:
+def impact_time(study: Study, scale: float, speed_m_s: float) -> float:
+    """Duration of an elastic impact of the mean particle on the workpiece's material, s.
+
+    Parameters
+    ----------
+    study : Study
+    scale : float
+        Factor on every Young's modulus.
+    speed_m_s : float
+    """
+    particle, plate = particle_material(study), study.materials[study.workpiece.material]
+    radius, modulus = study.media.radius_mean_m, effective_modulus(particle, plate, scale)
+    return hertz_contact_time(particle_mass(particle, radius), radius, modulus, speed_m_s)
+
+
+def outrun(study: Study, field: str, who: str, speed_m_s: float) -> Iterator[Caution]:
     """A warning where particles outrun the neighbour lists, which fails a run.
 
     Parameters
     ----------
     study : Study
-    field : StepField
-        Of the scene's time step.
+    field : str
+        Of the fidelity: that of the scene's time step.
     who : str
         What moves, with its verb.
     speed_m_s : float
@@ -73,11 +85,12 @@ def outrun(study: Study, field: StepField, who: str, speed_m_s: float) -> Iterat
     needed, has = 2 * speed_m_s * bed_timestep(study, field), skin(study)
     if needed <= has * JUST_BEYOND:
         return
-    least, widest = rounded(needed, up=True), round_to(_WIDEST_SKIN * study.media.radius_mean_m, 3)
-    settings = {"skin_m": least}
-    if least > max(has, widest):
-        shorter = getattr(study.chosen_fidelity(), field) * max(has, widest) / needed
-        settings = {"skin_m": max(has, widest), field: rounded(shorter, up=False)}
+    least = rounded(needed, up=True)
+    widest = max(has, widest_skin(study))
+    settings = {"skin_m": min(least, widest)}
+    if least > widest:
+        fraction = getattr(study.chosen_fidelity(), field)
+        settings[field] = rounded(fraction * widest / needed, up=False)
     yield Caution(
         "skin",
         f"{who} at up to {speed_m_s:.2g} m/s, more than half the neighbour skin of {has:.2g} m "
@@ -96,3 +109,8 @@ def skin(study: Study) -> float:
     """Neighbour skin, m: the fidelity's own, or a tenth of the mean radius."""
     chosen = study.chosen_fidelity().skin_m
     return chosen if chosen is not None else round_to(0.1 * study.media.radius_mean_m, 3)
+
+
+def widest_skin(study: Study) -> float:
+    """Widest neighbour skin that was measured to cost nothing significant, m (docs/costs.md)."""
+    return round_to(0.3 * study.media.radius_mean_m, 3)

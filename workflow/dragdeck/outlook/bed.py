@@ -2,13 +2,7 @@
 
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import cores_here
-from dragdeck.scenes.filling import (
-    MOST_OVERLAP,
-    box_top,
-    first_particles,
-    floor_overlap,
-    rank_split,
-)
+from dragdeck.scenes.filling import MOST_OVERLAP, floor_overlap, rank_split
 
 
 def notes(case: Case) -> list[tuple[str, str]]:
@@ -26,7 +20,7 @@ def _overlap(case: Case) -> str:
 
 
 def _ranks(case: Case) -> str:
-    parts = rank_split(case, box_top(case.study, first_particles(case.study)))
+    parts = rank_split(case)
     if case.study.chosen_fidelity().ranks != "auto":
         return f"{case.ranks}, {parts}"
     cases = f"{case.beside} case{'s' if case.beside > 1 else ''}"

@@ -157,7 +157,7 @@ def _edges(count: int, low: float, high: float) -> _Fractions:
 
 def warnings(found: Split) -> list[Caution]:
     """What a user should know of a split before the run; a single rank has none."""
-    ranks = len(found.particles)
+    ranks, text = len(found.particles), ""
     if found.idle:
         text = (
             f"{found.idle} of {ranks} ranks would have no particle, in a grid of "
@@ -169,6 +169,4 @@ def warnings(found: Split) -> list[Caution]:
             f"number of particles, more than {_MOST_OVER_MEAN:g}: a number with more factors "
             "splits more evenly (fidelity.ranks)"
         )
-    else:
-        return []
-    return [Caution("ranks", text, {"ranks": 1})]
+    return [Caution("ranks", text, {"ranks": 1})] if text else []

@@ -14,7 +14,7 @@ from dragdeck.documents import Part
 from dragdeck.physics.contact_mechanics import particle_mass, rayleigh_time
 from dragdeck.physics.rounding import timestep
 from dragdeck.physics.run_limits import RunLimits, run_limits
-from dragdeck.scenes.filling import box_top, filling_content, first_particles
+from dragdeck.scenes.filling import box_top, filling_content
 from dragdeck.scenes.scene import case_of_study, material_table
 
 _STACK = 12
@@ -102,7 +102,7 @@ def column_scene(
     dt, load_dt = timestep(rayleigh, fraction), timestep(rayleigh, _LOAD_FRACTION)
     count = _STACK if stack else study.media.count
     tube = (1 + _TUBE_CLEARANCE) * radius if stack else study.bowl.radius_m
-    top = 2 * radius * (_STACK + 4) if stack else box_top(study, first_particles(study))
+    top = 2 * radius * (_STACK + 4) if stack else box_top(study)
     types = study.type_names()
     gravity, mass = load_factor * study.gravity_m_s2, particle_mass(material, radius)
     deck = _ColumnDeck(

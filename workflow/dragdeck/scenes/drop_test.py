@@ -3,19 +3,13 @@
 import math
 from dataclasses import dataclass
 
-from dragdeck.cases.bed import particle_material
+from dragdeck.cases.bed import impact_time, particle_material
 from dragdeck.cases.case import Case, materials_content
 from dragdeck.decks import outputs
 from dragdeck.decks.case_file import DropTestCase
 from dragdeck.decks.data_file import Body, data_file
 from dragdeck.decks.deck import Deck, LeftOut, Scene
-from dragdeck.physics.contact_mechanics import (
-    effective_modulus,
-    fall_speed,
-    hertz_contact_time,
-    particle_mass,
-    rayleigh_time,
-)
+from dragdeck.physics.contact_mechanics import fall_speed, rayleigh_time
 from dragdeck.physics.rounding import timestep
 from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
@@ -132,13 +126,9 @@ def _modulus(scale: float) -> dict[str, str]:
 
 def _slowest_contact_time(study: Study, scale: float = 1.0) -> float:
     """Hertz time of the last impact, the slowest and so the longest, s."""
-    particle, plate = particle_material(study), study.materials[study.workpiece.material]
-    radius = study.media.radius_mean_m
     pair = study.pair(study.media.material, study.workpiece.material)
     speed = fall_speed(study.drop_test.height_m, study.gravity_m_s2)
-    last = speed * pair.restitution ** (study.drop_test.impacts - 1)
-    modulus = effective_modulus(particle, plate, scale)
-    return hertz_contact_time(particle_mass(particle, radius), radius, modulus, last)
+    return impact_time(study, scale, speed * pair.restitution ** (study.drop_test.impacts - 1))
 
 
 def _duration(study: Study) -> float:

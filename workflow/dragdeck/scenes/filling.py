@@ -81,11 +81,9 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     rayleigh = bed_rayleigh_time(study)
     dt = bed_timestep(study, "filling_timestep_fraction")
     check_steps = max(1, math.ceil(_CHECK_INTERVAL_S / dt))
-    particles = first_particles(study)
-    top = box_top(study, particles)
+    particles, top = first_particles(study), box_top(study)
     longest = study.filling.max_time_s
     types = _filling_types(study)
-    parts = rank_split(case, top)
     deck = FillingDeck(
         title=f"Fill: {study.title}",
         study=case.study_name,
@@ -100,7 +98,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         outputs=(outputs.thermo(check_steps, None), outputs.settled_particles()),
         thermo_steps=check_steps,
         checkpoint_steps=5 * check_steps,
-        processors=parts.line,
+        processors=rank_split(case).line,
         bowl_type=types.index(study.bowl.material) + 1,
         bowl_radius_m=study.bowl.radius_m,
         energy_ratio=study.filling.energy_ratio,
@@ -191,7 +189,7 @@ def _height(study: Study, solid_fraction: float) -> float:
     return bed_height(media_volume(study.media), study.bowl.radius_m, solid_fraction)
 
 
-def box_top(study: Study, particles: Particles) -> float:
+def box_top(study: Study) -> float:
     """Top of the simulation box, m.
 
     Room for the falling particles, and for a workpiece above the bed.
@@ -201,18 +199,12 @@ def box_top(study: Study, particles: Particles) -> float:
     """
     diameter = 2 * study.media.radius_mean_m
     above_bed = 2 * expected_surface(study) + 8 * diameter
-    return math.ceil(100 * max(particles.top_m, above_bed, 2 * study.bowl.height_m) + 5) / 100
+    falling = first_particles(study).top_m
+    return math.ceil(100 * max(falling, above_bed, 2 * study.bowl.height_m) + 5) / 100
 
 
-def rank_split(case: Case, top_m: float) -> Split:
-    """How the box of a case is split among its ranks.
-
-    Parameters
-    ----------
-    case : Case
-    top_m : float
-        Top of the box.
-    """
+def rank_split(case: Case) -> Split:
+    """How the box of a case is split among its ranks."""
     study = case.study
     filled = FilledBowl(
         particles=study.media.count,
@@ -220,7 +212,7 @@ def rank_split(case: Case, top_m: float) -> Split:
         height_m=expected_surface(study),
         half_width_m=_half_width(study),
         bottom_m=-study.media.radius_mean_m,
-        top_m=top_m,
+        top_m=box_top(study),
         reach_m=2 * float(bed_radii(study).max()) + skin(study),
     )
     return split(case.ranks, filled)
@@ -239,11 +231,10 @@ def floor_overlap(study: Study) -> float:
 def filling_cautions(case: Case) -> Iterator[Caution]:
     """What a user should know of a filling before it runs."""
     study = case.study
-    particles = first_particles(study)
-    yield from rank_warnings(rank_split(case, box_top(study, particles)))
+    yield from rank_warnings(rank_split(case))
     yield from _overlap_caution(study)
-    fall = fall_speed(_free_fall(study, particles), study.gravity_m_s2)
-    speed = math.hypot(particles.fastest_m_s, fall)
+    particles = first_particles(study)
+    speed = math.hypot(particles.fastest_m_s, _arrival_speed(study, particles))
     yield from outrun(study, "filling_timestep_fraction", "particles fall", speed)
 
 
@@ -277,13 +268,12 @@ def _energy_unit(study: Study) -> float:
 
 
 def _expected_time(study: Study, particles: Particles) -> float:
-    fall = fall_speed(_free_fall(study, particles), study.gravity_m_s2) / study.gravity_m_s2
-    return fall + _SETTLING_ESTIMATE_S
+    return _arrival_speed(study, particles) / study.gravity_m_s2 + _SETTLING_ESTIMATE_S
 
 
-def _free_fall(study: Study, particles: Particles) -> float:
-    """Height that the highest particle falls to the bed, m."""
-    return max(particles.top_m - expected_surface(study), 0.0)
+def _arrival_speed(study: Study, particles: Particles) -> float:
+    """Speed of the highest particle on the bed if it falls from rest, m/s."""
+    return fall_speed(max(particles.top_m - expected_surface(study), 0.0), study.gravity_m_s2)
 
 
 def _half_width(study: Study) -> float:

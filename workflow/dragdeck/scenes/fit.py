@@ -7,22 +7,17 @@ from dragdeck.cases.bed import (
     JUST_BEYOND,
     bed_radii,
     bed_timestep,
+    impact_time,
     outrun,
-    particle_material,
     smallest_radius,
 )
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution, InputError, together
-from dragdeck.physics.contact_mechanics import (
-    effective_modulus,
-    fall_speed,
-    hertz_contact_time,
-    particle_mass,
-)
+from dragdeck.physics.contact_mechanics import fall_speed
 from dragdeck.physics.rounding import rounded
+from dragdeck.physics.run_limits import SPEED_FACTOR
 from dragdeck.scenes.motion import farthest_reach
 from dragdeck.scenes.workpiece import workpiece_length, workpiece_radius, workpiece_warnings
-from dragdeck.study.model import Study
 
 _FEWEST_STEPS_PER_CONTACT = 5
 """Below this many steps in a contact at the workpiece's speed a warning is given."""
@@ -64,41 +59,21 @@ def process_cautions(case: Case) -> Iterator[Caution]:
             f"the gap between workpiece and bowl is {gap:.2g} particle diameters, less than "
             f"{_JAMMING_GAP:g}: particles can jam in it, with forces far beyond those of the bed",
         )
-    fraction, steps = study.chosen_fidelity().timestep_fraction, _contact_steps(study)
+    fidelity = study.chosen_fidelity()
+    contact = impact_time(study, fidelity.youngs_modulus_scale, case.axis_speed_m_s)
+    steps = contact / bed_timestep(study, "timestep_fraction")
     if steps * JUST_BEYOND < _FEWEST_STEPS_PER_CONTACT:
+        shorter = fidelity.timestep_fraction * steps / _FEWEST_STEPS_PER_CONTACT
         yield Caution(
             "steps_per_contact",
             f"a contact at the workpiece's speed takes {steps:.1f} steps, fewer than "
             f"{_FEWEST_STEPS_PER_CONTACT}: single impacts are not resolved",
-            {"timestep_fraction": rounded(fraction * steps / _FEWEST_STEPS_PER_CONTACT, up=False)},
+            {"timestep_fraction": rounded(shorter, up=False)},
         )
-    yield from outrun(study, "timestep_fraction", "particles may move", _particle_speed(case))
-
-
-def _particle_speed(case: Case) -> float:
-    """Speed of a particle that is hit, bounces off the bowl and is hit again, or that falls, m/s.
-
-    An assumption: 2.1 times the workpiece's speed was seen at a restitution of 0.7, for which
-    this is 2.5 times; at low speeds the fall into the workpiece's wake is faster.
-    """
-    study = case.study
-    hit, bounce = (
-        study.pair(study.media.material, other.material).restitution
-        for other in (study.workpiece, study.bowl)
-    )
+    # seen: 2 to 3 times the workpiece's speed, once 6 times; or the fall into a slow one's wake
     fall = fall_speed(study.motion.immersion_depth_m, study.gravity_m_s2)
-    return math.hypot((1 + hit) * (1 + hit * bounce) * fastest_motion(case), fall)
-
-
-def _contact_steps(study: Study) -> float:
-    """Steps of an elastic impact of a particle on the workpiece at the workpiece's speed."""
-    fidelity = study.chosen_fidelity()
-    particle, workpiece = particle_material(study), study.materials[study.workpiece.material]
-    radius = study.media.radius_mean_m
-    modulus = effective_modulus(particle, workpiece, fidelity.youngs_modulus_scale)
-    speed = study.motion.speed_m_s * fidelity.speed_factor
-    contact = hertz_contact_time(particle_mass(particle, radius), radius, modulus, speed)
-    return contact / bed_timestep(study, "timestep_fraction")
+    speed = math.hypot(SPEED_FACTOR * fastest_motion(case), fall)
+    yield from outrun(study, "timestep_fraction", "particles may move", speed)
 
 
 def _gap(case: Case) -> float:

@@ -31,7 +31,6 @@ from dragdeck.scenes.filling import (
     box_top,
     expected_surface,
     filling_content,
-    first_particles,
     partners_in_bed,
     rank_split,
 )
@@ -129,9 +128,9 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     timed = _timed_legs(legs(study.motion, dive, fidelity.speed_factor), study, dt, periods.network)
     drag, last = timed[-1], timed[-1].end_step
     types = study.type_names()
-    top = box_top(study, first_particles(study))
+    top = box_top(study)
     check_headroom(case, clear, top)
-    parts = rank_split(case, top)
+    parts = rank_split(case)
     deck = ProcessDeck(
         title=study.title,
         study=case.study_name,

@@ -45,9 +45,8 @@ def workpiece_warnings(case: Case) -> list[Caution]:
     if isinstance(shape, CylinderShape):
         return []
     _, found = _of_case(case, shape)
-    return [
-        Caution("mesh", f"{shape.file}: {one.problem}: {one.value} ({one.remedy})") for one in found
-    ]
+    said = (f"{shape.file}: {one.problem}: {one.value} ({one.remedy})" for one in found)
+    return [Caution("mesh", text) for text in said]
 
 
 def _of_case(case: Case, shape: MeshShape) -> tuple[Trimesh, list[Finding]]:

@@ -178,10 +178,9 @@ def warnings(study: Study) -> list[Caution]:
     """Values of a valid study that are hardly meant, one line each."""
     return [
         Caution(
-            "implausible",
-            f"{error.field} {error.value:g} {error.problem}; {error.remedy}; {error.limit}",
+            "implausible", f"{one.field} {one.value:g} {one.problem}; {one.remedy}; {one.limit}"
         )
-        for error, _ in implausible(study.plain())
+        for one, _ in implausible(study.plain())
     ]
 
 
