@@ -90,10 +90,12 @@ GRID = "  1 by 1 by 1 MPI processor grid\n"
 GOOD = HEAD + "10 0.1 2 1e-9 0 0.1\n20 0.2 2 1e-9 0 0.1\n"
 
 
-def failed(folder: Path, inputs: RunInputs, status: int = 0, parts: int = 1) -> set[str]:
-    """Codes of the checks that did not pass."""
-    run_parts = [RunPart(part=k + 1, checkpoint=None, from_step=10 * k) for k in range(parts)]
-    checks = check_run(folder, inputs, {"thermo": THERMO}, status, run_parts, ranks=1)
+def failed(
+    folder: Path, inputs: RunInputs, status: int = 0, begins: Sequence[int] = (0,)
+) -> set[str]:
+    """Codes of the checks that did not pass, of parts that begin at some steps."""
+    parts = [RunPart(part=k + 1, checkpoint=None, from_step=step) for k, step in enumerate(begins)]
+    checks = check_run(folder, inputs, {"thermo": THERMO}, status, parts, ranks=1)
     return {check.code for check in checks if not check.passed}
 
 
@@ -131,7 +133,17 @@ def test_a_row_that_the_interruption_cut_short_does_not_fail_a_resumed_run(tmp_p
     (tmp_path / "thermo.1.txt").write_text(HEAD + "10 0.1 2 1e-9 0 0.1\n11 0.11 2 1e-")
     (tmp_path / "screen.2.txt").write_text(GRID + "DRAGDECK END\n")
     (tmp_path / "thermo.2.txt").write_text(GOOD)
-    assert failed(tmp_path, INPUTS, parts=2) == set()
+    assert failed(tmp_path, INPUTS, begins=(0, 10)) == set()
+
+
+@pytest.mark.parametrize(("last", "fails"), [("20 0.2", set()), ("15 0.2", {"output_complete"})])
+def test_a_part_from_a_checkpoint_at_the_end_need_not_write_again(
+    tmp_path: Path, last: str, fails: set[str]
+) -> None:
+    (tmp_path / "screen.1.txt").write_text(GRID)
+    (tmp_path / "thermo.1.txt").write_text(GOOD.replace("20 0.2", last))
+    (tmp_path / "screen.2.txt").write_text(GRID + "DRAGDECK END\n")
+    assert failed(tmp_path, INPUTS, begins=(0, 20)) == fails
 
 
 def test_a_lost_particle_has_its_own_reason(tmp_path: Path) -> None:

@@ -153,16 +153,17 @@ def record_file(case: Case) -> Path:
     Raises
     ------
     InputError
-        The study names none, or there is no such file.
+        The study names none, or there is no such file in its folder.
     """
-    file = case.file.parent / settings(case).record
-    if not file.is_file():
+    folder = case.file.parent
+    file = folder / settings(case).record
+    if not file.is_file() or not file.resolve().is_relative_to(folder.resolve()):
         raise InputError(
-            "no such record",
+            "no such record in the study's folder",
             file=case.file,
             field="calibration.record",
             value=settings(case).record,
-            limit=f"a file in {case.file.parent}",
+            limit=f"a file in {folder}",
             remedy="put the CSV there, or correct the name",
         )
     return file
