@@ -9,6 +9,7 @@ rule advise:
         f"results/{STUDY}/logs/advise.log",
     benchmark:
         f"results/{STUDY}/benchmarks/advise.tsv"
+    priority: 1
     conda:
         "../envs/python.yaml"
     params:
