@@ -20,6 +20,7 @@ include: "workflow/rules/scaling.smk"
 
 # With a queue, these stay where snakemake runs: they take a second or two.
 localrules:
+    advise,
     all,
     calibrate,
     promises,

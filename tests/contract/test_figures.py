@@ -2,7 +2,7 @@
 
 import pytest
 
-from dragchain.report.run_figures import FIGURES
+from dragchain.report.findings import FIGURES
 from dragdeck.scenes.registry import SCENES
 
 

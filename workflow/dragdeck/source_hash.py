@@ -64,7 +64,9 @@ def _imports(file: Path, package: str) -> tuple[str, ...]:
 
 
 def _imported(file: Path) -> Iterator[str]:
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    statements: list[ast.AST] = [ast.parse(file.read_bytes())]
+    for node in statements:  # and those inside them: no expression imports anything
+        statements += (one for one in ast.iter_child_nodes(node) if not isinstance(one, ast.expr))
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module is not None:

@@ -1,6 +1,6 @@
 # A run from its input script to its figures: a rule for each phase and folder of runs.
 # A point of a plan that fails is a finding, and its outcome says how; any other run that
-# fails is none, and leaves no run.json.
+# fails is none, and leaves no run.json. What a process waits for goes before drop tests and figures.
 
 RECORD = {place: "outcome.json" if place == POINTS else "run.json" for place in PLACES}
 
@@ -22,6 +22,7 @@ for PLACE, SCENE in PLACES.items():
             of_run(PLACE, "logs/render.log"),
         benchmark:
             of_run(PLACE, "benchmarks/render.tsv")
+        priority: 0 if SCENE.single_particle else 1
         localrule: True
         conda:
             "../envs/python.yaml"
@@ -51,6 +52,7 @@ for PLACE, SCENE in PLACES.items():
             of_run(PLACE, "logs/run.log"),
         benchmark:
             of_run(PLACE, "benchmarks/run.tsv")
+        priority: 0 if SCENE.single_particle else 1
         conda:
             "../envs/python.yaml"
         threads: ranks_of(PLACE)
@@ -76,6 +78,7 @@ for PLACE, SCENE in SCENES.items():
             of_run(PLACE, "logs/tables.log"),
         benchmark:
             of_run(PLACE, "benchmarks/tables.tsv")
+        priority: 0 if SCENE.single_particle else 1
         conda:
             "../envs/python.yaml"
         params:

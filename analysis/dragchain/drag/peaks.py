@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
@@ -67,6 +66,8 @@ def find_drag_peaks(
     SeriesError
         If there are fewer than 3 samples or the intervals are not equal.
     """
+    from scipy.signal import find_peaks
+
     if len(time_s) < 3:
         raise SeriesError(f"peaks need at least 3 samples, the series has {len(time_s)}")
     intervals = np.diff(time_s)

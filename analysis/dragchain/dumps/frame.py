@@ -58,7 +58,7 @@ class Frame:
 
     def vectors(self, *names: str) -> NDArray[np.float64]:
         """Columns side by side, shape (N, len(names)), float64."""
-        return np.column_stack([self.columns[name] for name in names]).astype(np.float64)
+        return np.array([self.columns[name] for name in names], dtype=np.float64).T.copy()
 
     def ids(self, name: str) -> NDArray[np.int64]:
         """A column of ids, shape (N,)."""

@@ -179,7 +179,7 @@ class _Schedule:
 
 def _merged(run_dir: Path | str, output: Output, read: _Reader) -> Iterator[_Piece]:
     files = part_files(run_dir, output)
-    limits = _limits(_first_step(file, read) for file in files)
+    limits = _limits([None, *(_first_step(file, read) for file in files[1:])])
     schedule = _Schedule(run_dir, output)
     for file, limit in zip(files, limits, strict=True):
         try:

@@ -1,11 +1,14 @@
 """The document of a run's loading, ``loading.json``; docs/loading.md explains its numbers."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import ClassVar
 
 from dragchain.documents import Document, Part
 from dragchain.loading.contact_events import Thresholds
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
+
+FILE = Path("tables") / "loading.json"
 
 Fractions = Mapping[str, Mapping[str, Real]]
 """Each type's fraction (by type) of an amount (by amount)."""

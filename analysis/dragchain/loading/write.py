@@ -16,8 +16,6 @@ from dragchain.run.case import Case, load_case
 from dragchain.run.workpiece import Surface, read_surface
 from dragchain.tables.parquet import write_parquet
 
-FILE = Path("tables") / "loading.json"
-
 
 @dataclass(frozen=True)
 class WorkpieceLoading:
@@ -98,8 +96,3 @@ def compute_loading(run_dir: Path, limits: Thresholds) -> WorkpieceLoading:
     summary = summarise(sampled, facets, events, event, case, limits, off_m)
     drawn = replace(sampled, rows=sampled.rows[DRAWN].copy())
     return WorkpieceLoading(case, surface, drawn, facets, events.drop(columns="frame"), summary)
-
-
-def read_loading(run_dir: Path) -> Loading:
-    """Read the ``loading.json`` that `write_loading` wrote."""
-    return Loading.read(run_dir / FILE)

@@ -10,6 +10,14 @@ from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 
 FILE = Path("tables") / "figures.json"
 
+_PICTURES = ("network_xy", "network_xz")
+FIGURES: Mapping[str, tuple[str, ...]] = {
+    "process": ("forces", *_PICTURES, "force_around_workpiece", "force_depth", "chains_peaks"),
+    "filling": ("filling",),
+    "drop_test": ("drop_test",),
+}
+"""The figures of each scene in the order of the report; it has their captions."""
+
 
 class Comparison(Part):
     """A mean drag of the study's source, and how ours differs from it.

@@ -18,6 +18,7 @@ from dragchain.figures.panels import head, legend_below, new_figure, new_panels
 from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED, drawing, save
 from dragchain.report.collect import write_findings
 from dragchain.report.findings import (
+    FIGURES,
     Comparison,
     DropFindings,
     DropImpacts,
@@ -252,18 +253,8 @@ _Draw = Callable[[RunData, Any], Figure | None]
 """Draws a figure of a run with its findings; None: it lacks an optional table."""
 
 
-def _named(*functions: _Draw) -> dict[str, _Draw]:
-    return {draw.__name__: draw for draw in functions}
-
-
-FIGURES: Mapping[str, Mapping[str, _Draw]] = {
-    "process": _named(
-        forces, network_xy, network_xz, force_around_workpiece, force_depth, chains_peaks
-    ),
-    "filling": _named(filling),
-    "drop_test": _named(drop_test),
-}
-"""The figures of each scene in the order of the report; it has their captions."""
+_PROCESS = (forces, network_xy, network_xz, force_around_workpiece, force_depth, chains_peaks)
+_DRAW: Mapping[str, _Draw] = {draw.__name__: draw for draw in (*_PROCESS, filling, drop_test)}
 
 
 def write_figures(run_dir: Path) -> list[Path]:
@@ -289,8 +280,8 @@ def write_figures(run_dir: Path) -> list[Path]:
     findings = write_findings(run)
     written = []
     with drawing():
-        for name, draw in FIGURES[run.case.scene].items():
-            if (figure := draw(run, findings)) is not None:
+        for name in FIGURES[run.case.scene]:
+            if (figure := _DRAW[name](run, findings)) is not None:
                 written.append(save(figure, run_dir / "figures" / f"{name}.png"))
     return written
 

@@ -8,10 +8,8 @@ from pathlib import Path
 import pandas as pd
 
 from dragchain.errors import DragchainError, MissingRunsError, TableError
-from dragchain.figures.style import drawing, png
+from dragchain.loading.document import FILE as LOADING
 from dragchain.loading.document import Loading
-from dragchain.loading.write import FILE as LOADING
-from dragchain.loading.write import read_loading
 from dragchain.report.bundle import write_bundle
 from dragchain.report.cost_check import (
     CostRow,
@@ -24,10 +22,9 @@ from dragchain.report.cost_check import (
 )
 from dragchain.report.extrapolated import FILE as EXTRAPOLATED
 from dragchain.report.extrapolated import Extrapolated
-from dragchain.report.findings import Findings
+from dragchain.report.findings import FIGURES, Findings
 from dragchain.report.missing import MissingRun, missing_run, scene_of
 from dragchain.report.page import data_uri, file_uri, render_page
-from dragchain.report.run_figures import FIGURES, drag_of_cases
 from dragchain.report.runs import (
     ReportedRun,
     StudyRuns,
@@ -146,7 +143,7 @@ def _section(study: StudyRuns, options: Sequence[Option]) -> Section:
         study=study,
         assumptions=_assumptions(study),
         pictures=[picture for run in study.runs for picture in _pictures(run)],
-        loading=read_loading(process.folder) if measured else None,
+        loading=Loading.read(process.folder / LOADING) if measured else None,
         corrections=Corrections.read(corrections) if corrections.is_file() else None,
         extrapolated=Extrapolated.read(extrapolated) if extrapolated.is_file() else None,
         interval=actual_interval(process.case.asked, process.findings.forces),
@@ -192,6 +189,10 @@ def _render(sections: Sequence[Section], table: pd.DataFrame, missing: Sequence[
 
 
 def _overview(studies: Sequence[StudyRuns]) -> str:
+    """The mean drag of all cases as a figure; no other part of the page needs matplotlib."""
+    from dragchain.figures.style import drawing, png
+    from dragchain.report.run_figures import drag_of_cases
+
     runs = [study.process for study in studies]
     rows = [row for run in runs for row in run.findings.comparison]
     with drawing():

@@ -96,9 +96,9 @@ def flattened(row: Mapping[str, object]) -> dict[str, object]:
 
 def student_quantile(degrees: float, confidence: float = CONFIDENCE) -> float:
     """Half-width of a two-sided interval of Student's t, in standard errors."""
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
-    return float(t.ppf(0.5 + 0.5 * confidence, degrees))
+    return float(stdtrit(degrees, 0.5 + 0.5 * confidence))
 
 
 def t_interval(value: float, se: float, degrees: float) -> Estimate:

@@ -268,7 +268,7 @@ def _place(contacts: Frame, particles: Frame) -> WallContacts:
 
 def _sums(at: Ints, vectors: Floats, count: int) -> Floats:
     """Sums of (N, 3) vectors by row, (count, 3)."""
-    return np.column_stack([np.bincount(at, column, count) for column in vectors.T])
+    return np.array([np.bincount(at, column, count) for column in vectors.T]).T.copy()
 
 
 def _fraction(evaluated: Floats, at: Ints, applied: Floats) -> Floats:

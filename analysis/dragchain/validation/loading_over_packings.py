@@ -6,8 +6,7 @@ import pandas as pd
 
 from dragchain.documents import Part
 from dragchain.loading.contact_events import Thresholds
-from dragchain.loading.document import ContactType, Loading
-from dragchain.loading.write import read_loading
+from dragchain.loading.document import FILE, ContactType, Loading
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.validation.runs_by_bed import Point, over_packings
@@ -62,7 +61,7 @@ def of_packings(packings: Sequence[Point]) -> LoadingOverPackings:
     DocumentError
         If a packing has no ``loading.json``.
     """
-    every = [read_loading(point.folder) for point in packings]
+    every = [Loading.read(point.folder / FILE) for point in packings]
     first, numbers = every[0], [_numbers(one) for one in every]
     return LoadingOverPackings(
         rows=tuple(

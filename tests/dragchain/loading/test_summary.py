@@ -30,9 +30,9 @@ from PIL import Image
 
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import Thresholds, event_types, find_events, surfaces
-from dragchain.loading.document import Loading
+from dragchain.loading.document import FILE, Loading
 from dragchain.loading.samples import sample
-from dragchain.loading.write import compute_loading, read_loading, write_loading
+from dragchain.loading.write import compute_loading, write_loading
 from dragchain.run.case import Circle, load_case
 from dragchain.run.kinematics import workpiece_velocity
 from dragchain.run.workpiece import off_facet, read_surface, turned
@@ -49,7 +49,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def found(run: Path) -> Loading:
-    return read_loading(run)
+    return Loading.read(run / FILE)
 
 
 @pytest.fixture

@@ -30,9 +30,15 @@ from dragchain.figures.rendering import RenderError, check_rendering
 from dragchain.network.frame import NetworkFrame
 from dragchain.network.write import write_chains
 from dragchain.report.collect import compare
-from dragchain.report.findings import FILE, DropFindings, FillingFindings, ProcessFindings
+from dragchain.report.findings import (
+    FIGURES,
+    FILE,
+    DropFindings,
+    FillingFindings,
+    ProcessFindings,
+)
 from dragchain.report.run_data import dominant_bottlenecks
-from dragchain.report.run_figures import FIGURES, drag_of_cases, energy_ratio, write_figures
+from dragchain.report.run_figures import drag_of_cases, energy_ratio, write_figures
 from dragchain.run.case import Case, PublishedDrag, Reference, load_case
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean

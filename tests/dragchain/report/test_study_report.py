@@ -24,7 +24,7 @@ from report_files import (
 
 from dragchain.errors import MissingRunsError, TableError
 from dragchain.loading.write import write_loading
-from dragchain.report.run_figures import FIGURES
+from dragchain.report.findings import FIGURES
 from dragchain.report.study_report import write_report
 from dragchain.report.summary import input_column
 from dragchain.run.completeness import RunRecord, refusal
