@@ -117,7 +117,6 @@ def network_frequency(
     normal, tangential = hertz_stiffness(contacts.overlap_m, effective, modulus, shear)
     return largest_frequency(
         Network(
-            radius_m=radius_m,
             mass_kg=sphere_mass(radius_m, case.media.density_kg_m3),
             a=contacts.a,
             b=contacts.b,

@@ -11,13 +11,12 @@ from dragchain.network.critical_timestep import (
     largest_frequency,
 )
 
-RADIUS, MASS, NORMAL, TANGENTIAL = 0.003, 4e-4, 1e5, 8e4
+MASS, NORMAL, TANGENTIAL = 4e-4, 1e5, 8e4
 
 
 def network(a: list[int], b: list[int], normal: list[list[float]], **changes: float) -> Network:
     count = max([*a, *b]) + 1
     return Network(
-        radius_m=np.full(count, RADIUS),
         mass_kg=np.full(count, MASS),
         a=np.array(a),
         b=np.array(b),
@@ -64,9 +63,7 @@ def test_a_chain_between_walls_has_the_frequency_of_the_textbook(count: int) -> 
 
 
 def test_no_contact_has_no_limit() -> None:
-    empty = Network(
-        *(np.ones(2),) * 2, *(np.zeros(0, int),) * 2, np.zeros((0, 3)), *(np.ones(0),) * 2
-    )
+    empty = Network(np.ones(2), *(np.zeros(0, int),) * 2, np.zeros((0, 3)), *(np.ones(0),) * 2)
     assert critical_step(largest_frequency(empty)) == np.inf
 
 

@@ -12,6 +12,10 @@ from dragdeck.engine.decomposition import decomposition, ranks_check
 from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.limits import breach, within
 from dragdeck.engine.record import AcceptanceCheck, CheckCode, CheckReason, RunPart
+from dragdeck.engine.stability import stability_check
+
+_WITH_NETWORK = ("filling", "process")
+"""Scenes whose result hangs on the contacts of a bed; `column` shows what unstable steps do."""
 
 
 def check_run(
@@ -53,6 +57,8 @@ def check_run(
         checks += _thermo(samples, inputs.media.count)
     checks += [_complete(folder, name, output, parts) for name, output in outputs.items()]
     checks.append(ranks_check(decomposition(screens[-1]), ranks))
+    if inputs.scene in _WITH_NETWORK and "particles" in outputs:
+        checks.append(stability_check(folder, outputs["particles"], parts))
     if inputs.limits is not None and "thermo" in outputs:
         # once more on all rows: the watch may not have looked at the last ones
         checks.append(breach(samples, inputs.limits) or within(inputs.limits))

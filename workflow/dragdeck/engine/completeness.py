@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine.record import RunPart
 
@@ -128,6 +131,16 @@ def _binary(text: mmap.mmap) -> Iterator[tuple[int, int]]:
         if place > len(text):
             return
         yield step, place
+
+
+def read_frame(file: Path, begin: int) -> NDArray[np.float64]:
+    """The rows of the frame of a binary dump that begins at a byte, from all ranks."""
+    with file.open("rb") as stream:
+        stream.seek(begin)
+        *_, width, ranks = _HEADER.unpack(stream.read(_HEADER.size))
+        counts = (_CHUNK.unpack(stream.read(_CHUNK.size))[0] for _ in range(ranks))
+        rows = [np.fromfile(stream, count=count) for count in counts]
+    return np.concatenate(rows).reshape(-1, width)
 
 
 @dataclass(frozen=True)
