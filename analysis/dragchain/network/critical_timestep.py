@@ -1,35 +1,9 @@
 """The critical time step of a loaded contact network."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from dragchain.arrays import Floats, Ints
-
-
-@dataclass(frozen=True)
-class Network:
-    """Particles and their loaded contacts; N particles and M contacts.
-
-    Attributes
-    ----------
-    mass_kg : (N,) ndarray
-    a, b : (M,) ndarray of int
-        The bodies of a contact as rows of the particles; ``b`` is -1 for a wall, which does not
-        move.
-    normal : (M, 3) ndarray
-        Unit vectors from ``a`` to ``b``.
-    normal_stiffness_n_m, tangential_stiffness_n_m : (M,) ndarray
-        Tangent stiffnesses.
-    """
-
-    mass_kg: Floats
-    a: Ints
-    b: Ints
-    normal: Floats
-    normal_stiffness_n_m: Floats
-    tangential_stiffness_n_m: Floats
 
 
 def hertz_stiffness(
@@ -56,7 +30,9 @@ def hertz_stiffness(
     return 2.0 * modulus_pa * contact_radius, 8.0 * shear_pa * contact_radius
 
 
-def largest_frequency(network: Network) -> float:
+def largest_frequency(
+    mass_kg: Floats, a: Ints, b: Ints, normal: Floats, stiffness_n_m: tuple[Floats, Floats]
+) -> float:
     """Largest eigenfrequency of a contact network, rotations included.
 
     The largest eigenvalue of ``M^-1/2 K M^-1/2`` by Lanczos iteration, K being the sum over all
@@ -66,7 +42,15 @@ def largest_frequency(network: Network) -> float:
 
     Parameters
     ----------
-    network : Network
+    mass_kg : (N,) ndarray
+        Of the particles.
+    a, b : (M,) ndarray of int
+        The bodies of a contact as rows of the particles; ``b`` is -1 for a wall, which does not
+        move.
+    normal : (M, 3) ndarray
+        Unit vectors from ``a`` to ``b``.
+    stiffness_n_m : (M,) ndarray, (M,) ndarray
+        Normal and tangential tangent stiffness.
 
     Returns
     -------
@@ -78,19 +62,18 @@ def largest_frequency(network: Network) -> float:
     Otsubo, O'Sullivan and Shire (2017), Empirical assessment of the critical time increment in
     explicit particulate discrete element method simulations, Computers and Geotechnics 86, 67-79.
     """
-    a, b, normal = network.a, network.b, network.normal
     if not len(a):
         return 0.0
     # a wall is the last body, row -1, and has no inverse mass; rotations count times the radius
-    inverse = np.append(1.0 / np.sqrt(network.mass_kg), 0.0)
+    inverse = np.append(1.0 / np.sqrt(mass_kg), 0.0)
     scale = inverse[:, None] * np.repeat([1.0, np.sqrt(2.5)], 3)
-    ahead, across = network.normal_stiffness_n_m, network.tangential_stiffness_n_m
+    ahead, across = np.stack(stiffness_n_m)[:, :, None]
 
     def act(shape: Floats) -> Floats:
         moved, turned = np.hsplit(shape.reshape(scale.shape) * scale, 2)
         apart = moved[b] - moved[a] + np.cross(normal, turned[a] + turned[b])
         along = (apart * normal).sum(axis=1, keepdims=True) * normal
-        force = ahead[:, None] * along + across[:, None] * (apart - along)
+        force = ahead * along + across * (apart - along)
         torque, found = np.cross(force, normal), np.zeros_like(scale)
         np.add.at(found, a, np.hstack([-force, torque]))
         np.add.at(found, b, np.hstack([force, torque]))

@@ -138,8 +138,7 @@ class PointRun:
         if self.record is None:
             return False
         failed = {check.code for check in self.record.failed_checks}
-        counts = bool(failed) and failed <= {"neighbour_builds", "stable_timestep"}
-        return self.record.complete or counts
+        return self.record.complete or set() < failed <= {"neighbour_builds", "stable_timestep"}
 
 
 def read_points(lists: Sequence[Path]) -> list[PointRun]:

@@ -91,10 +91,8 @@ def stability_number(
     return math.sqrt(_largest_eigenvalue(bodies, normal, weights, inverse_mass)) / 2
 
 
-def _largest_eigenvalue(
-    bodies: Ints, normal: Floats, weights: Floats, inverse_mass: Floats
-) -> float:
-    """Largest eigenvalue of ``M^-1/2 W M^-1/2``.
+def _largest_eigenvalue(bodies: Ints, normal: Floats, weights: Floats, inverse: Floats) -> float:
+    """Largest eigenvalue of ``M^-1/2 W M^-1/2`` from the inverse masses.
 
     W adds up all contacts, each with its normal and its tangential weight on the relative
     displacement of the two surfaces.
@@ -102,7 +100,7 @@ def _largest_eigenvalue(
     a, b = bodies
     ahead, across = weights[:, :, None]
     # rotations count times the radius; the inertia of a sphere is 2/5 m R^2
-    scale = np.sqrt(inverse_mass)[:, None] * np.repeat([1, math.sqrt(2.5)], 3)
+    scale = np.sqrt(inverse)[:, None] * np.repeat([1, math.sqrt(2.5)], 3)
 
     def act(shape: Floats) -> Floats:
         moved, turned = np.hsplit(shape.reshape(scale.shape) * scale, 2)
@@ -127,11 +125,8 @@ def _touching(centre: Floats, radius: Floats, bowl_radius: float) -> tuple[Ints,
     (2, M), (M, 3) and (M,) ndarray
         Bodies a and b, where N is the bowl; unit vector from a to b; overlap, m.
     """
-    count, (first, second) = (
-        len(radius),
-        KDTree(centre).query_pairs(2 * radius.max(), output_type="ndarray").T,
-    )
-    everyone, bowl = np.arange(count), np.full(count, count)
+    first, second = KDTree(centre).query_pairs(2 * radius.max(), output_type="ndarray").T
+    everyone, bowl = np.arange(count := len(radius)), np.full(count, count)
     bodies = np.stack([np.r_[first, everyone, everyone], np.r_[second, bowl, bowl]])
     away = np.concatenate([centre[second] - centre[first], centre * [0, 0, -1], centre * [1, 1, 0]])
     distance = np.linalg.norm(away, axis=1)
