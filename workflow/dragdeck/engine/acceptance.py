@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dragdeck.decks import CASE_FILE, PACKING_FILE
 from dragdeck.decks.case_file import CaseOfStudy
@@ -17,7 +16,7 @@ from dragdeck.engine.decomposition import decomposition, ranks_check
 from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.limits import breach, within
 from dragdeck.engine.record import AcceptanceCheck, CheckCode, CheckReason, RunPart
-from dragdeck.physics.contact_network import stability_number
+from dragdeck.physics.contact_network import Floats, stability_number
 
 _FRAMES = 20
 """Frames whose contacts are looked at. An assumption: their stability number scatters by 3 % from
@@ -177,7 +176,7 @@ def _stable_timestep(
     return _check("stable_timestep", "stable time step", number <= 1 or bool(reason), seen, limit)
 
 
-def _stability_number(case: CaseOfStudy, rows: NDArray[np.float64]) -> float:
+def _stability_number(case: CaseOfStudy, rows: Floats) -> float:
     """That of centres and radii; infinite for those of no packing."""
     if not (rows.size and np.isfinite(rows).all()):
         return math.inf

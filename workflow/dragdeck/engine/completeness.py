@@ -10,10 +10,10 @@ from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine.record import RunPart
+from dragdeck.physics.contact_network import Floats
 
 _HEADER = struct.Struct("<qqi6i6d2i")
 _CHUNK = struct.Struct("<i")
@@ -181,7 +181,7 @@ def coverage(folder: Path, output: OutputOfRun, parts: Sequence[RunPart]) -> Cov
 
 def some_frames(
     folder: Path, output: OutputOfRun, parts: Sequence[RunPart], most: int
-) -> Iterator[NDArray[np.float64]]:
+) -> Iterator[Floats]:
     """The rows of so many frames of a binary dump at most, evenly spread over all parts."""
     files = [file for file in part_files(folder, {"": output}, parts) if file.is_file()]
     ends = [(file, (0, *(end for _, end in whole_frames(file, output).ends))) for file in files]
@@ -190,7 +190,7 @@ def some_frames(
         yield _rows_of_frame(*begins[number])
 
 
-def _rows_of_frame(file: Path, begin: int) -> NDArray[np.float64]:
+def _rows_of_frame(file: Path, begin: int) -> Floats:
     """The rows of the frame that begins at a byte, from all ranks."""
     with file.open("rb") as stream:
         stream.seek(begin)
