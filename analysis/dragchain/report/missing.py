@@ -22,6 +22,7 @@ _REMEDIES: Mapping[CheckCode, str] = {
     "at_rest": "choose a larger filling.max_time_s or filling.energy_ratio",
     "particles_kept": _SMALLER_STEP,
     "finite_numbers": _SMALLER_STEP,
+    "stable_timestep": _SMALLER_STEP,
     "within_limits": _SMALLER_STEP,
     "output_complete": "start it anew with: dragdeck run --again",
     "ranks": "use the mpirun that belongs to this LIGGGHTS (DRAGDECK_LAUNCHER)",

@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 from dragchain.arrays import Floats, Ints
 from dragchain.contact_law.hertz import sphere_mass
 from dragchain.dumps.frame import Frame
-from dragchain.network.critical_timestep import Network, hertz_stiffness, largest_frequency
+from dragchain.network.critical_timestep import hertz_stiffness, largest_frequency
 from dragchain.run.case import Case
 
 PARTNERS = ("particle", "bowl", "workpiece")
@@ -115,14 +115,6 @@ def network_frequency(
     modulus = np.array([pair.modulus_pa for pair in moduli])[contacts.partner]
     shear = np.array([pair.shear_pa for pair in moduli])[contacts.partner]
     normal, tangential = hertz_stiffness(contacts.overlap_m, effective, modulus, shear)
-    return largest_frequency(
-        Network(
-            radius_m=radius_m,
-            mass_kg=sphere_mass(radius_m, case.media.density_kg_m3),
-            a=contacts.a,
-            b=contacts.b,
-            normal=contacts.normal,
-            normal_stiffness_n_m=normal,
-            tangential_stiffness_n_m=tangential if sticks else 0.0 * tangential,
-        )
-    )
+    mass = sphere_mass(radius_m, case.media.density_kg_m3)
+    stiffness = normal, tangential if sticks else 0.0 * tangential
+    return largest_frequency(mass, contacts.a, contacts.b, contacts.normal, stiffness)

@@ -4,27 +4,21 @@ import numpy as np
 import pytest
 
 from dragchain.network.critical_timestep import (
-    Network,
     critical_step,
     damped_fraction,
     hertz_stiffness,
     largest_frequency,
 )
 
-RADIUS, MASS, NORMAL, TANGENTIAL = 0.003, 4e-4, 1e5, 8e4
+MASS, NORMAL, TANGENTIAL = 4e-4, 1e5, 8e4
 
 
-def network(a: list[int], b: list[int], normal: list[list[float]], **changes: float) -> Network:
-    count = max([*a, *b]) + 1
-    return Network(
-        radius_m=np.full(count, RADIUS),
-        mass_kg=np.full(count, MASS),
-        a=np.array(a),
-        b=np.array(b),
-        normal=np.array(normal),
-        normal_stiffness_n_m=np.full(len(a), changes.get("normal", NORMAL)),
-        tangential_stiffness_n_m=np.full(len(a), changes.get("tangential", TANGENTIAL)),
-    )
+def frequency(
+    a: list[int], b: list[int], normal: list[list[float]], tangential: float = TANGENTIAL
+) -> float:
+    mass = np.full(max([*a, *b]) + 1, MASS)
+    stiffness = np.full(len(a), NORMAL), np.full(len(a), tangential)
+    return largest_frequency(mass, np.array(a), np.array(b), np.array(normal), stiffness)
 
 
 TILTED = [0.6, 0.0, 0.8]
@@ -33,41 +27,37 @@ TILTED = [0.6, 0.0, 0.8]
 @pytest.mark.parametrize("normal", [[0.0, 0.0, -1.0], TILTED])
 def test_a_particle_on_a_wall_rolls_and_slides(normal: list[float]) -> None:
     """Sliding and rolling together: k_t (1/m + R^2/I) = 3.5 k_t/m."""
-    found = largest_frequency(network([0], [-1], [normal]))
+    found = frequency([0], [-1], [normal])
     assert found == pytest.approx(np.sqrt(3.5 * TANGENTIAL / MASS), rel=1e-12)
 
 
 def test_without_friction_only_the_normal_counts() -> None:
-    on_wall = largest_frequency(network([0], [-1], [TILTED], tangential=0.0))
+    on_wall = frequency([0], [-1], [TILTED], tangential=0.0)
     assert on_wall == pytest.approx(np.sqrt(NORMAL / MASS), rel=1e-12)
-    pair = largest_frequency(network([0], [1], [TILTED], tangential=0.0))
+    pair = frequency([0], [1], [TILTED], tangential=0.0)
     assert pair == pytest.approx(np.sqrt(2 * NORMAL / MASS), rel=1e-12)
 
 
 def test_two_particles_double_it() -> None:
-    found = largest_frequency(network([0], [1], [TILTED]))
+    found = frequency([0], [1], [TILTED])
     assert found == pytest.approx(np.sqrt(7 * TANGENTIAL / MASS), rel=1e-12)
 
 
 @pytest.mark.parametrize("count", [5, 60])
 def test_a_chain_between_walls_has_the_frequency_of_the_textbook(count: int) -> None:
-    """N masses, N + 1 springs, fixed ends: 2 sqrt(k/m) sin(N pi / (2 (N + 1))).
-
-    60 particles go through the iteration, 5 through the whole matrix.
-    """
+    """N masses, N + 1 springs, fixed ends: 2 sqrt(k/m) sin(N pi / (2 (N + 1)))."""
     a = [*range(count), 0]
     b = [*range(1, count), -1, -1]
     normals = [[1.0, 0.0, 0.0]] * count + [[-1.0, 0.0, 0.0]]
-    found = largest_frequency(network(a, b, normals, tangential=0.0))
+    found = frequency(a, b, normals, tangential=0.0)
     known = 2 * np.sqrt(NORMAL / MASS) * np.sin(count * np.pi / (2 * (count + 1)))
     assert found == pytest.approx(known, rel=1e-9)
 
 
 def test_no_contact_has_no_limit() -> None:
-    empty = Network(
-        *(np.ones(2),) * 2, *(np.zeros(0, int),) * 2, np.zeros((0, 3)), *(np.ones(0),) * 2
-    )
-    assert critical_step(largest_frequency(empty)) == np.inf
+    none, nowhere = np.zeros(0, int), np.zeros((0, 3))
+    found = largest_frequency(np.ones(2), none, none, nowhere, (np.zeros(0), np.zeros(0)))
+    assert critical_step(found) == np.inf
 
 
 def test_hertz_stiffness_is_the_slope_of_the_force() -> None:

@@ -115,7 +115,9 @@ def short_case(case: Case) -> Case:
         skin_m=asked.skin_m,
         ranks=case.ranks,
     )
-    changed = study.model_copy(update={"fidelity": consistent(case, soft, None)})
+    accepted = study.accepted.model_copy(update={"unsafe_timestep": "only its speed counts"})
+    update = {"fidelity": consistent(case, soft, None), "accepted": accepted}
+    changed = study.model_copy(update=update)
     dt = bed_timestep(changed, "timestep_fraction")
     pace = asked.speed_factor * bed_timestep(study, "timestep_fraction") / dt
     update = {"motion": _motion(changed, pace, dt), "outputs": _outputs(study.outputs, pace, dt)}

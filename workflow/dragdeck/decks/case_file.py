@@ -6,6 +6,7 @@ from typing import Literal
 from pydantic import JsonValue
 
 from dragdeck.documents import Document, Part
+from dragdeck.physics.contact_network import ContactConstants
 from dragdeck.physics.run_limits import RunLimits
 from dragdeck.study.reference import Reference
 
@@ -64,13 +65,6 @@ class Phase(Part):
     end_step: int
 
 
-class ContactModuli(Part):
-    """Effective moduli of the contact of two bodies, softened as the run is, Pa."""
-
-    modulus_pa: float
-    shear_pa: float
-
-
 class CaseFile(Document):
     """What the case files of all scenes share.
 
@@ -102,6 +96,8 @@ class CaseOfStudy(CaseFile):
     ----------
     contact_moduli : mapping
         Of a particle with a ``particle``, the ``bowl`` and the ``workpiece``.
+    unsafe_timestep : str or None
+        Why a step of the process beyond the stable one is accepted.
     """
 
     gravity_m_s2: float
@@ -109,9 +105,10 @@ class CaseOfStudy(CaseFile):
     inputs: Mapping[str, JsonValue]
     media: MediaOfRun
     bowl: BowlOfRun
-    contact_moduli: Mapping[str, ContactModuli]
+    contact_moduli: Mapping[str, ContactConstants]
     assumptions: Sequence[AssumptionOfRun]
     reference: Reference | None
+    unsafe_timestep: str | None = None
 
 
 class DropTestCase(CaseOfStudy):

@@ -1,17 +1,26 @@
 """The acceptance checks that a finished run must pass before it counts as a result."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from dragdeck.decks import PACKING_FILE
+import numpy as np
+
+from dragdeck.decks import CASE_FILE, PACKING_FILE
+from dragdeck.decks.case_file import CaseOfStudy
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
-from dragdeck.engine.completeness import coverage, part_files
+from dragdeck.engine.completeness import coverage, part_files, some_frames
 from dragdeck.engine.decomposition import decomposition, ranks_check
 from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.limits import breach, within
 from dragdeck.engine.record import AcceptanceCheck, CheckCode, CheckReason, RunPart
+from dragdeck.physics.contact_network import Floats, stability_number
+
+_FRAMES = 20
+"""Frames whose contacts are looked at. An assumption: their stability number scatters by 3 % from
+frame to frame, and the median of so many by 1 %."""
 
 
 def check_run(
@@ -53,6 +62,8 @@ def check_run(
         checks += _thermo(samples, inputs.media.count)
     checks += [_complete(folder, name, output, parts) for name, output in outputs.items()]
     checks.append(ranks_check(decomposition(screens[-1]), ranks))
+    if inputs.scene in ("filling", "process") and "particles" in outputs:
+        checks.append(_stable_timestep(folder, outputs["particles"], parts))
     if inputs.limits is not None and "thermo" in outputs:
         # once more on all rows: the watch may not have looked at the last ones
         checks.append(breach(samples, inputs.limits) or within(inputs.limits))
@@ -147,3 +158,28 @@ def _complete(
         passed = True
     limit = "every frame whole" if output.last_step is None else f"to step {output.last_step}"
     return _check("output_complete", f"{name} whole", passed, seen, limit)
+
+
+def _stable_timestep(
+    folder: Path, particles: OutputOfRun, parts: Sequence[RunPart]
+) -> AcceptanceCheck:
+    """Whether the median `stability_number` of the frames is 1 at most."""
+    case = CaseOfStudy.read(folder / CASE_FILE)
+    wanted = [particles.columns.index(name) for name in ("x_m", "y_m", "z_m", "radius_m")]
+    frames = some_frames(folder, particles, parts, _FRAMES)
+    found = [_stability_number(case, rows[:, wanted]) for rows in frames]
+    number, reason, limit = float(np.median(found or [0.0])), case.unsafe_timestep, "1"
+    if number > 1:
+        stable = f"{number**-2:.2g} times the time step is stable"
+        limit = f"1; accepted beyond it: {reason}" if reason else f"1; {stable}"
+    seen = f"stability number {number:.3g} of the contacts, median of {len(found)} frames"
+    return _check("stable_timestep", "stable time step", number <= 1 or bool(reason), seen, limit)
+
+
+def _stability_number(case: CaseOfStudy, rows: Floats) -> float:
+    """That of centres and radii; infinite for those of no packing."""
+    if not (rows.size and np.isfinite(rows).all()):
+        return math.inf
+    constants = [case.contact_moduli[name] for name in ("particle", "bowl")]
+    of_case = case.media.density_kg_m3, case.bowl.radius_m, constants, case.timestep_s
+    return stability_number(rows[:, :3], rows[:, 3], *of_case)

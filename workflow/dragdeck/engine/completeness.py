@@ -9,8 +9,11 @@ from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 
+import numpy as np
+
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine.record import RunPart
+from dragdeck.physics.contact_network import Floats
 
 _HEADER = struct.Struct("<qqi6i6d2i")
 _CHUNK = struct.Struct("<i")
@@ -174,6 +177,27 @@ def coverage(folder: Path, output: OutputOfRun, parts: Sequence[RunPart]) -> Cov
         frames = whole_frames(file, output) if file.is_file() else WholeFrames((), 0)
         steps = {step for step in steps if step <= part.from_step}.union(frames.steps)
     return Coverage(frozenset(steps), _gap(steps, output), frames.damaged)
+
+
+def some_frames(
+    folder: Path, output: OutputOfRun, parts: Sequence[RunPart], most: int
+) -> Iterator[Floats]:
+    """The rows of so many frames of a binary dump at most, evenly spread over all parts."""
+    files = [file for file in part_files(folder, {"": output}, parts) if file.is_file()]
+    ends = [(file, (0, *(end for _, end in whole_frames(file, output).ends))) for file in files]
+    begins = [(file, begin) for file, places in ends for begin in places[:-1]]
+    for number in np.linspace(0, len(begins) - 1, min(most, len(begins))).astype(int):
+        yield _rows_of_frame(*begins[number])
+
+
+def _rows_of_frame(file: Path, begin: int) -> Floats:
+    """The rows of the frame that begins at a byte, from all ranks."""
+    with file.open("rb") as stream:
+        stream.seek(begin)
+        *_, width, ranks = _HEADER.unpack(stream.read(_HEADER.size))
+        counts = (_CHUNK.unpack(stream.read(_CHUNK.size))[0] for _ in range(ranks))
+        rows = [np.fromfile(stream, count=count) for count in counts]
+    return np.concatenate(rows).reshape(-1, width)
 
 
 def _gap(steps: set[int], output: OutputOfRun) -> int | None:

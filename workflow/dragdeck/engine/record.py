@@ -13,6 +13,7 @@ CheckCode = Literal[
     "no_engine_error",
     "neighbour_builds",
     "at_rest",
+    "stable_timestep",
     "particles_kept",
     "finite_numbers",
     "within_limits",

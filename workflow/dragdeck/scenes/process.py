@@ -243,6 +243,7 @@ def _process_case(
         timestep_s,
         rayleigh_s,
         asked=case.advised,
+        unsafe_timestep=study.accepted.unsafe_timestep,
         case=case.name,
         upstream={scene.name: scene.run_id(case) for scene in (FILLING, DROP_TEST)},
         numbers=describe(case),

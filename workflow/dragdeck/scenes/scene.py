@@ -12,7 +12,6 @@ from dragdeck.decks.case_file import (
     AssumptionOfRun,
     BowlOfRun,
     CaseOfStudy,
-    ContactModuli,
     FidelityOfRun,
     MediaOfRun,
 )
@@ -20,6 +19,7 @@ from dragdeck.decks.deck import Materials, StudyScene, contact_law
 from dragdeck.documents import Document
 from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear
+from dragdeck.physics.contact_network import ContactConstants
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.base import Json, flat
@@ -197,7 +197,7 @@ def case_of_study(
     return kind(**{**entries, **own})
 
 
-def _contact_moduli(study: Study) -> dict[str, ContactModuli]:
+def _contact_moduli(study: Study) -> dict[str, ContactConstants]:
     scale, particle = study.chosen_fidelity().youngs_modulus_scale, particle_material(study)
     others = {
         "particle": study.media.material,
@@ -205,9 +205,11 @@ def _contact_moduli(study: Study) -> dict[str, ContactModuli]:
         "workpiece": study.workpiece.material,
     }
     return {
-        name: ContactModuli(
+        name: ContactConstants(
             modulus_pa=effective_modulus(particle, study.materials[other], scale),
             shear_pa=effective_shear(particle, study.materials[other], scale),
+            restitution=study.pair(study.media.material, other).restitution,
+            friction=study.pair(study.media.material, other).friction,
         )
         for name, other in others.items()
     }

@@ -19,8 +19,8 @@ class Accepted(Model):
 
     unsafe_timestep: Line | None = Field(
         default=None,
-        description="reason for a process time step at or beyond the smallest unstable one; "
-        "shown among the assumptions of the report",
+        description="reason for a process time step at or beyond the smallest unstable one, and "
+        "for accepting its run; shown among assumptions and acceptance checks of the report",
     )
     cases: Annotated[Whole, Field(ge=1)] = Field(
         default=200, description="largest number of cases that sweep may have"

@@ -1,0 +1,147 @@
+"""The acceptance check of the time step: on made frames, and on LIGGGHTS."""
+
+import json
+import struct
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dragdeck.cases.case import Case
+from dragdeck.decks.outputs import particles
+from dragdeck.decks.render import write_run
+from dragdeck.decks.templates import environment
+from dragdeck.engine.acceptance import check_run
+from dragdeck.engine.inputs import RunInputs
+from dragdeck.engine.record import AcceptanceCheck, RunPart, RunRecord
+from dragdeck.engine.reports import silent
+from dragdeck.engine.run_folder import run_to_outcome
+from dragdeck.project import Project
+from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.scene import Bed
+from dragdeck.sweep.cases import load_cases
+
+OUTPUT = particles(10, 10, 40, bowl_facets=True)
+RADIUS = 3e-3
+
+
+def frame(step: int, overlap_m: float, ranks: int) -> bytes:
+    """Two particles on the floor, far from each other, dumped by some ranks."""
+    width = len(OUTPUT.columns)
+    rows = np.zeros((2, width))
+    names = [column.name for column in OUTPUT.columns]
+    rows[:, names.index("x_m")] = -0.01, 0.01
+    rows[:, names.index("z_m")] = RADIUS - overlap_m
+    rows[:, names.index("radius_m")] = RADIUS
+    head = struct.pack("<qqi6i6d2i", step, 2, 0, *[1] * 6, *[0.0] * 6, width, ranks)
+    chunks = [rows] if ranks == 1 else [rows[:1], rows[1:]]
+    return head + b"".join(struct.pack("<i", part.size) + part.tobytes() for part in chunks)
+
+
+def checked(
+    folder: Path, overlaps: Sequence[float], ranks: int = 1, **changes: Any
+) -> AcceptanceCheck:
+    """The check of a run in two parts with a frame for each overlap."""
+    folder.mkdir(exist_ok=True)
+    law = {"modulus_pa": 4e7, "shear_pa": 1e7, "restitution": 0.9, "friction": 0.3}
+    case = {
+        "schema": 2, "study": "a", "title": "A", "scene": "process", "run": "a",
+        "versions": {}, "files": {},
+        "timestep_s": 2e-4, "rayleigh_time_s": 1e-4, "gravity_m_s2": 9.81, "inputs": {},
+        "fidelity": {
+            "name": "a", "youngs_modulus_scale": 1.0, "timestep_fraction": 2.0, "ranks": ranks,
+            "filling_timestep_fraction": 0.2, "speed_factor": 1.0, "skin_m": 1e-3,
+        },
+        "media": {
+            "count": 2, "radius_mean_m": RADIUS, "radius_std_m": 0.0, "density_kg_m3": 2500.0
+        },
+        "bowl": {"radius_m": 0.05, "walls": "primitive"}, "assumptions": [], "reference": None,
+        "contact_moduli": {"particle": law, "bowl": law}, **changes,
+    }  # fmt: skip
+    (folder / "case.json").write_text(json.dumps(case))
+    frames = [frame(10 * n + 10, overlap, ranks) for n, overlap in enumerate(overlaps)]
+    for part, some in ((1, frames[:2]), (2, frames[2:])):
+        (folder / f"particles.{part}.bin").write_bytes(b"".join(some))
+    parts = [RunPart(part=part, checkpoint=None, from_step=20 * part - 20) for part in (1, 2)]
+    checks = check_run(
+        folder,
+        RunInputs.read(folder / "case.json"),
+        {"particles": OUTPUT.as_part()},
+        0,
+        parts,
+        ranks,
+    )
+    return next(check for check in checks if check.code == "stable_timestep")
+
+
+def number(check: AcceptanceCheck) -> float:
+    return float(check.seen.split()[2])
+
+
+LIGHT, HEAVY = 1e-8, 1e-4
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_the_median_of_all_parts_counts(tmp_path: Path, ranks: int) -> None:
+    light = checked(tmp_path, [LIGHT, HEAVY, LIGHT, LIGHT], ranks)
+    assert (light.code, light.passed, light.limit) == ("stable_timestep", True, "1")
+    assert light.seen.endswith("of the contacts, median of 4 frames")
+    heavy = checked(tmp_path, [HEAVY, LIGHT, HEAVY, HEAVY], ranks)
+    assert not heavy.passed
+    assert number(light) < 1 < number(heavy)
+
+
+def test_what_it_says_is_stable_is(tmp_path: Path) -> None:
+    check = checked(tmp_path, [HEAVY] * 4)
+    factor = float(check.limit.removeprefix("1; ").split()[0])
+    assert factor < 0.5
+    assert number(checked(tmp_path, [HEAVY] * 4, timestep_s=0.95 * factor * 2e-4)) < 1
+
+
+def test_an_accepted_step_passes_and_says_so(tmp_path: Path) -> None:
+    check = checked(tmp_path, [HEAVY] * 4, unsafe_timestep="to see it break")
+    assert check.passed
+    assert number(check) > 1
+    assert check.limit == "1; accepted beyond it: to see it break"
+    fine = checked(tmp_path, [LIGHT] * 4, unsafe_timestep="to see it break")
+    assert (fine.passed, fine.limit) == (True, "1")
+
+
+@pytest.mark.parametrize("overlap", [np.nan, np.inf])
+def test_a_frame_that_is_no_packing_fails(tmp_path: Path, overlap: float) -> None:
+    assert not checked(tmp_path, [LIGHT, overlap, overlap, overlap]).passed
+
+
+@pytest.mark.engine
+def test_the_engine_at_a_stable_and_at_an_unstable_step(
+    small: dict[str, Any], write_study: Callable[..., Path], project: Project
+) -> None:
+    """Every other check passes at the unstable step: nothing else sees it."""
+    small["motion"]["path"]["revolutions"] = 0.05
+    records = {}
+    for fraction in (0.5, 1.05):
+        small["fidelities"]["quick"]["timestep_fraction"] = fraction
+        (case,) = load_cases(write_study(small))
+        records[fraction] = outcome(case, project)
+    assert records[0.5].state == "complete"
+    assert records[1.05].state == "failed"
+    failed = [check for check in records[1.05].checks if not check.passed]
+    assert [check.code for check in failed] == ["stable_timestep"]
+    found = {fraction: next(
+        number(check) for check in record.checks if check.code == "stable_timestep"
+    ) for fraction, record in records.items()}  # fmt: skip
+    assert found[0.5] < 0.8 < 1.05 < found[1.05]
+
+
+def outcome(case: Case, project: Project) -> RunRecord:
+    """The record of a case's process; its filling is run if it was not before."""
+    templates = environment(project.templates)
+    filling, process = (project.run_folder(case, kind) for kind in (FILLING, PROCESS))
+    write_run(FILLING.build(case, None), filling, templates)
+    run_to_outcome(filling, filling / "outcome.json", silent)
+    write_run(PROCESS.build(case, Bed(0.055, 0.065)), process, templates)
+    run_to_outcome(process, process / "outcome.json", silent)
+    return RunRecord.read(process / "outcome.json")
