@@ -15,13 +15,13 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.log import read_samples
 from dragdeck.engine.run_folder import run
 from dragdeck.project import Project
-from dragdeck.scenes.collide import Body, Experiment, ExperimentFacts, Wall, collide_scene
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.registry import SCENES
 from dragdeck.study.contact_law import Pair, coefficients, contact_model, contact_settings
 from dragdeck.study.material import Material
 from dragdeck.sweep.cases import load_cases
+from evidence.verification.collide import Body, Experiment, ExperimentFacts, Wall, collide_scene
 
 OPTIONAL = [name for name, row in coefficients().items() if row.model]
 USED = 0.1

@@ -1,0 +1,108 @@
+"""The critical step: networks whose frequencies are known in closed form."""
+
+import numpy as np
+import pytest
+
+from evidence.stability.critical_timestep import (
+    Network,
+    critical_step,
+    damped_fraction,
+    hertz_stiffness,
+    largest_frequency,
+)
+
+RADIUS, MASS, NORMAL, TANGENTIAL = 0.003, 4e-4, 1e5, 8e4
+
+
+def network(a: list[int], b: list[int], normal: list[list[float]], **changes: float) -> Network:
+    count = max([*a, *b]) + 1
+    return Network(
+        radius_m=np.full(count, RADIUS),
+        mass_kg=np.full(count, MASS),
+        a=np.array(a),
+        b=np.array(b),
+        normal=np.array(normal),
+        normal_stiffness_n_m=np.full(len(a), changes.get("normal", NORMAL)),
+        tangential_stiffness_n_m=np.full(len(a), changes.get("tangential", TANGENTIAL)),
+    )
+
+
+TILTED = [0.6, 0.0, 0.8]
+
+
+@pytest.mark.parametrize("normal", [[0.0, 0.0, -1.0], TILTED])
+def test_a_particle_on_a_wall_rolls_and_slides(normal: list[float]) -> None:
+    """Sliding and rolling together: k_t (1/m + R^2/I) = 3.5 k_t/m."""
+    found = largest_frequency(network([0], [-1], [normal]))
+    assert found == pytest.approx(np.sqrt(3.5 * TANGENTIAL / MASS), rel=1e-12)
+
+
+def test_without_friction_only_the_normal_counts() -> None:
+    on_wall = largest_frequency(network([0], [-1], [TILTED], tangential=0.0))
+    assert on_wall == pytest.approx(np.sqrt(NORMAL / MASS), rel=1e-12)
+    pair = largest_frequency(network([0], [1], [TILTED], tangential=0.0))
+    assert pair == pytest.approx(np.sqrt(2 * NORMAL / MASS), rel=1e-12)
+
+
+def test_two_particles_double_it() -> None:
+    found = largest_frequency(network([0], [1], [TILTED]))
+    assert found == pytest.approx(np.sqrt(7 * TANGENTIAL / MASS), rel=1e-12)
+
+
+@pytest.mark.parametrize("count", [5, 60])
+def test_a_chain_between_walls_has_the_frequency_of_the_textbook(count: int) -> None:
+    """N masses, N + 1 springs, fixed ends: 2 sqrt(k/m) sin(N pi / (2 (N + 1))).
+
+    60 particles go through the iteration, 5 through the whole matrix.
+    """
+    a = [*range(count), 0]
+    b = [*range(1, count), -1, -1]
+    normals = [[1.0, 0.0, 0.0]] * count + [[-1.0, 0.0, 0.0]]
+    found = largest_frequency(network(a, b, normals, tangential=0.0))
+    known = 2 * np.sqrt(NORMAL / MASS) * np.sin(count * np.pi / (2 * (count + 1)))
+    assert found == pytest.approx(known, rel=1e-9)
+
+
+def test_no_contact_has_no_limit() -> None:
+    empty = Network(
+        *(np.ones(2),) * 2, *(np.zeros(0, int),) * 2, np.zeros((0, 3)), *(np.ones(0),) * 2
+    )
+    assert critical_step(largest_frequency(empty)) == np.inf
+
+
+def test_hertz_stiffness_is_the_slope_of_the_force() -> None:
+    overlap, radius, modulus, shear = (np.array([v]) for v in (1e-6, 0.002, 4e10, 9e9))
+    normal, tangential = hertz_stiffness(overlap, radius, modulus, shear)
+
+    def force(d: float) -> float:
+        return float(4 / 3 * modulus[0] * np.sqrt(radius[0]) * d**1.5)
+
+    slope = (force(1.0001e-6) - force(0.9999e-6)) / 2e-10
+    assert normal[0] == pytest.approx(slope, rel=1e-6)
+    assert tangential[0] == pytest.approx(4 * shear[0] / modulus[0] * normal[0], rel=1e-12)
+    assert hertz_stiffness(-overlap, radius, modulus, shear)[0][0] == 0.0
+
+
+def test_damping_makes_the_step_smaller() -> None:
+    assert damped_fraction(1.0) == 1.0
+    assert damped_fraction(0.06) < damped_fraction(0.5) < damped_fraction(0.86) < 1.0
+
+
+def test_the_critical_step_of_central_differences_with_lagging_damping() -> None:
+    """The engine's own order of things: half a kick, a move, the force with that speed, a kick."""
+    restitution, omega = 0.3, 1.0
+    log = abs(np.log(restitution))
+    ratio = np.sqrt(5 / 6) * log / np.hypot(log, np.pi)
+
+    def grows(step: float) -> bool:
+        x, v, a = 1.0, 0.0, -1.0
+        for _ in range(4000):
+            v += 0.5 * step * a
+            x += step * v
+            a = -(omega**2) * x - 2 * ratio * omega * v
+            v += 0.5 * step * a
+        return abs(x) > 1.0
+
+    limit = critical_step(omega) * damped_fraction(restitution)
+    assert not grows(0.99 * limit)
+    assert grows(1.01 * limit)
