@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from dragdeck import __version__
 from dragdeck.decks import outputs
@@ -119,38 +119,42 @@ class CollideCase(CaseFile, ExperimentFacts):
         return next(wall.type for wall in self.walls if wall.name == body)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Experiment:
-    """What a run of this scene models.
+def collide_case(
+    types: Sequence[tuple[str, Material]],
+    pairs: Mapping[tuple[int, int], Pair],
+    bodies: Sequence[Body],
+    **own: Any,
+) -> CollideCase:
+    """The case of a few particles and walls.
 
-    Attributes
+    Parameters
     ----------
-    group, run, title : str
-        Name of the group of results, run id, and a title.
     types : sequence of (str, Material)
         A name and a material for each type.
     pairs : mapping of (int, int) to Pair
         Types (from 1, the smaller first) that meet, and what they do to each other.
-    gravity_m_s2 : (float, float, float)
-        The vector.
-    facts : ExperimentFacts
-        What is tested, for ``case.json``.
+    bodies : sequence of Body
+    **own
+        The other fields of `CollideCase`; without gravity and walls there are none.
     """
+    return CollideCase(
+        **{"gravity_m_s2": (0.0, 0.0, 0.0), "limit_force": True, "walls": (), **own},
+        versions={"dragdeck": __version__},
+        fidelity=RanksOfRun(ranks=1),
+        media=CountOfRun(count=len(bodies)),
+        types=[NamedMaterial(name=name, **material.model_dump()) for name, material in types],
+        pairs=[MeetingPair(types=met, **pair.model_dump()) for met, pair in pairs.items()],
+        bodies=bodies,
+    )
 
-    group: str
-    run: str
-    title: str
-    types: Sequence[tuple[str, Material]]
-    pairs: Mapping[tuple[int, int], Pair]
-    bodies: Sequence[Body]
-    walls: Sequence[Wall]
-    limit_force: bool
-    timestep_s: float
-    rayleigh_time_s: float
+
+@dataclass(frozen=True)
+class Experiment:
+    """A run of this scene: what it models, its steps, and the steps between frames if given."""
+
+    case: CollideCase
     steps: int
-    gravity_m_s2: Vector = (0.0, 0.0, 0.0)
     period: int | None = None
-    facts: ExperimentFacts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,35 +167,35 @@ class _CollideDeck(Deck):
 
 def collide_scene(experiment: Experiment) -> Scene[CollideCase]:
     """The scene of an experiment: one engine process, no checkpoints, no pair output."""
-    every = experiment.period or frame_period(experiment.steps, len(experiment.bodies))
-    last = experiment.steps // every * every
-    look = max(1, experiment.steps // 10)
-    size = math.hypot(*experiment.gravity_m_s2)
+    case, steps = experiment.case, experiment.steps
+    every = experiment.period or frame_period(steps, len(case.bodies))
+    look = max(1, steps // 10)
+    size = math.hypot(*case.gravity_m_s2)
     deck = _CollideDeck(
-        title=experiment.title,
-        study=experiment.group,
-        scene="collide",
-        run=experiment.run,
+        title=case.title,
+        study=case.study,
+        scene=case.scene,
+        run=case.run,
         source="bodies.data",
-        materials=_pair_table(experiment.types, experiment.pairs),
-        limit_force=experiment.limit_force,
+        materials=_pair_table(case),
+        limit_force=case.limit_force,
         gravity_m_s2=size,
-        gravity_direction=_direction(experiment.gravity_m_s2, size),
-        skin_m=_skin(experiment.bodies),
-        timestep_s=experiment.timestep_s,
+        gravity_direction=_direction(case.gravity_m_s2, size),
+        skin_m=_skin(case.bodies),
+        timestep_s=case.timestep_s,
         outputs=(
-            outputs.thermo(look, experiment.steps // look * look),
-            outputs.bodies(every, last, [wall.name for wall in experiment.walls]),
+            outputs.thermo(look, steps // look * look),
+            outputs.bodies(every, steps // every * every, [wall.name for wall in case.walls]),
         ),
         thermo_steps=look,
-        walls=experiment.walls,
-        steps=experiment.steps,
+        walls=case.walls,
+        steps=steps,
     )
     return Scene(
         deck=deck,
-        case=_case(experiment),
-        steps=experiment.steps,
-        files={"bodies.data": lambda: _bodies_data(experiment)},
+        case=case,
+        steps=steps,
+        files={"bodies.data": lambda: _bodies_data(case, steps * case.timestep_s)},
         models={"every particle": "placed and set in motion by hand", "exact walls": "planes"},
         leaves_out={
             "output of pairs": LeftOut("forces on so few particles say all"),
@@ -210,40 +214,37 @@ def _skin(bodies: Sequence[Body]) -> float:
     return round_to(0.2 * min(body.radius_m for body in bodies), 3)
 
 
-def _pair_table(
-    types: Sequence[tuple[str, Material]], pairs: Mapping[tuple[int, int], Pair]
-) -> Materials:
+def _pair_table(case: CollideCase) -> Materials:
     """The engine's constants; pairs that never meet repeat one that does."""
-    other = next(iter(pairs.values()))
-    size = range(1, len(types) + 1)
+    pairs, size = {pair.types: pair for pair in case.pairs}, range(1, len(case.types) + 1)
+    other = case.pairs[0]
     law = contact_law([[pairs.get((min(i, j), max(i, j)), other) for j in size] for i in size])
     return Materials(
-        names=[name for name, _ in types],
-        youngs_moduli_pa=[material.youngs_modulus_pa for _, material in types],
-        poissons_ratios=[material.poissons_ratio for _, material in types],
+        names=[material.name for material in case.types],
+        youngs_moduli_pa=[material.youngs_modulus_pa for material in case.types],
+        poissons_ratios=[material.poissons_ratio for material in case.types],
         law=law,
     )
 
 
-def _bodies_data(experiment: Experiment) -> str:
+def _bodies_data(case: CollideCase, duration_s: float) -> str:
     """The data file, with a box that no particle can leave."""
-    duration = experiment.steps * experiment.timestep_s
-    x, y, z = (_side(experiment, axis, duration) for axis in range(3))
-    densities = [material.density_kg_m3 for _, material in experiment.types]
+    x, y, z = (_side(case, axis, duration_s) for axis in range(3))
     bodies = [
-        DataBody(density_kg_m3=densities[body.type - 1], **dict(body)) for body in experiment.bodies
+        DataBody(density_kg_m3=case.types[body.type - 1].density_kg_m3, **dict(body))
+        for body in case.bodies
     ]
-    return data_file(experiment.title, len(experiment.types), (x, y, z), bodies)
+    return data_file(case.title, len(case.types), (x, y, z), bodies)
 
 
-def _side(experiment: Experiment, axis: int, duration_s: float) -> tuple[float, float]:
+def _side(case: CollideCase, axis: int, duration_s: float) -> tuple[float, float]:
     """Bounds of the box along an axis: where the fastest particle could get, and some room, m."""
-    places = [body.position_m[axis] for body in experiment.bodies]
-    speed = max(math.hypot(*body.velocity_m_s) for body in experiment.bodies)
-    fall = 0.5 * math.hypot(*experiment.gravity_m_s2) * duration_s**2
-    walled = len(experiment.walls) > 0 and axis == 2
+    places = [body.position_m[axis] for body in case.bodies]
+    speed = max(math.hypot(*body.velocity_m_s) for body in case.bodies)
+    fall = 0.5 * math.hypot(*case.gravity_m_s2) * duration_s**2
+    walled = len(case.walls) > 0 and axis == 2
     reach = 0.0 if walled else 2 * speed * duration_s + fall
-    room = reach + 4 * max(body.radius_m for body in experiment.bodies)
+    room = reach + 4 * max(body.radius_m for body in case.bodies)
     return round_to(min(places) - room, 6), round_to(max(places) + room, 6)
 
 
@@ -252,28 +253,3 @@ def _direction(vector: Vector, size: float) -> Vector:
         return (0, 0, -1)
     x, y, z = (component / size for component in vector)
     return (x, y, z)
-
-
-def _case(experiment: Experiment) -> CollideCase:
-    return CollideCase(
-        study=experiment.group,
-        title=experiment.title,
-        run=experiment.run,
-        timestep_s=experiment.timestep_s,
-        rayleigh_time_s=experiment.rayleigh_time_s,
-        versions={"dragdeck": __version__},
-        gravity_m_s2=experiment.gravity_m_s2,
-        limit_force=experiment.limit_force,
-        fidelity=RanksOfRun(ranks=1),
-        media=CountOfRun(count=len(experiment.bodies)),
-        types=[
-            NamedMaterial(name=name, **material.model_dump()) for name, material in experiment.types
-        ],
-        pairs=[
-            MeetingPair(types=types, **pair.model_dump())
-            for types, pair in experiment.pairs.items()
-        ],
-        bodies=experiment.bodies,
-        walls=experiment.walls,
-        **dict(experiment.facts),
-    )

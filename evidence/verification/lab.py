@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,13 +12,7 @@ from dragdeck.study.base import Model, Whole
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.material import Material
 from dragdeck.study.model import Study
-from evidence.verification.collide import (
-    Body,
-    ContactFacts,
-    Experiment,
-    ExperimentFacts,
-    collide_scene,
-)
+from evidence.verification.collide import Body, ContactFacts, Experiment, collide_case
 
 _GROUP = "verification"
 """Folder below ``results/``."""
@@ -110,15 +104,12 @@ def experiment(
     test: Test,
     slug: Sequence[str],
     *,
-    series: str,
-    vary: str,
-    steps_per_contact: int,
-    contacts: Rows,
-    timestep_s: float,
-    steps: int,
     types: Sequence[tuple[str, Material]],
-    bodies: Sequence[Body],
     pairs: Mapping[tuple[int, int], Pair],
+    bodies: Sequence[Body],
+    contacts: Rows,
+    steps: int,
+    period: int | None = None,
     **more: Any,
 ) -> Experiment:
     """An experiment with its run id: a slug and 8 hex digits of all it depends on.
@@ -130,46 +121,26 @@ def experiment(
     test : Test
     slug : sequence of str
         The readable part of the run id, after the name.
-    series : str
-        The materials that meet, for readers.
-    vary : str
-        What differs from contact to contact.
-    steps_per_contact : int
+    types, pairs, bodies
+        As `collide_case` has them; the first body sets the Rayleigh time.
     contacts : sequence of (int, int or str, float)
         Particle, partner and the value that is varied.
-    timestep_s : float
-    steps : int
-    types, bodies, pairs
-        As `Experiment` has them; the first body sets the Rayleigh time.
+    steps, period : int
     **more
-        Further fields of `Experiment`, and ``impacts`` or ``angle_deg`` of `ExperimentFacts`.
+        Further fields of `CollideCase`.
     """
-    facts = ExperimentFacts(
-        test=name,
-        number=test.number,
-        heading=test.title,
-        series=series,
-        vary=vary,
-        steps_per_contact=steps_per_contact,
-        contacts=[ContactFacts(particle=a, partner=b, value=v) for a, b, v in contacts],
-        **{key: more.pop(key) for key in ("impacts", "angle_deg") if key in more},
-    )
-    unnamed = Experiment(
-        **{"title": test.title, "limit_force": True, "walls": (), **more},
-        group=_GROUP,
-        run="",
-        types=types,
-        bodies=bodies,
-        pairs=pairs,
-        timestep_s=timestep_s,
-        rayleigh_time_s=mechanics.rayleigh_time(types[0][1], bodies[0].radius_m),
-        steps=steps,
-        facts=facts,
-    )
-    case = collide_scene(unnamed).case
+    given = {
+        "title": test.title,
+        "test": name,
+        "number": test.number,
+        "heading": test.title,
+        "contacts": [ContactFacts(particle=a, partner=b, value=v) for a, b, v in contacts],
+        "rayleigh_time_s": mechanics.rayleigh_time(types[0][1], bodies[0].radius_m),
+    }
+    case = collide_case(types, pairs, bodies, study=_GROUP, run="", **{**given, **more})
     content = case.model_dump(mode="json", by_alias=True, exclude={"title", "heading", "versions"})
-    run = "-".join([name, *slug, digest({**content, "steps": unnamed.steps})])
-    return replace(unnamed, run=run)
+    run = "-".join([name, *slug, digest({**content, "steps": steps})])
+    return Experiment(case.model_copy(update={"run": run}), steps, period)
 
 
 def contact_time(

@@ -57,7 +57,7 @@ def suite_of(study: Study) -> Mapping[str, Experiment]:
     file = suite_file()
     lab = file.lab(study)
     every = (one for name, test in file.tests().items() for one in test.experiments(name, lab))
-    return {experiment.run: experiment for experiment in every}
+    return {experiment.case.run: experiment for experiment in every}
 
 
 def render_suite(study: str, fidelity: str | None) -> None:
@@ -66,5 +66,5 @@ def render_suite(study: str, fidelity: str | None) -> None:
     case = project.cases(study, fidelity)[0]
     templates = environment(project.templates, study_templates(case))
     for run, experiment in suite_of(case.study).items():
-        folder = project.root / run_path(experiment.group, "collide", run)
+        folder = project.root / run_path(experiment.case.study, "collide", run)
         write_run(collide_scene(experiment), folder, templates)

@@ -26,13 +26,13 @@ def experiments(case: Case) -> dict[str, Experiment]:
 
 
 def of_test(experiments: dict[str, Experiment], name: str) -> list[Experiment]:
-    return [found for found in experiments.values() if found.facts.test == name]
+    return [found for found in experiments.values() if found.case.test == name]
 
 
 def test_the_eight_published_tests_and_five_more_are_there(
     experiments: dict[str, Experiment],
 ) -> None:
-    assert {found.facts.number for found in experiments.values()} == set(range(1, 14))
+    assert {found.case.number for found in experiments.values()} == set(range(1, 14))
 
 
 def test_every_experiment_is_a_deck(experiments: dict[str, Experiment], project: Project) -> None:
@@ -41,9 +41,9 @@ def test_every_experiment_is_a_deck(experiments: dict[str, Experiment], project:
         scene = collide_scene(experiment)
         text = deck_text(scene, templates)
         assert f"\nrun {experiment.steps}\n" in text
-        assert text.count("wall/gran") == len(experiment.walls)
+        assert text.count("wall/gran") == len(experiment.case.walls)
         limited = text.count("limitForce on")
-        assert limited == (1 + len(experiment.walls) if experiment.limit_force else 0)
+        assert limited == (1 + len(experiment.case.walls) if experiment.case.limit_force else 0)
         last = next(out.last_step for out in scene.deck.outputs if out.name == "bodies")
         assert last is not None
         assert experiment.steps - scene.deck.outputs[1].period_steps < last <= experiment.steps
@@ -65,24 +65,24 @@ def test_no_two_particles_touch_at_the_start_but_in_the_column(
     experiments: dict[str, Experiment],
 ) -> None:
     for experiment in experiments.values():
-        if experiment.facts.test == "column":
+        if experiment.case.test == "column":
             continue
-        for one, other in itertools.combinations(experiment.bodies, 2):
+        for one, other in itertools.combinations(experiment.case.bodies, 2):
             apart = math.dist(one.position_m, other.position_m)
             assert apart > one.radius_m + other.radius_m
 
 
 def test_every_impact_begins_within_the_same_step(experiments: dict[str, Experiment]) -> None:
     for experiment in of_test(experiments, "oblique_angle"):
-        for body in experiment.bodies:
+        for body in experiment.case.bodies:
             gap = body.position_m[2] - body.radius_m
-            steps = gap / -body.velocity_m_s[2] / experiment.timestep_s
+            steps = gap / -body.velocity_m_s[2] / experiment.case.timestep_s
             assert steps == pytest.approx(10.4, rel=1e-6)
 
 
 def test_the_angle_leaves_the_speed_alone(experiments: dict[str, Experiment]) -> None:
     for experiment in of_test(experiments, "oblique_angle"):
-        for body, entry in zip(experiment.bodies, experiment.facts.contacts, strict=True):
+        for body, entry in zip(experiment.case.bodies, experiment.case.contacts, strict=True):
             assert math.hypot(*body.velocity_m_s) == pytest.approx(3.9)
             tangent = body.velocity_m_s[0] / -body.velocity_m_s[2]
             assert tangent == pytest.approx(math.tan(math.radians(entry.value)))
@@ -90,14 +90,16 @@ def test_the_angle_leaves_the_speed_alone(experiments: dict[str, Experiment]) ->
 
 def test_opposite_spins_roll_on_each_other(experiments: dict[str, Experiment]) -> None:
     for experiment in of_test(experiments, "spin_pair"):
-        for one, other in zip(experiment.bodies[::2], experiment.bodies[1::2], strict=True):
+        for one, other in zip(
+            experiment.case.bodies[::2], experiment.case.bodies[1::2], strict=True
+        ):
             assert one.spin_rad_s[1] == -other.spin_rad_s[1] != 0.0
 
 
 def test_each_restitution_is_a_type_of_its_own(experiments: dict[str, Experiment]) -> None:
     experiment = of_test(experiments, "restitution")[0]
-    values = [entry.value for entry in experiment.facts.contacts]
-    size = len(experiment.types)
+    values = [entry.value for entry in experiment.case.contacts]
+    size = len(experiment.case.types)
     table = next(
         table.values
         for table in collide_scene(experiment).deck.materials.law.tables
@@ -132,8 +134,8 @@ def test_no_particle_of_the_suite_can_leave_its_box(experiments: dict[str, Exper
             for line in text.splitlines()
             if line.endswith("hi")
         }
-        seconds = experiment.steps * experiment.timestep_s
-        for body in experiment.bodies:
+        seconds = experiment.steps * experiment.case.timestep_s
+        for body in experiment.case.bodies:
             way = abs(body.velocity_m_s[0]) * seconds
             low, high = bounds["x"]
             assert low < body.position_m[0] - way - body.radius_m
