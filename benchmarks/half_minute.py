@@ -49,7 +49,7 @@ def call(checkout: Path, tolerance: float) -> Call:
     file.parent.mkdir(exist_ok=True)
     file.write_text(asked)
     shutil.rmtree(results, ignore_errors=True)
-    paths = os.pathsep.join([str(checkout / "workflow"), str(checkout / "analysis")])
+    paths = os.pathsep.join([str(checkout / "workflow"), str(checkout / "analysis"), str(checkout)])
     words = [sys.executable, "-m", "snakemake", "all", "--config", f"study={NAME}"]
     before, start, first = _children_s(), time.perf_counter(), 0.0
     environment = {

@@ -16,7 +16,7 @@ from typing import Any
 import pandas as pd
 import pytest
 import yaml
-from paths import ROOT, SMALL_STUDY
+from paths import PROJECT, ROOT, SMALL_STUDY
 from snakemake_calls import snakemake
 
 pytestmark = pytest.mark.slurm
@@ -56,7 +56,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 
 
 def copy_of_project(folder: Path) -> Path:
-    for name in ("workflow", "analysis", "meshes", "profiles", "templates", "Snakefile"):
+    for name in PROJECT:
         (folder / name).symlink_to(ROOT / name)
     (folder / "studies/small").mkdir(parents=True)
     (folder / "studies/small/study.yaml").write_text(SMALL_STUDY.read_text())

@@ -130,15 +130,6 @@ STEPS = (
     Command("validate", "compare the runs of a study with its source",
             "validation.report:write_validation",
             (OUT_DIR, RUN_DIRS, _argument("--command", required=True, help="for the record"))),
-    Command("stability", "write the report on a stability map",
-            "stability.report:write_stability", (
-        OUT_DIR,
-        _argument("lists", type=Path, nargs="+", metavar="POINTS", help="lists of points"))),
-    Command("verify", "check the runs of the verification suite",
-            "verification.report:write_verification",
-            (OUT_DIR, RUN_DIRS)),
-    Command("verdict", "fail if a quantity of the suite failed", "verification.report:verdict", (
-        _argument("report_dir", type=Path, metavar="DIR", help="folder written by `verify`"),)),
     Command("record", "find the impacts of a measured drop test",
             "calibration.results:write_record", (
         RECORD,

@@ -10,7 +10,7 @@ from paths import ROOT
 
 def snakemake(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     words = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
-    paths = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis")])
+    paths = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis"), str(ROOT)])
     scripts = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = {**os.environ, "PYTHONPATH": paths, "PATH": scripts}
     environment.pop("DISPLAY", None)

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A copy of the project whose package holds a trade."""
-    for name in ("analysis", "meshes", "profiles", "templates", "Snakefile"):
+    for name in ("analysis", "evidence", "meshes", "profiles", "templates", "Snakefile"):
         (tmp_path / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "workflow", tmp_path / "workflow")
     (tmp_path / "studies/small").mkdir(parents=True)
@@ -38,7 +38,7 @@ def planned(folder: Path, fidelity: Any) -> list[str]:
     file.write_text(
         yaml.safe_dump(yaml.safe_load(SMALL_STUDY.read_text()) | {"fidelity": fidelity})
     )
-    paths = os.pathsep.join([str(folder / "workflow"), str(ROOT / "analysis")])
+    paths = os.pathsep.join([str(folder / "workflow"), str(ROOT / "analysis"), str(ROOT)])
     words = [sys.executable, "-m", "snakemake", "--dry-run", "--cores", "1", "all", "--config"]
     shown = subprocess.run(
         [*words, "study=small", "plan=long"],

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 import yaml
-from paths import ROOT, SMALL_STUDY
+from paths import PROJECT, ROOT, SMALL_STUDY
 from snakemake_calls import jobs, snakemake
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
@@ -18,7 +18,7 @@ SCALING = ("scaling", "--config", "study=small")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the project with a small study of four depths."""
     folder = tmp_path_factory.mktemp("scaling")
-    for name in ("workflow", "analysis", "meshes", "profiles", "templates", "Snakefile"):
+    for name in PROJECT:
         (folder / name).symlink_to(ROOT / name)
     data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
     data["sweep"] = {"motion.immersion_depth_m": [0.008, 0.012, 0.016, 0.020]}

@@ -37,7 +37,7 @@ dump total_forces all custom {{ deck.thermo_steps }} total_forces.${part}.dump i
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the project in which the small study was run."""
     folder = tmp_path_factory.mktemp("project")
-    for name in ("workflow", "analysis", "meshes", "profiles", "Snakefile"):
+    for name in ("workflow", "analysis", "evidence", "meshes", "profiles", "Snakefile"):
         (folder / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "templates", folder / "templates")
     data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())

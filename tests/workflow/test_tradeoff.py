@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 from pages import stands_alone
-from paths import ROOT, SMALL_STUDY
+from paths import PROJECT, ROOT, SMALL_STUDY
 from snakemake_calls import jobs, snakemake
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
@@ -36,7 +36,7 @@ TRADEOFF = ("tradeoff", "--config", "study=small", "plan=plan.yaml")
 def traded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the project in which the plan was run on the small study."""
     folder = tmp_path_factory.mktemp("tradeoff")
-    for name in ("workflow", "analysis", "meshes", "profiles", "templates", "Snakefile"):
+    for name in PROJECT:
         (folder / name).symlink_to(ROOT / name)
     (folder / "studies/small").mkdir(parents=True)
     (folder / "studies/small/study.yaml").write_text(SMALL_STUDY.read_text())

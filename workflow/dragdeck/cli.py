@@ -79,8 +79,6 @@ STEPS = (
         _argument("run", help="run id, as `dragdeck cases` lists it"),
         _argument("--packing", type=Path, help="packing.json of the settled bed (process)"))),
     Command("fields", "print the fields of a study file as a page", "study.field_page:show", ()),
-    Command("verify", "write the input scripts of the verification suite",
-            "campaigns.verification.suite:render_suite", (STUDY, FIDELITY)),
     Command("drops", "run the drop tests that a calibration needs",
             "campaigns.restitution_drops:drops_command", (
                 STUDY, FIDELITY, OUT_DIR,
@@ -88,10 +86,6 @@ STEPS = (
                 _argument("--fit", type=Path, help="result.json of the fit (confirm)"),
                 _argument("--count", type=int, default=10, help="number of trials (trials)"),
                 _argument("--seed", type=int, default=1, help="seed of the trials (trials)"))),
-    Command("stability", "run one regime of the stability map",
-            "campaigns.stability_map:stability_command", (
-                _argument("regime", help="impact, settle, beds, column or drag"),
-                _argument("--map", type=Path, required=True, dest="points", help="map.yaml"))),
 )  # fmt: skip
 """What the rules call: ``dragdeck step NAME``."""
 

@@ -111,10 +111,6 @@ class Project:
         place = POINTS if of_plan and scene.needs_bed else scene.name
         return self.root / run_path(case.study_name, place, scene.run_id(case))
 
-    def experiment_folder(self, group: str, run: str) -> Path:
-        """The folder of a run of the `collide` scene, which belongs to no case of a study."""
-        return self.root / run_path(group, "collide", run)
-
 
 def find_project(start: Path) -> Project:
     """The project that a folder belongs to: the nearest with templates/ and studies/.

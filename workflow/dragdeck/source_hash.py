@@ -12,9 +12,12 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
+_PACKAGES = ("dragdeck", "dragchain", "evidence")
+"""The packages of this project."""
+
 
 def source_hash(*modules: str) -> str:
-    """Hash of the given modules and all they import from their own packages.
+    """Hash of the given modules and all they import from this project.
 
     Parameters
     ----------
@@ -33,7 +36,7 @@ def source_hash(*modules: str) -> str:
 
 
 def source_files(*modules: str) -> dict[str, Path]:
-    """The files of the given modules and of all they import from their own packages."""
+    """The files of the given modules and of all they import from this project."""
     found: dict[str, Path] = {}
     waiting = list(modules)
     while waiting:
@@ -60,7 +63,8 @@ def _file(name: str) -> Path | None:
 
 @cache
 def _imports(file: Path, package: str) -> tuple[str, ...]:
-    return tuple(name for name in _imported(file) if name.partition(".")[0] == package)
+    own = {package, *_PACKAGES}
+    return tuple(name for name in _imported(file) if name.partition(".")[0] in own)
 
 
 def _imported(file: Path) -> Iterator[str]:

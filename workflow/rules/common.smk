@@ -7,8 +7,6 @@ from shlex import quote
 from snakemake.exceptions import WorkflowError
 
 from dragdeck.campaigns.restitution_drops import record_file
-from dragdeck.campaigns.stability_map import bed_names
-from dragdeck.campaigns.verification.suite import suite_of
 from dragdeck.decks.templates import environment, template_files
 from dragdeck.errors import DragdeckError, choices
 from dragdeck.outlook.timestep import largest_of_case
@@ -26,6 +24,8 @@ from dragdeck.snakemake_lock import clear_stale_locks
 from dragdeck.source_hash import source_hash
 from dragdeck.study.base import NAME, NAME_LIMIT
 from dragdeck.study.yaml import warnings
+from evidence.stability.map import bed_names
+from evidence.verification.suite import suite_of
 
 clear_stale_locks(Path(".snakemake"), say)
 
@@ -126,10 +126,11 @@ def templates_of(scene):
     return [str(relative(file)) for file in explained(template_files, templates, scene)]
 
 
-def page_templates(*names):
+def page_templates(*names, package="analysis/dragchain"):
     """The templates of a page, with those that all pages are made of."""
-    folder = PROJECT.root / "analysis/dragchain"
-    return [str(folder / name) for name in (*names, "report/page.html.j2", "report/macros.html.j2")]
+    shared = PROJECT.root / "analysis/dragchain/report"
+    own = [PROJECT.root / package / name for name in names]
+    return [str(file) for file in (*own, shared / "page.html.j2", shared / "macros.html.j2")]
 
 
 # --- cases and runs ------------------------------------------------------------------

@@ -25,9 +25,9 @@ rule settle_beds:
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragdeck.campaigns.stability_map"),
+        source=source_hash("evidence.stability.map_runs"),
     shell:
-        "dragdeck step stability beds --map {input.points:q} 2>&1 | tee -i {log}"
+        "python -m evidence run-map beds --map {input.points:q} 2>&1 | tee -i {log}"
 
 
 rule run_regime:
@@ -47,9 +47,9 @@ rule run_regime:
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragdeck.campaigns.stability_map"),
+        source=source_hash("evidence.stability.map_runs"),
     shell:
-        "dragdeck step stability {wildcards.regime} --map {input.points:q} 2>&1 | tee -i {log}"
+        "python -m evidence run-map {wildcards.regime} --map {input.points:q} 2>&1 | tee -i {log}"
 
 
 rule write_stability:
@@ -58,7 +58,7 @@ rule write_stability:
             "results/stability/points/{regime}.json",
             regime=["impact", "settle", "column", "drag"],
         ),
-        templates=page_templates("stability/stability.html.j2"),
+        templates=page_templates("stability/stability.html.j2", package="evidence"),
     output:
         page=report(
             "results/stability/report.html",
@@ -76,6 +76,6 @@ rule write_stability:
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragchain.stability.report"),
+        source=source_hash("evidence.stability.report"),
     shell:
-        "dragchain step stability --out $(dirname {output.page}) {input.lists} > {log} 2>&1"
+        "python -m evidence report-map --out $(dirname {output.page}) {input.lists} > {log} 2>&1"

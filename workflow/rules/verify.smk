@@ -6,7 +6,7 @@ VERIFICATION_RUNS = list(suite_of(CASES[0].study))
 rule render_verification:
     input:
         templates_of("collide"),
-        suite="workflow/dragdeck/campaigns/verification/suite.yaml",
+        suite="evidence/verification/suite.yaml",
     output:
         [
             of_experiment(run, file)
@@ -22,9 +22,9 @@ rule render_verification:
     params:
         study=STUDY,
         fidelity=fidelity_option,
-        source=source_hash("dragdeck.campaigns.verification.suite", "dragdeck.decks.render"),
+        source=source_hash("evidence.verification.suite"),
     shell:
-        "dragdeck step verify {params.study} {params.fidelity} > {log} 2>&1"
+        "python -m evidence render-suite {params.study} {params.fidelity} > {log} 2>&1"
 
 
 rule run_verification:
@@ -50,8 +50,10 @@ rule run_verification:
 rule judge_verification:
     input:
         [of_experiment(run, "run.json") for run in VERIFICATION_RUNS],
-        templates=page_templates("verification/verification.html.j2", "verification/tests.html.j2"),
-        published="analysis/dragchain/verification/published.csv",
+        templates=page_templates(
+            "verification/verification.html.j2", "verification/tests.html.j2", package="evidence"
+        ),
+        published="evidence/verification/published.csv",
     output:
         multiext(
             "results/verification/report/",
@@ -74,9 +76,9 @@ rule judge_verification:
         "../envs/python.yaml"
     params:
         runs=[of_experiment(run, "") for run in VERIFICATION_RUNS],
-        source=source_hash("dragchain.verification.report"),
+        source=source_hash("evidence.verification.report"),
     shell:
-        "dragchain step verify --out $(dirname {output.page}) {params.runs} > {log} 2>&1"
+        "python -m evidence judge-suite --out $(dirname {output.page}) {params.runs} > {log} 2>&1"
 
 
 # Fails if a quantity failed, and leaves the report to look at.
@@ -92,6 +94,6 @@ rule pass_verdict:
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragchain.verification.report"),
+        source=source_hash("evidence.verification.report"),
     shell:
-        "dragchain step verdict $(dirname {input}) > {output} 2> {log}"
+        "python -m evidence verdict $(dirname {input}) > {output} 2> {log}"

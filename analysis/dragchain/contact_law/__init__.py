@@ -1,1 +1,1 @@
-"""The Hertz-Mindlin contact law as exact formulae."""
+"""The Hertz-Mindlin contact law: Hertz contacts and the Coulomb limit."""

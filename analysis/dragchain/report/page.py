@@ -24,26 +24,34 @@ _HEADING = re.compile(r'<h2 id="([^"]+)">(.*?)</h2>')
 Filters = Mapping[str, Callable[..., object]]
 
 
-def render_page(template: str, filters: Filters | None = None, **content: object) -> str:
+def render_page(
+    template: str, filters: Filters | None = None, package: str = "dragchain", /, **content: object
+) -> str:
     """A page as text.
 
     Parameters
     ----------
     template : str
-        Path below the package, for example ``validation/validation.html.j2``.
+        Path below this package or the given one, for example ``validation/validation.html.j2``.
     filters : mapping, optional
         Filters of this page alone, by name.
+    package : str
+        The package that the template is in.
     **content
         What the template shows. A name that it uses and that is not given is an error.
     """
-    page = page_environment(filters).get_template(template).render(**content)
+    page = page_environment(filters, package).get_template(template).render(**content)
     return page.replace(" %", "\N{NO-BREAK SPACE}%")
 
 
-def page_environment(filters: Filters | None = None) -> jinja2.Environment:
+def page_environment(
+    filters: Filters | None = None, package: str = "dragchain"
+) -> jinja2.Environment:
     """The environment of all pages, with further filters if need be."""
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("dragchain", ""),
+        loader=jinja2.ChoiceLoader(
+            [jinja2.PackageLoader(name, "") for name in ("dragchain", package)]
+        ),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,

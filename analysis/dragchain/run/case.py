@@ -10,7 +10,7 @@ from pydantic import Field, JsonValue, PositiveFloat, PositiveInt, model_validat
 from dragchain.documents import Document, Part
 from dragchain.errors import TableError
 
-Scene = Literal["drop_test", "filling", "process", "impact", "column"]
+Scene = Literal["drop_test", "filling", "process"]
 OutputKind = Literal["print", "custom", "local"]
 
 
@@ -110,25 +110,6 @@ class SettlingCriterion(Part):
     energy_ratio: PositiveFloat
 
 
-class Impacts(Part):
-    """How the bodies of a scene of single impacts meet; the contact time is Hertz's."""
-
-    speed_m_s: PositiveFloat
-    normal_speed_m_s: PositiveFloat
-    size_ratio: float
-    effective_radius_m: PositiveFloat
-    effective_mass_kg: PositiveFloat
-    effective_modulus_pa: PositiveFloat
-    contact_time_s: PositiveFloat
-
-
-class LoadedPacking(Part):
-    """Particles at rest under gravity times a factor."""
-
-    packing: Literal["stack", "bed"]
-    load_factor: PositiveFloat
-
-
 class AdvisedSettings(Part):
     """The tolerance that a run's settings were chosen for, and what is expected of them.
 
@@ -177,8 +158,7 @@ class Case(Document):
     """The content of ``case.json`` of a run of a study.
 
     ``case``, ``workpiece``, ``motion``, ``surface_m`` and ``statistics`` are None outside a
-    process; ``restitution`` is None outside a drop test, ``settled`` outside a filling,
-    ``impact`` outside single impacts and ``column`` outside particles at rest under load.
+    process; ``restitution`` is None outside a drop test, ``settled`` outside a filling.
     ``contact_moduli`` are those of a particle with a ``particle``, the ``bowl`` and the
     ``workpiece``; ``numbers`` are the dimensionless numbers of a process; ``asked`` is the
     tolerance that its settings were chosen for, if any.
@@ -207,8 +187,6 @@ class Case(Document):
     statistics: Statistics | None = None
     restitution: float | None = None
     settled: SettlingCriterion | None = None
-    impact: Impacts | None = None
-    column: LoadedPacking | None = None
     assumptions: tuple[Assumption, ...]
     reference: Reference | None = None
     versions: Mapping[str, str]
@@ -220,8 +198,6 @@ class Case(Document):
             "drop_test": ("restitution",),
             "filling": ("bowl",),
             "process": ("bowl", "case", "workpiece", "motion", "surface_m", "statistics"),
-            "impact": ("impact",),
-            "column": ("bowl", "column"),
         }
         for name in needed[self.scene]:
             assert getattr(self, name) is not None, f"{name} is missing, which a {self.scene} has"

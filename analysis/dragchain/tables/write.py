@@ -361,7 +361,5 @@ _TABLES: Mapping[Scene, tuple[Table, ...]] = {
         _PARTICLES,
         Table("contacts.parquet", ("contacts", "particles", *_ON_WORKPIECE), _write_contacts),
     ),
-    "impact": (_THERMO,),
-    "column": (_THERMO,),
 }
 """What is made of a run of each scene, in this order."""

@@ -11,6 +11,7 @@ from pages import stands_alone
 from PIL import Image
 
 import dragchain
+import evidence
 from dragchain.report.page import (
     LARGE_PICTURE,
     data_uri,
@@ -21,8 +22,12 @@ from dragchain.report.page import (
 )
 from dragchain.tradeoff.notation import FILTERS
 
-FOLDER = Path(dragchain.__file__).parent
-TEMPLATES = sorted(file.relative_to(FOLDER).as_posix() for file in FOLDER.rglob("*.html.j2"))
+FOLDERS = [Path(package.__path__[0]) for package in (dragchain, evidence)]
+TEMPLATES = {
+    file.relative_to(folder).as_posix(): file
+    for folder in FOLDERS
+    for file in sorted(folder.rglob("*.html.j2"))
+}
 PAGES = [
     "calibration/calibration.html.j2", "report/report.html.j2", "stability/stability.html.j2",
     "tradeoff/tradeoff.html.j2",
@@ -83,16 +88,16 @@ def test_a_page_that_leaves_out_a_block_is_refused(block: str) -> None:
 
 @pytest.mark.parametrize("name", PAGES)
 def test_every_page_packings_the_frame(name: str) -> None:
-    environment = page_environment({**FILTERS, "quantity": str, "setting": str})
+    environment = page_environment({**FILTERS, "quantity": str, "setting": str}, "evidence")
     template = environment.get_template(name)
     assert {"title", "lead", "says", "body"} <= set(template.blocks)
-    source = (FOLDER / name).read_text(encoding="utf-8")
+    source = TEMPLATES[name].read_text(encoding="utf-8")
     assert source.startswith('{% extends "report/page.html.j2" %}')
 
 
-@pytest.mark.parametrize("name", sorted({*TEMPLATES} - {"report/page.html.j2"}))
+@pytest.mark.parametrize("name", [name for name in TEMPLATES if name != "report/page.html.j2"])
 def test_one_style_sheet_is_enough(name: str) -> None:
-    source = (FOLDER / name).read_text(encoding="utf-8")
+    source = TEMPLATES[name].read_text(encoding="utf-8")
     for word in ("<style", "<script", "<link", "<html", "http://", "https://"):
         assert word not in source
 

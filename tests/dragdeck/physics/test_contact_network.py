@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from dragchain.network.critical_timestep import hertz_stiffness, largest_frequency
 from dragdeck.physics.contact_network import ContactConstants, Floats, stability_number
+from evidence.stability.critical_timestep import hertz_stiffness, largest_frequency
 
 RADIUS, DENSITY, BOWL, OVERLAP = 3e-3, 2500.0, 0.05, 1e-5
 MASS = 4 / 3 * math.pi * RADIUS**3 * DENSITY

@@ -15,13 +15,13 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.log import read_samples
 from dragdeck.engine.run_folder import run
 from dragdeck.project import Project
-from dragdeck.scenes.collide import Body, Experiment, ExperimentFacts, Wall, collide_scene
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.registry import SCENES
 from dragdeck.study.contact_law import Pair, coefficients, contact_model, contact_settings
 from dragdeck.study.material import Material
 from dragdeck.sweep.cases import load_cases
+from evidence.verification.collide import Body, Experiment, Wall, collide_case, collide_scene
 
 OPTIONAL = [name for name, row in coefficients().items() if row.model]
 USED = 0.1
@@ -102,35 +102,21 @@ def test_a_rolling_particle_slows_down_by_five_sevenths_of_the_coefficient(
     mu, radius, speed, gravity, step = 0.02, 0.003, 0.1, 9.81, 1e-6
     steel = Material(youngs_modulus_pa=1e8, poissons_ratio=0.3, density_kg_m3=7800)
     pair = Pair(restitution=0.5, friction=0.5, rolling_friction=mu)
-    scene = collide_scene(
-        Experiment(
-            group="rolling",
-            run="rolling",
-            title="A rolling particle",
-            types=[("particle", steel), ("plane", steel)],
-            pairs={(1, 2): pair},
-            bodies=[
-                Body(
-                    type=1,
-                    radius_m=radius,
-                    position_m=(0, 0, radius),
-                    velocity_m_s=(speed, 0, 0),
-                    spin_rad_s=(0, speed / radius, 0),
-                )
-            ],
-            walls=[Wall("floor", 2, "zplane 0.0")],
-            limit_force=True,
-            timestep_s=step,
-            rayleigh_time_s=20 * step,
-            steps=200_000,
-            gravity_m_s2=(0, 0, -gravity),
-            period=20_000,
-            facts=ExperimentFacts(
-                test="rolling", number=1, heading="", series="", vary="", steps_per_contact=1,
-                contacts=[],
-            ),
-        )
+    turning = Body(
+        type=1,
+        radius_m=radius,
+        position_m=(0, 0, radius),
+        velocity_m_s=(speed, 0, 0),
+        spin_rad_s=(0, speed / radius, 0),
+    )
+    rolling = collide_case(
+        [("particle", steel), ("plane", steel)], {(1, 2): pair}, [turning],
+        study="rolling", run="rolling", title="A rolling particle",
+        walls=[Wall("floor", 2, "zplane 0.0")], timestep_s=step, rayleigh_time_s=20 * step,
+        gravity_m_s2=(0, 0, -gravity), test="rolling", number=1, heading="", series="", vary="",
+        steps_per_contact=1, contacts=[],
     )  # fmt: skip
+    scene = collide_scene(Experiment(rolling, steps=200_000, period=20_000))
     folder = tmp_path / "rolling"
     write_run(scene, folder, environment(project.templates))
     run(folder, lambda line: None)

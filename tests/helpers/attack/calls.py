@@ -53,7 +53,7 @@ class Said:
 
 def environment() -> dict[str, str]:
     """Of a command: this project's packages, whatever is installed."""
-    paths = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis")])
+    paths = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis"), str(ROOT)])
     scripts = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     seen = {**os.environ, "PYTHONPATH": paths, "PATH": scripts, "PYTHONUNBUFFERED": "1"}
     seen.pop("DISPLAY", None)

@@ -61,7 +61,7 @@ def entry(folder: Path) -> Path:
     for name in ("run", "pyproject.toml", "constraints.txt"):
         shutil.copy2(ROOT / name, project / name)
     (project / ".venv/bin").mkdir(parents=True)
-    paths = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis")])
+    paths = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis"), str(ROOT)])
     for name, words in _TOOLS.items():
         tool = project / ".venv/bin" / name
         command = words.format(python=sys.executable)

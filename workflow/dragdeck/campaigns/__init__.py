@@ -1,1 +1,1 @@
-"""Sets of many small runs: verification, stability map, calibration, costs."""
+"""Sets of many small runs: calibration, speed of this machine."""

@@ -1,0 +1,185 @@
+"""The verification suite: what it asks the engine for."""
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from dragdeck.cases.case import Case
+from dragdeck.decks.render import deck_text
+from dragdeck.decks.templates import environment
+from dragdeck.project import Project
+from dragdeck.study.model import Study
+from evidence.__main__ import main
+from evidence.verification.collide import Experiment, collide_scene, frame_period
+from evidence.verification.impacts import Impacts
+from evidence.verification.lab import contact_time
+from evidence.verification.suite import suite_file, suite_of
+
+
+@pytest.fixture
+def experiments(case: Case) -> dict[str, Experiment]:
+    return dict(suite_of(case.study))
+
+
+def of_test(experiments: dict[str, Experiment], name: str) -> list[Experiment]:
+    return [found for found in experiments.values() if found.case.test == name]
+
+
+def test_the_eight_published_tests_and_five_more_are_there(
+    experiments: dict[str, Experiment],
+) -> None:
+    assert {found.case.number for found in experiments.values()} == set(range(1, 14))
+
+
+def test_every_experiment_is_a_deck(experiments: dict[str, Experiment], project: Project) -> None:
+    templates = environment(project.templates)
+    for experiment in experiments.values():
+        scene = collide_scene(experiment)
+        text = deck_text(scene, templates)
+        assert f"\nrun {experiment.steps}\n" in text
+        assert text.count("wall/gran") == len(experiment.case.walls)
+        limited = text.count("limitForce on")
+        assert limited == (1 + len(experiment.case.walls) if experiment.case.limit_force else 0)
+        last = next(out.last_step for out in scene.deck.outputs if out.name == "bodies")
+        assert last is not None
+        assert experiment.steps - scene.deck.outputs[1].period_steps < last <= experiment.steps
+
+
+def test_the_suite_is_always_the_same(case: Case) -> None:
+    assert list(suite_of(case.study)) == list(suite_of(case.study))
+
+
+def test_a_study_changes_its_own_series_and_no_other(case: Case) -> None:
+    data: dict[str, Any] = case.study.model_dump()
+    data["pairs"]["ceramic-steel"]["restitution"] = 0.5
+    before, after = (set(suite_of(study)) for study in (case.study, Study.model_validate(data)))
+    changed = {run.partition("-")[0] for run in before - after}
+    assert changed == {"oblique_study", "time_step", "column"}
+
+
+def test_no_two_particles_touch_at_the_start_but_in_the_column(
+    experiments: dict[str, Experiment],
+) -> None:
+    for experiment in experiments.values():
+        if experiment.case.test == "column":
+            continue
+        for one, other in itertools.combinations(experiment.case.bodies, 2):
+            apart = math.dist(one.position_m, other.position_m)
+            assert apart > one.radius_m + other.radius_m
+
+
+def test_every_impact_begins_within_the_same_step(experiments: dict[str, Experiment]) -> None:
+    for experiment in of_test(experiments, "oblique_angle"):
+        for body in experiment.case.bodies:
+            gap = body.position_m[2] - body.radius_m
+            steps = gap / -body.velocity_m_s[2] / experiment.case.timestep_s
+            assert steps == pytest.approx(10.4, rel=1e-6)
+
+
+def test_the_angle_leaves_the_speed_alone(experiments: dict[str, Experiment]) -> None:
+    for experiment in of_test(experiments, "oblique_angle"):
+        for body, entry in zip(experiment.case.bodies, experiment.case.contacts, strict=True):
+            assert math.hypot(*body.velocity_m_s) == pytest.approx(3.9)
+            tangent = body.velocity_m_s[0] / -body.velocity_m_s[2]
+            assert tangent == pytest.approx(math.tan(math.radians(entry.value)))
+
+
+def test_opposite_spins_roll_on_each_other(experiments: dict[str, Experiment]) -> None:
+    for experiment in of_test(experiments, "spin_pair"):
+        for one, other in zip(
+            experiment.case.bodies[::2], experiment.case.bodies[1::2], strict=True
+        ):
+            assert one.spin_rad_s[1] == -other.spin_rad_s[1] != 0.0
+
+
+def test_each_restitution_is_a_type_of_its_own(experiments: dict[str, Experiment]) -> None:
+    experiment = of_test(experiments, "restitution")[0]
+    values = [entry.value for entry in experiment.case.contacts]
+    size = len(experiment.case.types)
+    table = next(
+        table.values
+        for table in collide_scene(experiment).deck.materials.law.tables
+        if table.name == "restitution"
+    )
+    assert [table[at * size + size - 1] for at in range(size - 1)] == values
+    assert np.allclose(np.reshape(table, (size, size)), np.reshape(table, (size, size)).T)
+
+
+def test_gravity_is_a_vector_that_hangs_down_by_default(
+    experiments: dict[str, Experiment], project: Project
+) -> None:
+    templates = environment(project.templates)
+    (incline,) = of_test(experiments, "incline")
+    line = next(
+        line
+        for line in deck_text(collide_scene(incline), templates).splitlines()
+        if line.startswith("fix gravity")
+    )
+    words = line.split()
+    assert float(words[4]) == pytest.approx(9.81)
+    assert [float(word) for word in words[6:]] == pytest.approx([0.5, 0.0, -math.sqrt(0.75)])
+    plain = deck_text(collide_scene(of_test(experiments, "spin_plane")[0]), templates)
+    assert "fix gravity all gravity 0.0 vector 0 0 -1\n" in plain
+
+
+def test_no_particle_of_the_suite_can_leave_its_box(experiments: dict[str, Experiment]) -> None:
+    for experiment in experiments.values():
+        text = collide_scene(experiment).files["bodies.data"]()
+        bounds = {
+            line.split()[2][0]: [float(word) for word in line.split()[:2]]
+            for line in text.splitlines()
+            if line.endswith("hi")
+        }
+        seconds = experiment.steps * experiment.case.timestep_s
+        for body in experiment.case.bodies:
+            way = abs(body.velocity_m_s[0]) * seconds
+            low, high = bounds["x"]
+            assert low < body.position_m[0] - way - body.radius_m
+            assert high > body.position_m[0] + way + body.radius_m
+
+
+def test_two_equal_particles_touch_shorter_than_one_on_its_like(case: Case) -> None:
+    steel = case.study.materials["steel"]
+    plane = contact_time(steel, 0.01, None, None, steel, 1.0)
+    pair = contact_time(steel, 0.01, steel, 0.01, steel, 1.0)
+    assert pair / plane == pytest.approx((0.5**2 / 0.5) ** 0.2)
+
+
+def test_few_particles_are_written_every_step_and_many_are_not() -> None:
+    assert frame_period(3000, 2) == 1
+    assert frame_period(3000, 20) == 3
+
+
+def test_a_rigid_partner_is_stiff(case: Case) -> None:
+    suite = suite_file()
+    test, lab = suite.impacts["elastic_plane"], suite.lab(case.study)
+    series = test.series[0]
+    name, material = test.partner_of(series, lab)
+    assert name == "rigid"
+    own = lab.material(series.material)
+    assert material.youngs_modulus_pa == pytest.approx(1e6 * own.youngs_modulus_pa)
+
+
+def test_a_test_varies_one_thing() -> None:
+    with pytest.raises(ValidationError, match="exactly one"):
+        Impacts.model_validate(
+            {"number": 1, "title": "t", "partner": "plane", "radius_m": 1, "speed_m_s": 1,
+             "vary": {"spin_m_s": [1], "angle_deg": [1]}, "series": []}
+        )  # fmt: skip
+
+
+def test_the_command_writes_every_deck(
+    case: Case, project: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(project.root)
+    assert main(["render-suite", "small"]) == 0
+    runs = list(suite_of(case.study))
+    for run in runs:
+        folder = project.results("verification") / "collide" / run
+        assert {file.name for file in folder.iterdir()} == {
+            "in.liggghts", "case.json", "columns.json", "bodies.data",
+        }  # fmt: skip
