@@ -169,7 +169,9 @@ def extrapolate(
     return Extrapolated(level, math.hypot(math.sqrt(covariance[0, 0]), law.model_std * reduced))
 
 
-def left_out(scenes: Sequence[ScaledRuns], plan: Mapping[float, int]) -> list[tuple[float, float]]:
+def left_out(
+    scenes: Sequence[ScaledRuns], plan: Mapping[float, int]
+) -> list[tuple[float, float, float]]:
     """Errors of the extrapolation in scenes that were left out of the fit.
 
     Parameters
@@ -180,8 +182,9 @@ def left_out(scenes: Sequence[ScaledRuns], plan: Mapping[float, int]) -> list[tu
 
     Returns
     -------
-    list of (float, float)
-        Extrapolated minus measured logarithm, and the standard error of that difference.
+    list of (float, float, float)
+        Extrapolated minus measured logarithm, the standard error of that difference, and the
+        difference without a correction, of the runs at the largest modulus.
     """
     found = []
     for one in scenes:
@@ -191,12 +194,14 @@ def left_out(scenes: Sequence[ScaledRuns], plan: Mapping[float, int]) -> list[tu
         chosen = np.concatenate(
             [np.flatnonzero(np.isclose(scale, level))[:count] for level, count in plan.items()]
         )
-        if len(stiff) < 2 or len(chosen) < sum(plan.values()):
+        if not len(stiff) or len(chosen) < sum(plan.values()):
             continue
         reduced = replace(one, numbers=one.numbers[chosen], logarithms=one.logarithms[chosen])
         guess = extrapolate(law, reduced)
-        error = guess.logarithm - float(stiff.mean())
-        found.append((error, math.hypot(guess.se, law.run_std / math.sqrt(len(stiff)))))
+        level = float(stiff.mean())
+        plain = float(reduced.logarithms[reduced.numbers == reduced.numbers.max()].mean())
+        se = math.hypot(guess.se, law.run_std / math.sqrt(len(stiff)))
+        found.append((guess.logarithm - level, se, plain - level))
     return found
 
 

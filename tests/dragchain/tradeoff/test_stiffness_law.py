@@ -60,7 +60,7 @@ def test_intervals_of_scenes_left_out_include_the_truth_as_often_as_they_say() -
     inside = [
         abs(error) <= 1.96 * se
         for seed in range(4)
-        for error, se in left_out(scenes(seed, count=10), {1e-3: 2, 1e-2: 2})
+        for error, se, _ in left_out(scenes(seed, count=10), {1e-3: 2, 1e-2: 2})
     ]
     assert len(inside) == 40
     assert sum(inside) >= 33  # fewer have a probability of 0.5 % if 95 % are meant
