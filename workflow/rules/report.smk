@@ -9,7 +9,7 @@ rule write_report:
             for name, scene in SCENES.items()
         ],
         [every(name, "tables/figures.json") for name in SCENES],
-        every("process", "tables/loading.json", "tables/extrapolated.json"),
+        every("process", "tables/loading.json"),
         advice=asked_advice("process"),
         templates=page_templates("report/report.html.j2"),
     output:
