@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dragchain.contact_law.hertz import sphere_mass
-from dragdeck.decks.case_file import CaseOfStudy, ContactModuli, MediaOfRun
+from dragdeck.decks.case_file import CaseOfStudy, MediaOfRun
+from dragdeck.physics.contact_network import ContactConstants
 from evidence.stability.contacts import (
     BOWL,
     PARTICLE,
@@ -31,9 +32,8 @@ def test_particles_that_touch_are_found_with_their_overlaps() -> None:
 def test_each_contact_has_the_moduli_of_its_partner(partner: int, modulus: float) -> None:
     """One particle on a plane without friction: the root of 2 E* sqrt(R d) / m."""
     moduli = {
-        "particle": ContactModuli(modulus_pa=7e9, shear_pa=1.0),
-        "bowl": ContactModuli(modulus_pa=1e9, shear_pa=1.0),
-        "workpiece": ContactModuli(modulus_pa=4e9, shear_pa=1.0),
+        name: ContactConstants(modulus_pa=own, shear_pa=1.0, restitution=0.9, friction=0.3)
+        for name, own in (("particle", 7e9), ("bowl", 1e9), ("workpiece", 4e9))
     }
     media = MediaOfRun(count=1, radius_mean_m=1e-3, radius_std_m=0.0, density_kg_m3=2500.0)
     case = CaseOfStudy.model_construct(contact_moduli=moduli, media=media)
