@@ -53,11 +53,12 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
         if measured == 0.0:
             continue
         run = ScaledRuns(
-            case.run,
-            full,
-            np.array([full * scale ** (2 / 3)]),
-            np.log(np.abs([measured])),
-            diameters,
+            scene=case.run,
+            stiffness_number=full,
+            inertial_number=case.numbers["inertial_number"],
+            numbers=np.array([full * scale ** (2 / 3)]),
+            logarithms=np.log(np.abs([measured])),
+            path_to_particle=diameters,
         )
         run_std = entry.law.run_std * math.sqrt(entry.path_to_particle / diameters)
         guess = extrapolate(entry.law, run, np.array([run_std]))

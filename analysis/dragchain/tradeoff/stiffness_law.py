@@ -5,8 +5,9 @@ The logarithm of a quantity Q follows the stiffness number kappa of the run::
     ln Q = ln Q_full + A (kappa^-b - kappa_full^-b)
 
 which is what Richardson's extrapolation assumes of a discretisation error, with a rate b that is
-measured. The amplitude A of a scene scatters about a common mean: A ~ N(alpha, tau^2). With that
-prior one run is corrected, and several are extrapolated, by one and the same estimator: the
+measured. The amplitude A of a scene grows with the inertial number I, since particles with reduced
+stiffness stay in contact for longer, and scatters about that: A ~ N(alpha + beta I, tau^2). With
+that prior one run is corrected, and several are extrapolated, by one and the same estimator: the
 best linear unbiased prediction of ln Q_full (Robinson 1991, Statistical Science 6, 15-32).
 """
 
@@ -24,6 +25,9 @@ from dragchain.tradeoff.six_digits import SixDigits
 UNIT = 1e4
 """Stiffness number at which kappa^-b is 1, so that amplitudes have a plain size."""
 
+UNIT_INERTIA = 0.1
+"""Unit of inertial numbers, so that slopes have a plain size."""
+
 _START = (math.log(0.3), math.log(0.1), math.log(0.05))
 """Logarithms of rate, tau and sigma to begin the search with."""
 
@@ -35,7 +39,7 @@ class ScaledRuns:
     Attributes
     ----------
     scene : str
-    stiffness_number : float
+    stiffness_number, inertial_number : float
         Of the scene at the physical Young's modulus.
     numbers : (N,) ndarray
         Stiffness number of each run.
@@ -47,6 +51,7 @@ class ScaledRuns:
 
     scene: str
     stiffness_number: float
+    inertial_number: float
     numbers: Floats
     logarithms: Floats
     path_to_particle: float
@@ -54,6 +59,11 @@ class ScaledRuns:
     def reduction(self, rate: float) -> Floats:
         """What the amplitude is multiplied with, (N,): 0 at the physical Young's modulus."""
         return _reduction(self.numbers, self.stiffness_number, rate)
+
+    @property
+    def of_amplitude(self) -> Floats:
+        """What alpha and beta are multiplied with, (2,)."""
+        return np.array([1.0, self.inertial_number / UNIT_INERTIA])
 
 
 @dataclass(frozen=True)
@@ -64,8 +74,10 @@ class StiffnessLaw:
     ----------
     rate : float
         Exponent b.
-    amplitude, amplitude_se : float
-        Mean amplitude alpha and its standard error.
+    amplitude, slope : float
+        Amplitude alpha of a quasi-static drag, and its slope beta over I / `UNIT_INERTIA`.
+    covariance : (float, float, float)
+        Variance of alpha, covariance, variance of beta.
     amplitude_std : float
         Standard deviation tau of the amplitude from scene to scene.
     run_std : float
@@ -76,10 +88,18 @@ class StiffnessLaw:
 
     rate: SixDigits
     amplitude: SixDigits
-    amplitude_se: SixDigits
+    slope: SixDigits
+    covariance: tuple[SixDigits, SixDigits, SixDigits]
     amplitude_std: SixDigits
     run_std: SixDigits
     model_std: SixDigits = 0.0
+
+    def prior(self, runs: ScaledRuns) -> tuple[float, float]:
+        """Mean and variance of the amplitude in a scene."""
+        one, inertia = runs.of_amplitude
+        variance, common, of_slope = self.covariance
+        error = variance + 2.0 * inertia * common + inertia**2 * of_slope
+        return self.amplitude * one + self.slope * inertia, self.amplitude_std**2 + error
 
 
 @dataclass(frozen=True)
@@ -96,11 +116,11 @@ def fit_stiffness_law(scenes: Sequence[ScaledRuns]) -> StiffnessLaw:
     Raises
     ------
     SeriesError
-        If there are fewer than three scenes, or none was run at two stiffness numbers.
+        If fewer than four scenes were run at two stiffness numbers.
     """
     useful = [one for one in scenes if len(set(one.numbers.tolist())) > 1]
-    if len(useful) < 3:
-        raise SeriesError("fewer than three scenes were run at two stiffness numbers")
+    if len(useful) < 4:
+        raise SeriesError("fewer than four scenes were run at two stiffness numbers")
 
     def against(point: Floats) -> float:
         return -_likelihood(useful, *np.exp(point))[0]
@@ -113,31 +133,34 @@ def fit_stiffness_law(scenes: Sequence[ScaledRuns]) -> StiffnessLaw:
         options={"xatol": 1e-4, "fatol": 1e-6, "maxiter": 4000},
     )
     rate, amplitude_std, run_std = np.exp(best.x).tolist()
-    _, amplitude, variance = _likelihood(useful, rate, amplitude_std, run_std)
-    return StiffnessLaw(rate, amplitude, math.sqrt(variance), amplitude_std, run_std)
+    _, (amplitude, slope), covariance = _likelihood(useful, rate, amplitude_std, run_std)
+    entries = (covariance[0, 0], covariance[0, 1], covariance[1, 1])
+    return StiffnessLaw(rate, amplitude, slope, entries, amplitude_std, run_std)
 
 
 def _likelihood(
     scenes: Iterable[ScaledRuns], rate: float, amplitude_std: float, run_std: float
-) -> tuple[float, float, float]:
-    """Logarithm of the likelihood, mean amplitude and its variance.
+) -> tuple[float, Floats, Floats]:
+    """Logarithm of the likelihood, alpha and beta, (2,), and their covariance, (2, 2).
 
-    The levels of the scenes are integrated out (restricted likelihood), the mean amplitude is
+    The levels of the scenes are integrated out (restricted likelihood), alpha and beta are
     estimated.
     """
-    weight = moment = square = constant = 0.0
+    weight, moment = np.zeros((2, 2)), np.zeros(2)
+    square = constant = 0.0
     for one in scenes:
         h, y, ones = one.reduction(rate), one.logarithms, np.ones(len(one.numbers))
         covariance = run_std**2 * np.eye(len(h)) + amplitude_std**2 * np.outer(h, h)
         inverse = np.linalg.inv(covariance)
         level = float(ones @ inverse @ ones)
         projected = inverse - np.outer(inverse @ ones, ones @ inverse) / level
-        weight += float(h @ projected @ h)
-        moment += float(h @ projected @ y)
+        weight += float(h @ projected @ h) * np.outer(one.of_amplitude, one.of_amplitude)
+        moment += float(h @ projected @ y) * one.of_amplitude
         square += float(y @ projected @ y)
         constant += float(np.linalg.slogdet(covariance)[1]) + math.log(level)
-    amplitude = moment / weight
-    return -0.5 * (constant + square - moment * amplitude), amplitude, 1.0 / weight
+    variance = np.asarray(np.linalg.inv(weight), dtype=np.float64)
+    amplitudes = variance @ moment
+    return -0.5 * (constant + square - float(moment @ amplitudes)), amplitudes, variance
 
 
 def extrapolate(
@@ -155,12 +178,13 @@ def extrapolate(
     """
     h = runs.reduction(law.rate)
     weight = (np.full(len(h), law.run_std) if run_stds is None else run_stds) ** -2.0
-    known = 1.0 / max(law.amplitude_std**2 + law.amplitude_se**2, 1e-12)
+    mean, variance = law.prior(runs)
+    known = 1.0 / max(variance, 1e-12)
     information = np.array([[weight.sum(), weight @ h], [weight @ h, weight @ h**2 + known]])
     right = np.array(
         [
             weight @ runs.logarithms,
-            (weight * h) @ runs.logarithms + known * law.amplitude,
+            (weight * h) @ runs.logarithms + known * mean,
         ]
     )
     covariance = np.linalg.inv(information)

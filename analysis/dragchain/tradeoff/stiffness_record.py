@@ -97,6 +97,7 @@ def scaled_runs(everyone: Sequence[Measures], quantity: Quantity) -> ScaledRuns 
     return ScaledRuns(
         scene=complete[0].run,
         stiffness_number=full,
+        inertial_number=complete[0].numbers["inertial_number"],
         numbers=full * scales ** (2 / 3),
         logarithms=np.log(np.abs([value for _, value in rows])),
         path_to_particle=arc / complete[0].particle_diameter_m,

@@ -1,6 +1,7 @@
 """The law of reduced stiffness: known laws are found, extrapolations are right and honest."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from dragchain.errors import SeriesError
 from dragchain.tradeoff.stiffness_law import (
     UNIT,
+    UNIT_INERTIA,
     ScaledRuns,
     StiffnessLaw,
     extrapolate,
@@ -15,18 +17,19 @@ from dragchain.tradeoff.stiffness_law import (
     left_out,
 )
 
-RATE, AMPLITUDE = 0.25, 0.6
+RATE, AMPLITUDE, SLOPE = 0.25, 0.6, 0.2
 SCALES = np.repeat([1.0, 1e-2, 1e-3], 4)
 
 
 def scene(
     rng: np.random.Generator, number: int, *, amplitude: float = AMPLITUDE, noise: float = 0.03
 ) -> ScaledRuns:
-    full = 10 ** rng.uniform(4.4, 5.3)
+    full, inertial = 10 ** rng.uniform(4.4, 5.3), 10 ** rng.uniform(-2.0, -0.5)
     numbers = full * SCALES ** (2 / 3)
+    amplitude += SLOPE * inertial / UNIT_INERTIA
     effect = amplitude * ((numbers / UNIT) ** -RATE - (full / UNIT) ** -RATE)
     logarithms = rng.normal() + effect + rng.normal(0.0, noise, len(numbers))
-    return ScaledRuns(f"scene {number}", full, numbers, logarithms, 15.0)
+    return ScaledRuns(f"scene {number}", full, inertial, numbers, logarithms, 15.0)
 
 
 def scenes(
@@ -43,9 +46,10 @@ def test_without_noise_the_law_is_found_and_the_extrapolation_exact() -> None:
     law = fit_stiffness_law(scenes(1, spread=0.0, noise=1e-6))
     assert law.rate == pytest.approx(RATE, rel=1e-2)
     assert law.amplitude == pytest.approx(AMPLITUDE, rel=1e-2)
+    assert law.slope == pytest.approx(SLOPE, rel=1e-2)
     new = scene(np.random.default_rng(9), 0, noise=0.0)
-    only_soft = ScaledRuns("new", new.stiffness_number, new.numbers[8:], new.logarithms[8:], 15.0)
-    assert extrapolate(law, only_soft).logarithm == pytest.approx(new.logarithms[0], abs=5e-3)
+    only = replace(new, numbers=new.numbers[8:], logarithms=new.logarithms[8:])
+    assert extrapolate(law, only).logarithm == pytest.approx(new.logarithms[0], abs=5e-3)
 
 
 def test_scatter_is_told_apart() -> None:
@@ -68,9 +72,9 @@ def test_intervals_of_scenes_left_out_include_the_truth_as_often_as_they_say() -
 
 def test_an_unknown_amplitude_is_richardsons_extrapolation() -> None:
     """Two stiffness numbers without noise and without prior: a straight line through them."""
-    law = StiffnessLaw(RATE, 0.0, 0.0, 1e3, 0.01)
+    law = StiffnessLaw(RATE, 0.0, 0.0, (0.0, 0.0, 0.0), 1e3, 0.01)
     new = scene(np.random.default_rng(3), 0, noise=0.0)
-    two = ScaledRuns("two", new.stiffness_number, new.numbers[[4, 8]], new.logarithms[[4, 8]], 15.0)
+    two = replace(new, numbers=new.numbers[[4, 8]], logarithms=new.logarithms[[4, 8]])
     got = extrapolate(law, two)
     assert got.logarithm == pytest.approx(new.logarithms[0], abs=1e-6)
     near, far = two.reduction(RATE)
@@ -78,12 +82,12 @@ def test_an_unknown_amplitude_is_richardsons_extrapolation() -> None:
 
 
 def test_at_the_physical_modulus_nothing_is_corrected() -> None:
-    law = StiffnessLaw(RATE, AMPLITUDE, 0.1, 0.1, 0.03, 0.2)
-    runs = ScaledRuns("stiff", 1e5, np.array([1e5]), np.array([1.5]), 15.0)
+    law = StiffnessLaw(RATE, AMPLITUDE, SLOPE, (0.01, 0.0, 0.01), 0.1, 0.03, 0.2)
+    runs = ScaledRuns("stiff", 1e5, 0.05, np.array([1e5]), np.array([1.5]), 15.0)
     assert extrapolate(law, runs).logarithm == pytest.approx(1.5)
     assert extrapolate(law, runs).se == pytest.approx(0.03)
 
 
 def test_too_few_scenes_are_refused() -> None:
-    with pytest.raises(SeriesError, match="three scenes"):
+    with pytest.raises(SeriesError, match="four scenes"):
         fit_stiffness_law(scenes(1, count=2))
