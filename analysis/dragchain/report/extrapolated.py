@@ -18,8 +18,6 @@ class ExtrapolatedQuantity(Part):
     value, ci95_low, ci95_high : float
         At the physical Young's modulus. The interval includes the scatter of one run, the
         uncertainty of rate and amplitude, and the model's own error.
-    amplitude_std : float
-        Part of the relative standard error that more path would not reduce.
     """
 
     name: str
@@ -29,7 +27,6 @@ class ExtrapolatedQuantity(Part):
     value: float
     ci95_low: float
     ci95_high: float
-    amplitude_std: float
 
 
 class Extrapolated(Document):

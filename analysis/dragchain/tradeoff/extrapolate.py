@@ -40,23 +40,18 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
     """
     case, known = load_case(run_dir), StiffnessRecord.read(record)
     scale = case.fidelity.youngs_modulus_scale
-    full = case.numbers["stiffness_number"]
     along = quantities_along(run_dir, case)
     diameters = along.arc_m / (2.0 * case.media.radius_mean_m)
+    values = along.values()
     found = []
     for quantity in QUANTITIES:
-        entry = known.laws.get(quantity.name)
-        blocks = along.of_blocks(quantity.name)
-        if entry is None or not blocks.size or not np.isfinite(blocks).all():
-            continue
-        measured = quantity.of_blocks(blocks)
-        if measured == 0.0:
+        entry, measured = known.laws.get(quantity.name), values.get(quantity.name, 0.0)
+        if entry is None or measured == 0.0:
             continue
         run = ScaledRuns(
-            scene=case.run,
-            stiffness_number=full,
+            stiffness_number=case.numbers["stiffness_number"],
             inertial_number=case.numbers["inertial_number"],
-            numbers=np.array([full * scale ** (2 / 3)]),
+            scales=np.array([scale]),
             logarithms=np.log(np.abs([measured])),
             path_to_particle=diameters,
         )
@@ -74,7 +69,6 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
                 value=value,
                 ci95_low=low,
                 ci95_high=high,
-                amplitude_std=math.sqrt(max(0.0, guess.se**2 - run_std**2)),
             )
         )
     Extrapolated(

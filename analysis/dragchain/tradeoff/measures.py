@@ -14,6 +14,7 @@ from dragchain.arrays import Floats
 from dragchain.documents import Document, Part
 from dragchain.run.case import Fidelity
 from dragchain.run.completeness import AcceptanceCheck
+from dragchain.tradeoff.quantities import QUANTITIES
 
 FILE = "measures.json"
 
@@ -76,6 +77,15 @@ class PathQuantities(Part):
     def of_blocks(self, name: str) -> Floats:
         """The values of a quantity, (B,), NaN where a block has none; (0,) if none has one."""
         return np.array(self.blocks.get(name, ()), dtype=np.float64)
+
+    def values(self, start: int = 0, stop: int | None = None) -> dict[str, float]:
+        """The quantities over some blocks, all if not given, that have a value in each."""
+        found = {}
+        for quantity in QUANTITIES:
+            blocks = self.of_blocks(quantity.name)[start:stop]
+            if blocks.size and np.isfinite(blocks).all():
+                found[quantity.name] = quantity.of_blocks(blocks)
+        return found
 
 
 class Measures(PathQuantities, Document):

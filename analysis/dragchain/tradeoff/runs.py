@@ -4,13 +4,11 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from pydantic import JsonValue
 
 from dragchain.errors import TableError
 from dragchain.run.case import changed_inputs
 from dragchain.tradeoff.measures import FILE, Measures
-from dragchain.tradeoff.quantities import QUANTITIES
 
 _PARAMETERS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
 OTHER = "other"
@@ -177,12 +175,8 @@ def values_within(measures: Measures, arc_m: float, stretch: int = 0) -> dict[st
     if not measures.complete:
         return {}
     count = max(1, round(arc_m / measures.block_m))
-    found = {} if stretch else dict(measures.single)
-    for quantity in QUANTITIES:
-        blocks = measures.of_blocks(quantity.name)[stretch * count : (stretch + 1) * count]
-        if blocks.size and np.isfinite(blocks).all():
-            found[quantity.name] = quantity.of_blocks(blocks)
-    return found
+    single = {} if stretch else measures.single
+    return {**single, **measures.values(stretch * count, (stretch + 1) * count)}
 
 
 def by_scene(runs: Sequence[Measures]) -> Iterator[tuple[dict[str, str], list[Measures]]]:

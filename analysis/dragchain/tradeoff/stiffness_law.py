@@ -38,27 +38,26 @@ class ScaledRuns:
 
     Attributes
     ----------
-    scene : str
     stiffness_number, inertial_number : float
         Of the scene at the physical Young's modulus.
-    numbers : (N,) ndarray
-        Stiffness number of each run.
+    scales : (N,) ndarray
+        Factor on Young's modulus in each run.
     logarithms : (N,) ndarray
         Logarithm of the quantity in each run.
     path_to_particle : float
         Path that each value covers over the mean diameter of a particle.
     """
 
-    scene: str
     stiffness_number: float
     inertial_number: float
-    numbers: Floats
+    scales: Floats
     logarithms: Floats
     path_to_particle: float
 
     def reduction(self, rate: float) -> Floats:
         """What the amplitude is multiplied with, (N,): 0 at the physical Young's modulus."""
-        return _reduction(self.numbers, self.stiffness_number, rate)
+        full = (self.stiffness_number / UNIT) ** -rate
+        return np.asarray(full * (self.scales ** (-2.0 / 3.0 * rate) - 1.0))
 
     @property
     def of_amplitude(self) -> Floats:
@@ -103,7 +102,7 @@ class StiffnessLaw:
 
 
 @dataclass(frozen=True)
-class Extrapolated:
+class Extrapolation:
     """Logarithm of a quantity at the physical Young's modulus, with its standard error."""
 
     logarithm: float
@@ -116,11 +115,11 @@ def fit_stiffness_law(scenes: Sequence[ScaledRuns]) -> StiffnessLaw:
     Raises
     ------
     SeriesError
-        If fewer than four scenes were run at two stiffness numbers.
+        If fewer than four scenes were run at two moduli.
     """
-    useful = [one for one in scenes if len(set(one.numbers.tolist())) > 1]
+    useful = [one for one in scenes if len(set(one.scales.tolist())) > 1]
     if len(useful) < 4:
-        raise SeriesError("fewer than four scenes were run at two stiffness numbers")
+        raise SeriesError("fewer than four scenes were run at two moduli")
 
     def against(point: Floats) -> float:
         return -_likelihood(useful, *np.exp(point))[0]
@@ -149,7 +148,7 @@ def _likelihood(
     weight, moment = np.zeros((2, 2)), np.zeros(2)
     square = constant = 0.0
     for one in scenes:
-        h, y, ones = one.reduction(rate), one.logarithms, np.ones(len(one.numbers))
+        h, y, ones = one.reduction(rate), one.logarithms, np.ones(len(one.scales))
         covariance = run_std**2 * np.eye(len(h)) + amplitude_std**2 * np.outer(h, h)
         inverse = np.linalg.inv(covariance)
         level = float(ones @ inverse @ ones)
@@ -165,14 +164,14 @@ def _likelihood(
 
 def extrapolate(
     law: StiffnessLaw, runs: ScaledRuns, run_stds: Floats | None = None
-) -> Extrapolated:
+) -> Extrapolation:
     """The logarithm of a quantity at the physical modulus, from runs at reduced ones.
 
     Parameters
     ----------
     law : StiffnessLaw
     runs : ScaledRuns
-        Any number of runs, at any stiffness number.
+        Any number of runs, at any modulus.
     run_stds : (N,) ndarray, optional
         Standard deviation of the logarithm of each run; none: that of the law.
     """
@@ -190,44 +189,49 @@ def extrapolate(
     covariance = np.linalg.inv(information)
     level = float(covariance[0] @ right)
     reduced = float(h.max(initial=0.0) > 0.0)
-    return Extrapolated(level, math.hypot(math.sqrt(covariance[0, 0]), law.model_std * reduced))
+    return Extrapolation(level, math.hypot(math.sqrt(covariance[0, 0]), law.model_std * reduced))
 
 
 def left_out(
-    scenes: Sequence[ScaledRuns], plan: Mapping[float, int]
-) -> list[tuple[float, float, float]]:
-    """Errors of the extrapolation in scenes that were left out of the fit.
+    scenes: Sequence[ScaledRuns], plans: Sequence[Mapping[float, int]]
+) -> list[list[tuple[float, float, float]]]:
+    """Errors of extrapolations in scenes that were left out of the fit, a list for each plan.
 
     Parameters
     ----------
     scenes : sequence of ScaledRuns
-    plan : mapping of float to int
-        Runs at each modulus scale that the extrapolation may use.
+    plans : sequence of mapping of float to int
+        Runs at each modulus scale that an extrapolation may use.
 
     Returns
     -------
-    list of (float, float, float)
+    list of list of (float, float, float)
         Extrapolated minus measured logarithm, the standard error of that difference, and the
         difference without a correction, of the runs at the largest modulus.
     """
-    found = []
-    for one in scenes:
-        law = fit_stiffness_law([other for other in scenes if other is not one])
-        scale = (one.numbers / one.stiffness_number) ** 1.5
-        stiff = one.logarithms[np.isclose(scale, 1.0)]
-        chosen = np.concatenate(
-            [np.flatnonzero(np.isclose(scale, level))[:count] for level, count in plan.items()]
-        )
-        if not len(stiff) or len(chosen) < sum(plan.values()):
-            continue
-        reduced = replace(one, numbers=one.numbers[chosen], logarithms=one.logarithms[chosen])
-        guess = extrapolate(law, reduced)
-        level = float(stiff.mean())
-        plain = float(reduced.logarithms[reduced.numbers == reduced.numbers.max()].mean())
-        se = math.hypot(guess.se, law.run_std / math.sqrt(len(stiff)))
-        found.append((guess.logarithm - level, se, plain - level))
-    return found
+    laws = [fit_stiffness_law([other for other in scenes if other is not one]) for one in scenes]
+    return [
+        [
+            error
+            for one, law in zip(scenes, laws, strict=True)
+            if (error := _error_in(one, law, plan)) is not None
+        ]
+        for plan in plans
+    ]
 
 
-def _reduction(numbers: Floats, full: float, rate: float) -> Floats:
-    return np.asarray((numbers / UNIT) ** -rate - (full / UNIT) ** -rate)
+def _error_in(
+    scene: ScaledRuns, law: StiffnessLaw, plan: Mapping[float, int]
+) -> tuple[float, float, float] | None:
+    """As of `left_out`; None where the scene lacks runs of the plan or at full modulus."""
+    stiff = scene.logarithms[scene.scales == 1.0]
+    chosen = np.concatenate(
+        [np.flatnonzero(scene.scales == scale)[:count] for scale, count in plan.items()]
+    )
+    if not len(stiff) or len(chosen) < sum(plan.values()):
+        return None
+    reduced = replace(scene, scales=scene.scales[chosen], logarithms=scene.logarithms[chosen])
+    guess, level = extrapolate(law, reduced), float(stiff.mean())
+    plain = float(reduced.logarithms[reduced.scales == max(plan)].mean())
+    se = math.hypot(guess.se, law.run_std / math.sqrt(len(stiff)))
+    return guess.logarithm - level, se, plain - level

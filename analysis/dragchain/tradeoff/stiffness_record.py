@@ -1,12 +1,13 @@
 """The record of reduced stiffness: a law for each quantity, and how well it extrapolates."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from dragchain.arrays import Floats
 from dragchain.documents import Document, Part
 from dragchain.errors import SeriesError
 from dragchain.tradeoff.measures import Measures
@@ -92,20 +93,17 @@ def scaled_runs(everyone: Sequence[Measures], quantity: Quantity) -> ScaledRuns 
     rows = [(run, value) for run, value in rows if math.isfinite(value) and value != 0.0]
     if not rows or len({math.copysign(1.0, value) for _, value in rows}) > 1:
         return None
-    full = complete[0].numbers["stiffness_number"]
-    scales = np.array([run.fidelity.youngs_modulus_scale for run, _ in rows])
     return ScaledRuns(
-        scene=complete[0].run,
-        stiffness_number=full,
+        stiffness_number=complete[0].numbers["stiffness_number"],
         inertial_number=complete[0].numbers["inertial_number"],
-        numbers=full * scales ** (2 / 3),
+        scales=np.array([run.fidelity.youngs_modulus_scale for run, _ in rows]),
         logarithms=np.log(np.abs([value for _, value in rows])),
         path_to_particle=arc / complete[0].particle_diameter_m,
     )
 
 
 def stiffness_record(
-    runs: Sequence[Measures], plans: Iterable[Mapping[float, int]]
+    runs: Sequence[Measures], plans: Sequence[Mapping[float, int]]
 ) -> StiffnessRecord:
     """Fit a law to each quantity, and leave each scene out once.
 
@@ -113,7 +111,7 @@ def stiffness_record(
     ----------
     runs : sequence of Measures
         Of many scenes, at the physical Young's modulus and at a reduced one.
-    plans : iterable of mapping of float to int
+    plans : sequence of mapping of float to int
         Runs at each modulus scale, for each way to extrapolate that is tried.
     """
     scenes = [everyone for _, everyone in by_scene(runs)]
@@ -130,7 +128,10 @@ def stiffness_record(
         except SeriesError as error:
             without[quantity.name] = str(error)
             continue
-        rows = [_left_out_entry(quantity, known, plan) for plan in plans]
+        rows = [
+            _left_out_entry(quantity, plan, np.reshape(of_plan, (-1, 3)))
+            for plan, of_plan in zip(plans, left_out(known, plans), strict=True)
+        ]
         errors += [row for row, _ in rows]
         law_std = max(std for _, std in rows)
         laws[quantity.name] = LawEntry(
@@ -150,10 +151,9 @@ def stiffness_record(
 
 
 def _left_out_entry(
-    quantity: Quantity, scenes: Sequence[ScaledRuns], plan: Mapping[float, int]
+    quantity: Quantity, plan: Mapping[float, int], found: Floats
 ) -> tuple[LeftOutEntry, float]:
-    """Errors of a plan in scenes left out, and what they say beyond their standard errors."""
-    found = np.array(left_out(scenes, plan)).reshape(-1, 3)
+    """Errors of a plan, (N, 3), and what they say beyond their standard errors."""
     errors, expected, plain = found.T
     entry = LeftOutEntry(
         quantity=quantity.name,
