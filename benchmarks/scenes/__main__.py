@@ -2,9 +2,9 @@
 
     python benchmarks/scenes --scenes 12 --seed 1 --out workflow/plans/scenes.yaml
 
-A scrambled Sobol sequence over the dimensionless numbers of a drag. Full stiffness must be
-affordable: where a run at full stiffness and 64 % of the Rayleigh time would take more than
-`--limit` particle-steps, the Young's modulus is lowered, and a scene that is too expensive even
+A scrambled Sobol sequence over the dimensionless numbers of a drag. The physical Young's
+modulus must be affordable: where a run with it and 64 % of the Rayleigh time would take more than
+`--limit` particle-steps, the modulus is lowered, and a scene that is too expensive even
 with the lowest one is left out. The scenes are therefore softer, faster and smaller than many
 real ones. Everything else is that of the study `uhlmann2015`.
 """
@@ -45,8 +45,8 @@ RANGES = {
 BELOW_TIP, GAP = 3.0, 2.5
 """Particle diameters between tip and floor, and between workpiece and bowl."""
 
-SOFTENED = (1e-3, 1e-2)
-"""Modulus scales that are compared with full stiffness."""
+REDUCED = (1e-3, 1e-2)
+"""Modulus scales that are compared with the physical Young's modulus."""
 
 PLAN = {
     "base": {
@@ -60,7 +60,7 @@ PLAN = {
     "points": [
         {
             "vary": {
-                "fidelity.youngs_modulus_scale": list(SOFTENED),
+                "fidelity.youngs_modulus_scale": list(REDUCED),
                 "fidelity.timestep_fraction": [0.5],
                 "fidelity.filling_timestep_fraction": [0.1],  # particles fall through long steps
             }
@@ -112,8 +112,8 @@ def scene_of(row: list[float]) -> dict[str, Any]:
     }
 
 
-def full_stiffness(scene: dict[str, Any], base: Case, file: Path) -> tuple[Case, float]:
-    """The case of a scene at full stiffness, and its particle-steps, filling included."""
+def physical_case(scene: dict[str, Any], base: Case, file: Path) -> tuple[Case, float]:
+    """The case of a scene at the physical modulus, and its particle-steps, filling included."""
     plan = Plan.model_validate(PLAN | {"scenes": {"one": scene}, "points": [], "seeds": 1})
     case = plan_points(plan, file, base).processes[0]
     steps = 0
@@ -129,7 +129,7 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=12, help="how many (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="of the design (default: %(default)s)")
     parser.add_argument(
-        "--limit", type=float, default=1e9, help="particle-steps at full stiffness, at most"
+        "--limit", type=float, default=1e9, help="particle-steps at the physical modulus, at most"
     )
     parser.add_argument("--out", type=Path, required=True, help="plan to write")
     asked = parser.parse_args()
@@ -142,7 +142,7 @@ def main() -> None:
         tried += 1
         scene = scene_of(design.random(1)[0].tolist())
         try:
-            case, cost = full_stiffness(scene, base, asked.out)
+            case, cost = physical_case(scene, base, asked.out)
         except InputError as error:
             print(f"{tried}: {error.problem}")
             continue
@@ -151,14 +151,15 @@ def main() -> None:
             scene[field] = float(f"{scene[field] * (0.97 * asked.limit / cost) ** 2:.2g}")
             if scene[field] < RANGES["youngs_modulus_pa"][0]:
                 continue
-            case, cost = full_stiffness(scene, base, asked.out)
+            case, cost = physical_case(scene, base, asked.out)
         scenes[f"s{asked.seed}-{tried}"] = scene
         numbers = ", ".join(f"{name} {value:.3g}" for name, value in describe(case).items())
         print(f"s{asked.seed}-{tried}: {cost:.2g} particle-steps; {numbers}")
     head = (
         f"# Made by `python benchmarks/scenes --scenes {asked.scenes} --seed {asked.seed} "
         f"--limit {asked.limit:g}`:\n# a space-filling design over the dimensionless numbers of a "
-        "drag, at full stiffness\n# and softened, to see what softness does in any scene.\n"
+        "drag, at the\n# physical Young's modulus and reduced ones, to see what that does in any "
+        "scene.\n"
     )
     asked.out.write_text(
         head + yaml.safe_dump(PLAN | {"scenes": scenes}, sort_keys=False), encoding="utf-8"

@@ -1,9 +1,9 @@
 """The critical time step of a loaded contact network."""
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, eigsh
 
 from dragchain.arrays import Floats, Ints
+from dragdeck.physics.contact_network import largest_eigenvalue
 
 
 def hertz_stiffness(
@@ -64,24 +64,10 @@ def largest_frequency(
     """
     if not len(a):
         return 0.0
-    # a wall is the last body, row -1, and has no inverse mass; rotations count times the radius
-    inverse = np.append(1.0 / np.sqrt(mass_kg), 0.0)
-    scale = inverse[:, None] * np.repeat([1.0, np.sqrt(2.5)], 3)
-    ahead, across = np.stack(stiffness_n_m)[:, :, None]
-
-    def act(shape: Floats) -> Floats:
-        moved, turned = np.hsplit(shape.reshape(scale.shape) * scale, 2)
-        apart = moved[b] - moved[a] + np.cross(normal, turned[a] + turned[b])
-        along = (apart * normal).sum(axis=1, keepdims=True) * normal
-        force = ahead * along + across * (apart - along)
-        torque, found = np.cross(force, normal), np.zeros_like(scale)
-        np.add.at(found, a, np.hstack([-force, torque]))
-        np.add.at(found, b, np.hstack([force, torque]))
-        return np.asarray((found * scale).ravel())
-
-    operator = LinearOperator((scale.size, scale.size), matvec=act, dtype=np.float64)
-    start = np.random.default_rng(1).normal(size=scale.size)  # the same result every time
-    largest = float(eigsh(operator, k=1, which="LA", v0=start, return_eigenvectors=False)[0])
+    # a wall is the last body, row -1, and has no inverse mass
+    inverse_mass = np.append(1.0 / mass_kg, 0.0)
+    stiffness = np.stack(stiffness_n_m)
+    largest = largest_eigenvalue(np.stack([a, b]), normal, stiffness, inverse_mass)
     return float(np.sqrt(max(largest, 0.0)))
 
 

@@ -1,4 +1,4 @@
-"""The law of reduced stiffness: known laws are found, extrapolations are right and honest."""
+"""The law of reduced stiffness: known laws are found, and intervals include the truth."""
 
 import math
 from dataclasses import replace

@@ -18,7 +18,7 @@ _TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class ContactConstants:
-    """Constants of the contact of a particle with another body, softened as the run is.
+    """Constants of the contact of a particle with another body, at the run's Young's modulus.
 
     Attributes
     ----------
@@ -88,19 +88,34 @@ def stability_number(
     ratio = -math.sqrt(5 / 6) * log / np.hypot(log, np.pi)
     damping = 2 * ratio * np.sqrt(stiffness / inverse_mass[bodies].sum(axis=0))
     weights = timestep_s**2 * stiffness + 2 * timestep_s * damping
-    return math.sqrt(_largest_eigenvalue(bodies, normal, weights, inverse_mass)) / 2
+    return math.sqrt(largest_eigenvalue(bodies, normal, weights, inverse_mass, _TOLERANCE)) / 2
 
 
-def _largest_eigenvalue(bodies: Ints, normal: Floats, weights: Floats, inverse: Floats) -> float:
-    """Largest eigenvalue of ``M^-1/2 W M^-1/2`` from the inverse masses.
+def largest_eigenvalue(
+    bodies: Ints, normal: Floats, weights: Floats, inverse_mass: Floats, tolerance: float = 0.0
+) -> float:
+    """Largest eigenvalue of ``M^-1/2 W M^-1/2`` of a contact network by Lanczos iteration.
 
     W adds up all contacts, each with its normal and its tangential weight on the relative
-    displacement of the two surfaces.
+    displacement of the two surfaces; rotations are included.
+
+    Parameters
+    ----------
+    bodies : (2, M) ndarray of int
+        The two bodies of each contact.
+    normal : (M, 3) ndarray
+        Unit vectors from the first to the second.
+    weights : (2, M) ndarray
+        Normal and tangential.
+    inverse_mass : (N,) ndarray
+        Of the bodies; 0 for one that never moves.
+    tolerance : float
+        Relative error; 0: the machine's.
     """
     a, b = bodies
     ahead, across = weights[:, :, None]
     # rotations count times the radius; the inertia of a sphere is 2/5 m R^2
-    scale = np.sqrt(inverse)[:, None] * np.repeat([1, math.sqrt(2.5)], 3)
+    scale = np.sqrt(inverse_mass)[:, None] * np.repeat([1, math.sqrt(2.5)], 3)
 
     def act(shape: Floats) -> Floats:
         moved, turned = np.hsplit(shape.reshape(scale.shape) * scale, 2)
@@ -114,7 +129,7 @@ def _largest_eigenvalue(bodies: Ints, normal: Floats, weights: Floats, inverse: 
 
     operator = LinearOperator((scale.size, scale.size), matvec=act, dtype=np.float64)
     start = np.random.default_rng(1).normal(size=scale.size)  # the same result every time
-    return float(eigsh(operator, k=1, v0=start, tol=_TOLERANCE, return_eigenvectors=False)[0])
+    return float(eigsh(operator, k=1, v0=start, tol=tolerance, return_eigenvectors=False)[0])
 
 
 def _touching(centre: Floats, radius: Floats, bowl_radius: float) -> tuple[Ints, Floats, Floats]:
