@@ -38,8 +38,8 @@ from dragdeck.project import Project, find_project, study_templates
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.scene import Bed, SceneType, read_bed
-from dragdeck.study.model import CirclePath
-from dragdeck.study.yaml import read_yaml
+from dragdeck.study.paths.circle import CirclePath
+from dragdeck.study.yaml import read_study
 from dragdeck.sweep.cases import settle_case
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -90,7 +90,7 @@ def case_of(project: Project, particles: int) -> Case:
         "motion.path.revolutions": round(path.revolutions / ratio, 4),
         "motion.plunge_at_m": [round(ratio * path.radius_m, 4), 0.0],
     }
-    return settle_case(pilot.file, read_yaml(pilot.file), values, shown={})
+    return settle_case(pilot.file, read_study(pilot.file), values, shown={})
 
 
 def made(project: Project, case: Case, kind: SceneType, bed: Bed | None) -> Path:

@@ -39,6 +39,7 @@ FAKE_PYTHON = """\
 #!/bin/sh
 case "$*" in
     *version_info*) exit "${FAKE_OLD:-0}" ;;
+    *"import gmsh"*) exit "${FAKE_NO_CAD:-0}" ;;
     *executor_plugin*) exit "${FAKE_NO_PLUGIN:-0}" ;;
     *ensurepip*) exit "${FAKE_NO_VENV:-0}" ;;
     --version) echo Python 3.12.1 ;;
@@ -312,6 +313,18 @@ def test_drawing_is_installed_or_missed_aloud(machine: Machine):
     done = machine.done()
     assert any("libegl1" in line for line in done if line.startswith("apt-get install"))
     assert done.count("picture") == 2
+
+
+def test_what_step_files_need_is_installed_or_missed_aloud(machine: Machine):
+    warned = machine.run("setup", FAKE_NO_CAD="1")
+    assert warned.returncode == 0
+    assert "STEP" in warned.stderr and "libglu1-mesa" in warned.stderr
+    assert any(".[cad,test]" in line for line in machine.done())
+
+    machine.make_root()
+    (machine.clone / ".venv/dragdeck-stamp").unlink()
+    machine.run("setup", FAKE_NO_CAD="1")
+    assert any("libglu1-mesa" in line for line in machine.done() if line.startswith("apt-get i"))
 
 
 def test_missing_mpirun_is_only_a_warning(machine: Machine):

@@ -38,6 +38,7 @@ OUT_DIR = _argument(
 MADE_BY = _argument("--command", help="command that made the runs, for the record")
 DROPS = _argument("--drops", type=Path, required=True, dest="drops_file", help="drops.json")
 RECORD = _argument("record", type=Path, metavar="RECORD", help="CSV of force against time")
+STIFFNESS = _argument("--record", type=Path, required=True, metavar="FILE", help="stiffness.json")
 MEASURES = _argument(
     "measures", type=Path, nargs="+", metavar="MEASURES", help="measures.json of the runs"
 )
@@ -108,17 +109,16 @@ STEPS = (
         _argument("--largest-step", type=float, default=math.inf,
                   help="largest fraction of the Rayleigh time to recommend"))),
     Command("promises", "test the advisor's predictions on other scenes",
-            "tradeoff.promises:promises_command", (OUT_DIR, MEASURES)),
+            "tradeoff.promises:promises_command", (OUT_DIR, MEASURES, STIFFNESS)),
     Command("stiffness", "fit what a reduced Young's modulus does to each quantity",
             "tradeoff.stiffness_record:stiffness_command", (
                 MEASURES,
                 _argument("--out", type=Path, required=True, metavar="FILE", dest="out_file",
-                          help="stiffness.json"))),
+                          help="stiffness.json"),
+                _argument("--tradeoff", type=Path, required=True, metavar="FILE",
+                          help="tradeoff.json of a scene to check the laws with"))),
     Command("extrapolate", "extrapolate a run's quantities to the physical Young's modulus",
-            "tradeoff.extrapolate:extrapolate_run", (
-                RUN_DIR,
-                _argument("--record", type=Path, required=True, metavar="FILE",
-                          help="stiffness.json"))),
+            "tradeoff.extrapolate:extrapolate_run", (RUN_DIR, STIFFNESS)),
     Command("scaling", "fit a power law of the mean drag over one field",
             "scaling.fit:scaling_command", (
         OUT_DIR, RUN_DIRS, MADE_BY,

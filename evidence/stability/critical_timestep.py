@@ -1,9 +1,12 @@
 """The critical time step of a loaded contact network."""
 
+import math
+
 import numpy as np
 
 from dragchain.arrays import Floats, Ints
 from dragdeck.physics.contact_network import largest_eigenvalue
+from dragdeck.physics.damping import damping_ratio
 
 
 def hertz_stiffness(
@@ -83,9 +86,7 @@ def damped_fraction(restitution: float) -> float:
     """Critical step with the contact's damping over that without.
 
     ``sqrt(1 + z^2) - z`` for velocities that lag half a step (Belytschko 1983), with the damping
-    ratio of the engine's Hertz law, ``z = sqrt(5/6) |ln e| / sqrt(ln^2 e + pi^2)`` (Tsuji et al.
-    1992 in the engine's form), taken for every mode.
+    ratio z of LIGGGHTS's Hertz law, ``sqrt(5/6)`` times `damping_ratio`, taken for every mode.
     """
-    log = abs(np.log(restitution))
-    ratio = np.sqrt(5.0 / 6.0) * log / np.hypot(log, np.pi)
+    ratio = math.sqrt(5.0 / 6.0) * damping_ratio(restitution)
     return float(np.hypot(1.0, ratio) - ratio)

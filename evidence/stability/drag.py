@@ -15,7 +15,7 @@ from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.network_contacts import KINDS, contact_rows
 from dragchain.tables.run_folder import Run
-from dragchain.tables.workpiece_contacts import WorkpieceFrame
+from dragchain.tables.workpiece_contacts import WorkpieceFrames
 from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks.case_file import CaseOfStudy
 from evidence.stability import contacts as network
@@ -110,17 +110,17 @@ def _contacts(point: PointRun, run: Run, case: CaseOfStudy) -> tuple[float, floa
         if on_workpiece.step not in pairs:
             continue
         workpiece = on_workpiece.join(merge=False)  # both stiffnesses of an edge act
-        frame = network.in_id_order(particles[workpiece.step])
-        contacts = _engine_contacts(frame, pairs[workpiece.step], workpiece, run.case)
+        frame = network.in_id_order(particles[on_workpiece.step])
+        contacts = _engine_contacts(frame, pairs[on_workpiece.step], workpiece, run.case)
         largest = max(largest, contacts.overlap_ratio(network.radii(frame)))
-        if workpiece.step in some:
+        if on_workpiece.step in some:
             own = network.network_frequency(case, point.sticks, network.radii(frame), contacts)
             frequency = max(frequency, own)
     return largest, frequency
 
 
 def _engine_contacts(
-    frame: Frame, pairs: Frame, workpiece: WorkpieceFrame, case: Case
+    frame: Frame, pairs: Frame, workpiece: WorkpieceFrames, case: Case
 ) -> network.Contacts:
     """The contacts of one frame as the engine wrote them, with bowl and workpiece."""
     bowl_radius = needed(case.bowl, "bowl").radius_m

@@ -12,7 +12,8 @@ from dragdeck.documents import Document, Part
 from dragdeck.errors import InputError
 from dragdeck.scenes.scene import Regime
 from dragdeck.study.base import Model, Number
-from dragdeck.study.yaml import explained, read_yaml
+from dragdeck.study.check import explained
+from dragdeck.study.yaml import read_yaml
 from evidence.stability.column import Packing
 
 REGIMES: tuple[Regime, ...] = get_args(Regime)

@@ -1,6 +1,5 @@
 """The runs of a stability map: the scene of each point, and how a batch of them is run."""
 
-import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from dragdeck.project import find_project
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.scene import Bed, read_bed
-from dragdeck.study.model import CirclePath, Motion, Study
+from dragdeck.study.model import Motion, Study
 from dragdeck.sweep.cases import load_cases
 from evidence.stability.column import Packing, column_scene
 from evidence.stability.impact import Impact, impact_scene
@@ -78,14 +77,12 @@ def point_case(base: Case, settings: Settings, fraction: float) -> Case:
 
 
 def _motion(study: Study, speed: float) -> Motion:
-    path = study.motion.path
-    if not isinstance(path, CirclePath):
+    around = study.motion.path.revolution_m
+    if around is None:
         raise InputError("the map's study drags on a circle", field="motion.path")
-    around = 2 * math.pi * path.radius_m
     length = min(max(DRAG_S * speed, SHORTEST_DRAG_M), LONGEST_DRAG_REVOLUTIONS * around)
-    turned = path.model_copy(update={"revolutions": length / around})
-    update = {"speed_m_s": speed, "path": turned, "transient_m": _TRANSIENT_FRACTION * length}
-    return study.motion.model_copy(update=update)
+    motion = study.motion.at(speed / study.motion.axis_speed_m_s, length)
+    return motion.model_copy(update={"transient_m": _TRANSIENT_FRACTION * length})
 
 
 @dataclass(frozen=True)

@@ -83,6 +83,21 @@ def test_outside_a_project(
     assert "not inside a dragdeck project" in capsys.readouterr().err
 
 
+def test_a_new_study_can_be_run_at_once(
+    case: Case, project: Project, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["new", "mine", "--from", "small"]) == 0
+    (mine,) = project.cases("mine")
+    assert PROCESS.run_id(mine) == PROCESS.run_id(case)
+    written = mine.file.read_text()
+    for name, problem in (("mine", "has that name already"), ("../x", "no name for a study")):
+        assert main(["new", name, "--from", "small"]) == 1
+        assert problem in capsys.readouterr().err
+    assert main(["new", "other", "--from", "none"]) == 1
+    assert "unknown study" in capsys.readouterr().err
+    assert mine.file.read_text() == written and not (project.studies / "other").exists()
+
+
 def edited(case: Case, **changes: Any) -> None:
     data = {**yaml.safe_load(case.file.read_text()), **changes}
     case.file.write_text(yaml.safe_dump(data, sort_keys=False))
@@ -111,8 +126,8 @@ def test_a_step_that_broke_needs_a_reason(
     edited(case, fidelity=unsafe)
     assert main(["check", "small"]) == 1
     said = capsys.readouterr().err
-    assert "fidelity.timestep_fraction: the time step is not safe with E x 0.001" in said
-    assert "below 100 %, where the drag was wrong" in said
+    problem = "the contacts are not stable at this time step with E x 0.001"
+    assert f"fidelity.timestep_fraction: {problem}" in said
     assert "accepted.unsafe_timestep" in said
     edited(case, accepted={"unsafe_timestep": "to see it break"})
     (accepted,) = project.cases("small")

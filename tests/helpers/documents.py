@@ -11,7 +11,7 @@ WRITERS = {
     "run": "dragdeck.engine.record:RunRecord",
     "case.drop_test": "dragdeck.decks.case_file:DropTestCase",
     "case.filling": "dragdeck.decks.case_file:FillingCase",
-    "case.process": "dragdeck.decks.case_file:ProcessCase",
+    "case.process": "dragdeck.decks.process_case:ProcessCase",
     "drops": "dragdeck.campaigns.restitution_drops:DropsFile",
     "costs": "cost_file:CostsFile",
     "packing": "dragchain.tables.bed:Packing",
@@ -45,6 +45,7 @@ READERS = {
     "costs": ["dragchain.tradeoff.costs:CostsFile"],
     "packing": ["dragdeck.scenes.scene:PackingFile"],
     "calibration": ["dragdeck.campaigns.restitution_drops:FitFile"],
+    "stiffness": ["dragdeck.outlook.measured:StiffnessRecord"],
     "tradeoff": ["dragdeck.outlook.measured:Tradeoff"],
     "advice": ["dragchain.report.cost_check:Advice"],
 }

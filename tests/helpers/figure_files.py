@@ -33,6 +33,7 @@ def case_json(scene_name: str) -> dict[str, Any]:
                "surface_m": 0.03,
         "motion": {
             "kind": "line", "axis_speed_m_s": 0.1, "start_m": [-0.01, 0.0], "direction_rad": 0.0,
+            "start_direction_rad": 0.0,
         },
         "phases": [
             {"name": "plunge", "start_step": 0, "end_step": DRAG_START},

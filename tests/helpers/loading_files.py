@@ -60,7 +60,7 @@ def case_json(**motion: Any) -> dict[str, Any]:
                  "immersion_depth_m": SIZE},
         "surface_m": SURFACE,
         "motion": {"kind": "line", "axis_speed_m_s": SPEED, "start_m": [0.0, 0.0],
-                   "direction_rad": 0.0} | motion,
+                   "direction_rad": 0.0, "start_direction_rad": 0.0} | motion,
         "phases": [
             {"name": "plunge", "start_step": 0, "end_step": START},
             {"name": "drag", "start_step": START, "end_step": LAST},

@@ -3,7 +3,13 @@
 from typing import Any
 
 from dragdeck.cases.case import Case
-from dragdeck.outlook.measured import MeasuredCost, MeasuredError, MeasuredSetting, Tradeoff
+from dragdeck.outlook.measured import (
+    MeasuredCost,
+    MeasuredError,
+    MeasuredSetting,
+    StiffnessRecord,
+    Tradeoff,
+)
 from dragdeck.scenes.dimensionless import describe
 
 
@@ -68,3 +74,33 @@ def made_tradeoff(case: Case, **more: Any) -> Tradeoff:
 def with_settings(tradeoff: Tradeoff, *more: MeasuredSetting) -> Tradeoff:
     """The same with further settings."""
     return tradeoff.model_copy(update={"settings": [*tradeoff.settings, *more]})
+
+
+def made_stiffness(case: Case, *, amplitude_std: float = 0.05, **numbers: float) -> StiffnessRecord:
+    """Laws from scenes whose numbers are half and twice those of a case, but for the given ones."""
+    here = {**describe(case), **numbers}
+    law = {
+        "label": "contacts on the workpiece", "friction": "particle_friction",
+        "quantile": 2.0, "path_to_particle": 15.0,
+        "law": {
+            "rate": 0.25,
+            "covariance": [[2e-4, -1e-4, 0.0], [-1e-4, 1e-4, 0.0], [0.0, 0.0, 1e-4]],
+            "amplitude_std": amplitude_std, "run_std": 0.06, "model_std": 0.01,
+        },
+    }  # fmt: skip
+    scenes = [
+        {"numbers": {name: factor * value for name, value in here.items()}, "runs": {"0.001": 1}}
+        for factor in (0.5, 2.0)
+    ]
+    laws = {"workpiece_contacts": law, "drag_mean": {**law, "label": "mean drag"}}
+    step = {
+        "stiffness": 69.0,
+        "damping": 46.0,
+        "spread": -1.3,
+        "scatter": 0.04,
+        "largest": 0.1,
+        "runs": 42,
+    }
+    return StiffnessRecord.model_validate(
+        {"measured": "2026-01-03", "scenes": scenes, "laws": laws, "stable_step": step}
+    )

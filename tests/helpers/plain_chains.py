@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from dragchain.arrays import Floats, Ints
+from dragchain.arrays import Floats, Ints, wrap_angle
 from dragchain.network.chains import (
     ALPHA_RAD,
     LEAST_PARTICLES,
@@ -21,7 +21,6 @@ from dragchain.network.chains import (
     major_stress,
 )
 from dragchain.network.frame import FLOOR, KINDS, PARTICLE, SIDE, WORKPIECE, NetworkFrame
-from dragchain.run.kinematics import wrap_angle
 
 BOWL = -1
 POINT_AND_FORCE = (("point", "m"), ("force", "n"))

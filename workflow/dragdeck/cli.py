@@ -50,6 +50,12 @@ COMMANDS = (
     Command("explain", "what the input scripts model, leave out and cost", "commands:explain", (
         STUDY, FIDELITY,
         _argument("scene", nargs="?", help="drop_test, filling or process; default: all"))),
+    Command("preview", "draw what a study describes, without running anything", "commands:preview",
+            (STUDY, FIDELITY, _argument("--case", help="case to draw (default: the first)"))),
+    Command("new", "make a study that extends another", "commands:new", (
+        _argument("study", help="its name"),
+        _argument("--from", default="uhlmann2015", metavar="STUDY", dest="base",
+                  help="the study that it extends (default: %(default)s)"))),
     Command("cases", "list the cases of a study and their runs", "commands:cases",
             (STUDY, FIDELITY, PLAN)),
     Command("advise", "find settings for a tolerance, with their error and cost",

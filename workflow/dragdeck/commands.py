@@ -9,7 +9,7 @@ from pathlib import Path
 from pydantic import ValidationError
 from rich.table import Table
 
-from dragdeck.advice.advise import Advice, breaking_note
+from dragdeck.advice.advise import Advice
 from dragdeck.advice.advise import advise as advised_settings
 from dragdeck.advice.forecast import (
     AdviceFile,
@@ -30,15 +30,24 @@ from dragdeck.decks.render import deck_text, write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
-from dragdeck.errors import InputError, together
+from dragdeck.errors import InputError, choices, together
+from dragdeck.files import replace_bytes, replace_text
 from dragdeck.outlook import bed as bed_outlook
+from dragdeck.outlook import fit as fit_outlook
 from dragdeck.outlook import timestep as timestep_outlook
 from dragdeck.outlook.explain import expected_cost, explanation, show
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_measured
+from dragdeck.outlook.stable_step import stable_step_cautions, stable_step_note
+from dragdeck.preview.layout import Layout, layout
+from dragdeck.preview.page import Words, page
+from dragdeck.preview.picture import picture
+from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_run, find_project, study_templates
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import Bed, SceneType, read_bed
-from dragdeck.study.yaml import explained, located, warnings
+from dragdeck.study.check import explained, warnings
+from dragdeck.study.yaml import located
+from dragdeck.sweep.cases import new_study
 
 
 def _scene_type(name: str) -> SceneType:
@@ -100,7 +109,8 @@ def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
     except InputError as error:
         error.file = error.file or case.file
         raise located(error) from None
-    return replace(scene, warnings=[*warnings(case.study), *scene.warnings])
+    more = stable_step_cautions(case) if kind.needs_bed else ()
+    return replace(scene, warnings=[*warnings(case.study), *scene.warnings, *more])
 
 
 def explain(study: str, fidelity: str | None, scene: str | None) -> None:
@@ -126,8 +136,85 @@ def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[
     """What is known of a scene's time step and bed before it is run."""
     notes = timestep_outlook.notes(case, kind, scene)
     if kind.needs_bed:
-        notes += breaking_note(case, tradeoff_if_measured())
+        notes += [stable_step_note(case), *fit_outlook.notes(case)]
     return [*notes, *([] if kind.single_particle else bed_outlook.notes(case))]
+
+
+def preview(study: str, fidelity: str | None, case: str | None) -> None:
+    """Draw one case of a study and print its clearances, whether `check` refuses it or not."""
+    project = find_project(Path.cwd())
+    every = project.cases(study, fidelity)
+    one = _case_named(every, case)
+    warnings, refused = _judged(one)
+    try:
+        found = layout(one)
+    except InputError as error:
+        raise together([*refused, located(error)]) from None
+    refusal = str(together(refused)) if refused else ""
+    words = Words(one.study.title, study, one.name, _numbers(one), warnings, refusal)
+    files = _drawn(found, words, project.results(study))
+    print(f"{study}: case {one.name}" + (f", one of {len(every)} (--case)" if every[1:] else ""))
+    for name, text in (row for rows in words.numbers.values() for row in rows):
+        print(f"  {name}: {text}")
+    for warning in warnings:
+        print(f"warning: {warning}")
+    print(*files, sep="\n")
+    if refused:
+        raise together(refused)
+
+
+def _numbers(case: Case) -> dict[str, list[tuple[str, str]]]:
+    """The tables of a preview by their headings."""
+    count = ("particles", str(case.study.media.count))
+    return {
+        "Expected": [*fit_outlook.notes(case), count],
+        "Dimensionless numbers": fit_outlook.dimensionless(case),
+    }
+
+
+def _drawn(found: Layout, words: Words, folder: Path) -> list[Path]:
+    """Write picture and page of a layout into a folder and return their files."""
+    swept = [swept_volume(body.mesh, body.drag.poses) for body in found.workpieces]
+    png = picture(found, swept, words.heading, refused=bool(words.refusal))
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [folder / "preview.png", folder / "preview.html"]
+    replace_bytes(files[0], png)
+    replace_text(files[1], page(found, swept, words, png))
+    return files
+
+
+def _case_named(cases: list[Case], name: str | None) -> Case:
+    """The case of this name, or the first.
+
+    Raises
+    ------
+    InputError
+        There is none of this name.
+    """
+    named = {one.name: one for one in reversed(cases)}
+    if name is None:
+        return cases[0]
+    if name not in named:
+        raise InputError("no such case", field="--case", value=name, limit=choices(name, named))
+    return named[name]
+
+
+def _judged(case: Case) -> tuple[list[str], list[InputError]]:
+    """Warnings of the scenes of a case, and why those that cannot be built cannot."""
+    warnings: dict[str, None] = {}
+    errors: list[InputError] = []
+    for kind in SCENES.values():
+        try:
+            warnings.update(dict.fromkeys(map(str, _built(kind, case, None).warnings)))
+        except InputError as error:
+            errors.append(error)
+    return list(warnings), errors
+
+
+def new(study: str, base: str) -> None:
+    """Make the folder of a study that extends another."""
+    file = new_study(find_project(Path.cwd()).studies, study, base)
+    say(f"{file}: change it, then dragdeck check {study}")
 
 
 def cases(study: str, fidelity: str | None, plan: str | None) -> None:

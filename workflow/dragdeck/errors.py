@@ -102,7 +102,16 @@ class RejectedRunError(DragdeckError):
     """A run ended, but what it left cannot be trusted."""
 
 
-CautionCode = Literal["gap", "implausible", "mesh", "overlap", "ranks", "skin", "steps_per_contact"]
+CautionCode = Literal[
+    "gap",
+    "implausible",
+    "mesh",
+    "overlap",
+    "ranks",
+    "skin",
+    "stable_timestep",
+    "steps_per_contact",
+]
 """What a `Caution` is about."""
 
 

@@ -13,9 +13,14 @@ def file_checksum(file: Path) -> str:
 
 def replace_text(file: Path, text: str) -> None:
     """Write a text file in one step: readers see the old version or the new one."""
+    replace_bytes(file, text.encode())
+
+
+def replace_bytes(file: Path, content: bytes) -> None:
+    """Write a file in one step: readers see the old version or the new one."""
     waiting = file.with_name(f".{file.name}.{os.getpid()}")
     try:
-        waiting.write_text(text, encoding="utf-8")
+        waiting.write_bytes(content)
         waiting.replace(file)
     finally:
         waiting.unlink(missing_ok=True)

@@ -8,15 +8,16 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from dragdeck.advice.advise import check_timestep, resolve
+from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError, choices
-from dragdeck.outlook.measured import Tradeoff, tradeoff_if_measured
+from dragdeck.outlook.measured import Tradeoff
+from dragdeck.outlook.stable_step import check_timestep
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import NAME, NAME_LIMIT
-from dragdeck.study.yaml import located
+from dragdeck.study.yaml import located, study_folders
 from dragdeck.sweep.cases import load_cases, study_file
 from dragdeck.sweep.plan import Points, plan_points, read_plan
 
@@ -67,7 +68,7 @@ class Project:
         try:
             found = load_cases(file, fidelity, partial(resolve, tradeoff=tradeoff))
             for case in found:
-                check_timestep(case, tradeoff or tradeoff_if_measured())
+                check_timestep(case)
         except InputError as error:
             raise located(error) from None
         return found
@@ -132,8 +133,9 @@ def find_project(start: Path) -> Project:
 
 
 def study_templates(case: Case) -> Path:
-    """A study's own templates; the folder need not exist."""
-    return case.file.parent / "templates"
+    """A study's own templates, or those of the nearest study it extends; there need be none."""
+    folders = [folder / "templates" for folder in study_folders(case.file)]
+    return next((folder for folder in folders if folder.is_dir()), folders[0])
 
 
 def by_run(cases: Iterable[Case], scene: SceneType) -> dict[str, Case]:

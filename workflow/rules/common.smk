@@ -23,7 +23,7 @@ from dragdeck.engine.reports import say
 from dragdeck.snakemake_lock import clear_stale_locks
 from dragdeck.source_hash import source_hash
 from dragdeck.study.base import NAME, NAME_LIMIT
-from dragdeck.study.yaml import warnings
+from dragdeck.study.check import warnings
 from evidence.stability.map import bed_names
 from evidence.verification.suite import suite_of
 
@@ -115,11 +115,30 @@ def every(place, *files):
     return [f"{folder}/{file}" for folder in every_folder(place) for file in files]
 
 
+STIFFNESS = "workflow/dragdeck/data/stiffness.json"
+
+
+def every_extrapolated():
+    """What is extrapolated to the physical Young's modulus: process runs with a reduced one.
+
+    Not with a faster workpiece, at which no law was measured.
+    """
+    chosen = {
+        run: case.study.chosen_fidelity() for run, case in by_run(CASES, PLACES["process"]).items()
+    }
+    return [
+        f"{run_path(STUDY, 'process', run)}/tables/extrapolated.json"
+        for run, one in chosen.items()
+        if one.youngs_modulus_scale < 1 and one.speed_factor == 1
+    ]
+
+
 def relative(file):
     """Path from the project, where the workflow runs; other paths stay as they are."""
     return file.relative_to(PROJECT.root) if file.is_relative_to(PROJECT.root) else file
 
 
+@cache
 def templates_of(scene):
     """Every template that a scene's deck is made of."""
     templates = explained(environment, PROJECT.templates, study_templates(CASES[0]))

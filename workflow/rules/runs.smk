@@ -137,6 +137,26 @@ for PLACE, SCENE in SCENES.items():
                 "dragchain chains $(dirname {input.run}) > {log} 2>&1"
 
 
+# What the quantities of a run would be at the physical Young's modulus.
+rule extrapolate_process:
+    input:
+        tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
+        run=of_run("process", "run.json"),
+        record=STIFFNESS,
+    output:
+        of_run("process", "tables/extrapolated.json"),
+    log:
+        of_run("process", "logs/extrapolate.log"),
+    benchmark:
+        of_run("process", "benchmarks/extrapolate.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        source=source_hash("dragchain.tradeoff.extrapolate"),
+    shell:
+        "dragchain step extrapolate $(dirname {input.run}) --record {input.record} > {log} 2>&1"
+
+
 # What is compared of a point: its tables, chains and numbers.
 rule measure_point:
     input:

@@ -70,7 +70,8 @@ rule write_tradeoff:
 # What the advisor promised, in scenes that it was not measured on: plan=promises.
 rule write_promises:
     input:
-        lambda wildcards: every_point("measures.json"),
+        measures=lambda wildcards: every_point("measures.json"),
+        record=STIFFNESS,
     output:
         promises=of_tradeoff("promises.json"),
         table=of_tradeoff("promises.csv"),
@@ -83,13 +84,15 @@ rule write_promises:
     params:
         source=source_hash("dragchain.tradeoff.promises"),
     shell:
-        "dragchain step promises --out $(dirname {output.promises}) {input} 2>&1 | tee -i {log}"
+        "dragchain step promises --out $(dirname {output.promises}) --record {input.record}"
+        " {input.measures} 2>&1 | tee -i {log}"
 
 
 # What a reduced Young's modulus does to each quantity, in designed scenes: plan=scenes.
 rule write_stiffness:
     input:
-        lambda wildcards: every_point("measures.json"),
+        measures=lambda wildcards: every_point("measures.json"),
+        tradeoff="workflow/dragdeck/data/tradeoff.json",
     output:
         of_tradeoff("stiffness.json"),
     log:
@@ -101,4 +104,5 @@ rule write_stiffness:
     params:
         source=source_hash("dragchain.tradeoff.stiffness_record"),
     shell:
-        "dragchain step stiffness --out {output} {input} 2>&1 | tee -i {log}"
+        "dragchain step stiffness --out {output} --tradeoff {input.tradeoff} {input.measures}"
+        " 2>&1 | tee -i {log}"

@@ -32,7 +32,7 @@ _PICTURE_TIME_S = 4.5
 """Process time, counted from the start of the drag, at which the paper shows the network."""
 
 _COLOURS = ("#1e8f4e", "#f0c929", "#c8102e")
-_PIXELS_PER_MM = 14
+_PIXELS_PER_MM = 10
 _SIDES = 18
 _MARGIN_M = 0.004
 _FADED = 0.3
@@ -45,7 +45,7 @@ DEPTH_DIAMETERS = 6.0
 side."""
 
 _MOST_PIXELS = 1400
-"""Most pixels along an edge of a picture: a bowl of 100 mm at full resolution."""
+"""Most pixels along an edge of a picture: a bowl of 140 mm at full resolution."""
 
 
 @dataclass(frozen=True)

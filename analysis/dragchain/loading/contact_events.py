@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from dragchain.arrays import Floats, Ints
 from dragchain.contact_law.hertz import Elastic, contact_time, effective_modulus
 from dragchain.run.case import Case, friction_with, input_of, number_of
-from dragchain.run.kinematics import motion_of
+from dragchain.run.kinematics import surface_speed
 
 IMPACT, SLIDING, ROLLING, RESTING = TYPES = ("impact", "sliding", "rolling", "resting")
 
@@ -103,7 +103,7 @@ def surfaces(case: Case) -> Surfaces:
     modulus = case.fidelity.youngs_modulus_scale * effective_modulus(*materials)
     radius = case.media.radius_mean_m
     mass = case.media.density_kg_m3 * 4.0 / 3.0 * np.pi * radius**3
-    time_s = contact_time(mass, radius, modulus, motion_of(case).axis_speed_m_s)
+    time_s = contact_time(mass, radius, modulus, surface_speed(case))
     return Surfaces(friction, float(time_s))
 
 
@@ -228,7 +228,7 @@ def event_types(
     is seen, it passes for rolling.
     """
     longest = max(limits.impact_times * surfaces(case).contact_time_s, interval_s)
-    speed = motion_of(case).axis_speed_m_s
+    speed = surface_speed(case)
     sliding, rolling = events["sliding_m"] / events["duration_s"], events["rolling_m_s"]
     short = events["complete"] & (events["duration_s"] <= longest * (1 + 1e-9))
     rests = sliding + rolling < limits.rest * speed

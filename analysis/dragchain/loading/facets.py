@@ -10,7 +10,7 @@ from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.files import draft_of
 from dragchain.loading.contact_events import AMOUNTS, POINT
-from dragchain.loading.samples import WORKPIECE, Sampled
+from dragchain.loading.samples import BODY, WORKPIECE, Sampled
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
 from dragchain.run.workpiece import Surface, off_facet
@@ -58,7 +58,7 @@ def facet_table(sampled: Sampled, surface: Surface, events: pd.DataFrame) -> pd.
     peak = np.zeros(count)
     np.maximum.at(peak, facet, rows["normal_force_n"])
     samples = np.bincount(facet, minlength=count)
-    names = (*AMOUNTS, *WORKPIECE)
+    names = [name for name in (*AMOUNTS, *WORKPIECE, *BODY) if name in rows]
     sums = {name: np.bincount(facet, rows[name], count) for name in names}
     errors = {f"{name}_se": _standard_error(sampled, name, count) for name in _UNCERTAIN}
     area = surface.areas

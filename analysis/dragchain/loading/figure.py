@@ -20,8 +20,8 @@ from dragchain.loading.document import Loading, Profile
 from dragchain.loading.facets import as_polydata
 from dragchain.loading.samples import Sampled
 from dragchain.loading.summary import DEPTH_BINS
-from dragchain.run.case import Case, Circle
-from dragchain.run.kinematics import needed
+from dragchain.run.case import Case
+from dragchain.run.kinematics import motion_of, needed, spins
 from dragchain.run.workpiece import Surface
 
 _COLOURS = "magma_r"
@@ -127,8 +127,7 @@ def _view(axes: Axes, mesh: Any, name: str, scale: Normalize, case: Case) -> Non
 
 def _keeps_direction(case: Case) -> bool:
     """Whether the workpiece's motion has one direction in its own frame."""
-    motion = case.motion
-    return not isinstance(motion, Circle) or motion.orientation == "follow_path"
+    return not spins(case) and motion_of(case).keeps_direction
 
 
 def _render(mesh: Any, eye: tuple[float, float], scale: Normalize, case: Case) -> Image:

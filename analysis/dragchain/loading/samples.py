@@ -16,13 +16,18 @@ from dragchain.run.kinematics import (
     counted_mask,
     motion_of,
     needed,
+    spins,
     workpiece_frame,
+    workpiece_turn,
     workpiece_velocity,
 )
-from dragchain.run.workpiece import turned, workpiece_turn
+from dragchain.run.workpiece import turned
 from dragchain.tables.by_step import read_groups
 
 WORKPIECE = ("drag_impulse_n_s", "lateral_impulse_n_s", "vertical_impulse_n_s")
+BODY = ("body_x_impulse_n_s", "body_y_impulse_n_s", "body_z_impulse_n_s")
+"""Impulse on a workpiece that spins, in its own frame."""
+
 _FORCE = ["force_x_n", "force_y_n", "force_z_n"]
 _PLACE = ["point_x_m", "point_y_m", "point_z_m"]
 _VELOCITY = ["slip_x_m_s", "slip_y_m_s", "slip_z_m_s"]
@@ -58,7 +63,8 @@ class Sampled:
     ----------
     rows : DataFrame
         A contact with force: as `find_events` takes them, and `WORKPIECE` and
-        ``workpiece_work_j``, the work that the workpiece does on the particle through it.
+        ``workpiece_work_j``, the work that the workpiece does on the particle through it, seen from
+        the bowl.
     frames : int
         Number of counted samples, those without contact included.
     interval_s : float
@@ -94,7 +100,7 @@ def sample(run_dir: Path, case: Case, limits: Thresholds) -> Sampled:
     for contacts in _read_contacts(tables / "workpiece_contacts.parquet", run_dir):
         contacts["frame"] = np.searchsorted(steps, contacts["step"])
         at = workpiece.reindex(contacts["step"])
-        parts.append(_with_amounts(contacts, at, case, interval_s, limits)[_KEPT])
+        parts.append(_with_amounts(contacts, at, case, interval_s, limits))
     if not parts:
         raise TableError(f"{run_dir}: no particle touches the workpiece in the counted drag")
     impulse = workpiece[["drag_n", "lateral_n", "vertical_n"]].to_numpy().sum(axis=0) * interval_s
@@ -155,14 +161,20 @@ def _with_amounts(
     normal, tangential = (rows[f"{name}_force_n"].to_numpy() for name in ("normal", "tangential"))
     reference = workpiece[_REFERENCE].to_numpy()
     heading = workpiece["direction_rad"].to_numpy()
-    turn = workpiece_turn(heading, case)
+    steps = rows["step"].to_numpy()
+    turn = workpiece_turn(steps, heading, case)
     speed = np.linalg.norm(slip, axis=1)
     most = surfaces(case).friction * normal
     mobilisation = np.divide(tangential, most, out=np.full_like(most, np.inf), where=most > 0.0)
     mobilised = mobilisation >= limits.mobilised
-    velocity = workpiece_velocity(rows["step"].to_numpy(), point, reference[:, :2], case)
+    velocity = workpiece_velocity(steps, point, reference, case)
+    velocity -= motion_of(case).bowl_velocity(point)
     drag = workpiece_frame(force, heading) * interval_s
-    return rows.assign(
+    in_body = {}
+    if spins(case):
+        in_body = dict(zip(BODY, (workpiece_frame(force, turn) * interval_s).T, strict=True))
+    added = rows.assign(
+        **in_body,
         **dict(zip(POINT, turned(point - reference, -turn).T, strict=True)),
         **dict(zip(SLIP, turned(slip, -turn).T, strict=True)),
         **dict(zip(WORKPIECE, drag.T, strict=True)),
@@ -177,3 +189,4 @@ def _with_amounts(
         normal_work_j=normal * rows["normal_velocity_m_s"].to_numpy() * interval_s,
         workpiece_work_j=-np.einsum("ij,ij->i", force, velocity) * interval_s,
     )
+    return added[[*_KEPT, *in_body]]

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from dragchain.arrays import Floats, Ints
+from dragchain.arrays import Floats, Ints, wrap_angle
 from dragchain.network.chains import (
     ALPHA_RAD,
     STRESS_FACTOR,
@@ -20,7 +20,6 @@ from dragchain.network.chains import (
     split,
 )
 from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame
-from dragchain.run.kinematics import wrap_angle
 
 
 def chain_table(
@@ -49,16 +48,25 @@ def chain_table(
         chain by Peters et al. has no direction: it is listed from its higher end, and reaches the
         bowl if one of its particles touches it; ``end_kind`` is then `none` all the same.
     """
-    tables = [_peters_table(frame, alpha_rad, stress_factor), _path_table(frame, threshold)]
-    return pd.concat(tables, ignore_index=True)
+    peters, paths = _peters(frame, alpha_rad, stress_factor), _paths(frame, threshold)
+    return pd.DataFrame({name: _joined(name, peters[name], paths[name]) for name in peters})
 
 
-def _peters_table(frame: NetworkFrame, alpha_rad: float, stress_factor: float) -> pd.DataFrame:
+def _joined(name: str, one: Any, other: Any) -> Any:
+    """A column of the chains of both definitions."""
+    if name == "particle_ids":
+        return pd.Series([*one, *other], dtype=object)
+    if name in ("definition", "end_kind"):
+        return pd.array([*one, *other], dtype="str")
+    return np.concatenate([one, other])
+
+
+def _peters(frame: NetworkFrame, alpha_rad: float, stress_factor: float) -> dict[str, Any]:
     major = major_stress(particle_stress(frame))
     rows = peters_rows(frame, alpha_rad, stress_factor, major)
     on_bowl = np.zeros(frame.particle_id.size, dtype=bool)
     on_bowl[frame.a[(frame.other == FLOOR) | (frame.other == SIDE)]] = True
-    return _table(
+    return _columns(
         frame,
         rows,
         _shape(frame, frame.centre[rows.particles], rows.particle_starts),
@@ -69,7 +77,7 @@ def _peters_table(frame: NetworkFrame, alpha_rad: float, stress_factor: float) -
     )
 
 
-def _path_table(frame: NetworkFrame, threshold: float) -> pd.DataFrame:
+def _paths(frame: NetworkFrame, threshold: float) -> dict[str, Any]:
     rows = path_rows(frame, threshold)
     whole = np.diff(rows.contact_starts) > 1
     first = rows.contacts[rows.contact_starts[:-1]]
@@ -81,7 +89,7 @@ def _path_table(frame: NetworkFrame, threshold: float) -> pd.DataFrame:
     points[inner] = frame.centre[rows.particles]
     points[starts[:-1]], points[starts[1:] - 1] = frame.point[first], frame.point[last]
     kinds = zip(frame.other[last].tolist(), whole, strict=True)
-    table = _table(
+    columns = _columns(
         frame,
         rows,
         _shape(frame, points, starts),
@@ -90,17 +98,17 @@ def _path_table(frame: NetworkFrame, threshold: float) -> pd.DataFrame:
         reaches=whole,
         ends=[KINDS[kind] if there else "none" for kind, there in kinds],
     )
-    table.loc[~whole, _OF_WHOLE_PATHS] = np.nan
-    order = np.lexsort((-table["mean_force_n"], -table["bottleneck_n"]))
-    dominant = np.zeros(len(rows), dtype=bool)
-    dominant[order[:1]] = whole[order[:1]]
-    return table.assign(dominant=dominant)
+    for name in _OF_WHOLE_PATHS:
+        columns[name][~whole] = np.nan
+    order = np.lexsort((-columns["mean_force_n"], -columns["bottleneck_n"]))
+    columns["dominant"][order[:1]] = whole[order[:1]]
+    return columns
 
 
 _OF_WHOLE_PATHS = ["bottleneck_n", "mean_force_n", "length_m", "azimuth_rad", "inclination_rad"]
 
 
-def _table(
+def _columns(
     frame: NetworkFrame,
     rows: ChainRows,
     shape: Mapping[str, Floats],
@@ -109,28 +117,26 @@ def _table(
     stress_pa: Floats,
     reaches: NDArray[np.bool_],
     ends: list[str],
-) -> pd.DataFrame:
-    """The rows of chains of one definition, none of them dominant."""
+) -> dict[str, Any]:
+    """The columns of chains of one definition, none of them dominant."""
     forces, count = frame.normal_force[rows.contacts], len(rows)
     ids = split(frame.particle_id[rows.particles], rows.particle_starts)
     height = frame.centre[rows.particles, 2]
-    return pd.DataFrame(
-        {
-            "step": np.full(count, frame.step),
-            "time_s": np.full(count, frame.time_s),
-            "definition": pd.array([definition] * count, dtype="str"),
-            "n_particles": np.diff(rows.particle_starts),
-            "particle_ids": pd.Series(ids, dtype=object),
-            "bottleneck_n": _of_each(rows.contact_starts, forces, lambda x: x.min(axis=1)),
-            "mean_force_n": _of_each(rows.contact_starts, forces, _mean),
-            **shape,
-            "altitude_m": _of_each(rows.particle_starts, height, _mean),
-            "major_stress_mean_pa": stress_pa,
-            "reaches_bowl": reaches,
-            "end_kind": pd.array(ends, dtype="str"),
-            "dominant": np.zeros(count, dtype=bool),
-        }
-    )
+    return {
+        "step": np.full(count, frame.step),
+        "time_s": np.full(count, frame.time_s),
+        "definition": [definition] * count,
+        "n_particles": np.diff(rows.particle_starts),
+        "particle_ids": ids,
+        "bottleneck_n": _of_each(rows.contact_starts, forces, lambda x: x.min(axis=1)),
+        "mean_force_n": _of_each(rows.contact_starts, forces, _mean),
+        **shape,
+        "altitude_m": _of_each(rows.particle_starts, height, _mean),
+        "major_stress_mean_pa": stress_pa,
+        "reaches_bowl": reaches,
+        "end_kind": ends,
+        "dominant": np.zeros(count, dtype=bool),
+    }
 
 
 def _shape(frame: NetworkFrame, points: Floats, starts: Ints) -> dict[str, Floats]:

@@ -13,6 +13,7 @@ from typing import ClassVar
 from pydantic import JsonValue
 
 from dragchain.documents import Document, Part
+from dragchain.report.extrapolated import Extrapolated
 from dragchain.run.case import AdvisedSettings, Case, changed_inputs
 from dragchain.run.completeness import RunRecord
 from dragchain.statistics.correlated import MeanEstimate
@@ -85,12 +86,17 @@ class CostRow:
 
 @dataclass(frozen=True)
 class RunInterval:
-    """Mean of one run with its 95 % interval, N, and the relative half-width of that."""
+    """Value of one run with its 95 % interval, and the relative half-width of that."""
 
     mean: float
     ci95_low: float
     ci95_high: float
     fraction: float
+
+    @classmethod
+    def of(cls, mean: float, low: float, high: float) -> "RunInterval":
+        """From a value, which is not 0, and its interval."""
+        return cls(mean, low, high, abs((high - low) / (2 * mean)))
 
 
 def read_advice(file: Path) -> list[Option]:
@@ -132,15 +138,21 @@ def cost_rows(option: Option, records: Mapping[str, RunRecord]) -> Iterator[Cost
 
 
 def actual_interval(
-    asked: AdvisedSettings | None, forces: Mapping[str, MeanEstimate]
+    asked: AdvisedSettings | None,
+    forces: Mapping[str, MeanEstimate],
+    extrapolated: Extrapolated | None,
 ) -> RunInterval | None:
-    """Mean and 95 % interval of the quantity asked about.
+    """Value and 95 % interval of the quantity asked about, extrapolated if that was asked.
 
     None where nothing was asked, or a single run has no interval of it.
     """
-    name = _INTERVALS.get(asked.quantity) if asked else None
+    if asked is None:
+        return None
+    if asked.extrapolated:
+        found = extrapolated.of(asked.quantity) if extrapolated else None
+        return RunInterval.of(found.value, found.ci95_low, found.ci95_high) if found else None
+    name = _INTERVALS.get(asked.quantity)
     if name is None or not forces[name].mean:
         return None
     force = forces[name]
-    half_width = abs((force.ci95_high - force.ci95_low) / (2 * force.mean))
-    return RunInterval(force.mean, force.ci95_low, force.ci95_high, half_width)
+    return RunInterval.of(force.mean, force.ci95_low, force.ci95_high)

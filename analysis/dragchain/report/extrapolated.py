@@ -49,3 +49,7 @@ class Extrapolated(Document):
     source: str
     outside: tuple[str, ...]
     quantities: tuple[ExtrapolatedQuantity, ...]
+
+    def of(self, name: str) -> ExtrapolatedQuantity | None:
+        """A quantity by its name, None if it was not extrapolated."""
+        return next((one for one in self.quantities if one.name == name), None)

@@ -20,6 +20,7 @@ _SMALLER_STEP = "choose a smaller timestep_fraction or a larger youngs_modulus_s
 _REMEDIES: Mapping[CheckCode, str] = {
     "neighbour_builds": "choose a larger skin_m",
     "at_rest": "choose a larger filling.max_time_s or filling.energy_ratio",
+    "steady_bed": "choose a longer motion.transient_m, or more motion.path.revolutions",
     "particles_kept": _SMALLER_STEP,
     "finite_numbers": _SMALLER_STEP,
     "stable_timestep": _SMALLER_STEP,

@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from dragchain.errors import DocumentError, RejectedRunError
+from dragchain.report.extrapolated import FILE as EXTRAPOLATED
+from dragchain.report.extrapolated import Extrapolated
 from dragchain.report.findings import (
     FILE,
     DropFindings,
@@ -31,11 +33,16 @@ class ReportedRun(Generic[F]):
 
 @dataclass(frozen=True)
 class StudyRuns:
-    """A process run with the filling and the drop test it belongs to, None where it names none."""
+    """A process run with the filling and the drop test it belongs to, None where it names none.
+
+    `extrapolated`: its quantities at the physical Young's modulus, None where that was not
+    computed.
+    """
 
     process: ReportedRun[ProcessFindings]
     filling: ReportedRun[FillingFindings] | None
     drop_test: ReportedRun[DropFindings] | None
+    extrapolated: Extrapolated | None = None
 
     @property
     def runs(self) -> list[ReportedRun[Findings]]:
@@ -64,7 +71,9 @@ def read_study(run_dir: Path) -> StudyRuns:
     with suppress(RejectedRunError, DocumentError):
         if "drop_test" in upstream:
             drop_test = _read(upstream["drop_test"], DropFindings)
-    return StudyRuns(process, filling, drop_test)
+    extrapolated = run_dir / EXTRAPOLATED
+    known = Extrapolated.read(extrapolated) if extrapolated.is_file() else None
+    return StudyRuns(process, filling, drop_test, known)
 
 
 def read_upstream(run_dir: Path) -> ReportedRun[Findings]:

@@ -20,8 +20,6 @@ from dragchain.report.cost_check import (
     prediction_for,
     read_advice,
 )
-from dragchain.report.extrapolated import FILE as EXTRAPOLATED
-from dragchain.report.extrapolated import Extrapolated
 from dragchain.report.findings import FIGURES, Findings
 from dragchain.report.missing import MissingRun, missing_run, scene_of
 from dragchain.report.page import data_uri, file_uri, render_page
@@ -61,7 +59,6 @@ class Section:
     pictures: list[Picture]
     loading: Loading | None
     corrections: Corrections | None
-    extrapolated: Extrapolated | None
     interval: RunInterval | None
     costs: list[CostRow]
     cost_source: str | None
@@ -138,15 +135,13 @@ def _section(study: StudyRuns, options: Sequence[Option]) -> Section:
     records = {str(run.case.scene): run.record for run in study.runs}
     measured = (process.folder / LOADING).is_file()
     corrections = process.folder / "tables" / "corrections.json"
-    extrapolated = process.folder / EXTRAPOLATED
     return Section(
         study=study,
         assumptions=_assumptions(study),
         pictures=[picture for run in study.runs for picture in _pictures(run)],
         loading=Loading.read(process.folder / LOADING) if measured else None,
         corrections=Corrections.read(corrections) if corrections.is_file() else None,
-        extrapolated=Extrapolated.read(extrapolated) if extrapolated.is_file() else None,
-        interval=actual_interval(process.case.asked, process.findings.forces),
+        interval=actual_interval(process.case.asked, process.findings.forces, study.extrapolated),
         costs=list(cost_rows(expected, records)) if expected else [],
         cost_source=expected.source if expected else None,
     )

@@ -41,6 +41,7 @@ def _summary_row(study: StudyRuns) -> Row:
         **_network(found),
         **_chains(found),
         **_upstream(study),
+        **_extrapolated(study),
     }
 
 
@@ -75,6 +76,16 @@ def _comparisons(comparisons: Sequence[Comparison]) -> Row:
         row[f"{name}_percent"] = against.difference_percent
         row[f"{name}_ci95_low_percent"] = against.ci95_low
         row[f"{name}_ci95_high_percent"] = against.ci95_high
+    return row
+
+
+def _extrapolated(study: StudyRuns) -> Row:
+    row: Row = {}
+    for found in study.extrapolated.quantities if study.extrapolated else ():
+        unit = f"_{found.unit.lower().replace('/', '_per_')}" if found.unit else ""
+        row[f"extrapolated_{found.name}{unit}"] = found.value
+        row[f"extrapolated_{found.name}_ci95_low{unit}"] = found.ci95_low
+        row[f"extrapolated_{found.name}_ci95_high{unit}"] = found.ci95_high
     return row
 
 

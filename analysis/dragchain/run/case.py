@@ -9,6 +9,12 @@ from pydantic import Field, JsonValue, PositiveFloat, PositiveInt, model_validat
 
 from dragchain.documents import Document, Part
 from dragchain.errors import TableError
+from dragchain.run.paths.circle import Circle
+from dragchain.run.paths.line import Line
+from dragchain.run.paths.rest import Rest
+from dragchain.run.paths.waypoints import Waypoints
+from dragchain.run.superposed.oscillation import Oscillation
+from dragchain.run.superposed.spin import Spin
 
 Scene = Literal["drop_test", "filling", "process"]
 OutputKind = Literal["print", "custom", "local"]
@@ -51,34 +57,11 @@ class Workpiece(Part):
     immersion_depth_m: float
 
 
-class Circle(Part):
-    """A drag on a circle about the bowl's axis.
+AnySuperposed = Annotated[Spin | Oscillation, Field(discriminator="kind")]
+"""The registry of motions superposed on the path: an entry of ``superposed``, told by its kind."""
 
-    ``direction`` is seen from above; ``start_direction_rad`` is the direction of
-    motion when the drag begins, from x towards y; a workpiece with the
-    orientation ``follow_path`` turns with its path.
-    """
-
-    kind: Literal["circle"]
-    axis_speed_m_s: PositiveFloat
-    radius_m: PositiveFloat
-    direction: Literal["ccw", "cw"]
-    start_direction_rad: float
-    orientation: Literal["follow_path", "fixed"]
-
-    @property
-    def sign(self) -> int:
-        """1 for a counter-clockwise path, -1 for a clockwise one."""
-        return 1 if self.direction == "ccw" else -1
-
-
-class Line(Part):
-    """A drag along a straight line that leaves ``start_m`` along ``direction_rad``."""
-
-    kind: Literal["line"]
-    axis_speed_m_s: PositiveFloat
-    start_m: tuple[float, float]
-    direction_rad: float
+AnyPath = Annotated[Circle | Line | Rest | Waypoints, Field(discriminator="kind")]
+"""The registry of paths: ``motion`` of a process, told by its kind."""
 
 
 class Phase(Part):
@@ -114,7 +97,8 @@ class AdvisedSettings(Part):
     """The tolerance that a run's settings were chosen for, and what is expected of them.
 
     ``held_to`` is the tolerance that the settings meet: the asked one, or less outside of the
-    measured range. ``error``, its interval and the ``bound`` of its size are None for the
+    measured range, for the value extrapolated to the physical Young's modulus if ``extrapolated``.
+    ``error``, its interval and the ``bound`` of its size are None for the
     reference; ``half_width`` is that of the relative 95 % interval of one run's value.
     """
 
@@ -122,6 +106,7 @@ class AdvisedSettings(Part):
     quantity: str
     label: str
     held_to: float
+    extrapolated: bool = False
     error: float | None
     ci95_low: float | None
     ci95_high: float | None
@@ -158,10 +143,10 @@ class Case(Document):
     """The content of ``case.json`` of a run of a study.
 
     ``case``, ``workpiece``, ``motion``, ``surface_m`` and ``statistics`` are None outside a
-    process; ``restitution`` is None outside a drop test, ``settled`` outside a filling.
-    ``contact_moduli`` are those of a particle with a ``particle``, the ``bowl`` and the
-    ``workpiece``; ``numbers`` are the dimensionless numbers of a process; ``asked`` is the
-    tolerance that its settings were chosen for, if any.
+    process; ``superposed`` is what is superposed on the path; ``restitution`` is None outside a
+    drop test, ``settled`` outside a filling. ``contact_moduli`` are those of a particle with a
+    ``particle``, the ``bowl`` and the ``workpiece``; ``numbers`` are the dimensionless numbers of
+    a process; ``asked`` is the tolerance that its settings were chosen for, if any.
     """
 
     made_by: ClassVar[str] = "dragdeck step render"
@@ -182,7 +167,8 @@ class Case(Document):
     bowl: Bowl | None = None
     workpiece: Workpiece | None = None
     surface_m: PositiveFloat | None = None
-    motion: Annotated[Circle | Line, Field(discriminator="kind")] | None = None
+    motion: AnyPath | None = None
+    superposed: tuple[AnySuperposed, ...] = ()
     phases: tuple[Phase, ...]
     statistics: Statistics | None = None
     restitution: float | None = None

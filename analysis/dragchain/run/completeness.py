@@ -14,6 +14,7 @@ CheckCode = Literal[
     "no_engine_error",
     "neighbour_builds",
     "at_rest",
+    "steady_bed",
     "stable_timestep",
     "particles_kept",
     "finite_numbers",
@@ -36,6 +37,8 @@ class AcceptanceCheck(Part):
         Why the check did not pass, where a code has several reasons.
     name, seen, limit : str
         For readers: the condition, what was seen, and what it asks for.
+    number : float or None
+        What was seen, where it is one number.
     """
 
     code: CheckCode
@@ -44,6 +47,7 @@ class AcceptanceCheck(Part):
     passed: bool
     seen: str
     limit: str
+    number: float | None = None
 
 
 class RunPart(Part):

@@ -1,16 +1,15 @@
 """How the workpiece moves: phases of a run, paths, the workpiece's frame, counted samples."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, TypeVar
+from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from dragchain.arrays import Floats, Ints
+from dragchain.arrays import Floats, Ints, wrap_angle
 from dragchain.errors import TableError
-from dragchain.run.case import Case, Circle, Line, Phase
+from dragchain.run.case import Case, Phase
+from dragchain.run.paths.kind import WorkpiecePath
 
 
 def drag_start_s(case: Case) -> float:
@@ -93,113 +92,11 @@ def needed(value: T | None, name: str) -> T:
     return value
 
 
-def motion_of(case: Case) -> Circle | Line:
+def motion_of(case: Case) -> WorkpiecePath:
     """The motion of the workpiece in the drag."""
     if case.motion is None:
         raise TableError("case.json has no motion, which these tables need")
     return case.motion
-
-
-@dataclass(frozen=True)
-class WorkpiecePath(ABC):
-    """How the workpiece is driven in the drag.
-
-    Attributes
-    ----------
-    axis_speed_m_s : float
-        Speed of the workpiece's axis.
-    start_direction_rad : float
-        Direction of motion when the drag begins, from x towards y.
-    """
-
-    axis_speed_m_s: float
-    start_direction_rad: float
-
-    @abstractmethod
-    def directions(self, ref_xy_m: Floats) -> Floats:
-        """Direction of motion, (N,), where the reference point is at (N, 2) places, m."""
-
-    def velocity(self, point_m: Floats, direction_rad: Floats) -> Floats:
-        """Horizontal velocity, (N, 2) in m/s, of (N, 3) points that are fixed to the workpiece."""
-        across = np.column_stack([np.cos(direction_rad), np.sin(direction_rad)])
-        return self.axis_speed_m_s * across
-
-    def turn(self, direction_rad: Floats) -> Floats:
-        """Angle of the workpiece's own frame about the vertical at (N,) directions of motion."""
-        return direction_rad
-
-
-@dataclass(frozen=True)
-class LinePath(WorkpiecePath):
-    """A straight line, along which the workpiece moves without turning."""
-
-    @classmethod
-    def of(cls, motion: Line) -> "LinePath":
-        """The path of a motion."""
-        return cls(motion.axis_speed_m_s, motion.direction_rad)
-
-    def directions(self, ref_xy_m: Floats) -> Floats:
-        """The line's direction everywhere."""
-        return np.full(len(ref_xy_m), wrap_angle(self.start_direction_rad))
-
-
-@dataclass(frozen=True)
-class CirclePath(WorkpiecePath):
-    """A circle about the bowl's axis, with a workpiece that is moved without turning.
-
-    Attributes
-    ----------
-    sign : int
-        1 for a counter-clockwise path, -1 for a clockwise one.
-    radius_m : float
-        Of the axis' path.
-    """
-
-    sign: int
-    radius_m: float
-
-    @classmethod
-    def of(cls, motion: Circle) -> "CirclePath":
-        """The path of a motion."""
-        kind = CirclePath if motion.orientation == "fixed" else _TurningCirclePath
-        speed, start = motion.axis_speed_m_s, motion.start_direction_rad
-        return kind(speed, start, motion.sign, motion.radius_m)
-
-    def directions(self, ref_xy_m: Floats) -> Floats:
-        """``sign * z x r`` with r the unit vector from the bowl's axis to the reference point."""
-        radial = np.arctan2(ref_xy_m[:, 1], ref_xy_m[:, 0])
-        return wrap_angle(radial + self.sign * np.pi / 2.0)
-
-    def turn(self, direction_rad: Floats) -> Floats:
-        """The first direction, which the workpiece keeps."""
-        return np.full_like(direction_rad, self.start_direction_rad)
-
-
-@dataclass(frozen=True)
-class _TurningCirclePath(CirclePath):
-    """A circle whose workpiece turns with it: ``w x r`` with ``w = sign speed / radius``."""
-
-    def velocity(self, point_m: Floats, direction_rad: Floats) -> Floats:
-        """Velocity of a rotation about the bowl's axis."""
-        turning = self.sign * self.axis_speed_m_s / self.radius_m
-        return turning * np.column_stack([-point_m[:, 1], point_m[:, 0]])
-
-    def turn(self, direction_rad: Floats) -> Floats:
-        """The direction of motion."""
-        return direction_rad
-
-
-_PATHS: Mapping[str, Callable[[Any], WorkpiecePath]] = {
-    "circle": CirclePath.of,
-    "line": LinePath.of,
-}
-"""The path of each kind of motion."""
-
-
-def path_of(case: Case) -> WorkpiecePath:
-    """How the workpiece is driven in the drag."""
-    motion = motion_of(case)
-    return _PATHS[motion.kind](motion)
 
 
 def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:
@@ -221,12 +118,40 @@ def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:
     (N,) ndarray
         Angles from x towards y, rad, in (-pi, pi].
     """
-    path = path_of(case)
+    path, since = motion_of(case), steps - drag_phase(case).start_step
     start = wrap_angle(path.start_direction_rad)
-    return np.where(steps > drag_phase(case).start_step, path.directions(ref_xy_m), start)
+    return np.where(since > 0, path.directions(since, case.timestep_s, ref_xy_m), start)
 
 
-def workpiece_velocity(steps: Ints, point_m: Floats, ref_xy_m: Floats, case: Case) -> Floats:
+def workpiece_turn(steps: Ints, direction_rad: Floats, case: Case) -> Floats:
+    """Angle of the workpiece's own frame about the vertical, (N,) in rad.
+
+    Parameters
+    ----------
+    steps : (N,) ndarray of int
+        Steps.
+    direction_rad : (N,) ndarray
+        Direction of motion at these steps, rad.
+    case : Case
+        The case, of a process.
+    """
+    turn, since = motion_of(case).turn(direction_rad), steps - drag_phase(case).start_step
+    for motion in case.superposed:
+        turn = turn + motion.turn(since, case.timestep_s)
+    return turn
+
+
+def surface_speed(case: Case) -> float:
+    """Highest speed of the workpiece's surface in the drag, m/s: of its axis, and what is added."""
+    return motion_of(case).axis_speed_m_s * (1.0 + case.numbers.get("superposed_speed", 0.0))
+
+
+def spins(case: Case) -> bool:
+    """Whether a superposed motion turns the workpiece."""
+    return any(one.turns for one in case.superposed)
+
+
+def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: Case) -> Floats:
     """Velocity of points that are fixed to the workpiece, in the drag.
 
     Parameters
@@ -235,7 +160,7 @@ def workpiece_velocity(steps: Ints, point_m: Floats, ref_xy_m: Floats, case: Cas
         Steps.
     point_m : (N, 3) ndarray
         The points at these steps, m.
-    ref_xy_m : (N, 2) ndarray
+    ref_m : (N, 3) ndarray
         Reference point of the workpiece at these steps, m.
     case : Case
         The case, of a process.
@@ -246,17 +171,13 @@ def workpiece_velocity(steps: Ints, point_m: Floats, ref_xy_m: Floats, case: Cas
         Velocities, m/s; NaN outside of the drag, of which alone ``case.json``
         gives the motion.
     """
-    drag = drag_phase(case)
-    across = path_of(case).velocity(point_m, directions(steps, ref_xy_m, case))
-    velocity = np.column_stack([across, np.zeros(len(steps))])
+    drag, dt = drag_phase(case), case.timestep_s
+    since, heading = steps - drag.start_step, directions(steps, ref_m[:, :2], case)
+    velocity = motion_of(case).velocity(since, dt, point_m, heading)
+    for motion in case.superposed:
+        velocity = velocity + motion.velocity(since, dt, point_m - ref_m)
     dragged = (steps > drag.start_step) & (steps <= drag.end_step)
     return np.where(dragged[:, None], velocity, np.nan)
-
-
-def wrap_angle(angle_rad: ArrayLike) -> Floats:
-    """Wrap angles into (-pi, pi]."""
-    turned = np.pi - np.asarray(angle_rad, dtype=np.float64)
-    return np.asarray(np.pi - np.mod(turned, 2.0 * np.pi))
 
 
 def workpiece_frame(force_n: Floats, direction_rad: Floats) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.run.case import Case
-from dragchain.run.kinematics import needed, path_of
+from dragchain.run.kinematics import motion_of, needed
 
 
 def workpiece_mesh(run_dir: Path, case: Case) -> Any:
@@ -76,11 +76,6 @@ class Surface:
         return np.asarray(np.cross(second - first, third - first))
 
 
-def workpiece_turn(direction_rad: Floats, case: Case) -> Floats:
-    """Angle of the workpiece's own frame about the vertical at these directions, rad."""
-    return path_of(case).turn(direction_rad)
-
-
 def turned(vectors: Floats, angle_rad: Floats | float) -> Floats:
     """Turn (..., 3) vectors about the vertical."""
     cos, sin = np.cos(angle_rad), np.sin(angle_rad)
@@ -101,7 +96,7 @@ def read_surface(run_dir: Path, case: Case) -> Surface:
     """
     corners = _corners(_mesh_file(run_dir, case))
     if needed(case.workpiece, "workpiece").kind == "cylinder":
-        corners = turned(corners, -path_of(case).start_direction_rad)
+        corners = turned(corners, -motion_of(case).start_direction_rad)
     return Surface(corners)
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from dragchain.drag.force import summarise_forces
 from dragchain.errors import TableError
-from dragchain.run.case import Case, Circle, load_case
+from dragchain.run.case import Case, load_case
 from dragchain.run.kinematics import needed
+from dragchain.run.paths.circle import Circle
 from dragchain.scaling.document import ScaledRun
 
 _UNLIKE = frozenset({"seed"})

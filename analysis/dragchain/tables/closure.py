@@ -1,13 +1,15 @@
 """Whether the contacts on the workpiece add up to the force on the workpiece."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dragchain.arrays import Floats
 from dragchain.documents import Document
-from dragchain.tables.workpiece_contacts import WorkpieceFrame
+from dragchain.tables.workpiece_contacts import WorkpieceFrames, sums
 
 LIMIT = 1e-6
 """Largest relative error that passes: far above rounding, far below physics."""
@@ -98,37 +100,42 @@ class Closure:
     _opening: list[_Error] = field(default_factory=list)
 
     def add(
-        self, frame: WorkpieceFrame, workpiece_force_n: Floats | None, *, counted: bool
-    ) -> bool:
-        """Take in the contacts of one step.
+        self,
+        frames: WorkpieceFrames,
+        workpiece_force_n: Sequence[Floats | None],
+        counted: NDArray[np.bool_],
+    ) -> NDArray[np.bool_]:
+        """Take in the contacts of F steps.
 
         Parameters
         ----------
-        frame : WorkpieceFrame
+        frames : WorkpieceFrames
             The contacts.
-        workpiece_force_n : (3,) ndarray or None
-            Force on the workpiece at this step; None if it was not written.
-        counted : bool
-            Whether statistics use this step.
+        workpiece_force_n : sequence of (3,) ndarray or None
+            Force on the workpiece at each step; None if it was not written.
+        counted : (F,) ndarray of bool
+            Whether statistics use a step.
 
         Returns
         -------
-        bool
+        (F,) ndarray of bool
             False for a frame that opens a file and whose forces are not the
             applied ones.
         """
-        contacts = frame.workpiece
+        contacts = frames.workpiece
         silent_n = contacts.evaluated_n[contacts.silent]
         self.contacts += len(contacts)
         self.silent += len(silent_n)
         self.silent_max_n = max(self.silent_max_n, _largest(silent_n))
-        self.unplaced += len(frame.unplaced_n)
-        self.unplaced_max_n = max(self.unplaced_max_n, _largest(frame.unplaced_n))
-        if workpiece_force_n is None:
-            return True
-        error = _error(frame, workpiece_force_n, counted)
-        (self._opening if frame.opening else self._errors).append(error)
-        return not frame.opening or error.relative <= self.limit
+        self.unplaced += len(frames.unplaced_n)
+        self.unplaced_max_n = max(self.unplaced_max_n, _largest(frames.unplaced_n))
+        as_applied = np.ones(len(frames.step), dtype=np.bool_)
+        errors = _errors(frames, workpiece_force_n, counted.tolist())
+        for place, (error, opening) in enumerate(zip(errors, frames.opening, strict=True)):
+            if error is not None:
+                (self._opening if opening else self._errors).append(error)
+                as_applied[place] = not opening or error.relative <= self.limit
+        return as_applied
 
     def problem(self) -> str | None:
         """What is wrong, or None if the acceptance check passes."""
@@ -176,13 +183,23 @@ class Closure:
         )
 
 
-def _error(frame: WorkpieceFrame, workpiece_force_n: Floats, counted: bool) -> _Error:
-    scale = max(float(np.linalg.norm(workpiece_force_n)), _FLOOR_N)
-    applied = frame.workpiece.force_n.sum(axis=0) + frame.unplaced_n.sum(axis=0)
-    gap = float(np.linalg.norm(applied + workpiece_force_n))
-    evaluated = frame.workpiece.evaluated_n.sum(axis=0)
-    evaluated_gap = float(np.linalg.norm(evaluated + workpiece_force_n))
-    return _Error(frame.step, gap, gap / scale, evaluated_gap, evaluated_gap / scale, counted)
+def _errors(
+    frames: WorkpieceFrames, workpiece_force_n: Sequence[Floats | None], counted: list[bool]
+) -> Iterator[_Error | None]:
+    """The error of each frame; None where the force on the workpiece was not written."""
+    count, at = len(frames.step), frames.workpiece_at
+    placed = sums(at, frames.workpiece.force_n, count)
+    applied = placed + sums(frames.unplaced_at, frames.unplaced_n, count)
+    evaluated = sums(at, frames.workpiece.evaluated_n, count)
+    for step, force, *totals, used in zip(
+        frames.step.tolist(), workpiece_force_n, applied, evaluated, counted, strict=True
+    ):
+        if force is None:
+            yield None
+            continue
+        scale = max(float(np.linalg.norm(force)), _FLOOR_N)
+        gap, evaluated_gap = (float(np.linalg.norm(total + force)) for total in totals)
+        yield _Error(step, gap, gap / scale, evaluated_gap, evaluated_gap / scale, used)
 
 
 def _worst(errors: list[_Error]) -> _Error:

@@ -22,6 +22,9 @@ WORKPIECE_FORCE = (
     "step", "time_s", "phase", *FORCES, *_TORQUES, *REFERENCE,
     "direction_rad", "drag_n", "lateral_n", "vertical_n", "in_statistics",
 )  # fmt: skip
+BODY = ("turn_rad", "body_x_n", "body_y_n", "body_z_n")
+"""Columns of ``workpiece_force`` beside these where the workpiece spins."""
+
 WORKPIECE_CONTACTS = (
     "step", "time_s", "phase", "particle_id", "facet_id", *POINT, *FORCES,
     "normal_force_n", "tangential_force_n", "overlap_m", *SLIP, "normal_velocity_m_s",

@@ -1,6 +1,6 @@
 """A run folder: its case, its raw outputs and its tables."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -9,7 +9,10 @@ from dragchain.dumps.frame import Columns, Frame
 from dragchain.dumps.run_parts import iter_frames, iter_prints
 from dragchain.errors import TableError
 from dragchain.run.case import Case, Output, friction_with, load_case, load_outputs
-from dragchain.tables.workpiece_contacts import WorkpieceFrame, join_workpiece_frame
+from dragchain.tables.workpiece_contacts import WorkpieceFrames, join_workpiece_frames
+
+_BATCH_ROWS = 8192
+"""Contacts on the workpiece that are joined at once, but for those of the last frame."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +28,14 @@ class WorkpiecePair:
         """The step."""
         return self.particles.step
 
-    def join(self, *, merge: bool = True) -> WorkpieceFrame:
-        """Give every contact the force that its particle received; see `join_workpiece_frame`."""
-        return join_workpiece_frame(self.particles, self.contacts, self.friction, merge=merge)
+    def join(self, *, merge: bool = True) -> WorkpieceFrames:
+        """Give every contact the force that its particle received; see `join_workpiece_frames`."""
+        return _joined([self], merge=merge)
+
+
+def _joined(pairs: Sequence[WorkpiecePair], *, merge: bool = True) -> WorkpieceFrames:
+    particles, contacts = ([pair.particles for pair in pairs], [pair.contacts for pair in pairs])
+    return join_workpiece_frames(particles, contacts, pairs[0].friction, merge=merge)
 
 
 @dataclass(frozen=True)
@@ -80,8 +88,8 @@ class Run:
                 )
             yield WorkpiecePair(particles, contacts, friction)
 
-    def workpiece_frames(self) -> Iterator[WorkpieceFrame]:
-        """Contacts on the workpiece, step by step.
+    def workpiece_frames(self) -> Iterator[WorkpieceFrames]:
+        """Contacts on the workpiece, a batch of steps at a time.
 
         Raises
         ------
@@ -90,4 +98,12 @@ class Run:
         DumpError
             If one of them cannot be read.
         """
-        return (pair.join() for pair in self.workpiece_pairs())
+        batch, rows = [], 0
+        for pair in self.workpiece_pairs():
+            batch.append(pair)
+            rows += pair.contacts.rows
+            if rows >= _BATCH_ROWS:
+                yield _joined(batch)
+                batch, rows = [], 0
+        if batch:
+            yield _joined(batch)

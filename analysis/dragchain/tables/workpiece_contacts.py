@@ -2,12 +2,13 @@
 
 ``workpiece_contacts`` says where the particles touch the workpiece, but its forces are
 evaluated a second time for output; ``workpiece_particles`` says what force each particle
-received. One `WorkpieceFrame` joins the two for one step.
+received. `join_workpiece_frames` joins the two.
 
 LIGGGHTS counts a particle over a convex edge twice, once for each facet. `_merged` makes one
 contact of those of a particle that lie within one contact patch.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.contact_law.coulomb import within_friction
-from dragchain.dumps.frame import Frame
+from dragchain.dumps.frame import Columns, Frame
 from dragchain.errors import TableError
 from dragchain.tables.columns import CENTRE, FORCES, POINT, SPIN, VELOCITY
 
@@ -80,28 +81,32 @@ class WallContacts:
 
 
 @dataclass(frozen=True)
-class WorkpieceFrame:
-    """What touches the meshes at one step.
+class WorkpieceFrames:
+    """What touches the meshes at F steps.
 
     Attributes
     ----------
-    step : int
-        The step.
+    step : (F,) ndarray of int64
+        The steps.
+    opening : (F,) ndarray of bool
+        Whether the forces may have been evaluated anew; see `Frame`.
     workpiece, bowl : WallContacts
-        Contacts on the workpiece and, if the bowl is a mesh, on the bowl.
-    unplaced_n : (K, 3) ndarray
-        Forces applied to particles for which no contact was written.
-    opening : bool
-        Whether its forces may have been evaluated anew; see `Frame`.
+        Contacts on the workpiece and, if the bowl is a mesh, on the bowl, step by step.
+    workpiece_at : (N,) ndarray of int64
+        Row in `step` of each contact on the workpiece.
+    unplaced_n, unplaced_at : (K, 3) and (K,) ndarray
+        Forces applied to particles for which no contact was written, and their rows in `step`.
     merged : int
         Contacts on the workpiece that were made part of another one of their particle.
     """
 
-    step: int
+    step: Ints
+    opening: NDArray[np.bool_]
     workpiece: WallContacts
     bowl: WallContacts
+    workpiece_at: Ints
     unplaced_n: Floats
-    opening: bool
+    unplaced_at: Ints
     merged: int = 0
 
 
@@ -111,9 +116,13 @@ def tangential_force(force_n: Floats, normal: Floats) -> Floats:
     return np.asarray(np.linalg.norm(force_n - along, axis=1))
 
 
-def join_workpiece_frame(
-    particles: Frame, contacts: Frame, friction: tuple[float, float], *, merge: bool = True
-) -> WorkpieceFrame:
+def join_workpiece_frames(
+    particles: Sequence[Frame],
+    contacts: Sequence[Frame],
+    friction: tuple[float, float],
+    *,
+    merge: bool = True,
+) -> WorkpieceFrames:
     """Give every contact the force that its particle received.
 
     The evaluated forces are cut to the limit of friction, and the contacts of a particle within
@@ -124,8 +133,8 @@ def join_workpiece_frame(
 
     Parameters
     ----------
-    particles, contacts : Frame
-        ``workpiece_particles`` and ``workpiece_contacts`` of one step.
+    particles, contacts : sequence of Frame
+        ``workpiece_particles`` and ``workpiece_contacts`` of the same steps.
     friction : (float, float)
         Coefficients of friction of a particle with workpiece and bowl.
     merge : bool
@@ -133,44 +142,61 @@ def join_workpiece_frame(
 
     Returns
     -------
-    WorkpieceFrame
-        The contacts, sorted by particle and facet.
+    WorkpieceFrames
+        The contacts, sorted by step, particle and facet.
 
     Raises
     ------
     TableError
-        If the frames are of different steps, or a particle comes twice.
+        If the frames are of different steps, or a particle comes twice in one.
     """
-    if particles.step != contacts.step:
-        raise TableError(
-            f"workpiece_particles has step {particles.step} where workpiece_contacts has "
-            f"step {contacts.step};"
-            " both must be written with one period"
-        )
-    order = np.argsort(particles.ids("particle_id"))
-    pushed = particles.take(order[(particles.vectors(*FORCES)[order] != 0.0).any(axis=1)])
+    for one, other in zip(particles, contacts, strict=True):
+        if one.step != other.step:
+            raise TableError(
+                f"workpiece_particles has step {one.step} where workpiece_contacts has "
+                f"step {other.step};"
+                " both must be written with one period"
+            )
+    frames = (*particles, *contacts)
+    above = 1 + max(int(frame.ids("particle_id").max(initial=0)) for frame in frames)
+    moved, touching = _one_frame(particles, above), _one_frame(contacts, above)
+    order = np.argsort(moved.ids("particle_id"))
+    pushed = moved.take(order[(moved.vectors(*FORCES)[order] != 0.0).any(axis=1)])
     known = pushed.ids("particle_id")
-    if (np.diff(known) == 0).any():
+    twice = known[1:][np.diff(known) == 0]
+    if twice.size:
         raise TableError(
-            f"step {particles.step}: workpiece_particles holds a particle more than once"
+            f"step {particles[twice[0] // above].step}: workpiece_particles holds a particle "
+            "more than once"
         )
-    written = int(np.count_nonzero(~_on_bowl(contacts)))
-    contacts = _within_friction(contacts, pushed, friction)
+    written = int(np.count_nonzero(~_on_bowl(touching)))
+    touching = _within_friction(touching, pushed, friction)
     if merge:
-        contacts = _merged(contacts, pushed)
-    contacts = contacts.take(np.lexsort((contacts.ids("facet_id"), contacts.ids("particle_id"))))
-    all_contacts = _place(contacts, pushed)
+        touching = _merged(touching, pushed)
+    touching = touching.take(np.lexsort((touching.ids("facet_id"), touching.ids("particle_id"))))
     unplaced = np.ones(len(known), dtype=np.bool_)
-    unplaced[np.searchsorted(known, all_contacts.particle_id[~all_contacts.silent])] = False
-    on_bowl = _on_bowl(contacts)
-    return WorkpieceFrame(
-        particles.step,
-        all_contacts.select(~on_bowl),
-        all_contacts.select(on_bowl),
+    unplaced[_rows_of(touching, pushed)[1]] = False
+    placed, on_bowl = _place(touching, pushed, above), _on_bowl(touching)
+    return WorkpieceFrames(
+        np.array([frame.step for frame in particles]),
+        np.array([frame.opening for frame in particles]),
+        placed.select(~on_bowl),
+        placed.select(on_bowl),
+        touching.ids("particle_id")[~on_bowl] // above,
         pushed.vectors(*FORCES)[unplaced],
-        particles.opening,
+        known[unplaced] // above,
         written - int(np.count_nonzero(~on_bowl)),
     )
+
+
+def _one_frame(frames: Sequence[Frame], above: int) -> Frame:
+    """The rows of all frames; `above` times a frame's place is added to its particles' ids."""
+    columns: Columns = {
+        name: np.concatenate([frame.columns[name] for frame in frames])
+        for name in frames[0].columns
+    }
+    ids = [place * above + frame.ids("particle_id") for place, frame in enumerate(frames)]
+    return Frame(frames[0].step, columns | {"particle_id": np.concatenate(ids)})
 
 
 def _on_bowl(contacts: Frame) -> NDArray[np.bool_]:
@@ -216,10 +242,10 @@ def _merged(contacts: Frame, particles: Frame) -> Frame:
     kept, slot = np.unique(head, return_inverse=True)
     several = np.bincount(slot) > 1
     forces, normals = contacts.vectors(*FORCES), contacts.vectors(*_NORMAL)
-    mean = _sums(slot, overlap[:, None] ** 1.5 * normals, len(kept))
+    mean = sums(slot, overlap[:, None] ** 1.5 * normals, len(kept))
     normal = normals[kept]
     normal[several] = _unit(mean[several])
-    both = np.column_stack([_sums(slot, forces, len(kept)), normal])
+    both = np.column_stack([sums(slot, forces, len(kept)), normal])
     return contacts.take(kept).replaced((*FORCES, *_NORMAL), both)
 
 
@@ -242,7 +268,7 @@ def _heads(particle_id: Ints, body: NDArray[np.bool_], points: Floats, patch_m2:
     return head
 
 
-def _place(contacts: Frame, particles: Frame) -> WallContacts:
+def _place(contacts: Frame, particles: Frame, above: int) -> WallContacts:
     """Join contacts with the particles that received a force, sorted by their ids."""
     loud, at = _rows_of(contacts, particles)
     evaluated, points = contacts.vectors(*FORCES), contacts.vectors(*POINT)
@@ -254,7 +280,7 @@ def _place(contacts: Frame, particles: Frame) -> WallContacts:
         turning = np.cross(particles.vectors(*SPIN)[at], points[loud] - centre)
         surface[loud] = particles.vectors(*VELOCITY)[at] + turning
     return WallContacts(
-        particle_id=contacts.ids("particle_id"),
+        particle_id=contacts.ids("particle_id") % above,
         facet_id=contacts.ids("facet_id"),
         point_m=points,
         force_n=force,
@@ -266,7 +292,7 @@ def _place(contacts: Frame, particles: Frame) -> WallContacts:
     )
 
 
-def _sums(at: Ints, vectors: Floats, count: int) -> Floats:
+def sums(at: Ints, vectors: Floats, count: int) -> Floats:
     """Sums of (N, 3) vectors by row, (count, 3)."""
     return np.array([np.bincount(at, column, count) for column in vectors.T]).T.copy()
 
@@ -274,7 +300,7 @@ def _sums(at: Ints, vectors: Floats, count: int) -> Floats:
 def _fraction(evaluated: Floats, at: Ints, applied: Floats) -> Floats:
     """Correct (N, 3) evaluated forces to add up to (K, 3) applied ones, particle by particle."""
     count = np.bincount(at, minlength=len(applied))
-    total = _sums(at, evaluated, len(applied))
+    total = sums(at, evaluated, len(applied))
     missing = (applied - total)[at] / count[at][:, None]
     return np.where(count[at][:, None] == 1, applied[at], evaluated + missing)
 

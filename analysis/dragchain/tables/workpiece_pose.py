@@ -8,7 +8,7 @@ import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.run.case import Case
-from dragchain.run.kinematics import path_of
+from dragchain.run.kinematics import workpiece_turn
 from dragchain.tables.by_step import read_table
 
 WorkpiecePlaces = Callable[[int], tuple[Floats, float]]
@@ -53,6 +53,7 @@ def _reference_point(workpiece: pd.DataFrame, step: int) -> Floats:
 
 
 def _workpiece_turn(workpiece: pd.DataFrame, step: int, case: Case) -> float:
-    """The workpiece's angle at the sample nearest to a step."""
+    """The workpiece's angle at a step, its direction of motion that of the nearest sample."""
     nearest = [int(np.abs(workpiece["step"].to_numpy(np.int64) - step).argmin())]
-    return float(path_of(case).turn(workpiece["direction_rad"].to_numpy(np.float64)[nearest])[0])
+    direction = workpiece["direction_rad"].to_numpy(np.float64)[nearest]
+    return float(workpiece_turn(np.array([step]), direction, case)[0])

@@ -4,12 +4,12 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import pyarrow as pa
 
-from dragchain.arrays import Floats, Ints
+from dragchain.arrays import Floats, Ints, wrap_angle
 from dragchain.dumps.frame import Columns
 from dragchain.errors import RejectedRunError, TableError
 from dragchain.run.case import Case, Scene, friction_with
@@ -18,13 +18,15 @@ from dragchain.run.kinematics import (
     directions,
     needed,
     phase_codes,
+    spins,
     workpiece_frame,
+    workpiece_turn,
     workpiece_velocity,
-    wrap_angle,
 )
 from dragchain.tables.bed import describe_bed
 from dragchain.tables.closure import LIMIT, SHARED_LIMIT, Closure
 from dragchain.tables.columns import (
+    BODY,
     CONTACTS,
     FORCES,
     IMPACTS,
@@ -108,15 +110,19 @@ def _write_all(file: Path, columns: Sequence[str], parts: Iterable[Rows]) -> Non
 
 def _write_workpiece_force(run: Run, file: Path) -> None:
     rows = (workpiece_force_rows(rows, run.case) for rows in run.prints("workpiece_force"))
-    _write_all(file, WORKPIECE_FORCE, rows)
+    _write_all(file, WORKPIECE_FORCE + (BODY if spins(run.case) else ()), rows)
 
 
 def workpiece_force_rows(rows: Columns, case: Case) -> Rows:
-    """Add phase, workpiece frame and ``in_statistics`` to raw samples of the workpiece's force."""
+    """Add phase, path frame, body frame and ``in_statistics`` to raw samples of the force."""
     steps = np.asarray(rows["step"], dtype=np.int64)
     heading = directions(steps, np.column_stack([rows["ref_x_m"], rows["ref_y_m"]]), case)
     force = np.column_stack([rows[name] for name in FORCES]).astype(np.float64)
     drag, lateral, vertical = workpiece_frame(force, heading).T
+    body: Rows = {}
+    if spins(case):
+        turn = workpiece_turn(steps, heading, case)
+        body = dict(zip(BODY, (turn, *workpiece_frame(force, turn).T), strict=True))
     return {
         **rows,
         "phase": _phases(steps, case),
@@ -125,6 +131,7 @@ def workpiece_force_rows(rows: Columns, case: Case) -> Rows:
         "lateral_n": lateral,
         "vertical_n": vertical,
         "in_statistics": counted_mask(steps, case),
+        **body,
     }
 
 
@@ -140,12 +147,12 @@ class WorkpieceSample:
     ----------
     force_n : (3,) ndarray or None
         The force on it; None if it was not written.
-    ref_xy_m : (2,) ndarray
-        Horizontal place of its reference point.
+    ref_m : (3,) ndarray
+        Place of its reference point.
     """
 
     force_n: Floats | None
-    ref_xy_m: Floats
+    ref_m: Floats
 
 
 class WorkpieceSamples:
@@ -175,7 +182,7 @@ class WorkpieceSamples:
             return None
         force, place = (
             np.array([self._block[name][row] for name in names], dtype=np.float64)
-            for names in (FORCES, REFERENCE[:2])
+            for names in (FORCES, REFERENCE)
         )
         return WorkpieceSample(force, place)
 
@@ -198,13 +205,13 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
     closure = Closure(limit=SHARED_LIMIT if shared else LIMIT)
     samples = WorkpieceSamples(run.prints("workpiece_force"))
     with table_writer(file, WORKPIECE_CONTACTS) as table:
-        for frame in run.workpiece_frames():
-            at = samples.from_start(frame.step)
-            rows = workpiece_contact_rows(frame.step, frame.workpiece, at.ref_xy_m, run.case)
-            counted = bool(counted_mask(np.array([frame.step]), run.case)[0])
-            if not closure.add(frame, at.force_n, counted=counted):
-                rows = {**rows, "in_statistics": np.full(len(frame.workpiece), False)}
-            table.write(rows)
+        for frames in run.workpiece_frames():
+            of_step = [samples.from_start(step) for step in frames.step.tolist()]
+            places, at = np.array([one.ref_m for one in of_step]), frames.workpiece_at
+            rows = workpiece_contact_rows(frames.step[at], frames.workpiece, places[at], run.case)
+            forces = [one.force_n for one in of_step]
+            used = closure.add(frames, forces, counted_mask(frames.step, run.case))
+            table.write({**rows, "in_statistics": rows["in_statistics"] & used[at]})
         closure.record().write(run.table("closure.json"))
         if (problem := closure.problem()) is not None:
             raise RejectedRunError(
@@ -213,17 +220,19 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
             )
 
 
-def workpiece_contact_rows(step: int, contacts: WallContacts, ref_xy_m: Floats, case: Case) -> Rows:
-    """Rows of ``workpiece_contacts.parquet`` for one step.
+def workpiece_contact_rows(
+    steps: Ints, contacts: WallContacts, references: Floats, case: Case
+) -> dict[str, Any]:
+    """Rows of ``workpiece_contacts.parquet``.
 
     Parameters
     ----------
-    step : int
-        The step.
+    steps : (N,) ndarray of int64
+        The step of each contact.
     contacts : WallContacts
         N contacts on the workpiece.
-    ref_xy_m : (2,) ndarray
-        Horizontal place of the workpiece's reference point, m.
+    references : (N, 3) ndarray
+        Place of the workpiece's reference point at each contact's step, m.
     case : Case
         The case, of a process.
 
@@ -233,12 +242,10 @@ def workpiece_contact_rows(step: int, contacts: WallContacts, ref_xy_m: Floats, 
         The columns; forces are on the workpiece, velocities those of the particle's
         surface against the workpiece's.
     """
-    steps = np.full(len(contacts), step)
-    references = np.tile(ref_xy_m, (len(steps), 1))
-    heading = directions(steps, references, case)
+    heading = directions(steps, references[:, :2], case)
     relative = contacts.surface_m_s - workpiece_velocity(steps, contacts.point_m, references, case)
     apart = np.einsum("ij,ij->i", relative, contacts.normal)
-    x, y = (contacts.point_m[:, :2] - ref_xy_m).T
+    x, y = (contacts.point_m - references)[:, :2].T
     return {
         "step": steps,
         "time_s": steps * case.timestep_s,

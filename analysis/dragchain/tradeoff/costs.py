@@ -3,42 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from dragchain.documents import Document, Part
 from dragchain.statistics.estimate import finite
 from dragchain.tradeoff.changes import hub
 from dragchain.tradeoff.outcome import StepCosts, Tradeoff
 from dragchain.tradeoff.runs import Setting
-from dragchain.tradeoff.six_digits import Number, SixDigits
+from dragchain.tradeoff.tradeoff_document import CostEntry
 
 _PLAIN = ("plain_full", "plain")
 """Names of the cost of the plain deck, that at full stiffness first."""
-
-
-class CostEntry(Part):
-    """Processor time with one thing changed over that without, as timed side by side.
-
-    ``ratio`` counts what ``unit`` says. ``parameter`` and ``level`` are those of a variant
-    that changes one setting of the fidelity alone.
-    """
-
-    name: str
-    scene: str
-    what: str
-    against: str | None = None
-    unit: Literal["per_step", "per_second"] = "per_second"
-    parameter: str | None = None
-    level: Number = None
-    ratio: SixDigits
-    ci95_low: Number
-    ci95_high: Number
-    per_step: Number = None
-    per_second: Number = None
-    wall_ratio: Number = None
-    rounds: int | None = None
-    steps: int | None = None
-    timestep_s: Number = None
 
 
 class StandardFidelity(Part):

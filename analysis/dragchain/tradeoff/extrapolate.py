@@ -4,15 +4,12 @@ import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import numpy as np
-
+from dragchain.errors import TableError
 from dragchain.report.extrapolated import FILE, Extrapolated, ExtrapolatedQuantity
 from dragchain.run.case import load_case
-from dragchain.statistics.estimate import student_quantile
 from dragchain.tradeoff.path_blocks import quantities_along
 from dragchain.tradeoff.quantities import QUANTITIES
-from dragchain.tradeoff.stiffness_law import ScaledRuns, extrapolate
-from dragchain.tradeoff.stiffness_record import StiffnessRecord
+from dragchain.tradeoff.stiffness_document import StiffnessRecord
 
 _WIDENING = 0.1
 """How far beyond the scenes of the record a number of a scene still counts as measured."""
@@ -36,28 +33,23 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
     DocumentError
         If the record or the run's case cannot be used.
     TableError
-        If a table is missing.
+        If a table is missing, or the workpiece is faster than the study says: the laws were
+        measured at a study's own speed.
     """
     case, known = load_case(run_dir), StiffnessRecord.read(record)
-    scale = case.fidelity.youngs_modulus_scale
+    scale, factor = case.fidelity.youngs_modulus_scale, case.fidelity.speed_factor
+    if factor != 1.0:
+        raise TableError(f"{case.run}: no law is known for a workpiece {factor:g} times as fast")
     along = quantities_along(run_dir, case)
     diameters = along.arc_m / (2.0 * case.media.radius_mean_m)
     values = along.values()
     found = []
     for quantity in QUANTITIES:
         entry, measured = known.laws.get(quantity.name), values.get(quantity.name, 0.0)
-        if entry is None or measured == 0.0:
-            continue
-        run = ScaledRuns(
-            stiffness_number=case.numbers["stiffness_number"],
-            inertial_number=case.numbers["inertial_number"],
-            scales=np.array([scale]),
-            logarithms=np.log(np.abs([measured])),
-            path_to_particle=diameters,
-        )
-        run_std = entry.law.run_std * math.sqrt(entry.path_to_particle / diameters)
-        guess = extrapolate(entry.law, run, np.array([run_std]))
-        half = student_quantile(entry.scenes - 1) * guess.se
+        if entry is None or measured == 0.0 or not case.numbers.get(entry.friction):
+            continue  # the laws are written in the logarithm of a coefficient of friction
+        guess = entry.at_physical_modulus(measured, case.numbers, scale, diameters)
+        half = entry.quantile * guess.se
         ends = [math.copysign(math.exp(guess.logarithm + s * half), measured) for s in (-1, 0, 1)]
         low, value, high = sorted(ends)
         found.append(
@@ -73,15 +65,15 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
         )
     Extrapolated(
         youngs_modulus_scale=scale,
-        source=f"{len(known.scenes)} scenes, measured {known.measured}",
+        source=f"{sum(bool(one.runs) for one in known.scenes)} scenes, measured {known.measured}",
         outside=tuple(_outside(case.numbers, known)),
         quantities=tuple(found),
     ).write(run_dir / FILE)
 
 
 def _outside(numbers: Mapping[str, float], record: StiffnessRecord) -> Iterator[str]:
-    for name in record.scenes[0].numbers:
-        values = [scene.numbers[name] for scene in record.scenes]
+    for name in {**record.scenes[0].numbers, **numbers}:
+        values = [scene.numbers.get(name, 0.0) for scene in record.scenes]
         low, high = (1 - _WIDENING) * min(values), (1 + _WIDENING) * max(values)
         if name != _SCENE_SIZE and not low <= numbers.get(name, 0.0) <= high:
             yield f"{name} {numbers.get(name, 0.0):.3g} is outside of {low:.3g} to {high:.3g}"

@@ -43,6 +43,9 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
             "cost": _cost(case, outcome),
             "versions": {**case.versions, "engine": outcome.engine_version},
             "started": outcome.started,
+            "stability_number": next(
+                (one.number for one in outcome.checks if one.code == "stable_timestep"), None
+            ),
         }
     )
     if measures.complete:

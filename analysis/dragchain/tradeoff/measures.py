@@ -40,11 +40,15 @@ class RunCost(Part):
 
 
 class Asked(Part):
-    """The tolerance that a run's settings were chosen for."""
+    """The tolerance that a run's settings were chosen for.
+
+    If `extrapolated`, for the value at the physical Young's modulus.
+    """
 
     quantity: str
     tolerance: float
     held_to: float | None = None
+    extrapolated: bool = False
 
     def same(self, other: "Asked") -> bool:
         """Whether the same is asked, however well it can be held."""
@@ -97,6 +101,8 @@ class Measures(PathQuantities, Document):
         Why the run is not `complete`; it has none of what follows then.
     single : mapping
         The quantities of the bed.
+    stability_number : float or None
+        Of the time step, as the acceptance check found it.
     """
 
     made_by = "dragchain step measure"
@@ -114,6 +120,7 @@ class Measures(PathQuantities, Document):
     started: str
     failure: tuple[AcceptanceCheck, ...] = ()
     single: Mapping[str, float] = {}
+    stability_number: float | None = None
 
     @property
     def seed(self) -> int:

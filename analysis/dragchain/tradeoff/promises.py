@@ -22,6 +22,8 @@ from dragchain.tradeoff.compare import Error, relative_error
 from dragchain.tradeoff.measures import Asked, Measures
 from dragchain.tradeoff.quantities import QUANTITIES
 from dragchain.tradeoff.runs import Setting, by_scene, values_within
+from dragchain.tradeoff.stiffness_document import ExtrapolationErrors, LawEntry, StiffnessRecord
+from dragchain.tradeoff.stiffness_errors import errors_in_new_scenes
 
 Verdict = Literal["kept", "broken", "open"]
 
@@ -94,6 +96,7 @@ class PromisesFile(Document):
 
     promises: tuple[Promise, ...]
     failed: tuple[FailedRun, ...] = ()
+    extrapolations: tuple[ExtrapolationErrors, ...] = ()
 
 
 def verdict(error: Error, tolerance: float) -> Verdict:
@@ -115,28 +118,43 @@ class _Pair:
     references: Sequence[Measures]
     failed: int
 
+    law: LawEntry | None
+
     def logarithms(self) -> tuple[Floats, Floats]:
-        """Of the quantity in the promised runs and in those at full stiffness."""
+        """Of the quantity in the promised runs, extrapolated if asked, and at full stiffness."""
         arc = min(run.arc_m for run in (*self.own, *self.references))
-        own, references = (
-            np.log([abs(values_within(run, arc)[self.asked.quantity]) for run in runs])
+        values, references = (
+            [abs(values_within(run, arc)[self.asked.quantity]) for run in runs]
             for runs in (self.own, self.references)
         )
-        return own, references
+        if self.law is None:
+            return np.log(values), np.log(references)
+        diameters = arc / self.own[0].particle_diameter_m
+        own = [
+            self.law.at_physical_modulus(
+                value, run.numbers, run.fidelity.youngs_modulus_scale, diameters
+            ).logarithm
+            for run, value in zip(self.own, values, strict=True)
+        ]
+        return np.array(own), np.log(references)
 
 
-def check_promises(runs: Sequence[Measures]) -> list[Promise]:
+def check_promises(
+    runs: Sequence[Measures], laws: Mapping[str, LawEntry] | None = None
+) -> list[Promise]:
     """Compare every promise among the runs of a plan with the full stiffness of its scene.
 
     A scene whose runs at full stiffness all failed has nothing to compare with;
     `failures` lists them. The scatter of runs is taken to be the same, relatively,
-    in all scenes and settings: it is pooled over them, because few runs are made
-    of each.
+    in all scenes and settings: for each quantity it is pooled over them, because few
+    runs are made of each.
 
     Parameters
     ----------
     runs : sequence of Measures
         Of the reference, which asks nothing, and of runs that ask for a tolerance.
+    laws : mapping of str to LawEntry, optional
+        Law of each quantity that runs extrapolate.
 
     Raises
     ------
@@ -144,27 +162,41 @@ def check_promises(runs: Sequence[Measures]) -> list[Promise]:
         If a scene was not run at full stiffness, a quantity may change its sign,
         or there are too few runs for an interval.
     """
-    pairs = list(_pairs(runs))
+    pairs = list(_pairs(runs, laws or {}))
+    scatters = {
+        name: _pooled([pair for pair in pairs if pair.asked.quantity == name])
+        for name in {pair.asked.quantity for pair in pairs}
+    }
+    return [_promise_of(pair, *scatters[pair.asked.quantity]) for pair in pairs]
+
+
+def _pooled(pairs: Sequence[_Pair]) -> tuple[float, int]:
+    """Standard deviation of the logarithm in one run, and its degrees of freedom."""
     groups = [group for pair in pairs for group in pair.logarithms()]
     degrees = sum(len(group) - 1 for group in groups)
     if degrees < 1:
         raise TableError("one run of each setting says nothing of their scatter: run more seeds")
-    scatter = math.sqrt(sum(float(((g - g.mean()) ** 2).sum()) for g in groups) / degrees)
-    return [_promise_of(pair, scatter, degrees) for pair in pairs]
+    return math.sqrt(sum(float(((g - g.mean()) ** 2).sum()) for g in groups) / degrees), degrees
 
 
-def _pairs(runs: Sequence[Measures]) -> Iterator[_Pair]:
+def _pairs(runs: Sequence[Measures], laws: Mapping[str, LawEntry]) -> Iterator[_Pair]:
     signed = {quantity.name for quantity in QUANTITIES if quantity.signed}
     for scene, everyone in by_scene(runs):
         if all(run.asked for run in everyone):
             raise TableError(f"scene {scene}: no run at full stiffness to compare with")
-        references = [run for run in everyone if run.complete and not run.asked]
+        references = [run for run in everyone if _is_reference(run)]
         for asked in _asked(everyone) if references else ():
             own = [run for run in everyone if run.asked and run.asked.same(asked)]
             complete = [run for run in own if run.complete]
             if asked.quantity in signed:
                 raise TableError(f"{asked.quantity} may change its sign: it has no promise")
-            yield _Pair(scene, asked, complete, references, len(own) - len(complete))
+            law = laws[asked.quantity] if asked.extrapolated else None
+            yield _Pair(scene, asked, complete, references, len(own) - len(complete), law)
+
+
+def _is_reference(run: Measures) -> bool:
+    """Whether it is a complete run at full stiffness."""
+    return run.complete and not run.asked and run.fidelity.youngs_modulus_scale == 1.0
 
 
 def _asked(runs: Iterable[Measures]) -> list[Asked]:
@@ -215,11 +247,16 @@ def _promise_of(pair: _Pair, scatter: float, degrees: int) -> Promise:
     )
 
 
-def write_promises(out_dir: Path, files: Sequence[Path]) -> list[Promise]:
+def write_promises(out_dir: Path, files: Sequence[Path], record: Path) -> list[Promise]:
     """Write ``promises.json`` and ``promises.csv`` and return what they hold."""
     runs = [Measures.read(file) for file in files]
-    promises = check_promises(runs)
-    document = PromisesFile(promises=tuple(promises), failed=tuple(failures(runs)))
+    laws = StiffnessRecord.read(record).laws
+    promises = check_promises(runs, laws)
+    document = PromisesFile(
+        promises=tuple(promises),
+        failed=tuple(failures(runs)),
+        extrapolations=tuple(errors_in_new_scenes(runs, laws)),
+    )
     document.write(out_dir / "promises.json")
     table = pd.DataFrame([_columns(promise) for promise in promises])
     write_text(out_dir / "promises.csv", table.to_csv(index=False))
@@ -232,10 +269,10 @@ def _columns(promise: Promise) -> dict[str, object]:
     return {**row, **promise.error.columns(), "verdict": promise.verdict, "met": promise.met}
 
 
-def promises_command(out_dir: Path, measures: Sequence[Path]) -> str:
+def promises_command(out_dir: Path, measures: Sequence[Path], record: Path) -> str:
     """Check promises as the command line asks for; a line per promise."""
     lines = []
-    for promise in write_promises(out_dir, measures):
+    for promise in write_promises(out_dir, measures, record):
         error = promise.error
         lines.append(
             f"{promise.place}: {promise.quantity} within {promise.tolerance:g} by"

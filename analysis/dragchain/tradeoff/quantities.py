@@ -21,6 +21,8 @@ class Quantity:
         Its blocks hold squares: a run's value is the root of their mean.
     signed : bool
         It may be zero or change its sign: errors are counted in mean drags.
+    friction : str
+        The number of a scene that the effect of a reduced modulus depends on.
     """
 
     name: str
@@ -29,6 +31,7 @@ class Quantity:
     short: str = ""
     squared: bool = False
     signed: bool = False
+    friction: str = "particle_friction"
 
     def of_blocks(self, blocks: Floats) -> float:
         """A run's value from the values of its blocks, (B,)."""
@@ -70,8 +73,17 @@ QUANTITIES = (
     ),
     Quantity("contact_force_p99", "99th percentile of the contact forces on the workpiece", "N"),
     Quantity("normal_load", "sum of the normal forces on the workpiece", "N"),
-    Quantity("sliding_distance", "sliding distance of all contacts over the path"),
-    Quantity("friction_work", "friction work on the workpiece for a metre of path", "J/m"),
+    Quantity(
+        "sliding_distance",
+        "sliding distance of all contacts over the path",
+        friction="workpiece_friction",
+    ),
+    Quantity(
+        "friction_work",
+        "friction work on the workpiece for a metre of path",
+        "J/m",
+        friction="workpiece_friction",
+    ),
     Quantity("workpiece_overlap", "mean relative overlap on the workpiece"),
     Quantity(
         "coordination_number",

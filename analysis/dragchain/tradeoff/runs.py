@@ -18,6 +18,7 @@ SILENT = (
     "seed",
     "motion.path.revolutions",
     "motion.path.length_m",
+    "motion.path.fraction",
     "outputs.workpiece_contacts_hz",
     "outputs.network_hz",
 )

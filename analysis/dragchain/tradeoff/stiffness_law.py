@@ -5,10 +5,11 @@ The logarithm of a quantity Q follows the stiffness number kappa of the run::
     ln Q = ln Q_full + A (kappa^-b - kappa_full^-b)
 
 which is what Richardson's extrapolation assumes of a discretisation error, with a rate b that is
-measured. The amplitude A of a scene grows with the inertial number I, since particles with reduced
-stiffness stay in contact for longer, and scatters about that: A ~ N(alpha + beta I, tau^2). With
-that prior one run is corrected, and several are extrapolated, by one and the same estimator: the
-best linear unbiased prediction of ln Q_full (Robinson 1991, Statistical Science 6, 15-32).
+measured. The amplitude A of a scene depends on the inertial number I, since particles with reduced
+stiffness stay in contact for longer, and on the friction mu between particles, and scatters about
+that: A ~ N(alpha + beta I + gamma ln mu, tau^2). With that prior one run is corrected, and several
+are extrapolated, by one and the same estimator: the best linear unbiased prediction of ln Q_full
+(Robinson 1991, Statistical Science 6, 15-32).
 """
 
 import math
@@ -25,8 +26,8 @@ from dragchain.tradeoff.six_digits import SixDigits
 UNIT = 1e4
 """Stiffness number at which kappa^-b is 1, so that amplitudes have a plain size."""
 
-UNIT_INERTIA = 0.1
-"""Unit of inertial numbers, so that slopes have a plain size."""
+UNIT_INERTIA, UNIT_FRICTION = 0.1, 0.3
+"""Inertial number and friction in whose units amplitudes are written, to have a plain size."""
 
 _START = (math.log(0.3), math.log(0.1), math.log(0.05))
 """Logarithms of rate, tau and sigma to begin the search with."""
@@ -38,8 +39,8 @@ class ScaledRuns:
 
     Attributes
     ----------
-    stiffness_number, inertial_number : float
-        Of the scene at the physical Young's modulus.
+    stiffness_number, inertial_number, friction : float
+        Of the scene at the physical Young's modulus; friction between particles.
     scales : (N,) ndarray
         Factor on Young's modulus in each run.
     logarithms : (N,) ndarray
@@ -50,6 +51,7 @@ class ScaledRuns:
 
     stiffness_number: float
     inertial_number: float
+    friction: float
     scales: Floats
     logarithms: Floats
     path_to_particle: float
@@ -61,8 +63,12 @@ class ScaledRuns:
 
     @property
     def of_amplitude(self) -> Floats:
-        """What alpha and beta are multiplied with, (2,)."""
-        return np.array([1.0, self.inertial_number / UNIT_INERTIA])
+        """What alpha, beta and gamma are multiplied with, (3,)."""
+        rough = math.log(self.friction / UNIT_FRICTION)
+        return np.array([1.0, self.inertial_number / UNIT_INERTIA, rough])
+
+
+Three = tuple[SixDigits, SixDigits, SixDigits]
 
 
 @dataclass(frozen=True)
@@ -73,10 +79,11 @@ class StiffnessLaw:
     ----------
     rate : float
         Exponent b.
-    amplitude, slope : float
-        Amplitude alpha of a quasi-static drag, and its slope beta over I / `UNIT_INERTIA`.
-    covariance : (float, float, float)
-        Variance of alpha, covariance, variance of beta.
+    amplitude : (float, float, float)
+        Alpha, of a quasi-static drag in particles with the friction `UNIT_FRICTION`; beta, over
+        I / `UNIT_INERTIA`; gamma.
+    covariance : 3 rows of 3 floats
+        Of these.
     amplitude_std : float
         Standard deviation tau of the amplitude from scene to scene.
     run_std : float
@@ -86,19 +93,21 @@ class StiffnessLaw:
     """
 
     rate: SixDigits
-    amplitude: SixDigits
-    slope: SixDigits
-    covariance: tuple[SixDigits, SixDigits, SixDigits]
+    amplitude: Three
+    covariance: tuple[Three, Three, Three]
     amplitude_std: SixDigits
     run_std: SixDigits
     model_std: SixDigits = 0.0
 
     def prior(self, runs: ScaledRuns) -> tuple[float, float]:
         """Mean and variance of the amplitude in a scene."""
-        one, inertia = runs.of_amplitude
-        variance, common, of_slope = self.covariance
-        error = variance + 2.0 * inertia * common + inertia**2 * of_slope
-        return self.amplitude * one + self.slope * inertia, self.amplitude_std**2 + error
+        along = runs.of_amplitude
+        error = float(along @ np.array(self.covariance) @ along)
+        return float(along @ np.array(self.amplitude)), self.amplitude_std**2 + error
+
+
+COEFFICIENTS = 3
+"""Coefficients of the amplitude, which take as many degrees of freedom from the scenes."""
 
 
 @dataclass(frozen=True)
@@ -115,11 +124,14 @@ def fit_stiffness_law(scenes: Sequence[ScaledRuns]) -> StiffnessLaw:
     Raises
     ------
     SeriesError
-        If fewer than four scenes were run at two moduli.
+        If fewer than five scenes were run at two moduli, or their inertial numbers and
+        coefficients of friction do not tell the amplitudes apart.
     """
     useful = [one for one in scenes if len(set(one.scales.tolist())) > 1]
-    if len(useful) < 4:
-        raise SeriesError("fewer than four scenes were run at two moduli")
+    if len(useful) < 5:
+        raise SeriesError("fewer than five scenes were run at two moduli")
+    if np.linalg.matrix_rank(np.array([one.of_amplitude for one in useful])) < 3:
+        raise SeriesError("the scenes are too alike in inertial number or friction")
 
     def against(point: Floats) -> float:
         return -_likelihood(useful, *np.exp(point))[0]
@@ -132,31 +144,37 @@ def fit_stiffness_law(scenes: Sequence[ScaledRuns]) -> StiffnessLaw:
         options={"xatol": 1e-4, "fatol": 1e-6, "maxiter": 4000},
     )
     rate, amplitude_std, run_std = np.exp(best.x).tolist()
-    _, (amplitude, slope), covariance = _likelihood(useful, rate, amplitude_std, run_std)
-    entries = (covariance[0, 0], covariance[0, 1], covariance[1, 1])
-    return StiffnessLaw(rate, amplitude, slope, entries, amplitude_std, run_std)
+    _, found, covariance = _likelihood(useful, rate, amplitude_std, run_std)
+    alpha, beta, gamma = found.tolist()
+    first, second, third = map(tuple, covariance.tolist())
+    entries = (first, second, third)
+    return StiffnessLaw(rate, (alpha, beta, gamma), entries, amplitude_std, run_std)
 
 
 def _likelihood(
     scenes: Iterable[ScaledRuns], rate: float, amplitude_std: float, run_std: float
 ) -> tuple[float, Floats, Floats]:
-    """Logarithm of the likelihood, alpha and beta, (2,), and their covariance, (2, 2).
+    """Logarithm of the likelihood, alpha to gamma, (3,), and their covariance, (3, 3).
 
-    The levels of the scenes are integrated out (restricted likelihood), alpha and beta are
+    The levels of the scenes are integrated out (restricted likelihood), alpha to gamma are
     estimated.
     """
-    weight, moment = np.zeros((2, 2)), np.zeros(2)
+    weight, moment = np.zeros((3, 3)), np.zeros(3)
     square = constant = 0.0
     for one in scenes:
-        h, y, ones = one.reduction(rate), one.logarithms, np.ones(len(one.scales))
-        covariance = run_std**2 * np.eye(len(h)) + amplitude_std**2 * np.outer(h, h)
-        inverse = np.linalg.inv(covariance)
-        level = float(ones @ inverse @ ones)
-        projected = inverse - np.outer(inverse @ ones, ones @ inverse) / level
-        weight += float(h @ projected @ h) * np.outer(one.of_amplitude, one.of_amplitude)
-        moment += float(h @ projected @ y) * one.of_amplitude
-        square += float(y @ projected @ y)
-        constant += float(np.linalg.slogdet(covariance)[1]) + math.log(level)
+        h = one.reduction(rate)
+        # 1, h and y under the inverse covariance (Sherman and Morrison), the level projected out
+        known = np.stack([np.ones(len(h)), h, one.logarithms])
+        share = (amplitude_std / run_std) ** 2
+        along = known @ h
+        growth = 1.0 + share * along[1]
+        products = (known @ known.T - share / growth * np.outer(along, along)) / run_std**2
+        level = float(products[0, 0])
+        projected = products - np.outer(products[0], products[0]) / level
+        weight += projected[1, 1] * np.outer(one.of_amplitude, one.of_amplitude)
+        moment += projected[1, 2] * one.of_amplitude
+        square += float(projected[2, 2])
+        constant += 2.0 * len(h) * math.log(run_std) + math.log(growth) + math.log(level)
     variance = np.asarray(np.linalg.inv(weight), dtype=np.float64)
     amplitudes = variance @ moment
     return -0.5 * (constant + square - float(moment @ amplitudes)), amplitudes, variance
@@ -214,13 +232,13 @@ def left_out(
         [
             error
             for one, law in zip(scenes, laws, strict=True)
-            if (error := _error_in(one, law, plan)) is not None
+            if (error := error_in(one, law, plan)) is not None
         ]
         for plan in plans
     ]
 
 
-def _error_in(
+def error_in(
     scene: ScaledRuns, law: StiffnessLaw, plan: Mapping[float, int]
 ) -> tuple[float, float, float] | None:
     """As of `left_out`; None where the scene lacks runs of the plan or at full modulus."""

@@ -14,8 +14,9 @@ from dragchain.arrays import Floats
 from dragchain.documents import Part
 from dragchain.drag.around import AZIMUTH_BINS, DEPTH_BINS
 from dragchain.drag.azimuth import circumference, parts, to_the_left, within
-from dragchain.run.case import Case, Circle
+from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
+from dragchain.run.paths.circle import Circle
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 from dragchain.tables.by_step import read_table
 from dragchain.validation.corridor import Network, bin_by_bin, corridor, network

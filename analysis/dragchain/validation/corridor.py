@@ -15,8 +15,8 @@ from dragchain.arrays import Floats
 from dragchain.documents import Part
 from dragchain.drag.force import read_counted
 from dragchain.errors import TableError
-from dragchain.run.case import Circle
 from dragchain.run.kinematics import needed
+from dragchain.run.paths.circle import Circle
 from dragchain.statistics.estimate import Estimate, EstimateColumns
 from dragchain.tables.by_step import read_groups
 from dragchain.validation.runs_by_bed import Point, over_packings

@@ -33,8 +33,9 @@ from dragchain.loading.contact_events import Thresholds, event_types, find_event
 from dragchain.loading.document import FILE, Loading
 from dragchain.loading.samples import sample
 from dragchain.loading.write import compute_loading, write_loading
-from dragchain.run.case import Circle, load_case
+from dragchain.run.case import load_case
 from dragchain.run.kinematics import workpiece_velocity
+from dragchain.run.paths.circle import Circle
 from dragchain.run.workpiece import off_facet, read_surface, turned
 from dragchain.tables.workpiece_contacts import WallContacts
 from dragchain.tables.write import workpiece_contact_rows
@@ -274,7 +275,7 @@ def made_case(tmp_path: Path, **motion: Any) -> Any:
 @pytest.mark.parametrize("sense", [1, -1])
 def test_a_workpiece_that_turns_moves_faster_farther_out(tmp_path: Path, sense: int) -> None:
     """Reference point on the x axis, 50 mm from the bowl's axis; the point 10 mm beyond it."""
-    steps, reference = np.array([200]), np.array([[0.05, 0.0]])
+    steps, reference = np.array([200]), np.array([[0.05, 0.0, 0.0]])
     point = np.array([[0.06, 0.01, 0.02]])
     turning = made_case(tmp_path, **circle(True, sense))
     moving = made_case(tmp_path, **circle(False, sense))
@@ -295,7 +296,7 @@ def test_a_particle_that_moves_with_the_workpiece_does_not_slip(
     """A particle glued to a turning workpiece spins with it; one on a workpiece that does not
     turn, not."""
     case = made_case(tmp_path, **circle(turns))
-    reference, centre = np.array([0.0, 0.05]), np.array([-0.013, 0.05, 0.02])
+    reference, centre = np.array([0.0, 0.05, 0.0]), np.array([-0.013, 0.05, 0.02])
     point = centre + np.array([0.003, 0, 0])
     spin = np.array([0, 0, SPEED / 0.05 if turns else 0.0])
     velocity = np.cross(spin, centre) if turns else np.array([-SPEED, 0.0, 0.0])
@@ -306,12 +307,11 @@ def test_a_particle_that_moves_with_the_workpiece_does_not_slip(
         normal=np.array([[-1.0, 0, 0]]), surface_m_s=surface[None],
         overlap_m=np.zeros(1), silent=np.array([False]),
     )  # fmt: skip
-    rows = workpiece_contact_rows(200, contacts, reference, case)
+    at = np.array([200]), contacts, reference[None]
+    rows = workpiece_contact_rows(*at, case)
     slip = [rows[f"slip_{axis}_m_s"][0] for axis in "xyz"]
     np.testing.assert_allclose([*slip, rows["normal_velocity_m_s"][0]], 0.0, atol=1e-15)
-    wrong = workpiece_contact_rows(
-        200, contacts, reference, made_case(tmp_path, **circle(not turns))
-    )
+    wrong = workpiece_contact_rows(*at, made_case(tmp_path, **circle(not turns)))
     assert abs(wrong["slip_y_m_s"][0]) + abs(wrong["normal_velocity_m_s"][0]) > 1e-3
 
 

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 from report_files import PICTURES, case_json, make_run, page_of, process_findings, run_json
 
@@ -16,6 +17,8 @@ from dragchain.report.cost_check import (
     prediction_for,
     read_advice,
 )
+from dragchain.report.extrapolated import FILE as EXTRAPOLATED
+from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity
 from dragchain.report.study_report import write_report
 from dragchain.run.case import AdvisedSettings, Case
 from dragchain.run.completeness import RunRecord
@@ -104,13 +107,13 @@ def test_only_scenes_that_were_run_and_predicted_have_a_row() -> None:
 
 def test_the_interval_of_a_run_is_that_of_the_asked_force() -> None:
     forces = process_findings().forces
-    found = actual_interval(AdvisedSettings(**ASKED), forces)
+    found = actual_interval(AdvisedSettings(**ASKED), forces, None)
     assert found is not None
     assert (found.mean, found.ci95_low, found.ci95_high) == (-2.5, -2.6, -2.4)
     assert found.fraction == pytest.approx(0.04)
     other = AdvisedSettings(**ASKED | {"quantity": "chain_count"})
-    assert actual_interval(other, forces) is None
-    assert actual_interval(None, forces) is None
+    assert actual_interval(other, forces, None) is None
+    assert actual_interval(None, forces, None) is None
 
 
 def test_a_missing_or_foreign_advice_is_refused(tmp_path: Path) -> None:
@@ -118,3 +121,27 @@ def test_a_missing_or_foreign_advice_is_refused(tmp_path: Path) -> None:
         read_advice(tmp_path / "advice.json")
     with pytest.raises(DocumentError, match="schema: is 1"):
         read_advice(advice_file(tmp_path, schema=1))
+
+
+def test_an_extrapolated_answer_stands_beside_the_value_of_the_run(tmp_path: Path) -> None:
+    asked = {**ASKED, "quantity": "workpiece_contacts", "extrapolated": True}
+    folder = make_run(
+        tmp_path / "results", case_json("process", "workpiece-1", asked=asked),
+        process_findings(), PICTURES,
+    )  # fmt: skip
+    contacts = ExtrapolatedQuantity(
+        name="workpiece_contacts", label="contacts on the workpiece", unit="", measured=32.1,
+        value=25.6, ci95_low=24.2, ci95_high=27.4,
+    )  # fmt: skip
+    known = Extrapolated(
+        youngs_modulus_scale=1e-3, source="14 scenes", outside=(), quantities=(contacts,)
+    )
+    known.write(folder / EXTRAPOLATED)
+    write_report(tmp_path, [folder])
+    words = " ".join(page_of(tmp_path).words.split())
+    assert "Values at the physical Young's modulus" in words
+    assert "contacts on the workpiece 32.1 25.6 24.2 to 27.4" in words
+    assert "25.6 (24.2 to 27.4) 6.2 %" in words  # in the table of tolerances
+    row = pd.read_csv(tmp_path / "summary.csv").iloc[0]
+    assert row["extrapolated_workpiece_contacts"] == 25.6
+    assert row["extrapolated_workpiece_contacts_ci95_high"] == 27.4

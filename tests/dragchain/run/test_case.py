@@ -4,7 +4,9 @@ from pathlib import Path
 import pytest
 
 from dragchain import DocumentError, load_case, load_outputs
-from dragchain.run.case import Circle, Line, Statistics, changed_inputs
+from dragchain.run.case import Statistics, changed_inputs
+from dragchain.run.paths.circle import Circle
+from dragchain.run.paths.line import Line
 
 
 def test_reads_a_process(tiny_run: Path) -> None:
@@ -17,7 +19,11 @@ def test_reads_a_process(tiny_run: Path) -> None:
     assert case.bowl is not None
     assert case.bowl.radius_m == 0.04
     assert case.motion == Line(
-        kind="line", axis_speed_m_s=1e-4, start_m=(0.0, 0.0), direction_rad=0.0
+        kind="line",
+        axis_speed_m_s=1e-4,
+        start_m=(0.0, 0.0),
+        direction_rad=0.0,
+        start_direction_rad=0.0,
     )
     assert [phase.name for phase in case.phases] == ["plunge", "drag"]
     assert case.restitution is None

@@ -1,5 +1,6 @@
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,14 +9,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dragchain import TableError, load_case
-from dragchain.run.case import Case, Circle, Phase, Statistics
+from dragchain.errors import DocumentError
+from dragchain.run.case import Case, Phase, Statistics
 from dragchain.run.kinematics import (
     counted_mask,
     directions,
     phase_codes,
+    spins,
     workpiece_frame,
+    workpiece_turn,
+    workpiece_velocity,
     wrap_angle,
 )
+from dragchain.run.paths.circle import Circle
+from dragchain.run.paths.rest import Rest
+from dragchain.run.paths.waypoints import Waypoints, WaypointStage
+from dragchain.run.superposed.oscillation import Oscillation
+from dragchain.run.superposed.spin import Spin, SpinStage
+from dragchain.run.workpiece import turned
 
 PHASES = (
     Phase(name="plunge", start_step=0, end_step=10),
@@ -97,7 +108,7 @@ def test_before_the_drag_the_heading_is_the_one_it_starts_with(circling: Case) -
 
 
 def test_on_a_line_the_heading_is_the_lines(case: Case) -> None:
-    case = changed(case, motion=changed(case.motion, direction_rad=1.5 * pi))
+    case = changed(case, motion=changed(case.motion, start_direction_rad=1.5 * pi))
     np.testing.assert_allclose(directions(np.array([0, 30]), np.ones((2, 2)), case), [-pi / 2] * 2)
 
 
@@ -122,3 +133,144 @@ def test_wrapped_angles_point_the_same_way(angle) -> None:
 
 def test_half_a_turn_wraps_to_plus_pi() -> None:
     np.testing.assert_array_equal(wrap_angle([pi, -pi]), [pi, pi])
+
+
+def test_a_workpiece_at_rest_has_no_velocity_and_one_direction(case: Case) -> None:
+    """Relative to a bowl that rotates counter-clockwise it moves along -y."""
+    rest = Rest(
+        kind="rest", axis_speed_m_s=0.02, start_direction_rad=-pi / 2, radius_m=0.01, bowl_rad_s=2.0
+    )
+    case = changed(case, motion=rest)
+    steps, place = np.array([20, 30]), np.array([[0.01, 0.0, 0.0]] * 2)
+    np.testing.assert_allclose(directions(steps, place[:, :2], case), [-pi / 2] * 2)
+    np.testing.assert_allclose(workpiece_turn(steps, np.full(2, -pi / 2), case), [-pi / 2] * 2)
+    velocity = workpiece_velocity(steps, place + 0.001, place, case)
+    assert not velocity[np.isfinite(velocity)].any() and np.isfinite(velocity).any()
+    np.testing.assert_allclose(rest.bowl_velocity(place), [[0.0, 0.02, 0.0]] * 2)
+
+
+# --- waypoints -----------------------------------------------------------------------------------
+
+STAGES = (
+    (3, (0.0, 0.0, 0.01)),
+    (4, (0.0, -0.02, 0.0)),
+    (2, (0.0, 0.0, 0.0)),
+    (2, (0.0, 0.0, -0.03)),
+    (9, (-0.03, 0.0, 0.01)),
+)
+"""Up, along -y, a pause, down, along -x and up."""
+
+
+@pytest.fixture
+def on_waypoints(case: Case) -> Case:
+    stages = tuple(WaypointStage(steps=steps, velocity_m_s=v) for steps, v in STAGES)
+    path = Waypoints(
+        kind="waypoints", axis_speed_m_s=0.02, start_direction_rad=-pi / 2, stages=stages
+    )
+    return changed(case, motion=path)
+
+
+def test_a_stretch_without_a_direction_keeps_the_last_one(on_waypoints: Case) -> None:
+    """The first one has that of the next; a stage owns its last step."""
+    steps = np.array([0, 20, 21, 23, 24, 27, 28, 29, 30, 31, 32, 40])
+    found = directions(steps, np.zeros((12, 2)), on_waypoints)
+    np.testing.assert_allclose(found, [-pi / 2] * 10 + [pi] * 2)
+
+
+def test_the_workpiece_does_not_turn_on_waypoints(on_waypoints: Case) -> None:
+    steps = np.array([0, 21, 40])
+    heading = directions(steps, np.zeros((3, 2)), on_waypoints)
+    np.testing.assert_allclose(workpiece_turn(steps, heading, on_waypoints), -pi / 2)
+    assert not on_waypoints.motion.keeps_direction
+
+
+@pytest.mark.parametrize("superposed", [False, True])
+def test_on_waypoints_the_velocity_is_that_of_the_stage(
+    on_waypoints: Case, superposed: bool
+) -> None:
+    steps = np.arange(21, 41)
+    case = changed(on_waypoints, superposed=(SPIN,)) if superposed else on_waypoints
+    reference = np.ones((20, 3))
+    point = reference + np.array([0.01, 0.0, 0.005])
+    wanted = np.repeat([v for _, v in STAGES], [n for n, _ in STAGES], axis=0)
+    if superposed:
+        wanted[:, 1] += 0.01 * np.repeat([30.0, -60.0], [8, 12])
+    found = workpiece_velocity(steps, point, reference, case)
+    np.testing.assert_allclose(found, wanted, atol=1e-15)
+    outside = workpiece_velocity(np.array([20, 41]), point[:2], reference[:2], case)
+    assert np.isnan(outside).all()
+
+
+def test_waypoints_are_read_from_case_json(tiny_run: Path, edit_json: Any, on_waypoints) -> None:
+    entry = on_waypoints.motion.model_dump()
+    edit_json(tiny_run / "case.json", lambda case: case.update(motion=entry))
+    assert load_case(tiny_run).motion == on_waypoints.motion
+    entry["stages"] = []
+    edit_json(tiny_run / "case.json", lambda case: case.update(motion=entry))
+    with pytest.raises(DocumentError, match="stages"):
+        load_case(tiny_run)
+
+
+# --- superposed on the path ----------------------------------------------------------------------
+
+SPIN = Spin(
+    kind="spin", stages=(SpinStage(steps=8, rate_rad_s=30.0), SpinStage(steps=12, rate_rad_s=-60.0))
+)
+OSCILLATION = Oscillation(kind="oscillation", amplitude_m=1e-3, rate_rad_s=40.0)
+
+
+def with_all(case: Case) -> Case:
+    return changed(case, superposed=(SPIN, OSCILLATION))
+
+
+def test_the_turn_adds_up_the_stages(circling: Case) -> None:
+    """In the drag, from step 20 to 40; the path's own turn beside it."""
+    steps = np.array([0, 20, 24, 28, 30, 40, 50])
+    turn = workpiece_turn(steps, np.zeros(7), with_all(circling)) / circling.timestep_s
+    np.testing.assert_allclose(turn, [0, 0, 120, 240, 120, -480, -480], atol=1e-9)
+    assert spins(with_all(circling))
+    assert not spins(circling)
+
+
+def place(case: Case, steps: np.ndarray, own_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A point that is fixed to the workpiece and the reference point, from angles alone."""
+    time = (steps - 20) * case.timestep_s
+    angle = 0.01 / 0.02 * time
+    height = 1e-3 * np.sin(40.0 * time)
+    reference = np.column_stack([0.02 * np.cos(angle), 0.02 * np.sin(angle), height])
+    turn = workpiece_turn(steps, directions(steps, reference[:, :2], case), case)
+    return reference + turned(np.tile(own_m, (len(steps), 1)), turn), reference
+
+
+@pytest.mark.parametrize("orientation", ["follow_path", "fixed"])
+def test_the_velocity_is_the_change_of_the_place(circling: Case, orientation: str) -> None:
+    """Of a point beside and above the reference point, apart from steps where the spin changes."""
+    case = with_all(circling)
+    case = changed(case, motion=changed(case.motion, orientation=orientation), timestep_s=1e-5)
+    steps = np.array([22, 25, 31, 38])
+    own = np.array([0.004, -0.003, 0.01])
+    point, reference = place(case, steps, own)
+    (after, _), (before, _) = (place(case, steps + shift, own) for shift in (1, -1))
+    np.testing.assert_allclose(
+        workpiece_velocity(steps, point, reference, case), (after - before) / 2e-5, atol=1e-6
+    )
+
+
+def test_a_stage_owns_its_last_step(circling: Case) -> None:
+    case = with_all(circling)
+    steps = np.array([28, 29])
+    reference = np.tile([0.02, 0.0, 0.0], (2, 1))
+    point = reference + np.array([0.01, 0.0, 0.0])
+    path = workpiece_velocity(steps, point, reference, circling)
+    added = workpiece_velocity(steps, point, reference, case) - path
+    np.testing.assert_allclose(added[:, 1], [0.3, -0.6])
+
+
+def test_superposed_motions_are_told_by_their_kind(tiny_run: Path, edit_json: Any) -> None:
+    entries = [one.model_dump() for one in (SPIN, OSCILLATION)]
+    edit_json(tiny_run / "case.json", lambda case: case.update(superposed=entries))
+    assert load_case(tiny_run).superposed == (SPIN, OSCILLATION)
+    entries[0]["kind"] = "wobble"
+    edit_json(tiny_run / "case.json", lambda case: case.update(superposed=entries))
+    with pytest.raises(DocumentError, match="wobble"):
+        load_case(tiny_run)

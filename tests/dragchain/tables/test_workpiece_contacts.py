@@ -6,7 +6,11 @@ from hypothesis.extra import numpy as arrays
 
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
-from dragchain.tables.workpiece_contacts import WorkpieceFrame, join_workpiece_frame
+from dragchain.tables.workpiece_contacts import (
+    WallContacts,
+    WorkpieceFrames,
+    join_workpiece_frames,
+)
 
 PARTICLES = ("particle_id", "x_m", "y_m", "z_m", "radius_m", "force_x_n", "force_y_n", "force_z_n")
 CONTACTS = (
@@ -24,8 +28,8 @@ def frame(names, rows, step=100):
     return Frame(step, columns)
 
 
-def joined_of(particles: Frame, contacts: Frame, friction: float = 10.0) -> WorkpieceFrame:
-    return join_workpiece_frame(particles, contacts, (friction, friction))
+def joined_of(particles: Frame, contacts: Frame, friction: float = 10.0) -> WorkpieceFrames:
+    return join_workpiece_frames([particles], [contacts], (friction, friction))
 
 
 def test_a_single_contact_takes_the_applied_force() -> None:
@@ -138,6 +142,24 @@ def test_contacts_with_a_meshed_bowl_are_told_from_the_tools() -> None:
     assert joined.workpiece.particle_id.tolist() == [5]
     assert joined.bowl.particle_id.tolist() == [6]
     assert joined.bowl.normal_force_n().tolist() == [1]
+
+
+def test_a_batch_has_the_contacts_of_each_of_its_frames() -> None:
+    over_edge = frame(PARTICLES, [[5, -0.05, 0, 0.99, 1, -0.3, 0, 7.5], [9, 8, 0, 0, 1, 1, 0, 0]])
+    batch = [
+        (over_edge, frame(CONTACTS, EDGE)),
+        (frame(PARTICLES, []), frame(CONTACTS, EDGE)),
+        (frame(PARTICLES, [[6, 3, 0, 0, 1, 2, 0, 1]]), frame(CONTACTS, [])),
+        (over_edge, frame(CONTACTS, EDGE[::-1])),
+    ]
+    joined = join_workpiece_frames(*zip(*batch, strict=True), (0.5, 0.5))
+    alone = [joined_of(*pair, friction=0.5) for pair in batch]
+    for name in WallContacts.__dataclass_fields__:
+        parts = [getattr(one.workpiece, name) for one in alone]
+        np.testing.assert_array_equal(getattr(joined.workpiece, name), np.concatenate(parts))
+    assert joined.workpiece_at.tolist() == [0, 1, 1, 3]
+    assert (joined.unplaced_at.tolist(), joined.unplaced_n[:, 0].tolist()) == ([0, 2, 3], [1, 2, 1])
+    assert joined.merged == sum(one.merged for one in alone) == 2
 
 
 def test_frames_that_do_not_belong_together_are_refused() -> None:

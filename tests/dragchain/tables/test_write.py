@@ -137,7 +137,9 @@ def test_a_run_without_velocities_has_tables_but_no_slip(tiny_run: Path, edit_js
 
 def test_the_azimuth_is_measured_from_the_direction_of_motion(tiny_run: Path, edit_json) -> None:
     """The particle lies in +x; a workpiece that heads along +y has it on its right."""
-    edit_json(tiny_run / "case.json", lambda case: case["motion"].update(direction_rad=pi / 2))
+    edit_json(
+        tiny_run / "case.json", lambda case: case["motion"].update(start_direction_rad=pi / 2)
+    )
     write_tables(tiny_run)
     contacts = pd.read_parquet(tiny_run / "tables" / "workpiece_contacts.parquet")
     np.testing.assert_allclose(contacts["azimuth_rad"], -pi / 2)
@@ -279,7 +281,7 @@ def test_samples_are_found_in_blocks_and_gaps_are_not() -> None:
     assert samples.first_step == 2
     assert (samples.at(4).force_n == 4.5).all()
     assert samples.at(5) is None
-    assert (samples.at(8).ref_xy_m == 8.5).all()
+    assert (samples.at(8).ref_m == 8.5).all()
     assert samples.at(10) is None
     with pytest.raises(TableError, match="no samples"):
         WorkpieceSamples([])

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from paths import ROOT
 from tradeoff_files import measures, write
 
 from dragchain.errors import TableError
@@ -56,6 +57,21 @@ def test_a_promise_kept_by_the_skin_of_its_teeth_is_not_met(tmp_path: Path) -> N
     assert check.verdict == "kept" and not check.met
 
 
+def test_the_scatter_of_a_quantity_is_its_own(tmp_path: Path) -> None:
+    """Contacts without scatter leave that of the drag as it is."""
+    rng = np.random.default_rng(5)
+    runs = scene(0.05, 1.0, rng)
+    contacts = {**ASKED, "quantity": "workpiece_contacts"}
+    still = [
+        measures(SOFT, seed, rng, inputs={"motion.immersion_depth_m": 0.05}, noise=0.0)
+        for seed in range(1, 7)
+    ]
+    (alone,) = check_promises(read(tmp_path / "alone", runs))
+    more = [*runs, *({**run, "asked": contacts} for run in still)]
+    drag, _ = check_promises(read(tmp_path / "both", more))
+    assert drag.error == alone.error
+
+
 def test_few_runs_leave_a_promise_open(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     runs = read(tmp_path, scene(0.05, 1.08, rng, runs=2))
@@ -92,7 +108,8 @@ def test_without_full_stiffness_there_is_nothing_to_compare_with(tmp_path: Path)
 
 def test_what_is_written_can_be_read(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
-    write_promises(tmp_path / "out", write(tmp_path, scene(0.05, 1.0, rng)))
+    files = write(tmp_path, scene(0.05, 1.0, rng))
+    write_promises(tmp_path / "out", files, ROOT / "workflow/dragdeck/data/stiffness.json")
     (row,) = json.loads((tmp_path / "out" / "promises.json").read_text())["promises"]
     assert row["verdict"] == "kept" and row["numbers"]["particles"] == 1422
     assert (tmp_path / "out" / "promises.csv").read_text().startswith("scene,")

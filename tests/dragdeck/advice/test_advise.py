@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from made_tradeoff import error, made_tradeoff, setting, with_settings
 
 from dragdeck import commands
-from dragdeck.advice.advise import advise, breaking_note, resolve
+from dragdeck.advice.advise import advise, resolve
 from dragdeck.advice.forecast import question, remarks
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
@@ -446,36 +446,6 @@ def test_a_wrong_question_is_explained(
     monkeypatch.chdir(project.root)
     with pytest.raises(InputError, match="command line: "):
         commands.advise("small", None, tolerance, quantity, quick=True, tradeoff=tradeoff)
-
-
-@pytest.mark.parametrize(
-    ("scale", "fraction", "words"),
-    [
-        (1e-3, 0.6, "60 % is below 80 %"),
-        (1e-3, 0.8, "80 % is NOT BELOW 80 %"),
-        (3e-3, 0.9, "90 % is NOT BELOW 80 %"),  # the next softer level counts
-        (1e-2, 0.9, "90 % is below 150 %"),
-    ],
-)
-def test_the_step_at_which_soft_particles_broke_is_told(
-    case: Case, tradeoff: Tradeoff, scale: float, fraction: float, words: str
-) -> None:
-    broken = [
-        setting(1e-3, 0.8, 1.0, 0.01, 0.3, breaks=True),
-        setting(1e-3, 1.0, 1.0, 0.01, 0.5, breaks=True),
-        setting(1e-3, 0.4, 5.0, 0.01, 0.5, breaks=True),
-        setting(1e-2, 1.5, 1.0, 0.01, 0.2, breaks=True),
-    ]
-    fidelity = Fidelity(youngs_modulus_scale=scale, timestep_fraction=fraction)
-    own = replace(case, study=case.study.model_copy(update={"fidelity": fidelity}))
-    ((what, text),) = breaking_note(own, with_settings(tradeoff, *broken))
-    assert what == "breaking step" and words in text
-
-
-def test_nothing_is_told_of_particles_softer_than_measured(case: Case, tradeoff: Tradeoff) -> None:
-    fidelity = Fidelity(youngs_modulus_scale=1e-4)
-    own = replace(case, study=case.study.model_copy(update={"fidelity": fidelity}))
-    assert breaking_note(own, tradeoff) == [] and breaking_note(own, None) == []
 
 
 def test_a_broken_step_is_no_candidate(case: Case, tradeoff: Tradeoff) -> None:

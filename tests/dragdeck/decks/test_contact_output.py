@@ -5,28 +5,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from plate import PLATE
 
 from dragdeck.engine.process import find_engine
 
 pytestmark = pytest.mark.engine
 
-PLATE = """solid plate
-facet normal 0 0 1
-outer loop
-vertex -0.02 -0.02 0
-vertex 0.02 -0.02 0
-vertex 0.02 0.02 0
-endloop
-endfacet
-facet normal 0 0 1
-outer loop
-vertex -0.02 -0.02 0
-vertex 0.02 0.02 0
-vertex -0.02 0.02 0
-endloop
-endfacet
-endsolid plate
-"""
 PARTICLE = """one particle on the plate
 
 1 atoms

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dragdeck.decks.case_file import CountOfRun, RanksOfRun, SettlingCriterion
+from dragdeck.decks.case_file import CountOfRun, RanksOfRun, SettlingCriterion, SteadyCriterion
 from dragdeck.decks.outputs import Kind, OutputOfRun
 from dragdeck.engine.acceptance import check_run
 from dragdeck.engine.completeness import whole_frames
@@ -119,6 +119,21 @@ def test_each_check_sees_its_own_fault(
     (tmp_path / "screen.1.txt").write_text(GRID + screen)
     (tmp_path / "thermo.1.txt").write_text(thermo)
     assert failed(tmp_path, INPUTS, status) == fails
+
+
+@pytest.mark.parametrize(("last", "fails"), [(1.08, set()), (1.25, {"steady_bed"})])
+def test_a_bed_whose_motion_changes_fails(tmp_path: Path, last: float, fails: set[str]) -> None:
+    """Mean energies 1, 1, 1 and then `last` three times; what is before is not counted."""
+    levels = [5.0, 1.0, 1.0, 1.0, last, last, last]
+    rows = [f"{10 * k} 0.1 2 {level * 1e-9} 0 0.1\n" for k, level in enumerate(levels, 1)]
+    (tmp_path / "screen.1.txt").write_text(GRID + "DRAGDECK END\n")
+    (tmp_path / "thermo.1.txt").write_text(HEAD + "".join(rows))
+    steady = SteadyCriterion(from_step=10, energy_drift=0.1)
+    thermo = THERMO.model_copy(update={"last_step": 70})
+    inputs = INPUTS.model_copy(update={"steady": steady})
+    parts = [RunPart(part=1, checkpoint=None, from_step=0)]
+    checks = check_run(tmp_path, inputs, {"thermo": thermo}, 0, parts, ranks=1)
+    assert {check.code for check in checks if not check.passed} == fails
 
 
 def test_a_bed_that_did_not_settle_fails(tmp_path: Path) -> None:

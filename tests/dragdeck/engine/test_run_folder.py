@@ -222,6 +222,14 @@ def test_the_engines_error_reaches_the_user_and_is_not_retried(filling: Path) ->
     assert (filling / "run.json").is_file()
 
 
+def test_a_bed_that_does_not_come_to_rest_is_rejected_and_not_resumed(filling: Path) -> None:
+    deck = filling / "in.liggghts"
+    rewrite(deck, deck.read_text().replace("variable check loop 500", "variable check loop 3"))
+    with pytest.raises(RejectedRunError, match="bed at rest: NOT SETTLED: energy ratio"):
+        run(filling, silent)
+    assert state(filling).state == "failed" and len(state(filling).parts) == 1
+
+
 def test_a_truncated_output_fails_its_check(filling: Path) -> None:
     deck = filling / "in.liggghts"
     rewrite(

@@ -104,6 +104,7 @@ def test_cylinder_against_the_formulas(facet_size_m: float):
     assert workpiece.bounds[:, 2].tolist() == [0.0, length]
     assert m.place(workpiece).vertices == pytest.approx(workpiece.vertices, abs=1e-15)
     assert m.envelope(workpiece).radius_m == pytest.approx(corner)
+    assert m.cylinder_radius(radius, length, facet_size_m) == m.envelope(workpiece).radius_m
     assert m.findings(workpiece, surroundings=SCENE) == []
 
 
@@ -170,6 +171,38 @@ def test_place_undoes_any_shift(shift: tuple[float, float, float]):
     assert moved.bounds == pytest.approx(
         np.array([[-0.005, -0.005, 0], [0.005, 0.005, 0.01]]), abs=1e-12
     )
+
+
+@pytest.mark.parametrize("axis", ["+x", "-x", "+y", "-y", "+z", "-z"])
+def test_upright_turns_an_axis_up_and_mirrors_nothing(axis: str):
+    up = np.zeros(3)
+    up["xyz".index(axis[1])] = 1.0 if axis[0] == "+" else -1.0
+    skew = m.surface(TETRAHEDRON.vertices * [1, 2, 3], TETRAHEDRON.faces)
+    stood = m.upright(skew, axis)
+    assert stood.vertices[:, 2].tolist() == (skew.vertices @ up).tolist()
+    assert stood.volume == pytest.approx(skew.volume)
+    assert np.sort(stood.edges_unique_length) == pytest.approx(np.sort(skew.edges_unique_length))
+
+
+def test_an_upright_mesh_is_left_to_the_last_bit():
+    rod = m.cylinder(0.005, 0.02, 0.0025)
+    assert (m.upright(rod, "+z").vertices == rod.vertices).all()
+
+
+def test_place_puts_the_clamping_axis_in_the_origin():
+    low = m.place(TETRAHEDRON, (0.002, -0.003)).bounds[0]
+    assert low == pytest.approx([-0.002, 0.003, 0.0])
+    assert m.place(TETRAHEDRON, (0.0, 0.0)).bounds[0] == pytest.approx([0, 0, 0])
+
+
+def test_nodes_that_are_there_twice_are_merged_with_a_word(tmp_path: Path):
+    loose = meshio.Mesh(TETRAHEDRON.triangles.reshape(-1, 3), [("triangle", [[0, 1, 2]])])
+    loose.cells[0].data = np.arange(12).reshape(4, 3)
+    for name, said in (("body.obj", 1), ("body.ply", 1), ("body.vtk", 1), ("body.stl", 0)):
+        loose.write(tmp_path / name)
+        found = m.check(m.read(tmp_path / name, "m"))
+        assert [one.problem for one in found] == said * ["nodes are there twice"]
+        assert not said or found[0].value.startswith("8 beside the 4")
 
 
 def test_weld_joins_nodes_within_the_precision_only():
@@ -427,7 +460,7 @@ def test_quadrilaterals_are_cut_along_the_shorter_diagonal(tmp_path: Path):
         ("five.obj", b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv .5 2 0\nv 0 1 0\nf 1 2 3 4 5\n", "neither"),
         ("bad.stl", b"solid\nfacet normal 0 0 1\nvertex 0 0 zero\nendsolid\n", "damaged"),
         ("cut.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "damaged"),
-        ("part.step", b"ISO-10303-21;", "unknown mesh format"),
+        ("part.iges", b"S", "unknown mesh format"),
     ],
 )
 def test_files_that_are_refused(tmp_path: Path, name: str, content: bytes, problem: str):
@@ -535,11 +568,17 @@ def test_every_mesh_is_in_the_manifest():
 def test_the_manifest_is_true(name: str):
     entry = manifest()[name]
     unit = str(entry["unit"])
-    body = m.read(MESHES / name, unit)
+    if name.endswith(".step"):
+        pytest.importorskip("gmsh", reason="gmsh is not made for every machine")
+    sizes = [entry.get(field) for field in ("facet_size_m", "edge_facet_size_m")]
+    body = m.read(MESHES / name, unit, *sizes)  # type: ignore[arg-type]
     assert body.is_watertight is entry["closed"]
-    assert len(body.faces) == entry["facets"]
-    assert body.bounds / m.UNITS[unit] == pytest.approx(np.array(entry["bounds"]), abs=1e-6)
-    assert m.findings(body, workpiece=bool(entry["closed"]), surroundings=SCENE) == []
+    facets = entry["facets"]  # of STEP: with the version of gmsh in constraints.txt
+    assert len(body.faces) == (facets if sizes[0] is None else pytest.approx(facets, rel=0.1))
+    abs_tol = 1e-6 if sizes[0] is None else 0.02
+    assert body.bounds / m.UNITS[unit] == pytest.approx(np.array(entry["bounds"]), abs=abs_tol)
+    stood = m.upright(body, str(entry.get("axis", "+z")))
+    assert m.findings(stood, workpiece=bool(entry["closed"]), surroundings=SCENE) == []
 
 
 def test_the_generator_makes_the_file_that_is_there():
@@ -601,6 +640,17 @@ def test_engine_reads_every_cylinder_without_a_warning(tmp_path: Path, facet_siz
     read, output = engine_reads(workpiece, tmp_path)
     assert read, output
     assert f"containing {len(workpiece.faces)} triangle(s) successful" in output
+    assert "WARNING" not in output
+
+
+@pytest.mark.engine
+@pytest.mark.parametrize("name", ["shaft.step", "cutter.step"])
+def test_engine_reads_the_parts_without_a_warning(tmp_path: Path, name: str):
+    pytest.importorskip("gmsh", reason="gmsh is not made for every machine")
+    part = m.place(m.read(MESHES / name, "mm", 0.0015, 0.0007))
+    read, output = engine_reads(part, tmp_path)
+    assert read, output
+    assert f"containing {len(part.faces)} triangle(s) successful" in output
     assert "WARNING" not in output
 
 

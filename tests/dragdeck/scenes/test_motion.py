@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from dragdeck.scenes.motion import farthest_reach, legs, start_direction
+from dragdeck.scenes.motion import farthest_reach, legs
 from dragdeck.study.model import Motion
 
 CIRCLE = {"kind": "circle", "radius_m": 0.02}
@@ -32,7 +32,7 @@ def test_clockwise_turns_the_heading_and_the_spin() -> None:
             "direction": "cw",
         }
     )
-    assert start_direction(clockwise) == pytest.approx(-math.pi / 2)
+    assert clockwise.path.direction_rad == pytest.approx(-math.pi / 2)
     assert legs(clockwise, 0.06, 1)[-1].angular_speed_rad_s == pytest.approx(-0.5)
 
 

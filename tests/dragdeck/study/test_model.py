@@ -8,8 +8,9 @@ import pytest
 from paths import ROOT
 
 from dragdeck.errors import InputError
+from dragdeck.study.check import validate
 from dragdeck.study.model import BUILT_IN_FIDELITIES
-from dragdeck.study.yaml import read_yaml, validate
+from dragdeck.study.yaml import read_study
 
 FILE = Path("study.yaml")
 
@@ -92,12 +93,12 @@ def test_a_pair_may_be_named_either_way_round(small: dict[str, Any]) -> None:
 
 def test_yaml_numbers_with_an_exponent_are_numbers(tmp_path: Path) -> None:
     assert (
-        read_yaml(ROOT / "studies/uhlmann2015/study.yaml")["materials"]["ceramic"][
+        read_study(ROOT / "studies/uhlmann2015/study.yaml")["materials"]["ceramic"][
             "youngs_modulus_pa"
         ]
         == "77e9"
     )  # what YAML 1.1 makes of it
-    study = validate(read_yaml(ROOT / "studies/uhlmann2015/study.yaml"), FILE)
+    study = validate(read_study(ROOT / "studies/uhlmann2015/study.yaml"), FILE)
     assert study.materials["ceramic"].youngs_modulus_pa == 77e9
 
 
@@ -114,7 +115,7 @@ def test_a_file_that_is_no_study_is_refused(tmp_path: Path, text: str, words: st
     file = tmp_path / "study.yaml"
     file.write_text(text)
     with pytest.raises(InputError) as caught:
-        read_yaml(file)
+        read_study(file)
     assert words in str(caught.value)
     assert str(file) in str(caught.value)
 
@@ -123,7 +124,7 @@ def test_a_missing_file_names_its_neighbours(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     (tmp_path / "there/study.yaml").write_text("a: 1\n")
     with pytest.raises(InputError, match="choose one of: there"):
-        read_yaml(tmp_path / "missing/study.yaml")
+        read_study(tmp_path / "missing/study.yaml")
 
 
 def test_own_fidelities_go_before_the_built_in(small: dict[str, Any]) -> None:
@@ -135,12 +136,12 @@ def test_own_fidelities_go_before_the_built_in(small: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("study", sorted((ROOT / "studies").glob("*/study.yaml")))
 def test_every_shipped_study_is_valid(study: Path) -> None:
-    validate(read_yaml(study), study)
+    validate(read_study(study), study)
 
 
 def test_the_papers_values(tmp_path: Path) -> None:
     """Uhlmann et al. 2015, section 4 and the table beside Fig. 4."""
-    study = validate(read_yaml(ROOT / "studies/uhlmann2015/study.yaml"), FILE)
+    study = validate(read_study(ROOT / "studies/uhlmann2015/study.yaml"), FILE)
     ceramic, steel = study.materials["ceramic"], study.materials["steel"]
     assert (ceramic.youngs_modulus_pa, ceramic.poissons_ratio, ceramic.density_kg_m3) == (
         77e9,
@@ -164,6 +165,6 @@ def test_the_papers_values(tmp_path: Path) -> None:
 
 
 def test_every_value_the_paper_lacks_is_marked(tmp_path: Path) -> None:
-    study = validate(read_yaml(ROOT / "studies/uhlmann2015/study.yaml"), FILE)
+    study = validate(read_study(ROOT / "studies/uhlmann2015/study.yaml"), FILE)
     assumed = {entry.field for entry in study.assumptions}
     assert {"bowl.radius_m", "motion.path.radius_m", "workpiece.shape.radius_m"} <= assumed

@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from dragdeck.errors import InputError
-from dragdeck.study.yaml import located, read_yaml, validate, warnings
+from dragdeck.study.check import validate, warnings
+from dragdeck.study.yaml import located, read_yaml
 
 FILE = Path("study.yaml")
 

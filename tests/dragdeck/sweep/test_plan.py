@@ -83,6 +83,12 @@ def test_scenes_change_the_study(make: Callable[..., Points]) -> None:
     assert [case.study.motion.immersion_depth_m for case in points.processes] == [0.016, 0.015]
 
 
+def test_a_scene_may_have_a_path_of_its_own(make: Callable[..., Points]) -> None:
+    points = make(scenes={"short": {"motion.path.revolutions": 0.4}}, points=[])
+    paths = [case.study.motion.path.model_dump()["revolutions"] for case in points.processes]
+    assert paths == [pytest.approx(0.2)]
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -1,11 +1,13 @@
 """Hostile meshes of a workpiece."""
 
+import re
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import trimesh
+from paths import ROOT
 
 from attack.calls import REFUSED
 from attack.case import Attack, Got
@@ -80,6 +82,15 @@ def _absurd_count() -> bytes:
     return bytes(content)
 
 
+def _part() -> bytes:
+    return (ROOT / "meshes/shaft.step").read_bytes()
+
+
+def _face_of(entity: bytes) -> bytes:
+    """A part whose first face has another entity as its bound: OpenCASCADE crashes."""
+    return re.sub(rb"(ADVANCED_FACE\('',\()#\d+", rb"\1" + entity, _part(), count=1)
+
+
 _FILE = r"hostile\.\w+"
 _HOSTILE = {
     "inverted normals": ("stl", lambda: _stl(_inverted()), (_FILE, "normal|inward|inside")),
@@ -102,6 +113,23 @@ _HOSTILE = {
     "cut to half": ("stl", lambda: _stl(_rod())[:1000], (_FILE,)),
     "an OBJ in an STL": ("stl", _obj, (_FILE,)),
     "another format": ("step", lambda: b"ISO-10303-21;", (_FILE,)),
+    "a STEP part cut to half": ("step", lambda: _part()[:28000], (_FILE,)),
+    "a STEP part that crashes its reader": ("stp", lambda: _face_of(b"#1"), (_FILE, "damaged")),
+    "a STEP part in metres": (
+        "step",
+        lambda: _part().replace(b".MILLI.", b"$"),
+        (_FILE, "unit"),
+    ),
+    "a STEP part without its solid": (
+        "step",
+        lambda: _part().replace(b"MANIFOLD_SOLID_BREP", b"FACETED_BREP"),
+        (_FILE,),
+    ),
+    "a script of gmsh in a STEP file": (
+        "step",
+        lambda: b'ISO-10303-21;\nSystemCall "touch pwned";\n',
+        (_FILE,),
+    ),
     "no suffix": ("", lambda: _stl(_rod()), ("hostile",)),
     "an index beyond": ("obj", lambda: _obj("f 1 2 999"), (_FILE,)),
     "an index of zero": ("obj", lambda: _obj("f 0 1 2"), (_FILE,)),
@@ -167,7 +195,8 @@ def _place(suffix: str, content: bytes, folder: Path) -> Path:
     project = new_project(folder / "project")
     data = tiny_study()
     name = f"hostile.{suffix}" if suffix else "hostile"
-    data["workpiece"]["shape"] = {"kind": "mesh", "file": name, "unit": "mm"}
+    size = {"facet_size_m": 0.002} if suffix in ("step", "stp") else {}
+    data["workpiece"]["shape"] = {"kind": "mesh", "file": name, "unit": "mm", **size}
     write_study(project, data)
     (project / "studies" / STUDY / name).write_bytes(content)
     return project

@@ -5,20 +5,20 @@ an engine.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from dragdeck.advice.options import (
     Option,
-    breaking_step,
     drop_options,
+    extrapolated_options,
     finest_drop,
     process_options,
     process_reference,
     with_option,
 )
 from dragdeck.cases.case import Case
-from dragdeck.decks.case_file import AdvisedSettings
+from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.errors import InputError
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
 from dragdeck.physics.similarity import SAME_NUMBER
@@ -44,6 +44,8 @@ _RANGE_LABELS = {
     "depth_to_particle": "ratio of depth to particle diameter",
     "bowl_to_particle": "ratio of bowl to particle diameter",
     **compared_labels(),
+    "superposed_speed": "ratio of additional surface speed to mean speed along the path",
+    "bowl_froude_number": "Froude number of the bowl's rotation",
 }
 """The numbers of a scene that must lie within the measured range."""
 
@@ -131,6 +133,7 @@ class Advice:
             quantity=self.asked.quantity,
             label=self.label,
             held_to=self.held_to,
+            extrapolated=self.chosen.extrapolated,
             error=error.value if error else None,
             ci95_low=error.ci95_low if error else None,
             ci95_high=error.ci95_high if error else None,
@@ -166,9 +169,10 @@ def resolve(case: Case, asked: Tolerance, tradeoff: Tradeoff | None = None) -> C
 def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
     """The cheapest measured settings whose error is within a tolerance.
 
-    Where the case's scene lies outside of the measured range the error is held
-    to `OUTSIDE_FACTOR` of the tolerance. Where nothing measured holds it, the
-    reference settings are taken.
+    Where the case's scene lies outside of the range of the trade-off, results that are
+    extrapolated to the physical Young's modulus are offered, with an error that was measured in
+    designed scenes. Outside of their range, too, the error must be within `OUTSIDE_FACTOR` of
+    the tolerance. Where no measured setting meets it, the reference settings are taken.
 
     Parameters
     ----------
@@ -187,7 +191,12 @@ def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
     options = list(drop_options(case, tradeoff) if drop else process_options(case, tradeoff, asked))
     reference = finest_drop(case, tradeoff) if drop else process_reference(case, tradeoff)
     names = ("lowest_restitution",) if drop else None
-    outside = list(_outside_of(describe(case), tradeoff, names))
+    here = describe(case)
+    outside = list(_outside_of(here, tradeoff, names))
+    extrapolated = [] if drop else list(_extrapolated(case, here, tradeoff, asked))
+    if outside and extrapolated:
+        options, outside = [one for one in options if _at_full_modulus(one)], []
+    options += extrapolated
     held_to = asked.tolerance * (OUTSIDE_FACTOR if outside else 1.0)
     holding = [option for option in options if option.error and option.error.limit <= held_to]
     chosen = min(holding, key=_cost_then_bound, default=reference)
@@ -195,7 +204,7 @@ def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
     return Advice(
         asked=asked,
         held_to=held_to,
-        label=RESTITUTION if drop else tradeoff.quantities[asked.quantity].label,
+        label=RESTITUTION if drop else tradeoff.label(asked.quantity),
         chosen=chosen,
         cheaper=cheaper,
         dearer=dearer,
@@ -203,14 +212,22 @@ def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
         outside=outside,
         fallback=None if holding else _fallback(asked, held_to, options, reference, tradeoff),
         spread=None if drop else _spread(case.study, asked, tradeoff),
-        source=f"measured {tradeoff.measured} on {tradeoff.study}, plan {tradeoff.plan}",
+        source=_source(chosen, tradeoff),
     )
+
+
+def _source(chosen: Option, tradeoff: Tradeoff) -> str:
+    if chosen.extrapolated and tradeoff.stiffness is not None:
+        scenes = sum(bool(one.runs) for one in tradeoff.stiffness.scenes)
+        return f"measured {tradeoff.stiffness.measured} in {scenes} designed scenes"
+    return f"measured {tradeoff.measured} on {tradeoff.study}, plan {tradeoff.plan}"
 
 
 def _check_quantity(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> None:
     """Refuse a tolerance about something that was not measured."""
     known = [RESTITUTION] if tradeoff.drop_test else []
-    known += [name for name in tradeoff.quantities if name not in known]
+    laws = tradeoff.stiffness.laws if tradeoff.stiffness else {}
+    known += [name for name in {**tradeoff.quantities, **laws} if name not in known]
     if asked.quantity not in known:
         raise InputError(
             "no error of this quantity was measured",
@@ -218,36 +235,8 @@ def _check_quantity(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> None:
             field="fidelity.quantity",
             value=asked.quantity,
             limit=f"one of: {', '.join(known)}",
-            remedy="ask for one of these",
-        )
-
-
-def breaking_note(case: Case, tradeoff: Tradeoff | None) -> list[tuple[str, str]]:
-    """What ``check`` and ``explain`` say of the breaking step; nothing if none was measured."""
-    fraction, where = breaking_step(case, tradeoff)
-    own = case.study.chosen_fidelity().timestep_fraction
-    verdict = "below" if own < fraction else "NOT BELOW"
-    return [("breaking step", f"{100 * own:.3g} % is {verdict} {where}")] if where else []
-
-
-def check_timestep(case: Case, tradeoff: Tradeoff | None) -> None:
-    """Refuse a step of the process that was measured to be too long, unless the study accepts it.
-
-    Raises
-    ------
-    InputError
-        The step is not below the breaking step, and the study gives no reason for that.
-    """
-    fraction, where = breaking_step(case, tradeoff)
-    chosen = case.study.chosen_fidelity()
-    if chosen.timestep_fraction >= fraction and not case.study.accepted.unsafe_timestep:
-        raise InputError(
-            f"the time step is not safe with E x {chosen.youngs_modulus_scale:g}",
-            file=case.file,
-            field="fidelity.timestep_fraction",
-            value=chosen.timestep_fraction,
-            limit=f"below {where}",
-            remedy="choose a smaller one; or, if you mean it, say why in accepted.unsafe_timestep",
+            remedy="ask for one of these; or name settings with the physical Young's modulus: "
+            "fidelity: {youngs_modulus_scale: 1}",
         )
 
 
@@ -261,14 +250,38 @@ def _outside_of(
     below, nor the inertial number above, what any setting was measured at.
     """
     scenes = [tradeoff.scene, *(one.numbers for one in tradeoff.promises if one.met)]
-    for name in _RANGE_LABELS if names is None else names:
+    yield from _beyond(here, scenes, _RANGE_LABELS if names is None else names)
+    if names is None:
+        yield from _outside_numbers(here, tradeoff)
+
+
+def _beyond(
+    here: Mapping[str, float], scenes: Sequence[Mapping[str, float]], names: Iterable[str]
+) -> Iterator[Outside]:
+    """The numbers of a scene that no other scene comes near."""
+    for name in names:
         values = [scene.get(name, 0.0) for scene in scenes]
         low, high = (1 - WIDENING) * min(values), (1 + WIDENING) * max(values)
         value = here.get(name, 0.0)  # an absent coefficient
         if not low <= value <= high:
-            yield Outside(_RANGE_LABELS[name], value, low, high)
-    if names is None:
-        yield from _outside_numbers(here, tradeoff)
+            yield Outside(_RANGE_LABELS.get(name, name.replace("_", " ")), value, low, high)
+
+
+def _extrapolated(
+    case: Case, here: Mapping[str, float], tradeoff: Tradeoff, asked: Tolerance
+) -> Iterator[Option]:
+    """What may be extrapolated to the physical modulus: nothing in a scene unlike all designed."""
+    if tradeoff.stiffness is None:
+        return
+    scenes = [scene.numbers for scene in tradeoff.stiffness.scenes]
+    names = [*_RANGE_LABELS, "stiffness_number", "inertial_number"]
+    if not any(_beyond(here, scenes, names)):
+        yield from extrapolated_options(case, tradeoff, asked)
+
+
+def _at_full_modulus(option: Option) -> bool:
+    """Whether only the time step differs from a plain run."""
+    return option.fidelity.youngs_modulus_scale == 1 and option.fidelity.speed_factor == 1
 
 
 def _outside_numbers(here: Mapping[str, float], tradeoff: Tradeoff) -> Iterator[Outside]:
@@ -330,13 +343,22 @@ def _fallback(
 
 def _spread(study: Study, asked: Tolerance, tradeoff: Tradeoff) -> Spread | None:
     """Chance in one run's value, from the spread of measured runs; falls with the root of path."""
-    quantity = tradeoff.quantities[asked.quantity]
-    counted = study.motion.path_length_m - study.motion.transient_m
-    if quantity.run_std is None or counted <= 0:
+    run_std, arc_m = _scatter_of(study, asked.quantity, tradeoff)
+    counted = study.motion.path_length_m - study.motion.uncounted_m
+    if run_std is None or counted <= 0:
         return None
-    alone = _NORMAL_95 * quantity.run_std
-    half_width = alone * math.sqrt(quantity.arc_m / counted)
-    return Spread(half_width, counted, quantity.arc_m * (alone / asked.tolerance) ** 2)
+    alone = _NORMAL_95 * run_std
+    half_width = alone * math.sqrt(arc_m / counted)
+    return Spread(half_width, counted, arc_m * (alone / asked.tolerance) ** 2)
+
+
+def _scatter_of(study: Study, name: str, tradeoff: Tradeoff) -> tuple[float | None, float]:
+    """Relative standard deviation of a quantity in one run, and the path that it belongs to, m."""
+    if name in tradeoff.quantities or tradeoff.stiffness is None:
+        quantity = tradeoff.quantities[name]
+        return quantity.run_std, quantity.arc_m
+    known = tradeoff.stiffness.laws[name]
+    return known.law.run_std, known.path_to_particle * 2.0 * study.media.radius_mean_m
 
 
 def percent(fraction: float) -> str:

@@ -14,7 +14,7 @@ from dragdeck.advice.advise import RESTITUTION, Advice, Spread, percent, signed
 from dragdeck.advice.options import Option, process_options, with_option
 from dragdeck.advice.speed import SCALE, Speed
 from dragdeck.cases.case import Case
-from dragdeck.decks.case_file import AdvisedSettings
+from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.decks.deck import StudyScene
 from dragdeck.documents import Document, Part
 from dragdeck.outlook.explain import Cost, expected_cost
@@ -24,7 +24,7 @@ from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import Json
-from dragdeck.study.model import CirclePath, Fidelity, Study, Tolerance
+from dragdeck.study.model import Fidelity, Study, Tolerance
 
 _DEFAULT_TOLERANCE = Tolerance(tolerance=0.05)
 """What is advised for where a study asks for nothing."""
@@ -323,6 +323,12 @@ def remarks(advice: Advice, study: Study) -> list[tuple[str, str]]:
             "measured says how it grows there)"
         )
         found.append(("safe side", text))
+    if advice.chosen.extrapolated:
+        text = (
+            f"the {advice.label} of the run is extrapolated to the physical Young's modulus; the "
+            "error is that of the law, and the report shows both values"
+        )
+        found.append(("extrapolated", text))
     if advice.fallback:
         found.append(("fallback", advice.fallback))
     cheaper = advice.cheaper
@@ -343,11 +349,9 @@ def _of_chance(advice: Advice, spread: Spread, study: Study) -> str:
     )
     if spread.half_width <= advice.asked.tolerance:
         return text
-    length = spread.needed_m + study.motion.transient_m
-    path = study.motion.path
-    whole = f"{length:.3g} m"
-    if isinstance(path, CirclePath):
-        whole = f"{length / (2 * math.pi * path.radius_m):.3g} revolutions"
+    length = spread.needed_m + study.motion.uncounted_m
+    around = study.motion.path.revolution_m
+    whole = f"{length:.3g} m" if around is None else f"{length / around:.3g} revolutions"
     seeds = math.ceil(spread.needed_m / spread.counted_m)
     return f"{text}: more than the tolerance, which takes {whole}, or the mean over {seeds} seeds"
 

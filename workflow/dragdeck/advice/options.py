@@ -5,18 +5,26 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 
+import numpy as np
+
 from dragdeck.cases.bed import widest_skin
 from dragdeck.cases.case import Case
 from dragdeck.outlook.measured import (
     FidelityParameters,
     MeasuredDrop,
     MeasuredError,
+    MeasuredLaw,
     MeasuredSetting,
     Tradeoff,
-    stability_map,
 )
+from dragdeck.outlook.stable_step import stable_step_cautions
 from dragdeck.outlook.timestep import largest_fraction
-from dragdeck.physics.similarity import carried_scale, carried_speed, softest_scale
+from dragdeck.physics.similarity import (
+    SAME_NUMBER,
+    carried_scale,
+    carried_speed,
+    softest_scale,
+)
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.filling import filling_cautions
 from dragdeck.scenes.fit import process_cautions
@@ -24,6 +32,10 @@ from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance
 
 _FEWEST_RUNS = 2
 """Runs of a setting below which its error is not believed."""
+
+UNIT_STIFFNESS, UNIT_INERTIA, UNIT_FRICTION = 1e4, 0.1, 0.3
+"""Stiffness number, inertial number and friction about which the laws of reduced moduli are
+written."""
 
 _PROCESS_OF_DROP = "standard"
 """Fidelity of the process in a study whose tolerance is about the drop test."""
@@ -43,12 +55,15 @@ class Option:
         checks take a stiffer modulus or a shorter step.
     drop_timestep_fraction : float or None
         Step of the drop test over the Rayleigh time, if the option is about it.
+    extrapolated : bool
+        The error is that of the value extrapolated to the physical Young's modulus.
     """
 
     fidelity: Fidelity
     error: MeasuredError | None
     relative_cost: float
     drop_timestep_fraction: float | None = None
+    extrapolated: bool = False
 
     def __str__(self) -> str:
         if self.drop_timestep_fraction is not None:
@@ -57,6 +72,7 @@ class Option:
         return (
             f"E x {chosen.youngs_modulus_scale:g}, {100 * chosen.timestep_fraction:.3g} % of the "
             f"Rayleigh time, speed x {chosen.speed_factor:g}"
+            f"{', extrapolated to E x 1' if self.extrapolated else ''}"
         )
 
     def same_settings(self, fidelity: Fidelity | FidelityParameters) -> bool:
@@ -73,28 +89,7 @@ def with_option(study: Study, option: Option) -> Study:
     return study.model_copy(update=update)
 
 
-def breaking_step(case: Case, tradeoff: Tradeoff | None) -> tuple[float, str]:
-    """The step over the Rayleigh time at which soft particles were seen to break, and where.
-
-    Soft particles break at shorter steps, as shares of the Rayleigh time: the next softer level
-    that was measured counts. Infinite where nothing was measured.
-    """
-    limit = case.study.chosen_fidelity().youngs_modulus_scale * (1 + 1e-9)
-    broken = [
-        (-one.youngs_modulus_scale, one.timestep_fraction)
-        for one in (tradeoff.settings if tradeoff else ())
-        if one.breaks and one.speed_factor == 1 and one.youngs_modulus_scale <= limit
-    ]
-    if tradeoff is None or not broken:
-        return math.inf, ""
-    level, fraction = min(broken)
-    return fraction, (
-        f"{100 * fraction:.3g} %, where the drag was wrong or a run failed with E x {-level:g} "
-        f"({tradeoff.study}, {tradeoff.measured})"
-    )
-
-
-def consistent(case: Case, fidelity: Fidelity, tradeoff: Tradeoff | None) -> Fidelity:
+def consistent(case: Case, fidelity: Fidelity) -> Fidelity:
     """Settings that pass every check of a case: the given ones, or the nearest to them.
 
     Modulus and time step change only to the accurate side, so that a measured error still holds;
@@ -106,8 +101,6 @@ def consistent(case: Case, fidelity: Fidelity, tradeoff: Tradeoff | None) -> Fid
     case : Case
         Its own fidelity does not matter.
     fidelity : Fidelity
-    tradeoff : Tradeoff or None
-        Steps that were seen to break.
     """
     lowest = describe(case)["lowest_restitution"]
     filling = min(fidelity.filling_timestep_fraction, largest_fraction("settle", lowest))
@@ -119,17 +112,15 @@ def consistent(case: Case, fidelity: Fidelity, tradeoff: Tradeoff | None) -> Fid
     while remedy:
         fidelity = fidelity.model_copy(update=remedy)
         study = case.study.model_copy(update={"fidelity": fidelity})
-        remedy = next(_remedies(replace(case, study=study), tradeoff), {})
+        remedy = next(_remedies(replace(case, study=study)), {})
     return fidelity
 
 
-def _remedies(case: Case, tradeoff: Tradeoff | None) -> Iterator[Mapping[str, float]]:
+def _remedies(case: Case) -> Iterator[Mapping[str, float]]:
     """What checks that a case's settings do not pass take; the next one may need less after it."""
-    found = chain(filling_cautions(case), process_cautions(case))
+    stable = stable_step_cautions(case, surely=True)
+    found = chain(filling_cautions(case), process_cautions(case), stable)
     yield from (one.settings for one in found if one.settings)
-    breaking, _ = breaking_step(case, tradeoff)
-    if case.study.chosen_fidelity().timestep_fraction >= breaking:
-        yield {"timestep_fraction": stability_map().safety_factor * breaking}
 
 
 def process_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterator[Option]:
@@ -140,18 +131,69 @@ def process_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterato
     limit of the measured scene, or that cost as much as the reference.
     """
     reference = process_reference(case, tradeoff)
-    limit = largest_fraction("drag", tradeoff.scene["lowest_restitution"])
-    for setting in tradeoff.settings:
-        error, cost = setting.errors.get(asked.quantity), setting.relative_cost
-        sound = setting.failed == 0 and not setting.breaks and setting.runs >= _FEWEST_RUNS
-        stable = sound and setting.timestep_fraction <= limit * (1 + 1e-9)
-        if error is None or cost is None or not stable:
+    for setting, cost in _sound_settings(tradeoff):
+        error = setting.errors.get(asked.quantity)
+        if error is None:
             continue
-        fidelity = consistent(case, _carried(case, setting, tradeoff.scene), tradeoff)
+        fidelity = consistent(case, _carried(case, setting, tradeoff.scene))
         option = Option(fidelity, error, cost * _steps(fidelity, setting))
         dearest = option.relative_cost >= reference.relative_cost
         if not dearest and not option.same_settings(reference.fidelity):
             yield option
+
+
+def extrapolated_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterator[Option]:
+    """Settings with a reduced modulus whose results are extrapolated to the physical one.
+
+    None where no law of the quantity was measured. The error is that of the law in one scene: how
+    far the effect of a reduced modulus scatters from scene to scene, how well its mean is known,
+    and what extrapolations erred in scenes that were left out.
+    """
+    known = tradeoff.stiffness.laws.get(asked.quantity) if tradeoff.stiffness else None
+    if tradeoff.stiffness is None or known is None:
+        return
+    numbers = describe(case)
+    for setting, cost in _sound_settings(tradeoff):
+        if setting.youngs_modulus_scale == 1 or setting.speed_factor != 1:
+            continue
+        plain = Fidelity(
+            youngs_modulus_scale=setting.youngs_modulus_scale,
+            timestep_fraction=setting.timestep_fraction,
+            skin_m=widest_skin(case.study),
+        )
+        fidelity = consistent(case, plain)
+        softness = fidelity.youngs_modulus_scale ** (2 / 3) * numbers["stiffness_number"]
+        if softness >= tradeoff.stiffness.lowest_stiffness_number * (1 - SAME_NUMBER):
+            error = _law_error(known, numbers, fidelity.youngs_modulus_scale)
+            cost_here = cost * _steps(fidelity, setting)
+            yield Option(fidelity, error, cost_here, extrapolated=True)
+
+
+def _sound_settings(tradeoff: Tradeoff) -> Iterator[tuple[MeasuredSetting, float]]:
+    """The measured settings that may be used anywhere, with their relative cost."""
+    limit = largest_fraction("drag", tradeoff.scene["lowest_restitution"]) * (1 + 1e-9)
+    for setting in tradeoff.settings:
+        sound = setting.failed == 0 and not setting.breaks and setting.runs >= _FEWEST_RUNS
+        if sound and setting.timestep_fraction <= limit and setting.relative_cost is not None:
+            yield setting, setting.relative_cost
+
+
+def _law_error(known: MeasuredLaw, numbers: Mapping[str, float], scale: float) -> MeasuredError:
+    """The relative error of an extrapolation from a modulus scale in a scene.
+
+    The standard error of `dragchain.tradeoff.stiffness_law.extrapolate`, without the scatter of
+    the run.
+    """
+    law, inertia = known.law, numbers["inertial_number"] / UNIT_INERTIA
+    along = np.array([1.0, inertia, math.log(numbers[known.friction] / UNIT_FRICTION)])
+    reduction = (numbers["stiffness_number"] / UNIT_STIFFNESS) ** -law.rate
+    reduction *= scale ** (-2 / 3 * law.rate) - 1
+    variance = law.amplitude_std**2 + float(along @ np.array(law.covariance) @ along)
+    se = math.hypot(reduction * math.sqrt(variance), law.model_std)
+    low, high = (math.expm1(sign * known.quantile * se) for sign in (-1, 1))
+    return MeasuredError(
+        value=0.0, se=se, ci95_low=low, ci95_high=high, bound=high, single_parameter_error=0.0
+    )
 
 
 def _carried(case: Case, setting: MeasuredSetting, there: Mapping[str, float]) -> Fidelity:
@@ -177,7 +219,7 @@ def _steps(fidelity: Fidelity, measured: FidelityParameters) -> float:
 def process_reference(case: Case, tradeoff: Tradeoff) -> Option:
     """The settings that errors are measured against, or the nearest that pass every check."""
     plain = Fidelity(**tradeoff.reference.model_dump(), skin_m=widest_skin(case.study))
-    fidelity = consistent(case, plain, tradeoff)
+    fidelity = consistent(case, plain)
     return Option(fidelity, None, _steps(fidelity, tradeoff.reference))
 
 
@@ -200,7 +242,7 @@ def _beside_drop(case: Case, tradeoff: Tradeoff) -> tuple[Fidelity, float]:
     """If the drop test is asked about: settings of the process, and largest step of the drop."""
     named = {**BUILT_IN_FIDELITIES, **case.study.fidelities}[_PROCESS_OF_DROP]
     limit = largest_fraction("impact", describe(case)["lowest_restitution"])
-    return consistent(case, named, tradeoff), limit
+    return consistent(case, named), limit
 
 
 def _drop_option(process: Fidelity, drop: MeasuredDrop, fraction: float) -> Option:

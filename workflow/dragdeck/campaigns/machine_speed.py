@@ -21,10 +21,10 @@ from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import Report
 from dragdeck.errors import EngineError, RejectedRunError
 from dragdeck.scenes.filling import FILLING, expected_surface
-from dragdeck.scenes.motion import plunge_point, start_point
+from dragdeck.scenes.motion import plunge_point
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import Bed, SceneType
-from dragdeck.study.model import CirclePath, Fidelity, Motion, Outputs, Study
+from dragdeck.study.model import Fidelity, Motion, Outputs, Study
 
 _TIMESTEP_FRACTION = 0.5
 """Step of its process over the Rayleigh time."""
@@ -116,7 +116,7 @@ def short_case(case: Case) -> Case:
         ranks=case.ranks,
     )
     accepted = study.accepted.model_copy(update={"unsafe_timestep": "only its speed counts"})
-    update = {"fidelity": consistent(case, soft, None), "accepted": accepted}
+    update = {"fidelity": consistent(case, soft), "accepted": accepted}
     changed = study.model_copy(update=update)
     dt = bed_timestep(changed, "timestep_fraction")
     pace = asked.speed_factor * bed_timestep(study, "timestep_fraction") / dt
@@ -131,27 +131,19 @@ def _motion(study: Study, pace: float, timestep_s: float) -> Motion:
     ----------
     study : Study
     pace : float
-        On the drag's speed, so that the workpiece's way in a step stays as it is.
+        On the speeds of the drag, so that the workpiece's way in a step stays as it is.
     timestep_s : float
     """
     motion = study.motion
-    speed = pace * motion.speed_m_s
-    length, arrival_s = speed * DRAG_STEPS * timestep_s, _ARRIVAL_STEPS * timestep_s
-    here, there = plunge_point(motion), start_point(motion)
-    way = math.dist(here, there) or motion.immersion_depth_m
-    path = motion.path
-    if isinstance(path, CirclePath):
-        turns = length / (2 * math.pi * path.radius_m)
-        path = path.model_copy(update={"revolutions": turns})
-    else:
-        path = path.model_copy(update={"length_m": min(length, path.length_m)})
-    return motion.model_copy(
+    length = pace * motion.axis_speed_m_s * DRAG_STEPS * timestep_s
+    arrival_s = _ARRIVAL_STEPS * timestep_s
+    way = math.dist(plunge_point(motion), motion.path.start_point) or motion.immersion_depth_m
+    if motion.path.revolution_m is None:  # a circle may go round again, a line may end at a wall
+        length = min(length, motion.path_length_m)
+    return motion.at(pace, length).model_copy(
         update={
-            "path": path,
-            "speed_m_s": speed,
             "plunge_speed_m_s": expected_surface(study) / arrival_s,
             "approach_speed_m_s": way / arrival_s,
-            "transient_m": 0.0,
         }
     )
 

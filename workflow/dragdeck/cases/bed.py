@@ -7,10 +7,12 @@ import numpy as np
 
 from dragdeck.errors import Caution
 from dragdeck.physics.contact_mechanics import (
+    bed_pressure,
     effective_modulus,
     hertz_contact_time,
     particle_mass,
     rayleigh_time,
+    stiffness_number,
 )
 from dragdeck.physics.packing import Array, radii
 from dragdeck.physics.rounding import round_to, rounded, timestep
@@ -103,6 +105,17 @@ def outrun(study: Study, field: str, who: str, speed_m_s: float) -> Iterator[Cau
 def particle_material(study: Study) -> Material:
     """Material of the particles."""
     return study.materials[study.media.material]
+
+
+def tip_pressure(study: Study) -> float:
+    """Pressure of the bed at the depth of the workpiece's tip, Pa."""
+    density, depth = particle_material(study).density_kg_m3, study.motion.immersion_depth_m
+    return bed_pressure(density, study.gravity_m_s2, depth)
+
+
+def full_stiffness_number(study: Study) -> float:
+    """Stiffness number at the tip, with the physical Young's modulus."""
+    return stiffness_number(particle_material(study), tip_pressure(study))
 
 
 def skin(study: Study) -> float:

@@ -11,10 +11,11 @@ from typing import Any
 from pydantic import JsonValue
 
 from dragdeck.cases.ranks import auto_ranks, cores_here
-from dragdeck.decks.case_file import AdvisedSettings
+from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.errors import InputError
 from dragdeck.study.base import Json
 from dragdeck.study.model import MeshShape, Study, Tolerance
+from dragdeck.study.yaml import study_folders
 
 SAID_BY_NAME = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
 """The settings that the name of a fidelity without a name says."""
@@ -61,7 +62,7 @@ class Case:
     @property
     def axis_speed_m_s(self) -> float:
         """Speed at which the workpiece's axis is driven along its path, m/s."""
-        return self.study.motion.speed_m_s * self.study.chosen_fidelity().speed_factor
+        return self.study.motion.axis_speed_m_s * self.study.chosen_fidelity().speed_factor
 
     @property
     def study_name(self) -> str:
@@ -92,13 +93,16 @@ class Case:
 def mesh_file(case: Case, shape: MeshShape) -> Path:
     """The file of a mesh: beside the study, in its meshes/, or in the project's meshes/.
 
+    A study that extends another finds its meshes, too.
+
     Raises
     ------
     InputError
         No such file in any of these places.
     """
-    folder = case.file.parent
-    places = (folder, folder / "meshes", folder.parent.parent / "meshes")
+    folders = study_folders(case.file)
+    places = [place for folder in folders for place in (folder, folder / "meshes")]
+    places.append(case.file.parent.parent.parent / "meshes")
     for place in places:
         if (place / shape.file).is_file():
             return place / shape.file

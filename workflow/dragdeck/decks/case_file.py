@@ -125,106 +125,20 @@ class SettlingCriterion(Part):
     energy_ratio: float
 
 
+class SteadyCriterion(Part):
+    """When the bed in a rotating bowl moves steadily.
+
+    From the step `from_step` on, the mean kinetic energy of a particle in the first third differs
+    from that in the last third by at most the fraction `energy_drift`.
+    """
+
+    from_step: int
+    energy_drift: float
+
+
 class FillingCase(CaseOfStudy):
     """A filling."""
 
     scene: Literal["filling"] = "filling"
     settled: SettlingCriterion
     limits: RunLimits
-
-
-class WorkpieceOfRun(Part):
-    """The workpiece: radius of the cylinder around it, length, mesh file, depth of its tip."""
-
-    kind: Literal["cylinder", "mesh"]
-    radius_m: float
-    length_m: float
-    mesh: str
-    immersion_depth_m: float
-
-
-class MotionOfRun(Part):
-    """The drag as it is driven: the speed of the workpiece's axis, and its first direction."""
-
-    kind: str
-    axis_speed_m_s: float
-    start_direction_rad: float
-    orientation: Literal["follow_path", "fixed"]
-
-
-class CircleOfRun(MotionOfRun):
-    """A circle about the bowl's axis, its direction seen from above."""
-
-    kind: Literal["circle"] = "circle"
-    radius_m: float
-    direction: Literal["ccw", "cw"]
-
-
-class LineOfRun(MotionOfRun):
-    """A straight line."""
-
-    kind: Literal["line"] = "line"
-    start_m: tuple[float, float]
-    direction_rad: float
-
-
-class StatisticsOfRun(Part):
-    """The first seconds of the drag that no statistic counts."""
-
-    transient_s: float
-
-
-class AdvisedSettings(Part):
-    """The tolerance that a run's settings were chosen for, and what is expected of them.
-
-    Attributes
-    ----------
-    held_to : float
-        The tolerance that the settings meet: the asked one, or less outside of the measured
-        range.
-    error, ci95_low, ci95_high, bound : float or None
-        Expected error, its interval and the bound of its size; None for the reference.
-    half_width : float or None
-        Of the 95 % interval of one run's value, relative.
-    """
-
-    tolerance: float
-    quantity: str
-    label: str
-    held_to: float
-    error: float | None
-    ci95_low: float | None
-    ci95_high: float | None
-    bound: float | None
-    relative_cost: float
-    half_width: float | None
-    outside: Sequence[str]
-    fallback: str | None
-    source: str
-
-
-class ProcessCase(CaseOfStudy):
-    """A process run: the workpiece dragged through a settled bed.
-
-    Attributes
-    ----------
-    case : str
-        The case's readable name.
-    upstream : mapping
-        Run ids of the filling and the drop test that it belongs to.
-    numbers : mapping
-        The scene's dimensionless numbers at full modulus and the study's own speed.
-    surface_m : float
-        The settled surface above the floor.
-    """
-
-    scene: Literal["process"] = "process"
-    case: str
-    upstream: Mapping[str, str]
-    numbers: Mapping[str, float]
-    surface_m: float
-    workpiece: WorkpieceOfRun
-    motion: CircleOfRun | LineOfRun
-    statistics: StatisticsOfRun
-    limits: RunLimits
-    asked: AdvisedSettings | None = None

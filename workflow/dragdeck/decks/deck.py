@@ -4,8 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
-from trimesh import Trimesh
-
 from dragdeck import __version__
 from dragdeck.decks.case_file import CaseFile, CaseOfStudy
 from dragdeck.decks.outputs import Output
@@ -142,8 +140,6 @@ class Scene(Generic[K]):
         Steps expected; an estimate where the engine decides.
     files : mapping of str to callable
         Other input files: their text by name, made when it is wanted.
-    meshes : mapping of str to Trimesh
-        Mesh files, by name.
     models : mapping of str to str
         What the deck models, and why.
     leaves_out : mapping of str to LeftOut
@@ -158,7 +154,6 @@ class Scene(Generic[K]):
     case: K
     steps: int
     files: Mapping[str, Callable[[], str]] = field(default_factory=dict)
-    meshes: Mapping[str, Trimesh] = field(default_factory=dict)
     models: Mapping[str, str] = field(default_factory=dict)
     leaves_out: Mapping[str, LeftOut] = field(default_factory=dict)
     warnings: Sequence[Caution] = ()

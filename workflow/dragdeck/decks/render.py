@@ -13,7 +13,6 @@ from dragdeck.decks.outputs import ColumnsFile, in_writing_order
 from dragdeck.decks.templates import explained, file_of, used
 from dragdeck.errors import InputError
 from dragdeck.files import file_checksum, replace_text
-from dragdeck.mesh import stl_text
 
 
 def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
@@ -63,7 +62,6 @@ def write_run(scene: AnyScene, folder: Path, templates: jinja2.Environment) -> l
         DECK_FILE: deck_text(scene, templates),
         COLUMNS_FILE: columns.as_text(),
         **scene.texts(),
-        **{name: stl_text(mesh) for name, mesh in scene.meshes.items()},
     }
     checksums = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
     folder.mkdir(parents=True, exist_ok=True)  # the source's path may lead through it

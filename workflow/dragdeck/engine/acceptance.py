@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dragdeck.decks import CASE_FILE, PACKING_FILE
-from dragdeck.decks.case_file import CaseOfStudy
+from dragdeck.decks.case_file import CaseOfStudy, SteadyCriterion
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
@@ -60,6 +60,8 @@ def check_run(
     if "thermo" in outputs:
         samples = _samples(folder, outputs["thermo"], parts)
         checks += _thermo(samples, inputs.media.count)
+        if inputs.steady is not None:
+            checks.append(_steady(samples, inputs.steady))
     checks += [_complete(folder, name, output, parts) for name, output in outputs.items()]
     checks.append(ranks_check(decomposition(screens[-1]), ranks))
     if inputs.scene in ("filling", "process") and "particles" in outputs:
@@ -77,6 +79,7 @@ def _check(
     seen: str,
     limit: str,
     reason: CheckReason | None = None,
+    number: float | None = None,
 ) -> AcceptanceCheck:
     return AcceptanceCheck(
         code=code,
@@ -85,6 +88,7 @@ def _check(
         passed=passed,
         seen=seen,
         limit=limit,
+        number=number,
     )
 
 
@@ -114,6 +118,19 @@ def _neighbour_builds(screens: str) -> AcceptanceCheck:
 def _at_rest(screen: str) -> AcceptanceCheck:
     rests, seen = log.settling(screen)
     return _check("at_rest", "bed at rest", rests, seen, "SETTLED")
+
+
+def _steady(samples: Sequence[log.Sample], asked: SteadyCriterion) -> AcceptanceCheck:
+    """Whether the mean kinetic energy of a particle stays, from its first third to its last."""
+    energies = [one.mean_energy_j for one in samples if one.step > asked.from_step]
+    third = len(energies) // 3
+    drift = math.nan
+    if third:
+        drift = abs(sum(energies[:third]) / sum(energies[-third:]) - 1)
+    seen = f"mean kinetic energy changes by {100 * drift:.2g} % while it is counted"
+    limit = f"at most {100 * asked.energy_drift:g} %"
+    passed = drift <= asked.energy_drift
+    return _check("steady_bed", "bed moves steadily", passed, seen, limit, number=drift)
 
 
 def _packing(file: Path, particles: int, ranks: int) -> AcceptanceCheck:
@@ -173,7 +190,11 @@ def _stable_timestep(
         stable = f"{number**-2:.2g} times the time step is stable"
         limit = f"1; accepted beyond it: {reason}" if reason else f"1; {stable}"
     seen = f"stability number {number:.3g} of the contacts, median of {len(found)} frames"
-    return _check("stable_timestep", "stable time step", number <= 1 or bool(reason), seen, limit)
+    passed, known = number <= 1 or bool(reason), found and math.isfinite(number)
+    return _check(
+        "stable_timestep", "stable time step", passed, seen, limit,
+        number=number if known else None,
+    )  # fmt: skip
 
 
 def _stability_number(case: CaseOfStudy, rows: Floats) -> float:

@@ -2,7 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 
-from dragdeck.decks.case_file import CountOfRun, Phase, RanksOfRun, SettlingCriterion
+from dragdeck.decks.case_file import (
+    CountOfRun,
+    Phase,
+    RanksOfRun,
+    SettlingCriterion,
+    SteadyCriterion,
+)
 from dragdeck.documents import Document
 from dragdeck.physics.run_limits import RunLimits
 
@@ -14,6 +20,8 @@ class RunInputs(Document):
     ----------
     settled : SettlingCriterion or None
         Of a run that must end with a bed at rest.
+    steady : SteadyCriterion or None
+        Of a run with a rotating bowl.
     limits : RunLimits or None
         Of a run that is watched.
     """
@@ -27,4 +35,5 @@ class RunInputs(Document):
     phases: Sequence[Phase] = ()
     files: Mapping[str, str]
     settled: SettlingCriterion | None = None
+    steady: SteadyCriterion | None = None
     limits: RunLimits | None = None

@@ -29,6 +29,11 @@ def settling(screen: str) -> tuple[bool, str]:
     return (False, "no word of it") if line is None else (line.group(2) is None, line.group(1))
 
 
+def never_settled(screen: str) -> bool:
+    """Whether a filling ended because its bed did not come to rest in time."""
+    return re.search(r"^DRAGDECK NOT SETTLED: ", screen, flags=re.MULTILINE) is not None
+
+
 def last_step(screen: str) -> int | None:
     """The last step in the table that LIGGGHTS prints."""
     rows = re.findall(r"^ *(\d+) +\d+ ", screen, flags=re.MULTILINE)

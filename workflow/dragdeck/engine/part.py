@@ -195,7 +195,7 @@ class PartOfRun:
         if full or any("Cannot open" in error for error in errors):
             said = "; ".join(errors) or "no word of LIGGGHTS"
             return f"the disk is full, or a file cannot be written ({said})"
-        if errors:
+        if errors or log.never_settled(screen):
             return None
         killed = ending.exit_status < 0 or ending.exit_status >= 128
         how = "was killed" if killed else "ended before its end without a word"

@@ -2,14 +2,32 @@
 
 Everything inside is in metres. A *workpiece* stands upright: +z points along its
 axis, away from the floor, and its reference point, the origin, is the middle
-of its bounding box in x and y at its lowest z. `cylinder` makes meshes that
-stand so; `place` moves a user's mesh there.
+of its bounding box in x and y, or the given clamping axis, at its lowest z.
+`cylinder` makes meshes that stand so; `upright` and `place` move a user's mesh
+there.
 """
 
 from dragdeck.mesh.checks import Finding, Surroundings, check, findings
 from dragdeck.mesh.files import UNITS, read, stl_text, write_stl
-from dragdeck.mesh.shapes import bowl, cylinder, polygon_radius, polygon_sides, prism
-from dragdeck.mesh.surface import Envelope, envelope, facing_out, place, surface, weld
+from dragdeck.mesh.shapes import (
+    bowl,
+    cylinder,
+    cylinder_radius,
+    polygon_radius,
+    polygon_sides,
+    prism,
+)
+from dragdeck.mesh.surface import (
+    Envelope,
+    envelope,
+    facing_out,
+    place,
+    points_below,
+    surface,
+    tilted,
+    upright,
+    weld,
+)
 
 __all__ = [
     "UNITS",
@@ -19,16 +37,20 @@ __all__ = [
     "bowl",
     "check",
     "cylinder",
+    "cylinder_radius",
     "envelope",
     "facing_out",
     "findings",
     "place",
+    "points_below",
     "polygon_radius",
     "polygon_sides",
     "prism",
     "read",
     "stl_text",
     "surface",
+    "tilted",
+    "upright",
     "weld",
     "write_stl",
 ]

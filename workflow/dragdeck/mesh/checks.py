@@ -3,17 +3,27 @@
 The limits are those of LIGGGHTS 3.8.0, fix mesh/surface; the geometry is trimesh's.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from trimesh import Trimesh
-from trimesh.graph import connected_component_labels
 
 from dragdeck.errors import InputError
-from dragdeck.mesh.surface import NODE_PRECISION_M, Floats, Integers, facing_out
+from dragdeck.mesh.surface import (
+    CAD_VOLUME,
+    MERGED,
+    NODE_PRECISION_M,
+    Floats,
+    Integers,
+    facing_out,
+)
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 _CURVATURE_DEG = 0.256235
 """Default of the engine's `curvature`; no facet may have a smaller angle."""
@@ -23,6 +33,10 @@ _ANGLE_WARNING_DEG = 0.5
 
 _MAX_NEIGHBOURS = 5
 """Facets that may share an edge with a facet."""
+
+
+_LOST_VOLUME = 0.05
+"""Part of a CAD part's volume that its facets may cut off; a round bar is then 1.3 % narrower."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +132,7 @@ def findings(
     found += _crowded_edges(mesh)
     if workpiece:
         found += _open_edges(mesh) or _several_bodies(mesh) or _turned_normals(mesh)
+        found += _merged_nodes(mesh) + _lost_volume(mesh)
     return sorted(found, key=lambda finding: finding.severity)
 
 
@@ -172,7 +187,7 @@ def _unit_remedy(mesh: Trimesh, scene: Surroundings) -> str:
         return "check the unit: in millimetres, declared as metres?"
     if _plausible(mesh, 1e3, scene):
         return "check the unit: in metres, declared as millimetres?"
-    return "check the unit that the file is declared in, or use a workpiece of another size"
+    return "check the unit of the file and the axis of the part, or use a workpiece of another size"
 
 
 def _degenerate(mesh: Trimesh) -> list[Finding]:
@@ -248,6 +263,8 @@ def _open_edges(mesh: Trimesh) -> list[Finding]:
 
 
 def _several_bodies(mesh: Trimesh) -> list[Finding]:
+    from trimesh.graph import connected_component_labels
+
     body = connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
     facets = np.bincount(body)
     if len(facets) == 1:
@@ -269,3 +286,24 @@ def _turned_normals(mesh: Trimesh) -> list[Finding]:
     value = "all point inwards" if mesh.is_winding_consistent else "mixed directions"
     remedy = "they are turned outwards for the run; turn them in the file too"
     return [Finding(problem, value, limit, remedy, "warning")]
+
+
+def _merged_nodes(mesh: Trimesh) -> list[Finding]:
+    merged = mesh.metadata.get(MERGED, 0)
+    if not merged:
+        return []
+    value = f"{merged} beside the {len(mesh.vertices)} that are left"
+    limit = f"one node within the engine's precision, {NODE_PRECISION_M:g} m"
+    remedy = "they are merged for the run; merge them in the file too"
+    return [Finding("nodes are there twice", value, limit, remedy, "warning")]
+
+
+def _lost_volume(mesh: Trimesh) -> list[Finding]:
+    part = mesh.metadata.get(CAD_VOLUME, 0.0)
+    lost = 1.0 - abs(mesh.volume) / part if part else 0.0
+    if abs(lost) <= _LOST_VOLUME:
+        return []
+    value = f"{100 * lost:.3g} % of the part's volume is lost"
+    remedy = "use a smaller facet_size_m"
+    limit = f"at most {100 * _LOST_VOLUME:g} %"
+    return [Finding("the facets are coarse for this part", value, limit, remedy, "warning")]

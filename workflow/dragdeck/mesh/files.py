@@ -1,35 +1,47 @@
 """Mesh files: a user's in many formats, the engine's in one."""
 
+from __future__ import annotations
+
 import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from trimesh import Trimesh
-from trimesh.exchange.stl import HeaderError, load_stl_binary
 
 from dragdeck.errors import InputError
 from dragdeck.files import replace_text
-from dragdeck.mesh.surface import Floats, Integers, surface, weld
+from dragdeck.mesh.step import mesh_step
+from dragdeck.mesh.surface import CAD_VOLUME, MERGED, Floats, Integers, surface, weld
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 """Length units that a mesh file may be declared in, in metres."""
+
+STEP = (".step", ".stp")
+"""Suffixes of CAD parts, which are meshed here."""
 
 _NAME = re.compile(rb"solid.*")
 _VERTEX = re.compile(rb"vertex\s(.*)")
 
 
-def read(path: Path | str, unit: str) -> Trimesh:
-    """Read a surface from STL (ASCII or binary), OBJ, PLY or legacy VTK.
+def read(
+    path: Path | str,
+    unit: str,
+    facet_size_m: float | None = None,
+    edge_facet_size_m: float | None = None,
+) -> Trimesh:
+    """Read a surface from STL (ASCII or binary), OBJ, PLY or legacy VTK, or mesh a STEP part.
 
     trimesh reads STL, meshio the rest: trimesh cuts quadrilaterals along
     whichever diagonal comes first, here they are cut along the shorter one. VTK
     polygon data is refused: meshio does not know it, and VTK's own reader fills
-    a file that was cut short with whatever the memory holds.
+    a file that was cut short with whatever the memory holds. gmsh meshes STEP.
 
     Parameters
     ----------
@@ -37,11 +49,14 @@ def read(path: Path | str, unit: str) -> Trimesh:
         The file; its suffix tells the format.
     unit : str
         What one is in the file: a key of `UNITS`.
+    facet_size_m, edge_facet_size_m : float, optional
+        Target edge length of a STEP part's facets, and of those at sharp edges, in metres.
 
     Returns
     -------
     Trimesh
-        In metres, welded, where the file puts it.
+        In metres, welded, where the file puts it. Its metadata have the nodes that were merged
+        (`MERGED`) and the volume of a STEP part (`CAD_VOLUME`, m3), for `findings`.
 
     Raises
     ------
@@ -54,11 +69,32 @@ def read(path: Path | str, unit: str) -> Trimesh:
         raise InputError(
             "unknown length unit", file=path, field="unit", value=unit, limit=", ".join(UNITS)
         )
+    if path.suffix.lower() in STEP:
+        return _read_step(path, unit, facet_size_m, edge_facet_size_m)
     points, blocks = _load(path)
     with _damage(path):
         triangles = [_triangles(block.type, block.data, points, path) for block in blocks]
         joined = np.concatenate([np.empty((0, 3), dtype=np.int64), *triangles])
-        return weld(surface(points * UNITS[unit], joined))
+        body = surface(points * UNITS[unit], joined)
+        mesh = weld(body)
+    if path.suffix.lower() != ".stl":  # each facet of an STL file has nodes of its own
+        mesh.metadata[MERGED] = int(body.referenced_vertices.sum()) - len(mesh.vertices)
+    return mesh
+
+
+def _read_step(path: Path, unit: str, size_m: float | None, edge_size_m: float | None) -> Trimesh:
+    assert size_m is not None, "a study with a STEP part states the size of its facets"
+    _refuse_missing(path)
+    one = UNITS[unit]
+    found = mesh_step(path, unit, size_m / one, (edge_size_m or size_m) / one)
+    mesh = weld(surface(one * np.array(found["points"]), found["triangles"]))
+    mesh.metadata[CAD_VOLUME] = one**3 * found["volume"]
+    return mesh
+
+
+def _refuse_missing(path: Path) -> None:
+    if not path.is_file():
+        raise InputError("there is no such mesh file", file=path)
 
 
 def _load(path: Path) -> tuple[Floats, list[Any]]:
@@ -77,11 +113,10 @@ def _load(path: Path) -> tuple[Floats, list[Any]]:
             "unknown mesh format",
             file=path,
             value=path.suffix or "no suffix",
-            limit=", ".join(readers),
+            limit=", ".join([*readers, *STEP]),
             remedy="export the surface as STL",
         )
-    if not path.is_file():
-        raise InputError("there is no such mesh file", file=path)
+    _refuse_missing(path)
     with _damage(path):
         content = readers[suffix](path)
         points = np.asarray(content.points, dtype=np.float64)
@@ -107,6 +142,7 @@ def _damage(path: Path) -> Iterator[None]:
 def _read_stl(path: Path) -> Any:
     """Read STL, every solid of the file; a text that was cut short holds none."""
     import meshio
+    from trimesh.exchange.stl import HeaderError, load_stl_binary
 
     with path.open("rb") as stream:
         try:

@@ -1,12 +1,17 @@
 """Surfaces made from a few lengths: the round workpiece, a bar with edges, the bowl."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-from trimesh import Trimesh
 
 from dragdeck.errors import InputError
 from dragdeck.mesh.surface import Floats, surface, weld
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 _MAX_FACETS = 200_000
 """More facets than any workpiece needs: a facet size in the wrong unit."""
@@ -74,6 +79,17 @@ def cylinder(
     _require_facet_size(facet_size_m, radius_m, length_m)
     sides = polygon_sides(radius_m, facet_size_m)
     return prism(sides, polygon_radius(radius_m, sides), length_m, facet_size_m, along_m)
+
+
+def cylinder_radius(radius_m: float, length_m: float, facet_size_m: float) -> float:
+    """Distance of the outermost nodes of a `cylinder` from its axis, without making the mesh.
+
+    Parameters and errors are those of `cylinder`.
+    """
+    _require_facet_size(facet_size_m, radius_m, length_m)
+    sides = polygon_sides(radius_m, facet_size_m)
+    x, y, _ = _ring(sides, polygon_radius(radius_m, sides)).T
+    return float(np.hypot(x, y).max())
 
 
 def prism(

@@ -1,19 +1,34 @@
 """Triangle surfaces in space: trimesh's, made, welded, placed and measured as the engine needs."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import KDTree
-from trimesh import Trimesh
-from trimesh.graph import connected_component_labels
-from trimesh.grouping import group_rows
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 NODE_PRECISION_M = 1e-8
 """Nodes closer than this are one node to the engine (its `precision`)."""
+
+MERGED, CAD_VOLUME = "merged_nodes", "cad_volume_m3"
+"""Keys of a mesh's metadata: what it was read from, for `findings`."""
+
+_TURNED = {
+    "+x": ((0, 0, -1), (0, 1, 0), (1, 0, 0)),
+    "-x": ((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
+    "+y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
+    "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+    "+z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "-z": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+}
+"""Rotations of an axis to +z: those of x about y, the others about x."""
 
 _KEY_FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 
@@ -33,6 +48,8 @@ def surface(points: ArrayLike, triangles: ArrayLike) -> Trimesh:
     ValueError
         If a facet names a node that is not there.
     """
+    from trimesh import Trimesh
+
     nodes = np.array(points, dtype=np.float64).reshape(-1, 3)
     facets = np.array(triangles, dtype=np.int64).reshape(-1, 3)
     if facets.size and not 0 <= facets.min() <= facets.max() < len(nodes):
@@ -49,6 +66,9 @@ def weld(mesh: Trimesh, precision_m: float = NODE_PRECISION_M) -> Trimesh:
     Unlike trimesh's own `merge_vertices`, which rounds coordinates, this joins
     close nodes on whichever side of a rounding limit they lie.
     """
+    from scipy.spatial import KDTree
+    from trimesh.graph import connected_component_labels
+
     if mesh.is_empty or not np.isfinite(mesh.vertices).all():
         return mesh
     used = surface(mesh.vertices[mesh.referenced_vertices], _renumbered(mesh))
@@ -109,6 +129,9 @@ def _one_side(mesh: Trimesh) -> Trimesh | None:
     through their common edge in opposite directions; what belongs together with the first facet
     is one side of the body.
     """
+    from trimesh.graph import connected_component_labels
+    from trimesh.grouping import group_rows
+
     edges = group_rows(mesh.edges_sorted, require_count=2)
     one, other = mesh.edges_face[edges].T
     count = len(mesh.faces)
@@ -122,18 +145,48 @@ def _one_side(mesh: Trimesh) -> Trimesh | None:
     return surface(mesh.vertices, np.where(flipped, mesh.faces[:, ::-1], mesh.faces))
 
 
-def place(mesh: Trimesh) -> Trimesh:
-    """Move a mesh to the workpiece's coordinates.
+def upright(mesh: Trimesh, axis: str) -> Trimesh:
+    """Turn a mesh so that a direction of its file, such as "+x", points up, away from the floor."""
+    turned = surface(mesh.vertices @ np.transpose(_TURNED[axis]), mesh.faces)
+    turned.metadata.update(mesh.metadata)
+    return turned
 
-    The origin becomes the middle of the bounding box in x and y, at its lowest
-    z. The axes keep their directions: a workpiece is drawn upright, +z away from
-    the floor.
+
+def tilted(mesh: Trimesh, angle_deg: float) -> Trimesh:
+    """Lean a placed mesh towards +x; its lowest point stays at z = 0."""
+    angle = np.radians(angle_deg)
+    turn = np.array(
+        [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+    )
+    corners = mesh.vertices @ turn.T
+    return surface(corners - [0.0, 0.0, corners[mesh.referenced_vertices, 2].min()], mesh.faces)
+
+
+def points_below(mesh: Trimesh, height_m: float) -> Floats:
+    """Corners, (N, 3), of what a mesh has below a height, m."""
+    begin, end = mesh.vertices[mesh.edges_unique].transpose(1, 0, 2)
+    first, second = begin[:, 2] <= height_m, end[:, 2] <= height_m
+    crossing = first != second
+    rise = np.where(crossing, end[:, 2] - begin[:, 2], 1.0)
+    cut = begin + ((height_m - begin[:, 2]) / rise)[:, None] * (end - begin)
+    return np.concatenate([begin[first], end[second], cut[crossing]])
+
+
+def place(mesh: Trimesh, axis_m: tuple[float, float] | None = None) -> Trimesh:
+    """Move an upright mesh to the workpiece's coordinates.
+
+    Parameters
+    ----------
+    mesh : Trimesh
+    axis_m : (float, float), optional
+        x and y of the clamping axis in metres, which becomes the z axis; by default the middle
+        of the bounding box. The lowest z becomes 0.
     """
     if mesh.is_empty:
         return mesh
     low, high = mesh.bounds
-    origin = np.array([(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, low[2]])
-    return surface(mesh.vertices - origin, mesh.faces)
+    x, y = axis_m or ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0)
+    return surface(mesh.vertices - np.array([x, y, low[2]]), mesh.faces)
 
 
 @dataclass(frozen=True)

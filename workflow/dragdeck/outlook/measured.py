@@ -1,5 +1,6 @@
-"""What was measured on the engine: ``data/tradeoff.json`` and ``data/stability.json``, as read."""
+"""What was measured on the engine: the records in ``data/``, as read."""
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
@@ -8,10 +9,14 @@ from typing import Literal
 
 from dragdeck.documents import Document, Part
 from dragdeck.errors import InputError
+from dragdeck.physics.damping import damping_ratio
 
 _DATA = Path(str(resources.files("dragdeck"))) / "data"
 _TRADEOFF_FILE = _DATA / "tradeoff.json"
 """The trade-off that was measured with this version."""
+
+_STIFFNESS_FILE = _DATA / "stiffness.json"
+"""The laws of reduced moduli that were measured with this version."""
 
 
 class FidelityParameters(Part):
@@ -136,6 +141,102 @@ class Prediction(Part):
     met: bool
 
 
+class StiffnessLaw(Part):
+    """What a reduced modulus does to a quantity: `dragchain.tradeoff.stiffness_law` defines it.
+
+    Attributes
+    ----------
+    rate : float
+        Exponent of the stiffness number.
+    covariance : 3 rows of 3 floats
+        Of the amplitude and its slopes over inertial number and friction.
+    amplitude_std : float
+        From scene to scene.
+    run_std, model_std : float
+        Of the logarithm: in one run, and of what the law does not explain.
+    """
+
+    rate: float
+    covariance: tuple[
+        tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]
+    ]
+    amplitude_std: float
+    run_std: float
+    model_std: float
+
+
+class MeasuredLaw(Part):
+    """The law of a quantity, and the path over particle diameter that a value of it covers.
+
+    `quantile`: half-width of a 95 % interval over its standard error; `friction`: the number of a
+    scene that is the law's coefficient of friction.
+    """
+
+    label: str
+    friction: str
+    quantile: float
+    path_to_particle: float
+    law: StiffnessLaw
+
+
+class MeasuredScene(Part):
+    """A scene that was run at several moduli: its numbers, and its runs by modulus scale."""
+
+    numbers: Mapping[str, float]
+    runs: Mapping[str, int]
+
+
+class StableStepLaw(Part):
+    """The law of the stability number of a time step.
+
+    With the step f over the Rayleigh time, the stiffness number kappa of the run and the damping
+    ratio z of a contact between particles and the relative standard deviation s of their radii,
+    number^2 = (`stiffness` u^2 + `damping` z u) exp(2 `spread` s), where u = f kappa^(-1/4).
+    `scatter`: standard deviation of the logarithm of a number about that; `largest`: how far one
+    was above it at most.
+    """
+
+    stiffness: float
+    damping: float
+    spread: float
+    scatter: float
+    largest: float
+    runs: int
+
+    def largest_fraction(
+        self, kappa: float, restitution: float, spread: float, number: float = 1.0
+    ) -> float:
+        """The step over the Rayleigh time at which the stability number has a value."""
+        number /= math.exp(self.spread * spread)
+        drag = self.damping * damping_ratio(restitution)
+        root = math.sqrt(drag**2 + 4.0 * self.stiffness * number**2)
+        return float((root - drag) / (2.0 * self.stiffness) * kappa**0.25)
+
+
+class StiffnessRecord(Document):
+    """What is read of ``stiffness.json``: laws by quantity, measured in designed scenes."""
+
+    remedy = (
+        "measure it, `snakemake stiffness --config study=uhlmann2015 plan=scenes`, and copy its"
+        " stiffness.json to workflow/dragdeck/data/"
+    )
+
+    measured: str
+    scenes: Sequence[MeasuredScene]
+    laws: Mapping[str, MeasuredLaw]
+    stable_step: StableStepLaw
+
+    @property
+    def lowest_stiffness_number(self) -> float:
+        """Of a run with a reduced modulus."""
+        softest: list[float] = [
+            scene.numbers["stiffness_number"] * math.pow(float(scale), 2 / 3)
+            for scene in self.scenes
+            for scale in scene.runs
+        ]
+        return min(softest)
+
+
 class EngineVersion(Part):
     """The version of LIGGGHTS."""
 
@@ -149,6 +250,8 @@ class Tradeoff(Document):
     ----------
     scene : mapping
         Dimensionless numbers of the measured scene.
+    stiffness : StiffnessRecord or None
+        What other scenes say of reduced moduli; a record of its own.
     """
 
     remedy = (
@@ -167,6 +270,13 @@ class Tradeoff(Document):
     drop_test: Sequence[MeasuredDrop]
     costs: Sequence[MeasuredCost]
     promises: Sequence[Prediction]
+    stiffness: StiffnessRecord | None = None
+
+    def label(self, quantity: str) -> str:
+        """A quantity in words."""
+        if quantity in self.quantities or self.stiffness is None:
+            return self.quantities[quantity].label
+        return self.stiffness.laws[quantity].label
 
     def cost(self, name: str) -> MeasuredCost | None:
         """The cost of a variant, None if it was not timed."""
@@ -174,15 +284,21 @@ class Tradeoff(Document):
 
 
 @cache
+def measured_stiffness() -> StiffnessRecord:
+    """The laws that were measured with this version in designed scenes."""
+    return StiffnessRecord.read(_STIFFNESS_FILE)
+
+
+@cache
 def measured_tradeoff(file: Path = _TRADEOFF_FILE) -> Tradeoff:
-    """The measured trade-off.
+    """The measured trade-off, with the laws of reduced moduli.
 
     Raises
     ------
     InputError
         It has not been measured, or another version of dragdeck wrote it.
     """
-    return Tradeoff.read(file)
+    return Tradeoff.read(file).model_copy(update={"stiffness": measured_stiffness()})
 
 
 def tradeoff_if_measured(file: Path = _TRADEOFF_FILE) -> Tradeoff | None:

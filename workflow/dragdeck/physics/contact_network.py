@@ -6,8 +6,8 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.linalg import LinearOperator, eigsh
-from scipy.spatial import KDTree
+
+from dragdeck.physics.damping import damping_ratio
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -80,13 +80,11 @@ def stability_number(
     # the bowl is the last body: it has no curvature and never moves
     curvature = np.append(1 / radius_m, 0.0)
     inverse_mass = 3 / (4 * math.pi * density_kg_m3) * curvature**3
-    laws = np.array([astuple(one) for one in constants])
-    modulus, shear, restitution, friction = laws[(bodies[1] == len(radius_m)).astype(int)].T
+    laws = np.array([(*astuple(one), damping_ratio(one.restitution)) for one in constants])
+    modulus, shear, _, friction, ratio = laws[(bodies[1] == len(radius_m)).astype(int)].T
     contact_radius = np.sqrt(overlap / curvature[bodies].sum(axis=0))
     stiffness = np.stack([2 * modulus, 8 * shear * (friction > 0)]) * contact_radius
-    log = np.log(restitution)
-    ratio = -math.sqrt(5 / 6) * log / np.hypot(log, np.pi)
-    damping = 2 * ratio * np.sqrt(stiffness / inverse_mass[bodies].sum(axis=0))
+    damping = 2 * math.sqrt(5 / 6) * ratio * np.sqrt(stiffness / inverse_mass[bodies].sum(axis=0))
     weights = timestep_s**2 * stiffness + 2 * timestep_s * damping
     return math.sqrt(largest_eigenvalue(bodies, normal, weights, inverse_mass, _TOLERANCE)) / 2
 
@@ -112,6 +110,8 @@ def largest_eigenvalue(
     tolerance : float
         Relative error; 0: the machine's.
     """
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
     a, b = bodies
     ahead, across = weights[:, :, None]
     # rotations count times the radius; the inertia of a sphere is 2/5 m R^2
@@ -140,6 +140,8 @@ def _touching(centre: Floats, radius: Floats, bowl_radius: float) -> tuple[Ints,
     (2, M), (M, 3) and (M,) ndarray
         Bodies a and b, where N is the bowl; unit vector from a to b; overlap, m.
     """
+    from scipy.spatial import KDTree
+
     first, second = KDTree(centre).query_pairs(2 * radius.max(), output_type="ndarray").T
     everyone, bowl = np.arange(count := len(radius)), np.full(count, count)
     bodies = np.stack([np.r_[first, everyone, everyone], np.r_[second, bowl, bowl]])

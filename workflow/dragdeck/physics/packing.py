@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
 
 from dragdeck.errors import InputError
 
@@ -67,6 +66,8 @@ def radii(count: int, mean_m: float, std_m: float) -> Array:
     (count,) array
         In ascending order, m.
     """
+    from scipy.special import ndtr, ndtri
+
     if count == 1 or std_m == 0:
         return np.full(count, mean_m)
     tail = float(ndtr(-CUTOFF_STD))

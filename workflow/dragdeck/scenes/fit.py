@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from dragdeck.cases.bed import (
     JUST_BEYOND,
@@ -9,6 +10,7 @@ from dragdeck.cases.bed import (
     bed_timestep,
     impact_time,
     outrun,
+    skin,
     smallest_radius,
 )
 from dragdeck.cases.case import Case
@@ -16,8 +18,14 @@ from dragdeck.errors import Caution, InputError, together
 from dragdeck.physics.contact_mechanics import fall_speed
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import SPEED_FACTOR
-from dragdeck.scenes.motion import farthest_reach
-from dragdeck.scenes.workpiece import workpiece_length, workpiece_radius, workpiece_warnings
+from dragdeck.scenes.motion import farthest_reach, vertical_range
+from dragdeck.scenes.workpiece import (
+    farthest_surface,
+    fastest_surface,
+    workpiece_length,
+    workpiece_radius,
+    workpiece_warnings,
+)
 
 _FEWEST_STEPS_PER_CONTACT = 5
 """Below this many steps in a contact at the workpiece's speed a warning is given."""
@@ -25,6 +33,37 @@ _FEWEST_STEPS_PER_CONTACT = 5
 _JAMMING_GAP = 2.0
 """Particle diameters between workpiece and bowl below which a warning is given: an arch of two
 particles at 1.7 diameters held a workpiece until the force was 190 N, and then left the bowl."""
+
+
+@dataclass(frozen=True)
+class Clearances:
+    """Least distances between workpiece and bowl over the whole motion, m; negative: it is outside.
+
+    Attributes
+    ----------
+    wall_m : float
+        Between workpiece and wall, superposed motions included.
+    tip_m : float
+        Between tip and floor at the immersion depth.
+    floor_m : float
+        Between tip and floor at the lowest point, superposed motions included.
+    """
+
+    wall_m: float
+    tip_m: float
+    floor_m: float
+
+
+def clearances(case: Case, surface_m: float) -> Clearances:
+    """Clearances of a case's workpiece in a bed with its surface at this height, m."""
+    motion = case.study.motion
+    tip = surface_m - motion.immersion_depth_m
+    return Clearances(_wall_gap(case), tip, tip + vertical_range(motion)[0])
+
+
+def _wall_gap(case: Case) -> float:
+    """Narrowest gap between the workpiece and the wall, m; no bed is needed for it."""
+    return case.study.bowl.radius_m - farthest_surface(case)
 
 
 def check_fit(case: Case, surface_m: float, timestep_s: float) -> None:
@@ -42,7 +81,13 @@ def check_fit(case: Case, surface_m: float, timestep_s: float) -> None:
     InputError
         Names every field that has to change.
     """
-    problems = (_beside(case), _below(case, surface_m), _per_step(case, timestep_s))
+    gaps = clearances(case, surface_m)
+    problems = (
+        _beside(case, gaps.wall_m),
+        _below(case, gaps.tip_m),
+        _up_and_down(case, gaps.tip_m),
+        _per_step(case, timestep_s),
+    )
     found = [error for group in problems for error in group]
     if found:
         raise together(found)
@@ -52,7 +97,7 @@ def process_cautions(case: Case) -> Iterator[Caution]:
     """What a user should know of the workpiece and its motion before a process runs."""
     study = case.study
     yield from workpiece_warnings(case)
-    gap = _gap(case) / (2 * study.media.radius_mean_m)
+    gap = _wall_gap(case) / (2 * study.media.radius_mean_m)
     if gap < _JAMMING_GAP:
         yield Caution(
             "gap",
@@ -60,7 +105,8 @@ def process_cautions(case: Case) -> Iterator[Caution]:
             f"{_JAMMING_GAP:g}: particles can jam in it, with forces far beyond those of the bed",
         )
     fidelity = study.chosen_fidelity()
-    contact = impact_time(study, fidelity.youngs_modulus_scale, case.axis_speed_m_s)
+    surface = fidelity.speed_factor * fastest_surface(case)
+    contact = impact_time(study, fidelity.youngs_modulus_scale, surface)
     steps = contact / bed_timestep(study, "timestep_fraction")
     if steps * JUST_BEYOND < _FEWEST_STEPS_PER_CONTACT:
         shorter = fidelity.timestep_fraction * steps / _FEWEST_STEPS_PER_CONTACT
@@ -76,15 +122,11 @@ def process_cautions(case: Case) -> Iterator[Caution]:
     yield from outrun(study, "timestep_fraction", "particles may move", speed)
 
 
-def _gap(case: Case) -> float:
-    """Narrowest gap between the workpiece and the bowl, m."""
-    return case.study.bowl.radius_m - farthest_reach(case.study.motion) - workpiece_radius(case)
-
-
-def _beside(case: Case) -> Iterator[InputError]:
+def _beside(case: Case, gap: float) -> Iterator[InputError]:
     study = case.study
-    radius, reach = workpiece_radius(case), farthest_reach(study.motion)
-    gap, diameter = _gap(case), 2 * study.media.radius_mean_m
+    reach = farthest_reach(study.motion)
+    radius = study.bowl.radius_m - gap - reach
+    diameter = 2 * study.media.radius_mean_m
     if gap < diameter:
         yield InputError(
             "the workpiece does not fit between its path and the bowl"
@@ -99,7 +141,7 @@ def _beside(case: Case) -> Iterator[InputError]:
         )
 
 
-def _below(case: Case, surface_m: float) -> Iterator[InputError]:
+def _below(case: Case, tip_m: float) -> Iterator[InputError]:
     depth, length = case.study.motion.immersion_depth_m, workpiece_length(case)
     if length < depth:
         yield InputError(
@@ -110,19 +152,48 @@ def _below(case: Case, surface_m: float) -> Iterator[InputError]:
             limit=f"at most the length of the workpiece, {length:.4g} m",
             remedy="submerge the workpiece less, or model it with the shaft that holds it",
         )
-    deepest = surface_m - 2 * float(bed_radii(case.study).max())
-    if depth > deepest:
+    largest = _largest_particle(case)
+    if tip_m < largest:
         yield InputError(
             "the workpiece would reach below the floor"
-            if depth > surface_m
+            if tip_m < 0
             else "the workpiece would crush particles between its tip and the floor",
             file=case.file,
             field="motion.immersion_depth_m",
             value=depth,
-            limit=f"at most {deepest:.4g} m: a bed {surface_m:.4g} m high minus one largest "
-            "particle",
+            limit=f"at most {depth + tip_m - largest:.4g} m: a bed {depth + tip_m:.4g} m high "
+            "minus one largest particle",
             remedy="submerge the workpiece less, or fill in more particles",
         )
+
+
+def _largest_particle(case: Case) -> float:
+    """Diameter of the largest particle, m: with less between tip and floor, one is crushed."""
+    return 2 * float(bed_radii(case.study).max())
+
+
+def _up_and_down(case: Case, tip_m: float) -> Iterator[InputError]:
+    """Refuse a path or superposed motions that take a workpiece to the floor or out of the bed."""
+    motion = case.study.motion
+    depth, (low, high) = motion.immersion_depth_m, vertical_range(motion)
+    deepest = min(depth + tip_m - _largest_particle(case), workpiece_length(case))
+    moving = ["path"] if any(motion.path.heights_m) else []
+    moving += [name for name, one in motion.superposed().items() if one.vertical_reach_m]
+    problems = (
+        (depth <= deepest < depth - low, "takes the workpiece too deep", deepest - depth),
+        (high >= depth, "takes the workpiece out of the bed", depth),
+    )
+    for wrong, problem, limit in problems:
+        if moving and wrong:
+            yield InputError(
+                problem,
+                file=case.file,
+                field=" and ".join(f"motion.{name}" for name in moving),
+                value=f"{-low:.4g} m below and {high:.4g} m above an immersion of {depth:.4g} m",
+                limit=f"below {limit:.4g} m: the tip stays at a depth between 0 and {deepest:.4g} "
+                "m, one largest particle above the floor and no deeper than the workpiece is long",
+                remedy="move it less up and down, or change motion.immersion_depth_m",
+            )
 
 
 def _per_step(case: Case, timestep_s: float) -> Iterator[InputError]:
@@ -131,17 +202,33 @@ def _per_step(case: Case, timestep_s: float) -> Iterator[InputError]:
         yield InputError(
             "the workpiece crosses a particle's radius in one step: contacts would be missed",
             file=case.file,
-            field="motion.speed_m_s",
+            field="motion.path" if case.study.motion.speed_m_s is None else "motion.speed_m_s",
             value=f"{moved:.3g} m in a step of {timestep_s:.3g} s",
             limit=f"below {radius:.3g} m",
             remedy="use a lower speed or speed_factor, or a smaller timestep_fraction",
         )
+        return
+    superposed, has = case.study.motion.superposed(), skin(case.study)
+    if superposed and moved > has:
+        radius = workpiece_radius(case)
+        name = max(superposed, key=lambda name: superposed[name].surface_speed_m_s(radius))
+        yield InputError(
+            "a surface point of the workpiece moves farther than the neighbour skin in one step",
+            file=case.file,
+            field=f"motion.{name}",
+            value=f"{moved:.3g} m in a step of {timestep_s:.3g} s",
+            limit=f"at most {has:.3g} m",
+            remedy="use a lower speed or speed_factor, a smaller timestep_fraction, or a larger "
+            "fidelity.skin_m",
+        )
 
 
 def fastest_motion(case: Case) -> float:
-    """Speed of the fastest motion of the workpiece, m/s."""
+    """Speed of the fastest motion of workpiece and bowl, superposed motions included, m/s."""
     motion, factor = case.study.motion, case.study.chosen_fidelity().speed_factor
-    return factor * max(motion.speed_m_s, motion.plunge_speed_m_s, motion.approach_speed_m_s)
+    rim = abs(motion.bowl_rad_s) * case.study.bowl.radius_m
+    entry = max(motion.plunge_speed_m_s, motion.approach_speed_m_s)
+    return factor * max(fastest_surface(case), rim, entry)
 
 
 def check_headroom(case: Case, tip_m: float, top_m: float) -> None:

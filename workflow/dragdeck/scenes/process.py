@@ -1,26 +1,22 @@
 """The process: the workpiece plunges into the settled bed and is dragged along its path."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-
-from trimesh import Trimesh
 
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, skin
 from dragdeck.cases.case import Case, materials_content, mesh_file
 from dragdeck.decks import PACKING_FILE, outputs
-from dragdeck.decks.case_file import (
-    CircleOfRun,
-    LineOfRun,
-    Phase,
+from dragdeck.decks.case_file import Phase, SteadyCriterion
+from dragdeck.decks.deck import Deck, LeftOut, Scene
+from dragdeck.decks.outputs import Output
+from dragdeck.decks.process_case import (
     ProcessCase,
     StatisticsOfRun,
     WorkpieceOfRun,
 )
-from dragdeck.decks.deck import Deck, LeftOut, Scene
-from dragdeck.decks.outputs import Output
 from dragdeck.files import file_checksum
-from dragdeck.mesh import bowl
+from dragdeck.mesh import bowl, stl_text
 from dragdeck.physics.domain_split import warnings as rank_warnings
 from dragdeck.physics.rounding import round_to
 from dragdeck.scenes.dimensionless import describe
@@ -35,14 +31,24 @@ from dragdeck.scenes.filling import (
     rank_split,
 )
 from dragdeck.scenes.fit import check_fit, check_headroom, fastest_motion, process_cautions
-from dragdeck.scenes.motion import Leg, legs, plunge_point, start_direction
+from dragdeck.scenes.motion import in_steps, legs, on_engine, plunge_point
 from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
-from dragdeck.scenes.workpiece import workpiece_length, workpiece_mesh, workpiece_radius
+from dragdeck.scenes.workpiece import (
+    workpiece_length,
+    workpiece_mesh,
+    workpiece_radius,
+    workpiece_reach,
+)
 from dragdeck.study.base import Json
 from dragdeck.study.contact_law import explained
-from dragdeck.study.model import CirclePath, CylinderShape, MeshShape, Study
+from dragdeck.study.model import CylinderShape, MeshShape, Study
+from dragdeck.study.paths.kind import Leg
+from dragdeck.study.superposed.kind import DragSteps, EngineMotion, SuperposedMotion
 
 _WORKPIECE_MESH = "workpiece.stl"
+
+_ENERGY_DRIFT = 0.1
+"""Largest change of the mean kinetic energy while it is counted: 5 % in the bed's speed."""
 
 
 @dataclass(frozen=True)
@@ -83,10 +89,13 @@ class ProcessDeck(Deck):
     bowl_type: int
     bowl_radius_m: float
     bowl_facets: bool
+    bowl_rad_s: float
     workpiece_type: int
     workpiece_start_m: tuple[float, float, float]
     workpiece_turn_deg: float
     legs: Sequence[TimedLeg]
+    staged: EngineMotion | None
+    superposed: Mapping[str, EngineMotion]
 
 
 @dataclass(frozen=True)
@@ -116,20 +125,19 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     """
     study = case.study
     fidelity = study.chosen_fidelity()
-    bed = bed or _expected_bed(study)
+    bed = bed or expected_bed(study)
     surface = bed.surface_m
     rayleigh = bed_rayleigh_time(study)
     dt = bed_timestep(study, "timestep_fraction")
     check_fit(case, surface, dt)
     periods = _output_periods(study, dt)
-    clear = round_to(bed.top_m + study.media.radius_mean_m, 6)
-    start = (*plunge_point(study.motion), clear)
-    dive = start[2] - (surface - study.motion.immersion_depth_m)
-    timed = _timed_legs(legs(study.motion, dive, fidelity.speed_factor), study, dt, periods.network)
+    start, plan = course(study, bed, fidelity.speed_factor)
+    timed = _timed_legs(plan, study, dt, periods.network)
     drag, last = timed[-1], timed[-1].end_step
+    steps = DragSteps(drag.start_step, last, dt)
     types = study.type_names()
     top = box_top(study)
-    check_headroom(case, clear, top)
+    check_headroom(case, start[2], top)
     parts = rank_split(case)
     deck = ProcessDeck(
         title=study.title,
@@ -142,32 +150,46 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         gravity_m_s2=study.gravity_m_s2,
         skin_m=skin(study),
         timestep_s=dt,
-        outputs=_outputs(periods, drag.start_step, last, study.bowl.facet_size_m is not None),
+        outputs=_outputs(periods, drag.start_step, last, study.bowl_facet_size_m is not None),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, last),
         processors=parts.line,
         bowl_type=types.index(study.bowl.material) + 1,
         bowl_radius_m=study.bowl.radius_m,
-        bowl_facets=study.bowl.facet_size_m is not None,
+        bowl_facets=study.bowl_facet_size_m is not None,
+        bowl_rad_s=fidelity.speed_factor * study.motion.bowl_rad_s,
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpiece_start_m=start,
-        workpiece_turn_deg=_workpiece_turn(study),
+        workpiece_turn_deg=workpiece_turn(study),
         legs=timed,
+        staged=on_engine(in_steps(drag.leg, steps), steps.start),
+        superposed={name: one.on_engine(steps) for name, one in _superposed(study).items()},
     )
     return Scene(
         deck=deck,
-        case=_process_case(case, bed.surface_m, timed, top, dt, rayleigh),
+        case=_process_case(case, bed.surface_m, timed, top, steps, rayleigh),
         steps=last,
-        meshes={_WORKPIECE_MESH: workpiece_mesh(case), **_bowl_meshes(study, top)},
+        files={_WORKPIECE_MESH: lambda: stl_text(workpiece_mesh(case)), **_bowl_files(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
         warnings=[*process_cautions(case), *rank_warnings(parts)],
     )
 
 
-def _expected_bed(study: Study) -> Bed:
+def expected_bed(study: Study) -> Bed:
+    """The settled bed before it exists: an estimate."""
     surface = expected_surface(study)
     return Bed(surface, surface + 2 * study.media.radius_mean_m)
+
+
+def course(
+    study: Study, bed: Bed, speed_factor: float
+) -> tuple[tuple[float, float, float], list[Leg]]:
+    """Where the workpiece's reference point is before the plunge, m, and its legs from there."""
+    motion = study.motion
+    clear = round_to(bed.top_m + study.media.radius_mean_m, 6)
+    dive = clear - (bed.surface_m - motion.immersion_depth_m + motion.path.heights_m[0])
+    return (*plunge_point(motion), clear), legs(motion, dive, speed_factor)
 
 
 def _output_periods(study: Study, timestep_s: float) -> Periods:
@@ -198,7 +220,7 @@ def _timed_legs(
             x, y, z = (round_to(slower * v, 12) for v in leg.velocity_m_s)
             leg = replace(leg, velocity_m_s=(x, y, z))
         timed = replace(leg, duration_s=round_to(duration, 12))
-        found.append(TimedLeg(timed, start, start + steps, start_direction(study.motion)))
+        found.append(TimedLeg(timed, start, start + steps, study.motion.path.direction_rad))
         start += steps
     return found
 
@@ -219,11 +241,11 @@ def _checkpoint_steps(study: Study, last: int) -> int:
     return math.ceil(last / (count + 1)) if count else 0
 
 
-def _workpiece_turn(study: Study) -> float:
+def workpiece_turn(study: Study) -> float:
     """A mesh looks along +x in its own file: turn it into the direction of motion, degrees."""
-    if not isinstance(study.workpiece.shape, MeshShape):
+    if not isinstance(study.workpiece.shape, MeshShape) and not study.motion.tilt_deg:
         return 0.0
-    return math.degrees(start_direction(study.motion))
+    return math.degrees(study.motion.path.direction_rad)
 
 
 def _process_case(
@@ -231,16 +253,17 @@ def _process_case(
     surface_m: float,
     timed: Sequence[TimedLeg],
     top_m: float,
-    timestep_s: float,
+    drag: DragSteps,
     rayleigh_s: float,
 ) -> ProcessCase:
-    study = case.study
+    study, motion = case.study, case.study.motion
+    transient_s = motion.uncounted_m / case.axis_speed_m_s
     return case_of_study(
         ProcessCase,
         case,
         PROCESS.run_id(case),
         {name: value for name, value in study.plain().items() if name in _INPUTS},
-        timestep_s,
+        drag.timestep_s,
         rayleigh_s,
         asked=case.advised,
         unsafe_timestep=study.accepted.unsafe_timestep,
@@ -249,18 +272,27 @@ def _process_case(
         numbers=describe(case),
         surface_m=surface_m,
         workpiece=WorkpieceOfRun(
-            kind=study.workpiece.shape.kind,
-            radius_m=workpiece_radius(case),
+            kind="mesh" if motion.tilt_deg else study.workpiece.shape.kind,
+            radius_m=workpiece_reach(case),
             length_m=workpiece_length(case),
             mesh=_WORKPIECE_MESH,
-            immersion_depth_m=study.motion.immersion_depth_m,
+            immersion_depth_m=motion.immersion_depth_m,
         ),
-        motion=_motion(case),
+        motion=motion.path.of_run(
+            case.axis_speed_m_s, motion.orientation, in_steps(timed[-1].leg, drag)
+        ),
+        superposed=[one.of_run(drag) for one in _superposed(study).values()],
         phases=[
             Phase(name=leg.name, start_step=leg.start_step, end_step=leg.end_step) for leg in timed
         ],
-        statistics=StatisticsOfRun(transient_s=study.motion.transient_m / case.axis_speed_m_s),
-        limits=bed_limits(study, top_m, max(leg.speed_m_s for leg in timed)),
+        statistics=StatisticsOfRun(transient_s=transient_s),
+        steady=SteadyCriterion(
+            from_step=drag.start + math.ceil(transient_s / drag.timestep_s),
+            energy_drift=_ENERGY_DRIFT,
+        )
+        if motion.bowl_rad_s
+        else None,
+        limits=bed_limits(study, top_m, _fastest(case, timed)),
     )
 
 
@@ -270,42 +302,39 @@ _INPUTS = (
 )
 
 
-def _motion(case: Case) -> CircleOfRun | LineOfRun:
-    motion = case.study.motion
-    speed, direction = case.axis_speed_m_s, start_direction(motion)
-    if isinstance(motion.path, CirclePath):
-        return CircleOfRun(
-            axis_speed_m_s=speed,
-            start_direction_rad=direction,
-            orientation=motion.orientation,
-            radius_m=motion.path.radius_m,
-            direction=motion.path.direction,
-        )
-    return LineOfRun(
-        axis_speed_m_s=speed,
-        start_direction_rad=direction,
-        orientation=motion.orientation,
-        start_m=motion.path.start_m,
-        direction_rad=math.radians(motion.path.direction_deg),
-    )
+def _fastest(case: Case, timed: Sequence[TimedLeg]) -> float:
+    """Speed of the fastest leg, or of a surface or the bowl if one can be faster, m/s."""
+    speeds, motion = [leg.speed_m_s for leg in timed], case.study.motion
+    if motion.superposed() or motion.bowl_rad_s or motion.path.peak_speed_ratio > 1:
+        speeds.append(fastest_motion(case))
+    return max(speeds)
 
 
-def _bowl_meshes(study: Study, top_m: float) -> dict[str, Trimesh]:
+def _superposed(study: Study) -> Mapping[str, SuperposedMotion]:
+    return study.motion.superposed(study.chosen_fidelity().speed_factor)
+
+
+def _bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
     """The bowl as a mesh, if the study asks for facets."""
-    size = study.bowl.facet_size_m
+    size = study.bowl_facet_size_m
     if size is None:
         return {}
-    return {"bowl.stl": bowl(study.bowl.radius_m, min(study.bowl.height_m, 0.99 * top_m), size)}
+    mesh = bowl(study.bowl.radius_m, min(study.bowl.height_m, 0.99 * top_m), size)
+    return {"bowl.stl": lambda: stl_text(mesh)}
 
 
 def _models(study: Study) -> dict[str, str]:
     optional, _ = explained(study.pairs.values())
-    bowl = "exact plane and cylinder" if study.bowl.facet_size_m is None else "facets, as asked"
+    exact, why = study.bowl_facet_size_m is None, "facets, as asked"
+    if study.motion.bowl_rad_s:
+        why = "facets, whose surface moves with the rotation"
+    bowl = "exact plane and cylinder" if exact else why
     return {
         "particle-particle, particle-workpiece, particle-bowl": "all three carry the chains",
         f"bowl: {bowl}": "its contacts end the chains, read from the force on each particle",
         **{words: "as the study gives it" for words in optional},
         "workpiece as facets": "the engine moves meshes only",
+        **{f"{name} of the workpiece": "as the study gives it" for name in _superposed(study)},
         f"total force, {study.outputs.workpiece_force_hz:g} Hz": "drag, its spread and its peaks",
         f"workpiece contacts, "
         f"{study.outputs.workpiece_contacts_hz:g} Hz": "few, so cheap at a high rate",
@@ -329,7 +358,7 @@ def _leaves_out(study: Study) -> dict[str, LeftOut]:
     }
     if network < workpiece:
         found[f"network at {workpiece:g} Hz"] = LeftOut("chains need no such rate", "network_rate")
-    if study.bowl.facet_size_m is None:
+    if study.bowl_facet_size_m is None:
         found["facets of the bowl"] = LeftOut(
             "slower, and no report asks for contacts per bowl facet", "bowl_facets"
         )

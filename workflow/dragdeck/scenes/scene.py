@@ -187,7 +187,7 @@ def case_of_study(
         ),
         "bowl": BowlOfRun(
             radius_m=study.bowl.radius_m,
-            walls="primitive" if study.bowl.facet_size_m is None else "mesh",
+            walls="primitive" if study.bowl_facet_size_m is None else "mesh",
         ),
         "contact_moduli": _contact_moduli(study),
         "assumptions": _assumptions(study),

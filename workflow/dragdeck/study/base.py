@@ -12,6 +12,8 @@ Json = Mapping[str, JsonValue]
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 """Names of studies, plans, materials and fidelities: they become parts of paths and commands."""
 
+STUDY_FILE = "study.yaml"
+
 NAME_LIMIT = "up to 64 letters (a-z), digits, '.', '_' and '-', the first a letter or digit"
 
 DECIMAL = re.compile(r"[-+]?((0|[1-9]\d*)(\.\d*)?|\.\d+)([eE][-+]?\d+)?", re.ASCII)

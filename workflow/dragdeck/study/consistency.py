@@ -6,7 +6,7 @@ from itertools import product
 
 from dragdeck.errors import InputError, choices
 from dragdeck.study.base import flat
-from dragdeck.study.model import BUILT_IN_FIDELITIES, Scaling, Study
+from dragdeck.study.model import BUILT_IN_FIDELITIES, CylinderShape, Scaling, Study
 
 _NO_SWEEP = ("accepted", "assumptions", "reference", "scaling", "sweep", "title")
 """Blocks that no run depends on: cases that differ in them would be the same."""
@@ -21,7 +21,7 @@ _Found = Iterator[tuple[str, str, str]]
 def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
     """Every contradiction within a whole study, or one of its cases; the errors name no file."""
     values = flat(study.plain())
-    for check in (_names, _pairs, _motion, *([_sweep] if whole else [])):
+    for check in (_names, _pairs, _shape, _motion, *([_sweep] if whole else [])):
         for field, problem, limit in check(study):
             yield InputError(problem, field=field, value=values.get(field), limit=limit)
 
@@ -53,12 +53,35 @@ def _pairs(study: Study) -> _Found:
             yield "pairs", f"has no entry {key!r}, and these two will touch", "all that touch"
 
 
+def _shape(study: Study) -> _Found:
+    shape, field = study.workpiece.shape, "workpiece.shape"
+    if isinstance(shape, CylinderShape):
+        return
+    size, edge = shape.facet_size_m, shape.edge_facet_size_m
+    if shape.file.lower().endswith((".step", ".stp")):
+        if size is None:
+            problem = f"{shape.file} is meshed here, and the size of the facets is missing"
+            yield f"{field}.facet_size_m", problem, "a target edge length, such as 0.0015"
+        elif edge is not None and edge > size:
+            problem = "the facets at edges are larger than the others"
+            yield f"{field}.edge_facet_size_m", problem, f"at most facet_size_m, {size:g}"
+        return
+    for name, value in (("facet_size_m", size), ("edge_facet_size_m", edge)):
+        if value is not None:
+            problem = f"{shape.file} is a mesh already: its facets are used as they are"
+            yield f"{field}.{name}", problem, "a STEP file (.step, .stp); or remove the field"
+
+
 def _motion(study: Study) -> _Found:
     length = study.motion.path_length_m
+    problem = "no path is left for the statistics"
     if study.motion.transient_m >= length * (1 - 1e-9):
         limit = f"below the length of the path, {length:.4g} m"
-        yield "motion.transient_m", "no path is left for the statistics", limit
-    rate = study.motion.speed_m_s / length
+        yield "motion.transient_m", problem, limit
+    elif study.motion.uncounted_m >= length * (1 - 1e-9):
+        limit = "a revolution that begins before the drag ends (motion.path.revolutions)"
+        yield "motion.counted_from_revolution", problem, limit
+    rate = study.motion.axis_speed_m_s / length
     if study.outputs.network_hz < rate:
         problem = "not one frame of the contact network is written during the drag"
         yield "outputs.network_hz", problem, f"at least {rate:.3g} Hz; or use a longer path"

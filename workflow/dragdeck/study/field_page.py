@@ -21,6 +21,10 @@ your choice. Names of studies, materials and fidelities have up to 64 letters (a
 field by its dotted name, such as `motion.speed_m_s`. Coefficients, fractions and multipliers are
 dimensionless.
 
+`extends: <name>` at the top takes every field from another study of `studies/`; the file then
+states only what differs. Fields are replaced one by one, lists, `fidelity`, `sweep` and a part with
+another `kind` as a whole. Meshes and templates of the other study are found, too.
+
 This page is generated from the model: `./run dragdeck step fields > docs/study.md`.
 """
 

@@ -5,8 +5,10 @@ than the study itself, or of how a scene is run.
 """
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from collections.abc import Iterable, Mapping
+from functools import reduce
+from operator import or_
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import (
     Discriminator,
@@ -27,11 +29,16 @@ from dragdeck.study.base import (
 )
 from dragdeck.study.contact_law import Contact, Pair
 from dragdeck.study.material import Material
+from dragdeck.study.paths.circle import CirclePath
+from dragdeck.study.paths.kind import PathOfRun
+from dragdeck.study.paths.line import LinePath
+from dragdeck.study.paths.rest import RestPath
+from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.reference import Reference
 from dragdeck.study.remarks import Accepted, Assumption
-
-STUDY_FILE = "study.yaml"
-
+from dragdeck.study.superposed.kind import SuperposedMotion, SuperposedOfRun
+from dragdeck.study.superposed.oscillation import Oscillation
+from dragdeck.study.superposed.spin import Spin
 
 Ranks = Annotated[
     Annotated[Literal["auto"], Tag("a-word")]
@@ -68,7 +75,8 @@ class Bowl(Model):
     height_m: Positive = Field(description="inner height from the floor to the rim, m")
     facet_size_m: Positive | None = Field(
         default=None,
-        description="edge length of the bowl's mesh elements, m; none: analytical walls",
+        description="edge length of the bowl's mesh elements, m; none: analytical walls, or a "
+        "particle diameter if the bowl rotates",
     )
 
 
@@ -82,11 +90,34 @@ class CylinderShape(Model):
 
 
 class MeshShape(Model):
-    """A workpiece from a mesh file, its axis along z, its lowest point the tip."""
+    """A workpiece from a mesh or CAD file, turned upright, its lowest point the tip."""
 
     kind: Literal["mesh"] = Field(description="a mesh from a file")
-    file: Line = Field(description="STL, OBJ, PLY or VTK; relative to the study or to meshes/")
+    file: Line = Field(description="STL, OBJ, PLY, VTK, STEP; relative to the study or to meshes/")
     unit: Literal["m", "cm", "mm", "um", "in"] = Field(description="unit of the file's numbers")
+    facet_size_m: Positive | None = Field(
+        default=None,
+        description="target edge length of the mesh of a STEP part, m; required for STEP and for "
+        "no other format",
+    )
+    edge_facet_size_m: Positive | None = Field(
+        default=None,
+        description="the same at sharp edges of a STEP part, m; none: as everywhere",
+    )
+    axis: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
+        default="+z",
+        description="direction in the file of the clamping axis, from the tip to the clamp; it is "
+        "turned upright, x about y and all others about x",
+    )
+    offset_m: tuple[Number, Number] | None = Field(
+        default=None,
+        description="x and y of the clamping axis in the file, turned upright, m; none: the middle "
+        "of the bounding box",
+    )
+
+    def absent(self) -> set[str]:
+        """The axis, too, where the part stands upright."""
+        return super().absent() | ({"axis"} if self.axis == "+z" else set())
 
 
 class Workpiece(Model):
@@ -96,45 +127,63 @@ class Workpiece(Model):
     shape: Annotated[CylinderShape | MeshShape, Field(discriminator="kind")]
 
 
-class CirclePath(Model):
-    """A circle about the bowl's axis, begun on the +x axis."""
+class Superposed(Model):
+    """The registry of superposed motions: the block of each kind, in the order of application.
 
-    kind: Literal["circle"] = Field(description="a circle about the bowl's axis, starting on +x")
-    radius_m: Positive = Field(description="radius of the path of the workpiece's axis, m")
-    revolutions: Positive = Field(default=1.0, description="path length, revolutions")
-    direction: Literal["ccw", "cw"] = Field(
-        default="ccw", description="direction seen from above: ccw (counter-clockwise) or cw"
+    A motion carries the centres of those that follow it: what turns the workpiece comes last.
+    """
+
+    oscillation: Oscillation | None = None
+    spin: Spin | None = None
+
+    def superposed(self, speed_factor: float = 1.0) -> Mapping[str, SuperposedMotion]:
+        """What is superposed on the path, by the name of its block, at this factor on speeds."""
+        found = {name: getattr(self, name) for name in Superposed.model_fields}
+        return {name: one.faster(speed_factor) for name, one in found.items() if one is not None}
+
+
+AnyPath = CirclePath | LinePath | RestPath | WaypointsPath
+"""The registry of paths."""
+
+
+if TYPE_CHECKING:
+    AnyPathOfRun = PathOfRun
+    AnySuperposedOfRun = SuperposedOfRun
+else:
+
+    def _of_run(kinds: Iterable[type]) -> object:
+        """The models in ``case.json`` of some kinds of motion; an entry is told by its kind."""
+        return Annotated[reduce(or_, [one.part for one in kinds]), Field(discriminator="kind")]
+
+    AnyPathOfRun = _of_run(get_args(AnyPath))
+    AnySuperposedOfRun = _of_run(
+        get_args(field.annotation)[0] for field in Superposed.model_fields.values()
     )
 
-    @property
-    def sign(self) -> int:
-        """1 for a counter-clockwise path, -1 for a clockwise one."""
-        return 1 if self.direction == "ccw" else -1
 
-
-class LinePath(Model):
-    """A straight line."""
-
-    kind: Literal["line"] = Field(description="a straight line")
-    start_m: tuple[Number, Number] = Field(description="x and y at the start of the drag, m")
-    direction_deg: Number = Field(default=0.0, description="direction of motion from +x, degrees")
-    length_m: Positive = Field(description="length of the drag, m")
-
-
-class Motion(Model):
+class Motion(Superposed):
     """How the workpiece goes in and where it goes."""
 
-    path: Annotated[CirclePath | LinePath, Field(discriminator="kind")]
-    speed_m_s: Positive = Field(description="speed of the workpiece's axis along the path, m/s")
+    path: Annotated[AnyPath, Field(discriminator="kind")]
+    speed_m_s: Positive | None = Field(
+        default=None,
+        description="speed of the workpiece's axis along the path, m/s; required, but not for the "
+        "paths `rest`, whose `bowl_rpm` gives it, and `waypoints`, whose times do",
+    )
     immersion_depth_m: Positive = Field(description="depth of the tip below the settled surface, m")
     orientation: Literal["follow_path", "fixed"] = Field(
         default="follow_path",
         description="follow_path: the workpiece turns with its path; fixed: it does not turn",
     )
+    tilt_deg: Annotated[Number, Field(ge=-45, le=45)] | None = Field(
+        default=None,
+        description="angle between the workpiece's axis and the vertical, degrees; positive: its "
+        "upper end leans in the direction of motion, with orientation fixed in the first direction",
+    )
     plunge_at_m: tuple[Number, Number] | None = Field(
         default=None,
         description="x and y at which the workpiece is immersed, m; none: the bowl's axis for a "
-        "circle, the start for a line",
+        "circle, else the start of the path",
     )
     plunge_speed_m_s: Positive = Field(default=0.05, description="plunge speed, m/s")
     approach_speed_m_s: Positive = Field(
@@ -143,13 +192,67 @@ class Motion(Model):
     transient_m: NonNegative = Field(
         description="initial path length excluded from all statistics, m"
     )
+    counted_from_revolution: Annotated[Whole, Field(ge=1)] | None = Field(
+        default=None,
+        description="first revolution of a circle that the statistics include, from 1; none: all "
+        "after `transient_m`",
+    )
+
+    @model_validator(mode="after")
+    def _path(self) -> "Motion":
+        if self.counted_from_revolution is not None and self.path.revolution_m is None:
+            raise ValueError("counted_from_revolution is for circles: this path has no revolutions")
+        if self.tilt_deg and self.spin is not None:
+            raise ValueError("tilt_deg and spin cannot be combined: remove one of them")
+        if self.speed_m_s is None and self.path.own_speed_m_s is None:
+            raise ValueError("speed_m_s is missing: give the speed along the path, m/s")
+        if self.speed_m_s is not None and self.path.own_speed_m_s is not None:
+            raise ValueError(
+                f"speed_m_s {self.speed_m_s:g} and the path's own speed, "
+                f"{self.path.own_speed_m_s:.3g} m/s, are both given: remove speed_m_s"
+            )
+        return self
+
+    @property
+    def axis_speed_m_s(self) -> float:
+        """Speed of the workpiece's axis relative to the bowl, m/s."""
+        return self.path.own_speed_m_s or self.speed_m_s or math.nan
+
+    @property
+    def bowl_rad_s(self) -> float:
+        """Angular speed of the bowl about +z, rad/s."""
+        return self.path.bowl_rad_s(self.axis_speed_m_s)
 
     @property
     def path_length_m(self) -> float:
         """Length of the drag, m."""
-        if isinstance(self.path, CirclePath):
-            return 2 * math.pi * self.path.radius_m * self.path.revolutions
-        return self.path.length_m
+        return self.path.path_length_m
+
+    @property
+    def uncounted_m(self) -> float:
+        """Length of the drag before the statistics begin, m."""
+        whole = (self.path.revolution_m or 0.0) * ((self.counted_from_revolution or 1) - 1)
+        return max(self.transient_m, whole)
+
+    def at(self, pace: float, length_m: float) -> "Motion":
+        """The drag at another pace and with another length, all of it counted.
+
+        Parameters
+        ----------
+        pace : float
+            On every speed of the drag.
+        length_m : float
+        """
+        speed = None if self.speed_m_s is None else pace * self.speed_m_s
+        return self.model_copy(
+            update={
+                "path": self.path.with_length(length_m).faster(pace),
+                "speed_m_s": speed,
+                "transient_m": 0.0,
+                "counted_from_revolution": None,
+                **self.superposed(pace),
+            }
+        )
 
 
 class DropTest(Model):
@@ -248,10 +351,18 @@ Quantity = Literal[
     "vertical_mean",
     "workpiece_contacts",
     "contact_force_mean",
+    "contact_force_p50",
     "contact_force_p90",
+    "contact_force_p99",
+    "normal_load",
+    "sliding_distance",
+    "friction_work",
     "coordination_number",
+    "mechanical_coordination_number",
+    "network_force_mean",
     "chain_count",
     "chain_length",
+    "path_bottleneck",
     "restitution",
 ]
 """What a tolerance can be about; docs/tradeoff.md defines each."""
@@ -369,6 +480,13 @@ class Study(Model):
             if key in self.pairs:
                 return self.pairs[key]
         raise ValueError(f"pairs has no entry '{first}-{second}', and these two will touch")
+
+    @property
+    def bowl_facet_size_m(self) -> float | None:
+        """Edge length of the bowl's facets, m; None for exact walls, which cannot rotate."""
+        if self.bowl.facet_size_m is None and self.motion.bowl_rad_s:
+            return 2 * self.media.radius_mean_m
+        return self.bowl.facet_size_m
 
     def chosen_fidelity(self) -> Fidelity:
         """The settings in ``fidelity``, or those it names; the study's own go before the built-in.

@@ -1,6 +1,7 @@
 """Which values are plausible: slips of a unit are named before anything is computed."""
 
 import contextlib
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatch
@@ -49,14 +50,22 @@ _RANGES = {
     "bowl.radius_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
     "bowl.height_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
     "workpiece.shape.radius_m": _Range(1e-5, 2e-4, 0.3, 2, _LENGTH),
-    "*.facet_*_m": _Range(1e-6, 5e-5, 0.1, 1, _LENGTH),
+    "*facet_*_m": _Range(1e-6, 5e-5, 0.1, 1, _LENGTH),
+    "workpiece.shape.offset_m.*": _Range(-10, -2, 2, 10, _LENGTH),
     "motion.path.radius_m": _Range(1e-5, 1e-3, 2, 10, _LENGTH),
     "motion.path.length_m": _Range(1e-5, 1e-3, 50, 1e4, _LENGTH),
     "motion.path.start_m.*": _Range(-10, -2, 2, 10, _LENGTH),
+    "motion.path.points.*.[123]": _Range(-10, -2, 2, 10, _LENGTH),
+    "motion.path.points.*.speed_m_s": _Range(0, 0, 3, 30, {}),
+    "motion.path.bowl_rpm": _Range(-1e4, -500, 500, 1e4, {"rad/s": 30 / math.pi}),
     "motion.path.revolutions": _Range(1e-5, 1e-3, 1e3, 1e5, {}),
     "motion.plunge_at_m.*": _Range(-10, -2, 2, 10, _LENGTH),
     "motion.immersion_depth_m": _Range(1e-5, 1e-3, 1, 5, _LENGTH),
     "motion.transient_m": _Range(0, 0, 2, 1e3, _LENGTH),
+    "motion.spin.*rpm": _Range(-1e5, -3e3, 3e3, 1e5, {"rad/s": 30 / math.pi}),
+    "motion.spin.*until_s": _Range(1e-4, 0.01, 1e4, 1e6, {"ms": 1e-3}),
+    "motion.oscillation.amplitude_m": _Range(1e-7, 1e-5, 0.2, 1, _LENGTH),
+    "motion.oscillation.frequency_hz": _Range(1e-4, 0.01, 100, 1e4, {"1/min": 1 / 60}),
     "motion.*speed_m_s": _Range(1e-6, 1e-4, 3, 30, _SPEED),
     "drop_test.height_m": _Range(1e-5, 5e-4, 1, 20, _LENGTH),
     "materials.*.youngs_modulus_pa": _Range(1e6, 5e6, 1.3e12, 1e13, _MODULUS),
@@ -91,6 +100,8 @@ def _numbers(values: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
     for field, value in values.items():
         if isinstance(value, list | tuple):
             yield from _numbers({f"{field}.{index}": item for index, item in enumerate(value)})
+        elif isinstance(value, Mapping):
+            yield from _numbers(flat(value, f"{field}."))
         elif isinstance(value, int | float | str) and not isinstance(value, bool):
             with contextlib.suppress(ValueError, OverflowError):
                 yield field, float(value)

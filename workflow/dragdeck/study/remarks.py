@@ -19,7 +19,7 @@ class Accepted(Model):
 
     unsafe_timestep: Line | None = Field(
         default=None,
-        description="reason for a process time step at or beyond the smallest unstable one, and "
+        description="reason for a process time step that is forecast to be unstable, and "
         "for accepting its run; shown among assumptions and acceptance checks of the report",
     )
     cases: Annotated[Whole, Field(ge=1)] = Field(

@@ -1,4 +1,4 @@
-"""Study files as YAML: reading, and errors that name file, line, field, value and limit."""
+"""Study files as YAML: reading them, with what they take from others, and the lines of fields."""
 
 import math
 import re
@@ -8,14 +8,9 @@ from pathlib import Path
 from typing import Any, cast
 
 import yaml
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
 
-from dragdeck.errors import Caution, InputError, near, together
-from dragdeck.study.base import DECIMAL, Model
-from dragdeck.study.consistency import contradictions
-from dragdeck.study.model import STUDY_FILE, Study
-from dragdeck.study.plausible import implausible
+from dragdeck.errors import InputError, choices
+from dragdeck.study.base import DECIMAL, NAME, STUDY_FILE
 
 
 class _Loader(yaml.SafeLoader):
@@ -108,17 +103,99 @@ def _studies_nearby(file: Path) -> str:
     return f"choose one of: {', '.join(names)}" if names else "check the path"
 
 
+def read_study(file: Path) -> dict[str, Any]:
+    """Read a study as plain data, with all that it takes from the studies it extends.
+
+    Raises
+    ------
+    InputError
+        As of `read_yaml` and `lineage`.
+    """
+    data: dict[str, Any] = {}
+    for _, own in reversed(lineage(file)):
+        data = _merged(data, own)
+    data.pop("extends", None)
+    return data
+
+
+def lineage(file: Path) -> list[tuple[Path, dict[str, Any]]]:
+    """The file of a study and its content, then those of each study it extends, nearest first.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read, a study extends one that there is not, or itself.
+    """
+    found = [(file, read_yaml(file))]
+    while (name := found[-1][1].get("extends")) is not None:
+        studies, place = file.parent.parent, found[-1][0]
+        base = studies / str(name) / STUDY_FILE
+        known = sorted(other.parent.name for other in studies.glob(f"*/{STUDY_FILE}"))
+        problem = None
+        if not isinstance(name, str) or not NAME.fullmatch(name) or not base.is_file():
+            problem = "extends an unknown study"
+        elif any(base == other for other, _ in found):
+            problem = "extends itself"
+        if problem:
+            raise InputError(
+                problem, file=place, field="extends", value=shown(name),
+                limit=choices(str(name), filter(NAME.fullmatch, known)),
+                remedy="name another study, or remove the line",
+            )  # fmt: skip
+        found.append((base, read_yaml(base)))
+    return found
+
+
+def study_folders(file: Path) -> tuple[Path, ...]:
+    """The folder of a study, then those of the studies it extends, nearest first."""
+    return _folders(file, file.stat().st_mtime_ns if file.is_file() else 0)
+
+
+@lru_cache(maxsize=64)
+def _folders(file: Path, _changed: int) -> tuple[Path, ...]:
+    return tuple(place.parent for place, _ in lineage(file))
+
+
+_WHOLE = ("fidelity", "sweep")
+"""Blocks that a study takes or replaces as a whole."""
+
+
+def _merged(base: Mapping[str, Any], own: Mapping[str, Any], top: bool = True) -> dict[str, Any]:
+    """A study's content with another's changes; a part of another `kind` is replaced."""
+    found = dict(base)
+    for key, value in own.items():
+        there = base.get(key)
+        found[key] = value
+        if isinstance(value, dict) and isinstance(there, dict) and not (top and key in _WHOLE):
+            same = value.get("kind", there.get("kind")) == there.get("kind")
+            found[key] = _merged(there, value, top=False) if same else value
+    return found
+
+
 def located(error: InputError) -> InputError:
-    """The error with the line of its field in the file, where both are known."""
-    file = error.file
-    if error.line is None and error.field and isinstance(file, Path) and file.is_file():
-        lines, field = _line_table(file.read_bytes()), error.field
-        while field and not {f"sweep.{field}", field} & set(lines):
+    """The error with the line of its field and the file that has it, where both are known."""
+    if error.line is None and error.field and isinstance(error.file, Path):
+        field, tables = error.field, list(_line_tables(error.file))
+        while field and not any({f"sweep.{field}", field} & set(lines) for _, lines in tables):
             field = field.rpartition(".")[0]
-        error.line = lines.get(f"sweep.{field}", lines.get(field))
+        for file, lines in tables:
+            line = lines.get(f"sweep.{field}", lines.get(field))
+            if line is not None:
+                error.file, error.line = file, line
+                break
     for other in error.more:
         located(other)
     return error
+
+
+def _line_tables(file: Path) -> Iterator[tuple[Path, Mapping[str, int]]]:
+    """The lines of a study's fields in its own file and in those of the studies it extends."""
+    try:
+        files = [place for place, _ in lineage(file)]
+    except InputError:
+        files = [file] if file.is_file() else []
+    for place in files:
+        yield place, _line_table(place.read_bytes())
 
 
 @lru_cache(maxsize=4)
@@ -142,109 +219,8 @@ def _lines(node: yaml.Node | None, prefix: str) -> Iterator[tuple[str, int]]:
         yield from _lines(value, f"{prefix}{name}.")
 
 
-def validate(data: Mapping[str, Any], file: Path | str, *, whole: bool = False) -> Study:
-    """Check plain data against the study model, and its values against each other.
-
-    Parameters
-    ----------
-    data : mapping
-    file : Path or str
-        For error messages.
-    whole : bool
-        Whether it is a study with its sweep, and not a case of it.
-
-    Raises
-    ------
-    InputError
-        Names every problem with its line, field, value, limit and a remedy.
-    """
-    found, study = [], None
-    try:
-        study = Study.model_validate(data)
-    except ValidationError as error:
-        found = _problems(error)
-    wrong = {error.field for error in found}
-    doubts = [row for row in implausible(data) if row[0].field not in wrong]
-    found += [error for error, _ in doubts]
-    doubtful = {error.field for error in found}
-    others = contradictions(study, whole) if study else iter(())
-    more = [error for error in others if error.field not in doubtful]
-    if study is None or more or any(refused for _, refused in doubts):
-        raise _of_file([*found, *more], file)
-    return study
-
-
-def warnings(study: Study) -> list[Caution]:
-    """Values of a valid study that are hardly meant, one line each."""
-    return [
-        Caution(
-            "implausible", f"{one.field} {one.value:g} {one.problem}; {one.remedy}; {one.limit}"
-        )
-        for one, _ in implausible(study.plain())
-    ]
-
-
-_FORMS = (
-    "cylinder",
-    "circle",
-    "line",
-    "a-name",
-    "a-number",
-    "a-word",
-    "settings",
-    "a-tolerance",
-    "[key]",
-)
-"""Names of alternatives, which are no part of a field's dotted name."""
-
-_LIMITS = {
-    "greater_than": "greater than {gt}",
-    "greater_than_equal": "at least {ge}",
-    "less_than": "less than {lt}",
-    "less_than_equal": "at most {le}",
-    "finite_number": "a finite number",
-}
-
-
-def explained(error: ValidationError, file: Path | str) -> InputError:
-    """What a model found in a file, as one error for the user."""
-    return _of_file(_problems(error), file)
-
-
-def _of_file(found: list[InputError], file: Path | str) -> InputError:
-    for error in found:
-        error.file = file
-    return located(together(found))
-
-
-def _problems(error: ValidationError) -> list[InputError]:
-    return [_problem(issue) for issue in error.errors()]
-
-
-def _problem(issue: ErrorDetails) -> InputError:
-    """One problem that a model found."""
-    kind = issue["type"]
-    field = ".".join(str(part) for part in issue["loc"] if part not in _FORMS)
-    limit = _LIMITS[kind].format(**issue.get("ctx", {})) if kind in _LIMITS else None
-    problem, remedy = issue["msg"].removeprefix("Value error, "), None
-    value: object = issue["input"]
-    if kind == "extra_forbidden":
-        hint = near(str(issue["loc"][-1]), _every_key())
-        problem, remedy = "unknown key", f"{hint}remove it, or see docs/study.md for its spelling"
-    elif kind == "missing":
-        problem, remedy, value = "a required key is missing", "add it", None
-    if isinstance(value, Mapping | BaseModel):
-        value = None
-    return InputError(problem, field=field or None, value=_shown(value), limit=limit, remedy=remedy)
-
-
-def _every_key(model: type[Model] = Model) -> set[str]:
-    """Every key that some part of a study may have."""
-    inner = (_every_key(part) for part in model.__subclasses__())
-    return set(model.model_fields).union(*inner)
-
-
-def _shown(value: object) -> str | None:
+def shown(value: object) -> str | None:
+    """A value as error messages show it."""
     if value is None:
         return None
     if isinstance(value, float) and math.isnan(value):

@@ -9,9 +9,10 @@ from typing import Any
 
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError, choices, together
-from dragdeck.study.base import NAME, NAME_LIMIT
-from dragdeck.study.model import STUDY_FILE, Tolerance
-from dragdeck.study.yaml import read_yaml, validate
+from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE
+from dragdeck.study.check import validate
+from dragdeck.study.model import Tolerance
+from dragdeck.study.yaml import read_study
 
 Resolve = Callable[[Case, Tolerance], Case]
 """Finds the settings of a case for a tolerance: `dragdeck.advice.advise.resolve`."""
@@ -36,7 +37,7 @@ def load_cases(
     InputError
         The file cannot be used; the message names field, value and limit.
     """
-    data = read_yaml(file)
+    data = read_study(file)
     if fidelity is not None:
         data["fidelity"] = fidelity
     plain, found, errors = {**data, "sweep": {}}, [], []
@@ -138,6 +139,42 @@ def study_file(studies: Path, name: str) -> Path:
             limit=choices(name, filter(NAME.fullmatch, known)),
             remedy=f"choose one of these, or make a folder; its name has {NAME_LIMIT}",
         )
+    return file
+
+
+_NEW_STUDY = """\
+# States only what differs from {base}; docs/study.md lists every field.
+title: {name}
+extends: {base}
+reference: null  # values to compare with, if there are any
+
+# fidelity: {{tolerance: 0.1}}
+# motion: {{speed_m_s: 0.02}}
+# sweep: {{motion.speed_m_s: [0.01, 0.02]}}
+"""
+
+
+def new_study(studies: Path, name: str, base: str) -> Path:
+    """Write the file of a study that extends another, and return it.
+
+    Raises
+    ------
+    InputError
+        The name cannot be one or is taken, or there is no such study to extend.
+    """
+    study_file(studies, base)
+    folder = studies / name
+    if not NAME.fullmatch(name) or folder.exists():
+        raise InputError(
+            "a study has that name already" if folder.exists() else "no name for a study",
+            file=studies,
+            value=name,
+            limit=f"a name has {NAME_LIMIT}",
+            remedy="choose another",
+        )
+    folder.mkdir()
+    file = folder / STUDY_FILE
+    file.write_text(_NEW_STUDY.format(name=name, base=base), encoding="utf-8")
     return file
 
 

@@ -20,13 +20,12 @@ from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import Model, Positive, Whole
+from dragdeck.study.check import explained
 from dragdeck.study.model import Study
-from dragdeck.study.yaml import explained, read_yaml
+from dragdeck.study.yaml import read_yaml
 from dragdeck.sweep.cases import Resolve, beside_each_other, settle_case
 
 Settings = Mapping[str, Any]
-
-_PATH_LENGTH = ("motion.path.revolutions", "motion.path.length_m")
 
 
 class Block(Model):
@@ -129,7 +128,7 @@ def plan_points(plan: Plan, plan_file: Path, base: Case, resolve: Resolve | None
     blocks = [plan.reference, *plan.points]
     found: dict[str, Case] = {}
     for scene, block in itertools.product(plan.scenes.values(), blocks):
-        for settings in _settings(plan, block, base.study, scene.get("seed", base.study.seed)):
+        for settings in _settings(plan, block, base.study, scene):
             shown = {**scene, **_unnamed(settings)}
             case = _case(base, {**plan.base, **scene, **settings}, shown, plan_file, resolve)
             found.setdefault(PROCESS.run_id(case), case)
@@ -154,13 +153,15 @@ def _combinations(block: Block) -> Iterator[dict[str, Any]]:
             yield {**dict(zip(block.vary, values, strict=True)), **alone}
 
 
-def _settings(plan: Plan, block: Block, study: Study, seed: int) -> Iterator[dict[str, Any]]:
-    """The fields that each point of a block sets, path and seed included."""
+def _settings(
+    plan: Plan, block: Block, study: Study, scene: Mapping[str, Any]
+) -> Iterator[dict[str, Any]]:
+    """The fields that each point of a block sets in a scene, path and seed included."""
     field, length = _path_length(study)
-    arc = {field: length * (block.arc or plan.arc)}
+    arc = {field: scene.get(field, length) * (block.arc or plan.arc)}
     for values in _combinations(block):
         for number in range(block.seeds or plan.seeds):
-            yield {**values, **arc, "seed": seed + number}
+            yield {**values, **arc, "seed": scene.get("seed", study.seed) + number}
 
 
 def _unnamed(settings: Settings) -> dict[str, Any]:
@@ -178,9 +179,8 @@ def _unnamed(settings: Settings) -> dict[str, Any]:
 
 def _path_length(study: Study) -> tuple[str, float]:
     path = study.motion.path
-    if path.kind == "circle":
-        return _PATH_LENGTH[0], path.revolutions
-    return _PATH_LENGTH[1], path.length_m
+    value: float = getattr(path, path.length_field)
+    return f"motion.path.{path.length_field}", value
 
 
 def _case(

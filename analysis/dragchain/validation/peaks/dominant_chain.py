@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from dragchain.arrays import Floats, Ints
+from dragchain.arrays import Floats, Ints, wrap_angle
 from dragchain.network import chains as network_chains
 from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame, read_frames
-from dragchain.run.kinematics import wrap_angle
 from dragchain.validation.peaks.lifetimes import lives
 from dragchain.validation.peaks.settings import FORCE_FACTORS, SETTINGS
 

@@ -11,8 +11,9 @@ from dragchain.arrays import Floats
 from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
 from dragchain.errors import TableError
-from dragchain.run.case import Circle, load_case
+from dragchain.run.case import load_case
 from dragchain.run.kinematics import drag_start_s
+from dragchain.run.paths.circle import Circle
 from dragchain.validation.peaks.dominant_chain import frame_table
 from dragchain.validation.peaks.run_series import AVERAGED_S, DISTINCT_STDS, RunSeries
 from dragchain.validation.peaks.settings import SETTINGS

@@ -1,0 +1,1 @@
+"""Motions that are superposed on the workpiece's path: one module for each kind."""

@@ -1,0 +1,58 @@
+"""The laws of reduced moduli beside a trade-off, in a scene that they were not fitted to."""
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from dragchain.tradeoff.stiffness_document import CheckEntry
+from dragchain.tradeoff.stiffness_law import ScaledRuns, StiffnessLaw
+from dragchain.tradeoff.tradeoff_document import TradeoffRecord
+
+_STEP = 0.5
+"""Time step over the Rayleigh time of the settings that are compared."""
+
+
+def check_laws(
+    laws: Mapping[str, tuple[StiffnessLaw, str]], tradeoff: TradeoffRecord
+) -> Iterator[CheckEntry]:
+    """Every law against every reduced modulus of a trade-off at the study's own speed.
+
+    Parameters
+    ----------
+    laws : mapping of str to (StiffnessLaw, str)
+        By quantity, with the number of a scene that is its coefficient of friction.
+    tradeoff : TradeoffRecord
+    """
+    for setting in tradeoff.settings:
+        scale = setting.youngs_modulus_scale
+        plain = setting.timestep_fraction == _STEP and setting.speed_factor == 1.0
+        if scale == 1.0 or not plain or setting.breaks:
+            continue
+        for quantity, (law, friction) in laws.items():
+            error = setting.errors.get(quantity)
+            if error is None:
+                continue
+            run = ScaledRuns(
+                stiffness_number=tradeoff.scene["stiffness_number"],
+                inertial_number=tradeoff.scene["inertial_number"],
+                friction=tradeoff.scene[friction],
+                scales=np.array([scale]),
+                logarithms=np.zeros(1),
+                path_to_particle=1.0,
+            )
+            mean, variance = law.prior(run)
+            (h,) = run.reduction(law.rate).tolist()
+            se = math.hypot(h * math.sqrt(variance), law.model_std)
+            apart = mean * h - math.log1p(error.value)
+            measured_se = error.se / (1.0 + error.value)
+            yield CheckEntry(
+                quantity=quantity,
+                scale=scale,
+                predicted=math.expm1(mean * h),
+                predicted_se=se,
+                measured=error.value,
+                ci95_low=error.ci95_low,
+                ci95_high=error.ci95_high,
+                inside=abs(apart) <= 1.96 * math.hypot(se, measured_se),
+            )

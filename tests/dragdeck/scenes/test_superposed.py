@@ -1,0 +1,226 @@
+"""Motions that are superposed on the path: study fields, speeds, checks, input scripts."""
+
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from dragdeck.campaigns.machine_speed import short_case
+from dragdeck.cases.bed import bed_timestep, skin
+from dragdeck.cases.case import Case
+from dragdeck.decks.render import deck_text
+from dragdeck.decks.templates import environment
+from dragdeck.errors import InputError
+from dragdeck.project import Project
+from dragdeck.scenes.dimensionless import describe
+from dragdeck.scenes.fit import fastest_motion
+from dragdeck.scenes.motion import surface_speed
+from dragdeck.scenes.process import PROCESS, process_scene
+from dragdeck.scenes.scene import Bed
+from dragdeck.scenes.workpiece import workpiece_length
+from dragdeck.study.model import Motion
+from dragdeck.study.superposed.kind import DragSteps
+from dragdeck.study.superposed.spin import Spin, SpinOfRun
+from dragdeck.sweep.cases import load_cases
+
+BED = Bed(surface_m=0.038, top_m=0.0446)
+RATE = 300 * 2 * math.pi / 60
+SCHEDULE = [{"until_s": 0.1, "rpm": 300}, {"until_s": 0.15, "rpm": -300}]
+
+WriteStudy = Callable[..., Path]
+
+
+@pytest.fixture
+def with_motion(small: dict[str, Any], write_study: WriteStudy) -> Callable[..., Case]:
+    """The small study with these fields of its motion and fidelity."""
+
+    def make(fidelity: dict[str, Any] | None = None, **motion: Any) -> Case:
+        small["motion"] |= motion
+        small["fidelities"]["quick"] |= fidelity or {}
+        (only,) = load_cases(write_study(small))
+        return only
+
+    return make
+
+
+def script(case: Case, project: Project) -> str:
+    return deck_text(process_scene(case, BED), environment(project.templates))
+
+
+def superposed(case: Case) -> Any:
+    return process_scene(case, BED).case.model_dump(mode="json").get("superposed")
+
+
+def test_a_study_without_them_is_as_it_was(case: Case, project: Project) -> None:
+    assert superposed(case) is None
+    assert "superpose" not in script(case, project)
+    assert not {"spin", "oscillation", "counted_from_revolution"} & set(case.study.motion.plain())
+    assert "superposed_speed" not in describe(case)
+
+
+def test_spin_follows_the_path_and_starts_where_the_engine_has_the_workpiece(
+    with_motion: Callable[..., Case], project: Project
+) -> None:
+    """The path carries the centre of what is defined after it, and is unfixed last."""
+    text = script(with_motion(spin={"rpm": -300}), project)
+    names = re.findall(r"^(fix|unfix) (move_drag|superpose_\w+)", text, re.MULTILINE)
+    assert names == [
+        ("fix", "move_drag"), ("fix", "superpose_spin"),
+        ("unfix", "superpose_spin"), ("unfix", "move_drag"),
+    ]  # fmt: skip
+    assert (
+        "rotate/variable origin ${reference_x} ${reference_y} ${reference_z} axis 0. 0. 1." in text
+    )
+    assert f"variable spin_rate_1 equal {-RATE!r}\n" in text
+
+
+def test_every_speed_grows_by_the_speed_factor(with_motion: Callable[..., Case]) -> None:
+    """Stages are as much shorter, so that the workpiece turns as far per metre of path."""
+    motion = {
+        "spin": {"schedule": SCHEDULE},
+        "oscillation": {"amplitude_m": 1e-3, "frequency_hz": 5},
+    }
+    slow = with_motion(**motion)
+    one, both = superposed(slow), []
+    assert [each["kind"] for each in one] == ["oscillation", "spin"]
+    fast = with_motion({"speed_factor": 2}, **motion)
+    for before, after in zip(one[1]["stages"], superposed(fast)[1]["stages"], strict=True):
+        assert after["rate_rad_s"] == pytest.approx(2 * before["rate_rad_s"])
+        both.append(after["steps"] / before["steps"])
+    assert both[0] == pytest.approx(0.5, rel=1e-3)
+    assert superposed(fast)[0]["rate_rad_s"] == pytest.approx(2 * one[0]["rate_rad_s"])
+    assert superposed(fast)[0]["amplitude_m"] == 1e-3
+    assert fastest_motion(fast) == pytest.approx(2 * fastest_motion(slow))
+    assert describe(fast) == describe(slow)
+
+
+def test_the_stages_fill_the_drag() -> None:
+    """A stage that ends after the drag ends with it; the last one always does."""
+    spin = Spin.model_validate({"schedule": [*SCHEDULE, {"until_s": 5, "rpm": 100}]})
+
+    def steps(end: int) -> list[int]:
+        found = spin.of_run(DragSteps(50, 50 + end, 1e-3))
+        assert isinstance(found, SpinOfRun)
+        return [stage.steps for stage in found.stages]
+
+    assert steps(400) == [100, 50, 250]
+    assert steps(120) == [100, 20]
+    assert steps(60) == [60]
+
+
+def test_the_highest_surface_speed_counts_all_that_moves(with_motion: Callable[..., Case]) -> None:
+    motion = {"spin": {"rpm": 300}, "oscillation": {"amplitude_m": 2e-3, "frequency_hz": 5}}
+    case = with_motion(**motion)
+    radius = 0.004
+    whole = 0.02 + RATE * radius + 2e-3 * 2 * math.pi * 5
+    assert surface_speed(case.study.motion, radius) == pytest.approx(whole)
+    assert fastest_motion(case) == pytest.approx(whole, rel=0.01)
+    assert describe(case)["superposed_speed"] == pytest.approx(whole / 0.02 - 1, rel=0.01)
+    plain = case.study.motion.model_copy(update={"spin": None, "oscillation": None})
+    assert surface_speed(plain, radius) == 0.02
+
+
+def test_the_short_run_for_its_speed_keeps_the_turn_per_step(
+    with_motion: Callable[..., Case],
+) -> None:
+    case = with_motion(spin={"rpm": 300}, counted_from_revolution=1)
+    short = short_case(case)
+    assert short.study.motion.spin is not None and short.study.motion.spin.rpm is not None
+    per_step = [
+        rpm
+        * bed_timestep(each.study, "timestep_fraction")
+        * each.study.chosen_fidelity().speed_factor
+        for rpm, each in ((300, case), (short.study.motion.spin.rpm, short))
+    ]
+    assert per_step[0] == pytest.approx(per_step[1])
+
+
+def test_a_workpiece_that_oscillates_is_as_much_longer(with_motion: Callable[..., Case]) -> None:
+    length = workpiece_length(with_motion())
+    moving = with_motion(oscillation={"amplitude_m": 1e-3, "frequency_hz": 5})
+    assert workpiece_length(moving) == pytest.approx(length + 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("motion", "field", "words"),
+    [
+        ({"oscillation": {"amplitude_m": 0.012, "frequency_hz": 1}, "immersion_depth_m": 0.025},
+         "motion.oscillation", "too deep"),
+        ({"oscillation": {"amplitude_m": 0.005, "frequency_hz": 1}, "immersion_depth_m": 0.005},
+         "motion.oscillation", "out of the bed"),
+        ({"spin": {"rpm": 30000}}, "motion.spin", "neighbour skin in one step"),
+        ({"spin": {"schedule": [{"until_s": 1, "rpm": 1}, {"until_s": 2, "rpm": -30000}]}},
+         "motion.spin", "neighbour skin in one step"),
+        ({"oscillation": {"amplitude_m": 1e-3, "frequency_hz": 3000}},
+         "motion.oscillation", "neighbour skin in one step"),
+    ],
+)  # fmt: skip
+def test_motions_that_cannot_be(
+    with_motion: Callable[..., Case], motion: dict[str, Any], field: str, words: str
+) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        process_scene(with_motion(**motion), BED)
+    text = str(caught.value)
+    assert field in text
+    assert "limit:" in text
+    assert "remedy:" in text
+
+
+def test_the_limit_of_a_spin_is_the_skin(with_motion: Callable[..., Case]) -> None:
+    case = with_motion()
+    step, radius = bed_timestep(case.study, "timestep_fraction"), 0.004
+    most = (skin(case.study) / step - 0.02) / radius * 60 / (2 * math.pi)
+    process_scene(with_motion(spin={"rpm": 0.99 * most}), BED)
+    with pytest.raises(InputError, match="skin"):
+        process_scene(with_motion(spin={"rpm": 1.01 * most}), BED)
+
+
+@pytest.mark.parametrize(
+    ("block", "words"),
+    [
+        ({"spin": {}}, "either rpm or schedule"),
+        ({"spin": {"rpm": 1, "schedule": SCHEDULE}}, "either rpm or schedule"),
+        ({"spin": {"schedule": SCHEDULE[::-1]}}, r"schedule.1.until_s is 0.1, not above the 0.15"),
+        ({"spin": {"schedule": [SCHEDULE[0]] * 2}}, "in the order of their times"),
+        ({"spin": {"schedule": []}}, "at least 1 item"),
+        ({"oscillation": {"amplitude_m": 0, "frequency_hz": 1}}, "greater than 0"),
+        ({"path": {"kind": "line", "start_m": [0, 0], "length_m": 0.1},
+          "counted_from_revolution": 1}, "for circles"),
+    ],
+)  # fmt: skip
+def test_blocks_that_cannot_be(block: dict[str, Any], words: str) -> None:
+    path = {"kind": "circle", "radius_m": 0.02}
+    given = {"path": path, "speed_m_s": 0.01, "immersion_depth_m": 0.05, "transient_m": 0.0}
+    with pytest.raises(ValidationError, match=words):
+        Motion.model_validate(given | block)
+
+
+def test_a_slip_of_the_unit_in_a_schedule_is_named(with_motion: Callable[..., Case]) -> None:
+    with pytest.raises(InputError, match=r"motion\.spin\.schedule\.0\.rpm: is not plausible"):
+        with_motion(spin={"schedule": [{"until_s": 1, "rpm": 1e6}]})
+
+
+def test_a_spin_of_zero_is_a_level_of_a_sweep(with_motion: Callable[..., Case]) -> None:
+    still = with_motion(spin={"rpm": 0})
+    assert superposed(still) == [
+        {"kind": "spin", "stages": [{"steps": pytest.approx(5950, rel=0.1), "rate_rad_s": 0.0}]}
+    ]
+    assert PROCESS.run_id(still) != PROCESS.run_id(with_motion(spin={"rpm": 1}))
+
+
+def test_statistics_from_a_revolution_on(with_motion: Callable[..., Case]) -> None:
+    """The later of the two counts: the end of the transient, or the start of the revolution."""
+    path = {"kind": "circle", "radius_m": 0.01, "revolutions": 2.5}
+
+    def transient(**more: Any) -> float:
+        return process_scene(with_motion(path=path, **more), BED).case.statistics.transient_s
+
+    assert transient() == pytest.approx(0.001 / 0.02)
+    assert transient(counted_from_revolution=1) == pytest.approx(0.001 / 0.02)
+    assert transient(counted_from_revolution=3) == pytest.approx(4 * math.pi * 0.01 / 0.02)
+    with pytest.raises(InputError, match="counted_from_revolution: no path is left"):
+        with_motion(path=path, counted_from_revolution=4)

@@ -1,0 +1,111 @@
+"""A workpiece whose axis is not upright."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dragdeck.cases.case import Case
+from dragdeck.errors import InputError
+from dragdeck.scenes.dimensionless import describe
+from dragdeck.scenes.process import PROCESS, process_scene
+from dragdeck.scenes.scene import Bed
+from dragdeck.scenes.workpiece import (
+    farthest_surface,
+    workpiece_length,
+    workpiece_mesh,
+    workpiece_reach,
+)
+from dragdeck.sweep.cases import load_cases
+
+BED = Bed(surface_m=0.038, top_m=0.0446)
+
+
+@pytest.fixture
+def moved(small: dict[str, Any], write_study: Callable[..., Path]) -> Callable[..., Case]:
+    """The small study with these fields of its motion."""
+
+    def make(**motion: Any) -> Case:
+        small["motion"] |= motion
+        (only,) = load_cases(write_study(small))
+        return only
+
+    return make
+
+
+@pytest.mark.parametrize("tilt", [15, -10])
+def test_the_upper_end_leans_in_the_direction_of_motion(
+    moved: Callable[..., Case], tilt: float
+) -> None:
+    """In the frame of the mesh that is +x, which the input script turns to the path."""
+    case = moved(tilt_deg=tilt)
+    mesh = workpiece_mesh(case)
+    top = mesh.vertices[mesh.vertices[:, 2] > 0.5 * mesh.bounds[1, 2]].mean(axis=0)
+    bottom = mesh.vertices[mesh.vertices[:, 2] < 0.5 * mesh.bounds[1, 2]].mean(axis=0)
+    x, y, z = top - bottom
+    assert math.degrees(math.atan2(x, z)) == pytest.approx(tilt, abs=0.5)
+    assert abs(y) < 1e-9
+    assert mesh.bounds[0, 2] == pytest.approx(0.0, abs=1e-12)
+    scene = process_scene(case, BED)
+    assert scene.deck.workpiece_turn_deg == pytest.approx(90.0)
+    assert scene.case.workpiece.kind == "mesh"
+
+
+def test_the_generated_workpiece_still_stands_out_of_the_bed(moved: Callable[..., Case]) -> None:
+    upright = workpiece_length(moved())
+    tilted = workpiece_length(moved(tilt_deg=15))
+    assert upright - 1e-6 <= tilted < 1.2 * upright
+
+
+def test_the_gap_is_that_of_what_is_in_the_bed(moved: Callable[..., Case]) -> None:
+    """A rod of radius r leans by depth * tan(tilt) at the surface."""
+    case = moved(tilt_deg=20)
+    mesh, depth = workpiece_mesh(case), case.study.motion.immersion_depth_m
+    highest = float(np.hypot(*mesh.vertices[:, :2].T).max())
+    radius = case.study.workpiece.shape.radius_m
+    reach = workpiece_reach(case)
+    leaning = depth * math.tan(math.radians(20)) + radius / math.cos(math.radians(20))
+    assert reach < highest
+    assert reach == pytest.approx(leaning, rel=0.1)
+    thickness = [describe(one)["workpiece_to_particle"] for one in (moved(tilt_deg=None), case)]
+    assert thickness[0] == pytest.approx(thickness[1])
+
+
+def test_a_workpiece_that_follows_a_circle_leans_along_it(moved: Callable[..., Case]) -> None:
+    """Its farthest point lies ahead of the axis, not outwards; with a fixed orientation it may."""
+    case = moved(tilt_deg=20)
+    depth, path = case.study.motion.immersion_depth_m, case.study.motion.path.reach_m
+    radius, lean = case.study.workpiece.shape.radius_m, depth * math.tan(math.radians(20))
+    farthest = farthest_surface(case)
+    assert math.hypot(path, lean) < farthest < math.hypot(path + radius, lean + 1.1 * radius)
+    assert farthest_surface(moved(orientation="fixed")) == pytest.approx(
+        path + workpiece_reach(case)
+    )
+    upright = farthest_surface(moved(tilt_deg=None, orientation="follow_path"))
+    assert upright == pytest.approx(path + radius, rel=0.01)
+    assert upright < farthest
+
+
+def test_an_upright_study_keeps_its_run_id(moved: Callable[..., Case]) -> None:
+    plain = PROCESS.run_id(moved())
+    assert PROCESS.run_id(moved(tilt_deg=None)) == plain != PROCESS.run_id(moved(tilt_deg=10))
+
+
+@pytest.mark.parametrize(
+    ("motion", "says"),
+    [
+        ({"tilt_deg": 10, "spin": {"rpm": 60}}, "tilt_deg and spin cannot be combined"),
+        ({"tilt_deg": 60}, "less than or equal to 45"),
+    ],
+)
+def test_bad_input_is_named(moved: Callable[..., Case], motion: dict[str, Any], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        moved(**motion)
+
+
+def test_a_workpiece_that_leans_into_the_wall_is_refused(moved: Callable[..., Case]) -> None:
+    with pytest.raises(InputError, match=r"between its path and the bowl|fits between"):
+        process_scene(moved(tilt_deg=45, immersion_depth_m=0.03, orientation="fixed"), BED)

@@ -1,0 +1,94 @@
+"""A study that extends another states only what differs."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from dragdeck.errors import InputError
+from dragdeck.project import study_templates
+from dragdeck.study.yaml import located, read_study
+from dragdeck.sweep.cases import load_cases
+
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def extend(write_study: Write, small: dict[str, Any]) -> Callable[[str], Path]:
+    base = write_study(small)
+
+    def write(text: str, name: str = "child") -> Path:
+        file = base.parent.parent / name / "study.yaml"
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(text)
+        return file
+
+    return write
+
+
+def test_fields_are_replaced_one_by_one(extend: Callable[..., Path], small: dict[str, Any]) -> None:
+    file = extend("extends: small\nmotion: {path: {revolutions: 0.1}}\n")
+    expected = yaml.safe_load(yaml.safe_dump(small))
+    expected["motion"]["path"]["revolutions"] = 0.1
+    assert read_study(file) == expected
+    (case,) = load_cases(file)
+    assert case.study_name == "child"
+
+
+def test_lists_fidelity_and_another_kind_are_replaced_as_a_whole(
+    extend: Callable[..., Path],
+) -> None:
+    file = extend(
+        "extends: small\nfidelity: {tolerance: 0.1}\nassumptions: []\n"
+        "motion: {path: {kind: line, length_m: 0.02, start_m: [0, 0]}}\n"
+    )
+    data = read_study(file)
+    assert data["fidelity"] == {"tolerance": 0.1}
+    assert data["assumptions"] == []
+    assert data["motion"]["path"] == {"kind": "line", "length_m": 0.02, "start_m": [0, 0]}
+    assert "speed_m_s" in data["motion"]
+
+
+def test_a_study_may_extend_one_that_extends(extend: Callable[..., Path]) -> None:
+    extend("extends: small\nseed: 7\ntitle: middle\n", "middle")
+    data = read_study(extend("extends: middle\ntitle: last\n"))
+    assert (data["seed"], data["title"]) == (7, "last")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("extends: smal\n", "unknown study"),
+        ("extends: ../small\n", "unknown study"),
+        ("extends: [small]\n", "unknown study"),
+        ("extends: child\n", "extends itself"),
+        ("extends: other\n", "extends itself"),
+    ],
+)
+def test_what_cannot_be_extended(extend: Callable[..., Path], text: str, words: str) -> None:
+    extend("extends: child\n", "other")
+    with pytest.raises(InputError, match=words) as caught:
+        load_cases(extend(text))
+    assert "extends" in str(caught.value) and "small" in str(caught.value)
+
+
+def test_an_error_names_the_file_and_line_that_has_the_value(extend: Callable[..., Path]) -> None:
+    extend("extends: small\nmotion:\n  speed_m_s: -1\n", "middle")
+    file = extend("extends: middle\nseed: -2\n")
+    with pytest.raises(InputError) as caught:
+        load_cases(file)
+    found = located(caught.value)
+    places = {
+        one.field: (Path(str(one.file)).parent.name, one.line) for one in (found, *found.more)
+    }
+    assert places == {"motion.speed_m_s": ("middle", 3), "seed": ("child", 2)}
+
+
+def test_templates_of_the_nearest_study_are_used(extend: Callable[..., Path]) -> None:
+    middle = extend("extends: small\n", "middle")
+    (case,) = load_cases(extend("extends: middle\n"))
+    assert study_templates(case) == case.file.parent / "templates"
+    (middle.parent / "templates").mkdir()
+    assert study_templates(case) == middle.parent / "templates"

@@ -1,0 +1,266 @@
+"""The preview: what it draws and prints before anything is run."""
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from PIL import Image
+
+from dragdeck.cases.case import Case
+from dragdeck.cli import main
+from dragdeck.errors import InputError
+from dragdeck.mesh import cylinder, prism, write_stl
+from dragdeck.preview.layout import Layout, layout
+from dragdeck.preview.page import Words, page
+from dragdeck.preview.swept import swept_volume
+from dragdeck.preview.views import COLOURS
+from dragdeck.project import Project
+from dragdeck.scenes.filling import expected_surface
+from dragdeck.scenes.fit import check_fit, clearances
+from dragdeck.study.superposed.oscillation import Oscillation
+from dragdeck.study.superposed.spin import Spin
+from dragdeck.sweep.cases import load_cases
+
+Made = Callable[..., Case]
+
+
+@pytest.fixture(autouse=True)
+def inside(project: Project, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(project.root)
+
+
+@pytest.fixture
+def made(small: dict[str, Any], write_study: Callable[..., Path]) -> Made:
+    """The small study with changed blocks; ``bar`` drags a hexagonal bar from a file."""
+
+    def make(bar: bool = False, **blocks: Any) -> Case:
+        for name, block in blocks.items():
+            small[name] = {**small.get(name, {}), **block} if isinstance(block, dict) else block
+        if bar:
+            small["workpiece"]["shape"] = {"kind": "mesh", "file": "bar.stl", "unit": "m"}
+        file = write_study(small)
+        write_stl(prism(6, 0.004, 0.05, 0.004, 0.01), file.parent / "bar.stl")
+        return load_cases(file)[0]
+
+    return make
+
+
+def picture(project: Project) -> np.ndarray:
+    """Pixels of the picture, (H, W, 3) from 0 to 1."""
+    with Image.open(project.results("small") / "preview.png") as image:
+        return np.asarray(image.convert("RGB")) / 255
+
+
+def shown_page(project: Project) -> str:
+    return (project.results("small") / "preview.html").read_text()
+
+
+def pixels(image: np.ndarray, name: str) -> int:
+    """How many pixels above the legend have the hue of a colour, in whatever light."""
+    image = image[:-60]
+    hue = np.array(to_rgb(COLOURS[name]))
+    norms = np.linalg.norm(image, axis=2) * np.linalg.norm(hue)
+    return int((image @ hue > 0.995 * norms).sum())
+
+
+def volume_and_bounds(found: Layout) -> tuple[float, np.ndarray]:
+    body = found.workpieces[0]
+    swept = swept_volume(body.mesh, body.drag.poses)
+    return swept.volume, swept.bounds
+
+
+def test_picture_and_page_are_written_and_show_the_workpiece(
+    case: Case, project: Project, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["preview", "small"]) == 0
+    said = capsys.readouterr().out
+    for name in ("preview.png", "preview.html"):
+        file = project.results("small") / name
+        assert str(file) in said and file.is_file()
+    image = picture(project)
+    assert pixels(image, "workpiece") > 5000
+    for name in ("drag", "approach", "plunge"):
+        assert pixels(image, name) > 80, name
+    text = shown_page(project)
+    assert not re.findall(r"""(?:src|href)\s*=\s*["'](?!data:)|https?://|@import""", text)
+    found = re.search(r'<script type="application/json" id="scene">(.*?)</script>', text, re.DOTALL)
+    assert found
+    (body,) = json.loads(found[1])["moving"]
+    pose, name = body["frames"][-1]
+    assert name == f"drag, {0.1 * 2 * np.pi * 0.01 / 0.02:.2f} s"
+    tip = 1e3 * layout(case).surface_m - 15
+    assert pose[12:15] == pytest.approx([8.09, 5.878, tip], abs=2e-3)
+
+
+def test_the_numbers_are_those_of_check(case: Case, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["check", "small"])
+    checked = capsys.readouterr().out
+    main(["preview", "small"])
+    shown = capsys.readouterr().out
+    names = ("gap between workpiece and wall", "gap between workpiece and floor",
+             "highest surface speed", "bed height")  # fmt: skip
+    for name in names:
+        (line,) = (row for row in shown.splitlines() if name in row)
+        assert line in checked.splitlines()
+    wall = (0.025 - 0.010 - 0.004) / 2 / 3.27e-3
+    stated = re.search(r"workpiece and wall: (\S+) particle diameters", shown)
+    assert stated and float(stated[1]) == pytest.approx(wall, rel=0.01)
+
+
+@pytest.mark.parametrize("missing_m", [-1e-4, 1e-4])
+def test_the_check_refuses_by_the_clearances(made: Made, missing_m: float) -> None:
+    """One largest particle between tip and floor is enough, and a little less is not."""
+    largest, media = 2 * 3.27e-3, {"radius_std_m": 0}
+    surface = expected_surface(made(media=media).study)
+    case = made(media=media, motion={"immersion_depth_m": surface - largest + missing_m})
+    assert clearances(case, surface).tip_m == pytest.approx(largest - missing_m)
+    if missing_m < 0:
+        check_fit(case, surface, 1e-6)
+        return
+    with pytest.raises(InputError, match="crush particles"):
+        check_fit(case, surface, 1e-6)
+
+
+def test_the_floor_gap_counts_an_oscillation(made: Made) -> None:
+    case = made(motion={"oscillation": {"amplitude_m": 0.003, "frequency_hz": 5}})
+    gaps = clearances(case, 0.05)
+    assert gaps.tip_m == pytest.approx(0.035)
+    assert gaps.floor_m == pytest.approx(0.032)
+
+
+def test_a_workpiece_through_the_wall_is_drawn_and_refused(
+    made: Made, project: Project, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made(motion={"path": {"kind": "circle", "radius_m": 0.023, "revolutions": 0.1}})
+    assert main(["preview", "small"]) == 1
+    said = capsys.readouterr()
+    assert "motion.path: the workpiece does not fit between its path and the bowl" in said.err
+    assert "workpiece and wall: -0.3" in said.out
+    assert pixels(picture(project), "workpiece") > 5000
+    assert "the workpiece does not fit between its path and the bowl" in shown_page(project)
+
+
+def test_a_workpiece_that_cannot_be_read_is_refused_as_by_check(
+    made: Made, project: Project, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shape = {"kind": "mesh", "file": "none.stl", "unit": "m"}
+    made(workpiece={"shape": shape})
+    assert main(["preview", "small"]) == 1
+    said = capsys.readouterr().err
+    assert said.count("no such mesh file") == 1 and "study.yaml:" in said
+    assert not project.results("small").exists()
+
+
+def test_texts_are_escaped(case: Case) -> None:
+    bad = "</script><script>alert(1)</script> {{ 7 * 7 }}"
+    words = Words(bad, bad, bad, {bad: [(bad, bad)]}, [bad], bad)
+    text = page(layout(case), [], words, b"")
+    assert "<script>alert" not in text
+    assert text.count("&lt;script&gt;alert(1)&lt;/script&gt; {{ 7 * 7 }}") == 9
+
+
+def test_the_title_is_on_the_page_and_is_no_formula(made: Made, project: Project) -> None:
+    made(title="$\\frac$ & <b>")
+    assert main(["preview", "small"]) == 0
+    assert "<h1>$\\frac$ &amp; &lt;b&gt;</h1>" in shown_page(project)
+
+
+def test_the_named_case_is_drawn_and_the_first_by_default(
+    made: Made, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Words] = []
+
+    def draw(found: Layout, words: Words, folder: Path) -> list[Path]:
+        drawn.append(words)
+        return []
+
+    monkeypatch.setattr("dragdeck.commands._drawn", draw)
+    made(sweep={"motion.immersion_depth_m": [0.010, 0.016]})
+    assert main(["preview", "small"]) == 0
+    assert "case quick_immersion_depth_m-0.01, one of 2 (--case)" in capsys.readouterr().out
+    assert main(["preview", "small", "--case", "quick_immersion_depth_m-0.016"]) == 0
+    assert "case quick_immersion_depth_m-0.016, one of 2" in capsys.readouterr().out
+    assert main(["preview", "small", "--case", "quick"]) == 1
+    assert "one of: quick_immersion_depth_m-0.01" in capsys.readouterr().err
+    gaps = [float(words.numbers["Expected"][1][1].split()[0]) for words in drawn]
+    assert gaps[0] - gaps[1] == pytest.approx(0.006 / 2 / 3.27e-3, abs=0.02)
+
+
+def test_a_mesh_is_turned_to_the_direction_of_motion(made: Made) -> None:
+    """A bar with a corner along +x has one along the direction of motion, and turns with it."""
+    line = {"kind": "line", "start_m": [-0.005, 0], "direction_deg": 70, "length_m": 0.01}
+    (body,) = layout(made(bar=True, motion={"path": line})).workpieces
+    across = body.at_start.vertices[:, :2] - body.drag.poses[0, :2, 3]
+    corner = across[np.hypot(*across.T) > 0.00399]
+    angles = np.degrees(np.arctan2(*corner.T[::-1])) % 60
+    assert angles == pytest.approx(10)
+    circle = {"kind": "circle", "radius_m": 0.01, "revolutions": 0.1}
+    first, last = layout(made(motion={"path": circle})).workpieces[0].drag.poses[[0, -1]]
+    angles = [np.degrees(np.arctan2(pose[1, 0], pose[0, 0])) for pose in (first, last)]
+    assert angles == pytest.approx([90, 126])
+
+
+def test_the_legs_follow_each_other_down_to_the_immersion_depth(case: Case) -> None:
+    found = layout(case)
+    stages = found.workpieces[0].stages
+    assert [stage.name for stage in stages] == ["plunge", "approach", "drag"]
+    for before, after in pairwise(stages):
+        assert before.poses[-1] == pytest.approx(after.poses[0])
+    assert stages[-1].poses[:, 2, 3] == pytest.approx(found.surface_m - 0.015)
+    assert np.hypot(*stages[-1].poses[:, :2, 3].T) == pytest.approx(0.010)
+
+
+def test_a_swept_ring_has_the_volume_of_pappus() -> None:
+    body, angle = cylinder(0.005, 0.03, 0.0015), np.linspace(0, 2 * np.pi, 100)
+    poses = np.tile(np.eye(4), (100, 1, 1))
+    poses[:, 0, 3], poses[:, 1, 3] = 0.02 * np.cos(angle), 0.02 * np.sin(angle)
+    swept = swept_volume(body, poses)
+    assert swept.is_watertight
+    assert swept.volume == pytest.approx(2 * np.pi * 0.02 * 0.01 * 0.03, rel=0.03)
+    assert swept.bounds[1] == pytest.approx([0.025, 0.025, 0.03], abs=2e-4)
+
+
+def test_a_body_thinner_than_the_grid_is_not_lost() -> None:
+    wire = cylinder(0.0001, 0.05, 0.0001, 0.01)
+    poses = np.tile(np.eye(4), (50, 1, 1))
+    poses[:, 0, 3] = poses[:, 1, 3] = np.linspace(0, 0.3, 50)
+    swept = swept_volume(wire, poses)
+    assert swept.extents == pytest.approx([0.3, 0.3, 0.05], abs=0.02)
+
+
+def test_spin_and_oscillation_enlarge_the_swept_volume(made: Made) -> None:
+    still, bounds = volume_and_bounds(layout(made(bar=True)))
+    spun, _ = volume_and_bounds(layout(made(bar=True, motion={"spin": {"rpm": 300}})))
+    assert spun > 1.02 * still
+    case = made(motion={"spin": None, "oscillation": {"amplitude_m": 0.003, "frequency_hz": 20}})
+    lifted, wide = volume_and_bounds(layout(case))
+    assert lifted > 1.05 * still
+    assert wide[:, 2] - bounds[:, 2] == pytest.approx([-0.003, 0.003], abs=3e-4)
+
+
+def test_what_is_superposed_moves_as_it_is_driven() -> None:
+    stages = [(1, 60), (2, -30), (3, 0)]
+    schedule = [{"until_s": until, "rpm": rpm} for until, rpm in stages]
+    spin = Spin.model_validate({"schedule": schedule})
+    turns = [spin.turn_rad(time) / (2 * np.pi) for time in (0, 0.5, 1, 1.5, 2, 9)]
+    assert turns == pytest.approx([0, 0.5, 1, 0.75, 0.5, 0.5])
+    up = Oscillation(amplitude_m=0.002, frequency_hz=2)
+    assert [up.lift_m(time) for time in (0, 0.125, 0.375)] == pytest.approx([0, 0.002, -0.002])
+
+
+def test_other_commands_load_no_graphics(case: Case) -> None:
+    script = (
+        "import sys; from dragdeck.cli import main; main(['check', 'small']); "
+        "print([name for name in ('pyvista', 'matplotlib', 'trimesh') if name in sys.modules])"
+    )
+    call = [sys.executable, "-c", script]
+    done = subprocess.run(call, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"

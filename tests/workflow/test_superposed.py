@@ -1,0 +1,378 @@
+"""Superposed motions on LIGGGHTS: where both packages and the engine say that the workpiece is."""
+
+import json
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from loading_files import STEP_S, case_json
+from paths import ROOT, SMALL_STUDY
+from plate import PLATE
+
+from dragchain import load_case, write_tables
+from dragchain.loading.contact_events import Thresholds
+from dragchain.loading.write import compute_loading
+from dragchain.run.case import Case
+from dragchain.run.kinematics import (
+    directions,
+    drag_phase,
+    motion_of,
+    workpiece_turn,
+)
+from dragchain.run.superposed.spin import Spin as SpinRead
+from dragchain.run.workpiece import read_surface, turned
+from dragdeck.decks import outputs
+from dragdeck.decks.outputs import ColumnsFile
+from dragdeck.decks.render import write_run
+from dragdeck.decks.templates import environment
+from dragdeck.engine.process import find_engine
+from dragdeck.engine.reports import silent
+from dragdeck.engine.run_folder import run_to_outcome
+from dragdeck.project import Project
+from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.scene import read_bed
+from dragdeck.study.superposed.kind import DragSteps
+from dragdeck.study.superposed.spin import Spin
+from dragdeck.sweep.cases import load_cases
+
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+CORNERS = """{% extends "base/process.in.j2" %}
+{% block extra %}
+dump corners all mesh/stl {{ deck.thermo_steps }} corners.*.stl workpiece
+{% endblock %}
+"""
+"""Writes the corners of the workpiece's facets with every network frame."""
+
+LINE = {"kind": "line", "start_m": [-0.005, 0.001], "direction_deg": 30, "length_m": 0.004}
+CIRCLE = {"kind": "circle", "radius_m": 0.01, "revolutions": 0.06}
+WAYPOINTS = {
+    "path": {
+        "kind": "waypoints",
+        "points": [
+            [7, -0.004, 0.001], [7.05, -0.003, 0.002, 0.001], [7.07, -0.003, 0.002, 0.001],
+            [7.11, -0.003, 0.002, -0.0007], [7.18, -0.0022, 0.0005],
+        ],
+    },
+    "speed_m_s": None,
+}  # fmt: skip
+"""Obliquely up, a pause, straight down, and on."""
+REVERSING = {"schedule": [{"until_s": 0.06, "rpm": 300}, {"until_s": 0.12, "rpm": -600}]}
+UP_AND_DOWN = {"amplitude_m": 0.001, "frequency_hz": 6}
+
+
+class Runs:
+    """Process runs of the small study with few particles; they share a filling."""
+
+    def __init__(self, folder: Path) -> None:
+        for name in ("templates", "meshes"):
+            (folder / name).symlink_to(ROOT / name)
+        self.study = folder / "studies/small"
+        (self.study / "templates").mkdir(parents=True)
+        (self.study / "templates/process.in.j2").write_text(CORNERS)
+        self.project = Project(folder)
+
+    def rendered(self, count: int, force_hz: float = 1000, **motion: Any) -> Path:
+        """The folder of a process run, not yet run, with a filling that is."""
+        data = yaml.safe_load(SMALL_STUDY.read_text())
+        data["media"]["count"] = count
+        data["motion"] |= {"plunge_speed_m_s": 0.5, "approach_speed_m_s": 0.5, **motion}
+        data["outputs"] = {"n_checkpoints": 3, "workpiece_force_hz": force_hz}
+        (self.study / "study.yaml").write_text(yaml.safe_dump(data))
+        (case,) = load_cases(self.study / "study.yaml")
+        templates = environment(self.project.templates, self.study / "templates")
+        filling, process = (self.project.run_folder(case, kind) for kind in (FILLING, PROCESS))
+        write_run(FILLING.build(case, None), filling, templates)
+        run_to_outcome(filling, filling / "outcome.json", silent)
+        write_tables(filling)
+        bed = read_bed(filling / "tables/packing.json")
+        write_run(PROCESS.build(case, bed), process, templates)
+        return process
+
+    def shallow(self, **motion: Any) -> Path:
+        """The same in a shallow bed, with the reference point at each step."""
+        return self.rendered(120, 1e5, immersion_depth_m=0.004, transient_m=0.0, **motion)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Runs:
+    return Runs(tmp_path_factory.mktemp("project"))
+
+
+def engine(folder: Path, *words: str) -> None:
+    """Run the input script of a folder as it stands."""
+    command = [find_engine().path, "-in", "in.liggghts", "-log", "none", *words]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-2000:]
+
+
+def reference(folder: Path, part: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Steps of the drag, and where the engine has the reference point then."""
+    rows = np.loadtxt(folder / f"workpiece_force.{part}.txt", skiprows=1)
+    steps = rows[:, 0].astype(int)
+    dragged = steps > drag_phase(load_case(folder)).start_step
+    return steps[dragged], rows[dragged, 8:11]
+
+
+def analytic(case: Case, motion: dict[str, Any], steps: np.ndarray) -> np.ndarray:
+    """Where the reference point has to be, its height from that of the immersion."""
+    time = (steps - drag_phase(case).start_step) * case.timestep_s
+    path, way = motion["path"], motion_of(case).axis_speed_m_s * time
+    found = np.zeros((len(steps), 3))
+    if path["kind"] == "circle":
+        angle = (-1 if path.get("direction") == "cw" else 1) * way / path["radius_m"]
+        found[:, 0] = path["radius_m"] * np.cos(angle)
+        found[:, 1] = path["radius_m"] * np.sin(angle)
+    elif path["kind"] == "waypoints":
+        points = np.array([[*point, 0.0][:4] for point in path["points"]])
+        ends = np.round((points[:, 0] - points[0, 0]) / case.timestep_s) * case.timestep_s
+        last = (time - ends[-2]) / (ends[-1] - ends[-2])
+        for axis, places in enumerate(points.T[1:]):
+            beyond = places[-2] + last * (places[-1] - places[-2])
+            found[:, axis] = np.where(last > 0, beyond, np.interp(time, ends, places))
+    else:
+        direction = np.radians(path["direction_deg"])
+        found[:, 0] = path["start_m"][0] + way * np.cos(direction)
+        found[:, 1] = path["start_m"][1] + way * np.sin(direction)
+    if "oscillation" in motion:
+        amplitude, hertz = (motion["oscillation"][key] for key in ("amplitude_m", "frequency_hz"))
+        found[:, 2] += amplitude * np.sin(2 * np.pi * hertz * time)
+    return found
+
+
+def farthest_corner(folder: Path, steps: np.ndarray, ref_m: np.ndarray) -> float:
+    """How far the engine's facets lie from where dragchain has them, at most, m."""
+    case, surface, off, frames = load_case(folder), read_surface(folder, load_case(folder)), 0.0, 0
+    for step, place in zip(steps, ref_m, strict=True):
+        file = folder / f"corners.{step}.stl"
+        if file.is_file():
+            mesh, frames = meshio.stl.read(file), frames + 1
+            at = np.array([step])
+            turn = workpiece_turn(at, directions(at, place[None, :2], case), case)[0]
+            corners = mesh.points[mesh.cells_dict["triangle"]]
+            off = max(off, float(np.abs(corners - turned(surface.corners, turn) - place).max()))
+    assert frames > 1
+    return off
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        {"path": CIRCLE, "spin": {"rpm": -400}},
+        {"path": CIRCLE | {"direction": "cw"}, "spin": REVERSING, "oscillation": UP_AND_DOWN},
+        {"path": CIRCLE, "orientation": "fixed", "spin": REVERSING, "oscillation": UP_AND_DOWN},
+        {"path": LINE, "spin": REVERSING, "oscillation": UP_AND_DOWN},
+        {"path": LINE, "oscillation": UP_AND_DOWN},
+        {"path": CIRCLE, "tilt_deg": 20},
+        WAYPOINTS,
+        {**WAYPOINTS, "spin": REVERSING, "oscillation": UP_AND_DOWN},
+    ],
+    ids=[
+        *("planetary", "clockwise", "fixed", "line", "oscillation", "tilted"),
+        *("waypoints", "waypoints-spin"),
+    ],
+)
+def test_the_engine_moves_the_workpiece_as_both_packages_say(
+    runs: Runs, motion: dict[str, Any]
+) -> None:
+    """The reference point to 1e-9 m at each step; the facets to the digits of an STL file."""
+    folder = runs.shallow(**motion)
+    engine(folder)
+    steps, place = reference(folder)
+    off = place - analytic(load_case(folder), motion, steps)
+    off[:, 2] -= off[0, 2]
+    assert np.abs(off).max() < 1e-9
+    assert farthest_corner(folder, steps, place) < 1e-7
+
+
+@pytest.mark.parametrize("rpm", [30, -30])
+def test_the_bed_rotates_with_the_bowl_about_a_workpiece_at_rest(runs: Runs, rpm: float) -> None:
+    """The same way and no faster, slowed by the workpiece; the drag is along the bed's motion."""
+    path = {"kind": "rest", "radius_m": 0.01, "bowl_rpm": rpm, "revolutions": 0.15}
+    folder = runs.shallow(path=path, speed_m_s=None)
+    engine(folder)
+    write_tables(folder)
+    _, place = reference(folder)
+    assert np.ptp(place, axis=0).max() < 1e-12
+    beds = pd.read_parquet(folder / "tables/particles.parquet")
+    x, y = beds["x_m"].to_numpy(), beds["y_m"].to_numpy()
+    momentum = x * beds["vy_m_s"].to_numpy() - y * beds["vx_m_s"].to_numpy()
+    rate = momentum.sum() / (x**2 + y**2).sum() / (rpm * 2 * np.pi / 60)
+    assert 0.3 < rate < 1.02
+    force = pd.read_parquet(folder / "tables/workpiece_force.parquet").query("in_statistics")
+    assert np.sign(force["force_y_n"].mean()) == np.sign(rpm)
+    assert force["drag_n"].mean() < 0
+
+
+@pytest.mark.parametrize("path", [{"path": CIRCLE, "speed_m_s": 0.021}, WAYPOINTS])
+def test_a_resumed_run_continues_the_motion(runs: Runs, path: dict[str, Any]) -> None:
+    """From a checkpoint within the second stage: a restart file has no moved centre of spin."""
+    motion = {**path, "spin": REVERSING, "oscillation": UP_AND_DOWN}
+    folder = runs.shallow(**motion)
+    engine(folder)
+    case, checkpoints = load_case(folder), sorted(folder.glob("checkpoint.*.restart"))
+    stage = case.superposed[-1]
+    assert isinstance(stage, SpinRead)
+    begun = drag_phase(case).start_step + stage.stages[0].steps
+    checkpoint = next(
+        file
+        for file in sorted(checkpoints, key=lambda file: int(file.name.split(".")[1]))
+        if int(file.name.split(".")[1]) > begun + 100
+    )
+    for file in folder.glob("corners.*"):
+        file.unlink()
+    engine(folder, *f"-var part 2 -var resume 1 -var from {checkpoint.name}".split())
+    steps, place = reference(folder, part=2)
+    assert drag_phase(case).end_step == steps[-1]
+    whole, before = reference(folder)
+    np.testing.assert_allclose(place, before[np.isin(whole, steps)], atol=1e-11)
+    off = place - analytic(case, motion, steps)
+    assert np.abs(off[:, :2]).max() < 1e-9
+    assert farthest_corner(folder, steps, place) < 1e-7
+
+
+def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
+    """Facets gather in the body frame, whose sums are those of the workpiece; work is power."""
+    schedule = [{"until_s": 0.1, "rpm": 300}, {"until_s": 1, "rpm": -300}]
+    path = {"kind": "circle", "radius_m": 0.01, "revolutions": 0.07}
+    spin = {"schedule": schedule}
+    deep = {"immersion_depth_m": 0.025, "plunge_speed_m_s": 0.15}
+    folder = runs.rendered(300, path=path, spin=spin, transient_m=1e-4, **deep)
+    engine(folder)
+    write_tables(folder)
+    case = load_case(folder)
+    force = pd.read_parquet(folder / "tables/workpiece_force.parquet")
+    force = force[force["in_statistics"]]
+    middle = drag_phase(case).start_step + case.superposed[0].stages[0].steps
+    first = force["step"].to_numpy() <= middle
+    torque = force["torque_z_n_m"].to_numpy()
+    assert torque[first].mean() < 0 < torque[~first].mean()
+    assert (torque[first] < 0).mean() > 0.9
+    assert (torque[~first] > 0).mean() > 0.9
+
+    world, body = (force[[f"{name}_{axis}_n" for axis in "xyz"]] for name in ("force", "body"))
+    turn = force["turn_rad"].to_numpy()
+    np.testing.assert_allclose(turned(body.to_numpy(), turn), world, atol=1e-12)
+
+    found = compute_loading(folder, Thresholds())
+    contacts = pd.read_parquet(folder / "tables/workpiece_contacts.parquet", columns=["step"])
+    sampled = force[force["step"].isin(contacts["step"])]
+    interval = found.sampled.interval_s
+    impulse = found.facets[[f"body_{axis}_impulse_n_s" for axis in "xyz"]].to_numpy().sum(axis=0)
+    whole = sampled[[f"body_{axis}_n" for axis in "xyz"]].to_numpy().sum(axis=0) * interval
+    np.testing.assert_allclose(impulse, whole, atol=0.02 * np.linalg.norm(whole))
+    assert found.summary.closure.point_off_facet_max_m < 1e-6
+
+    rate = np.where(sampled["step"] <= middle, 1, -1) * 300 * 2 * np.pi / 60
+    rate += motion_of(case).axis_speed_m_s / path["radius_m"]
+    power = -(sampled["drag_n"] * motion_of(case).axis_speed_m_s + sampled["torque_z_n_m"] * rate)
+    work = found.summary.totals["workpiece_work_j"]
+    assert work == pytest.approx(power.sum() * interval, rel=0.05)
+
+
+# --- a particle on a spinning plate --------------------------------------------------------------
+
+RADIUS, DENSITY, MODULUS, FRICTION, GRAVITY = 3e-3, 2500.0, 1e7, 0.3, 9.81
+STEPS, SPEED, RPM, PLACE = 200, 0.1, 200.0, (-0.008, 0.006)
+DECK = """units si
+soft_particles yes
+atom_style granular
+atom_modify map array
+boundary f f f
+newton off
+communicate single vel yes
+read_data particle.data
+neighbor 0.001 bin
+neigh_modify delay 0
+fix youngs all property/global youngsModulus peratomtype {{ modulus }}
+fix poisson all property/global poissonsRatio peratomtype 0.3
+fix restitution all property/global coefficientRestitution peratomtypepair 1 0.5
+fix friction all property/global coefficientFriction peratomtypepair 1 {{ friction }}
+pair_style gran model {{ law }}
+pair_coeff * *
+timestep {{ timestep }}
+fix gravity all gravity {{ gravity }} vector 0 0 -1
+fix workpiece all mesh/surface/stress file workpiece.stl type 1 reference_point 0. 0. 0.
+fix workpiece_wall all wall/gran model {{ law }} mesh n_meshes 1 meshes workpiece store_force yes
+compute workpiece_contacts all wall/gran/local pos id force delta
+fix integrate all nve/sphere
+variable part index 1
+variable reference_x equal f_workpiece[7]
+variable reference_y equal f_workpiece[8]
+variable reference_z equal f_workpiece[9]
+fix drag all move/mesh mesh workpiece linear {{ speed }} 0. 0.
+{% for name, formula in spin.variables | items %}
+variable {{ name }} equal {{ formula }}
+{% endfor %}
+fix spin all move/mesh mesh workpiece {{ spin.mover }}
+{% from "outputs.j2" import write %}
+{% for output in outputs %}
+{{ write(output) }}
+{% endfor %}
+run {{ steps }}
+"""
+
+
+def static_overlap(mass: float) -> float:
+    """The overlap at which Hertz' force on a plate of the same material carries a particle."""
+    stiffness = 4 / 3 * MODULUS / (2 * (1 - 0.3**2)) * np.sqrt(RADIUS)
+    return float((mass * GRAVITY / stiffness) ** (2 / 3))
+
+
+def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: Path) -> None:
+    """At first it rests: the plate's velocity v + w x r is the slip, and friction mu m g along it.
+
+    Friction then accelerates its centre by mu g, and its surface by another 5/2 mu g.
+    """
+    drag, mass = DragSteps(0, STEPS, STEP_S / 10), DENSITY * 4 / 3 * np.pi * RADIUS**3
+    written = outputs.in_writing_order(
+        [
+            outputs.workpiece_force(20, STEPS),
+            outputs.workpiece_particles(20, 0, STEPS),
+            outputs.workpiece_contacts(20, 0, STEPS, bowl_facets=False),
+        ]
+    )
+    spin = Spin(rpm=RPM)
+    deck = environment(ROOT / "templates").from_string(DECK)
+    text = deck.render(
+        spin=spin.on_engine(drag), outputs=written, steps=STEPS, timestep=drag.timestep_s,
+        modulus=MODULUS, friction=FRICTION, gravity=GRAVITY, speed=SPEED,
+        law="hertz tangential history",
+    )  # fmt: skip
+    (tmp_path / "in.liggghts").write_text(text)
+    (tmp_path / "workpiece.stl").write_text(PLATE)
+    place = f"{PLACE[0]} {PLACE[1]} {RADIUS - static_overlap(mass)}"
+    (tmp_path / "particle.data").write_text(
+        "one particle\n\n1 atoms\n\n1 atom types\n\n-0.05 0.05 xlo xhi\n-0.05 0.05 ylo yhi\n"
+        f"-0.01 0.05 zlo zhi\n\nAtoms\n\n1 1 {2 * RADIUS} {DENSITY} {place}\n"
+    )
+    ColumnsFile(outputs={each.name: each.as_part() for each in written}).write(
+        tmp_path / "columns.json"
+    )
+    superposed = [spin.of_run(drag).model_dump()]
+    made = case_json(axis_speed_m_s=SPEED, direction_rad=0.0) | {
+        "superposed": superposed,
+        "timestep_s": drag.timestep_s,
+        "phases": [{"name": "drag", "start_step": 0, "end_step": STEPS}],
+    }  # fmt: skip
+    made["inputs"] |= {"bowl.material": "steel", "pairs.ceramic-steel.friction": FRICTION}
+    (tmp_path / "case.json").write_text(json.dumps(made))
+    engine(tmp_path)
+    write_tables(tmp_path)
+    rows = pd.read_parquet(tmp_path / "tables/workpiece_contacts.parquet").iloc[1:]
+    time = rows["step"].to_numpy() * drag.timestep_s
+    point = rows[["point_x_m", "point_y_m"]].to_numpy()
+    rate = RPM * 2 * np.pi / 60
+    arm = point - np.column_stack([SPEED * time, np.zeros(len(time))])
+    plate = np.column_stack([SPEED - rate * arm[:, 1], rate * arm[:, 0]])
+    along = plate / np.linalg.norm(plate, axis=1)[:, None]
+    slip = -(np.linalg.norm(plate, axis=1) - 3.5 * FRICTION * GRAVITY * time)[:, None] * along
+    np.testing.assert_allclose(rows[["slip_x_m_s", "slip_y_m_s"]], slip, atol=0.005 * 0.2)
+    force = -rows[["force_x_n", "force_y_n"]].to_numpy()
+    np.testing.assert_allclose(force, FRICTION * mass * GRAVITY * along, rtol=0.02, atol=2e-6)

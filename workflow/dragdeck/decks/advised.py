@@ -1,0 +1,37 @@
+"""What ``case.json`` keeps of the advice that a run's settings came from."""
+
+from collections.abc import Sequence
+
+from dragdeck.documents import Part
+
+
+class AdvisedSettings(Part):
+    """The tolerance that a run's settings were chosen for, and what is expected of them.
+
+    Attributes
+    ----------
+    held_to : float
+        The tolerance that the settings meet: the asked one, or less outside of the measured
+        range.
+    extrapolated : bool
+        They are meant for the value that is extrapolated to the physical Young's modulus.
+    error, ci95_low, ci95_high, bound : float or None
+        Expected error, its interval and the bound of its size; None for the reference.
+    half_width : float or None
+        Of the 95 % interval of one run's value, relative.
+    """
+
+    tolerance: float
+    quantity: str
+    label: str
+    held_to: float
+    extrapolated: bool
+    error: float | None
+    ci95_low: float | None
+    ci95_high: float | None
+    bound: float | None
+    relative_cost: float
+    half_width: float | None
+    outside: Sequence[str]
+    fallback: str | None
+    source: str

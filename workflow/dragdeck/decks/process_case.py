@@ -1,0 +1,61 @@
+"""The ``case.json`` of a process run: the workpiece, its motion, and what was asked."""
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+from pydantic import Field
+
+from dragdeck.decks.advised import AdvisedSettings
+from dragdeck.decks.case_file import CaseOfStudy, SteadyCriterion
+from dragdeck.documents import Part
+from dragdeck.physics.run_limits import RunLimits
+from dragdeck.study.model import AnyPathOfRun, AnySuperposedOfRun
+
+
+class WorkpieceOfRun(Part):
+    """The workpiece: radius of the cylinder around it, length, mesh file, depth of its tip."""
+
+    kind: Literal["cylinder", "mesh"]
+    radius_m: float
+    length_m: float
+    mesh: str
+    immersion_depth_m: float
+
+
+class StatisticsOfRun(Part):
+    """The first seconds of the drag that no statistic counts."""
+
+    transient_s: float
+
+
+class ProcessCase(CaseOfStudy):
+    """A process run: the workpiece dragged through a settled bed.
+
+    Attributes
+    ----------
+    case : str
+        The case's readable name.
+    upstream : mapping
+        Run ids of the filling and the drop test that it belongs to.
+    numbers : mapping
+        The scene's dimensionless numbers at full modulus and the study's own speed.
+    surface_m : float
+        The settled surface above the floor.
+    superposed : sequence
+        What is superposed on the path; the key is absent if nothing is.
+    steady : SteadyCriterion
+        When the bed moves steadily; the key is absent if the bowl stands still.
+    """
+
+    scene: Literal["process"] = "process"
+    case: str
+    upstream: Mapping[str, str]
+    numbers: Mapping[str, float]
+    surface_m: float
+    workpiece: WorkpieceOfRun
+    motion: AnyPathOfRun
+    superposed: Sequence[AnySuperposedOfRun] = Field(default=(), exclude_if=lambda value: not value)
+    statistics: StatisticsOfRun
+    steady: SteadyCriterion | None = Field(default=None, exclude_if=lambda value: value is None)
+    limits: RunLimits
+    asked: AdvisedSettings | None = None

@@ -1,0 +1,169 @@
+"""Mesh the surface of a STEP part with gmsh: `python step_mesher.py`, the arguments of `main`.
+
+A program of its own that imports nothing of the package: OpenCASCADE, which reads the part, can end
+the interpreter on a damaged file. The file is opened by its STEP reader only, without gmsh's own
+scripts and configuration files, and without the other files that a STEP file may refer to.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+CPU_LIMIT_S = 120
+"""More CPU time than any sensible part needs, s."""
+
+_MOST_FACETS = 200_000
+"""More facets than any workpiece needs: a facet size in the wrong unit."""
+
+_SHARP_DEG = 30.0
+"""Smallest angle between the normals of two faces at a sharp edge."""
+
+_GROWTH = 2.0
+"""Distance from a sharp edge, in facet sizes, within which the facets grow to their full size."""
+
+EXPORT = "export the part again as STEP, as one solid; or its surface as STL"
+"""What helps against a damaged file."""
+
+_OPTIONS = {
+    "General.Terminal": 0,
+    "General.NumThreads": 1,  # the same mesh every time
+    "Geometry.OCCImportLabels": 0,  # its reader of names opens other files
+    "Mesh.MeshSizeFromPoints": 0,
+    "Mesh.MeshSizeExtendFromBoundary": 0,
+    "Mesh.MeshSizeFromCurvature": 8,  # facets around a full circle, at least
+}
+_INSTALL = (
+    "./run setup; or pip install 'dragdeck[cad]', and on Debian apt-get install libgl1 "
+    "libglu1-mesa libxcursor1 libxft2 libxinerama1 libgomp1; or export the surface as STL"
+)
+
+
+class Refusal(Exception):
+    """What is wrong with a part: problem, value, limit and remedy of the message."""
+
+
+def main(file: str, answer: str, unit: str, size: str, edge_size: str) -> None:
+    """Write the mesh, or why there is none, as JSON.
+
+    Parameters
+    ----------
+    file, answer : str
+        The STEP file; the file to write.
+    unit : str
+        OpenCASCADE's name of the unit that the numbers shall be in.
+    size, edge_size : str
+        Target edge length of the facets, and of those at sharp edges, in that unit.
+    """
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT_S, CPU_LIMIT_S))
+    found: dict[str, Any]
+    try:
+        found = _mesh(_gmsh(), file, unit, float(size), float(edge_size))
+    except Refusal as refusal:
+        found = {"refused": refusal.args}
+    Path(answer).write_text(json.dumps(found), encoding="ascii")
+
+
+def _gmsh() -> Any:
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:
+        problem = "STEP files are read with gmsh, which cannot be loaded"
+        raise Refusal(problem, str(error), "gmsh 4.12 or newer", _INSTALL) from error
+    return gmsh
+
+
+def _mesh(gmsh: Any, file: str, unit: str, size: float, edge_size: float) -> dict[str, Any]:
+    """Nodes, facets and the volume of the part itself, in the unit."""
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        for name, value in _OPTIONS.items():
+            gmsh.option.setNumber(name, value)
+        gmsh.option.setString("Geometry.OCCTargetUnit", unit)
+        solid = _solid(gmsh, file)
+        _refuse_too_many(gmsh, size)
+        _set_sizes(gmsh, size, edge_size)
+        return {**_surface(gmsh), "volume": gmsh.model.occ.getMass(3, solid)}
+    finally:
+        gmsh.finalize()
+
+
+def _solid(gmsh: Any, file: str) -> int:
+    """The only solid of a file."""
+    try:
+        gmsh.model.occ.importShapes(file, format="step")
+        gmsh.model.occ.synchronize()
+    except Exception as error:
+        raise Refusal("the STEP file is damaged", str(error), "a STEP part", EXPORT) from error
+    solids = [tag for _, tag in gmsh.model.getEntities(3)]
+    if len(solids) == 1:
+        return int(solids[0])
+    faces = len(gmsh.model.getEntities(2))
+    problem = "the STEP file holds several parts" if solids else "the STEP file holds no solid"
+    value = f"{len(solids)} solids, {faces} faces"
+    raise Refusal(problem, value, "one solid: the workpiece is one body", EXPORT)
+
+
+def _refuse_too_many(gmsh: Any, size: float) -> None:
+    area = sum(gmsh.model.occ.getMass(2, face) for _, face in gmsh.model.getEntities(2))
+    facets = area / (0.433 * size**2)
+    if facets > _MOST_FACETS:
+        remedy = "use a larger facet_size_m: a fifth of a particle's diameter is fine"
+        limit = f"at most {_MOST_FACETS}"
+        raise Refusal("the mesh would have too many facets", f"about {facets:.3g}", limit, remedy)
+
+
+def _set_sizes(gmsh: Any, size: float, edge_size: float) -> None:
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    sharp = [curve for _, curve in gmsh.model.getEntities(1) if _is_sharp(gmsh, curve)]
+    if edge_size >= size or not sharp:
+        return
+    field = gmsh.model.mesh.field
+    distance, target = field.add("Distance"), field.add("Threshold")
+    field.setNumbers(distance, "CurvesList", sharp)
+    field.setNumber(distance, "Sampling", 200)
+    values = {"InField": distance, "SizeMin": edge_size, "SizeMax": size, "DistMin": 0.0}
+    for name, value in {**values, "DistMax": _GROWTH * size}.items():
+        field.setNumber(target, name, value)
+    field.setAsBackgroundMesh(target)
+
+
+def _is_sharp(gmsh: Any, curve: int) -> bool:
+    """Whether two faces meet at a curve at an angle, seen in its middle."""
+    faces = gmsh.model.getAdjacencies(1, curve)[0]
+    if len(faces) != 2:
+        return False
+    start, end = gmsh.model.getParametrizationBounds(1, curve)
+    middle = gmsh.model.getValue(1, curve, (start + end) / 2)
+    one, other = (
+        gmsh.model.getNormal(face, gmsh.model.getParametrization(2, face, middle)) for face in faces
+    )
+    return bool(np.dot(one, other) < np.cos(np.radians(_SHARP_DEG)))
+
+
+def _surface(gmsh: Any) -> dict[str, Any]:
+    """Nodes, (N, 3), and rows of them, (M, 3), of the meshed faces."""
+    try:
+        gmsh.model.mesh.generate(2)
+    except Exception as error:
+        remedy = "use another facet_size_m, or remove tiny faces from the part and export it again"
+        raise Refusal(
+            "a face of the part cannot be meshed", str(error), "a mesh of every face", remedy
+        ) from error
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    order = np.argsort(tags)
+    _, corners = gmsh.model.mesh.getElementsByType(2)
+    rows = order[np.searchsorted(tags[order], corners)]
+    return {
+        "points": coordinates.reshape(-1, 3).tolist(),
+        "triangles": rows.reshape(-1, 3).tolist(),
+    }
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,60 @@
+"""What to expect of the workpiece in its bowl before anything is run: clearances, speed, ratios."""
+
+import math
+
+from dragdeck.cases.case import Case
+from dragdeck.scenes.dimensionless import describe
+from dragdeck.scenes.filling import expected_surface
+from dragdeck.scenes.fit import clearances
+from dragdeck.scenes.workpiece import fastest_surface
+from dragdeck.study.contact_law import compared_labels
+
+_RATIOS = {
+    "workpiece_to_particle": "diameter of the workpiece / mean particle diameter",
+    "depth_to_particle": "immersion depth / mean particle diameter",
+    "bowl_to_particle": "diameter of the bowl / mean particle diameter",
+    "superposed_speed": "(highest surface speed - speed along the path) / speed along the path",
+    "bowl_froude_number": "Froude number of the bowl's rotation",
+}
+
+
+def notes(case: Case) -> list[tuple[str, str]]:
+    """What ``check``, ``explain`` and ``preview`` say of a process: a heading and a text each."""
+    surface = expected_surface(case.study)
+    gaps = clearances(case, surface)
+    return [
+        ("gap between workpiece and wall", _gap(case, gaps.wall_m)),
+        ("gap between workpiece and floor", _gap(case, gaps.floor_m)),
+        ("highest surface speed of the workpiece", _speed(case)),
+        ("bed height", f"{1e3 * surface:.3g} mm, an estimate"),
+        *_rotation(case),
+    ]
+
+
+def dimensionless(case: Case) -> list[tuple[str, str]]:
+    """The dimensionless numbers of a process and their values."""
+    words = {**compared_labels(), **_RATIOS}
+    return [
+        (words.get(name, name.replace("_", " ")), f"{value:.4g}")
+        for name, value in describe(case).items()
+        if name != "particles"
+    ]
+
+
+def _gap(case: Case, gap_m: float) -> str:
+    diameters = gap_m / (2 * case.study.media.radius_mean_m)
+    return f"{diameters:.3g} particle diameters, {1e3 * gap_m:.3g} mm"
+
+
+def _rotation(case: Case) -> list[tuple[str, str]]:
+    """How the bowl rotates, if it does."""
+    rpm = case.study.motion.bowl_rad_s * 60 / math.tau
+    sense = "counter-clockwise" if rpm > 0 else "clockwise"
+    text = f"{abs(rpm):.4g} 1/min, {sense} seen from above; the workpiece stands still"
+    return [("rotation of the bowl", text)] if rpm else []
+
+
+def _speed(case: Case) -> str:
+    speed, factor = fastest_surface(case), case.study.chosen_fidelity().speed_factor
+    faster = "" if factor == 1 else f", {factor * speed:.3g} m/s in the run (speed_factor)"
+    return f"{speed:.3g} m/s{faster}"

@@ -1,0 +1,1 @@
+"""What a study describes, drawn before anything is run."""

@@ -1,0 +1,153 @@
+"""The geometry of a case: bowl, bed, and each workpiece with its poses along its path.
+
+Picture and page draw what stands here and know nothing of studies. A further workpiece is one more
+`MovingWorkpiece`, a further kind of path gives other poses.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dragdeck.cases.case import Case
+from dragdeck.mesh import bowl, surface
+from dragdeck.scenes.motion import Place, pose
+from dragdeck.scenes.process import course, expected_bed, workpiece_turn
+from dragdeck.scenes.workpiece import fastest_surface, workpiece_mesh, workpiece_radius
+from dragdeck.study.model import Motion
+from dragdeck.study.paths.kind import Leg
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+Floats = NDArray[np.float64]
+
+_POSES_PER_RADIUS = 4
+"""Poses while a surface point moves by the workpiece's radius: a swept cylinder is then at most
+1 % of the radius too narrow between two of them."""
+
+_MOST_POSES = 2000
+"""Of a leg: beyond, poses are farther apart."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A leg of the motion as drawn.
+
+    Attributes
+    ----------
+    name : str
+        ``plunge``, ``approach`` or ``drag``.
+    poses : (N, 4, 4) array
+        From the mesh to the bowl, in m, at equal intervals of time; N is at least 2.
+    duration_s : float
+    """
+
+    name: str
+    poses: Floats
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class MovingWorkpiece:
+    """A workpiece, its mesh (its reference point in the origin, m) and its legs in their order."""
+
+    name: str
+    mesh: "Trimesh"
+    stages: Sequence[Stage]
+
+    @property
+    def drag(self) -> Stage:
+        """The last leg."""
+        return self.stages[-1]
+
+    @property
+    def at_start(self) -> "Trimesh":
+        """The mesh where the drag starts."""
+        return self.mesh.copy().apply_transform(self.drag.poses[0])
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What is drawn of a case; lengths in m.
+
+    Attributes
+    ----------
+    bowl, bed : Trimesh
+        The inside of the bowl, and the expected surface of the bed.
+    bowl_radius_m, bowl_height_m, surface_m : float
+    direction_rad : float
+        Direction of motion from +x at the start of the drag.
+    workpieces : sequence of MovingWorkpiece
+    """
+
+    bowl: "Trimesh"
+    bed: "Trimesh"
+    bowl_radius_m: float
+    bowl_height_m: float
+    surface_m: float
+    direction_rad: float
+    workpieces: Sequence[MovingWorkpiece]
+
+
+def layout(case: Case) -> Layout:
+    """The geometry of a case in the expected bed, whether it fits or not.
+
+    Raises
+    ------
+    InputError
+        The mesh of the workpiece is missing or cannot be used.
+    """
+    study = case.study
+    radius, level = study.bowl.radius_m, expected_bed(study).surface_m
+    return Layout(
+        bowl=bowl(radius, study.bowl.height_m, radius / 10),
+        bed=_disc(radius, level),
+        bowl_radius_m=radius,
+        bowl_height_m=study.bowl.height_m,
+        surface_m=level,
+        direction_rad=study.motion.path.direction_rad,
+        workpieces=[MovingWorkpiece("workpiece", workpiece_mesh(case), list(_stages(case)))],
+    )
+
+
+def _disc(radius_m: float, height_m: float) -> "Trimesh":
+    angle = np.linspace(0, math.tau, 90, endpoint=False)
+    x, y = radius_m * np.cos(angle), radius_m * np.sin(angle)
+    rim = np.arange(1, 91)
+    points = np.column_stack([x, y, np.full(90, height_m)])
+    triangles = np.column_stack([np.zeros(90), rim, np.roll(rim, -1)])
+    return surface(np.vstack([[0, 0, height_m], points]), triangles)
+
+
+def _stages(case: Case) -> Iterator[Stage]:
+    """The legs at the study's own speed; a faster run goes through the same poses."""
+    study = case.study
+    start, legs = course(study, expected_bed(study), speed_factor=1.0)
+    place: Place = (*start, math.radians(workpiece_turn(study)))
+    radius, fastest = workpiece_radius(case), fastest_surface(case)
+    for leg in legs:
+        speed = max(math.hypot(*leg.velocity_m_s), fastest if leg.name == "drag" else 0.0)
+        travel = (speed + abs(leg.angular_speed_rad_s) * radius) * leg.duration_s
+        count = min(_MOST_POSES, 2 + math.ceil(_POSES_PER_RADIUS * travel / radius))
+        times = np.linspace(0.0, leg.duration_s, count)
+        poses = [_matrix(_moved(leg, place, float(time), study.motion)) for time in times]
+        yield Stage(leg.name, np.array(poses), leg.duration_s)
+        place = pose(leg, place, leg.duration_s)
+
+
+def _moved(leg: Leg, start: Place, time_s: float, motion: Motion) -> Place:
+    """Place on the path, and in the drag what is superposed on it."""
+    x, y, z, turn = pose(leg, start, time_s)
+    for one in motion.superposed().values() if leg.name == "drag" else ():
+        z, turn = z + one.lift_m(time_s), turn + one.turn_rad(time_s)
+    return x, y, z, turn
+
+
+def _matrix(place: Place) -> Floats:
+    x, y, z, turn = place
+    c, s = math.cos(turn), math.sin(turn)
+    return np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, z], [0, 0, 0, 1]])

@@ -1,0 +1,132 @@
+"""The picture of a layout: four parallel projections with scales in mm.
+
+Triangles are painted from the farthest to the nearest, so no graphics driver is needed.
+"""
+
+import io
+import math
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from dragdeck.preview.layout import Floats, Layout
+from dragdeck.preview.swept import below_and_above, drawn
+from dragdeck.preview.views import COLOURS, View, views
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from trimesh import Trimesh
+
+_DASHES = {"plunge": (0, (1, 1.2)), "approach": (0, (4, 1.5)), "drag": "solid"}
+
+_WORDS = {"bed": "expected bed surface", "swept": "swept in the drag", "workpiece": "workpiece"}
+
+_LIGHT = np.array([0.35, -0.5, 0.79])
+
+
+class _Layer(NamedTuple):
+    """A surface to paint: what it is, and how opaque it is."""
+
+    mesh: "Trimesh"
+    name: str
+    opacity: float
+
+
+def picture(layout: Layout, swept: Sequence["Trimesh"], title: str, refused: bool) -> bytes:
+    """Draw a layout and the volumes that its workpieces sweep, as PNG; the title is plain text."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 10), dpi=110, layout="constrained")
+    colour = "#b3261e" if refused else "#1d2733"
+    figure.suptitle(title, fontsize=12, color=colour, parse_math=False)
+    layers = list(_layers(layout, swept))
+    for axes, view in zip(figure.subplots(2, 2).flat, views(layout.direction_rad), strict=True):
+        _draw(axes, view, layout, layers)
+    handles, names = figure.axes[0].get_legend_handles_labels()
+    known = dict(zip(names, handles, strict=True))
+    figure.legend(known.values(), known, loc="outside lower center", ncols=7, frameon=False)
+    content = io.BytesIO()
+    figure.savefig(content, format="png")
+    return content.getvalue()
+
+
+def _layers(layout: Layout, swept: Sequence["Trimesh"]) -> Iterator[_Layer]:
+    """Surfaces in the order of painting: below the surface of the bed, the surface, and above."""
+    bodies = [_Layer(volume, "swept", 0.7) for volume in swept]
+    bodies += [_Layer(drawn(body.at_start), "workpiece", 1.0) for body in layout.workpieces]
+    parts = [below_and_above(body.mesh, layout.surface_m) for body in bodies]
+    yield _Layer(layout.bowl, "bowl", 0.7)
+    yield from (body._replace(mesh=below) for body, (below, _) in zip(bodies, parts, strict=True))
+    yield _Layer(layout.bed, "bed", 0.6)
+    yield from (body._replace(mesh=above) for body, (_, above) in zip(bodies, parts, strict=True))
+
+
+def _draw(axes: "Axes", view: View, layout: Layout, layers: Sequence[_Layer]) -> None:
+    for layer in layers:
+        _paint(axes, view, layer)
+    for name in _WORDS:
+        axes.fill([], [], color=COLOURS[name], label=_WORDS[name])
+    for height, name in ((layout.surface_m, "bed"), (layout.bowl_height_m, "bowl"), (0.0, "bowl")):
+        _line(axes, view, _circle(layout.bowl_radius_m, height), _darker(name), lw=1.2)
+    for body in layout.workpieces:
+        for stage in body.stages:
+            style = {"ls": _DASHES.get(stage.name, "solid"), "label": stage.name}
+            _line(axes, view, stage.poses[:, :3, 3], COLOURS[stage.name], lw=1.8, **style)
+        _arrow(axes, view, body.drag.poses[0, :3, 3], layout)
+    axes.set(title=view.title, xlabel=view.across, ylabel=view.along, aspect="equal")
+    axes.autoscale_view()
+    if not view.across:
+        axes.set_axis_off()
+
+
+def _paint(axes: "Axes", view: View, layer: _Layer) -> None:
+    """Paint the triangles that face the viewer, all of them together as transparent as asked."""
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import to_rgb
+
+    mesh = layer.mesh
+    placed = 1e3 * mesh.triangles @ view.basis.T
+    order = np.argsort(placed[:, :, 2].mean(axis=1))
+    order = order[mesh.face_normals[order] @ view.basis[2] > 0.02]
+    light = 0.65 + 0.35 * np.clip(mesh.face_normals[order] @ _LIGHT, 0.0, 1.0)
+    colours = light[:, None] * to_rgb(COLOURS[layer.name])
+    triangles = PolyCollection(
+        placed[order, :, :2], facecolors=colours, edgecolors="face", lw=0.5, antialiased=False
+    )
+    if layer.opacity < 1:
+        triangles.set_agg_filter(partial(_faded, layer.opacity))
+    axes.add_collection(triangles)
+
+
+def _faded(opacity: float, image: Any, _dpi: float) -> tuple[Any, float, float]:
+    """A drawn layer, (H, W, 4), as one transparent sheet."""
+    return image * np.array([1.0, 1.0, 1.0, opacity]), 0, 0
+
+
+def _arrow(axes: "Axes", view: View, start_m: Floats, layout: Layout) -> None:
+    """The direction of motion."""
+    ahead = np.array([math.cos(layout.direction_rad), math.sin(layout.direction_rad), 0.0])
+    points = 1e3 * view.basis[:2] @ np.array([start_m, 0.3 * layout.bowl_radius_m * ahead]).T
+    (x, across), (y, along) = points
+    scale: Any = {"angles": "xy", "scale_units": "xy", "scale": 1}
+    axes.quiver(x, y, across, along, color=COLOURS["drag"], width=0.008, zorder=3, **scale)
+
+
+def _line(axes: "Axes", view: View, points: Floats, colour: Any, **style: Any) -> None:
+    across, along, _ = 1e3 * view.basis @ points.T
+    axes.plot(across, along, color=colour, **style)
+
+
+def _circle(radius_m: float, height_m: float) -> Floats:
+    angle = np.linspace(0.0, math.tau, 181)
+    return np.column_stack(
+        [radius_m * np.cos(angle), radius_m * np.sin(angle), 0 * angle + height_m]
+    )
+
+
+def _darker(name: str) -> Floats:
+    from matplotlib.colors import to_rgb
+
+    return 0.6 * np.array(to_rgb(COLOURS[name]))

@@ -1,0 +1,1 @@
+"""Paths of the workpiece's axis: one module for each kind."""

@@ -1,0 +1,78 @@
+"""Waypoints in a CSV file: they take their place in the study, and errors name file and line."""
+
+import csv
+import os
+from collections.abc import Mapping
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from dragdeck.errors import InputError
+from dragdeck.study.paths.waypoints import MOST_POINTS, Waypoint
+from dragdeck.study.yaml import located, study_folders
+
+_COLUMNS = Waypoint._fields
+_POINTS = "motion.path.points"
+_Place = tuple[Path | str, int | None, str | None]
+Places = Mapping[str | None, _Place]
+"""File, line and column of fields that do not stand in the study's own file."""
+
+
+def with_recording(data: Mapping[str, Any], study: Path) -> tuple[Mapping[str, Any], Places]:
+    """Plain data of a study with the waypoints instead of the name of their file, if it has one.
+
+    Raises
+    ------
+    InputError
+        There is no such file, or it is no table of waypoints.
+    """
+    try:
+        motion, path = data["motion"], data["motion"]["path"]
+        recorded = path["kind"] == "waypoints" and not path.get("points")
+        name = path["file"]
+    except (KeyError, TypeError):
+        return data, {}
+    if not recorded or not isinstance(name, str):
+        return data, {}
+    points, places = _read(_found(name, study))
+    path = {**path, "file": None, "points": points}
+    return {**data, "motion": {**motion, "path": path}}, places
+
+
+def _found(name: str, study: Path) -> Path:
+    """The file beside the study, or beside one that it extends."""
+    folders = study_folders(study)
+    for folder in folders:
+        if os.path.isfile(folder / name):  # a name that can be none is no error here
+            return folder / name
+    limit, remedy = f"a file in {', '.join(map(str, folders))}", "put it there, or correct the name"
+    field, problem = "motion.path.file", "no such file"
+    raise located(
+        InputError(problem, file=study, field=field, value=name, limit=limit, remedy=remedy)
+    )
+
+
+def _read(file: Path) -> tuple[list[list[Any]], Places]:
+    """Waypoints as a study may have them, numbers or not, and where they stand.
+
+    Of too long a file, no more is read than shows that it is.
+    """
+    try:
+        with file.open(encoding="utf-8-sig", newline="") as stream:
+            reader = csv.DictReader(stream, skipinitialspace=True)
+            header = reader.fieldnames or []
+            rows = [(reader.line_num, row) for row in islice(reader, MOST_POINTS + 1)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"not a CSV file: {error}", file=file) from None
+    if sorted(header) not in (sorted(_COLUMNS), sorted(_COLUMNS[:-1])):
+        limit = f"{','.join(_COLUMNS[:-1])} and optionally {_COLUMNS[-1]}, separated by commas"
+        problem, value = "the columns are not those of waypoints", ",".join(header)[:200]
+        raise InputError(problem, file=file, field="line 1", value=value, limit=limit)
+    surplus: Any = None  # the key of values beyond the header
+    points = [[*(row.get(key, "0") for key in _COLUMNS), *row.get(surplus, ())] for _, row in rows]
+    places: dict[str | None, _Place] = {_POINTS: (file, None, None)}
+    for number, (line, _) in enumerate(rows):
+        places[f"{_POINTS}.{number}"] = file, line, None
+        for at, name in [*enumerate(_COLUMNS), ("speed_m_s", "speed_m_s")]:
+            places[f"{_POINTS}.{number}.{at}"] = file, line, name
+    return points, places
