@@ -19,7 +19,7 @@ ENDS_WITHIN_S = 5.0
 """An engine whose runner was killed is gone after this time, s."""
 
 VICTIMS = ("runner", "engine", "everything")
-_MOST_TRIES = 4
+MOST_TRIES = 4
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def kill_attacks(seed: int, per_engine_phase: int = 15, per_phase: int = 5) -> I
 
 def _kill(phase_name: str, victim: str, fraction: float, at_once: bool, arena: Arena) -> Got:
     phase = arena.ground.phases[phase_name]
-    for number in range(_MOST_TRIES):
+    for number in range(MOST_TRIES):
         project = arena.ground.copy_before(phase, arena.folder / f"project-{number}")
         running = Call(phase.words, project, arena.folder / "first.log")
         moment = fraction * 0.8**number * phase.cpu_s
