@@ -38,13 +38,14 @@ from dragdeck.outlook import timestep as timestep_outlook
 from dragdeck.outlook.explain import expected_cost, explanation, show
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_measured
 from dragdeck.outlook.stable_step import stable_step_cautions, stable_step_note
+from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import Layout, layout
 from dragdeck.preview.page import Words, page
 from dragdeck.preview.picture import picture
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_run, find_project, study_templates
 from dragdeck.scenes.registry import SCENES
-from dragdeck.scenes.scene import Bed, SceneType, read_bed
+from dragdeck.scenes.scene import SceneType, read_bed
 from dragdeck.study.check import explained, warnings
 from dragdeck.study.yaml import located
 from dragdeck.sweep.cases import new_study

@@ -10,3 +10,6 @@ END = "DRAGDECK END"
 
 PACKING_FILE = "packing.restart"
 """What a filling leaves for the runs that start from its bed."""
+
+WORKPIECE_MESH = "workpiece.stl"
+"""The workpiece of a process run, or the first of several."""

@@ -1,7 +1,6 @@
 """The geometry of a case: bowl, bed, and each workpiece with its poses along its path.
 
-Picture and page draw what stands here and know nothing of studies. A further workpiece is one more
-`MovingWorkpiece`, a further kind of path gives other poses.
+Picture and page draw what stands here and know nothing of studies.
 """
 
 import math
@@ -12,10 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dragdeck.cases.case import Case
+from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.mesh import bowl, surface
-from dragdeck.scenes.motion import Place, pose
-from dragdeck.scenes.process import course, expected_bed, workpiece_turn
+from dragdeck.scenes.filling import expected_bed
+from dragdeck.scenes.motion import Place, course, pose
+from dragdeck.scenes.moved_workpiece import workpiece_turn
 from dragdeck.scenes.workpiece import fastest_surface, workpiece_mesh, workpiece_radius
 from dragdeck.study.model import Motion
 from dragdeck.study.paths.kind import Leg
@@ -110,7 +110,12 @@ def layout(case: Case) -> Layout:
         bowl_height_m=study.bowl.height_m,
         surface_m=level,
         direction_rad=study.motion.path.direction_rad,
-        workpieces=[MovingWorkpiece("workpiece", workpiece_mesh(case), list(_stages(case)))],
+        workpieces=[
+            MovingWorkpiece(
+                f"workpiece {one.number or ''}".rstrip(), workpiece_mesh(one), list(_stages(one))
+            )
+            for one in of_each_workpiece(case)
+        ],
     )
 
 
