@@ -5,6 +5,9 @@ CASE_FILE = "case.json"
 COLUMNS_FILE = "columns.json"
 """Files of a run's folder, beside its particles and meshes."""
 
+RUN_FILE = "run.json"
+"""How the run ended, once it is complete."""
+
 END = "DRAGDECK END"
 """What LIGGGHTS prints when it comes to the last line of a deck."""
 

@@ -128,6 +128,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         workpieces=moved,
     )
     number = max(case.number, 1) - 1
+    own = {WORKPIECE_MESH: partial(_stl, each[number])}
     limits = bed_limits(study, top, max(map(_fastest, each, moved)))
     models = {body.mesh: partial(_stl, one) for one, body in zip(each, moved, strict=True)}
     cautions = {str(caution): caution for one in each for caution in process_cautions(one)}
@@ -135,7 +136,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         deck=deck,
         case=_process_case(each[number], len(each), bed.surface_m, moved[number], steps, limits),
         steps=steps.end,
-        files={**models, **_bowl_files(study, top)},
+        files=own if number else {**models, **_bowl_files(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
         warnings=[*cautions.values(), *rank_warnings(parts)],
