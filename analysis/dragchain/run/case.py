@@ -50,7 +50,8 @@ class Bowl(Part):
 class Workpiece(Part):
     """The body that is dragged through the particles: the ``number``-th, from 1, of ``count``.
 
-    The number of a single one is 0.
+    The number of a single one is 0. After ``wake_from_m`` of its path its axis goes where a
+    workpiece went before; None if it never does.
     """
 
     kind: Literal["cylinder", "mesh"]
@@ -60,6 +61,7 @@ class Workpiece(Part):
     immersion_depth_m: float
     number: int = 0
     count: PositiveInt = 1
+    wake_from_m: PositiveFloat | None = None
 
 
 AnySuperposed = Annotated[Spin | Oscillation, Field(discriminator="kind")]

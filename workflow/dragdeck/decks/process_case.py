@@ -19,6 +19,9 @@ class WorkpieceOfRun(Part):
     ----------
     number, count : int
         Which workpiece it is, from 1, and of how many; the keys are absent if there is one.
+    wake_from_m : float or None
+        Path length from which on its axis goes where a workpiece went before; the key is absent
+        if it never does, or if the path is no circle.
     """
 
     kind: Literal["cylinder", "mesh"]
@@ -28,6 +31,7 @@ class WorkpieceOfRun(Part):
     immersion_depth_m: float
     number: int = Field(default=0, exclude_if=lambda value: not value)
     count: int = Field(default=1, exclude_if=lambda value: value == 1)
+    wake_from_m: float | None = Field(default=None, exclude_if=lambda value: value is None)
 
 
 class StatisticsOfRun(Part):

@@ -20,6 +20,7 @@ from dragdeck.files import file_checksum
 from dragdeck.mesh import bowl, stl_text
 from dragdeck.physics.domain_split import warnings as rank_warnings
 from dragdeck.physics.packing import Bed
+from dragdeck.physics.rounding import round_to
 from dragdeck.physics.run_limits import RunLimits
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.drop_test import DROP_TEST
@@ -134,7 +135,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     cautions = {str(caution): caution for one in each for caution in process_cautions(one)}
     return Scene(
         deck=deck,
-        case=_process_case(each[number], len(each), bed.surface_m, moved[number], steps, limits),
+        case=_process_case(each, number, bed.surface_m, moved[number], steps, limits),
         steps=steps.end,
         files=own if number else {**models, **_bowl_files(study, top)},
         models=_models(study),
@@ -187,13 +188,14 @@ def _checkpoint_steps(study: Study, last: int) -> int:
 
 
 def _process_case(
-    case: Case,
-    count: int,
+    each: Sequence[Case],
+    number: int,
     surface_m: float,
     moved: MovedWorkpiece,
     drag: DragSteps,
     limits: RunLimits,
 ) -> ProcessCase:
+    case = each[number]
     study, motion = case.study, case.study.motion
     transient_s = motion.uncounted_m / case.axis_speed_m_s
     return case_of_study(
@@ -216,7 +218,8 @@ def _process_case(
             mesh=WORKPIECE_MESH,
             immersion_depth_m=motion.immersion_depth_m,
             number=case.number,
-            count=count,
+            count=len(each),
+            wake_from_m=_wake_from(each, number),
         ),
         output_of=PROCESS.run_id(case.all_workpieces) if case.number > 1 else None,
         motion=motion.path.of_run(
@@ -236,6 +239,18 @@ def _process_case(
         else None,
         limits=limits,
     )
+
+
+def _wake_from(each: Sequence[Case], number: int) -> float | None:
+    """Path length after which a workpiece on a circle comes to where one began, itself included."""
+    path = each[number].study.motion.path
+    around, ahead = path.revolution_m, path.ahead_deg
+    if around is None or ahead is None:
+        return None
+    others = (one.study.motion.path.ahead_deg or 0.0 for one in each)
+    gap = min((other - ahead - 1e-6) % 360 + 1e-6 for other in others)
+    found = round_to(around * gap / 360, 9)
+    return found if found < path.path_length_m * (1 - 1e-9) else None
 
 
 _INPUTS = (

@@ -118,6 +118,11 @@ class WorkpiecePath(ABC):
         """Largest distance of the workpiece's axis from the bowl's."""
 
     @property
+    def ahead_deg(self) -> float | None:
+        """Angle of its start about the bowl's axis, in the sense of motion; None if no circle."""
+        return None
+
+    @property
     def own_speed_m_s(self) -> float | None:
         """Speed that the path itself gives; None if ``motion.speed_m_s`` does."""
         return None
@@ -201,6 +206,11 @@ class AroundBowl(WorkpiecePath):
     def start_point(self) -> Point:
         """At the radius and the angle."""
         return turned((self.radius_m, 0.0), self.start_deg)
+
+    @property
+    def ahead_deg(self) -> float:
+        """The angle, or its negative for a clockwise motion."""
+        return math.copysign(1.0, math.sin(self.direction_rad - self.start_rad)) * self.start_deg
 
     @property
     def reach_m(self) -> float:
