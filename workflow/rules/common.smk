@@ -17,6 +17,7 @@ from dragdeck.project import (
     by_folder,
     by_run,
     run_path,
+    study_files,
     study_templates,
 )
 from dragdeck.scenes.registry import SCENES
@@ -45,7 +46,9 @@ DEFAULTS = {
     "fidelity": "",
     "plan": "",
     "stability_map": "studies/stability/map.yaml",
+    "crate": "selected",
 }
+CRATE_EXTENTS = {"selected": [], "everything": ["--everything"]}
 
 
 def refuse_setting(key, problem, limit):
@@ -65,11 +68,13 @@ def check_settings():
             )
         if not file and not NAME.fullmatch(str(value)):
             refuse_setting(key, "not a name", NAME_LIMIT)
+        if key == "crate" and value not in CRATE_EXTENTS:
+            refuse_setting(key, "unknown extent", choices(str(value), CRATE_EXTENTS))
 
 
 check_settings()
 PROJECT = Project(Path(workflow.basedir))
-STUDY, FIDELITY, PLAN, STABILITY_MAP = (str(config.get(*item)) for item in DEFAULTS.items())
+STUDY, FIDELITY, PLAN, STABILITY_MAP, CRATE = (str(config.get(*item)) for item in DEFAULTS.items())
 PLAN, VALIDATION = PLAN or "default", PLAN or "paper"
 explained(PROJECT.plan_file, PLAN)
 CASES = explained(PROJECT.cases, STUDY, FIDELITY or None)

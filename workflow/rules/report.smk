@@ -16,6 +16,7 @@ rule write_report:
     output:
         csv=of_study("report", "summary.csv"),
         parquet=of_study("report", "summary.parquet"),
+        xlsx=of_study("report", "summary.xlsx"),
         complete=touch(of_study("report", "complete")),
         page=report(
             of_study("report", "report.html"),
