@@ -128,14 +128,13 @@ STEPS = (
         _argument("--fit-range", type=float, nargs=2, metavar=("LOW", "HIGH"),
                   help="levels for which the exponent is expected"))),
     Command("crate", "write a study's inputs, runs and report as an RO-Crate",
-            "report.crate:crate_command", (
+            "report.crate:write_crate", (
         OUT_DIR, RUN_DIRS,
         _argument("--report", type=Path, required=True, metavar="DIR", dest="report_dir",
                   help="folder of the study's report"),
         _argument("--inputs", type=Path, nargs="*", default=[], metavar="FILE",
                   help="study files, templates and meshes"),
-        _argument("--licence", metavar="TEXT", help="licence of the results"),
-        _argument("--everything", action="store_true", help="raw outputs and large files too"))),
+        _argument("--licence", metavar="TEXT", help="licence of the results"))),
     Command("validate", "compare the runs of a study with its source",
             "validation.report:write_validation",
             (OUT_DIR, RUN_DIRS, _argument("--command", required=True, help="for the record"))),

@@ -46,9 +46,7 @@ DEFAULTS = {
     "fidelity": "",
     "plan": "",
     "stability_map": "studies/stability/map.yaml",
-    "crate": "selected",
 }
-CRATE_EXTENTS = {"selected": [], "everything": ["--everything"]}
 
 
 def refuse_setting(key, problem, limit):
@@ -68,13 +66,11 @@ def check_settings():
             )
         if not file and not NAME.fullmatch(str(value)):
             refuse_setting(key, "not a name", NAME_LIMIT)
-        if key == "crate" and value not in CRATE_EXTENTS:
-            refuse_setting(key, "unknown extent", choices(str(value), CRATE_EXTENTS))
 
 
 check_settings()
 PROJECT = Project(Path(workflow.basedir))
-STUDY, FIDELITY, PLAN, STABILITY_MAP, CRATE = (str(config.get(*item)) for item in DEFAULTS.items())
+STUDY, FIDELITY, PLAN, STABILITY_MAP = (str(config.get(*item)) for item in DEFAULTS.items())
 PLAN, VALIDATION = PLAN or "default", PLAN or "paper"
 explained(PROJECT.plan_file, PLAN)
 CASES = explained(PROJECT.cases, STUDY, FIDELITY or None)

@@ -8,11 +8,10 @@ def crate_inputs(wildcards=None):
     return list(dict.fromkeys([*(str(relative(file)) for file in files), *templates]))
 
 
-def crate_options(wildcards=None):
-    """Licence and extent of the crate, as options of the command line."""
+def licence_option(wildcards=None):
+    """How to name the licence of the results on the command line, if the study states one."""
     licence = CASES[0].study.licence
-    options = [f"--licence={licence}"] if licence else []
-    return " ".join(quote(option) for option in [*options, *CRATE_EXTENTS[CRATE]])
+    return quote(f"--licence={licence}") if licence else ""
 
 
 rule write_crate:
@@ -31,8 +30,8 @@ rule write_crate:
     params:
         runs=[folder for name in SCENES for folder in every_folder(name)],
         report=of_study("report", ""),
-        options=crate_options,
+        licence=licence_option,
         source=source_hash("dragchain.report.crate"),
     shell:
-        "dragchain step crate --out $(dirname {output}) --report {params.report} {params.options}"
+        "dragchain step crate --out $(dirname {output}) --report {params.report} {params.licence}"
         " --inputs {input.files:q} -- {params.runs} > {log} 2>&1"

@@ -12,7 +12,7 @@ rule write_report:
         every("process", "tables/loading.json"),
         every_extrapolated(),
         advice=asked_advice("process"),
-        templates=page_templates("report/report.html.j2"),
+        templates=page_templates("report/report.html.j2", "report/summary_columns.csv"),
     output:
         csv=of_study("report", "summary.csv"),
         parquet=of_study("report", "summary.parquet"),

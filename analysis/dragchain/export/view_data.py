@@ -14,11 +14,9 @@ SCRIPT = "view.py"
 DATA = "view.json"
 
 SCALED = {
-    "particles": {"v": 0.99, "max_normal_force_n": 0.99},
-    "contacts": {"normal_force_n": 0.999},
-    "workpiece": {"mean_pressure_pa": 0.99},
-}
-"""Arrays that colour the parts of a view, and the fraction of a frame that their scales cover."""
+    "v": 0.99, "max_normal_force_n": 0.99, "normal_force_n": 0.999, "mean_pressure_pa": 0.99
+}  # fmt: skip
+"""Arrays that colour a view, and the fraction of a frame that the scale of each covers."""
 
 
 class View(Document):
@@ -26,23 +24,17 @@ class View(Document):
 
     Attributes
     ----------
-    parts : tuple of str
-        The PVD files that there are.
     chains : bool
         Whether particles and contacts have the arrays of chains.
-    load_map : bool
-        Whether the workpiece has the arrays of its loading.
     bowl_radius_m, bowl_height_m, particle_radius_m : float
         Inner sizes of the bowl and mean radius of the particles, m.
     upper : mapping of str to float
-        Upper end of the colour scale of each array, in the array's unit.
+        Upper end of the colour scale of each array that there is, in the array's unit.
     """
 
     made_by: ClassVar[str] = "dragchain export"
 
-    parts: tuple[str, ...]
     chains: bool
-    load_map: bool
     bowl_radius_m: float
     bowl_height_m: float
     particle_radius_m: float
@@ -56,27 +48,22 @@ class ViewWriter:
         self._case = case
         self._chains = chains
         self._upper: dict[str, list[float]] = {}
-        self._parts: dict[str, None] = {}
 
     def add(self, parts: Mapping[str, Any]) -> None:
         """Take the meshes of one frame into account."""
-        for part, mesh in parts.items():
-            self._parts[part] = None
-            for name, covered in SCALED[part].items():
-                if name in mesh.array_names and len(mesh[name]):
-                    values = mesh[name]
-                    sizes = np.linalg.norm(values, axis=1) if values.ndim > 1 else values
-                    found = float(np.quantile(sizes, covered))
-                    self._upper.setdefault(name, []).append(found)
+        for mesh in parts.values():
+            for name in (name for name in SCALED if name in mesh.array_names and mesh.n_points):
+                values = mesh[name]
+                sizes = np.linalg.norm(values, axis=1) if values.ndim > 1 else values
+                found = float(np.quantile(sizes, SCALED[name]))
+                self._upper.setdefault(name, []).append(found)
 
     def write(self, folder: Path) -> None:
         """Write ``view.py`` and ``view.json``; a scale ends at the median over the frames."""
         bowl = needed(self._case.bowl, "bowl")
         height_m = self._case.inputs.get("bowl.height_m")
         View(
-            parts=tuple(self._parts),
             chains=self._chains,
-            load_map="mean_pressure_pa" in self._upper,
             bowl_radius_m=bowl.radius_m,
             bowl_height_m=height_m if isinstance(height_m, int | float) else 2 * bowl.radius_m,
             particle_radius_m=self._case.media.radius_mean_m,

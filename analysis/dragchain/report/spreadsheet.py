@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pandas as pd
@@ -25,30 +26,11 @@ _UNITS = {
 """Units by the end of a column's name; the first that fits counts."""
 
 _WORDS = {
-    "ci95 low": "95 % CI lower end",
-    "ci95 high": "95 % CI upper end",
-    "std": "standard deviation",
-    "youngs": "Young's",
-    "poissons": "Poisson's",
-    "timestep": "time step",
-}
+    "ci95 low": "95 % CI lower end", "ci95 high": "95 % CI upper end", "youngs": "Young's",
+    "std": "standard deviation", "timestep": "time step", "poissons": "Poisson's",
+}  # fmt: skip
 
-_MEANINGS = {
-    "input_": "value of the study",
-    "fidelity_": "setting of the fidelity",
-    "drag_against_": "relative difference of the mean drag from the reference",
-    "drag_": "force on the workpiece along its direction of motion; negative: against the motion",
-    "lateral_": "force on the workpiece across its direction of motion, horizontal",
-    "vertical_": "force on the workpiece upwards",
-    "peak_": "peaks of the drag",
-    "peters_": "force chains by Peters et al. (2005)",
-    "widest_": "paths of the largest bottleneck force from workpiece to bowl",
-    "dominant_": "the strongest path from workpiece to bowl in a frame",
-    "extrapolated_": "quantity at the physical Young's modulus, for a run with a reduced one",
-    "ahead_": "normal force on the half of the workpiece that faces the motion",
-    "behind_": "normal force on the half of the workpiece that faces away from the motion",
-    "depth_": "change of the normal force on the workpiece with depth",
-}
+COLUMNS = Path(__file__).with_name("summary_columns.csv")
 """Meanings by the start of a column's name; the first that fits counts."""
 
 
@@ -74,15 +56,13 @@ def definitions(
     DataFrame
         N rows ``heading``, ``column``, ``unit``, ``meaning``. The heading ends with the unit.
     """
+    meanings = list(pd.read_csv(COLUMNS).itertuples(index=False, name=None))
     rows = []
     for column in columns:
-        unit, meaning = (known or {}).get(column) or (unit_of(column), _meaning(column))
+        found = (text for start, text in meanings if column.startswith(start))
+        unit, meaning = (known or {}).get(column) or (unit_of(column), next(found, ""))
         rows.append((_heading(column, unit), column, unit, meaning))
     return pd.DataFrame(rows, columns=["heading", "column", "unit", "meaning"], dtype=object)
-
-
-def _meaning(column: str) -> str:
-    return next((text for start, text in _MEANINGS.items() if column.startswith(start)), "")
 
 
 def _heading(column: str, unit: str) -> str:
@@ -91,7 +71,7 @@ def _heading(column: str, unit: str) -> str:
     text = column.removesuffix(end).replace("_", " ")
     for word, shown in _WORDS.items():
         text = f" {text} ".replace(f" {word} ", f" {shown} ").strip()
-    return f"{text[:1].upper()}{text[1:]} ({unit})" if unit else f"{text[:1].upper()}{text[1:]}"
+    return f"{text[:1].upper()}{text[1:]}" + (f" ({unit})" if unit else "")
 
 
 def summary_workbook(
@@ -112,17 +92,13 @@ def summary_workbook(
     """
     about = definitions(table.columns, known)
     assumed = [
-        (run, one.field, json.dumps(one.value), one.why)
+        {"run": run, "field": one.field, "value": json.dumps(one.value), "reason": one.why}
         for run, found in assumptions.items()
         for one in found
     ]
-    return workbook(
-        {
-            "Summary": table.set_axis(about["heading"], axis=1),
-            "Definitions": about,
-            "Assumptions": pd.DataFrame(assumed, columns=["run", "field", "value", "reason"]),
-        }
-    )
+    summary = table.set_axis(about["heading"], axis=1)
+    assumption_sheet = pd.DataFrame(assumed, columns=["run", "field", "value", "reason"])
+    return workbook({"Summary": summary, "Definitions": about, "Assumptions": assumption_sheet})
 
 
 def workbook(sheets: Mapping[str, pd.DataFrame]) -> bytes:
