@@ -41,11 +41,13 @@ FOLLOW = """
 from paraview import simple
 def start_cue(self): pass
 def end_cue(self): pass
-def tick(self):
-    x0, x1, y0, y1, z0, z1 = simple.FindSource('workpiece').GetDataInformation().GetBounds()
+def tick(self): move(self.GetClockTime())
+def move(time_s):
+    workpiece = simple.FindSource('workpiece')
+    workpiece.UpdatePipeline(time_s)
+    x0, x1, y0, y1, z0, z1 = workpiece.GetDataInformation().GetBounds()
     for cut in filter(None, map(simple.FindSource, ('cut particles', 'cut contacts'))):
-        if x0 <= x1:
-            cut.ClipType.Origin = [(x0 + x1) / 2, (y0 + y1) / 2, 0.0]
+        cut.ClipType.Origin = [(x0 + x1) / 2, (y0 + y1) / 2, 0.0]
 """
 """Keeps these planes at the workpiece while time goes on; ParaView takes it as text."""
 
@@ -124,7 +126,7 @@ class Picture:
         if "workpiece" in shown:
             self.show_workpiece(shown["workpiece"])
             shown |= {name: self.cut(name) for name in CUTS if name in shown}
-            self.follow(shown["workpiece"])
+            self.follow_workpiece()
         if "contacts" in shown:
             self.show_contacts(shown["contacts"])
         self.show_particles(shown["particles"], colour)
@@ -138,15 +140,14 @@ class Picture:
         cut.ClipType.Offset = CUTS[name] * 2 * self.particle_m
         return cut
 
-    def follow(self, workpiece: Any) -> None:
+    def follow_workpiece(self) -> None:
         """Let the planes go with the workpiece."""
         cue = pv.PythonAnimationCue()
         cue.Script = FOLLOW
         pv.GetAnimationScene().Cues.append(cue)
-        workpiece.UpdatePipeline(self.view.ViewTime)
         place: Any = {}
         exec(FOLLOW, place)
-        place["tick"](cue)
+        place["move"](self.view.ViewTime)
 
     def show_particles(self, source: Any, colour: Sequence[str]) -> None:
         """Particles as spheres."""
