@@ -176,11 +176,18 @@ def _render(sections: Sequence[Section], table: pd.DataFrame, missing: Sequence[
         title=", ".join(dict.fromkeys(study.process.case.study for study in studies)),
         sections=sections,
         missing=missing,
+        runs=_engine_runs(studies),
         overview=_overview(studies) if len(studies) > 1 else None,
         columns={str(name): table[name].tolist() for name in table},
         shown=_SHOWN,
         reliable_times=RELIABLE_TIMES,
     )
+
+
+def _engine_runs(studies: Sequence[StudyRuns]) -> list[ReportedRun[Findings]]:
+    """Every run of LIGGGHTS once: cases may share one, and so may workpieces."""
+    every = {(str(run.case.scene), run.case.run): run for study in studies for run in study.runs}
+    return [run for run in every.values() if run.case.output_of is None]
 
 
 def _overview(studies: Sequence[StudyRuns]) -> str:
