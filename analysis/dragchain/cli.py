@@ -74,6 +74,12 @@ COMMANDS = (
     Command("figures", "draw the figures of a run, from its tables",
             "report.run_figures:write_figures",
             (RUN_DIR,)),
+    Command("journal", "draw the figures of a process run for a publication",
+            "report.journal:write_journal_figures", (
+        RUN_DIR,
+        _argument("--paper-colours", action="store_true",
+                  help="forces from green to red, as in Uhlmann et al. (2015)"),
+    )),
     Command("export", "export a run to ParaView or OVITO", "export.write:export_command", (
         RUN_DIR,
         _argument("--to", required=True, choices=("paraview", "xyz"),
