@@ -176,6 +176,7 @@ for PLACE, SCENE in SCENES.items():
 rule draw_for_journal:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
+        of_run("process", "tables/figures.json"),
         run=of_run("process", "run.json"),
     output:
         of_run("process", "figures/journal/workpiece.pdf"),

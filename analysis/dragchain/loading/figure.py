@@ -62,7 +62,7 @@ def workpiece_figure(
     cylinder = needed(case.workpiece, "workpiece").kind == "cylinder"
     names = ("front", "rear") if cylinder else tuple(_VIEWS)
     widths = [1.0, 1.0, 2.8, 2.4] if cylinder else [1.0] * 4 + [1.4]
-    shown = _averaged(surface, facets, case)
+    shown = averaged_load(surface, facets, case)
     scale = Normalize(0.0, _largest(facets.assign(**{_QUANTITY: shown})))
     mesh = as_polydata(surface)
     mesh.cell_data[_QUANTITY] = shown
@@ -142,7 +142,7 @@ def _render(mesh: Any, eye: tuple[float, float], scale: Normalize, case: Case) -
     return photograph(plotter, Camera((*eye, middle), (0.0, 0.0, middle)), height)
 
 
-def _averaged(surface: Surface, facets: pd.DataFrame, case: Case) -> Floats:
+def averaged_load(surface: Surface, facets: pd.DataFrame, case: Case) -> Floats:
     """Load of each facet, (N,) in Pa: the mean over the area of those that lie beside it.
 
     Facets are beside each other in a cube of a particle's radius, if they face the same way.

@@ -9,13 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.typing import RcKeyType
 
-from dragchain.errors import TableError
 from dragchain.figures.style import PAPER_COLOURS, drawing
 from dragchain.files import write_bytes
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.write import compute_loading, figure_of
-from dragchain.report.collect import write_findings
-from dragchain.report.findings import ProcessFindings
+from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData
 from dragchain.report.run_figures import DRAW_PROCESS
 from dragchain.run.case import load_case
@@ -47,7 +45,7 @@ def write_journal_figures(run_dir: Path, paper_colours: bool = False) -> list[Pa
     Parameters
     ----------
     run_dir : Path
-        The folder of a process run, with its tables and chains made.
+        The folder of a process run, with its tables, chains and figures made.
     paper_colours : bool
         Forces from green to red, as in Uhlmann et al. (2015), instead of the map that is told
         apart with any kind of colour vision.
@@ -60,13 +58,11 @@ def write_journal_figures(run_dir: Path, paper_colours: bool = False) -> list[Pa
     Raises
     ------
     DragchainError
-        If a table is missing, a series is too short, or pictures cannot be rendered here.
+        If it is no process run, a table is missing, or pictures cannot be rendered here.
     """
     case = load_case(run_dir)
     run = RunData(run_dir, case)
-    findings = write_findings(run)
-    if not isinstance(findings, ProcessFindings):
-        raise TableError(f"{run_dir}: its scene is {case.scene}; only process runs are drawn")
+    findings = ProcessFindings.read(run_dir / FILE)
     written = []
     with drawing():
         matplotlib.rcParams.update(_PRINT)
