@@ -74,6 +74,8 @@ COMMANDS = (
     Command("figures", "draw the figures of a run, from its tables",
             "report.run_figures:write_figures",
             (RUN_DIR,)),
+    Command("network", "write the interactive page on a run's contact network",
+            "network_page.page:write_page", (RUN_DIR,)),
     Command("export", "export a run to ParaView or OVITO", "export.write:export_command", (
         RUN_DIR,
         _argument("--to", required=True, choices=("paraview", "xyz"),

@@ -38,6 +38,9 @@ from dragchain.tables.corrections import Corrections
 _SHOWN = 6
 """Cases that the head of the page names; more are in its first table alone."""
 
+NETWORK_PAGE = "network.html"
+"""The page on the contact network of a process run, beside its tables."""
+
 _FROM_LOADING = "workpiece"
 """The figure of `dragchain.loading`, without which a report is still made."""
 
