@@ -1,7 +1,7 @@
 // Colours of the scene: one map for force, speed, displacement and load; one colour per class.
 
 export const INK = "#1d2733", SOFT = "#aab4be", PALE = "#dfe3e8", MEDIA = "#b9c2cc", STEEL = "#8d98a5";
-export const PATH_COLOUR = "#0072b2", CHAIN_COLOUR = "#009e73", CHOSEN = "#d55e00";
+export const PATH_COLOUR = "#1fa2e8", CHAIN_COLOUR = "#009e73", CHOSEN = "#d55e00";
 export const CLASS_COLOURS = ["#56657a", "#d55e00", "#0072b2"]; // told apart with any colour vision
 
 export const rgb = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);

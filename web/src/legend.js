@@ -11,6 +11,9 @@ const SCALES = {
 
 /** Fill the legend with the scale of the scene and that of the load on the workpiece. */
 export function showLegend(element, { colours, scales }, look, load) {
+  const key = `${look.colour} ${load?.name}`;
+  if (element.dataset.key === key) return;
+  element.dataset.key = key;
   const parts = [look.colour === "class" ? classes() : scale(SCALES[look.colour][0], scales[look.colour], colours)];
   if (load) parts.push(scale(`Workpiece: ${load.label} (${load.unit})`, load.top, colours));
   element.replaceChildren(...parts);
@@ -19,7 +22,7 @@ export function showLegend(element, { colours, scales }, look, load) {
 function scale(title, top, colours) {
   const bar = block("bar"), ends = block("ends"), part = block("", title);
   bar.style.background = `linear-gradient(to right, ${colours.join(", ")})`;
-  ends.append(...["0", digits(top / 2, 2), digits(top, 3)].map((text) => Object.assign(document.createElement("span"), { textContent: text })));
+  ends.append(...["0", digits(top / 2, 3), `≥ ${digits(top, 3)}`].map((text) => Object.assign(document.createElement("span"), { textContent: text })));
   part.append(bar, ends);
   return part;
 }

@@ -1,6 +1,7 @@
 // network.html: the contact network of a run over time, and its drag force.
 import { Vector3 } from "three";
 import { outline } from "./bowl.js";
+import { Chosen } from "./chosen.js";
 import { CLASS_COLOURS, colourMap } from "./colours.js";
 import { readColumns } from "./columns.js";
 import { Contacts } from "./contacts.js";
@@ -25,7 +26,8 @@ class Page {
     this.look = { classes: [true, true, true], threshold: 0, chosen: null };
     this.startCurve(columns);
     this.startScene(columns);
-    this.show(this.number);
+    if (head.peaks.length) this.showPeak(0);
+    else this.show(0);
   }
 
   // --- curve ---------------------------------------------------------------------------------
@@ -59,7 +61,7 @@ class Page {
     const { frame, time } = this.head.peaks[rank];
     this.peak = rank;
     this.curve.reveal(time);
-    if (this.view) this.set("path", true);
+    byId("path").checked = true;
     this.show(frame, time);
   }
 
@@ -78,7 +80,8 @@ class Page {
     document.documentElement.classList.add("with-scene");
     this.media = new Media(frames);
     this.contacts = new Contacts(frames);
-    this.view.scene.add(outline(head), this.workpiece.group, this.workpiece.arrow, this.media.mesh, ...this.contacts.meshes);
+    this.chosen = new Chosen(frames, this.workpiece);
+    this.view.scene.add(outline(head), this.workpiece.group, this.workpiece.arrow, this.media.mesh, ...this.contacts.meshes, this.chosen.group);
     this.view.after = () => showScale(byId("scale-bar"), byId("scale-length"), this.view.millimetresPerPixel);
     this.view.resize();
     this.view.preset("overview");
@@ -119,11 +122,6 @@ class Page {
 
   setThreshold(force) {
     byId("threshold").value = Number(force.toPrecision(3));
-    this.redraw();
-  }
-
-  set(name, checked) {
-    byId(name).checked = checked;
     this.redraw();
   }
 
@@ -193,6 +191,7 @@ class Page {
     this.media.update(frame, this.look, this.colourOf);
     this.contacts.update(frame, this.look, this.colourOf);
     this.workpiece.update(this.look, this.colourOf);
+    this.chosen.update(frame, this.look.chosen);
     showLegend(byId("legend"), this.head, this.look, this.workpiece.own.loads.find(({ name }) => name === this.look.load));
     this.tellNumbers(frame);
     this.view.wanted();

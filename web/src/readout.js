@@ -41,9 +41,8 @@ function contact([particle, other], frame, frames) {
 
 function facet(number, workpiece) {
   const { depth, azimuth } = workpiece.facet(number), { loads } = workpiece.own;
-  const short = { force_slide_pa: "force × sliding", mean_pressure_pa: "mean pressure", friction_work_pa: "friction work" };
   return [`Facet ${number} of the workpiece`, [
-    ...loads.map(({ name, unit }) => [short[name] ?? name, `${digits(workpiece.columns[name][number])} ${unit}`]),
+    ...loads.map(({ name, short, unit }) => [short, `${digits(workpiece.columns[name][number])} ${unit}`]),
     ["depth below surface", `${digits(depth, 3)} mm`],
     ["azimuth from motion", degrees(azimuth)],
   ]];

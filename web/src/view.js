@@ -5,12 +5,15 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 ColorManagement.enabled = false; // colours are shown as they are given
 
 export const PRESETS = ["overview", "above", "along", "side", "follow"];
+const FINE = 2; // pixels of the picture per pixel of the page at rest: smooth edges
+const LEAST_RATIO = 0.6;
+const REST_MS = 180, SLOW_MS = 32;
 const UP = new Vector3(0, 0, 1);
 
 export class View {
   /** `area()`: centre, radius, reach to the sides and height, mm, of what is to be seen; `pose()`: that of the workpiece. */
   constructor(canvas, { area, pose }) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.renderer = new WebGLRenderer({ canvas, antialias: false, powerPreference: "high-performance" });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     this.renderer.setClearColor(0xffffff);
     this.scene = new Scene();
@@ -22,7 +25,8 @@ export class View {
     Object.assign(this.controls, { enableDamping: false, zoomToCursor: true, minZoom: 0.3, maxZoom: 40 });
     this.controls.addEventListener("change", () => this.wanted());
     this.controls.addEventListener("start", () => this.touched?.());
-    this.drawn = 0;
+    this.drawn = 0; // pictures so far
+    this.pace = { ratio: devicePixelRatio, last: 0, slow: 0 };
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
     this.resize();
     this.preset("overview");
@@ -31,21 +35,33 @@ export class View {
   resize() {
     const { clientWidth: width, clientHeight: height } = this.renderer.domElement.parentElement;
     if (!width || !height) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.renderer.setSize(width, height, false);
     const { radius } = this.area(), half = radius * Math.max(1, height / width);
     Object.assign(this.camera, { left: -half * width / height, right: half * width / height, top: half, bottom: -half, near: 0.1 * radius, far: 20 * radius });
     this.camera.updateProjectionMatrix();
+    this.renderer.setSize(width, height, false);
     this.wanted();
   }
 
-  /** Draw before the screen is next refreshed. */
+  /** Draw before the screen is next refreshed, and finer once nothing has changed for a while. */
   wanted() {
-    this.request ??= requestAnimationFrame(() => this.draw());
+    this.request ??= requestAnimationFrame((now) => this.draw(this.paced(now)));
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => this.draw(Math.max(FINE, devicePixelRatio)), REST_MS);
   }
 
-  draw() {
+  /** Pixels of the picture per pixel of the page while it moves: fewer if pictures come too slowly. */
+  paced(now) {
+    const { pace } = this, took = now - pace.last;
+    pace.last = now;
+    if (took < REST_MS) pace.slow = 0.8 * pace.slow + 0.2 * took;
+    if (pace.slow > SLOW_MS && pace.ratio > LEAST_RATIO) Object.assign(pace, { ratio: Math.max(0.85 * pace.ratio, LEAST_RATIO), slow: 0 });
+    return pace.ratio;
+  }
+
+  draw(ratio = this.pace.ratio) {
+    cancelAnimationFrame(this.request);
     this.request = undefined;
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
     this.renderer.render(this.scene, this.camera);
     this.drawn++;
     this.after?.();
@@ -55,14 +71,14 @@ export class View {
     const { heading } = this.pose(), { centre, radius } = this.area(), ahead = new Vector3(Math.cos(heading), Math.sin(heading), 0);
     const right = new Vector3().crossVectors(ahead, UP);
     const from = {
-      overview: () => new Vector3(-0.55, -0.75, 0.42),
+      overview: () => ahead.clone().multiplyScalar(0.55).addScaledVector(right, 0.75).add(new Vector3(0, 0, 0.4)),
       above: () => new Vector3(0, -1e-4, 1),
       along: () => ahead.clone().negate(),
       side: () => right,
       follow: () => ahead.clone().multiplyScalar(-0.75).addScaledVector(right, 0.5).add(new Vector3(0, 0, 0.45)),
     }[name]();
     this.follows = name === "follow" ? heading : null;
-    this.look(this.follows === null ? centre : this.nearWorkpiece(), from, name === "follow" ? 2 : this.zoomOf(from), radius);
+    this.look(this.follows === null ? centre : this.nearWorkpiece(), from, name === "follow" ? 1.4 * this.zoomOf(from) : this.zoomOf(from), radius);
   }
 
   /** The magnification at which the area just fits, seen from a direction. */
@@ -83,8 +99,8 @@ export class View {
   }
 
   nearWorkpiece() {
-    const { x, y, z } = this.pose();
-    return new Vector3(x, y, 0.5 * z + 0.5 * this.area().centre.z);
+    const { x, y } = this.pose();
+    return new Vector3(x, y, this.area().centre.z);
   }
 
   /** Go along with the workpiece and turn with its heading, if that is wanted. */

@@ -1,6 +1,6 @@
 // The workpiece: its facets, coloured by what acted on them, and an arrow along its motion.
 import { BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, Group, Mesh } from "three";
-import { CHOSEN, INK, STEEL, rgb } from "./colours.js";
+import { INK, STEEL, rgb } from "./colours.js";
 import { facetMaterial } from "./shading.js";
 
 export class Workpiece {
@@ -39,9 +39,11 @@ export class Workpiece {
   /** Colour the facets by a load; plain if there is none of that name. */
   update(look, colourOf) {
     const load = this.own.loads.find(({ name }) => name === look.load), plain = rgb(STEEL);
+    if (this.shown === look.load) return;
+    this.shown = look.load;
     this.group.visible = look.load !== "hidden";
     for (let facet = 0; facet < this.count; facet++) {
-      const tint = facet === look.chosen?.facet ? rgb(CHOSEN) : load ? colourOf(this.columns[load.name][facet] / load.top) : plain;
+      const tint = load ? colourOf(this.columns[load.name][facet] / load.top) : plain;
       for (let corner = 0; corner < 3; corner++) this.tints.set(tint, 9 * facet + 3 * corner);
     }
     this.body.geometry.attributes.colour.needsUpdate = true;

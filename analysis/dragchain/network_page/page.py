@@ -8,8 +8,7 @@ from dragchain.errors import RejectedRunError
 from dragchain.files import write_text
 from dragchain.network_page.columns import ROUNDING
 from dragchain.network_page.scene import Scene, load_scene
-from dragchain.report.page import file_uri, page_environment
-from dragchain.report.study_report import NETWORK_PAGE
+from dragchain.report.page import NETWORK_PAGE, file_uri, page_environment
 from dragchain.run.case import Case
 from dragchain.run.completeness import read_accepted
 from dragchain.tables.run_folder import Run

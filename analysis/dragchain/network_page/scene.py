@@ -34,11 +34,15 @@ COLOURS = "magma_r"
 """Perceptually uniform; also that of the pictures of the workpiece."""
 
 _LOADS = {
-    "force_slide_pa": ("normal force × sliding distance, per area and path length", "N/m²"),
-    "mean_pressure_pa": ("mean normal pressure", "Pa"),
-    "friction_work_pa": ("friction work per area and path length", "J/m³"),
+    "force_slide_pa": (
+        "force × sliding",
+        "normal force × sliding distance, per area and path length",
+        "N/m²",
+    ),
+    "mean_pressure_pa": ("mean pressure", "mean normal pressure", "Pa"),
+    "friction_work_pa": ("friction work", "friction work per area and path length", "J/m³"),
 }
-"""Columns of ``facets.parquet`` that the workpiece can be coloured by: what they are, and unit."""
+"""Columns of ``facets.parquet`` that the workpiece can be coloured by: short name, name, unit."""
 
 _MOST_SAMPLES = 50_000
 """Of the force curve; of a longer one only every n-th sample is shown."""
@@ -227,12 +231,12 @@ def _loads(columns: Columns, run: Run) -> list[dict[str, Any]]:
     if not file.is_file():
         return []
     table, loads = read_table(file, list(_LOADS)), []
-    for name, (label, unit) in _LOADS.items():
+    for name, (short, label, unit) in _LOADS.items():
         values = table[name].to_numpy(np.float64)
         columns.add(name, "f24", values)
         loaded = values[values > 0.0]
         top = float(np.quantile(loaded, 0.99)) if loaded.size else 1.0
-        loads.append({"name": name, "label": label, "unit": unit, "top": top})
+        loads.append({"name": name, "short": short, "label": label, "unit": unit, "top": top})
     return loads
 
 
