@@ -34,10 +34,11 @@ from dragdeck.engine.process import Ending, command, execute, find_engine
 from dragdeck.engine.record import ParticlesPerRank, RunRecord
 from dragdeck.engine.run_folder import run
 from dragdeck.files import replace_text
+from dragdeck.physics.packing import Bed
 from dragdeck.project import Project, find_project, study_templates
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.scene import Bed, SceneType, read_bed
+from dragdeck.scenes.scene import SceneType, read_bed
 from dragdeck.study.paths.circle import CirclePath
 from dragdeck.study.yaml import read_study
 from dragdeck.sweep.cases import settle_case

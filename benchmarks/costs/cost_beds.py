@@ -13,9 +13,10 @@ from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import deck_text
 from dragdeck.engine.batch import Batch
 from dragdeck.errors import DragdeckError
+from dragdeck.physics.packing import Bed
 from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.scene import Bed, read_bed
-from dragdeck.study.model import Workpiece
+from dragdeck.scenes.scene import read_bed
+from dragdeck.study.workpiece import Workpiece
 
 
 @dataclass(frozen=True)

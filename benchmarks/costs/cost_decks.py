@@ -14,11 +14,12 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.outputs import Column
 from dragdeck.physics.contact_mechanics import particle_mass
+from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import timestep
 from dragdeck.scenes.drop_test import DropDeck, drop_scene
 from dragdeck.scenes.filling import FillingDeck, filling_scene
-from dragdeck.scenes.process import ProcessDeck, process_scene
-from dragdeck.scenes.scene import Bed
+from dragdeck.scenes.moved_workpiece import MovedWorkpiece, ProcessDeck
+from dragdeck.scenes.process import process_scene
 from dragdeck.study.model import Study
 
 DAMPED_S, DAMPING_TIME_S, FREE_S = 0.005, 0.001, 0.05
@@ -157,20 +158,25 @@ def _begun(scene: AnyScene, source: str, steps: int) -> AnyScene:
     """A process that begins where its drag does, with a bed that has the workpiece in it."""
     deck = scene.deck
     assert isinstance(deck, ProcessDeck)
-    x, y, z = deck.workpiece_start_m
-    for leg in deck.legs[:-1]:
+    workpieces = [_in_its_drag(workpiece, steps) for workpiece in deck.workpieces]
+    return replace(scene, deck=replace(deck, source=source, workpieces=workpieces))
+
+
+def _in_its_drag(workpiece: MovedWorkpiece, steps: int) -> MovedWorkpiece:
+    x, y, z = workpiece.start_m
+    for leg in workpiece.legs[:-1]:
         u, v, w = leg.velocity_m_s
         x, y, z = (place + leg.duration_s * speed for place, speed in ((x, u), (y, v), (z, w)))
-    drag = replace(deck.legs[-1], start_step=0, end_step=steps)
-    begun = replace(deck, source=source, workpiece_start_m=(x, y, z), legs=(drag,))
-    return replace(scene, deck=begun)
+    drag = replace(workpiece.legs[-1], start_step=0, end_step=steps)
+    return replace(workpiece, start_m=(x, y, z), legs=(drag,))
 
 
 def workpiece_in(case: Case, bed: Bed, source: str) -> AnyScene:
     """A run that brings the workpiece into a settled bed and keeps the particles."""
     scene = process_scene(case, bed)
     assert isinstance(scene.deck, ProcessDeck)
-    deck = replace(scene.deck, source=source, legs=scene.deck.legs[:-1], outputs=())
+    workpieces = [replace(one, legs=one.legs[:-1]) for one in scene.deck.workpieces]
+    deck = replace(scene.deck, source=source, workpieces=workpieces, outputs=())
     phases = scene.case.model_copy(update={"phases": scene.case.phases[:-1]})
     return replace(scene, deck=deck, case=phases, override="costs/keep_particles.in.j2")
 

@@ -12,8 +12,10 @@ from typing import Any, Literal
 from dragdeck.cases.case import Case
 from dragdeck.outlook.measured import FidelityParameters
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
-from dragdeck.scenes.process import ProcessDeck, process_scene
-from dragdeck.study.model import CylinderShape, Study
+from dragdeck.scenes.moved_workpiece import ProcessDeck
+from dragdeck.scenes.process import process_scene
+from dragdeck.study.model import Study
+from dragdeck.study.workpiece import CylinderShape
 from dragdeck.sweep.cases import settle_case
 
 SceneName = Literal["process", "drop_test", "filling"]

@@ -13,10 +13,11 @@ from dragdeck.documents import Document
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report, say
 from dragdeck.errors import InputError
+from dragdeck.physics.packing import Bed
 from dragdeck.project import find_project
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import process_scene
-from dragdeck.scenes.scene import Bed, read_bed
+from dragdeck.scenes.scene import read_bed
 from dragdeck.study.model import Motion, Study
 from dragdeck.sweep.cases import load_cases
 from evidence.stability.column import Packing, column_scene

@@ -38,11 +38,11 @@ from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
 from dragdeck.engine.reports import silent
 from dragdeck.errors import DragdeckError, InputError
+from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import drop_scene
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import process_scene
-from dragdeck.scenes.scene import Bed
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.045, top_m=0.05)

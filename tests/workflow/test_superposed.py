@@ -333,9 +333,9 @@ def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: 
     drag, mass = DragSteps(0, STEPS, STEP_S / 10), DENSITY * 4 / 3 * np.pi * RADIUS**3
     written = outputs.in_writing_order(
         [
-            outputs.workpiece_force(20, STEPS),
+            outputs.workpiece_force(20, STEPS, "workpiece"),
             outputs.workpiece_particles(20, 0, STEPS),
-            outputs.workpiece_contacts(20, 0, STEPS, bowl_facets=False),
+            outputs.workpiece_contacts(20, 0, STEPS, several=False),
         ]
     )
     spin = Spin(rpm=RPM)

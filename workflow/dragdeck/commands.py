@@ -26,7 +26,7 @@ from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks
 from dragdeck.decks.deck import StudyScene
-from dragdeck.decks.render import deck_text, write_run
+from dragdeck.decks.render import deck_text, write_run, write_workpiece
 from dragdeck.decks.templates import environment
 from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
@@ -38,13 +38,14 @@ from dragdeck.outlook import timestep as timestep_outlook
 from dragdeck.outlook.explain import expected_cost, explanation, show
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_measured
 from dragdeck.outlook.stable_step import stable_step_cautions, stable_step_note
+from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import Layout, layout
 from dragdeck.preview.page import Words, page
 from dragdeck.preview.picture import picture
 from dragdeck.preview.swept import swept_volume
-from dragdeck.project import Project, by_run, find_project, study_templates
+from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
 from dragdeck.scenes.registry import SCENES
-from dragdeck.scenes.scene import Bed, SceneType, read_bed
+from dragdeck.scenes.scene import SceneType, read_bed
 from dragdeck.study.check import explained, warnings
 from dragdeck.study.yaml import located
 from dragdeck.sweep.cases import new_study
@@ -285,12 +286,12 @@ def render(
     run: str,
     packing: Path | None,
 ) -> None:
-    """Write the input files of one run."""
+    """Write the input files of one run, or the folder of a further workpiece of a run."""
     project = find_project(Path.cwd())
     kind = _scene_type(scene)
     points = project.points(study, plan) if plan else None
     every = points.of(kind) if points else project.cases(study, fidelity)
-    runs = by_run(every, kind)
+    runs = by_folder(every, kind)
     if run not in runs:
         raise InputError(
             f"no {scene} run of this name",
@@ -304,6 +305,10 @@ def render(
     for warning in built.warnings:
         say(f"warning: {warning}")
     folder = project.run_folder(case, kind, of_plan=plan is not None)
+    if case.number > 1:
+        whole = project.run_folder(case.all_workpieces, kind, of_plan=plan is not None)
+        write_workpiece(built, folder, case.number, whole)
+        return
     write_run(built, folder, environment(project.templates, study_templates(case)))
 
 

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from dragdeck.advice.advise import resolve
-from dragdeck.cases.case import Case
+from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.errors import InputError, choices
 from dragdeck.outlook.measured import Tradeoff
 from dragdeck.outlook.stable_step import check_timestep
@@ -150,3 +150,14 @@ def by_run(cases: Iterable[Case], scene: SceneType) -> dict[str, Case]:
     for case in cases:
         runs.setdefault(scene.run_id(case), case)
     return runs
+
+
+def by_folder(cases: Iterable[Case], scene: SceneType) -> dict[str, Case]:
+    """One case for each folder of results of a scene, by its name.
+
+    Further workpieces of a run have folders of their own.
+    """
+    runs = by_run(cases, scene)
+    if not scene.needs_bed:
+        return runs
+    return by_run([one for case in runs.values() for one in of_each_workpiece(case)], scene)

@@ -14,6 +14,7 @@ from dragdeck.project import (
     PLACES,
     POINTS,
     Project,
+    by_folder,
     by_run,
     run_path,
     study_templates,
@@ -82,6 +83,11 @@ wildcard_constraints:
     run="[A-Za-z0-9._-]+",
 
 
+# A run of LIGGGHTS, and a further workpiece of one: its number follows the run's name.
+ENGINE_RUN = "[A-Za-z0-9._-]+-[0-9a-f]{8}"
+FURTHER_WORKPIECE = ENGINE_RUN + "[.][0-9]+"
+
+
 # --- paths ---------------------------------------------------------------------------
 
 
@@ -107,7 +113,7 @@ def of_tradeoff(file):
 
 def every_folder(place):
     """The folder of every run of the study's cases."""
-    return [run_path(STUDY, place, run) for run in by_run(CASES, PLACES[place])]
+    return [run_path(STUDY, place, run) for run in by_folder(CASES, PLACES[place])]
 
 
 def every(place, *files):
@@ -124,7 +130,8 @@ def every_extrapolated():
     Not with a faster workpiece, at which no law was measured.
     """
     chosen = {
-        run: case.study.chosen_fidelity() for run, case in by_run(CASES, PLACES["process"]).items()
+        run: case.study.chosen_fidelity()
+        for run, case in by_folder(CASES, PLACES["process"]).items()
     }
     return [
         f"{run_path(STUDY, 'process', run)}/tables/extrapolated.json"
@@ -171,7 +178,7 @@ def origins(place):
     """Where cases of a folder's runs come from: how to name them on the command line, and by run."""
     scene = PLACES[place]
     if place != POINTS:
-        yield fidelity_option(), by_run(CASES, scene)
+        yield fidelity_option(), by_folder(CASES, scene)
     yield f"--plan {PLAN}", points_by_run(scene.name)
     yield f"--plan {VALIDATION}", points_by_run(scene.name, VALIDATION)
 

@@ -22,6 +22,8 @@ for PLACE, SCENE in PLACES.items():
             of_run(PLACE, "logs/render.log"),
         benchmark:
             of_run(PLACE, "benchmarks/render.tsv")
+        wildcard_constraints:
+            run=ENGINE_RUN,
         priority: 0 if SCENE.single_particle else 1
         localrule: True
         conda:
@@ -52,6 +54,8 @@ for PLACE, SCENE in PLACES.items():
             of_run(PLACE, "logs/run.log"),
         benchmark:
             of_run(PLACE, "benchmarks/run.tsv")
+        wildcard_constraints:
+            run=ENGINE_RUN,
         priority: 0 if SCENE.single_particle else 1
         conda:
             "../envs/python.yaml"
@@ -63,6 +67,37 @@ for PLACE, SCENE in PLACES.items():
         shell:
             "dragdeck run $(dirname {output}) {params.outcome} {params.file} --every 60"
             " 2>&1 | tee -i {log}"
+
+
+# Workpieces beyond the first of a run: each has tables, chains and figures of its own.
+rule share_run:
+    input:
+        templates_of("process"),
+        run=lambda wildcards: of_run("process", "run.json").format(
+            study=wildcards.study, run=wildcards.run.rpartition(".")[0]
+        ),
+        packing=of_its_bed("process", "tables/packing.json"),
+    output:
+        [
+            of_run("process", file)
+            for file in ("run.json", "case.json", "columns.json", *SCENES["process"].inputs)
+        ],
+    log:
+        of_run("process", "logs/render.log"),
+    benchmark:
+        of_run("process", "benchmarks/render.tsv")
+    wildcard_constraints:
+        run=FURTHER_WORKPIECE,
+    localrule: True
+    conda:
+        "../envs/python.yaml"
+    params:
+        case=digest_of("process"),
+        cases=cases_option("process"),
+        source=source_hash("dragdeck.decks.render", "dragdeck.scenes.registry"),
+    shell:
+        "dragdeck step render {wildcards.study} process {wildcards.run} {params.cases}"
+        " --packing {input.packing} > {log} 2>&1"
 
 
 for PLACE, SCENE in SCENES.items():

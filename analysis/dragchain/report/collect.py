@@ -1,5 +1,6 @@
 """Compute the findings of one run from its tables."""
 
+import math
 from dataclasses import asdict
 
 import numpy as np
@@ -9,6 +10,7 @@ from dragchain.arrays import Ints
 from dragchain.drag.around import ahead_behind, azimuth_profile, depth_profile, depth_slope
 from dragchain.drag.force import read_counted, summarise_forces
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
+from dragchain.errors import SeriesError
 from dragchain.report.findings import (
     FILE,
     AheadBehind,
@@ -23,12 +25,13 @@ from dragchain.report.findings import (
     Findings,
     Peaks,
     ProcessFindings,
+    Wake,
 )
 from dragchain.report.run_data import RunData
-from dragchain.run.case import load_outputs
-from dragchain.run.kinematics import drag_start_s
+from dragchain.run.case import Case, load_outputs
+from dragchain.run.kinematics import drag_start_s, motion_of, needed
 from dragchain.run.reference import ReferenceDrag, reference_drags
-from dragchain.statistics.correlated import MeanEstimate
+from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, EstimateColumns
 from dragchain.tables.bed import Packing
 from dragchain.tables.impacts import effective_restitution
@@ -83,7 +86,32 @@ def _process(run: RunData) -> ProcessFindings:
             line_load_n_per_m=EstimateColumns.of(line),
             slope_n_per_m=depth_slope(frame, frames, depth, force),
         ),
+        wake=_wake(samples, run.case),
     )
+
+
+def _wake(samples: pd.DataFrame, case: Case) -> Wake | None:
+    workpiece = needed(case.workpiece, "workpiece")
+    if workpiece.wake_from_m is None:
+        return None
+    path = (samples["time_s"] - drag_start_s(case)) * motion_of(case).axis_speed_m_s
+    fresh = path <= workpiece.wake_from_m - 2 * workpiece.radius_m
+    try:
+        before, after = (
+            estimate_mean(samples["drag_n"][which].to_numpy())
+            for which in (fresh, path > workpiece.wake_from_m)
+        )
+    except SeriesError:
+        return None
+    return Wake(fresh_n=before, wake_n=after, ratio=_ratio(after, before))
+
+
+def _ratio(above: MeanEstimate, below: MeanEstimate) -> Estimate:
+    """Ratio of two independent means; its relative error is the root of the sum of squares."""
+    value = above.mean / below.mean
+    relative = (0.5 * (one.ci95_high - one.ci95_low) / one.mean for one in (above, below))
+    half = abs(value) * math.hypot(*relative)
+    return Estimate(value, value - half, value + half)
 
 
 def compare(ours: MeanEstimate, reference: ReferenceDrag) -> Comparison:

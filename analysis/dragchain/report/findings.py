@@ -95,6 +95,17 @@ class DepthProfile(Part):
     slope_n_per_m: Estimate
 
 
+class Wake(Part):
+    """Mean drag before a workpiece comes to a wake, in the wake, and their ratio.
+
+    The last diameter of the workpiece before the wake is in neither.
+    """
+
+    fresh_n: MeanEstimate
+    wake_n: MeanEstimate
+    ratio: Estimate
+
+
 class Findings(Document):
     """What the findings of every scene have."""
 
@@ -114,6 +125,8 @@ class ProcessFindings(Findings):
         ``drag_n``, ``lateral_n`` and ``vertical_n``.
     network : mapping of str to float
         Means of the columns of ``network.parquet``, and the number of ``frames``.
+    wake : Wake or None
+        None if the workpiece comes to no wake, or has too few samples before or in it.
     """
 
     scene: Literal["process"] = "process"
@@ -128,6 +141,7 @@ class ProcessFindings(Findings):
     ahead_behind: AheadBehind
     azimuth: AzimuthProfile
     depth: DepthProfile
+    wake: Wake | None = None
 
 
 class FillingFindings(Findings):

@@ -38,6 +38,7 @@ def _summary_row(study: StudyRuns) -> Row:
         **_comparisons(found.comparison),
         "peak_count": found.peaks.count,
         "peak_max_n": found.peaks.largest_n,
+        **_wake(found),
         **_network(found),
         **_chains(found),
         **_upstream(study),
@@ -87,6 +88,18 @@ def _extrapolated(study: StudyRuns) -> Row:
         row[f"extrapolated_{found.name}_ci95_low{unit}"] = found.ci95_low
         row[f"extrapolated_{found.name}_ci95_high{unit}"] = found.ci95_high
     return row
+
+
+def _wake(found: ProcessFindings) -> Row:
+    if found.wake is None:
+        return {}
+    return {
+        "drag_fresh_mean_n": found.wake.fresh_n.mean,
+        "drag_in_wake_mean_n": found.wake.wake_n.mean,
+        "drag_wake_ratio": found.wake.ratio.value,
+        "drag_wake_ratio_ci95_low": found.wake.ratio.ci95_low,
+        "drag_wake_ratio_ci95_high": found.wake.ratio.ci95_high,
+    }
 
 
 def _network(found: ProcessFindings) -> Row:

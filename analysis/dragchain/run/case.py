@@ -48,13 +48,20 @@ class Bowl(Part):
 
 
 class Workpiece(Part):
-    """The body that is dragged through the particles."""
+    """The body that is dragged through the particles: the ``number``-th, from 1, of ``count``.
+
+    The number of a single one is 0. After ``wake_from_m`` of its path its axis goes where a
+    workpiece went before; None if it never does.
+    """
 
     kind: Literal["cylinder", "mesh"]
     radius_m: PositiveFloat
     length_m: PositiveFloat
     mesh: str
     immersion_depth_m: float
+    number: int = 0
+    count: PositiveInt = 1
+    wake_from_m: PositiveFloat | None = None
 
 
 AnySuperposed = Annotated[Spin | Oscillation, Field(discriminator="kind")]
@@ -145,7 +152,8 @@ class Case(Document):
     ``case``, ``workpiece``, ``motion``, ``surface_m`` and ``statistics`` are None outside a
     process; ``superposed`` is what is superposed on the path; ``restitution`` is None outside a
     drop test, ``settled`` outside a filling. ``contact_moduli`` are those of a particle with a
-    ``particle``, the ``bowl`` and the ``workpiece``; ``numbers`` are the dimensionless numbers of
+    ``particle``, the ``bowl`` and the ``workpiece``; a further workpiece of a run is read from the
+    run ``output_of``; ``numbers`` are the dimensionless numbers of
     a process; ``asked`` is the tolerance that its settings were chosen for, if any.
     """
 
@@ -156,6 +164,7 @@ class Case(Document):
     run: str
     case: str | None = None
     upstream: Mapping[str, str] = {}
+    output_of: str | None = None
     timestep_s: PositiveFloat
     rayleigh_time_s: PositiveFloat
     gravity_m_s2: float

@@ -9,7 +9,8 @@ from dragchain.dumps.frame import Columns, Frame
 from dragchain.dumps.run_parts import iter_frames, iter_prints
 from dragchain.errors import TableError
 from dragchain.run.case import Case, Output, friction_with, load_case, load_outputs
-from dragchain.tables.workpiece_contacts import WorkpieceFrames, join_workpiece_frames
+from dragchain.run.kinematics import needed
+from dragchain.tables.workpiece_contacts import Meshes, WorkpieceFrames, join_workpiece_frames
 
 _BATCH_ROWS = 8192
 """Contacts on the workpiece that are joined at once, but for those of the last frame."""
@@ -22,6 +23,7 @@ class WorkpiecePair:
     particles: Frame
     contacts: Frame
     friction: tuple[float, float]
+    meshes: Meshes
 
     @property
     def step(self) -> int:
@@ -35,7 +37,8 @@ class WorkpiecePair:
 
 def _joined(pairs: Sequence[WorkpiecePair], *, merge: bool = True) -> WorkpieceFrames:
     particles, contacts = ([pair.particles for pair in pairs], [pair.contacts for pair in pairs])
-    return join_workpiece_frames(particles, contacts, pairs[0].friction, merge=merge)
+    first = pairs[0]
+    return join_workpiece_frames(particles, contacts, first.friction, first.meshes, merge=merge)
 
 
 @dataclass(frozen=True)
@@ -69,24 +72,31 @@ class Run:
         """Path of a table."""
         return self.folder / "tables" / name
 
+    @property
+    def raw(self) -> Path:
+        """Folder of the raw outputs: its own, or that of the run whose workpiece this is."""
+        return self.folder.parent / self.case.output_of if self.case.output_of else self.folder
+
     def frames(self, name: str) -> Iterator[Frame]:
         """Frames of a dump."""
-        return iter_frames(self.folder, self.outputs[name])
+        return iter_frames(self.raw, self.outputs[name])
 
     def prints(self, name: str) -> Iterator[Columns]:
         """Blocks of rows of a ``fix print`` output."""
-        return iter_prints(self.folder, self.outputs[name])
+        return iter_prints(self.raw, self.outputs[name])
 
     def workpiece_pairs(self) -> Iterator[WorkpiecePair]:
         """What `workpiece_frames` joins, for those who need some steps only."""
         friction = friction_with(self.case, "workpiece"), friction_with(self.case, "bowl")
+        workpiece = needed(self.case.workpiece, "workpiece")
+        meshes = Meshes(max(workpiece.number, 1) - 1, workpiece.count)
         pairs = zip_longest(self.frames("workpiece_particles"), self.frames("workpiece_contacts"))
         for particles, contacts in pairs:
             if particles is None or contacts is None:
                 raise TableError(
                     "one of workpiece_particles and workpiece_contacts ends before the other"
                 )
-            yield WorkpiecePair(particles, contacts, friction)
+            yield WorkpiecePair(particles, contacts, friction, meshes)
 
     def workpiece_frames(self) -> Iterator[WorkpieceFrames]:
         """Contacts on the workpiece, a batch of steps at a time.

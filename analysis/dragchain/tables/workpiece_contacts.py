@@ -22,8 +22,16 @@ from dragchain.tables.columns import CENTRE, FORCES, POINT, SPIN, VELOCITY
 
 _NORMAL = ("normal_x", "normal_y", "normal_z")
 
-_BOWL_MESH = 1
-"""``mesh_id`` of a contact when the bowl is a mesh too."""
+
+@dataclass(frozen=True)
+class Meshes:
+    """``mesh_id`` of the workpiece's contacts and of the bowl's, if the bowl is a mesh too."""
+
+    workpiece: int = 0
+    bowl: int = 1
+
+
+_ONE_WORKPIECE = Meshes()
 
 
 @dataclass(frozen=True)
@@ -120,6 +128,7 @@ def join_workpiece_frames(
     particles: Sequence[Frame],
     contacts: Sequence[Frame],
     friction: tuple[float, float],
+    meshes: Meshes = _ONE_WORKPIECE,
     *,
     merge: bool = True,
 ) -> WorkpieceFrames:
@@ -137,6 +146,8 @@ def join_workpiece_frames(
         ``workpiece_particles`` and ``workpiece_contacts`` of the same steps.
     friction : (float, float)
         Coefficients of friction of a particle with workpiece and bowl.
+    meshes : Meshes
+        Whose contacts are asked for; those on other workpieces are left out.
     merge : bool
         False for the contacts as LIGGGHTS counts them.
 
@@ -169,23 +180,24 @@ def join_workpiece_frames(
             f"step {particles[twice[0] // above].step}: workpiece_particles holds a particle "
             "more than once"
         )
-    written = int(np.count_nonzero(~_on_bowl(touching)))
-    touching = _within_friction(touching, pushed, friction)
+    written = int(np.count_nonzero(_on(touching) == meshes.workpiece))
+    touching = _within_friction(touching, pushed, friction, meshes.bowl)
     if merge:
         touching = _merged(touching, pushed)
     touching = touching.take(np.lexsort((touching.ids("facet_id"), touching.ids("particle_id"))))
     unplaced = np.ones(len(known), dtype=np.bool_)
     unplaced[_rows_of(touching, pushed)[1]] = False
-    placed, on_bowl = _place(touching, pushed, above), _on_bowl(touching)
+    placed, mesh = _place(touching, pushed, above), _on(touching)
+    own = mesh == meshes.workpiece
     return WorkpieceFrames(
         np.array([frame.step for frame in particles]),
         np.array([frame.opening for frame in particles]),
-        placed.select(~on_bowl),
-        placed.select(on_bowl),
-        touching.ids("particle_id")[~on_bowl] // above,
+        placed.select(own),
+        placed.select(mesh == meshes.bowl),
+        touching.ids("particle_id")[own] // above,
         pushed.vectors(*FORCES)[unplaced],
         known[unplaced] // above,
-        written - int(np.count_nonzero(~on_bowl)),
+        written - int(np.count_nonzero(own)),
     )
 
 
@@ -199,8 +211,10 @@ def _one_frame(frames: Sequence[Frame], above: int) -> Frame:
     return Frame(frames[0].step, columns | {"particle_id": np.concatenate(ids)})
 
 
-def _on_bowl(contacts: Frame) -> NDArray[np.bool_]:
-    return np.asarray(contacts.columns.get("mesh_id", np.zeros(contacts.rows)) == _BOWL_MESH)
+def _on(contacts: Frame) -> Ints:
+    """Mesh of each contact; 0 if it was not written because there is one mesh only."""
+    mesh = contacts.columns.get("mesh_id", np.zeros(contacts.rows))
+    return np.asarray(mesh, dtype=np.int64)
 
 
 def _rows_of(contacts: Frame, particles: Frame) -> tuple[NDArray[np.bool_], Ints]:
@@ -211,13 +225,15 @@ def _rows_of(contacts: Frame, particles: Frame) -> tuple[NDArray[np.bool_], Ints
     return loud, at[loud]
 
 
-def _within_friction(contacts: Frame, particles: Frame, friction: tuple[float, float]) -> Frame:
+def _within_friction(
+    contacts: Frame, particles: Frame, friction: tuple[float, float], bowl: int
+) -> Frame:
     """Add the normals, and cut the evaluated forces on particles that received one."""
     loud, at = _rows_of(contacts, particles)
     forces, points = contacts.vectors(*FORCES), contacts.vectors(*POINT)
     normal = np.zeros_like(points)
     normal[loud] = _unit(particles.vectors(*CENTRE)[at] - points[loud])
-    limit = np.array(friction)[_on_bowl(contacts)[loud].astype(int)]
+    limit = np.array(friction)[(_on(contacts)[loud] == bowl).astype(int)]
     forces[loud], _ = within_friction(forces[loud], normal[loud], limit)
     return contacts.replaced((*FORCES, *_NORMAL), np.column_stack([forces, normal]))
 
@@ -231,14 +247,14 @@ def _merged(contacts: Frame, particles: Frame) -> Frame:
     forces. Its normal is the mean of the normals, weighted by d^(3/2) as Hertz's forces are.
     Contacts farther apart, as in a groove, stay separate.
     """
-    depth, body = contacts.columns["overlap_m"], _on_bowl(contacts)
+    depth, body = contacts.columns["overlap_m"], _on(contacts)
     contacts = contacts.take(np.lexsort((-depth, body, contacts.ids("particle_id"))))
     loud, at = _rows_of(contacts, particles)
     overlap = np.maximum(contacts.columns["overlap_m"], 0.0)
     patch = np.full(contacts.rows, -1.0)
     patch[loud] = 2.0 * particles.columns["radius_m"][at] * overlap[loud]
     points = contacts.vectors(*POINT)
-    head = _heads(contacts.ids("particle_id"), _on_bowl(contacts), points, patch)
+    head = _heads(contacts.ids("particle_id"), _on(contacts), points, patch)
     kept, slot = np.unique(head, return_inverse=True)
     several = np.bincount(slot) > 1
     forces, normals = contacts.vectors(*FORCES), contacts.vectors(*_NORMAL)
@@ -249,7 +265,7 @@ def _merged(contacts: Frame, particles: Frame) -> Frame:
     return contacts.take(kept).replaced((*FORCES, *_NORMAL), both)
 
 
-def _heads(particle_id: Ints, body: NDArray[np.bool_], points: Floats, patch_m2: Floats) -> Ints:
+def _heads(particle_id: Ints, body: Ints, points: Floats, patch_m2: Floats) -> Ints:
     """The contact whose patch each of (N,) contacts lies in, itself if in none.
 
     The contacts of a particle with a body follow each other, deepest first.

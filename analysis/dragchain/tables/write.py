@@ -201,7 +201,7 @@ class WorkpieceSamples:
 
 
 def _write_workpiece_contacts(run: Run, file: Path) -> None:
-    shared = "mesh_id" in run.outputs["workpiece_contacts"].columns
+    shared = needed(run.case.bowl, "bowl").walls == "mesh"
     closure = Closure(limit=SHARED_LIMIT if shared else LIMIT)
     samples = WorkpieceSamples(run.prints("workpiece_force"))
     with table_writer(file, WORKPIECE_CONTACTS) as table:

@@ -13,10 +13,10 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text, write_run
 from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
+from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.registry import SCENES
-from dragdeck.scenes.scene import Bed
 from dragdeck.sweep.cases import load_cases
 
 GOLDEN = ROOT / "tests/golden"
@@ -156,7 +156,7 @@ def test_every_rate_is_at_least_the_asked(case: Case) -> None:
 
 def test_the_tip_ends_at_the_asked_depth(case: Case) -> None:
     deck: Any = process_scene(case, BED).deck
-    tip = list(deck.workpiece_start_m)
+    tip = list(deck.workpieces[0].start_m)
     for leg in deck.legs[:-1]:
         seconds = (leg.end_step - leg.start_step) * deck.timestep_s
         tip = [x + v * seconds for x, v in zip(tip, leg.velocity_m_s, strict=True)]

@@ -13,9 +13,9 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import comment, environment, number, quoted, template_files
 from dragdeck.errors import InputError
+from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.process import process_scene
-from dragdeck.scenes.scene import Bed
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)

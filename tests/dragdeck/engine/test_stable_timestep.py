@@ -18,10 +18,10 @@ from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.record import AcceptanceCheck, RunPart, RunRecord
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run_to_outcome
+from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
-from dragdeck.scenes.scene import Bed
 from dragdeck.sweep.cases import load_cases
 
 OUTPUT = particles(10, 10, 40, bowl_facets=True)

@@ -12,11 +12,11 @@ from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
 from dragdeck.outlook.fit import notes
+from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.fit import fastest_motion
 from dragdeck.scenes.process import process_scene
-from dragdeck.scenes.scene import Bed
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)

@@ -15,12 +15,12 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
+from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.fit import fastest_motion
 from dragdeck.scenes.motion import surface_speed
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.scene import Bed
 from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.model import Motion
 from dragdeck.study.superposed.kind import DragSteps

@@ -10,9 +10,9 @@ import pytest
 
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
+from dragdeck.physics.packing import Bed
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.scene import Bed
 from dragdeck.scenes.workpiece import (
     farthest_surface,
     workpiece_length,
@@ -50,7 +50,7 @@ def test_the_upper_end_leans_in_the_direction_of_motion(
     assert abs(y) < 1e-9
     assert mesh.bounds[0, 2] == pytest.approx(0.0, abs=1e-12)
     scene = process_scene(case, BED)
-    assert scene.deck.workpiece_turn_deg == pytest.approx(90.0)
+    assert scene.deck.workpieces[0].turn_deg == pytest.approx(90.0)
     assert scene.case.workpiece.kind == "mesh"
 
 

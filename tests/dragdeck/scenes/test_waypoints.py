@@ -17,13 +17,13 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
+from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import layout
 from dragdeck.project import Project
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.fit import clearances, fastest_motion
 from dragdeck.scenes.motion import in_steps, surface_speed
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.scene import Bed
 from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.check import warnings
 from dragdeck.study.paths.kind import Leg

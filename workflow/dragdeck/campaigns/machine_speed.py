@@ -20,10 +20,11 @@ from dragdeck.engine.log import loops
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import Report
 from dragdeck.errors import EngineError, RejectedRunError
+from dragdeck.physics.packing import Bed
 from dragdeck.scenes.filling import FILLING, expected_surface
 from dragdeck.scenes.motion import plunge_point
 from dragdeck.scenes.process import PROCESS
-from dragdeck.scenes.scene import Bed, SceneType
+from dragdeck.scenes.scene import SceneType
 from dragdeck.study.model import Fidelity, Motion, Outputs, Study
 
 _TIMESTEP_FRACTION = 0.5

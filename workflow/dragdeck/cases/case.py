@@ -4,7 +4,7 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,8 @@ from dragdeck.cases.ranks import auto_ranks, cores_here
 from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.errors import InputError
 from dragdeck.study.base import Json
-from dragdeck.study.model import MeshShape, Study, Tolerance
+from dragdeck.study.model import Study, Tolerance
+from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import study_folders
 
 SAID_BY_NAME = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
@@ -39,6 +40,10 @@ class Case:
         What is expected of them then.
     beside : int
         Cases that can run beside each other, this one among them.
+    whole : Case or None
+        Of one of several workpieces: the case of all.
+    number : int
+        The workpiece's number from 1; 0 for the case of all.
     """
 
     file: Path
@@ -47,6 +52,13 @@ class Case:
     asked: Tolerance | None = None
     advised: AdvisedSettings | None = None
     beside: int = 1
+    whole: "Case | None" = None
+    number: int = 0
+
+    @property
+    def all_workpieces(self) -> "Case":
+        """The case that is run: of all workpieces."""
+        return self.whole or self
 
     @property
     def ranks(self) -> int:
@@ -73,7 +85,8 @@ class Case:
     def name(self) -> str:
         """Readable name: the fidelity and the sweep values."""
         parts = [f"{field.rsplit('.', 1)[-1]}-{value}" for field, value in self.settings.items()]
-        return slug("_".join([self.fidelity_name, *parts]))
+        workpiece = [f"workpiece-{self.number}"] if self.number else []
+        return slug("_".join([self.fidelity_name, *parts, *workpiece]))
 
     @property
     def fidelity_name(self) -> str:
@@ -88,6 +101,17 @@ class Case:
         chosen = self.study.chosen_fidelity()
         name = f"E{chosen.youngs_modulus_scale:g}_dt{chosen.timestep_fraction:g}"
         return name if chosen.speed_factor == 1 else f"{name}_v{chosen.speed_factor:g}"
+
+
+def of_each_workpiece(case: Case) -> list[Case]:
+    """The case of each workpiece alone; the case itself if there is one, or it is one of these."""
+    studies = case.study.of_each_workpiece()
+    if studies == [case.study]:
+        return [case]
+    return [
+        replace(case, study=study, whole=case, number=number if studies[1:] else 0)
+        for number, study in enumerate(studies, 1)
+    ]
 
 
 def mesh_file(case: Case, shape: MeshShape) -> Path:

@@ -153,6 +153,9 @@ _RADIUS = Column("radius_m", "radius")
 _STEP = Column("step", "step", whole=True)
 _TIME = Column("time_s", "step*dt")
 
+WORKPIECE_FORCE = "workpiece_force"
+"""Output of the force on a workpiece, and the first part of its name for further ones."""
+
 _CONTACTS_PER_PARTICLE = 3.0
 """A settled bed of spheres with friction has five to six neighbours a particle."""
 
@@ -176,16 +179,17 @@ def settled_particles() -> Output:
     return Output("particles", "custom", columns, 1, 0, None, True, 1.0)
 
 
-def workpiece_force(period: int, last: int) -> Output:
-    """Force and torque on the workpiece, and where its reference point is."""
+def workpiece_force(period: int, last: int, workpiece: str) -> Output:
+    """Force and torque on a workpiece, and where its reference point is."""
     columns = (
         _STEP,
         _TIME,
-        *_vector("force", "n", "f_workpiece"),
-        *_vector("torque", "n_m", "f_workpiece", 4),
-        *_vector("ref", "m", "f_workpiece", 7),
+        *_vector("force", "n", f"f_{workpiece}"),
+        *_vector("torque", "n_m", f"f_{workpiece}", 4),
+        *_vector("ref", "m", f"f_{workpiece}", 7),
     )
-    return Output("workpiece_force", "print", columns, period, period, last)
+    name = workpiece.replace("workpiece", WORKPIECE_FORCE)
+    return Output(name, "print", columns, period, period, last)
 
 
 def workpiece_particles(period: int, first: int, last: int) -> Output:
@@ -195,12 +199,12 @@ def workpiece_particles(period: int, first: int, last: int) -> Output:
     return Output("workpiece_particles", "custom", columns, period, first, last, binary=True)
 
 
-def workpiece_contacts(period: int, first: int, last: int, bowl_facets: bool) -> Output:
-    """Contacts of the workpiece's facets, with the force as evaluated again.
+def workpiece_contacts(period: int, first: int, last: int, several: bool) -> Output:
+    """Contacts of facets, with the force as evaluated again.
 
-    With `bowl_facets`, the bowl's too, told apart by the mesh id.
+    With `several` meshes they are told apart by the mesh id: the workpieces from 0, then the bowl.
     """
-    mesh = (Column("mesh_id", "c_workpiece_contacts[7]", whole=True),) if bowl_facets else ()
+    mesh = (Column("mesh_id", "c_workpiece_contacts[7]", whole=True),) if several else ()
     columns = (
         *_vector("point", "m", "c_workpiece_contacts", 1),
         *mesh,

@@ -13,13 +13,25 @@ from dragdeck.study.model import AnyPathOfRun, AnySuperposedOfRun
 
 
 class WorkpieceOfRun(Part):
-    """The workpiece: radius of the cylinder around it, length, mesh file, depth of its tip."""
+    """The workpiece: radius of the cylinder around it, length, mesh file, depth of its tip.
+
+    Attributes
+    ----------
+    number, count : int
+        Which workpiece it is, from 1, and of how many; the keys are absent if there is one.
+    wake_from_m : float or None
+        Path length from which on its axis goes where a workpiece went before; the key is absent
+        if it never does, or if the path is no circle.
+    """
 
     kind: Literal["cylinder", "mesh"]
     radius_m: float
     length_m: float
     mesh: str
     immersion_depth_m: float
+    number: int = Field(default=0, exclude_if=lambda value: not value)
+    count: int = Field(default=1, exclude_if=lambda value: value == 1)
+    wake_from_m: float | None = Field(default=None, exclude_if=lambda value: value is None)
 
 
 class StatisticsOfRun(Part):
@@ -41,6 +53,8 @@ class ProcessCase(CaseOfStudy):
         The scene's dimensionless numbers at full modulus and the study's own speed.
     surface_m : float
         The settled surface above the floor.
+    output_of : str or None
+        Of a further workpiece: the run whose output it is read from; else the key is absent.
     superposed : sequence
         What is superposed on the path; the key is absent if nothing is.
     steady : SteadyCriterion
@@ -50,6 +64,7 @@ class ProcessCase(CaseOfStudy):
     scene: Literal["process"] = "process"
     case: str
     upstream: Mapping[str, str]
+    output_of: str | None = Field(default=None, exclude_if=lambda value: value is None)
     numbers: Mapping[str, float]
     surface_m: float
     workpiece: WorkpieceOfRun

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import jinja2
 
-from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, END
+from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, END, RUN_FILE
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.engine_commands import leaving_folder
-from dragdeck.decks.outputs import ColumnsFile, in_writing_order
+from dragdeck.decks.outputs import WORKPIECE_FORCE, ColumnsFile, in_writing_order
 from dragdeck.decks.templates import explained, file_of, used
 from dragdeck.errors import InputError
 from dragdeck.files import file_checksum, replace_text
@@ -44,6 +44,34 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
             remedy="remove the command from the template; see docs/templates.md",
         )
     return text
+
+
+def write_workpiece(scene: AnyScene, folder: Path, number: int, run: Path) -> None:
+    """Write the folder of a further workpiece of a complete run, from which tables are made.
+
+    It has what a run's folder has but for the input script and the output, which are the run's.
+
+    Parameters
+    ----------
+    scene : AnyScene
+        Of the workpiece.
+    folder : Path
+    number : int
+        Of the workpiece, from 1.
+    run : Path
+        Folder of the run.
+    """
+    outputs = {each.name: each.as_part() for each in scene.deck.outputs}
+    forces = [outputs.pop(name) for name in list(outputs) if name.startswith(WORKPIECE_FORCE)]
+    columns = ColumnsFile(outputs={**outputs, WORKPIECE_FORCE: forces[number - 1]})
+    texts = {
+        CASE_FILE: scene.case.as_text(),
+        COLUMNS_FILE: columns.as_text(),
+        **scene.texts(),
+        RUN_FILE: (run / RUN_FILE).read_text(encoding="utf-8"),
+    }
+    for name, text in texts.items():
+        replace_text(folder / name, text)
 
 
 def write_run(scene: AnyScene, folder: Path, templates: jinja2.Environment) -> list[Path]:

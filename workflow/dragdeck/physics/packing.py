@@ -28,6 +28,22 @@ vertical one points down."""
 
 
 @dataclass(frozen=True)
+class Bed:
+    """A settled bed.
+
+    Attributes
+    ----------
+    surface_m : float
+        Its mean height above the floor.
+    top_m : float
+        The highest point of any particle.
+    """
+
+    surface_m: float
+    top_m: float
+
+
+@dataclass(frozen=True)
 class Particles:
     """Particles in the air above the bowl's floor.
 

@@ -1,7 +1,6 @@
 """The geometry of a case: bowl, bed, and each workpiece with its poses along its path.
 
-Picture and page draw what stands here and know nothing of studies. A further workpiece is one more
-`MovingWorkpiece`, a further kind of path gives other poses.
+Picture and page draw what stands here and know nothing of studies.
 """
 
 import math
@@ -12,10 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dragdeck.cases.case import Case
+from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.mesh import bowl, surface
-from dragdeck.scenes.motion import Place, pose
-from dragdeck.scenes.process import course, expected_bed, workpiece_turn
+from dragdeck.scenes.filling import expected_bed
+from dragdeck.scenes.motion import Place, course, pose
+from dragdeck.scenes.moved_workpiece import workpiece_turn
 from dragdeck.scenes.workpiece import fastest_surface, workpiece_mesh, workpiece_radius
 from dragdeck.study.model import Motion
 from dragdeck.study.paths.kind import Leg
@@ -28,6 +28,9 @@ Floats = NDArray[np.float64]
 _POSES_PER_RADIUS = 4
 """Poses while a surface point moves by the workpiece's radius: a swept cylinder is then at most
 1 % of the radius too narrow between two of them."""
+
+_A_MOMENT_S = 1e-6
+"""After the start of the drag: its spin shows by then, and no stage of it has ended."""
 
 _MOST_POSES = 2000
 """Of a leg: beyond, poses are farther apart."""
@@ -53,10 +56,28 @@ class Stage:
 
 @dataclass(frozen=True)
 class MovingWorkpiece:
-    """A workpiece, its mesh (its reference point in the origin, m) and its legs in their order."""
+    """A workpiece as drawn.
+
+    Attributes
+    ----------
+    name : str
+    mesh : Trimesh
+        Its reference point in the origin, m.
+    radius_m : float
+        Of the cylinder around it.
+    direction_rad : float
+        Direction of motion from +x at the start of the drag.
+    spin : int
+        Sense of its spin at the start of the drag: 1 counter-clockwise from above, -1, 0 for none.
+    stages : sequence of Stage
+        Its legs in their order.
+    """
 
     name: str
     mesh: "Trimesh"
+    radius_m: float
+    direction_rad: float
+    spin: int
     stages: Sequence[Stage]
 
     @property
@@ -79,8 +100,8 @@ class Layout:
     bowl, bed : Trimesh
         The inside of the bowl, and the expected surface of the bed.
     bowl_radius_m, bowl_height_m, surface_m : float
-    direction_rad : float
-        Direction of motion from +x at the start of the drag.
+    bowl_turn : int
+        Sense of the bowl's rotation: 1 counter-clockwise from above, -1, 0 for none.
     workpieces : sequence of MovingWorkpiece
     """
 
@@ -89,7 +110,7 @@ class Layout:
     bowl_radius_m: float
     bowl_height_m: float
     surface_m: float
-    direction_rad: float
+    bowl_turn: int
     workpieces: Sequence[MovingWorkpiece]
 
 
@@ -109,8 +130,21 @@ def layout(case: Case) -> Layout:
         bowl_radius_m=radius,
         bowl_height_m=study.bowl.height_m,
         surface_m=level,
-        direction_rad=study.motion.path.direction_rad,
-        workpieces=[MovingWorkpiece("workpiece", workpiece_mesh(case), list(_stages(case)))],
+        bowl_turn=int(np.sign(study.motion.bowl_rad_s)),
+        workpieces=[_moving(one) for one in of_each_workpiece(case)],
+    )
+
+
+def _moving(case: Case) -> MovingWorkpiece:
+    motion = case.study.motion
+    turn = sum(one.turn_rad(_A_MOMENT_S) for one in motion.superposed().values())
+    return MovingWorkpiece(
+        name=f"workpiece {case.number or ''}".rstrip(),
+        mesh=workpiece_mesh(case),
+        radius_m=workpiece_radius(case),
+        direction_rad=motion.path.direction_rad,
+        spin=int(np.sign(turn)),
+        stages=list(_stages(case)),
     )
 
 

@@ -71,7 +71,7 @@ def _scene(layout: Layout, swept: Sequence["Trimesh"]) -> dict[str, Any]:
         "moving": [_moving(body) for body in layout.workpieces],
         "views": [
             {"title": one.title, "basis": np.round(one.basis, 6).tolist()}
-            for one in views(layout.direction_rad)
+            for one in views(layout.workpieces[0].direction_rad)
         ],
     }
 

@@ -42,7 +42,9 @@ def picture(layout: Layout, swept: Sequence["Trimesh"], title: str, refused: boo
     colour = "#b3261e" if refused else "#1d2733"
     figure.suptitle(title, fontsize=12, color=colour, parse_math=False)
     layers = list(_layers(layout, swept))
-    for axes, view in zip(figure.subplots(2, 2).flat, views(layout.direction_rad), strict=True):
+    for axes, view in zip(
+        figure.subplots(2, 2).flat, views(layout.workpieces[0].direction_rad), strict=True
+    ):
         _draw(axes, view, layout, layers)
     handles, names = figure.axes[0].get_legend_handles_labels()
     known = dict(zip(names, handles, strict=True))
@@ -74,7 +76,12 @@ def _draw(axes: "Axes", view: View, layout: Layout, layers: Sequence[_Layer]) ->
         for stage in body.stages:
             style = {"ls": _DASHES.get(stage.name, "solid"), "label": stage.name}
             _line(axes, view, stage.poses[:, :3, 3], COLOURS[stage.name], lw=1.8, **style)
-        _arrow(axes, view, body.drag.poses[0, :3, 3], layout)
+        start, ahead = body.drag.poses[0, :3, 3], body.direction_rad
+        along = np.array([math.cos(ahead), math.sin(ahead), 0.0])
+        _arrow(axes, view, start, 0.3 * layout.bowl_radius_m * along)
+        _turn(axes, view, start, 1.3 * body.radius_m, body.spin)
+    rim = np.array([0.0, 0.0, layout.bowl_height_m])
+    _turn(axes, view, rim, 1.08 * layout.bowl_radius_m, layout.bowl_turn)
     axes.set(title=view.title, xlabel=view.across, ylabel=view.along, aspect="equal")
     axes.autoscale_view()
     if not view.across:
@@ -105,13 +112,22 @@ def _faded(opacity: float, image: Any, _dpi: float) -> tuple[Any, float, float]:
     return image * np.array([1.0, 1.0, 1.0, opacity]), 0, 0
 
 
-def _arrow(axes: "Axes", view: View, start_m: Floats, layout: Layout) -> None:
-    """The direction of motion."""
-    ahead = np.array([math.cos(layout.direction_rad), math.sin(layout.direction_rad), 0.0])
-    points = 1e3 * view.basis[:2] @ np.array([start_m, 0.3 * layout.bowl_radius_m * ahead]).T
+def _arrow(axes: "Axes", view: View, start_m: Floats, along_m: Floats) -> None:
+    points = 1e3 * view.basis[:2] @ np.array([start_m, along_m]).T
     (x, across), (y, along) = points
     scale: Any = {"angles": "xy", "scale_units": "xy", "scale": 1}
     axes.quiver(x, y, across, along, color=COLOURS["drag"], width=0.008, zorder=3, **scale)
+
+
+def _turn(axes: "Axes", view: View, centre_m: Floats, radius_m: float, sense: int) -> None:
+    """A third of a circle with an arrowhead where something turns, as seen by this view."""
+    if not sense:
+        return
+    angle = math.pi * (0.75 + sense * np.linspace(-1 / 3, 1 / 3, 40))
+    ring = radius_m * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    _line(axes, view, centre_m + ring, COLOURS["drag"], lw=1.8)
+    ahead = sense * np.array([-ring[-1, 1], ring[-1, 0], 0.0])
+    _arrow(axes, view, centre_m + ring[-1], 0.3 * ahead)
 
 
 def _line(axes: "Axes", view: View, points: Floats, colour: Any, **style: Any) -> None:

@@ -10,8 +10,9 @@ from dragdeck.decks.case_file import DropTestCase
 from dragdeck.decks.data_file import Body, data_file
 from dragdeck.decks.deck import Deck, LeftOut, Scene
 from dragdeck.physics.contact_mechanics import fall_speed, rayleigh_time
+from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import timestep
-from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
+from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
 from dragdeck.study.model import Study
 

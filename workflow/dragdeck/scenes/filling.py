@@ -35,10 +35,10 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.domain_split import FilledBowl, Split, split
 from dragdeck.physics.domain_split import warnings as rank_warnings
-from dragdeck.physics.packing import Particles, pour
+from dragdeck.physics.packing import Bed, Particles, pour
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import RunLimits, run_limits
-from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
+from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
 from dragdeck.study.model import Media, Study
 
@@ -182,6 +182,12 @@ def _check_capacity(case: Case) -> None:
 def expected_surface(study: Study) -> float:
     """Height of the settled bed before it exists, m: an estimate."""
     return _height(study, SOLID_FRACTION_ESTIMATE)
+
+
+def expected_bed(study: Study) -> Bed:
+    """The settled bed before it exists: an estimate."""
+    surface = expected_surface(study)
+    return Bed(surface, surface + 2 * study.media.radius_mean_m)
 
 
 def _height(study: Study, solid_fraction: float) -> float:

@@ -1,8 +1,12 @@
 """Whether the workpiece and its motion fit into the bowl, the bed and the time step."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dragdeck.cases.bed import (
     JUST_BEYOND,
@@ -16,19 +20,24 @@ from dragdeck.cases.bed import (
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution, InputError, together
 from dragdeck.physics.contact_mechanics import fall_speed
+from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import SPEED_FACTOR
-from dragdeck.scenes.motion import farthest_reach, vertical_range
+from dragdeck.scenes.motion import axis_course, course, farthest_reach, vertical_range
 from dragdeck.scenes.workpiece import (
     farthest_surface,
     fastest_surface,
     workpiece_length,
     workpiece_radius,
+    workpiece_reach,
     workpiece_warnings,
 )
 
 _FEWEST_STEPS_PER_CONTACT = 5
 """Below this many steps in a contact at the workpiece's speed a warning is given."""
+
+_PLACES_PER_LEG = 500
+"""At which the distance of two workpieces is compared."""
 
 _JAMMING_GAP = 2.0
 """Particle diameters between workpiece and bowl below which a warning is given: an arch of two
@@ -91,6 +100,46 @@ def check_fit(case: Case, surface_m: float, timestep_s: float) -> None:
     found = [error for group in problems for error in group]
     if found:
         raise together(found)
+
+
+def check_apart(each: Sequence[Case], bed: Bed) -> None:
+    """Refuse workpieces that come so close to each other that a particle touches two.
+
+    Each counts as the upright cylinder around what of it is in the bed.
+
+    Raises
+    ------
+    InputError
+        Names the two workpieces that come closest.
+    """
+    if len(each) < 2:
+        return
+    reaches = [workpiece_reach(one) for one in each]
+    ways = [_way(one, bed) for one in each]
+    gaps = {
+        (a, b): float(np.hypot(*(ways[a] - ways[b]).T).min()) - reaches[a] - reaches[b]
+        for a, b in combinations(range(len(each)), 2)
+    }
+    a, b = min(gaps, key=lambda pair: gaps[pair])
+    diameter = _largest_particle(each[0])
+    if gaps[a, b] < diameter:
+        collide = gaps[a, b] <= 0
+        raise InputError(
+            f"workpieces {a + 1} and {b + 1} "
+            + ("collide" if collide else "come so close that a particle touches both"),
+            file=each[0].file,
+            field="workpieces",
+            value=f"a gap of {gaps[a, b]:.4g} m between them",
+            limit=f"at least {diameter:.4g} m, the diameter of the largest particle",
+            remedy="use fewer or smaller workpieces, other angles, or a larger radius of the path",
+        )
+
+
+def _way(case: Case, bed: Bed) -> NDArray[np.float64]:
+    """X and y, (N, 2), of the workpiece's axis along all its legs."""
+    start, plan = course(case.study, bed, speed_factor=1.0)
+    places = axis_course((*start, 0.0), plan, _PLACES_PER_LEG)
+    return np.array([(x, y) for x, y, _, _ in places])
 
 
 def process_cautions(case: Case) -> Iterator[Caution]:

@@ -5,8 +5,11 @@ on the path (`dragdeck.study.superposed`) moves the workpiece during the drag on
 """
 
 import math
+from collections.abc import Iterator, Sequence
 
-from dragdeck.study.model import Motion
+from dragdeck.physics.packing import Bed
+from dragdeck.physics.rounding import round_to
+from dragdeck.study.model import Motion, Study
 from dragdeck.study.paths.kind import Leg, Point, StageOfRun, Stages
 from dragdeck.study.stages import chain, integral
 from dragdeck.study.superposed.kind import DragSteps, EngineMotion
@@ -76,6 +79,16 @@ def legs(motion: Motion, dive_m: float, speed_factor: float) -> list[Leg]:
     return found
 
 
+def course(
+    study: Study, bed: Bed, speed_factor: float
+) -> tuple[tuple[float, float, float], list[Leg]]:
+    """Where the workpiece's reference point is before the plunge, m, and its legs from there."""
+    motion = study.motion
+    clear = round_to(bed.top_m + study.media.radius_mean_m, 6)
+    dive = clear - (bed.surface_m - motion.immersion_depth_m + motion.path.heights_m[0])
+    return (*plunge_point(motion), clear), legs(motion, dive, speed_factor)
+
+
 def pose(leg: Leg, start: Place, time_s: float) -> Place:
     """Where the path has the workpiece so long after the start of a leg; nothing is superposed."""
     x, y, z, turn = start
@@ -87,6 +100,14 @@ def pose(leg: Leg, start: Place, time_s: float) -> Place:
     angle = leg.angular_speed_rad_s * time_s
     c, s = math.cos(angle), math.sin(angle)
     return (c * x - s * y, s * x + c * y, z, turn + angle * (leg.kind == "rotate"))
+
+
+def axis_course(start: Place, plan: Sequence[Leg], per_leg: int) -> Iterator[Place]:
+    """Where the path has the workpiece at equal intervals of time within each leg."""
+    for leg in plan:
+        for number in range(per_leg + 1):
+            yield pose(leg, start, leg.duration_s * number / per_leg)
+        start = pose(leg, start, leg.duration_s)
 
 
 def in_steps(leg: Leg, drag: DragSteps) -> Stages:

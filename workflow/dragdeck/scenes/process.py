@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, skin
-from dragdeck.cases.case import Case, materials_content, mesh_file
-from dragdeck.decks import PACKING_FILE, outputs
+from dragdeck.cases.case import Case, materials_content, mesh_file, of_each_workpiece
+from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
 from dragdeck.decks.case_file import Phase, SteadyCriterion
-from dragdeck.decks.deck import Deck, LeftOut, Scene
+from dragdeck.decks.deck import LeftOut, Scene
 from dragdeck.decks.outputs import Output
 from dragdeck.decks.process_case import (
     ProcessCase,
@@ -18,21 +19,36 @@ from dragdeck.decks.process_case import (
 from dragdeck.files import file_checksum
 from dragdeck.mesh import bowl, stl_text
 from dragdeck.physics.domain_split import warnings as rank_warnings
+from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
+from dragdeck.physics.run_limits import RunLimits
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import (
     FILLING,
     bed_limits,
     box_top,
-    expected_surface,
+    expected_bed,
     filling_content,
     partners_in_bed,
     rank_split,
 )
-from dragdeck.scenes.fit import check_fit, check_headroom, fastest_motion, process_cautions
-from dragdeck.scenes.motion import in_steps, legs, on_engine, plunge_point
-from dragdeck.scenes.scene import Bed, SceneType, case_of_study, material_table
+from dragdeck.scenes.fit import (
+    check_apart,
+    check_fit,
+    check_headroom,
+    fastest_motion,
+    process_cautions,
+)
+from dragdeck.scenes.motion import in_steps
+from dragdeck.scenes.moved_workpiece import (
+    MovedWorkpiece,
+    ProcessDeck,
+    drag_steps,
+    moved_workpiece,
+    superposed,
+)
+from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.scenes.workpiece import (
     workpiece_length,
     workpiece_mesh,
@@ -41,61 +57,12 @@ from dragdeck.scenes.workpiece import (
 )
 from dragdeck.study.base import Json
 from dragdeck.study.contact_law import explained
-from dragdeck.study.model import CylinderShape, MeshShape, Study
-from dragdeck.study.paths.kind import Leg
-from dragdeck.study.superposed.kind import DragSteps, EngineMotion, SuperposedMotion
-
-_WORKPIECE_MESH = "workpiece.stl"
+from dragdeck.study.model import Study
+from dragdeck.study.superposed.kind import DragSteps
+from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
 
 _ENERGY_DRIFT = 0.1
 """Largest change of the mean kinetic energy while it is counted: 5 % in the bed's speed."""
-
-
-@dataclass(frozen=True)
-class TimedLeg:
-    """A leg of the motion with its steps, as the template writes it."""
-
-    leg: Leg
-    start_step: int
-    end_step: int
-    direction_rad: float
-
-    name = property(lambda self: self.leg.name)
-    kind = property(lambda self: self.leg.kind)
-    duration_s = property(lambda self: self.leg.duration_s)
-    velocity_m_s = property(lambda self: self.leg.velocity_m_s)
-    angular_speed_rad_s = property(lambda self: self.leg.angular_speed_rad_s)
-
-    @property
-    def speed_m_s(self) -> float:
-        """Speed of the workpiece's axis, m/s."""
-        return math.hypot(*self.leg.velocity_m_s)
-
-    @property
-    def period_s(self) -> float:
-        """Time of a revolution, s."""
-        return 2 * math.pi / abs(self.leg.angular_speed_rad_s)
-
-    @property
-    def sense(self) -> float:
-        """1 counter-clockwise from above, -1 not."""
-        return math.copysign(1.0, self.leg.angular_speed_rad_s)
-
-
-@dataclass(frozen=True, kw_only=True)
-class ProcessDeck(Deck):
-    """What the process template sees."""
-
-    bowl_type: int
-    bowl_radius_m: float
-    bowl_facets: bool
-    bowl_rad_s: float
-    workpiece_type: int
-    workpiece_start_m: tuple[float, float, float]
-    workpiece_turn_deg: float
-    legs: Sequence[TimedLeg]
-    staged: EngineMotion | None
-    superposed: Mapping[str, EngineMotion]
 
 
 @dataclass(frozen=True)
@@ -123,73 +90,71 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         The workpiece does not fit between path and bowl, would reach below the
         floor, or has a mesh that cannot be used.
     """
-    study = case.study
-    fidelity = study.chosen_fidelity()
+    whole, each = case.all_workpieces, of_each_workpiece(case.all_workpieces)
+    study = whole.study
+    fidelity, facets = study.chosen_fidelity(), study.bowl_facet_size_m is not None
     bed = bed or expected_bed(study)
-    surface = bed.surface_m
-    rayleigh = bed_rayleigh_time(study)
-    dt = bed_timestep(study, "timestep_fraction")
-    check_fit(case, surface, dt)
+    dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
     periods = _output_periods(study, dt)
-    start, plan = course(study, bed, fidelity.speed_factor)
-    timed = _timed_legs(plan, study, dt, periods.network)
-    drag, last = timed[-1], timed[-1].end_step
-    steps = DragSteps(drag.start_step, last, dt)
-    types = study.type_names()
-    top = box_top(study)
-    check_headroom(case, start[2], top)
-    parts = rank_split(case)
+    meshes = _mesh_files(each)
+    check_apart(each, bed)
+    moved = []
+    for one in each:
+        check_fit(one, bed.surface_m, dt)
+        mesh = meshes[one.study.workpiece.shape]
+        moved.append(moved_workpiece(one, bed, dt, periods.network, mesh))
+        check_headroom(one, moved[-1].start_m[2], top)
+    steps = drag_steps(moved[0].legs, dt)
+    types, parts = study.type_names(), rank_split(whole)
     deck = ProcessDeck(
         title=study.title,
-        study=case.study_name,
+        study=whole.study_name,
         scene="process",
-        run=PROCESS.run_id(case),
-        source=f"../../filling/{FILLING.run_id(case)}/{PACKING_FILE}",
-        materials=material_table(study, types, fidelity.youngs_modulus_scale, case),
+        run=PROCESS.run_id(whole),
+        source=f"../../filling/{FILLING.run_id(whole)}/{PACKING_FILE}",
+        materials=material_table(study, types, fidelity.youngs_modulus_scale, whole),
         limit_force=study.contact.limit_force,
         gravity_m_s2=study.gravity_m_s2,
         skin_m=skin(study),
         timestep_s=dt,
-        outputs=_outputs(periods, drag.start_step, last, study.bowl_facet_size_m is not None),
+        outputs=_outputs(periods, steps, [one.name for one in moved], facets),
         thermo_steps=periods.network,
-        checkpoint_steps=_checkpoint_steps(study, last),
+        checkpoint_steps=_checkpoint_steps(study, steps.end),
         processors=parts.line,
         bowl_type=types.index(study.bowl.material) + 1,
         bowl_radius_m=study.bowl.radius_m,
-        bowl_facets=study.bowl_facet_size_m is not None,
+        bowl_facets=facets,
         bowl_rad_s=fidelity.speed_factor * study.motion.bowl_rad_s,
         workpiece_type=types.index(study.workpiece.material) + 1,
-        workpiece_start_m=start,
-        workpiece_turn_deg=workpiece_turn(study),
-        legs=timed,
-        staged=on_engine(in_steps(drag.leg, steps), steps.start),
-        superposed={name: one.on_engine(steps) for name, one in _superposed(study).items()},
+        workpieces=moved,
     )
+    number = max(case.number, 1) - 1
+    own = {WORKPIECE_MESH: partial(_stl, each[number])}
+    limits = bed_limits(study, top, max(map(_fastest, each, moved)))
+    models = {body.mesh: partial(_stl, one) for one, body in zip(each, moved, strict=True)}
+    cautions = {str(caution): caution for one in each for caution in process_cautions(one)}
     return Scene(
         deck=deck,
-        case=_process_case(case, bed.surface_m, timed, top, steps, rayleigh),
-        steps=last,
-        files={_WORKPIECE_MESH: lambda: stl_text(workpiece_mesh(case)), **_bowl_files(study, top)},
+        case=_process_case(each, number, bed.surface_m, moved[number], steps, limits),
+        steps=steps.end,
+        files=own if number else {**models, **_bowl_files(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
-        warnings=[*process_cautions(case), *rank_warnings(parts)],
+        warnings=[*cautions.values(), *rank_warnings(parts)],
     )
 
 
-def expected_bed(study: Study) -> Bed:
-    """The settled bed before it exists: an estimate."""
-    surface = expected_surface(study)
-    return Bed(surface, surface + 2 * study.media.radius_mean_m)
+def _mesh_files(each: Sequence[Case]) -> Mapping[Shape, str]:
+    """File of the mesh of each shape."""
+    shapes = dict.fromkeys(one.study.workpiece.shape for one in each)
+    return {
+        shape: f"workpiece_{number}.stl" if number > 1 else WORKPIECE_MESH
+        for number, shape in enumerate(shapes, 1)
+    }
 
 
-def course(
-    study: Study, bed: Bed, speed_factor: float
-) -> tuple[tuple[float, float, float], list[Leg]]:
-    """Where the workpiece's reference point is before the plunge, m, and its legs from there."""
-    motion = study.motion
-    clear = round_to(bed.top_m + study.media.radius_mean_m, 6)
-    dive = clear - (bed.surface_m - motion.immersion_depth_m + motion.path.heights_m[0])
-    return (*plunge_point(motion), clear), legs(motion, dive, speed_factor)
+def _stl(case: Case) -> str:
+    return stl_text(workpiece_mesh(case))
 
 
 def _output_periods(study: Study, timestep_s: float) -> Periods:
@@ -202,35 +167,16 @@ def _output_periods(study: Study, timestep_s: float) -> Periods:
     return Periods(force, contacts, network)
 
 
-def _timed_legs(
-    plan: Sequence[Leg], study: Study, timestep_s: float, period: int
-) -> list[TimedLeg]:
-    """Give every leg its steps; each ends with a whole network period.
-
-    A plunge or an approach goes a little slower to end where it should; the
-    drag keeps its speed and goes a little farther.
-    """
-    found: list[TimedLeg] = []
-    start = 0
-    for leg in plan:
-        steps = period * max(1, math.ceil(leg.duration_s / timestep_s / period - 1e-9))
-        duration = steps * timestep_s
-        if leg.name != "drag":
-            slower = leg.duration_s / duration
-            x, y, z = (round_to(slower * v, 12) for v in leg.velocity_m_s)
-            leg = replace(leg, velocity_m_s=(x, y, z))
-        timed = replace(leg, duration_s=round_to(duration, 12))
-        found.append(TimedLeg(timed, start, start + steps, study.motion.path.direction_rad))
-        start += steps
-    return found
-
-
-def _outputs(periods: Periods, first: int, last: int, facets: bool) -> tuple[Output, ...]:
+def _outputs(
+    periods: Periods, drag: DragSteps, workpieces: Sequence[str], facets: bool
+) -> tuple[Output, ...]:
+    first, last = drag.start, drag.end
+    several = facets or len(workpieces) > 1
     return (
         outputs.thermo(periods.network, last),
-        outputs.workpiece_force(periods.force, last),
+        *(outputs.workpiece_force(periods.force, last, name) for name in workpieces),
         outputs.workpiece_particles(periods.contacts, first, last),
-        outputs.workpiece_contacts(periods.contacts, first, last, facets),
+        outputs.workpiece_contacts(periods.contacts, first, last, several),
         outputs.particles(periods.network, first, last, facets),
         outputs.contacts(periods.network, first, last),
     )
@@ -241,21 +187,15 @@ def _checkpoint_steps(study: Study, last: int) -> int:
     return math.ceil(last / (count + 1)) if count else 0
 
 
-def workpiece_turn(study: Study) -> float:
-    """A mesh looks along +x in its own file: turn it into the direction of motion, degrees."""
-    if not isinstance(study.workpiece.shape, MeshShape) and not study.motion.tilt_deg:
-        return 0.0
-    return math.degrees(study.motion.path.direction_rad)
-
-
 def _process_case(
-    case: Case,
+    each: Sequence[Case],
+    number: int,
     surface_m: float,
-    timed: Sequence[TimedLeg],
-    top_m: float,
+    moved: MovedWorkpiece,
     drag: DragSteps,
-    rayleigh_s: float,
+    limits: RunLimits,
 ) -> ProcessCase:
+    case = each[number]
     study, motion = case.study, case.study.motion
     transient_s = motion.uncounted_m / case.axis_speed_m_s
     return case_of_study(
@@ -264,7 +204,7 @@ def _process_case(
         PROCESS.run_id(case),
         {name: value for name, value in study.plain().items() if name in _INPUTS},
         drag.timestep_s,
-        rayleigh_s,
+        bed_rayleigh_time(study),
         asked=case.advised,
         unsafe_timestep=study.accepted.unsafe_timestep,
         case=case.name,
@@ -275,15 +215,20 @@ def _process_case(
             kind="mesh" if motion.tilt_deg else study.workpiece.shape.kind,
             radius_m=workpiece_reach(case),
             length_m=workpiece_length(case),
-            mesh=_WORKPIECE_MESH,
+            mesh=WORKPIECE_MESH,
             immersion_depth_m=motion.immersion_depth_m,
+            number=case.number,
+            count=len(each),
+            wake_from_m=_wake_from(each, number),
         ),
+        output_of=PROCESS.run_id(case.all_workpieces) if case.number > 1 else None,
         motion=motion.path.of_run(
-            case.axis_speed_m_s, motion.orientation, in_steps(timed[-1].leg, drag)
+            case.axis_speed_m_s, motion.orientation, in_steps(moved.legs[-1].leg, drag)
         ),
-        superposed=[one.of_run(drag) for one in _superposed(study).values()],
+        superposed=[one.of_run(drag) for one in superposed(study).values()],
         phases=[
-            Phase(name=leg.name, start_step=leg.start_step, end_step=leg.end_step) for leg in timed
+            Phase(name=leg.name, start_step=leg.start_step, end_step=leg.end_step)
+            for leg in moved.legs
         ],
         statistics=StatisticsOfRun(transient_s=transient_s),
         steady=SteadyCriterion(
@@ -292,8 +237,20 @@ def _process_case(
         )
         if motion.bowl_rad_s
         else None,
-        limits=bed_limits(study, top_m, _fastest(case, timed)),
+        limits=limits,
     )
+
+
+def _wake_from(each: Sequence[Case], number: int) -> float | None:
+    """Path length after which a workpiece on a circle comes to where one began, itself included."""
+    path = each[number].study.motion.path
+    around, ahead = path.revolution_m, path.ahead_deg
+    if around is None or ahead is None:
+        return None
+    others = (one.study.motion.path.ahead_deg or 0.0 for one in each)
+    gap = min((other - ahead - 1e-6) % 360 + 1e-6 for other in others)
+    found = round_to(around * gap / 360, 9)
+    return found if found < path.path_length_m * (1 - 1e-9) else None
 
 
 _INPUTS = (
@@ -302,16 +259,12 @@ _INPUTS = (
 )
 
 
-def _fastest(case: Case, timed: Sequence[TimedLeg]) -> float:
+def _fastest(case: Case, moved: MovedWorkpiece) -> float:
     """Speed of the fastest leg, or of a surface or the bowl if one can be faster, m/s."""
-    speeds, motion = [leg.speed_m_s for leg in timed], case.study.motion
+    speeds, motion = [leg.speed_m_s for leg in moved.legs], case.study.motion
     if motion.superposed() or motion.bowl_rad_s or motion.path.peak_speed_ratio > 1:
         speeds.append(fastest_motion(case))
     return max(speeds)
-
-
-def _superposed(study: Study) -> Mapping[str, SuperposedMotion]:
-    return study.motion.superposed(study.chosen_fidelity().speed_factor)
 
 
 def _bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
@@ -334,7 +287,7 @@ def _models(study: Study) -> dict[str, str]:
         f"bowl: {bowl}": "its contacts end the chains, read from the force on each particle",
         **{words: "as the study gives it" for words in optional},
         "workpiece as facets": "the engine moves meshes only",
-        **{f"{name} of the workpiece": "as the study gives it" for name in _superposed(study)},
+        **{f"{name} of the workpiece": "as the study gives it" for name in superposed(study)},
         f"total force, {study.outputs.workpiece_force_hz:g} Hz": "drag, its spread and its peaks",
         f"workpiece contacts, "
         f"{study.outputs.workpiece_contacts_hz:g} Hz": "few, so cheap at a high rate",
@@ -375,11 +328,18 @@ def _partners(case: Case) -> list[tuple[str, str, float]]:
     return [*partners_in_bed(case), workpiece]
 
 
+def _carousel(study: Study) -> Json:
+    plain = study.plain()
+    return {"workpieces": plain["workpieces"]} if "workpieces" in plain else {}
+
+
 def _content(case: Case) -> Json:
     """What a process depends on."""
     study = case.study
-    shape = study.workpiece.shape
-    mesh = {"mesh": file_checksum(mesh_file(case, shape))} if isinstance(shape, MeshShape) else {}
+    shapes = [one.study.workpiece.shape for one in of_each_workpiece(case)]
+    files = [mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)]
+    checksums = [file_checksum(file) for file in dict.fromkeys(files)]
+    mesh = {"mesh": " ".join(checksums)} if checksums else {}
     return {
         "filling": dict(filling_content(case)),
         "materials": materials_content(study, study.workpiece.material),
@@ -387,6 +347,7 @@ def _content(case: Case) -> Json:
         "facet_size_m": study.bowl.facet_size_m,
         "workpiece": study.workpiece.plain(),
         "motion": study.motion.plain(),
+        **_carousel(study),
         "outputs": study.outputs.plain(),
         "fidelity": study.chosen_fidelity().plain(),
         **mesh,
@@ -398,7 +359,7 @@ PROCESS = SceneType(
     slug=lambda case: case.name,
     content=_content,
     build=process_scene,
-    inputs=(_WORKPIECE_MESH,),
+    inputs=(WORKPIECE_MESH,),
     tables=(
         "thermo.parquet",
         "workpiece_force.parquet",

@@ -21,6 +21,7 @@ from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear
 from dragdeck.physics.contact_network import ContactConstants
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
+from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.base import Json, flat
 from dragdeck.study.model import Study
@@ -32,22 +33,6 @@ _LONGEST_SLUG = 160
 
 Regime = Literal["impact", "settle", "column", "drag"]
 """What the stability map tells apart: each has its own limit of the time step."""
-
-
-@dataclass(frozen=True)
-class Bed:
-    """A settled bed.
-
-    Attributes
-    ----------
-    surface_m : float
-        Its mean height above the floor.
-    top_m : float
-        The highest point of any particle.
-    """
-
-    surface_m: float
-    top_m: float
 
 
 class PackingFile(Document):
@@ -121,8 +106,13 @@ class SceneType:
     loading: tuple[str, ...] = ()
 
     def run_id(self, case: Case) -> str:
-        """Run id of a case: a readable slug and 8 hex digits of what the run depends on."""
-        return f"{slug(self.slug(case))[:_LONGEST_SLUG]}-{digest(self.content(case))}"
+        """Run id of a case: a readable slug and 8 hex digits of what the run depends on.
+
+        All workpieces share a run; what is made for each but the first is named by its number.
+        """
+        whole = case.all_workpieces
+        found = f"{slug(self.slug(whole))[:_LONGEST_SLUG]}-{digest(self.content(whole))}"
+        return f"{found}.{case.number}" if self.needs_bed and case.number > 1 else found
 
     def digest(self, case: Case) -> str:
         """Hash of all that the run's files say, remarks included.

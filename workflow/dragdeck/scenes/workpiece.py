@@ -26,7 +26,7 @@ from dragdeck.mesh import (
 )
 from dragdeck.physics.rounding import round_to
 from dragdeck.scenes.motion import deepest, farthest_reach, plunge_point, surface_speed
-from dragdeck.study.model import CylinderShape, MeshShape
+from dragdeck.study.workpiece import CylinderShape, MeshShape
 
 if TYPE_CHECKING:
     from trimesh import Trimesh

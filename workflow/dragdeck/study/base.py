@@ -88,8 +88,14 @@ class Model(BaseModel):
         return {name: _plain(value) for name, value in self if name not in absent}
 
     def absent(self) -> set[str]:
-        """Fields whose value says that there is nothing: None, unless a model says more."""
-        return {name for name in type(self).model_fields if getattr(self, name) is None}
+        """Fields whose value says that there is nothing: None, or what the field excludes."""
+        values = {name: getattr(self, name) for name in type(self).model_fields}
+        excluded = {name: field.exclude_if for name, field in type(self).model_fields.items()}
+        return {
+            name
+            for name, value in values.items()
+            if value is None or ((excludes := excluded[name]) is not None and excludes(value))
+        }
 
 
 def flat(data: Mapping[str, Any], prefix: str = "") -> Mapping[str, Any]:

@@ -6,7 +6,8 @@ from itertools import product
 
 from dragdeck.errors import InputError, choices
 from dragdeck.study.base import flat
-from dragdeck.study.model import BUILT_IN_FIDELITIES, CylinderShape, Scaling, Study
+from dragdeck.study.model import BUILT_IN_FIDELITIES, Scaling, Study
+from dragdeck.study.workpiece import CylinderShape
 
 _NO_SWEEP = ("accepted", "assumptions", "reference", "scaling", "sweep", "title")
 """Blocks that no run depends on: cases that differ in them would be the same."""

@@ -5,7 +5,7 @@ than the study itself, or of how a scene is run.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
@@ -30,7 +30,7 @@ from dragdeck.study.base import (
 from dragdeck.study.contact_law import Contact, Pair
 from dragdeck.study.material import Material
 from dragdeck.study.paths.circle import CirclePath
-from dragdeck.study.paths.kind import PathOfRun
+from dragdeck.study.paths.kind import PathOfRun, turned
 from dragdeck.study.paths.line import LinePath
 from dragdeck.study.paths.rest import RestPath
 from dragdeck.study.paths.waypoints import WaypointsPath
@@ -39,6 +39,7 @@ from dragdeck.study.remarks import Accepted, Assumption
 from dragdeck.study.superposed.kind import SuperposedMotion, SuperposedOfRun
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin
+from dragdeck.study.workpiece import Carousel, Workpiece
 
 Ranks = Annotated[
     Annotated[Literal["auto"], Tag("a-word")]
@@ -78,53 +79,6 @@ class Bowl(Model):
         description="edge length of the bowl's mesh elements, m; none: analytical walls, or a "
         "particle diameter if the bowl rotates",
     )
-
-
-class CylinderShape(Model):
-    """A generated round workpiece with flat ends."""
-
-    kind: Literal["cylinder"] = Field(description="a generated cylinder")
-    radius_m: Positive = Field(description="radius, m")
-    facet_size_m: Positive = Field(default=0.0015, description="mesh size around the axis, m")
-    facet_length_m: Positive = Field(default=0.01, description="mesh size along the axis, m")
-
-
-class MeshShape(Model):
-    """A workpiece from a mesh or CAD file, turned upright, its lowest point the tip."""
-
-    kind: Literal["mesh"] = Field(description="a mesh from a file")
-    file: Line = Field(description="STL, OBJ, PLY, VTK, STEP; relative to the study or to meshes/")
-    unit: Literal["m", "cm", "mm", "um", "in"] = Field(description="unit of the file's numbers")
-    facet_size_m: Positive | None = Field(
-        default=None,
-        description="target edge length of the mesh of a STEP part, m; required for STEP and for "
-        "no other format",
-    )
-    edge_facet_size_m: Positive | None = Field(
-        default=None,
-        description="the same at sharp edges of a STEP part, m; none: as everywhere",
-    )
-    axis: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
-        default="+z",
-        description="direction in the file of the clamping axis, from the tip to the clamp; it is "
-        "turned upright, x about y and all others about x",
-    )
-    offset_m: tuple[Number, Number] | None = Field(
-        default=None,
-        description="x and y of the clamping axis in the file, turned upright, m; none: the middle "
-        "of the bounding box",
-    )
-
-    def absent(self) -> set[str]:
-        """The axis, too, where the part stands upright."""
-        return super().absent() | ({"axis"} if self.axis == "+z" else set())
-
-
-class Workpiece(Model):
-    """The workpiece that is dragged."""
-
-    material: str = Field(description="name of an entry of materials")
-    shape: Annotated[CylinderShape | MeshShape, Field(discriminator="kind")]
 
 
 class Superposed(Model):
@@ -233,6 +187,12 @@ class Motion(Superposed):
         """Length of the drag before the statistics begin, m."""
         whole = (self.path.revolution_m or 0.0) * ((self.counted_from_revolution or 1) - 1)
         return max(self.transient_m, whole)
+
+    def turned(self, angle_deg: float) -> "Motion":
+        """The same motion turned about the bowl's axis, immersed where the drag begins."""
+        path, place = self.path.turned(angle_deg), self.plunge_at_m
+        at = path.start_point if place is None else turned(place, angle_deg)
+        return self.model_copy(update={"path": path, "plunge_at_m": at})
 
     def at(self, pace: float, length_m: float) -> "Motion":
         """The drag at another pace and with another length, all of it counted.
@@ -439,6 +399,7 @@ class Study(Model):
     media: Media
     bowl: Bowl
     workpiece: Workpiece
+    workpieces: Carousel | None = None
     motion: Motion
     contact: Contact = Contact()
     drop_test: DropTest = DropTest()
@@ -462,6 +423,32 @@ class Study(Model):
     accepted: Accepted = Accepted()
     assumptions: list[Assumption] = Field(default_factory=list)
     reference: Reference | None = None
+
+    def of_each_workpiece(self) -> Sequence["Study"]:
+        """The study of each workpiece alone, its path and its place of immersion turned.
+
+        Several workpieces are immersed where their drag begins unless the study says other.
+        """
+        stations = self.workpieces.stations if self.workpieces else ()
+        if len(stations) < 2 and not any(one.angle_deg or one.shape for one in stations):
+            return [self]
+        return [
+            self.model_copy(
+                update={
+                    "workpiece": self.workpiece.model_copy(
+                        update={"shape": one.shape or self.workpiece.shape}
+                    ),
+                    "motion": self.motion.turned(one.angle_deg),
+                    "workpieces": None,
+                }
+            )
+            for one in stations
+        ]
+
+    def absent(self) -> set[str]:
+        """The carousel, too, where it has one workpiece as the study gives it."""
+        alone = self.of_each_workpiece() == [self]
+        return super().absent() | ({"workpieces"} if alone else set())
 
     def type_names(self) -> list[str]:
         """Materials in the order of the engine's types: particle, bowl, workpiece, each once."""

@@ -5,7 +5,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
-from dragdeck.study.base import Model, Positive
+from dragdeck.study.base import Model, Number, Positive
 from dragdeck.study.paths.kind import AroundBowl, Leg, Orientation, PathOfRun, Point, Stages
 
 
@@ -18,12 +18,17 @@ class CircleOfRun(PathOfRun):
 
 
 class CirclePath(AroundBowl, Model):
-    """A circle about the bowl's axis, begun on the +x axis."""
+    """A circle about the bowl's axis."""
 
     part: ClassVar[type[PathOfRun]] = CircleOfRun
 
-    kind: Literal["circle"] = Field(description="a circle about the bowl's axis, starting on +x")
+    kind: Literal["circle"] = Field(description="a circle about the bowl's axis")
     radius_m: Positive = Field(description="radius of the path of the workpiece's axis, m")
+    start_deg: Number = Field(
+        default=0.0,
+        description="angle of the start about the bowl's axis from +x, degrees",
+        exclude_if=lambda value: value == 0,
+    )
     revolutions: Positive = Field(default=1.0, description="path length, revolutions")
     direction: Literal["ccw", "cw"] = Field(
         default="ccw", description="direction seen from above: ccw (counter-clockwise) or cw"
@@ -41,12 +46,16 @@ class CirclePath(AroundBowl, Model):
 
     @property
     def direction_rad(self) -> float:
-        """Along y."""
-        return self.sign * math.pi / 2
+        """Along the circle."""
+        return self.start_rad + self.sign * math.pi / 2
 
     def one_side_inwards(self, orientation: Orientation) -> bool:
         """If it turns with the path."""
         return orientation == "follow_path"
+
+    def turned(self, angle_deg: float) -> Self:
+        """Begun at another angle."""
+        return self.model_copy(update={"start_deg": self.start_deg + angle_deg})
 
     def with_length(self, length_m: float) -> Self:
         """As many revolutions as give the length."""

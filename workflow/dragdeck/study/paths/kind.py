@@ -34,6 +34,13 @@ class PathOfRun(BaseModel):
     orientation: Orientation
 
 
+def turned(place: Point, angle_deg: float) -> Point:
+    """A place turned about the bowl's axis, to 1e-12 m."""
+    angle, (x, y) = math.radians(angle_deg), place
+    c, s = math.cos(angle), math.sin(angle)
+    return round(c * x - s * y, 12) + 0.0, round(s * x + c * y, 12) + 0.0
+
+
 @dataclass(frozen=True)
 class Leg:
     """A stretch of motion at one speed, or in stages.
@@ -111,6 +118,11 @@ class WorkpiecePath(ABC):
         """Largest distance of the workpiece's axis from the bowl's."""
 
     @property
+    def ahead_deg(self) -> float | None:
+        """Angle of its start about the bowl's axis, in the sense of motion; None if no circle."""
+        return None
+
+    @property
     def own_speed_m_s(self) -> float | None:
         """Speed that the path itself gives; None if ``motion.speed_m_s`` does."""
         return None
@@ -143,6 +155,10 @@ class WorkpiecePath(ABC):
         return self
 
     @abstractmethod
+    def turned(self, angle_deg: float) -> Self:
+        """The same path turned about the bowl's axis."""
+
+    @abstractmethod
     def with_length(self, length_m: float) -> Self:
         """The same path with another length."""
 
@@ -162,13 +178,19 @@ class WorkpiecePath(ABC):
 
 
 class AroundBowl(WorkpiecePath):
-    """Block of a study: a path on a circle about the bowl's axis, begun on the +x axis."""
+    """Block of a study: a path on a circle about the bowl's axis."""
 
     length_field: ClassVar[str] = "revolutions"
 
     if TYPE_CHECKING:
+        start_deg: float
         radius_m: float
         revolutions: float
+
+    @property
+    def start_rad(self) -> float:
+        """Angle of its start from +x."""
+        return math.radians(self.start_deg)
 
     @property
     def path_length_m(self) -> float:
@@ -182,8 +204,13 @@ class AroundBowl(WorkpiecePath):
 
     @property
     def start_point(self) -> Point:
-        """On the +x axis."""
-        return self.radius_m, 0.0
+        """At the radius and the angle."""
+        return turned((self.radius_m, 0.0), self.start_deg)
+
+    @property
+    def ahead_deg(self) -> float:
+        """The angle, or its negative for a clockwise motion."""
+        return math.copysign(1.0, math.sin(self.direction_rad - self.start_rad)) * self.start_deg
 
     @property
     def reach_m(self) -> float:

@@ -6,7 +6,15 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field
 
 from dragdeck.study.base import Model, Number, Positive
-from dragdeck.study.paths.kind import Leg, Orientation, PathOfRun, Point, Stages, WorkpiecePath
+from dragdeck.study.paths.kind import (
+    Leg,
+    Orientation,
+    PathOfRun,
+    Point,
+    Stages,
+    WorkpiecePath,
+    turned,
+)
 
 
 class LineOfRun(PathOfRun):
@@ -52,6 +60,15 @@ class LinePath(WorkpiecePath, Model):
             y + self.length_m * math.sin(self.direction_rad),
         )
         return max(math.hypot(x, y), math.hypot(*end))
+
+    def turned(self, angle_deg: float) -> Self:
+        """From another place in another direction."""
+        return self.model_copy(
+            update={
+                "start_m": turned(self.start_m, angle_deg),
+                "direction_deg": self.direction_deg + angle_deg,
+            }
+        )
 
     def with_length(self, length_m: float) -> Self:
         """As long as that."""

@@ -18,20 +18,23 @@ class RestOfRun(PathOfRun):
 
 
 class RestPath(AroundBowl, Model):
-    """A place on the +x axis, and the bowl's rotation.
+    """A place, and the bowl's rotation.
 
     Seen from the bowl, the workpiece goes round against the rotation.
     """
 
     part: ClassVar[type[PathOfRun]] = RestOfRun
 
-    kind: Literal["rest"] = Field(
-        description="the workpiece stands still on +x and the bowl rotates"
-    )
+    kind: Literal["rest"] = Field(description="the workpiece stands still and the bowl rotates")
     radius_m: Positive = Field(description="distance of the workpiece's axis from the bowl's, m")
     bowl_rpm: Number = Field(
         description="rotational speed of the bowl, 1/min; positive: counter-clockwise seen from "
         "above"
+    )
+    start_deg: Number = Field(
+        default=0.0,
+        description="angle of the start about the bowl's axis from +x, degrees",
+        exclude_if=lambda value: value == 0,
     )
     revolutions: Positive = Field(default=1.0, description="revolutions of the bowl")
 
@@ -49,7 +52,7 @@ class RestPath(AroundBowl, Model):
     @property
     def direction_rad(self) -> float:
         """Against the rotation of the bowl."""
-        return -math.copysign(math.pi / 2, self.bowl_rpm)
+        return self.start_rad - math.copysign(math.pi / 2, self.bowl_rpm)
 
     @property
     def own_speed_m_s(self) -> float:
@@ -67,6 +70,10 @@ class RestPath(AroundBowl, Model):
     def faster(self, factor: float) -> Self:
         """With a bowl that rotates faster."""
         return self.model_copy(update={"bowl_rpm": factor * self.bowl_rpm})
+
+    def turned(self, angle_deg: float) -> Self:
+        """Begun at another angle."""
+        return self.model_copy(update={"start_deg": self.start_deg + angle_deg})
 
     def with_length(self, length_m: float) -> Self:
         """As many revolutions of the bowl as give the length."""

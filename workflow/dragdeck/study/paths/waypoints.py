@@ -9,7 +9,15 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from dragdeck.study.base import Line, Model, Number
-from dragdeck.study.paths.kind import Leg, Orientation, PathOfRun, Point, Stages, WorkpiecePath
+from dragdeck.study.paths.kind import (
+    Leg,
+    Orientation,
+    PathOfRun,
+    Point,
+    Stages,
+    WorkpiecePath,
+    turned,
+)
 
 MOST_POINTS = 100
 
@@ -118,6 +126,14 @@ class WaypointsPath(WorkpiecePath, Model):
         speeds = [math.hypot(*shift) / duration for duration, *shift in self._stretches()]
         ends = {f"motion.path.points.{n}.speed_m_s": speed for n, speed in enumerate(speeds, 1)}
         return {"motion.path.speed_m_s": self.own_speed_m_s, **ends}
+
+    def turned(self, angle_deg: float) -> Self:
+        """Every waypoint at another place."""
+        places = [turned((point.x_m, point.y_m), angle_deg) for point in self.points]
+        points = [
+            point._replace(x_m=x, y_m=y) for point, (x, y) in zip(self.points, places, strict=True)
+        ]
+        return self.model_copy(update={"points": points})
 
     def faster(self, factor: float) -> Self:
         """The same places after shorter times."""

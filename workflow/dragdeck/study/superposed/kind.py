@@ -1,5 +1,6 @@
 """What every kind of superposed motion knows of itself."""
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -44,6 +45,17 @@ class EngineMotion:
 
     variables: Mapping[str, str]
     mover: str
+
+    def ending(self, ending: str) -> "EngineMotion":
+        """The same motion with an ending after the name of each of its variables."""
+        own = "|".join([*self.variables, "reference_[xyz]"])
+        name = re.compile(rf"(v_|\$\{{)({own})\b")
+
+        def renamed(text: str) -> str:
+            return type(text)(name.sub(rf"\g<0>{ending}", text)) if ending else text
+
+        variables = {f"{own}{ending}": renamed(text) for own, text in self.variables.items()}
+        return EngineMotion(variables, renamed(self.mover))
 
 
 class SuperposedMotion(ABC):

@@ -1,0 +1,96 @@
+"""The workpiece, and several of them on one carousel."""
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from dragdeck.study.base import Line, Model, Number, Positive, Whole
+
+
+class CylinderShape(Model):
+    """A generated round workpiece with flat ends."""
+
+    kind: Literal["cylinder"] = Field(description="a generated cylinder")
+    radius_m: Positive = Field(description="radius, m")
+    facet_size_m: Positive = Field(default=0.0015, description="mesh size around the axis, m")
+    facet_length_m: Positive = Field(default=0.01, description="mesh size along the axis, m")
+
+
+class MeshShape(Model):
+    """A workpiece from a mesh or CAD file, turned upright, its lowest point the tip."""
+
+    kind: Literal["mesh"] = Field(description="a mesh from a file")
+    file: Line = Field(description="STL, OBJ, PLY, VTK, STEP; relative to the study or to meshes/")
+    unit: Literal["m", "cm", "mm", "um", "in"] = Field(description="unit of the file's numbers")
+    facet_size_m: Positive | None = Field(
+        default=None,
+        description="target edge length of the mesh of a STEP part, m; required for STEP and for "
+        "no other format",
+    )
+    edge_facet_size_m: Positive | None = Field(
+        default=None,
+        description="the same at sharp edges of a STEP part, m; none: as everywhere",
+    )
+    axis: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
+        default="+z",
+        exclude_if=lambda value: value == "+z",
+        description="direction in the file of the clamping axis, from the tip to the clamp; it is "
+        "turned upright, x about y and all others about x",
+    )
+    offset_m: tuple[Number, Number] | None = Field(
+        default=None,
+        description="x and y of the clamping axis in the file, turned upright, m; none: the middle "
+        "of the bounding box",
+    )
+
+
+Shape = Annotated[CylinderShape | MeshShape, Field(discriminator="kind")]
+
+
+class Workpiece(Model):
+    """The workpiece that is dragged."""
+
+    material: str = Field(description="name of an entry of materials")
+    shape: Shape
+
+
+class Station(Model):
+    """A workpiece of a carousel."""
+
+    angle_deg: Number = Field(
+        description="angle about the bowl's axis by which its path and motion are turned, degrees; "
+        "positive: counter-clockwise seen from above"
+    )
+    shape: Shape | None = None
+
+
+class Carousel(Model):
+    """Several workpieces that move alike, each turned about the bowl's axis."""
+
+    count: Annotated[Whole, Field(ge=1, le=12)] | None = Field(
+        default=None,
+        description="number of workpieces at equal angles, all of the shape `workpiece.shape`; "
+        "either this or a list of them",
+    )
+    each: list[Station] | None = Field(default=None, min_length=1, max_length=12)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _list(cls, value: Any) -> Any:
+        """A list is short for `each`."""
+        return {"each": value} if isinstance(value, list) else value
+
+    @model_validator(mode="after")
+    def _one_form(self) -> "Carousel":
+        if (self.count is None) == (self.each is None):
+            raise ValueError("give either count, or a list with the angle of each workpiece")
+        return self
+
+    @property
+    def stations(self) -> Sequence[Station]:
+        """The workpieces, from the first to the last."""
+        if self.each is not None:
+            return self.each
+        count = self.count or 1
+        return [Station(angle_deg=number * 360 / count) for number in range(count)]
