@@ -13,6 +13,7 @@ for (const name of sources.sort()) hash.update(`${name}\n`).update(readFileSync(
 const licence = readFileSync("node_modules/three/LICENSE", "utf8").trim();
 
 const result = await build({
+  absWorkingDir: import.meta.dirname,
   entryPoints: ["src/main.js"],
   bundle: true,
   minify: true,

@@ -231,7 +231,7 @@ class Page {
     });
     canvas.addEventListener("keydown", (event) => this.key(event));
     byId("find-button").onclick = () => this.find(byId("find").value);
-    byId("find").onkeydown = (event) => event.key === "Enter" && this.find(byId("find").value);
+    byId("find").addEventListener("keydown", ({ key }) => key === "Enter" && this.find(byId("find").value));
     byId("highest-facet").onclick = () => this.showHighestFacet();
     byId("highest-facet").hidden = !this.workpiece.own.loads.length;
   }

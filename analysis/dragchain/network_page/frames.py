@@ -83,7 +83,7 @@ def shown_frames(run: Run, peak_time_s: Floats) -> FrameSeries:
     TableError
         If the run wrote no contact network.
     """
-    if not run.wrote("contacts", "particles", "workpiece_contacts"):
+    if not run.wrote("contacts", "particles", "workpiece_contacts", "workpiece_particles"):
         raise TableError(
             f"{run.folder}: this {run.case.scene} run wrote no contact network, so there is no"
             " page on it\n  remedy: list contacts and particles in its outputs"
@@ -126,4 +126,3 @@ def _near(frame: NetworkFrame, workpiece_m: Floats) -> NDArray[np.bool_]:
     if away.size <= MOST_PARTICLES:
         return np.ones(away.size, dtype=bool)
     return np.asarray(away < np.partition(away, MOST_PARTICLES)[MOST_PARTICLES])
-

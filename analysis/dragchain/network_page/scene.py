@@ -3,6 +3,7 @@
 `Scene.head` is what the page's scripts read as JSON; its entries have the names used there.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,8 +24,7 @@ from dragchain.network_page.frames import (
     read_shown,
     shown_frames,
 )
-from dragchain.run.case import Case
-from dragchain.run.kinematics import drag_phase, drag_start_s, motion_of, needed
+from dragchain.run.kinematics import drag_phase, drag_start_s, needed
 from dragchain.run.workpiece import read_surface
 from dragchain.tables.by_step import read_table
 from dragchain.tables.columns import CENTRE, POINT, VELOCITY
@@ -35,8 +35,8 @@ COLOURS = "magma_r"
 
 _LOADS = {
     "force_slide_pa": (
-        "force × sliding",
-        "normal force × sliding distance, per area and path length",
+        "sliding load",
+        "normal force times sliding distance, per area and path length",
         "N/m²",
     ),
     "mean_pressure_pa": ("mean pressure", "mean normal pressure", "Pa"),
@@ -77,7 +77,7 @@ def load_scene(run: Run) -> Scene:
     frames = list(read_shown(series))
     start_s = drag_start_s(case)
     times_s = series.times_s - start_s
-    bowl = needed(case.bowl, "bowl")
+    bowl, surface = needed(case.bowl, "bowl"), 1e3 * needed(case.surface_m, "surface_m")
     head = {
         "steps": series.steps.tolist(),
         "times": times_s.tolist(),
@@ -85,7 +85,10 @@ def load_scene(run: Run) -> Scene:
         "scales": _scales(frames),
         "paths": _dominant_paths(run, frames),
         "bodies": {BODIES + body: name for body, name in KINDS.items() if body != PARTICLE},
-        "bowl": {"radius": 1e3 * bowl.radius_m, "height": 1.2e3 * needed(case.surface_m, "surface")},
+        "bowl": {
+            "radius": 1e3 * bowl.radius_m,
+            "height": 1.2e3 * needed(case.surface_m, "surface"),
+        },
         "surface": 1e3 * needed(case.surface_m, "surface"),
         "media": {
             "radius": 1e3 * case.media.radius_mean_m,
@@ -188,17 +191,18 @@ def _dominant_paths(run: Run, frames: list[ShownFrame]) -> list[dict[str, Any] |
     names = ["step", "particle_ids", "bottleneck_n", "mean_force_n", "end_kind", "dominant"]
     table = read_table(run.table("chains.parquet"), names)
     rows = {int(row["step"]): row for row in table[table["dominant"]].to_dict("records")}
-    paths = (rows.get(frame.data.step) for frame in frames)
-    return [
-        path
-        and {
-            "bottleneck": path["bottleneck_n"],
-            "mean": path["mean_force_n"],
-            "particles": [int(number) for number in path["particle_ids"]],
-            "end": path["end_kind"],
-        }
-        for path in paths
-    ]
+    return [_path(rows.get(frame.data.step)) for frame in frames]
+
+
+def _path(row: Mapping[Any, Any] | None) -> dict[str, Any] | None:
+    if row is None:
+        return None
+    return {
+        "bottleneck": row["bottleneck_n"],
+        "mean": row["mean_force_n"],
+        "particles": [int(number) for number in row["particle_ids"]],
+        "end": row["end_kind"],
+    }
 
 
 # --- workpiece and force -----------------------------------------------------------------------
@@ -210,12 +214,11 @@ def _workpiece(columns: Columns, run: Run, frames: list[ShownFrame]) -> dict[str
     surface = read_surface(run.folder, case)
     columns.add("corners", "f24", 1e3 * surface.corners)
     own = needed(case.workpiece, "workpiece")
-    unturned = motion_of(case).start_direction_rad if own.kind == "cylinder" else 0.0
     poses = []
     for frame in frames:
         assert frame.data.workpiece is not None
         place, turn = frame.data.workpiece
-        poses.append([*(1e3 * place).tolist(), turn + unturned])
+        poses.append([*(1e3 * place).tolist(), turn])
     return {
         "poses": poses,
         "headings": _headings(run, frames),
@@ -273,7 +276,5 @@ def _peaks(peaks: Peaks, times_s: Floats, start_s: float) -> list[dict[str, Any]
     """The highest peaks, each with its nearest frame."""
     return [
         {"time": time, "force": -drag, "frame": int(np.abs(times_s - time).argmin())}
-        for time, drag in zip(
-            (peaks.time_s - start_s).tolist(), peaks.drag_n.tolist(), strict=True
-        )
+        for time, drag in zip((peaks.time_s - start_s).tolist(), peaks.drag_n.tolist(), strict=True)
     ]
