@@ -63,6 +63,17 @@ WAYPOINTS = {
     "speed_m_s": None,
 }  # fmt: skip
 """Obliquely up, a pause, straight down, and on."""
+TURNS = [0, 90, 90, -30, 20]
+TURNING = {
+    "path": {
+        "kind": "waypoints",
+        "points": [
+            [*[*point, 0.0][:4], turn]
+            for point, turn in zip(WAYPOINTS["path"]["points"], TURNS, strict=True)  # type: ignore[index]
+        ],
+    },
+    "speed_m_s": None,
+}
 REVERSING = {"schedule": [{"until_s": 0.06, "rpm": 300}, {"until_s": 0.12, "rpm": -600}]}
 UP_AND_DOWN = {"amplitude_m": 0.001, "frequency_hz": 6}
 
@@ -172,10 +183,11 @@ def farthest_corner(folder: Path, steps: np.ndarray, ref_m: np.ndarray) -> float
         {"path": CIRCLE, "tilt_deg": 20},
         WAYPOINTS,
         {**WAYPOINTS, "spin": REVERSING, "oscillation": UP_AND_DOWN},
+        {**TURNING, "oscillation": UP_AND_DOWN},
     ],
     ids=[
         *("planetary", "clockwise", "fixed", "line", "oscillation", "tilted"),
-        *("waypoints", "waypoints-spin"),
+        *("waypoints", "waypoints-spin", "waypoints-turn"),
     ],
 )
 def test_the_engine_moves_the_workpiece_as_both_packages_say(

@@ -34,6 +34,7 @@ BED = Bed(surface_m=0.038, top_m=0.0446)
 POINTS = [[2, -0.01, 0], [2.2, -0.006, 0], [2.3, -0.006, 0, 0.001], [2.5, -0.006, 0, 0.001],
           [2.7, -0.006, 0.008]]  # fmt: skip
 """Along x at 0.02 m/s, up, a pause, and along y and down at about 0.04 m/s."""
+TURNING = [[*[*point, 0.0][:4], 45 * number] for number, point in enumerate(POINTS)]
 LENGTH = 0.004 + 0.001 + math.hypot(0.008, 0.001)
 CSV = "time_s,x_m,y_m,z_m\n" + "".join(
     f"{','.join(map(str, point))}{',0' * (4 - len(point))}\n" for point in POINTS
@@ -126,7 +127,7 @@ HEADER = "time_s,x_m,y_m\n"
         ("time_s,x_m,y_m,y_m\n0,0,0,0\n", ": line 1", "the columns are not those"),
         ("0,0,0\n1,0.01,0\n", ": line 1", "the columns are not those"),
         (HEADER + "0,0,0\n\n1,0.01\n", ":4: y_m", "should be a valid number"),
-        (HEADER + "0,0,0\n1,0.01,0,0\n", ":3", "should have at most 4 items"),
+        (HEADER + "0,0,0\n1,0.01,0,0\n", ":3", "should have at most 5 items"),
         (HEADER + "0,0,0\n\n1,abc,0\n", ":4: x_m", "'abc' is text, not a number"),
         (HEADER + '0,0,0\n1,0,"0,01"\n', ":3: y_m", "is text, not a number"),
         (HEADER + "0,0,0\n1,nan,0\n", ":3: x_m", "is text, not a number"),
@@ -184,7 +185,7 @@ def test_a_missing_file_is_named(made: Made, name: str) -> None:
         ({"points": None}, "motion.path.points: Input should be a valid list"),
         ({"points": []}, "motion.path.points: List should have at least 2"),
         ({"points": [[0, 0, 0], [1, 0]]}, "motion.path.points.1.2: a required"),
-        ({"points": [[0, 0, 0], [1, 0, 0, 0, 0]]}, "motion.path.points.1: NamedTuple "),
+        ({"points": [[0, 0, 0], [1, 0, 0, 0, 0, 0]]}, "motion.path.points.1: NamedTuple "),
         ({"points": [[0, 0, 0], [1, True, 0]]}, "motion.path.points.1.1: a truth value"),
         ({"points": [[0, 0, 0], [0, 0.01, 0]]}, "motion.path.points.1.0: the time does not"),
         ({"points": [[0, 0, 0], [1, 0, 0, 0.01]]}, "does not move horizontally"),
@@ -218,6 +219,14 @@ def test_neither_file_nor_points(small: dict[str, Any], write_study: Any) -> Non
         ({"speed_m_s": 0.01}, "are both given: remove speed_m_s"),
         ({"counted_from_revolution": 1}, "for circles: this path has no revolutions"),
         ({"transient_m": 1.01 * LENGTH}, "no path is left for the statistics"),
+        (
+            {"path": {"kind": "waypoints", "points": TURNING}, "spin": {"rpm": 9}},
+            "spin and waypoints that turn cannot be combined",
+        ),
+        (
+            {"path": {"kind": "waypoints", "points": TURNING}, "tilt_deg": 5},
+            "tilt_deg and a rotation cannot be combined",
+        ),
     ],
 )
 def test_fields_beside_it_that_cannot_be(made: Made, motion: Any, words: str) -> None:

@@ -38,7 +38,7 @@ from dragdeck.study.reference import Reference
 from dragdeck.study.remarks import Accepted, Assumption
 from dragdeck.study.superposed.kind import SuperposedMotion, SuperposedOfRun
 from dragdeck.study.superposed.oscillation import Oscillation
-from dragdeck.study.superposed.spin import Spin
+from dragdeck.study.superposed.spin import Spin, SpinStage
 from dragdeck.study.workpiece import Carousel, Workpiece
 
 Ranks = Annotated[
@@ -156,8 +156,10 @@ class Motion(Superposed):
     def _path(self) -> "Motion":
         if self.counted_from_revolution is not None and self.path.revolution_m is None:
             raise ValueError("counted_from_revolution is for circles: this path has no revolutions")
-        if self.tilt_deg and self.spin is not None:
-            raise ValueError("tilt_deg and spin cannot be combined: remove one of them")
+        if self.path.turning and self.spin is not None:
+            raise ValueError("spin and waypoints that turn cannot be combined: remove one of them")
+        if self.tilt_deg and (self.spin is not None or self.path.turning):
+            raise ValueError("tilt_deg and a rotation cannot be combined: remove one of them")
         if self.speed_m_s is None and self.path.own_speed_m_s is None:
             raise ValueError("speed_m_s is missing: give the speed along the path, m/s")
         if self.speed_m_s is not None and self.path.own_speed_m_s is not None:
@@ -166,6 +168,14 @@ class Motion(Superposed):
                 f"{self.path.own_speed_m_s:.3g} m/s, are both given: remove speed_m_s"
             )
         return self
+
+    def superposed(self, speed_factor: float = 1.0) -> Mapping[str, SuperposedMotion]:
+        """What is superposed on the path, the rotation that it gives included."""
+        found = super().superposed(speed_factor)
+        if not self.path.turning:
+            return found
+        stages = [SpinStage(until_s=end, rpm=rpm) for end, rpm in self.path.turning]
+        return {**found, "spin": Spin(schedule=stages).faster(speed_factor)}
 
     @property
     def axis_speed_m_s(self) -> float:

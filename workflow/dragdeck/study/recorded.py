@@ -64,8 +64,9 @@ def _read(file: Path) -> tuple[list[list[Any]], Places]:
             rows = [(reader.line_num, row) for row in islice(reader, MOST_POINTS + 1)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"not a CSV file: {error}", file=file) from None
-    if sorted(header) not in (sorted(_COLUMNS), sorted(_COLUMNS[:-1])):
-        limit = f"{','.join(_COLUMNS[:-1])} and optionally {_COLUMNS[-1]}, separated by commas"
+    needed, optional = set(_COLUMNS[:-2]), _COLUMNS[-2:]
+    if not needed <= set(header) <= set(_COLUMNS) or len(set(header)) < len(header):
+        limit = f"{','.join(_COLUMNS[:-2])}, optionally {', '.join(optional)}, separated by commas"
         problem, value = "the columns are not those of waypoints", ",".join(header)[:200]
         raise InputError(problem, file=file, field="line 1", value=value, limit=limit)
     surplus: Any = None  # the key of values beyond the header

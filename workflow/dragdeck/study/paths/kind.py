@@ -138,6 +138,11 @@ class WorkpiecePath(ABC):
         return (0.0,)
 
     @property
+    def turning(self) -> Sequence[tuple[float, float]]:
+        """Rotation that the path itself gives: end of each stage, s, and its speed, 1/min."""
+        return ()
+
+    @property
     def implied(self) -> Mapping[str, float]:
         """What follows from its fields and has to be plausible too, by dotted name."""
         return {}

@@ -23,12 +23,13 @@ MOST_POINTS = 100
 
 
 class Waypoint(NamedTuple):
-    """Time, place of the workpiece's axis, and height of the tip above the immersion depth."""
+    """Time, place of the workpiece's axis, height of the tip above the immersion depth, turn."""
 
     time_s: Number
     x_m: Number
     y_m: Number
     z_m: Number = 0.0
+    turn_deg: Number = 0.0
 
 
 class WaypointsOfRun(PathOfRun):
@@ -46,17 +47,19 @@ class WaypointsPath(WorkpiecePath, Model):
 
     kind: Literal["waypoints"] = Field(
         description="a recorded path, straight between waypoints, at its own speed; lengths count "
-        "at its mean speed. The workpiece does not turn with it, whatever `orientation` says"
+        "at its mean speed. The workpiece turns as the waypoints say, whatever `orientation` says"
     )
     file: Line | None = Field(
         default=None,
-        description="CSV file with the columns time_s, x_m, y_m and optionally z_m, beside the "
-        "study; either this or `points`",
+        description="CSV file with the columns time_s, x_m, y_m and optionally z_m and turn_deg, "
+        "beside the study; either this or `points`",
     )
     points: Annotated[list[Waypoint], Field(min_length=2, max_length=MOST_POINTS)] = Field(
         default_factory=list,
-        description="2 to 100 waypoints [time, x, y, z]: time, s; place of the workpiece's axis, "
-        "m; height of the tip above the immersion depth, m, 0 if absent. Equal places are a pause",
+        description="2 to 100 waypoints [time, x, y, z, turn]: time, s; place of the workpiece's "
+        "axis, m; height of the tip above the immersion depth, m, 0 if absent; turn about the "
+        "vertical, degrees, positive: counter-clockwise, 0 if absent, of which only differences "
+        "count. Equal places are a pause",
     )
     fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=1.0, description="fraction of the path's time that is driven, from its start"
@@ -82,7 +85,17 @@ class WaypointsPath(WorkpiecePath, Model):
 
     def _stretches(self) -> Sequence[Sequence[float]]:
         """Differences between each waypoint and the next: duration, s, and x, y and z, m."""
-        return [[b - a for a, b in zip(*both, strict=True)] for both in pairwise(self.points)]
+        return [[b - a for a, b in zip(*both, strict=True)][:4] for both in pairwise(self.points)]
+
+    @property
+    def turning(self) -> Sequence[tuple[float, float]]:
+        """From the start to each waypoint, s, and the speed of rotation until then, 1/min."""
+        start = self.points[0].time_s
+        found = [
+            (b.time_s - start, (b.turn_deg - a.turn_deg) / 6 / (b.time_s - a.time_s))
+            for a, b in pairwise(self.points)
+        ]
+        return found if any(rpm for _, rpm in found) else ()
 
     @property
     def path_length_m(self) -> float:
@@ -102,7 +115,7 @@ class WaypointsPath(WorkpiecePath, Model):
     @property
     def reach_m(self) -> float:
         """The farthest waypoint."""
-        return max(math.hypot(x, y) for _, x, y, _ in self.points)
+        return max(math.hypot(point.x_m, point.y_m) for point in self.points)
 
     @property
     def heights_m(self) -> Sequence[float]:

@@ -53,7 +53,7 @@ class Spin(SuperposedMotion, Model):
         description="rotational speed during the drag, relative to `orientation`, 1/min; positive: "
         "counter-clockwise seen from above; either this or `schedule`",
     )
-    schedule: list[SpinStage] | None = Field(default=None, min_length=1, max_length=50)
+    schedule: list[SpinStage] | None = Field(default=None, min_length=1, max_length=100)
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
