@@ -84,7 +84,7 @@ class Page {
     this.view.scene.add(outline(head), this.workpiece.group, this.workpiece.arrow, this.media.mesh, ...this.contacts.meshes, this.chosen.group);
     this.view.after = () => showScale(byId("scale-bar"), byId("scale-length"), this.view.millimetresPerPixel);
     this.view.resize();
-    this.view.preset("overview");
+    this.preset("overview");
     this.startControls();
     this.startTransport();
     this.startChoosing();
@@ -267,7 +267,7 @@ class Page {
     const facet = this.workpiece.highest(byId("load").value), { group, normals } = this.workpiece, { centre } = this.workpiece.facet(facet);
     group.updateMatrixWorld();
     const target = new Vector3(...centre).applyMatrix4(group.matrixWorld), from = new Vector3(...normals.subarray(9 * facet, 9 * facet + 3)).transformDirection(group.matrixWorld);
-    this.view.follows = null;
+    Object.assign(this.view, { follows: null, framed: null });
     this.view.look(target, from.add(new Vector3(0, 0, 0.15)), this.view.camera.zoom);
     this.choose({ facet });
   }

@@ -24,7 +24,7 @@ export class View {
     this.controls = new OrbitControls(this.camera, canvas);
     Object.assign(this.controls, { enableDamping: false, zoomToCursor: true, minZoom: 0.3, maxZoom: 40 });
     this.controls.addEventListener("change", () => this.wanted());
-    this.controls.addEventListener("start", () => this.touched?.());
+    this.controls.addEventListener("start", () => (this.framed = null));
     this.drawn = 0; // pictures so far
     this.pace = { ratio: devicePixelRatio, last: 0, slow: 0 };
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
@@ -39,7 +39,8 @@ export class View {
     Object.assign(this.camera, { left: -half * width / height, right: half * width / height, top: half, bottom: -half, near: 0.1 * radius, far: 20 * radius });
     this.camera.updateProjectionMatrix();
     this.renderer.setSize(width, height, false);
-    this.wanted();
+    if (this.framed) this.preset(this.framed);
+    else this.wanted();
   }
 
   /** Draw before the screen is next refreshed, and finer once nothing has changed for a while. */
@@ -78,6 +79,7 @@ export class View {
       follow: () => ahead.clone().multiplyScalar(-0.75).addScaledVector(right, 0.5).add(new Vector3(0, 0, 0.45)),
     }[name]();
     this.follows = name === "follow" ? heading : null;
+    this.framed = name; // until the user moves the camera: a window of another size is filled again
     this.look(this.follows === null ? centre : this.nearWorkpiece(), from, name === "follow" ? 1.4 * this.zoomOf(from) : this.zoomOf(from), radius);
   }
 
@@ -95,6 +97,7 @@ export class View {
     this.camera.zoom = zoom;
     this.camera.updateProjectionMatrix();
     this.controls.update();
+    this.camera.updateMatrixWorld();
     this.wanted();
   }
 
@@ -112,6 +115,7 @@ export class View {
   }
 
   turn(sideways, upwards) {
+    this.framed = null;
     const offset = this.camera.position.clone().sub(this.controls.target).applyAxisAngle(UP, sideways);
     const tilt = Math.min(Math.max(offset.angleTo(UP) + upwards, 1e-4), Math.PI - 1e-4), radius = Math.hypot(offset.x, offset.y), length = offset.length();
     const across = radius > 1e-6 ? new Vector3(offset.x / radius, offset.y / radius, 0) : new Vector3(0, -1, 0);
@@ -119,6 +123,7 @@ export class View {
   }
 
   magnify(factor) {
+    this.framed = null;
     this.camera.zoom = Math.min(Math.max(this.camera.zoom * factor, this.controls.minZoom), this.controls.maxZoom);
     this.camera.updateProjectionMatrix();
     this.wanted();

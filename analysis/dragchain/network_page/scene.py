@@ -85,11 +85,8 @@ def load_scene(run: Run) -> Scene:
         "scales": _scales(frames),
         "paths": _dominant_paths(run, frames),
         "bodies": {BODIES + body: name for body, name in KINDS.items() if body != PARTICLE},
-        "bowl": {
-            "radius": 1e3 * bowl.radius_m,
-            "height": 1.2e3 * needed(case.surface_m, "surface"),
-        },
-        "surface": 1e3 * needed(case.surface_m, "surface"),
+        "bowl": {"radius": 1e3 * bowl.radius_m, "height": 1.2 * surface},
+        "surface": surface,
         "media": {
             "radius": 1e3 * case.media.radius_mean_m,
             "count": max(len(frame.data.particles) for frame in frames),

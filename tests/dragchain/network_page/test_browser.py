@@ -320,11 +320,27 @@ def test_the_workpiece_is_followed(page: Browser) -> None:
         assert target[:2] == pytest.approx([x, y])
 
 
+def test_a_window_of_another_size_is_filled_again(page: Browser) -> None:
+    def part() -> float:
+        """Height of the bowl over that of the picture."""
+        low, high = page.run("""const {height} = networkPage.head.bowl;
+            return [[0, 0, 0], [0, 0, height]].map(at => networkPage.view.onCanvas(at)[1])""")
+        return (low - high) / page.run("return document.getElementById('canvas').clientHeight")
+
+    before = part()
+    page.driver.set_window_size(700, 1100)
+    page.wait(lambda: page.run("return innerWidth") < 800, "the narrow window")
+    page.wait(lambda: 0.3 < part() < 0.95, "the bowl to fit")
+    page.driver.set_window_size(1366, 900)
+    page.wait(lambda: abs(part() - before) < 0.02, "the bowl to fit again")
+
+
 def test_all_controls_have_names(page: Browser) -> None:
     nameless = page.run("""
         const controls = document.querySelectorAll("input, select, button, canvas, svg");
         const named = one => one.getAttribute("aria-label") || one.textContent.trim();
-        return [...controls].filter(one => !one.labels?.length && !named(one)).map(one => one.outerHTML)
+        const nameless = [...controls].filter(one => !one.labels?.length && !named(one));
+        return nameless.map(one => one.outerHTML)
     """)
     assert nameless == []
 
