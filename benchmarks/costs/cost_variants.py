@@ -5,6 +5,7 @@ side by side with the deck it is compared with; `cost_timing` does the timing.
 """
 
 import copy
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -15,6 +16,7 @@ from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
 from dragdeck.scenes.moved_workpiece import ProcessDeck
 from dragdeck.scenes.process import process_scene
 from dragdeck.study.model import Study
+from dragdeck.study.paths.circle import CirclePath
 from dragdeck.study.workpiece import CylinderShape
 from dragdeck.sweep.cases import settle_case
 
@@ -69,9 +71,10 @@ class Variant:
         return _SCENE_OF_BASE[self.base]
 
     @property
-    def own_particles(self) -> bool:
-        """Whether its bed is one of other particles."""
-        return any(name.startswith("media.") for name in self.fields)
+    def own_bed(self) -> bool:
+        """Whether its bed has other particles, or a workpiece in another place or pose."""
+        others = ("media.", "workpieces", "motion.tilt_deg", "motion.path")
+        return any(name.startswith(others) for name in self.fields)
 
     @property
     def parameter(self) -> str | None:
@@ -133,14 +136,15 @@ def variant_case(base: Case, variant: Variant) -> Case:
 
 
 def bed_case(base: Case, variant: Variant) -> Case:
-    """The case whose settled bed a variant is dragged through: other particles, other bed."""
-    return variant_case(base, variant) if variant.own_particles else base
+    """The case whose bed, with its workpiece in it, a variant is dragged through."""
+    return variant_case(base, variant) if variant.own_bed else base
 
 
 def variants(base: Case) -> list[Variant]:
     """All variants that the study of a standard case allows."""
     families = (
         _geometry(base.study),
+        _motions(base.study),
         _outputs(base),
         _neighbours(base.study),
         _steps(base.study),
@@ -171,6 +175,28 @@ def _geometry(study: Study) -> Iterator[Variant]:
     for name, factor in (("narrow", 0.5), ("wide", 2.0)):
         what = f"{facets} {1000 * factor * wide:g} mm wide"
         yield Variant(f"workpiece_{name}_facets", what, {width: factor * wide})
+
+
+def _motions(study: Study) -> Iterator[Variant]:
+    path = study.motion.path
+    if not isinstance(path, CirclePath) or study.motion.superposed() or study.workpieces:
+        return
+    yield Variant("spin", "the workpiece spins, 60 1/min", {"motion.spin": {"rpm": 60}})
+    up_and_down = {"amplitude_m": 0.001, "frequency_hz": 5}
+    yield Variant(
+        "oscillation", "the workpiece oscillates, 1 mm at 5 Hz", {"motion.oscillation": up_and_down}
+    )
+    yield Variant("tilt", "the workpiece leans by 10 degrees", {"motion.tilt_deg": 10})
+    yield Variant("workpieces", "three workpieces on the circle", {"workpieces": {"count": 3}})
+    rest = {"kind": "rest", "radius_m": path.radius_m, "bowl_rpm": _rpm(study, path)}
+    fields = {"motion.path": rest, "motion.speed_m_s": None}
+    what = "the bowl rotates, as facets of a particle diameter, and the workpiece stands still"
+    yield Variant("rotating_bowl", what, fields)
+
+
+def _rpm(study: Study, path: CirclePath) -> float:
+    """Of a bowl that passes the workpiece as fast as it is dragged, 1/min."""
+    return 60 * study.motion.axis_speed_m_s / (2 * math.pi * path.radius_m)
 
 
 def _outputs(base: Case) -> Iterator[Variant]:

@@ -97,7 +97,7 @@ def test_an_upright_study_keeps_its_run_id(moved: Callable[..., Case]) -> None:
 @pytest.mark.parametrize(
     ("motion", "says"),
     [
-        ({"tilt_deg": 10, "spin": {"rpm": 60}}, "tilt_deg and spin cannot be combined"),
+        ({"tilt_deg": 10, "spin": {"rpm": 60}}, "tilt_deg and a rotation cannot be combined"),
         ({"tilt_deg": 60}, "less than or equal to 45"),
     ],
 )
