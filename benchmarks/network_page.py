@@ -2,7 +2,8 @@
 
 The time to the first picture is counted from the start of loading the page. The frame rate is that
 of 3 s in which every picture shows another frame of the run from another direction: as much work
-as playing and turning at once. Each round has a browser of its own; medians are reported.
+as playing and turning at once. Each round has a browser of its own; medians are reported. A page that is
+drawn too slowly takes fewer pixels while it moves; the fraction, along an edge, is given then.
 
     PYTHONPATH=tests/helpers python benchmarks/network_page.py RUN_DIR... [--rounds 5]
 
@@ -33,15 +34,19 @@ const next = (now) => {
   page.show((page.number + 1) % page.frames.count);
   page.view.turn(0.02, 0);
   if (now - start < 3000) requestAnimationFrame(next);
-  else done((1000 * (page.view.drawn - before)) / (now - start));
+  else done([(1000 * (page.view.drawn - before)) / (now - start), page.view.pace.ratio]);
 };
 requestAnimationFrame(next);
 """
 LOOKS = ("as opened", "contacts above the mean", "media in full")
 
 
-def one_round(page: Path, size: str) -> tuple[float, dict[str, float]]:
-    """Time to the first picture in s, and pictures per second of each look."""
+Rates = dict[str, tuple[float, float]]
+"""Of each look: pictures per second, and pixels drawn per pixel of the page along an edge."""
+
+
+def one_round(page: Path, size: str) -> tuple[float, Rates]:
+    """Time to the first picture in s, and the rate of each look."""
     with tempfile.TemporaryDirectory() as profile:
         browser = Browser(Path(profile), size=size)
         try:
@@ -49,6 +54,11 @@ def one_round(page: Path, size: str) -> tuple[float, dict[str, float]]:
             return first, {look: browser.driver.execute_async_script(PLAY, look) for look in LOOKS}
         finally:
             browser.close()
+
+
+def _words(rates: list[tuple[float, float]]) -> str:
+    rate, ratio = (median(values) for values in zip(*rates, strict=True))
+    return f"{rate:.0f}" if ratio == 1 else f"{rate:.0f} (at {100 * ratio:.0f} % of the pixels)"
 
 
 def main() -> None:
@@ -65,7 +75,7 @@ def main() -> None:
         page = run_dir / "network.html"
         for size in SIZES:
             rounds = [one_round(page, size) for _ in range(options.rounds)]
-            rates = [f"{median(rates[look] for _, rates in rounds):.0f}" for look in LOOKS]
+            rates = [_words([rates[look] for _, rates in rounds]) for look in LOOKS]
             first = f"{median(first for first, _ in rounds):.2f}"
             size_mb = f"{page.stat().st_size / 1e6:.1f}"
             row = [run_dir.name, size_mb, size.replace(",", " x "), first, *rates]

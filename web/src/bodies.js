@@ -48,6 +48,9 @@ export class Bodies {
   show() {
     this.mesh.geometry.setDrawRange(0, 6 * this.count);
     this.mesh.visible = this.count > 0;
-    this.texture.needsUpdate = true;
+    const { width } = this.texture.image, used = Math.ceil((TEXELS * this.count) / width);
+    this.texture.clearUpdateRanges();
+    for (let row = 0; row < used; row++) this.texture.addUpdateRange(4 * width * row, 4 * width);
+    if (used) this.texture.needsUpdate = true;
   }
 }

@@ -19,19 +19,19 @@ export class Contacts {
   /** Show the contacts of a frame that pass threshold and classes; see `media.js`. */
   update(frame, look, colourOf) {
     const { from, to } = this.frames.ends(frame), { force } = this.frames.head.scales, mean = this.frames.head.media.radius;
-    const classes = CLASS_COLOURS.map(rgb), pale = rgb(PALE), steel = rgb(STEEL), marks = [PATH_COLOUR, CHAIN_COLOUR].map(rgb);
+    const kinds = this.frames.classes(frame), tints = CLASS_COLOURS.map(rgb), pale = rgb(PALE), steel = rgb(STEEL), marks = [PATH_COLOUR, CHAIN_COLOUR].map(rgb);
     this.rows = [];
     this.counts = [0, 0, 0];
     this.cylinders.clear();
     this.halos.clear();
     for (let k = 0; k < frame.a.length; k++) {
-      const kind = this.frames.classOf(frame, k), value = frame.normal[k], flags = frame.flags[k];
+      const kind = kinds[k], value = frame.normal[k], flags = frame.flags[k];
       const onPath = look.path && (flags & DOMINANT) > 0, inChain = look.chains && (flags & QUASI_LINEAR) > 0;
       const passes = look.classes[kind] && value > look.threshold;
       if (passes) this.counts[kind]++;
       const marked = onPath || (inChain && passes);
       if (!passes && !marked) continue;
-      let tint = look.colour === "force" ? colourOf(value / force) : look.colour === "class" ? classes[kind] : steel;
+      let tint = look.colour === "force" ? colourOf(value / force) : look.colour === "class" ? tints[kind] : steel;
       if (look.fade && !marked) tint = blend(tint, pale, 0.8);
       const radius = mean * Math.min(Math.max((LARGEST * value) / force, marked ? LEAST_MARKED : LEAST), LARGEST);
       const start = from.subarray(3 * k, 3 * k + 3), end = to.subarray(3 * k, 3 * k + 3);

@@ -72,10 +72,10 @@ export class Frames {
     return (frame.ends = { from, to });
   }
 
-  /** 0 between particles, 1 with the workpiece, 2 with the bowl. */
-  classOf(frame, contact) {
-    const b = frame.b[contact];
-    return b < FIRST_BODY ? 0 : this.head.bodies[b].startsWith("workpiece") ? 1 : 2;
+  /** The class of each contact: 0 between particles, 1 with the workpiece, 2 with the bowl. */
+  classes(frame) {
+    const ofBody = (b) => (this.head.bodies[b].startsWith("workpiece") ? 1 : 2);
+    return (frame.classes ??= Uint8Array.from(frame.b, (b) => (b < FIRST_BODY ? 0 : ofBody(b))));
   }
 
   /** Name of a contact's second body: the particle's number, or workpiece, floor or side. */

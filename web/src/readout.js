@@ -31,7 +31,7 @@ function contact([particle, other], frame, frames) {
   if (k < 0) return [name, [["no contact at this time", ""]]];
   const flags = frame.flags[k], chains = [flags & QUASI_LINEAR && "quasi-linear chain", flags & DOMINANT ? "dominant path" : flags & PATH && "path to the bowl"];
   return [name, [
-    ["class", CLASSES[frames.classOf(frame, k)].replace("-", "–")],
+    ["class", CLASSES[frames.classes(frame)[k]].replace("-", "–")],
     ["normal force", `${digits(frame.normal[k])} N`],
     ["tangential force", `${digits(frame.tangential[k])} N`],
     ["tangential / normal", frame.normal[k] > 0 ? digits(frame.tangential[k] / frame.normal[k], 3) : "–"],

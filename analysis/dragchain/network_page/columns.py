@@ -52,4 +52,4 @@ class Columns:
 
     def text(self) -> str:
         """All columns, one after another, compressed (zlib) and in base64."""
-        return base64.b64encode(zlib.compress(b"".join(self._parts), 9)).decode("ascii")
+        return base64.b64encode(zlib.compress(b"".join(self._parts))).decode("ascii")
