@@ -2,8 +2,9 @@
 
 The time to the first picture is counted from the start of loading the page. The frame rate is that
 of 3 s in which every picture shows another frame of the run from another direction: as much work
-as playing and turning at once. Each round has a browser of its own; medians are reported. A page that is
-drawn too slowly takes fewer pixels while it moves; the fraction, along an edge, is given then.
+as playing and turning at once. Each round has a browser of its own; medians are reported. A page
+that is drawn too slowly takes fewer pixels while it moves; the fraction, along an edge, is given
+then.
 
     PYTHONPATH=tests/helpers python benchmarks/network_page.py RUN_DIR... [--rounds 5]
 

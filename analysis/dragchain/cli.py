@@ -129,9 +129,6 @@ STEPS = (
         _argument("--source", help="source of the expected exponent"),
         _argument("--fit-range", type=float, nargs=2, metavar=("LOW", "HIGH"),
                   help="levels for which the exponent is expected"))),
-    Command("validate", "compare the runs of a study with its source",
-            "validation.report:write_validation",
-            (OUT_DIR, RUN_DIRS, _argument("--command", required=True, help="for the record"))),
     Command("record", "find the impacts of a measured drop test",
             "calibration.results:write_record", (
         RECORD,

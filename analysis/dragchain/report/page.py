@@ -35,7 +35,7 @@ def render_page(
     Parameters
     ----------
     template : str
-        Path below this package or the given one, for example ``validation/validation.html.j2``.
+        Path below this package or the given one, for example ``tradeoff/tradeoff.html.j2``.
     filters : mapping, optional
         Filters of this page alone, by name.
     package : str

@@ -197,7 +197,7 @@ def _network_pages(sections: Sequence[Section]) -> list[str]:
     """The name, beside the report, of each case's page on its contact network."""
     if len(sections) == 1:
         return [NETWORK_PAGE]
-    return [f"network-{section.study.process.case.run}.html" for section in sections]
+    return [f"network-{section.study.process.folder.name}.html" for section in sections]
 
 
 def _overview(studies: Sequence[StudyRuns]) -> str:

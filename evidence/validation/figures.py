@@ -13,11 +13,11 @@ from dragchain.figures.panels import legend_below, new_figure, new_panels
 from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
 from dragchain.run.kinematics import drag_start_s
 from dragchain.statistics.estimate import Estimate
-from dragchain.validation.around_workpiece import Statements
-from dragchain.validation.corridor import Network
-from dragchain.validation.effects import Effect
-from dragchain.validation.force import Compared, Force, Spectrum
-from dragchain.validation.runs_by_bed import Point
+from evidence.validation.around_workpiece import Statements
+from evidence.validation.corridor import Network
+from evidence.validation.effects import Effect
+from evidence.validation.force import Compared, Force, Spectrum
+from evidence.validation.runs_by_bed import Point
 
 _COLOURS = {"experiment": GREEN, "simulation": ORANGE}
 

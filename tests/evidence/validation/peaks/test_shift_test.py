@@ -8,7 +8,7 @@ from peak_runs import FRAMES, INTERVAL_S, wander
 from scipy.stats import binom, false_discovery_control
 
 from dragchain.drag.peaks import find_drag_peaks
-from dragchain.statistics.shift_test import (
+from evidence.validation.peaks.shift_test import (
     Window,
     band,
     draw_shifts,

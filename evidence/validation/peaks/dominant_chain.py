@@ -15,8 +15,8 @@ import pandas as pd
 from dragchain.arrays import Floats, Ints, wrap_angle
 from dragchain.network import chains as network_chains
 from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame, read_frames
-from dragchain.validation.peaks.lifetimes import lives
-from dragchain.validation.peaks.settings import FORCE_FACTORS, SETTINGS
+from evidence.validation.peaks.lifetimes import lives
+from evidence.validation.peaks.settings import FORCE_FACTORS, SETTINGS
 
 Contacts = dict[tuple[int, int], int]
 """The contact of each linked pair of particles, the lower row first."""

@@ -6,7 +6,7 @@ import pandas as pd
 
 from dragchain.documents import Part
 from dragchain.statistics.estimate import Estimate
-from dragchain.validation.around_workpiece import Statements
+from evidence.validation.around_workpiece import Statements
 
 Verdict = Literal["holds", "does not hold", "not resolved"]
 

@@ -12,15 +12,18 @@ from changed import changed
 from scipy import stats
 
 from dragchain.errors import DocumentError, SeriesError
+from dragchain.report.notation import MINUS
+from dragchain.report.page import page_environment
 from dragchain.run.case import PublishedDrag, Reference, load_case
+from dragchain.scaling.fit import read_scalings
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import Measures, RunCost
-from dragchain.validation import force
-from dragchain.validation.around_workpiece import contacts_of
-from dragchain.validation.claims import verdict
-from dragchain.validation.corridor import Corridor, relative_places
-from dragchain.validation.effects import effect_table, effects
-from dragchain.validation.runs_by_bed import (
+from evidence.validation import force
+from evidence.validation.around_workpiece import contacts_of
+from evidence.validation.claims import verdict
+from evidence.validation.corridor import Corridor, relative_places
+from evidence.validation.effects import effect_table, effects
+from evidence.validation.runs_by_bed import (
     Point,
     Points,
     over_packings,
@@ -289,3 +292,15 @@ def test_the_reach_lies_where_half_of_the_excess_is_left() -> None:
 def test_a_reference_that_is_not_measured_is_named(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match=r"measures.json: there is no such file"):
         read_points([tmp_path])
+
+
+def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
+    scalings = read_scalings()
+    template = page_environment(package="evidence").get_template("validation/scaling.html.j2")
+    page = template.render(found=scalings, picture=lambda name: f"data:image/png;base64,{name}")
+    assert 'src="data:image/png;base64,scaling.png"' in page
+    for found in scalings:
+        value, low, high = (
+            f"{n:.2f}".replace("-", MINUS) for n in vars(found.judged.exponent).values()
+        )
+        assert f"{found.verdict}: exponent {value} ({low} to {high})" in page

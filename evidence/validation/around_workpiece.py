@@ -19,8 +19,8 @@ from dragchain.run.kinematics import needed
 from dragchain.run.paths.circle import Circle
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 from dragchain.tables.by_step import read_table
-from dragchain.validation.corridor import Network, bin_by_bin, corridor, network
-from dragchain.validation.runs_by_bed import Point, over_packings
+from evidence.validation.corridor import Network, bin_by_bin, corridor, network
+from evidence.validation.runs_by_bed import Point, over_packings
 
 _FRONT = np.pi / 4.0
 """The front of the workpiece: azimuths within 45 degrees of the motion."""

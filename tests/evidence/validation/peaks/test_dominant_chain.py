@@ -12,7 +12,7 @@ from dragchain.network.chains import dominant_path, peters_rows, widest_paths
 from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame
 from dragchain.network.write import write_chains
 from dragchain.tables.write import write_tables
-from dragchain.validation.peaks.dominant_chain import (
+from evidence.validation.peaks.dominant_chain import (
     ChainNumbers,
     around_workpiece,
     chains_of,
@@ -20,7 +20,7 @@ from dragchain.validation.peaks.dominant_chain import (
     frame_table,
     path_chain,
 )
-from dragchain.validation.peaks.settings import DEFAULTS, FORCE_FACTORS, SETTINGS, Setting
+from evidence.validation.peaks.settings import DEFAULTS, FORCE_FACTORS, SETTINGS, Setting
 
 
 def by_setting(frame: NetworkFrame) -> list[tuple[Setting, ChainNumbers]]:

@@ -24,11 +24,11 @@ from dragchain.errors import TableError
 from dragchain.figures.network_picture import cylinder_radii
 from dragchain.network.write import write_chains
 from dragchain.report.page import page_environment
-from dragchain.validation.peaks import film
-from dragchain.validation.peaks.findings import Findings
-from dragchain.validation.peaks.report import report_peaks
-from dragchain.validation.peaks.runs import read_run
-from dragchain.validation.peaks.settings import SETTINGS
+from evidence.validation.peaks import film
+from evidence.validation.peaks.findings import Findings
+from evidence.validation.peaks.report import report_peaks
+from evidence.validation.peaks.runs import read_run
+from evidence.validation.peaks.settings import SETTINGS
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_tables_figures_and_film_are_written(written: Path) -> None:
 
 
 def section(found: Findings) -> str:
-    template = page_environment().get_template("validation/peaks/peaks.html.j2")
+    template = page_environment(package="evidence").get_template("validation/peaks/peaks.html.j2")
     content = json.loads(found.as_text())
     return template.render(found=content, picture=lambda name: f"data:{name}")
 

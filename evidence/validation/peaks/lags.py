@@ -7,9 +7,9 @@ import numpy as np
 from dragchain.arrays import Floats, Ints
 from dragchain.documents import Part
 from dragchain.statistics.estimate import Real
-from dragchain.statistics.shift_test import band, joint, standardised
-from dragchain.validation.peaks.run_series import RunSeries
-from dragchain.validation.peaks.settings import DEFAULTS, Definition
+from evidence.validation.peaks.run_series import RunSeries
+from evidence.validation.peaks.settings import DEFAULTS, Definition
+from evidence.validation.peaks.shift_test import band, joint, standardised
 
 _LAG_S = 0.5
 """The averages reach this far before and after a peak."""

@@ -10,11 +10,11 @@ from dragchain.figures.style import drawing, png
 from dragchain.files import write_bytes
 from dragchain.report.bundle import write_bundle
 from dragchain.tables.parquet import write_parquet
-from dragchain.validation.peaks.figures import draw
-from dragchain.validation.peaks.film import FILM, PICTURES, peak_pictures
-from dragchain.validation.peaks.findings import Findings, study
-from dragchain.validation.peaks.runs import peak_rows
-from dragchain.validation.peaks.tests import test_table
+from evidence.validation.peaks.figures import draw
+from evidence.validation.peaks.film import FILM, PICTURES, peak_pictures
+from evidence.validation.peaks.findings import Findings, study
+from evidence.validation.peaks.runs import peak_rows
+from evidence.validation.peaks.tests import test_table
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats, Ints
-from dragchain.statistics.shift_test import Window, shifted_means
+from evidence.validation.peaks.shift_test import Window, shifted_means
 
 REACH_S = 0.02
 """Frames within this time of a peak count as at the peak."""

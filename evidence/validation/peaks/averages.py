@@ -9,8 +9,8 @@ from scipy.stats import CensoredData, ecdf
 from dragchain.arrays import Floats
 from dragchain.documents import Part
 from dragchain.statistics.estimate import Estimate, Real, mean_of
-from dragchain.validation.peaks.run_series import PeakRule, RunSeries
-from dragchain.validation.peaks.tests import mean_of_known
+from evidence.validation.peaks.run_series import PeakRule, RunSeries
+from evidence.validation.peaks.tests import mean_of_known
 
 TOP = 0.95
 """Quantile of a run's chains above which one is among the strongest."""

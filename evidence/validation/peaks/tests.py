@@ -15,10 +15,10 @@ from scipy.signal import find_peaks
 
 from dragchain.arrays import Floats, Ints
 from dragchain.documents import Part
-from dragchain.statistics import shift_test
 from dragchain.statistics.estimate import Real
-from dragchain.validation.peaks.run_series import PeakRule, RunSeries, rules_of
-from dragchain.validation.peaks.settings import SETTINGS, Definition
+from evidence.validation.peaks import shift_test
+from evidence.validation.peaks.run_series import PeakRule, RunSeries, rules_of
+from evidence.validation.peaks.settings import SETTINGS, Definition
 
 ASIDE_S = (0.05, 0.15)
 """Stretch before, and after, a peak that are compared with each other."""

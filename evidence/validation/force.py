@@ -15,7 +15,7 @@ from dragchain.run.kinematics import drag_start_s
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.statistics.estimate import Estimate, Real
-from dragchain.validation.runs_by_bed import Point, over_packings
+from evidence.validation.runs_by_bed import Point, over_packings
 
 _COMPONENTS = ("drag_n", "lateral_n", "vertical_n")
 

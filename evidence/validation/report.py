@@ -16,15 +16,15 @@ from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.figures import draw_scalings
 from dragchain.scaling.fit import read_scalings
 from dragchain.statistics.estimate import EstimateColumns
-from dragchain.validation import figures
-from dragchain.validation import loading_over_packings as loading
-from dragchain.validation.around_workpiece import Profile, Statements, of_packings
-from dragchain.validation.claims import Claim, claim_table, claims
-from dragchain.validation.effects import Effect, effect_table, effects
-from dragchain.validation.force import Compared, Force, compare
-from dragchain.validation.force import of_packings as force_of
-from dragchain.validation.peaks.report import PeaksReport, report_peaks
-from dragchain.validation.runs_by_bed import Points, read_points
+from evidence.validation import figures
+from evidence.validation import loading_over_packings as loading
+from evidence.validation.around_workpiece import Profile, Statements, of_packings
+from evidence.validation.claims import Claim, claim_table, claims
+from evidence.validation.effects import Effect, effect_table, effects
+from evidence.validation.force import Compared, Force, compare
+from evidence.validation.force import of_packings as force_of
+from evidence.validation.peaks.report import PeaksReport, report_peaks
+from evidence.validation.runs_by_bed import Points, read_points
 
 _SAME_SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particles")
 """Numbers that a scene shares with the sweeps that are shown beside it."""
@@ -186,6 +186,8 @@ def render(
 
     return render_page(
         "validation/validation.html.j2",
+        None,
+        "evidence",
         found=json.loads(found.as_text()),
         scalings=found.scalings,
         peaks=json.loads(peaks.findings.as_text()),

@@ -13,13 +13,13 @@ from dragchain.arrays import Floats
 from dragchain.figures.marks import compass, key, row, row_names
 from dragchain.figures.panels import head, legend_below, new_figure, new_panels
 from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
-from dragchain.validation.peaks.averages import Lifetimes
-from dragchain.validation.peaks.findings import Study
-from dragchain.validation.peaks.lags import LagCurves
-from dragchain.validation.peaks.run_series import RunSeries
-from dragchain.validation.peaks.settings import DEFAULTS, DEFINITIONS, SETTINGS, Definition
-from dragchain.validation.peaks.tests import DESCRIPTORS, PeakTest
-from dragchain.validation.peaks.verdicts import LEVEL
+from evidence.validation.peaks.averages import Lifetimes
+from evidence.validation.peaks.findings import Study
+from evidence.validation.peaks.lags import LagCurves
+from evidence.validation.peaks.run_series import RunSeries
+from evidence.validation.peaks.settings import DEFAULTS, DEFINITIONS, SETTINGS, Definition
+from evidence.validation.peaks.tests import DESCRIPTORS, PeakTest
+from evidence.validation.peaks.verdicts import LEVEL
 
 _COLOURS: dict[Definition, str] = {
     "widest_path": BLUE, "free_path": GREEN, "peters": RED, "peters_workpiece": ORANGE

@@ -14,13 +14,13 @@ import numpy as np
 
 from dragchain.documents import Document, Part
 from dragchain.errors import TableError
-from dragchain.statistics.shift_test import SHIFTS, draw_shifts
-from dragchain.validation.peaks import averages, run_series
-from dragchain.validation.peaks.lags import LagCurves, lag_curves
-from dragchain.validation.peaks.runs import read_run
-from dragchain.validation.peaks.settings import DEFAULTS, DEFINITIONS, Definition
-from dragchain.validation.peaks.tests import ASIDE_S, NEAR_S, STRONG_STDS, PeakTest, tests_of
-from dragchain.validation.peaks.verdicts import LEVEL, SMALL, StatementVerdict, judge
+from evidence.validation.peaks import averages, run_series
+from evidence.validation.peaks.lags import LagCurves, lag_curves
+from evidence.validation.peaks.runs import read_run
+from evidence.validation.peaks.settings import DEFAULTS, DEFINITIONS, Definition
+from evidence.validation.peaks.shift_test import SHIFTS, draw_shifts
+from evidence.validation.peaks.tests import ASIDE_S, NEAR_S, STRONG_STDS, PeakTest, tests_of
+from evidence.validation.peaks.verdicts import LEVEL, SMALL, StatementVerdict, judge
 
 
 class RunRow(Part):

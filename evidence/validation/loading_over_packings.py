@@ -9,7 +9,7 @@ from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.document import FILE, ContactType, Loading
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
-from dragchain.validation.runs_by_bed import Point, over_packings
+from evidence.validation.runs_by_bed import Point, over_packings
 
 _PER_METRE = {
     "normal_impulse_n_s": "N s/m",

@@ -11,7 +11,7 @@ from dragchain.documents import Part
 from dragchain.drag.force import read_counted
 from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.estimate import Estimate
-from dragchain.validation.runs_by_bed import Point, Points
+from evidence.validation.runs_by_bed import Point, Points
 
 
 class Effect(Part):

@@ -14,9 +14,9 @@ from dragchain.errors import TableError
 from dragchain.run.case import load_case
 from dragchain.run.kinematics import drag_start_s
 from dragchain.run.paths.circle import Circle
-from dragchain.validation.peaks.dominant_chain import frame_table
-from dragchain.validation.peaks.run_series import AVERAGED_S, DISTINCT_STDS, RunSeries
-from dragchain.validation.peaks.settings import SETTINGS
+from evidence.validation.peaks.dominant_chain import frame_table
+from evidence.validation.peaks.run_series import AVERAGED_S, DISTINCT_STDS, RunSeries
+from evidence.validation.peaks.settings import SETTINGS
 
 
 def read_run(run_dir: Path) -> RunSeries:

@@ -26,8 +26,8 @@ from typing import Literal, get_args
 
 from dragchain.documents import Part
 from dragchain.statistics.estimate import Real
-from dragchain.validation.peaks.settings import DEFINITIONS, Definition
-from dragchain.validation.peaks.tests import FRACTIONS, ORIENTATION, BuiltIn, PeakTest, Statement
+from evidence.validation.peaks.settings import DEFINITIONS, Definition
+from evidence.validation.peaks.tests import FRACTIONS, ORIENTATION, BuiltIn, PeakTest, Statement
 
 LEVEL = 0.05
 SMALL = 0.2

@@ -19,7 +19,7 @@ from dragchain.run.kinematics import needed
 from dragchain.run.paths.circle import Circle
 from dragchain.statistics.estimate import Estimate, EstimateColumns
 from dragchain.tables.by_step import read_groups
-from dragchain.validation.runs_by_bed import Point, over_packings
+from evidence.validation.runs_by_bed import Point, over_packings
 
 _WIDTH = 1.0
 """Half width of the corridor beyond the workpiece's radius, in particle diameters."""

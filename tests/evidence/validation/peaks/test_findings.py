@@ -8,13 +8,13 @@ import pytest
 from peak_runs import COUNT, findings, made_run
 
 from dragchain.errors import TableError
-from dragchain.validation.peaks.averages import lifetimes
-from dragchain.validation.peaks.findings import Findings, study, study_of
-from dragchain.validation.peaks.lifetimes import lives
-from dragchain.validation.peaks.runs import averaged, peak_rows, peak_table
-from dragchain.validation.peaks.settings import SETTINGS, Definition
-from dragchain.validation.peaks.tests import BuiltIn, PeakTest, near_any
-from dragchain.validation.peaks.verdicts import judge
+from evidence.validation.peaks.averages import lifetimes
+from evidence.validation.peaks.findings import Findings, study, study_of
+from evidence.validation.peaks.lifetimes import lives
+from evidence.validation.peaks.runs import averaged, peak_rows, peak_table
+from evidence.validation.peaks.settings import SETTINGS, Definition
+from evidence.validation.peaks.tests import BuiltIn, PeakTest, near_any
+from evidence.validation.peaks.verdicts import judge
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
 

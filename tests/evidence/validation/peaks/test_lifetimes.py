@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dragchain.validation.peaks.lifetimes import lives, overlap
+from evidence.validation.peaks.lifetimes import lives, overlap
 
 
 def test_overlap_is_shared_over_all() -> None:
