@@ -4,7 +4,8 @@ import { Bodies } from "./bodies.js";
 import { CHOSEN, rgb } from "./colours.js";
 import { bodyMaterial, facetMaterial } from "./shading.js";
 
-const PARTICLE = 0.6, CONTACT = 0.12; // radii, in the particle's own and in the mean particle radius
+const PARTICLE = 0.6,
+  CONTACT = 0.12; // radii, in the particle's own and in the mean particle radius
 
 export class Chosen {
   constructor(frames, workpiece) {
@@ -13,7 +14,10 @@ export class Chosen {
     this.body = new Bodies(1, onTop(bodyMaterial()));
     this.corners = new BufferAttribute(new Float32Array(9), 3);
     const geometry = new BufferGeometry().setAttribute("position", this.corners);
-    for (const [name, value] of [["normal", [0, 0, 1]], ["colour", rgb(CHOSEN)]]) {
+    for (const [name, value] of [
+      ["normal", [0, 0, 1]],
+      ["colour", rgb(CHOSEN)],
+    ]) {
       geometry.setAttribute(name, new BufferAttribute(new Float32Array([value, value, value].flat()), 3));
     }
     this.facet = new Mesh(geometry, onTop(facetMaterial()));
@@ -32,13 +36,21 @@ export class Chosen {
   }
 
   markContact(frame, pair) {
-    const k = this.frames.find(frame, ...pair), { from, to } = this.frames.ends(frame);
+    const k = this.frames.find(frame, ...pair),
+      { from, to } = this.frames.ends(frame);
     if (k < 0) return;
-    this.body.add(from.subarray(3 * k, 3 * k + 3), to.subarray(3 * k, 3 * k + 3), CONTACT * this.frames.head.media.radius, 0, rgb(CHOSEN));
+    this.body.add(
+      from.subarray(3 * k, 3 * k + 3),
+      to.subarray(3 * k, 3 * k + 3),
+      CONTACT * this.frames.head.media.radius,
+      0,
+      rgb(CHOSEN),
+    );
   }
 
   markParticle(frame, id) {
-    const row = frame.id.indexOf(id), centre = frame.centre.subarray(3 * row, 3 * row + 3);
+    const row = frame.id.indexOf(id),
+      centre = frame.centre.subarray(3 * row, 3 * row + 3);
     if (row >= 0) this.body.add(centre, centre, PARTICLE * frame.radius[row], 0, rgb(CHOSEN));
   }
 

@@ -1,6 +1,8 @@
 // The frames of the run: particles and contacts of one moment, in mm, N and mm/s.
 
-export const QUASI_LINEAR = 1, PATH = 2, DOMINANT = 4; // flags of a contact, as frames.py sets them
+export const QUASI_LINEAR = 1,
+  PATH = 2,
+  DOMINANT = 4; // flags of a contact, as frames.py sets them
 const FIRST_BODY = 0xfff0; // numbers from here on stand for bodies that are no particle
 
 export const CLASSES = ["particle-particle", "particle-workpiece", "particle-bowl"];
@@ -39,12 +41,21 @@ export class Frames {
     const [from, to] = range(this.starts.contacts, number);
     const part = (name) => this.columns[name].subarray(from, to);
     const point = this.places("point", ...range(this.starts.points, number));
-    return { a: part("a"), b: part("b"), flags: part("flags"), normal: part("normal"), tangential: part("tangential"), point };
+    return {
+      a: part("a"),
+      b: part("b"),
+      flags: part("flags"),
+      normal: part("normal"),
+      tangential: part("tangential"),
+      point,
+    };
   }
 
   /** Places in mm, (x, y, z) one after another, of numbers in 2 bytes that stand axis by axis. */
   places(name, from, to) {
-    const { low, step } = this.head.frames, column = this.columns[name], length = column.length / 3;
+    const { low, step } = this.head.frames,
+      column = this.columns[name],
+      length = column.length / 3;
     const places = new Float32Array(3 * (to - from));
     for (let axis = 0; axis < 3; axis++) {
       for (let k = from; k < to; k++) places[3 * (k - from) + axis] = low[axis] + step * column[axis * length + k];
@@ -55,7 +66,8 @@ export class Frames {
   /** How far each particle has moved since it was first shown, mm. */
   moved(frame) {
     return (frame.moved ??= Float32Array.from(frame.id, (id, k) => {
-      const [x, y, z] = this.first.get(id), at = frame.centre.subarray(3 * k, 3 * k + 3);
+      const [x, y, z] = this.first.get(id),
+        at = frame.centre.subarray(3 * k, 3 * k + 3);
       return Math.hypot(at[0] - x, at[1] - y, at[2] - z);
     }));
   }
@@ -63,7 +75,8 @@ export class Frames {
   /** The ends of each contact's line: centre to centre, or centre to contact point; (x, y, z) each. */
   ends(frame) {
     if (frame.ends) return frame.ends;
-    const from = new Float32Array(3 * frame.a.length), to = new Float32Array(3 * frame.a.length);
+    const from = new Float32Array(3 * frame.a.length),
+      to = new Float32Array(3 * frame.a.length);
     for (let k = 0, outer = 0; k < frame.a.length; k++) {
       from.set(frame.centre.subarray(3 * frame.a[k], 3 * frame.a[k] + 3), 3 * k);
       const [places, at] = frame.b[k] < FIRST_BODY ? [frame.centre, frame.b[k]] : [frame.point, outer++];
@@ -88,7 +101,7 @@ export class Frames {
   find(frame, particle, other) {
     const same = (contact) => {
       const pair = [String(frame.id[frame.a[contact]]), String(this.other(frame, contact))];
-      return pair[0] === particle && pair[1] === other || pair[1] === particle && pair[0] === other;
+      return (pair[0] === particle && pair[1] === other) || (pair[1] === particle && pair[0] === other);
     };
     let found = -1;
     for (let k = 0; k < frame.a.length; k++) {

@@ -20,9 +20,15 @@ export function showLegend(element, { colours, scales }, look, load) {
 }
 
 function scale(title, top, colours) {
-  const bar = block("bar"), ends = block("ends"), part = block("", title);
+  const bar = block("bar"),
+    ends = block("ends"),
+    part = block("", title);
   bar.style.background = `linear-gradient(to right, ${colours.join(", ")})`;
-  ends.append(...["0", digits(top / 2, 3), `≥ ${digits(top, 3)}`].map((text) => Object.assign(document.createElement("span"), { textContent: text })));
+  ends.append(
+    ...["0", digits(top / 2, 3), `≥ ${digits(top, 3)}`].map((text) =>
+      Object.assign(document.createElement("span"), { textContent: text }),
+    ),
+  );
   part.append(bar, ends);
   return part;
 }
@@ -30,7 +36,8 @@ function scale(title, top, colours) {
 function classes() {
   const part = block("", "Class of a contact");
   CLASSES.forEach((name, kind) => {
-    const row = block("", name.replace("-", "–")), swatch = document.createElement("i");
+    const row = block("", name.replace("-", "–")),
+      swatch = document.createElement("i");
     swatch.style.background = CLASS_COLOURS[kind];
     row.prepend(swatch);
     part.append(row);
@@ -42,7 +49,8 @@ const block = (name, text = "") => Object.assign(document.createElement("div"), 
 
 /** Draw a bar of a round length in mm. */
 export function showScale(bar, label, millimetresPerPixel) {
-  const rough = 110 * millimetresPerPixel, power = 10 ** Math.floor(Math.log10(rough));
+  const rough = 110 * millimetresPerPixel,
+    power = 10 ** Math.floor(Math.log10(rough));
   const length = [5, 2, 1].map((factor) => factor * power).find((one) => one <= rough) ?? power;
   bar.style.width = `${length / millimetresPerPixel}px`;
   label.textContent = `${Number(length.toPrecision(1))} mm`;

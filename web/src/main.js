@@ -1,6 +1,7 @@
 // network.html: the contact network of a run over time, and its drag force.
 import { Vector3 } from "three";
 import { outline } from "./bowl.js";
+import { named, underRay } from "./choice.js";
 import { Chosen } from "./chosen.js";
 import { CLASS_COLOURS, colourMap } from "./colours.js";
 import { readColumns } from "./columns.js";
@@ -10,6 +11,7 @@ import { Frames } from "./frames.js";
 import { showLegend, showScale } from "./legend.js";
 import { Media } from "./media.js";
 import { digits, seconds, whole } from "./numbers.js";
+import { Player } from "./player.js";
 import { numbers } from "./readout.js";
 import { PRESETS, View } from "./view.js";
 import { Workpiece } from "./workpiece.js";
@@ -34,26 +36,47 @@ class Page {
 
   startCurve({ resistance }) {
     document.documentElement.classList.add("with-curve");
-    const { curve, peaks } = this.head, hovered = byId("hovered");
-    const go = (time) => this.show(this.nearest(time)), goToPeak = (rank) => this.showPeak(rank);
-    this.curve = new ForceCurve(byId("curve"), { curve, peaks, values: resistance, end: this.frames.times.at(-1) }, { go, goToPeak });
-    this.curve.hovered = (at) => (hovered.textContent = at ? `${seconds(at.time)}: raw ${digits(at.raw)} N, filtered ${digits(at.smooth)} N` : "");
-    for (const name of ["raw", "smooth"]) byId(name).onchange = () => { this.curve.shown[name] = byId(name).checked; this.curve.draw(); };
+    const { curve, peaks } = this.head,
+      hovered = byId("hovered");
+    const go = (time) => this.go(this.nearest(time)),
+      goToPeak = (rank) => this.showPeak(rank);
+    this.curve = new ForceCurve(
+      byId("curve"),
+      { curve, peaks, values: resistance, end: this.frames.times.at(-1) },
+      { go, goToPeak },
+    );
+    this.curve.hovered = (at) =>
+      (hovered.textContent = at ? `${seconds(at.time)}: raw ${digits(at.raw)} N, filtered ${digits(at.smooth)} N` : "");
+    for (const name of ["raw", "smooth"])
+      byId(name).onchange = () => {
+        this.curve.shown[name] = byId(name).checked;
+        this.curve.draw();
+      };
     byId("whole").onclick = () => this.curve.zoom([...this.curve.whole]);
-    byId("peaks").append(...peaks.map(({ time, force }, rank) => {
-      const item = document.createElement("li"), button = document.createElement("button");
-      button.type = "button";
-      button.append(...[seconds(time), `${digits(force, 3)} N`].map((text) => Object.assign(document.createElement("span"), { textContent: text })));
-      button.setAttribute("aria-label", `Peak ${rank + 1}: ${digits(force)} N at ${seconds(time)}`);
-      button.onclick = () => this.showPeak(rank);
-      item.append(button);
-      return item;
-    }));
+    byId("peaks").append(
+      ...peaks.map(({ time, force }, rank) => {
+        const item = document.createElement("li"),
+          button = document.createElement("button");
+        button.type = "button";
+        button.append(
+          ...[seconds(time), `${digits(force, 3)} N`].map((text) =>
+            Object.assign(document.createElement("span"), { textContent: text }),
+          ),
+        );
+        button.setAttribute("aria-label", `Peak ${rank + 1}: ${digits(force)} N at ${seconds(time)}`);
+        button.onclick = () => this.showPeak(rank);
+        item.append(button);
+        return item;
+      }),
+    );
     if (!peaks.length) byId("peaks").append(Object.assign(document.createElement("li"), { textContent: "none" }));
   }
 
   nearest(time) {
-    return this.frames.times.reduce((best, one, k) => (Math.abs(one - time) < Math.abs(this.frames.times[best] - time) ? k : best), 0);
+    return this.frames.times.reduce(
+      (best, one, k) => (Math.abs(one - time) < Math.abs(this.frames.times[best] - time) ? k : best),
+      0,
+    );
   }
 
   /** Go to a peak and show the dominant path of its frame. */
@@ -62,7 +85,7 @@ class Page {
     this.peak = rank;
     this.curve.reveal(time);
     byId("path").checked = true;
-    this.show(frame, time);
+    this.go(frame, time);
   }
 
   // --- scene ---------------------------------------------------------------------------------
@@ -81,7 +104,14 @@ class Page {
     this.media = new Media(frames);
     this.contacts = new Contacts(frames);
     this.chosen = new Chosen(frames, this.workpiece);
-    this.view.scene.add(outline(head), this.workpiece.group, this.workpiece.arrow, this.media.mesh, ...this.contacts.meshes, this.chosen.group);
+    this.view.scene.add(
+      outline(head),
+      this.workpiece.group,
+      this.workpiece.arrow,
+      this.media.mesh,
+      ...this.contacts.meshes,
+      this.chosen.group,
+    );
     this.view.after = () => showScale(byId("scale-bar"), byId("scale-length"), this.view.millimetresPerPixel);
     this.view.resize();
     this.preset("overview");
@@ -92,27 +122,35 @@ class Page {
 
   /** What is to be seen: the bowl, or the surroundings of the workpiece in a wide one. */
   area() {
-    const { bowl } = this.head, { height } = bowl;
-    const { reach, x, y } = this.frames.partial ? { reach: this.reach, ...this.workpiece.pose(this.number) } : { reach: bowl.radius, x: 0, y: 0 };
+    const { bowl } = this.head,
+      { height } = bowl;
+    const { reach, x, y } = this.frames.partial
+      ? { reach: this.reach, ...this.workpiece.pose(this.number) }
+      : { reach: bowl.radius, x: 0, y: 0 };
     return { centre: new Vector3(x, y, 0.5 * height), radius: Math.hypot(reach, 0.5 * height), reach, height };
   }
 
   /** How far the shown particles reach from the workpiece's axis, mm. */
   get reach() {
-    const { centre } = this.frames.at(0), { x, y } = this.workpiece.pose(0);
+    const { centre } = this.frames.at(0),
+      { x, y } = this.workpiece.pose(0);
     let reach = 0;
     for (let k = 0; k < centre.length; k += 3) reach = Math.max(reach, Math.hypot(centre[k] - x, centre[k + 1] - y));
     return reach;
   }
 
   startControls() {
-    const redraw = () => this.redraw(), { scales } = this.head;
+    const redraw = () => this.redraw(),
+      { scales } = this.head;
     for (const button of byId("presets").children) button.onclick = () => this.preset(button.dataset.preset);
-    for (const name of ["colour", "load", "path", "chains", "fade", "class-0", "class-1", "class-2"]) byId(name).onchange = redraw;
+    for (const name of ["colour", "load", "path", "chains", "fade", "class-0", "class-1", "class-2"])
+      byId(name).onchange = redraw;
     for (const name of ["size", "threshold"]) byId(name).oninput = redraw;
-    byId("threshold-range").oninput = () => this.setThreshold(scales.largest * (byId("threshold-range").value / 1000) ** 2);
+    byId("threshold-range").oninput = () =>
+      this.setThreshold(scales.largest * (byId("threshold-range").value / 1000) ** 2);
     byId("mean").onclick = () => this.setThreshold(scales.mean);
-    for (const swatch of document.querySelectorAll("[data-class]")) swatch.style.background = CLASS_COLOURS[swatch.dataset.class];
+    for (const swatch of document.querySelectorAll("[data-class]"))
+      swatch.style.background = CLASS_COLOURS[swatch.dataset.class];
   }
 
   preset(name) {
@@ -128,34 +166,32 @@ class Page {
   // --- time ----------------------------------------------------------------------------------
 
   startTransport() {
-    const slider = byId("time");
+    const slider = byId("time"),
+      play = byId("play"),
+      speed = byId("speed");
+    const told = (on) => {
+      play.textContent = on ? "Pause" : "Play";
+      play.setAttribute("aria-pressed", on);
+    };
+    this.player = new Player(this.frames.times, { show: (number) => this.show(number), told });
     slider.max = this.frames.count - 1;
-    slider.oninput = () => this.show(Number(slider.value));
-    byId("previous").onclick = () => this.show(this.number - 1);
-    byId("next").onclick = () => this.show(this.number + 1);
-    byId("play").onclick = () => this.play(!this.playing);
+    slider.oninput = () => this.go(Number(slider.value));
+    byId("previous").onclick = () => this.go(this.number - 1);
+    byId("next").onclick = () => this.go(this.number + 1);
+    play.onclick = () => this.playOrPause();
+    speed.onchange = () => (this.player.speed = Number(speed.value));
+    this.player.speed = Number(speed.value);
   }
 
-  /** Play from the present frame, again from the first one after the last, or pause. */
-  play(on) {
-    this.playing = on;
-    byId("play").textContent = on ? "Pause" : "Play";
-    byId("play").setAttribute("aria-pressed", on);
-    if (!on) return;
-    const { times, count } = this.frames;
-    if (this.number === count - 1) this.show(0);
-    let last = performance.now(), time = times[this.number];
-    const advance = (now) => {
-      if (!this.playing) return;
-      time += (Number(byId("speed").value) * (now - last)) / 1000;
-      last = now;
-      let next = this.number;
-      while (next < count - 1 && times[next + 1] <= time) next++;
-      if (next !== this.number) this.show(next);
-      if (next === count - 1) this.play(false);
-      else requestAnimationFrame(advance);
-    };
-    requestAnimationFrame(advance);
+  playOrPause() {
+    if (this.player.playing) this.player.stop();
+    else this.player.start(this.number);
+  }
+
+  /** Go to a frame as the user wants, which ends playing; see `show`. */
+  go(number, time) {
+    this.player?.stop();
+    this.show(number, time);
   }
 
   /** Show a frame; `time`: where the cursor of the curve stands, if not at the frame. */
@@ -175,8 +211,15 @@ class Page {
   // --- what is seen --------------------------------------------------------------------------
 
   readControls() {
-    const checked = (name) => byId(name).checked, { look } = this;
-    Object.assign(look, { colour: byId("colour").value, load: byId("load").value, path: checked("path"), chains: checked("chains"), fade: checked("fade") });
+    const checked = (name) => byId(name).checked,
+      { look } = this;
+    Object.assign(look, {
+      colour: byId("colour").value,
+      load: byId("load").value,
+      path: checked("path"),
+      chains: checked("chains"),
+      fade: checked("fade"),
+    });
     look.classes = [0, 1, 2].map((kind) => checked(`class-${kind}`));
     look.threshold = Math.max(Number(byId("threshold").value) || 0, 0);
     look.size = byId("size").value / 100;
@@ -192,25 +235,49 @@ class Page {
     this.contacts.update(frame, this.look, this.colourOf);
     this.workpiece.update(this.look, this.colourOf);
     this.chosen.update(frame, this.look.chosen);
-    showLegend(byId("legend"), this.head, this.look, this.workpiece.own.loads.find(({ name }) => name === this.look.load));
+    showLegend(
+      byId("legend"),
+      this.head,
+      this.look,
+      this.workpiece.own.loads.find(({ name }) => name === this.look.load),
+    );
     this.tellNumbers(frame);
     this.view.wanted();
   }
 
   tellNumbers(frame) {
-    const { counts } = this.contacts, path = this.head.paths[this.number], { look } = this;
+    const { counts } = this.contacts,
+      path = this.head.paths[this.number],
+      { look } = this;
     counts.forEach((count, kind) => (byId(`count-${kind}`).textContent = whole(count)));
-    const parts = [["b", whole(counts.reduce((sum, count) => sum + count))], [0, ` of ${whole(frame.a.length)} contacts shown, normal force above ${digits(look.threshold, 3)} N. Drag force `], ["b", `${digits(this.curve.at(this.time))} N`], [0, ` at ${seconds(this.time)}. `]];
-    if (look.path && path) parts.push([0, "Dominant path: bottleneck "], ["b", `${digits(path.bottleneck)} N`], [0, `, mean ${digits(path.mean)} N, ${path.particles.length} particles, from workpiece to ${path.end}.`]);
+    const parts = [
+      ["b", whole(counts.reduce((sum, count) => sum + count))],
+      [
+        0,
+        ` of ${whole(frame.a.length)} contacts shown, normal force above ${digits(look.threshold, 3)} N. Drag force `,
+      ],
+      ["b", `${digits(this.curve.at(this.time))} N`],
+      [0, ` at ${seconds(this.time)}. `],
+    ];
+    if (look.path && path)
+      parts.push(
+        [0, "Dominant path: bottleneck "],
+        ["b", `${digits(path.bottleneck)} N`],
+        [0, `, mean ${digits(path.mean)} N, ${path.particles.length} particles, from workpiece to ${path.end}.`],
+      );
     if (look.path && !path) parts.push([0, "No path of contacts above the mean force leads from workpiece to bowl."]);
-    byId("status").replaceChildren(...parts.map(([tag, text]) => (tag ? Object.assign(document.createElement(tag), { textContent: text }) : text)));
+    byId("status").replaceChildren(
+      ...parts.map(([tag, text]) => (tag ? Object.assign(document.createElement(tag), { textContent: text }) : text)),
+    );
     if (look.chosen) this.tellChosen(frame);
   }
 
   tellChosen(frame) {
-    const [title, rows] = numbers(this.look.chosen, frame, this.frames, this.workpiece), table = document.createElement("table");
+    const [title, rows] = numbers(this.look.chosen, frame, this.frames, this.workpiece),
+      table = document.createElement("table");
     for (const [name, value] of rows) {
-      const row = table.insertRow(), head = document.createElement("th");
+      const row = table.insertRow(),
+        head = document.createElement("th");
       head.scope = "row";
       head.textContent = name;
       row.append(head);
@@ -237,14 +304,9 @@ class Page {
   }
 
   chooseAt(x, y) {
-    const { origin, direction } = this.view.ray(x, y), frame = this.frames.at(this.number);
-    const hits = (near) => [
-      [this.media.hit(origin, direction), (row) => ({ particle: frame.id[row] })],
-      [this.contacts.hit(origin, direction, near), (row) => ({ pair: [String(frame.id[frame.a[row]]), String(this.frames.other(frame, row))] })],
-      [this.workpiece.hit(origin, direction), (row) => ({ facet: row })],
-    ].filter(([hit]) => hit).sort(([one], [other]) => one.distance - other.distance);
-    const [nearest] = hits(0).length ? hits(0) : hits(NEAR * this.view.millimetresPerPixel);
-    if (nearest) this.choose(nearest[1](nearest[0].row));
+    const near = NEAR * this.view.millimetresPerPixel;
+    const choice = underRay(this.view.ray(x, y), near, this.frames.at(this.number), this);
+    if (choice) this.choose(choice);
   }
 
   choose(chosen) {
@@ -252,11 +314,9 @@ class Page {
     this.redraw();
   }
 
-  /** Choose a particle by its number, or a contact by the two bodies that it is between. */
   find(text) {
-    const names = text.trim().toLowerCase().split(/[\s,;–-]+/).filter(Boolean);
-    if (names.length === 1 && /^\d+$/.test(names[0])) this.choose({ particle: Number(names[0]) });
-    else if (names.length === 2) this.choose({ pair: names });
+    const choice = named(text);
+    if (choice) this.choose(choice);
     else byId("chosen").textContent = "Enter the number of a particle, or two bodies such as 12 345 or 12 workpiece.";
   }
 
@@ -264,16 +324,20 @@ class Page {
   showHighestFacet() {
     const { loads } = this.workpiece.own;
     if (!loads.some(({ name }) => name === byId("load").value)) byId("load").value = loads[0].name;
-    const facet = this.workpiece.highest(byId("load").value), { group, normals } = this.workpiece, { centre } = this.workpiece.facet(facet);
+    const facet = this.workpiece.highest(byId("load").value),
+      { group, normals } = this.workpiece,
+      { centre } = this.workpiece.facet(facet);
     group.updateMatrixWorld();
-    const target = new Vector3(...centre).applyMatrix4(group.matrixWorld), from = new Vector3(...normals.subarray(9 * facet, 9 * facet + 3)).transformDirection(group.matrixWorld);
+    const target = new Vector3(...centre).applyMatrix4(group.matrixWorld),
+      from = new Vector3(...normals.subarray(9 * facet, 9 * facet + 3)).transformDirection(group.matrixWorld);
     Object.assign(this.view, { follows: null, framed: null });
     this.view.look(target, from.add(new Vector3(0, 0, 0.15)), this.view.camera.zoom);
     this.choose({ facet });
   }
 
   key(event) {
-    const turn = 0.09, presets = Object.fromEntries(PRESETS.map((name, k) => [k + 1, () => this.preset(name)]));
+    const turn = 0.09,
+      presets = Object.fromEntries(PRESETS.map((name, k) => [k + 1, () => this.preset(name)]));
     const actions = {
       ...presets,
       ArrowLeft: () => this.view.turn(-turn, 0),
@@ -283,12 +347,13 @@ class Page {
       "+": () => this.view.magnify(1.15),
       "=": () => this.view.magnify(1.15),
       "-": () => this.view.magnify(1 / 1.15),
-      " ": () => this.play(!this.playing),
-      ",": () => this.show(this.number - 1),
-      ".": () => this.show(this.number + 1),
+      " ": () => this.playOrPause(),
+      ",": () => this.go(this.number - 1),
+      ".": () => this.go(this.number + 1),
       p: () => this.head.peaks.length && this.showPeak(((this.peak ?? -1) + 1) % this.head.peaks.length),
     };
-    const action = event.ctrlKey || event.metaKey || event.altKey ? null : actions[event.key] ?? actions[event.key.toLowerCase()];
+    const action =
+      event.ctrlKey || event.metaKey || event.altKey ? null : (actions[event.key] ?? actions[event.key.toLowerCase()]);
     if (!action) return;
     event.preventDefault();
     action();
@@ -310,4 +375,6 @@ async function start() {
   document.documentElement.dataset.ready = "true";
 }
 
-start().catch((error) => tell("This page could not be shown; the pictures below are static. Use a browser of 2023 or later.", error));
+start().catch((error) =>
+  tell("This page could not be shown; the pictures below are static. Use a browser of 2023 or later.", error),
+);

@@ -17,8 +17,11 @@ export class Media {
   /** Show a frame; `look` is the state of the controls. */
   update(frame, look, colourOf) {
     const onPath = look.path ? particlesOnPath(frame) : new Set();
-    const measure = { speed: frame.speed, displacement: look.colour === "displacement" && this.frames.moved(frame) }[look.colour];
-    const plain = rgb(MEDIA), path = blend(rgb(PATH_COLOUR), [1, 1, 1], 0.25);
+    const measure = { speed: frame.speed, displacement: look.colour === "displacement" && this.frames.moved(frame) }[
+      look.colour
+    ];
+    const plain = rgb(MEDIA),
+      path = blend(rgb(PATH_COLOUR), [1, 1, 1], 0.25);
     this.rows = [];
     this.spheres.clear();
     for (let k = 0; k < frame.id.length; k++) {
@@ -36,7 +39,8 @@ export class Media {
   hit(origin, direction) {
     let nearest = null;
     this.rows.forEach((row, at) => {
-      const [centre, , radius] = this.spheres.at(at), to = [0, 1, 2].map((axis) => centre[axis] - origin[axis]);
+      const [centre, , radius] = this.spheres.at(at),
+        to = [0, 1, 2].map((axis) => centre[axis] - origin[axis]);
       const along = to[0] * direction[0] + to[1] * direction[1] + to[2] * direction[2];
       const inside = radius ** 2 - (to[0] ** 2 + to[1] ** 2 + to[2] ** 2 - along ** 2);
       const distance = along - Math.sqrt(Math.max(inside, 0));

@@ -8,7 +8,12 @@ const LIGHT = `float light(vec3 normal) { return 0.58 + 0.42 * max(dot(normal, v
 `;
 
 const material = (vertexShader, fragmentShader, options = {}) =>
-  new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: HEAD + vertexShader, fragmentShader: "precision highp float;\n" + fragmentShader, ...options });
+  new RawShaderMaterial({
+    glslVersion: GLSL3,
+    vertexShader: HEAD + vertexShader,
+    fragmentShader: "precision highp float;\n" + fragmentShader,
+    ...options,
+  });
 
 // The four corners of a square, by the number of a vertex, and the texels of the body it is of.
 const SQUARE = `
@@ -22,7 +27,10 @@ const SQUARE = `
 /** Bodies between two points, which may be one: spheres, and cylinders with round ends. Texels:
  *  (start, radius), (end, width of a halo or 0), (colour, 0). In parallel projection the outline of such
  *  a body is that of a stadium, and its depth is exact where it is a sphere. */
-export const bodyMaterial = () => material(SQUARE + `
+export const bodyMaterial = () =>
+  material(
+    SQUARE +
+      `
   flat out vec3 tint; flat out vec4 shape; flat out vec3 depth; out vec2 place;
   void main() {
     vec4 first = texel(0), second = texel(1);
@@ -35,7 +43,9 @@ export const bodyMaterial = () => material(SQUARE + `
     place = vec2(at.x < 0.0 ? -radius : size + radius, at.y * radius);
     tint = texel(2).rgb; shape = vec4(along, size, radius);
     depth = vec3(start.z, end.z - start.z, second.w > 0.0 ? -2.0 : 1.0);
-  }`, LIGHT + `
+  }`,
+    LIGHT +
+      `
   uniform mat4 projectionMatrix;
   flat in vec3 tint; flat in vec4 shape; flat in vec3 depth; in vec2 place; out vec4 shown;
   void main() {
@@ -49,25 +59,38 @@ export const bodyMaterial = () => material(SQUARE + `
     gl_FragDepth = 0.5 * (projectionMatrix[2][2] * z + projectionMatrix[3][2]) + 0.5;
     vec3 normal = vec3(off.x * shape.xy + off.y * vec2(-shape.y, shape.x), towards);
     shown = vec4(halo ? tint : tint * light(normal), 1.0);
-  }`, { side: DoubleSide });
+  }`,
+    { side: DoubleSide },
+  );
 
 /** Facets with a colour each, lit from the camera's side. */
-export const facetMaterial = () => material(`
+export const facetMaterial = () =>
+  material(
+    `
   in vec3 position, normal, colour;
   out vec3 tint, facing;
   void main() {
     gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
     facing = mat3(modelViewMatrix) * normal; tint = colour;
-  }`, LIGHT + `
+  }`,
+    LIGHT +
+      `
   in vec3 tint, facing; out vec4 shown;
   void main() {
     vec3 normal = normalize(facing);
     shown = vec4(tint * (0.3 + 0.7 * light(normal.z < 0.0 ? -normal : normal)), 1.0);
-  }`, { side: DoubleSide });
+  }`,
+    { side: DoubleSide },
+  );
 
 /** Lines of one colour. */
-export const lineMaterial = (colour, options) => material(`
+export const lineMaterial = (colour, options) =>
+  material(
+    `
   in vec3 position;
-  void main() { gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }`, `
+  void main() { gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }`,
+    `
   uniform vec3 colour; out vec4 shown;
-  void main() { shown = vec4(colour, 1.0); }`, { uniforms: { colour: { value: colour } }, ...options });
+  void main() { shown = vec4(colour, 1.0); }`,
+    { uniforms: { colour: { value: colour } }, ...options },
+  );

@@ -162,8 +162,8 @@ def test_it_plays_pauses_and_ends(page: Browser) -> None:
     def now() -> int:
         return int(page.run("return networkPage.number"))
 
-    speed = "document.getElementById('speed').options[1].value = arguments[0]"
-    page.run(f"networkPage.show(0); {speed}", "0.02")  # so slow that no machine comes to the end
+    speed = "networkPage.player.speed = arguments[0]"
+    page.run(f"networkPage.show(0); {speed}", 0.02)  # so slow that no machine comes to the end
     page.click("#play")
     assert page.text("#play") == "Pause"
     page.wait(lambda: now() > 0, "the second frame")
@@ -172,13 +172,17 @@ def test_it_plays_pauses_and_ends(page: Browser) -> None:
     paused = now()
     page.run("return new Promise(done => setTimeout(done, 1500))")
     assert now() == paused
-    page.run(speed, "2")
+    page.run(speed, 2)
     page.click("#play")
     page.wait(lambda: page.text("#play") == "Play", "the end")
     assert page.run("return networkPage.frames.count") == now() + 1
-    page.run(speed, "0.02")
+    page.run(speed, 0.02)
     page.click("#play")
     assert now() == 0
+    page.click("#next")
+    assert (now(), page.text("#play")) == (1, "Play")
+    page.find("#speed").send_keys("\N{MULTIPLICATION SIGN} 5")
+    assert page.run("return networkPage.player.speed") == 5
 
 
 def test_the_slider_moves_the_cursor_of_the_curve(page: Browser) -> None:
