@@ -27,6 +27,7 @@ localrules:
     promises,
     drop_test,
     export,
+    figures,
     filling,
     pass_verdict,
     process,
@@ -73,6 +74,12 @@ rule process:
 rule report:
     input:
         rules.write_report.output,
+
+
+# The figures of the process runs for a publication: SVG, PDF and PNG at the widths of columns.
+rule figures:
+    input:
+        every("process", "figures/journal/workpiece.pdf"),
 
 
 # The process runs as time series for ParaView and OVITO.

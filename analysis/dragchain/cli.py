@@ -76,6 +76,12 @@ COMMANDS = (
             (RUN_DIR,)),
     Command("network", "write the interactive page on a run's contact network",
             "network_page.page:write_page", (RUN_DIR,)),
+    Command("journal", "draw the figures of a process run for a publication",
+            "report.journal:write_journal_figures", (
+        RUN_DIR,
+        _argument("--paper-colours", action="store_true",
+                  help="forces from green to red, as in Uhlmann et al. (2015)"),
+    )),
     Command("export", "export a run to ParaView or OVITO", "export.write:export_command", (
         RUN_DIR,
         _argument("--to", required=True, choices=("paraview", "xyz"),

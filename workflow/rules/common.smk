@@ -45,6 +45,7 @@ DEFAULTS = {
     "fidelity": "",
     "plan": "",
     "stability_map": "studies/stability/map.yaml",
+    "colours": "uniform",
 }
 
 
@@ -63,13 +64,17 @@ def check_settings():
             refuse_setting(
                 key, "not the path of a file", "letters (a-z), digits, '.', '_', '-', '/'"
             )
+        if key == "colours" and value not in ("uniform", "paper"):
+            refuse_setting(key, "no such colours", "uniform or paper")
         if not file and not NAME.fullmatch(str(value)):
             refuse_setting(key, "not a name", NAME_LIMIT)
 
 
 check_settings()
 PROJECT = Project(Path(workflow.basedir))
-STUDY, FIDELITY, PLAN, STABILITY_MAP = (str(config.get(*item)) for item in DEFAULTS.items())
+STUDY, FIDELITY, PLAN, STABILITY_MAP, COLOURS = (
+    str(config.get(*item)) for item in DEFAULTS.items()
+)
 PLAN, VALIDATION = PLAN or "default", PLAN or "paper"
 explained(PROJECT.plan_file, PLAN)
 CASES = explained(PROJECT.cases, STUDY, FIDELITY or None)

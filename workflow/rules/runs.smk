@@ -172,6 +172,26 @@ for PLACE, SCENE in SCENES.items():
                 "dragchain chains $(dirname {input.run}) > {log} 2>&1"
 
 
+# The figures of a run for a publication; --config colours=paper: forces from green to red.
+rule draw_for_journal:
+    input:
+        tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
+        run=of_run("process", "run.json"),
+    output:
+        of_run("process", "figures/journal/workpiece.pdf"),
+    log:
+        of_run("process", "logs/journal.log"),
+    benchmark:
+        of_run("process", "benchmarks/journal.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        colours="--paper-colours" if COLOURS == "paper" else "",
+        source=source_hash("dragchain.report.journal"),
+    shell:
+        "dragchain journal $(dirname {input.run}) {params.colours} > {log} 2>&1"
+
+
 # What the quantities of a run would be at the physical Young's modulus.
 rule extrapolate_process:
     input:

@@ -14,6 +14,7 @@ from matplotlib.colors import to_hex
 
 from dragchain.arrays import Floats
 from dragchain.drag.peaks import Peaks, peak_separation_s
+from dragchain.figures.style import STYLE
 from dragchain.network.frame import KINDS, PARTICLE
 from dragchain.network_page.columns import Columns
 from dragchain.network_page.frames import (
@@ -29,9 +30,6 @@ from dragchain.run.workpiece import read_surface
 from dragchain.tables.by_step import read_table
 from dragchain.tables.columns import CENTRE, POINT, VELOCITY
 from dragchain.tables.run_folder import Run
-
-COLOURS = "magma_r"
-"""Perceptually uniform; also that of the pictures of the workpiece."""
 
 _LOADS = {
     "force_slide_pa": (
@@ -101,8 +99,9 @@ def load_scene(run: Run) -> Scene:
 
 
 def _colours() -> list[str]:
-    """The colour map; its palest end is left out, which could not be seen on white."""
-    return [to_hex(one) for one in matplotlib.colormaps[COLOURS](np.linspace(0.06, 0.94, 33))]
+    """The colour map of all figures, without its palest end, which could not be seen on white."""
+    colours = matplotlib.colormaps[STYLE["image.cmap"]]
+    return [to_hex(one) for one in colours(np.linspace(0.06, 0.94, 33))]
 
 
 # --- frames ----------------------------------------------------------------------------------

@@ -253,8 +253,8 @@ _Draw = Callable[[RunData, Any], Figure | None]
 """Draws a figure of a run with its findings; None: it lacks an optional table."""
 
 
-_PROCESS = (forces, network_xy, network_xz, force_around_workpiece, force_depth, chains_peaks)
-_DRAW: Mapping[str, _Draw] = {draw.__name__: draw for draw in (*_PROCESS, filling, drop_test)}
+DRAW_PROCESS = (forces, network_xy, network_xz, force_around_workpiece, force_depth, chains_peaks)
+_DRAW: Mapping[str, _Draw] = {draw.__name__: draw for draw in (*DRAW_PROCESS, filling, drop_test)}
 
 
 def write_figures(run_dir: Path) -> list[Path]:

@@ -186,6 +186,7 @@ def _render(sections: Sequence[Section], table: pd.DataFrame, missing: Sequence[
         sections=sections,
         network_pages=_network_pages(sections),
         missing=missing,
+        runs=_engine_runs(studies),
         overview=_overview(studies) if len(studies) > 1 else None,
         columns={str(name): table[name].tolist() for name in table},
         shown=_SHOWN,
@@ -198,6 +199,12 @@ def _network_pages(sections: Sequence[Section]) -> list[str]:
     if len(sections) == 1:
         return [NETWORK_PAGE]
     return [f"network-{section.study.process.folder.name}.html" for section in sections]
+
+
+def _engine_runs(studies: Sequence[StudyRuns]) -> list[ReportedRun[Findings]]:
+    """Every run of LIGGGHTS once: cases may share one, and so may workpieces."""
+    every = {(str(run.case.scene), run.case.run): run for study in studies for run in study.runs}
+    return [run for run in every.values() if run.case.output_of is None]
 
 
 def _overview(studies: Sequence[StudyRuns]) -> str:

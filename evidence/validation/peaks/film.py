@@ -20,7 +20,7 @@ from dragchain.figures.network_overlay import force_bar, show_network
 from dragchain.figures.network_picture import Look, Scene, View
 from dragchain.figures.panels import new_figure
 from dragchain.figures.rendering import check_rendering
-from dragchain.figures.style import BLUE, CHAIN, RED, drawing, png
+from dragchain.figures.style import BLUE, CHAIN, RED, drawing, force_map, png
 from dragchain.network.frame import read_frames
 from dragchain.run.case import Case, load_case
 from dragchain.run.kinematics import drag_start_s
@@ -236,7 +236,7 @@ def _picture(moments: PeakAndQuiet, shown: Scene, largest_n: float) -> Image.Ima
 
 def _swatches() -> Image.Image:
     """The colours of forces, bright and dark, and of marks, so that none is lost."""
-    bright = scene.colour_map()(np.linspace(0.0, 1.0, 16))[:, :3]
+    bright = force_map()(np.linspace(0.0, 1.0, 16))[:, :3]
     marks = np.array([to_rgb(colour) for colour in (BLUE, RED, CHAIN, "white")])
     greys = np.linspace(0.0, 1.0, 16)[:, None].repeat(3, axis=1)
     rows = [bright, 0.7 * bright, np.repeat(marks, 4, axis=0), greys]
