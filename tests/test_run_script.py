@@ -392,6 +392,35 @@ def test_test_runs_the_checks_then_pytest(machine: Machine):
     assert "[Snakefile] [workflow/rules/decks.smk]" in done[4]
 
 
+def test_the_browser_of_the_tests_is_installed_or_missed_aloud(machine: Machine):
+    machine.run("setup")
+    assert not any("chromium" in line for line in machine.done())
+    warned = machine.run("test")
+    assert warned.returncode == 0
+    assert "chromium-driver" in warned.stderr
+
+    machine.make_root()
+    machine.done()
+    machine.run("test")
+    assert any("chromium chromium-driver" in line for line in machine.done())
+    for name in ("chromium", "chromedriver"):
+        machine.add(name, FAKE_TOOL)
+    machine.run("test")
+    assert not any("apt-get" in line for line in machine.done())
+
+
+def test_bundling_scripts_needs_npm_alone(machine: Machine):
+    for name in ("liggghts", "python3"):
+        machine.remove(name)
+    refused = machine.run("web")
+    assert refused.returncode == 1
+    assert "npm is missing" in refused.stderr
+    for name in ("npm", "node"):
+        machine.add(name, FAKE_TOOL)
+    assert machine.run("web").returncode == 0
+    assert names(machine.done()) == ["npm", "node"]
+
+
 def test_a_quick_test_leaves_out_what_is_slow(machine: Machine):
     machine.run("setup")
     machine.done()

@@ -74,6 +74,8 @@ COMMANDS = (
     Command("figures", "draw the figures of a run, from its tables",
             "report.run_figures:write_figures",
             (RUN_DIR,)),
+    Command("network", "write the interactive page on a run's contact network",
+            "network_page.page:write_page", (RUN_DIR,)),
     Command("journal", "draw the figures of a process run for a publication",
             "report.journal:write_journal_figures", (
         RUN_DIR,

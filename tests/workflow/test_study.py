@@ -61,7 +61,10 @@ def test_the_report_has_a_row_a_case(finished: Path) -> None:
     assert (summary.drag_mean_n < summary.drag_ci95_high_n).all()
     assert summary.bed_height_m.nunique() == 1
     assert 0.5 < summary.solid_fraction[0] < 0.64
-    assert stands_alone((report / "report.html").read_text()).images
+    networks = [file.name for file in report.glob("network-*.html")]
+    assert len(networks) == 2
+    page = stands_alone((report / "report.html").read_text(), networks)
+    assert page.images and set(networks) <= set(page.references)
 
 
 def test_cases_share_their_filling_and_drop(finished: Path) -> None:

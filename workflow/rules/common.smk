@@ -164,6 +164,12 @@ def page_templates(*names, package="analysis/dragchain"):
     return [str(file) for file in (*own, shared / "page.html.j2", shared / "macros.html.j2")]
 
 
+def network_page_files():
+    """What a page on the contact network is made of beside the data of its run."""
+    folder = PROJECT.root / "analysis/dragchain/network_page"
+    return [str(folder / name) for name in ("network.html.j2", "network.css", "network.js")]
+
+
 # --- cases and runs ------------------------------------------------------------------
 
 

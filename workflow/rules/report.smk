@@ -10,6 +10,7 @@ rule write_report:
         ],
         [every(name, "tables/figures.json") for name in SCENES],
         every("process", "tables/loading.json"),
+        every("process", "network.html"),
         every_extrapolated(),
         advice=asked_advice("process"),
         templates=page_templates("report/report.html.j2"),

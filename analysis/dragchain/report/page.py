@@ -19,6 +19,9 @@ from dragchain.report import notation
 LARGE_PICTURE = 200_000
 """Bytes above which a page holds a picture as WebP; ``figures/`` keeps the PNG."""
 
+NETWORK_PAGE = "network.html"
+"""The interactive page on the contact network of a process run, in its folder."""
+
 _HEADING = re.compile(r'<h2 id="([^"]+)">(.*?)</h2>')
 
 Filters = Mapping[str, Callable[..., object]]

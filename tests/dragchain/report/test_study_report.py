@@ -138,6 +138,32 @@ def test_two_cases_have_two_rows_and_an_overview(process: Path, tmp_path: Path) 
     assert "#workpiece-2" in page.references
 
 
+def test_the_page_on_the_contact_network_is_beside_the_report(
+    process: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    write_report(out, [process])
+    assert "There is no interactive page of this run" in page_of(out).words
+    (process / "network.html").write_text("the scene")
+    write_report(out, [process])
+    assert (out / "network.html").read_text() == "the scene"
+    page = stands_alone((out / "report.html").read_text(encoding="utf-8"), ["network.html"])
+    assert page.references.count("network.html") == 3
+    assert "There is no interactive page" not in page.words
+
+
+def test_each_case_has_its_own_page_on_the_contact_network(process: Path, tmp_path: Path) -> None:
+    case = case_json("process", "workpiece-2")
+    other = make_run(tmp_path / "results", case, process_findings(-3.0), PICTURES)
+    (other / "network.html").write_text("the second")
+    write_report(tmp_path / "out", [process, other])
+    assert (tmp_path / "out/network-workpiece-2.html").read_text() == "the second"
+    page = page_of(tmp_path / "out")
+    assert "network-workpiece-2.html" in page.references
+    assert "network-workpiece-1.html" not in page.references
+    assert "There is no interactive page of this run" in page.words
+
+
 def test_folders_of_filling_and_drop_may_be_given_too(process: Path, tmp_path: Path) -> None:
     small = process.parent.parent
     write_report(
