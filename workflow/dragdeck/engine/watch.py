@@ -8,7 +8,7 @@ from dragdeck.engine.checkpoints import drop_old_checkpoints, name_whole_checkpo
 from dragdeck.engine.limits import breach
 from dragdeck.engine.log import Sample, read_samples
 from dragdeck.engine.record import AcceptanceCheck
-from dragdeck.engine.reports import Report, shown_bytes
+from dragdeck.engine.reports import Report, shown_bytes, shown_time
 from dragdeck.engine.space import SPARE_BYTES, free_bytes, size_of
 from dragdeck.physics.run_limits import RunLimits
 
@@ -50,12 +50,9 @@ class Progress:
         speed = f"{self.steps_per_s:,.0f} steps/s"
         if not self.steps or not self.steps_per_s:
             return f"step {self.step:,}, {speed}"
-        left = (self.steps - self.step) / self.steps_per_s
+        left = shown_time((self.steps - self.step) / self.steps_per_s)
         fraction = 100 * self.step / self.steps
-        return (
-            f"step {self.step:,} of {self.steps:,} ({fraction:.0f} %), {speed}, "
-            f"{left // 60:.0f} min {left % 60:02.0f} s left"
-        )
+        return f"step {self.step:,} of {self.steps:,} ({fraction:.0f} %), {speed}, {left} left"
 
 
 @dataclass

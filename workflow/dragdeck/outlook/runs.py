@@ -1,0 +1,184 @@
+"""The runs of a study: what each is expected to take, how far it is, and how long all will take."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from dragdeck.cases.case import Case
+from dragdeck.decks.deck import StudyScene
+from dragdeck.engine.reports import shown_bytes, shown_time
+from dragdeck.engine.space import expected_bytes
+from dragdeck.engine.status import RunStatus, run_status
+from dragdeck.errors import InputError
+from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds
+from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.scene import SceneType
+
+WAITING = RunStatus("waiting")
+_ENDED = ("complete", "failed")
+
+
+@dataclass(frozen=True)
+class StudyRun:
+    """A run of LIGGGHTS: what it is expected to take, and how far it is.
+
+    Attributes
+    ----------
+    scene : str
+    folder : Path
+    after : Path or None
+        Folder of the filling that it starts from.
+    ranks : int
+    cost : Cost
+        Expected for the whole run.
+    size_bytes : float
+        Expected on the disk.
+    status : RunStatus
+    """
+
+    scene: str
+    folder: Path
+    after: Path | None
+    ranks: int
+    cost: Cost
+    size_bytes: float
+    status: RunStatus = WAITING
+
+    @property
+    def name(self) -> str:
+        """Scene and run id."""
+        return f"{self.scene} {self.folder.name}"
+
+    def now(self) -> "StudyRun":
+        """The same with the status that its folder has now."""
+        return replace(self, status=run_status(self.folder))
+
+    @property
+    def fraction(self) -> float:
+        """How much of it is done, by its steps; of a filling by the expected ones."""
+        if self.status.state == "complete":
+            return 1.0
+        end = self.status.last or self.cost.steps
+        return min(self.status.step / end, 0.99) if end else 0.0
+
+    @property
+    def left_s(self) -> float:
+        """Wall time that it still needs: by its own speed where that is known. An estimate."""
+        if self.status.state in _ENDED:
+            return 0.0
+        speed = self.status.steps_per_s
+        if speed is None:
+            return (1 - self.fraction) * self.cost.wall_time_s
+        return max(0.0, ((self.status.last or self.cost.steps) - self.status.step) / speed)
+
+    @property
+    def cells(self) -> tuple[str, str, str]:
+        """Percent, what it does, and time left, for a reader."""
+        status = self.status
+        speed = f", {status.steps_per_s:,.0f} steps/s" if status.steps_per_s else ""
+        if status.state in _ENDED:
+            took = f", {shown_time(status.wall_time_s)}" if status.wall_time_s else ""
+            return "", f"{status.state}{speed}{took}", ""
+        left = f"about {shown_time(self.left_s)}"
+        if status.state == "waiting":
+            return "", "waiting", f"{left} (speed {self.cost.basis})"
+        about = "" if status.last else "~"  # a filling's end is an estimate
+        energy = ""
+        if status.energy is not None:
+            energy = f", kinetic energy {status.energy:.2g} m g d (rest: {status.at_rest:g})"
+        if status.last is None and status.step >= self.cost.steps:
+            left = "longer than expected"
+        return f"{about}{100 * self.fraction:.0f} %", f"{status.state}{speed}{energy}", left
+
+
+def alike(runs: Mapping[Path, Case]) -> list[dict[Path, Case]]:
+    """Runs by their folders, those that differ in the seed alone together: they cost the same."""
+    found: dict[str, dict[Path, Case]] = {}
+    for folder, case in runs.items():
+        but_for_the_seed = case.study.model_copy(update={"seed": 0})
+        found.setdefault(but_for_the_seed.model_dump_json(), {})[folder] = case
+    return list(found.values())
+
+
+def expected_runs(
+    kind: SceneType,
+    runs: Mapping[Path, Case],
+    build: Callable[[Mapping[Path, Case]], StudyScene] | None = None,
+) -> Iterator[StudyRun]:
+    """What runs of a scene are expected to take; those whose scene cannot be built are left out.
+
+    Parameters
+    ----------
+    kind : SceneType
+    runs : mapping of Path to Case
+        By their folders.
+    build : callable, optional
+        The scene of runs that differ in the seed alone, if not that of `kind`.
+    """
+    speeds = measured_speeds(next(iter(runs)).parent) if runs else []
+    for group in alike(runs):
+        first = next(iter(group.values()))
+        try:
+            scene = build(group) if build else kind.build(first, None)
+        except InputError:
+            continue
+        count = 1 if kind.single_particle else scene.case.media.count
+        outputs = {output.name: output.as_part() for output in scene.deck.outputs}
+        size, cost = expected_bytes(outputs, count), expected_cost(kind, scene, speeds)
+        ranks = 1 if kind.single_particle else first.ranks
+        for folder, case in group.items():
+            filling = folder.parents[1] / FILLING.name / FILLING.run_id(case)
+            after = filling if kind.needs_bed else None
+            yield StudyRun(kind.name, folder, after, ranks, cost, size)
+
+
+def time_left(runs: Sequence[StudyRun], cores: int) -> float:
+    """Wall time that runs still need beside each other on so many cores. An estimate.
+
+    No less than their work shared by all cores, and than any run with the filling before it.
+    """
+    left = {run.folder: run.left_s for run in runs}
+    work = sum(run.left_s * min(run.ranks, cores) for run in runs) / cores
+    chains = (run.left_s + left.get(run.after, 0.0) if run.after else run.left_s for run in runs)
+    return max(work, *chains, 0.0)
+
+
+def done_fraction(runs: Sequence[StudyRun]) -> float:
+    """How much of the expected processor time of runs is behind them."""
+    work = [run.cost.wall_time_s * run.ranks for run in runs]
+    done = sum(run.fraction * one for run, one in zip(runs, work, strict=True))
+    return done / sum(work) if sum(work) else 1.0
+
+
+def cost_in_words(runs: Sequence[StudyRun], cores: int) -> str:
+    """Time and space that runs still need, in one line."""
+    waiting = [run for run in runs if run.status.state not in _ENDED]
+    basis = " and ".join(sorted({run.cost.basis for run in waiting}))
+    said = f"about {shown_time(time_left(runs, cores))} on {cores} core{'s' if cores > 1 else ''}"
+    size = shown_bytes(sum(run.size_bytes for run in waiting))
+    return f"{said}, {size} on the disk (estimates; speed {basis})"
+
+
+def plan_in_words(runs: Sequence[StudyRun], cores: int) -> list[str]:
+    """What will be run, as lines for a reader."""
+    todo = [run for run in runs if run.status.state not in _ENDED]
+    lines = [f"{_counted(todo)} of LIGGGHTS, {cost_in_words(todo, cores)}"] if todo else []
+    for scene in dict.fromkeys(run.scene for run in todo):
+        mine = [run for run in todo if run.scene == scene]
+        size = shown_bytes(sum(run.size_bytes for run in mine))
+        times = [shown_time(time) for time in _ends(run.left_s for run in mine)]
+        each = " each" if len(mine) > 1 else ""
+        lines.append(f"  {scene}: {_counted(mine)}, about {' to '.join(times)}{each}, {size}")
+    if ended := len(runs) - len(todo):
+        lines.append(f"{ended} ended before: repeated only if the input script has changed")
+    return lines
+
+
+def _counted(runs: Sequence[StudyRun]) -> str:
+    return f"{len(runs)} run{'s' if len(runs) != 1 else ''}"
+
+
+def _ends(values: Iterator[float]) -> list[float]:
+    """The smallest and the largest of some values, once if they are shown alike."""
+    found = sorted(values)
+    return [found[0]] if shown_time(found[0]) == shown_time(found[-1]) else [found[0], found[-1]]

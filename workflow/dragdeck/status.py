@@ -1,0 +1,106 @@
+"""What a study's runs will take, how far they are, and where its report is."""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from dragdeck.cases.case import Case
+from dragdeck.cases.ranks import cores_here
+from dragdeck.engine.reports import shown_bytes
+from dragdeck.engine.space import free_bytes
+from dragdeck.engine.status import RunState
+from dragdeck.errors import InputError
+from dragdeck.outlook.runs import (
+    StudyRun,
+    cost_in_words,
+    done_fraction,
+    expected_runs,
+    plan_in_words,
+)
+from dragdeck.project import POINTS, Project, find_project
+from dragdeck.scenes.registry import SCENES
+
+_SHOWN = 8
+"""Runs of a state that are listed without ``--verbose``."""
+
+_ORDER: tuple[RunState, ...] = ("failed", "running", "interrupted", "waiting", "complete")
+
+
+def runs_of(project: Project, cases: Iterable[Case], *, of_plan: bool = False) -> list[StudyRun]:
+    """The engine runs of cases, with the status that they have now."""
+    every = list(cases)
+    found = (
+        expected_runs(kind, project.run_folders(every, kind, of_plan=of_plan))
+        for kind in SCENES.values()
+    )
+    return [run.now() for several in found for run in several]
+
+
+def plan_of_jobs(
+    project: Project, cases: Iterable[Case], folders: Iterable[Path]
+) -> list[StudyRun]:
+    """Those runs of cases, or of points of a plan, that are in some folders."""
+    every, wanted = list(cases), {project.root / folder for folder in folders}
+    of_plan = any(folder.parent.name == POINTS for folder in wanted)
+    return [run for run in runs_of(project, every, of_plan=of_plan) if run.folder in wanted]
+
+
+def plan_text(study: str, folder: Path, runs: Sequence[StudyRun], cores: int) -> str:
+    """What will be run of a study, and the free space."""
+    first, *more = plan_in_words(runs, cores)
+    return "\n".join([f"{study}: {first}; {shown_bytes(free_bytes(folder))} free", *more])
+
+
+def status(study: str, fidelity: str | None, plan: str | None, verbose: bool) -> None:
+    """Print how far the runs of a study, or of a plan, are; at any time, whoever runs them."""
+    project = find_project(Path.cwd())
+    points = project.points(study, plan) if plan else None
+    cases = points.processes if points else project.cases(study, fidelity)
+    runs = runs_of(project, cases, of_plan=plan is not None)
+    for state in _ORDER:
+        _show_state(state, [run for run in runs if run.status.state == state], verbose)
+    left = [run for run in runs if run.status.state not in ("complete", "failed")]
+    counts = {state: sum(run.status.state == state for run in runs) for state in _ORDER}
+    said = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
+    cost = f"; {cost_in_words(left, cores_here())} left" if left else ""
+    print(f"{study}: {100 * done_fraction(runs):.0f} % done; runs: {said}{cost}")
+    if not plan and (file := project.report(study)).is_file():
+        print(f"report: {file}")
+
+
+def _show_state(state: RunState, runs: Sequence[StudyRun], verbose: bool) -> None:
+    """Print the runs of a state, those that need attention with the reason."""
+    shown = runs if verbose or state == "failed" else runs[:_SHOWN]
+    for run in shown:
+        print(f"{run.name}: {', '.join(filter(None, run.cells))}")
+        if run.status.problem:
+            print("  " + run.status.problem.replace("\n", "\n  "))
+        if state == "interrupted":
+            print("  remedy: give the same command again: it goes on from its last checkpoint")
+    if runs[len(shown) :]:
+        print(f"and {len(runs) - len(shown)} more {state} (--verbose)")
+
+
+def open_report(study: str) -> None:
+    """Print the path of a study's report, and open it where there is a display.
+
+    Raises
+    ------
+    InputError
+        There is no such study, or no report yet.
+    """
+    project = find_project(Path.cwd())
+    project.cases(study)
+    file = project.report(study)
+    if not file.is_file():
+        raise InputError(
+            "there is no report yet",
+            file=file,
+            remedy=f"make it with: ./run all --config study={study}",
+        )
+    print(file)
+    viewer = shutil.which("xdg-open")
+    if viewer and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        subprocess.Popen([viewer, str(file)], stderr=subprocess.DEVNULL, start_new_session=True)
