@@ -19,7 +19,7 @@ from dragdeck.outlook.runs import (
     expected_runs,
     plan_in_words,
 )
-from dragdeck.project import POINTS, Project, find_project
+from dragdeck.project import Project, find_project
 from dragdeck.scenes.registry import SCENES
 
 _SHOWN = 8
@@ -36,15 +36,6 @@ def runs_of(project: Project, cases: Iterable[Case], *, of_plan: bool = False) -
         for kind in SCENES.values()
     )
     return [run.now() for several in found for run in several]
-
-
-def plan_of_jobs(
-    project: Project, cases: Iterable[Case], folders: Iterable[Path]
-) -> list[StudyRun]:
-    """Those runs of cases, or of points of a plan, that are in some folders."""
-    every, wanted = list(cases), {project.root / folder for folder in folders}
-    of_plan = any(folder.parent.name == POINTS for folder in wanted)
-    return [run for run in runs_of(project, every, of_plan=of_plan) if run.folder in wanted]
 
 
 def plan_text(study: str, folder: Path, runs: Sequence[StudyRun], cores: int) -> str:
@@ -64,7 +55,7 @@ def status(study: str, fidelity: str | None, plan: str | None, verbose: bool) ->
     left = [run for run in runs if run.status.state not in ("complete", "failed")]
     counts = {state: sum(run.status.state == state for run in runs) for state in _ORDER}
     said = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
-    cost = f"; {cost_in_words(left, cores_here())} left" if left else ""
+    cost = f"; still to run: {cost_in_words(left, cores_here())}" if left else ""
     print(f"{study}: {100 * done_fraction(runs):.0f} % done; runs: {said}{cost}")
     if not plan and (file := project.report(study)).is_file():
         print(f"report: {file}")
@@ -74,7 +65,7 @@ def _show_state(state: RunState, runs: Sequence[StudyRun], verbose: bool) -> Non
     """Print the runs of a state, those that need attention with the reason."""
     shown = runs if verbose or state == "failed" else runs[:_SHOWN]
     for run in shown:
-        print(f"{run.name}: {', '.join(filter(None, run.cells))}")
+        print(run)
         if run.status.problem:
             print("  " + run.status.problem.replace("\n", "\n  "))
         if state == "interrupted":

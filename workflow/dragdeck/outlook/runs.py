@@ -73,22 +73,22 @@ class StudyRun:
 
     @property
     def cells(self) -> tuple[str, str, str]:
-        """Percent, what it does, and time left, for a reader."""
-        status = self.status
-        speed = f", {status.steps_per_s:,.0f} steps/s" if status.steps_per_s else ""
+        """Percent, speed with what a filling waits for, and time, for a reader."""
+        status, left = self.status, f"about {shown_time(self.left_s)} left"
+        doing = f"{status.steps_per_s:,.0f} steps/s" if status.steps_per_s else ""
         if status.state in _ENDED:
-            took = f", {shown_time(status.wall_time_s)}" if status.wall_time_s else ""
-            return "", f"{status.state}{speed}{took}", ""
-        left = f"about {shown_time(self.left_s)}"
-        if status.state == "waiting":
-            return "", "waiting", f"{left} (speed {self.cost.basis})"
-        about = "" if status.last else "~"  # a filling's end is an estimate
-        energy = ""
+            return "", doing, shown_time(status.wall_time_s) if status.wall_time_s else ""
+        if not status.step:
+            return "", "", f"about {shown_time(self.left_s)} (speed {self.cost.basis})"
         if status.energy is not None:
-            energy = f", kinetic energy {status.energy:.2g} m g d (rest: {status.at_rest:g})"
+            doing = f"{doing}, kinetic energy {status.energy:.1e} (rest: {status.at_rest:g})"
         if status.last is None and status.step >= self.cost.steps:
             left = "longer than expected"
-        return f"{about}{100 * self.fraction:.0f} %", f"{status.state}{speed}{energy}", left
+        about = "" if status.last else "~"  # where a filling ends is an estimate
+        return f"{about}{100 * self.fraction:.0f} %", doing.strip(", "), left
+
+    def __str__(self) -> str:
+        return f"{self.name}: {', '.join(filter(None, (self.status.state, *self.cells)))}"
 
 
 def alike(runs: Mapping[Path, Case]) -> list[dict[Path, Case]]:
@@ -156,13 +156,13 @@ def cost_in_words(runs: Sequence[StudyRun], cores: int) -> str:
     basis = " and ".join(sorted({run.cost.basis for run in waiting}))
     said = f"about {shown_time(time_left(runs, cores))} on {cores} core{'s' if cores > 1 else ''}"
     size = shown_bytes(sum(run.size_bytes for run in waiting))
-    return f"{said}, {size} on the disk (estimates; speed {basis})"
+    return f"{said}, {size} (estimates; speed {basis})"
 
 
 def plan_in_words(runs: Sequence[StudyRun], cores: int) -> list[str]:
     """What will be run, as lines for a reader."""
     todo = [run for run in runs if run.status.state not in _ENDED]
-    lines = [f"{_counted(todo)} of LIGGGHTS, {cost_in_words(todo, cores)}"] if todo else []
+    lines = [f"{_counted(todo)}, {cost_in_words(todo, cores)}"] if todo else []
     for scene in dict.fromkeys(run.scene for run in todo):
         mine = [run for run in todo if run.scene == scene]
         size = shown_bytes(sum(run.size_bytes for run in mine))
