@@ -14,6 +14,7 @@ from dragdeck.engine.status import RunState
 from dragdeck.errors import InputError
 from dragdeck.outlook.runs import (
     StudyRun,
+    by_their_speeds,
     cost_in_words,
     done_fraction,
     expected_runs,
@@ -49,7 +50,7 @@ def status(study: str, fidelity: str | None, plan: str | None, verbose: bool) ->
     project = find_project(Path.cwd())
     points = project.points(study, plan) if plan else None
     cases = points.processes if points else project.cases(study, fidelity)
-    runs = runs_of(project, cases, of_plan=plan is not None)
+    runs = by_their_speeds(runs_of(project, cases, of_plan=plan is not None))
     for state in _ORDER:
         _show_state(state, [run for run in runs if run.status.state == state], verbose)
     left = [run for run in runs if run.status.state not in ("complete", "failed")]

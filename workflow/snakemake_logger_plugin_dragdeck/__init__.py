@@ -21,7 +21,7 @@ from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
 from dragdeck.engine.reports import printable, shown_time
 from dragdeck.outlook.explain import Cost
-from dragdeck.outlook.runs import StudyRun, done_fraction, time_left
+from dragdeck.outlook.runs import StudyRun, by_their_speeds, done_fraction, time_left
 
 _RECORDS = ("run.json", "outcome.json")
 """Outputs of jobs that run LIGGGHTS in a folder."""
@@ -110,7 +110,7 @@ class LogHandler(LogHandlerBase):
         elif event == LogEvent.JOB_ERROR:
             self._ended(values["jobid"])
         elif event == LogEvent.PROGRESS:
-            self._progress = f"job {values['done']} of {values['total']}"
+            self._progress = f"{values['done']} of {values['total']} jobs done"
         elif "plan" in values:
             self._runs = {run.folder: run for run in values["plan"]}
             self._cores = values["cores"]
@@ -185,23 +185,26 @@ class LogHandler(LogHandlerBase):
         for run in active:
             lines.add_row(*map(Text, (run.name, *run.cells)))
         overall = Table.grid(padding=(0, 1))
-        bar = ProgressBar(total=1.0, completed=self._fraction(active), width=20)
-        overall.add_row(bar, Text(self._overall(active)))
+        overall.add_column()
+        overall.add_column(no_wrap=True, overflow="ellipsis")
+        done = done_fraction(self._together(active))
+        overall.add_row(ProgressBar(1.0, done, width=20), Text(self._overall(active)))
         return Group(lines, overall)
 
     def _together(self, active: list[StudyRun]) -> list[StudyRun]:
-        return list({**self._runs, **{run.folder: run for run in active}}.values())
-
-    def _fraction(self, active: list[StudyRun]) -> float:
-        return done_fraction(self._together(active))
+        runs = {**self._runs, **{run.folder: run for run in active}}
+        return by_their_speeds(list(runs.values()))
 
     def _overall(self, active: list[StudyRun]) -> str:
-        """How far the whole study is."""
-        runs = self._together(active)
-        left = f"runs: about {shown_time(time_left(runs, self._cores))} left" if runs else ""
-        percent = f"{100 * done_fraction(runs):.0f} %" if runs else ""
-        others = dict.fromkeys(job.rule for job in self._jobs.values() if not job.folder)
-        return ", ".join(filter(None, (percent, left, self._progress, *others)))
+        """How far the whole study is; only of runs of LIGGGHTS is known how long they take."""
+        runs, said = self._together(active), []
+        if runs:
+            left = time_left(runs, self._cores)
+            time = f", about {shown_time(left)} left" if left else ""
+            said = [f"runs {100 * done_fraction(runs):.0f} %{time}"]
+        others = dict.fromkeys(job.rule for job in list(self._jobs.values()) if not job.folder)
+        now = f": {', '.join(others)}" if others else ""
+        return "; ".join([*said, f"{self._progress or 'no job done'}{now}"])
 
 
 def _unplanned(folder: Path) -> StudyRun:

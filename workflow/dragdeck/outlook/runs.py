@@ -72,6 +72,11 @@ class StudyRun:
         return max(0.0, ((self.status.last or self.cost.steps) - self.status.step) / speed)
 
     @property
+    def basis(self) -> str:
+        """Whether the speed behind `left_s` is ``measured`` or ``assumed``."""
+        return "measured" if self.status.steps_per_s else self.cost.basis
+
+    @property
     def cells(self) -> tuple[str, str, str]:
         """Percent, speed with what a filling waits for, and time, for a reader."""
         status, left = self.status, f"about {shown_time(self.left_s)} left"
@@ -132,6 +137,22 @@ def expected_runs(
             yield StudyRun(kind.name, folder, after, ranks, cost, size)
 
 
+def by_their_speeds(runs: Sequence[StudyRun]) -> list[StudyRun]:
+    """Runs, those of an assumed speed corrected by the speeds of others of the same scene."""
+    seen: dict[str, list[float]] = {}
+    for run in runs:
+        if speed := run.status.steps_per_s:
+            seen.setdefault(run.scene, []).append(run.cost.steps / speed / run.cost.wall_time_s)
+    return [_corrected(run, seen.get(run.scene, [])) for run in runs]
+
+
+def _corrected(run: StudyRun, slower: Sequence[float]) -> StudyRun:
+    if not slower or run.cost.basis == "measured":
+        return run
+    time = run.cost.wall_time_s * sum(slower) / len(slower)
+    return replace(run, cost=Cost(run.cost.steps, time, f"{len(slower)} run(s) of this study here"))
+
+
 def time_left(runs: Sequence[StudyRun], cores: int) -> float:
     """Wall time that runs still need beside each other on so many cores. An estimate.
 
@@ -153,7 +174,7 @@ def done_fraction(runs: Sequence[StudyRun]) -> float:
 def cost_in_words(runs: Sequence[StudyRun], cores: int) -> str:
     """Time and space that runs still need, in one line."""
     waiting = [run for run in runs if run.status.state not in _ENDED]
-    basis = " and ".join(sorted({run.cost.basis for run in waiting}))
+    basis = " and ".join(sorted({run.basis for run in waiting}))
     said = f"about {shown_time(time_left(runs, cores))} on {cores} core{'s' if cores > 1 else ''}"
     size = shown_bytes(sum(run.size_bytes for run in waiting))
     return f"{said}, {size} (estimates; speed {basis})"
