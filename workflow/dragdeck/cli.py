@@ -76,8 +76,6 @@ COMMANDS = (
                   help="write the result to FILE and succeed even if the run is rejected"),
         _argument("--again", action="store_true",
                   help="start again even if the run was rejected before"),
-        _argument("--every", type=float, default=10.0, metavar="S", dest="every_s",
-                  help="seconds between reports"),
         _argument("--patience", type=float, default=1800.0, metavar="S", dest="patience_s",
                   help="seconds without any output after which LIGGGHTS is ended"))),
 )  # fmt: skip

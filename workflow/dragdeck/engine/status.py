@@ -95,7 +95,7 @@ def _unfinished(folder: Path, record: RunRecord, held: bool) -> RunStatus:
         state="running" if held else "interrupted",
         step=step,
         last=inputs.phases[-1].end_step if inputs.phases else None,
-        steps_per_s=(step - first) / seconds if held and step > first and seconds > 0 else None,
+        steps_per_s=(step - first) / seconds if step > first and seconds > 0 else None,
         wall_time_s=record.wall_time_s,
         energy=energy,
         at_rest=at_rest,

@@ -174,7 +174,8 @@ def done_fraction(runs: Sequence[StudyRun]) -> float:
 def cost_in_words(runs: Sequence[StudyRun], cores: int) -> str:
     """Time and space that runs still need, in one line."""
     waiting = [run for run in runs if run.status.state not in _ENDED]
-    basis = " and ".join(sorted({run.basis for run in waiting}))
+    bases = {run.basis for run in waiting}
+    basis = "partly assumed" if bases == {"assumed", "measured"} else "".join(bases)
     said = f"about {shown_time(time_left(runs, cores))} on {cores} core{'s' if cores > 1 else ''}"
     size = shown_bytes(sum(run.size_bytes for run in waiting))
     return f"{said}, {size} (estimates; speed {basis})"
@@ -187,9 +188,8 @@ def plan_in_words(runs: Sequence[StudyRun], cores: int) -> list[str]:
     for scene in dict.fromkeys(run.scene for run in todo):
         mine = [run for run in todo if run.scene == scene]
         size = shown_bytes(sum(run.size_bytes for run in mine))
-        times = [shown_time(time) for time in _ends(run.left_s for run in mine)]
-        each = " each" if len(mine) > 1 else ""
-        lines.append(f"  {scene}: {_counted(mine)}, about {' to '.join(times)}{each}, {size}")
+        time = shown_time(time_left(mine, cores))
+        lines.append(f"  {scene}: {_counted(mine)}, about {time}, {size}")
     if ended := len(runs) - len(todo):
         lines.append(f"{ended} ended before: repeated only if the input script has changed")
     return lines
@@ -197,9 +197,3 @@ def plan_in_words(runs: Sequence[StudyRun], cores: int) -> list[str]:
 
 def _counted(runs: Sequence[StudyRun]) -> str:
     return f"{len(runs)} run{'s' if len(runs) != 1 else ''}"
-
-
-def _ends(values: Iterator[float]) -> list[float]:
-    """The smallest and the largest of some values, once if they are shown alike."""
-    found = sorted(values)
-    return [found[0]] if shown_time(found[0]) == shown_time(found[-1]) else [found[0], found[-1]]
