@@ -3,10 +3,9 @@
 import os
 import shutil
 import subprocess
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import cores_here
 from dragdeck.engine.reports import shown_bytes
 from dragdeck.engine.space import free_bytes
@@ -20,23 +19,13 @@ from dragdeck.outlook.runs import (
     expected_runs,
     plan_in_words,
 )
-from dragdeck.project import Project, find_project
+from dragdeck.project import find_project
 from dragdeck.scenes.registry import SCENES
 
 _SHOWN = 8
 """Runs of a state that are listed without ``--verbose``."""
 
 _ORDER: tuple[RunState, ...] = ("failed", "running", "interrupted", "waiting", "complete")
-
-
-def runs_of(project: Project, cases: Iterable[Case], *, of_plan: bool = False) -> list[StudyRun]:
-    """The engine runs of cases, with the status that they have now."""
-    every = list(cases)
-    found = (
-        expected_runs(kind, project.run_folders(every, kind, of_plan=of_plan))
-        for kind in SCENES.values()
-    )
-    return [run.now() for several in found for run in several]
 
 
 def plan_text(study: str, folder: Path, runs: Sequence[StudyRun], cores: int) -> str:
@@ -49,8 +38,15 @@ def status(study: str, fidelity: str | None, plan: str | None, verbose: bool) ->
     """Print how far the runs of a study, or of a plan, are; at any time, whoever runs them."""
     project = find_project(Path.cwd())
     points = project.points(study, plan) if plan else None
-    cases = points.processes if points else project.cases(study, fidelity)
-    runs = by_their_speeds(runs_of(project, cases, of_plan=plan is not None))
+    every = [] if points else project.cases(study, fidelity)
+    found = (
+        expected_runs(
+            kind,
+            project.run_folders(points.of(kind) if points else every, kind, of_plan=bool(plan)),
+        )
+        for kind in SCENES.values()
+    )
+    runs = by_their_speeds([run.now() for several in found for run in several])
     for state in _ORDER:
         _show_state(state, [run for run in runs if run.status.state == state], verbose)
     left = [run for run in runs if run.status.state not in ("complete", "failed")]
