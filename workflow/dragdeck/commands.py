@@ -79,19 +79,18 @@ def check(study: str, fidelity: str | None, verbose: bool) -> None:
         for kind in SCENES.values()
         for run in expected_runs(kind, project.run_folders(every, kind), partial(found.look, kind))
     ]
-    line = ", ".join(
-        f"{len(several) or 'no'} {name}{'' if len(several) == 1 else 's'}"
-        for name, several in (("error", found.distinct_errors), ("warning", found.warnings))
-    )
+    warned = f"{len(found.warnings) or 'no'} warning{'' if len(found.warnings) == 1 else 's'}"
     if found.errors:
-        say(f"dragdeck: {together(found.errors)}")
+        wrong = together(found.errors)
+        say(f"dragdeck: {wrong}")
+        found.show(verbose)
+        errors = f"{1 + len(wrong.more)} error{'s' if wrong.more else ''}"
+        raise DragdeckError(f"{study}: {errors}, {warned}; it cannot be run")
     found.show(verbose)
-    if found.errors:
-        raise DragdeckError(f"{study}: {line}; it cannot be run")
     engine = find_engine()
     cost, *scenes = plan_in_words(runs, cores_here())
     print(*scenes, sep="\n")
-    print(f"{study}: {line}; {len(every)} case(s), {cost}; LIGGGHTS {engine.version}")
+    print(f"{study}: no errors, {warned}; {len(every)} case(s), {cost}; LIGGGHTS {engine.version}")
 
 
 @dataclass
@@ -120,11 +119,6 @@ class _Findings:
         names = [f"{kind.name} {folder.name}" for folder in runs]
         self.notes.setdefault("\n  ".join(lines), []).extend(names)
         return scene
-
-    @property
-    def distinct_errors(self) -> list[InputError]:
-        """Each error once."""
-        return list({str(error): error for error in self.errors}.values())
 
     def show(self, verbose: bool) -> None:
         """Print the warnings; and what is expected of every run, if that is asked for."""

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dragdeck.cases.ranks import cores_here
-from dragdeck.engine.reports import shown_bytes
-from dragdeck.engine.space import free_bytes
 from dragdeck.engine.status import RunState
 from dragdeck.errors import InputError
 from dragdeck.outlook.runs import (
@@ -17,7 +15,6 @@ from dragdeck.outlook.runs import (
     cost_in_words,
     done_fraction,
     expected_runs,
-    plan_in_words,
 )
 from dragdeck.project import find_project
 from dragdeck.scenes.registry import SCENES
@@ -28,28 +25,20 @@ _SHOWN = 8
 _ORDER: tuple[RunState, ...] = ("failed", "running", "interrupted", "waiting", "complete")
 
 
-def plan_text(study: str, folder: Path, runs: Sequence[StudyRun], cores: int) -> str:
-    """What will be run of a study, and the free space."""
-    first, *more = plan_in_words(runs, cores)
-    return "\n".join([f"{study}: {first}; {shown_bytes(free_bytes(folder))} free", *more])
-
-
 def status(study: str, fidelity: str | None, plan: str | None, verbose: bool) -> None:
     """Print how far the runs of a study, or of a plan, are; at any time, whoever runs them."""
     project = find_project(Path.cwd())
     points = project.points(study, plan) if plan else None
     every = [] if points else project.cases(study, fidelity)
-    found = (
-        expected_runs(
-            kind,
-            project.run_folders(points.of(kind) if points else every, kind, of_plan=bool(plan)),
-        )
-        for kind in SCENES.values()
-    )
-    runs = by_their_speeds([run.now() for several in found for run in several])
+    runs: list[StudyRun] = []
+    for kind in SCENES.values():
+        cases = points.of(kind) if points else every
+        folders = project.run_folders(cases, kind, of_plan=points is not None)
+        runs += [run.now() for run in expected_runs(kind, folders)]
+    runs = by_their_speeds(runs)
     for state in _ORDER:
         _show_state(state, [run for run in runs if run.status.state == state], verbose)
-    left = [run for run in runs if run.status.state not in ("complete", "failed")]
+    left = [run for run in runs if not run.status.final]
     counts = {state: sum(run.status.state == state for run in runs) for state in _ORDER}
     said = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
     cost = f"; still to run: {cost_in_words(left, cores_here())}" if left else ""
@@ -65,7 +54,7 @@ def _show_state(state: RunState, runs: Sequence[StudyRun], verbose: bool) -> Non
         print(run)
         if run.status.problem:
             print("  " + run.status.problem.replace("\n", "\n  "))
-        if state == "interrupted":
+        if state == "interrupted" and "remedy:" not in run.status.problem:
             print("  remedy: give the same command again: it goes on from its last checkpoint")
     if runs[len(shown) :]:
         print(f"and {len(runs) - len(shown)} more {state} (--verbose)")

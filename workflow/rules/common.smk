@@ -9,7 +9,7 @@ from snakemake.exceptions import WorkflowError
 from dragdeck.campaigns.restitution_drops import record_file
 from dragdeck.decks.templates import environment, template_files
 from dragdeck.errors import DragdeckError, choices
-from dragdeck.outlook.runs import expected_runs
+from dragdeck.outlook.runs import expected_runs, plan_in_words
 from dragdeck.outlook.timestep import largest_of_case
 from dragdeck.project import (
     PLACES,
@@ -21,10 +21,10 @@ from dragdeck.project import (
     study_templates,
 )
 from dragdeck.scenes.registry import SCENES
-from dragdeck.engine.reports import say
+from dragdeck.engine.reports import say, shown_bytes
+from dragdeck.engine.space import free_bytes
 from dragdeck.snakemake_lock import clear_stale_locks
 from dragdeck.source_hash import source_hash
-from dragdeck.status import plan_text
 from dragdeck.study.base import NAME, NAME_LIMIT
 from dragdeck.study.check import warnings
 from evidence.stability.map import bed_names

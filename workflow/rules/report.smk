@@ -41,8 +41,9 @@ rule write_report:
 onstart:
     runs, cores = planned_runs(workflow.dag.needrun_jobs()), workflow.cores or 1
     if runs:
-        shown = {"shown": True, "plan": runs, "cores": cores}
-        logger.info(plan_text(STUDY, PROJECT.root, runs, cores), extra=shown)
+        first, *more = plan_in_words(runs, cores)
+        lines = [f"{STUDY}: {first}; {shown_bytes(free_bytes(PROJECT.root))} free", *more]
+        logger.info("\n".join(lines), extra={"shown": True, "plan": runs, "cores": cores})
 
 
 onsuccess:

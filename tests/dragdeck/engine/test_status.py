@@ -117,6 +117,7 @@ def test_what_ended_a_run_before_its_start_is_in_its_log(process: Path) -> None:
     log = process / "logs/run.log"
     log.write_text("part 1\ndragdeck: no \x1b[31mengine\n  remedy: install it\n")
     status = run_status(process)
+    assert not status.final
     assert (status.state, status.problem) == ("failed", "no [31mengine\n  remedy: install it")
     with only_runner(process, silent):
         assert run_status(process).state == "waiting"

@@ -41,7 +41,7 @@ def test_runs_share_the_cores_and_wait_for_their_filling() -> None:
     assert time_left([filling, drags[0]], 8) == 40.0
     assert time_left([filling, *drags], 2) == 65.0
     assert time_left([filling, a_run("a", 30.0, ranks=8, after="f")], 4) == 40.0
-    done = replace(filling, status=RunStatus("complete"))
+    done = replace(filling, status=RunStatus("complete", final=True))
     assert time_left([done, drags[0]], 8) == 30.0
     assert time_left([], 2) == 0.0
 
@@ -70,7 +70,7 @@ def test_a_waiting_run_says_that_its_speed_is_assumed() -> None:
 
 
 def test_a_failed_run_takes_no_time_and_is_not_done() -> None:
-    failed = a_run("a", 30.0, RunStatus("failed", step=100))
+    failed = a_run("a", 30.0, RunStatus("failed", step=100, final=True))
     assert failed.left_s == 0.0
     assert failed.fraction == 0.1
 
@@ -84,13 +84,13 @@ def test_waiting_runs_take_the_measured_speed_of_their_scene() -> None:
 
 
 def test_what_is_done_counts_by_its_expected_time() -> None:
-    complete = a_run("a", 30.0, RunStatus("complete", step=1000))
+    complete = a_run("a", 30.0, RunStatus("complete", step=1000, final=True))
     assert done_fraction([complete, a_run("b", 10.0)]) == 0.75
     assert done_fraction([]) == 1.0
 
 
 def test_the_plan_counts_what_is_left() -> None:
-    complete = a_run("a", 30.0, RunStatus("complete"), after="f")
+    complete = a_run("a", 30.0, RunStatus("complete", final=True), after="f")
     lines = plan_in_words([a_run("f", 10.0), complete, a_run("b", 30.0, after="f")], 1)
     assert lines == [
         "2 runs, about 40 s on 1 core, 2 MB (estimates; speed assumed)",

@@ -37,6 +37,8 @@ class RunStatus:
         The last one that is known.
     last : int or None
         The one at which it ends; None where LIGGGHTS decides.
+    final : bool
+        It is complete, or was rejected: the same inputs are not run again.
     steps_per_s : float or None
         As measured: of the part that runs, or of all parts of a run that has ended.
     wall_time_s : float
@@ -50,6 +52,7 @@ class RunStatus:
     state: RunState
     step: int = 0
     last: int | None = None
+    final: bool = False
     steps_per_s: float | None = None
     wall_time_s: float = 0.0
     energy: float | None = None
@@ -77,7 +80,7 @@ def _status(folder: Path) -> RunStatus:
     return RunStatus(
         state=record.state,
         step=record.steps,
-        last=record.steps if complete else None,
+        final=True,
         steps_per_s=record.steps_per_s,
         wall_time_s=record.wall_time_s,
         problem="" if complete else printable(why_rejected(folder, record)),

@@ -55,16 +55,13 @@ def expected_cost(kind: SceneType, scene: StudyScene, speeds: Sequence[tuple[int
 
 def measured_speeds(results: Path) -> list[tuple[int, float]]:
     """Particles and steps per second of each complete run in a folder."""
-    return list(_measured(results))
-
-
-def _measured(results: Path) -> Iterable[tuple[int, float]]:
+    found = []
     for file in results.glob("*/run.json"):
         with suppress(OSError, ValueError, LookupError, TypeError):  # damaged: tells nothing
             speed = json.loads(file.read_text(encoding="utf-8"))["steps_per_s"]
             media = json.loads(file.with_name("case.json").read_text(encoding="utf-8"))["media"]
-            if speed:
-                yield int(media["count"]), float(speed)
+            found += [(int(media["count"]), float(speed))] if speed else []
+    return found
 
 
 def price_of(name: str, tradeoff: Tradeoff | None) -> str:

@@ -15,7 +15,6 @@ from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.scene import SceneType
 
 WAITING = RunStatus("waiting")
-_ENDED = ("complete", "failed")
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class StudyRun:
     @property
     def left_s(self) -> float:
         """Wall time that it still needs: by its own speed where that is known. An estimate."""
-        if self.status.state in _ENDED:
+        if self.status.final:
             return 0.0
         speed = self.status.steps_per_s
         if speed is None:
@@ -81,7 +80,7 @@ class StudyRun:
         """Percent, speed with what a filling waits for, and time, for a reader."""
         status, left = self.status, f"about {shown_time(self.left_s)} left"
         doing = f"{status.steps_per_s:,.0f} steps/s" if status.steps_per_s else ""
-        if status.state in _ENDED:
+        if status.final:
             return "", doing, shown_time(status.wall_time_s) if status.wall_time_s else ""
         if not status.step:
             return "", "", f"about {shown_time(self.left_s)} (speed {self.cost.basis})"
@@ -173,7 +172,7 @@ def done_fraction(runs: Sequence[StudyRun]) -> float:
 
 def cost_in_words(runs: Sequence[StudyRun], cores: int) -> str:
     """Time and space that runs still need, in one line."""
-    waiting = [run for run in runs if run.status.state not in _ENDED]
+    waiting = [run for run in runs if not run.status.final]
     bases = {run.basis for run in waiting}
     basis = "partly assumed" if bases == {"assumed", "measured"} else "".join(bases)
     said = f"about {shown_time(time_left(runs, cores))} on {cores} core{'s' if cores > 1 else ''}"
@@ -183,7 +182,7 @@ def cost_in_words(runs: Sequence[StudyRun], cores: int) -> str:
 
 def plan_in_words(runs: Sequence[StudyRun], cores: int) -> list[str]:
     """What will be run, as lines for a reader."""
-    todo = [run for run in runs if run.status.state not in _ENDED]
+    todo = [run for run in runs if not run.status.final]
     lines = [f"{_counted(todo)}, {cost_in_words(todo, cores)}"] if todo else []
     for scene in dict.fromkeys(run.scene for run in todo):
         mine = [run for run in todo if run.scene == scene]
