@@ -21,11 +21,11 @@ pytestmark = [pytest.mark.engine, pytest.mark.slow]
 SHOWN = ("--logger", "dragdeck", "--show-failed-logs")
 STUDY = ("--config", "study=tiny")
 CHATTER = ("rule run_", "Select jobs", "Building DAG", "Job stats", "jobid", "Finished job")
-QUIT = """{% extends "base/process.in.j2" %}
-{% block run %}{% if '0.005' in deck.run %}quit
+REJECTED = """{% extends "base/process.in.j2" %}
+{% block run %}{% if '0.005' in deck.run %}print "ERROR: on purpose"
 {% endif %}{{ super() }}{% endblock %}
 """
-"""One of the cases ends before its end."""
+"""One of the cases does not pass its acceptance checks."""
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +105,12 @@ def test_a_call_with_nothing_to_do_says_so(project: Path, piped: str) -> None:
     assert "Nothing to be done" in done.stderr
 
 
+def test_what_is_wrong_with_a_call_is_told(project: Path) -> None:
+    done = snakemake(project, *SHOWN, "all", "--config", "study=large")
+    assert done.returncode != 0
+    assert "unknown study 'large'" in done.stderr and "one of: tiny" in done.stderr
+
+
 def test_a_dry_run_lists_its_jobs(project: Path, piped: str) -> None:
     done = snakemake(project, *SHOWN, "--dry-run", "--forceall", "drop_test", *STUDY)
     assert "rule run_drop_test:" in done.stdout + done.stderr
@@ -146,14 +152,14 @@ def test_a_failed_run_is_told_in_full_and_has_a_status(
     data: dict[str, Any] = yaml.safe_load(file.read_text())
     data["sweep"] = {"motion.immersion_depth_m": [0.005, 0.006]}
     file.write_text(yaml.safe_dump(data))
-    (file.parent / "templates/process.in.j2").write_text(QUIT)
+    (file.parent / "templates/process.in.j2").write_text(REJECTED)
     done = snakemake(project, *SHOWN, "all", *STUDY)
     assert done.returncode != 0
     assert "Error in rule run_process:" in done.stderr
-    assert done.stderr.count("ended by itself: exit status 0, no end of the deck reached") > 0
+    assert "check:  no engine error: ERROR: on purpose (limit: none)" in done.stderr
     assert "report: results/tiny/report/report.html" in done.stderr
     assert main(["status", "tiny"]) == 0
     said = capsys.readouterr().out
     assert said.startswith("process quick_immersion_depth_m-0.005-")
-    assert "ended by itself" in said.splitlines()[2]
+    assert "  check:  no engine error: ERROR: on purpose (limit: none)" in said
     assert "runs: 1 failed, 3 complete" in said

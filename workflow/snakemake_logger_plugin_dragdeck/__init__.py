@@ -26,6 +26,9 @@ from dragdeck.outlook.runs import StudyRun, by_their_speeds, done_fraction, time
 _RECORDS = ("run.json", "outcome.json")
 """Outputs of jobs that run LIGGGHTS in a folder."""
 
+_BAR = 20
+"""Characters of the bar."""
+
 
 @dataclass
 class LogHandlerSettings(LogHandlerSettingsBase):
@@ -66,7 +69,9 @@ class LogHandler(LogHandlerBase):
             stderr=not common.stdout, no_color=common.nocolor, highlight=False, markup=False,
             emoji=False, soft_wrap=True,
         )  # fmt: skip
-        self._everything = common.dryrun or common.printshellcmds or common.verbose
+        self._everything = any(
+            (common.dryrun, common.printshellcmds, common.verbose, common.debug_dag)
+        )
         self._held: list[str] | None = []
         self._jobs: dict[int, _Job] = {}
         self._runs: dict[Path, StudyRun] = {}
@@ -185,10 +190,10 @@ class LogHandler(LogHandlerBase):
         for run in active:
             lines.add_row(*map(Text, (run.name, *run.cells)))
         overall = Table.grid(padding=(0, 1))
-        overall.add_column()
+        overall.add_column(min_width=_BAR)
         overall.add_column(no_wrap=True, overflow="ellipsis")
         done = done_fraction(self._together(active))
-        overall.add_row(ProgressBar(1.0, done, width=20), Text(self._overall(active)))
+        overall.add_row(ProgressBar(1.0, done, width=_BAR), Text(self._overall(active)))
         return Group(lines, overall)
 
     def _together(self, active: list[StudyRun]) -> list[StudyRun]:
