@@ -64,7 +64,7 @@ def test_a_call_says_first_what_it_will_do(piped: str) -> None:
 
 def test_each_run_has_plain_lines_with_percent_and_speed(piped: str) -> None:
     for pattern in (
-        r"^filling 140-particles-\w+: running, ~\d+ %, .* steps/s, kinetic energy \S+ \(rest: ",
+        r"^filling 140-particles-\w+: running, ~\d+ %, .* steps/s, energy \S+ [<>] 1e-05",
         r"^process quick-\w+: running, \d+ %, [\d,]+ steps/s, about \S+ s left$",
         r"^runs \d+ %, about .* left; \d+ of \d+ jobs done",
         r"^process quick-\w+: complete, [\d,]+ steps/s, ",

@@ -26,8 +26,8 @@ from dragdeck.outlook.runs import StudyRun, by_their_speeds, done_fraction, time
 _RECORDS = ("run.json", "outcome.json")
 """Outputs of jobs that run LIGGGHTS in a folder."""
 
-_BAR = 20
-"""Characters of the bar."""
+_BAR, _SHORTEST_NAME = 20, 12
+"""Characters of the bar, and of a run's name that is cut to make room for its numbers."""
 
 
 @dataclass
@@ -184,17 +184,19 @@ class LogHandler(LogHandlerBase):
     def _screen(self) -> Group:
         active = self._active()
         lines = Table.grid(padding=(0, 1))
-        lines.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
-        for _ in range(3):
-            lines.add_column(no_wrap=True)
-        for run in active:
-            lines.add_row(*map(Text, (run.name, *run.cells)))
+        cells = [run.cells for run in active]
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        left = max(_SHORTEST_NAME, self._console.width - sum(widths) - 4)
+        for run, row in zip(active, cells, strict=True):
+            name = Text(run.name, no_wrap=True)
+            name.truncate(left, overflow="ellipsis")
+            lines.add_row(name, *(Text(text, no_wrap=True) for text in row))
         overall = Table.grid(padding=(0, 1))
         overall.add_column(min_width=_BAR)
         overall.add_column(no_wrap=True, overflow="ellipsis")
         done = done_fraction(self._together(active))
         overall.add_row(ProgressBar(1.0, done, width=_BAR), Text(self._overall(active)))
-        return Group(lines, overall)
+        return Group(lines, overall) if active else Group(overall)
 
     def _together(self, active: list[StudyRun]) -> list[StudyRun]:
         runs = {**self._runs, **{run.folder: run for run in active}}

@@ -57,9 +57,7 @@ def test_a_running_run_needs_what_its_own_speed_says() -> None:
 def test_where_a_filling_ends_is_an_estimate() -> None:
     status = RunStatus("running", step=250, steps_per_s=50.0, energy=3e-4, at_rest=1e-5)
     run = a_run("a", 30.0, status)
-    assert run.cells == (
-        *("~25 %", "50 steps/s, kinetic energy 3.0e-04 (rest: 1e-05)", "about 15 s left"),
-    )
+    assert run.cells == (*("~25 %", "50 steps/s, energy 3.0e-04 > 1e-05", "about 15 s left"),)
     late = replace(run, status=replace(status, step=1200))
     assert late.fraction < 1
     assert late.cells[2] == "longer than expected"

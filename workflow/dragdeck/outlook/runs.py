@@ -84,8 +84,9 @@ class StudyRun:
             return "", doing, shown_time(status.wall_time_s) if status.wall_time_s else ""
         if not status.step:
             return "", "", f"about {shown_time(self.left_s)} (speed {self.cost.basis})"
-        if status.energy is not None:
-            doing = f"{doing}, kinetic energy {status.energy:.1e} (rest: {status.at_rest:g})"
+        if status.energy is not None and status.at_rest is not None:
+            sign = ">" if status.energy > status.at_rest else "<"
+            doing = f"{doing}, energy {status.energy:.1e} {sign} {status.at_rest:g}"
         if status.last is None and status.step >= self.cost.steps:
             left = "longer than expected"
         about = "" if status.last else "~"  # where a filling ends is an estimate
