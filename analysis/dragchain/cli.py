@@ -99,6 +99,9 @@ COMMANDS = (
 """What a user calls."""
 
 STEPS = (
+    Command("numbers", "print where a report is, and its main numbers",
+            "report.numbers:main_numbers",
+            (_argument("report_dir", type=Path, metavar="REPORT_DIR"),)),
     Command("measure", "make tables, chains and measures of a run of a plan",
             "tradeoff.measure_run:write_measures", (
                 RUN_DIR,
