@@ -19,8 +19,8 @@ from dragchain.errors import TableError
 PIECE_ROWS = 32_768
 """Rows that come at once: what is computed of them is a multiple of their size."""
 
-_NUMBER = re.compile("^step$|_(n|m|s|j|id|pa|m_s|n_m|rad_s)$")
-"""Names of columns that hold numbers, by their units."""
+_NUMBER = re.compile("^step$|^(?!input_).*_(n|m|s|j|id|pa|m_s|n_m|rad_s)$")
+"""Names of columns that hold numbers, by their units; an input may be a list, as text."""
 
 _NEVER_EMPTY = ("network", "particles", "workpiece_contacts")
 """Tables of a bed with a workpiece in it: they always have rows."""
