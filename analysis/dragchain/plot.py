@@ -31,11 +31,11 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
     peaks : bool
         Mark the peaks of the drag.
     """
-    ax = _axes(ax)
-    run_panels.forces(ax, run, run.findings)
+    found, ax = run.findings, _axes(ax)
+    run_panels.forces(ax, run, found)
     if peaks:
-        found = run.findings.peaks
-        ax.plot(found.process_time_s, found.drag_n, "v", color=RED, label=f"{found.count} peaks")
+        times_s, label = found.peaks.process_time_s, f"{found.peaks.count} peaks"
+        ax.plot(times_s, found.peaks.drag_n, "v", color=RED, label=label)
     ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.15), frameon=False, fontsize="small")
     return ax
 
@@ -51,10 +51,10 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
     peaks : bool
         Draw a line at the time of each peak of the drag.
     """
-    ax = _axes(ax)
-    run_panels.bottlenecks(ax, run, run.findings)
+    found, ax = run.findings, _axes(ax)
+    run_panels.bottlenecks(ax, run, found)
     if peaks:
-        run_panels.peak_times(ax, run.findings)
+        run_panels.peak_times(ax, found)
     return ax
 
 
@@ -68,10 +68,9 @@ def force_around(run: FinishedRun, ax: Any = None) -> Any:
     ax : PolarAxes, optional
         ``plt.subplots(subplot_kw={"projection": "polar"})`` makes them; `ValueError` for others.
     """
-    ax = _axes(ax, projection="polar")
+    around, ax = run.findings.azimuth, _axes(ax, projection="polar")
     if ax.name != "polar":
         raise ValueError("force_around needs polar axes: subplot_kw={'projection': 'polar'}")
-    around = run.findings.azimuth
     compass_bars(as_compass(ax), around.edges_rad, around.force_n)
     return ax
 
@@ -87,9 +86,9 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
     total : bool
         Draw the sum of the normal forces per depth (N/mm) instead.
     """
-    ax = _axes(ax)
+    found, ax = run.findings, _axes(ax)
     draw = run_panels.load_over_depth if total else run_panels.force_over_depth
-    draw(ax, run.findings)
+    draw(ax, found)
     return ax
 
 
@@ -98,15 +97,15 @@ def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
 
     Widest paths count if they reach the bowl.
     """
-    ax = _axes(ax)
     chains = run.table("chains", ["definition", "n_particles", "reaches_bowl"])
+    ax = _axes(ax)
     for name, colour in (("peters", BLUE), ("widest_path", GREEN)):
         of_name = chains[chains["definition"] == name]
         whole = of_name[of_name["reaches_bowl"]] if name == "widest_path" else of_name
         found = whole["n_particles"].value_counts(normalize=True).sort_index()
         label = f"{name} (mean {whole['n_particles'].mean():.1f})"
         ax.plot(found.index, found, "o-", color=colour, label=label)
-    ax.xaxis.get_major_locator().set_params(integer=True)
+    ax.locator_params(axis="x", integer=True)
     ax.set(xlabel="particles per chain", ylabel="fraction of the chains", yscale="log")
     ax.legend()
     return ax
@@ -124,7 +123,6 @@ def contact_forces(run: FinishedRun, ax: Axes | None = None, *, kind: str | None
         Bodies of the contacts, such as ``particle-workpiece``; all contacts by default.
         `UnknownNameError` if there are none of it.
     """
-    ax = _axes(ax)
     contacts = run.table("contacts", ["step", "kind", "normal_force_n"])
     contacts = contacts[contacts["step"].isin(run.network["step"])]
     if kind is not None:
@@ -135,9 +133,9 @@ def contact_forces(run: FinishedRun, ax: Axes | None = None, *, kind: str | None
     force = contacts["normal_force_n"].to_numpy(np.float64)
     edges = np.arange(0.0, force.max() / force.mean() + _BIN, _BIN)
     density, _ = np.histogram(force / force.mean(), edges, density=True)
-    ax.stairs(
-        density, edges, baseline=None, label=f"{kind or 'all contacts'} (mean {force.mean():.3g} N)"
-    )
+    label = f"{kind or 'all contacts'} (mean {force.mean():.3g} N)"
+    ax = _axes(ax)
+    ax.stairs(density, edges, baseline=None, label=label)
     ax.set(xlabel="normal force / mean normal force", ylabel="probability density", yscale="log")
     ax.legend()
     return ax

@@ -123,3 +123,4 @@ def test_a_plot_of_a_missing_table_names_the_command(run: FinishedRun, tmp_path:
         (tmp_path / name).write_bytes((run.folder / name).read_bytes())
     with pytest.raises(TableError, match="`dragchain chains "):
         plot.chain_lengths(load(tmp_path).run())
+    assert not pyplot.get_fignums()
