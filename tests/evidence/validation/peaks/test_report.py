@@ -6,15 +6,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-import pyvista as pv
 from figure_files import (
-    case_json,
-    columns_json,
-    network_tables,
-    printed,
     save,
-    workpiece_contacts_table,
     workpiece_force_table,
+    write_process_run,
 )
 from networks import R
 from peak_runs import findings
@@ -22,7 +17,6 @@ from PIL import Image
 
 from dragchain.errors import TableError
 from dragchain.figures.network_picture import cylinder_radii
-from dragchain.network.write import write_chains
 from dragchain.report.page import page_environment
 from evidence.validation.peaks import film
 from evidence.validation.peaks.findings import Findings
@@ -34,18 +28,7 @@ from evidence.validation.peaks.settings import SETTINGS
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a made process run with one peak, with tables and chains."""
-    run_dir = tmp_path_factory.mktemp("made")
-    (run_dir / "case.json").write_text(json.dumps(case_json("process")))
-    columns_json(run_dir, {"workpiece_contacts": printed(["step"], 10)})
-    contacts, particles = network_tables()
-    save(workpiece_force_table(), run_dir, "workpiece_force")
-    save(contacts, run_dir, "contacts")
-    save(particles, run_dir, "particles")
-    save(workpiece_contacts_table(), run_dir, "workpiece_contacts")
-    workpiece = pv.Cylinder(center=(0, 0, 0.025), direction=(0, 0, 1), radius=0.002, height=0.05)
-    workpiece.triangulate().save(run_dir / "workpiece.stl")
-    write_chains(run_dir)
-    return run_dir
+    return write_process_run(tmp_path_factory.mktemp("made"))
 
 
 @pytest.fixture(scope="module")
