@@ -11,6 +11,7 @@ include: "workflow/rules/advise.smk"
 include: "workflow/rules/network.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/export.smk"
+include: "workflow/rules/crate.smk"
 include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/verify.smk"
 include: "workflow/rules/stability.smk"
@@ -24,6 +25,7 @@ localrules:
     advise,
     all,
     calibrate,
+    crate,
     promises,
     drop_test,
     export,
@@ -70,7 +72,7 @@ rule process:
         every("process", "tables/workpiece_force.parquet"),
 
 
-# summary.csv, summary.parquet and report.html.
+# summary.csv, summary.parquet, summary.xlsx and report.html.
 rule report:
     input:
         rules.write_report.output,
@@ -82,10 +84,16 @@ rule figures:
         every("process", "figures/journal/workpiece.pdf"),
 
 
-# The process runs as time series for ParaView and OVITO.
+# The process runs as time series for ParaView and OVITO, with a view for ParaView.
 rule export:
     input:
-        every("process", "export/paraview/run.pvd"),
+        every("process", "export/paraview/run.pvd", "export/paraview/view.py"),
+
+
+# The study's inputs, runs and report as an RO-Crate.
+rule crate:
+    input:
+        rules.write_crate.output,
 
 
 # The restitution that a measured drop test asks for.

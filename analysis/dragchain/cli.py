@@ -138,6 +138,14 @@ STEPS = (
         _argument("--source", help="source of the expected exponent"),
         _argument("--fit-range", type=float, nargs=2, metavar=("LOW", "HIGH"),
                   help="levels for which the exponent is expected"))),
+    Command("crate", "write a study's inputs, runs and report as an RO-Crate",
+            "report.crate:write_crate", (
+        OUT_DIR, RUN_DIRS,
+        _argument("--report", type=Path, required=True, metavar="DIR", dest="report_dir",
+                  help="folder of the study's report"),
+        _argument("--inputs", type=Path, nargs="*", default=[], metavar="FILE",
+                  help="study files, templates and meshes"),
+        _argument("--licence", metavar="TEXT", help="licence of the results"))),
     Command("record", "find the impacts of a measured drop test",
             "calibration.results:write_record", (
         RECORD,

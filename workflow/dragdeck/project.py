@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from dragdeck.advice.advise import resolve
-from dragdeck.cases.case import Case, of_each_workpiece
+from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
 from dragdeck.errors import InputError, choices
 from dragdeck.outlook.measured import Tradeoff
 from dragdeck.outlook.stable_step import check_timestep
@@ -17,6 +17,7 @@ from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import NAME, NAME_LIMIT
+from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import located, study_folders
 from dragdeck.sweep.cases import load_cases, study_file
 from dragdeck.sweep.plan import Points, plan_points, read_plan
@@ -147,6 +148,21 @@ def study_templates(case: Case) -> Path:
     """A study's own templates, or those of the nearest study it extends; there need be none."""
     folders = [folder / "templates" for folder in study_folders(case.file)]
     return next((folder for folder in folders if folder.is_dir()), folders[0])
+
+
+def study_files(cases: Iterable[Case]) -> list[Path]:
+    """What cases are described in: the folders of their studies, and meshes from elsewhere.
+
+    Hidden files are left out.
+    """
+    found = set()
+    for case in cases:
+        for folder in study_folders(case.file):
+            inside = (file for file in folder.rglob("[!.]*") if file.is_file())
+            found |= {file for file in inside if "/." not in f"/{file.relative_to(folder)}"}
+        shapes = [one.study.workpiece.shape for one in of_each_workpiece(case)]
+        found |= {mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)}
+    return sorted(found)
 
 
 def by_run(cases: Iterable[Case], scene: SceneType) -> dict[str, Case]:

@@ -18,6 +18,7 @@ from dragdeck.project import (
     by_folder,
     by_run,
     run_path,
+    study_files,
     study_templates,
 )
 from dragdeck.scenes.registry import SCENES

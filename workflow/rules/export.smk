@@ -4,9 +4,13 @@
 rule export_paraview:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
+        of_run("process", "tables/facets.parquet"),
         run=of_run("process", "run.json"),
     output:
-        of_run("process", "export/paraview/run.pvd"),
+        [
+            of_run("process", f"export/paraview/{name}")
+            for name in ("run.pvd", "view.py", "view.json")
+        ],
     log:
         of_run("process", "logs/export.log"),
     benchmark:
@@ -14,6 +18,6 @@ rule export_paraview:
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragchain.export.write"),
+        source=source_hash("dragchain.export.write", "dragchain.export.view"),
     shell:
         "dragchain export $(dirname {input.run}) --to paraview --replace > {log} 2>&1"

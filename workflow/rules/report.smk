@@ -13,10 +13,11 @@ rule write_report:
         every("process", "network.html"),
         every_extrapolated(),
         advice=asked_advice("process"),
-        templates=page_templates("report/report.html.j2"),
+        templates=page_templates("report/report.html.j2", "report/summary_columns.csv"),
     output:
         csv=of_study("report", "summary.csv"),
         parquet=of_study("report", "summary.parquet"),
+        xlsx=of_study("report", "summary.xlsx"),
         complete=touch(of_study("report", "complete")),
         page=report(
             of_study("report", "report.html"),

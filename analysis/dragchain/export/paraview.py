@@ -9,18 +9,23 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+import pandas as pd
 
+from dragchain.arrays import Floats
 from dragchain.export.frames import FrameData, FrameSeries
+from dragchain.export.view_data import ViewWriter
 from dragchain.figures.network_picture import segments
 from dragchain.network.chains import major_stress, particle_stress
-from dragchain.network.frame import PARTICLE
+from dragchain.network.frame import PARTICLE, NetworkFrame
 from dragchain.network.statistics import contact_counts
 from dragchain.run.workpiece import placed, workpiece_mesh
+from dragchain.tables.run_folder import Run
 
 MAIN = "run.pvd"
 """The file to open: all there is."""
 
 _FRAMES = "frames"
+_LOADING = ("mean_pressure_pa", "friction_work_pa", "peak_normal_force_n")
 _CHAIN_ARRAYS = {"peters_chain": "peters", "widest_paths": "paths", "dominant": "dominant"}
 
 
@@ -40,9 +45,8 @@ class ParaviewWriter:
         self._with_chains = series.has_chains
         self._width = len(str(series.steps[-1]))
         case = series.run.case
-        self._workpiece = (
-            None if case.workpiece is None else workpiece_mesh(series.run.folder, case)
-        )
+        self._workpiece = None if case.workpiece is None else _loaded_workpiece(series.run)
+        self._view = ViewWriter(case, chains=self._with_chains)
         self._series: dict[str, list[tuple[float, str]]] = {}
         (folder / _FRAMES).mkdir()
 
@@ -55,6 +59,7 @@ class ParaviewWriter:
             parts["contacts"] = _contacts_mesh(frame_data, with_chains=self._with_chains)
         if self._workpiece is not None and frame_data.workpiece is not None:
             parts["workpiece"] = placed(self._workpiece, *frame_data.workpiece)
+        self._view.add(parts)
         name = f"{frame_data.step:0{self._width}d}"
         frames = self._folder / _FRAMES
         pv.MultiBlock(parts).save(frames / f"{name}.vtm", compression=None)
@@ -69,9 +74,10 @@ class ParaviewWriter:
         self._series.setdefault(series, []).append((time_s, f"{_FRAMES}/{file}"))
 
     def close(self) -> None:
-        """Write the PVD files."""
+        """Write the PVD files, and the script that opens them."""
         for name, files in self._series.items():
             (self._folder / f"{name}.pvd").write_text(pvd(files), encoding="utf-8")
+        self._view.write(self._folder)
 
 
 def pvd(files: list[tuple[float, str]]) -> str:
@@ -87,12 +93,28 @@ def pvd(files: list[tuple[float, str]]) -> str:
     )
 
 
+def _loaded_workpiece(run: Run) -> Any:
+    """The workpiece's mesh; if its loading was computed, with the arrays `_LOADING` of its facets.
+
+    The facets of ``facets.parquet`` are in the order of the mesh unless VTK left one out.
+    """
+    mesh = workpiece_mesh(run.folder, run.case)
+    file = run.table("facets.parquet")
+    if file.is_file():
+        facets = pd.read_parquet(file, columns=list(_LOADING))
+        if len(facets) == mesh.n_cells:
+            for name in _LOADING:
+                mesh.cell_data[name] = facets[name].to_numpy(np.float64)
+    return mesh
+
+
 def _particles_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     """The particles as points with what is known of each.
 
     ``id``, ``radius`` (m), ``v`` (m/s) and ``omega`` (rad/s); with contacts
-    ``coordination_number`` and ``major_stress_pa`` (major compressive principal stress);
-    with chains ``peters_chain``, ``widest_paths`` and ``dominant``, see `_chains`.
+    ``coordination_number``, ``major_stress_pa`` (major compressive principal stress) and
+    ``max_normal_force_n`` (of the particle's contacts); with chains ``peters_chain``,
+    ``widest_paths`` and ``dominant``, see `_chains`.
     """
     import pyvista as pv
 
@@ -106,9 +128,19 @@ def _particles_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:
     if frame_data.network is not None:
         data["coordination_number"] = contact_counts(frame_data.network).astype(np.int32)
         data["major_stress_pa"] = major_stress(particle_stress(frame_data.network))[0]
+        data["max_normal_force_n"] = _max_normal_force(frame_data.network)
     if with_chains:
         _chains(data, frame_data, "particle", len(particles))
     return mesh
+
+
+def _max_normal_force(frame: NetworkFrame) -> Floats:
+    """The largest normal force of each particle's contacts, (N,) in N; 0 without contacts."""
+    largest = np.zeros(frame.particle_id.size)
+    inner = frame.between_particles()
+    np.maximum.at(largest, frame.a, frame.normal_force)
+    np.maximum.at(largest, frame.b[inner], frame.normal_force[inner])
+    return largest
 
 
 def _contacts_mesh(frame_data: FrameData, *, with_chains: bool) -> Any:

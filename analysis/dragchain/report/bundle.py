@@ -14,6 +14,7 @@ def write_bundle(
     out_dir: Path,
     *,
     tables: Mapping[str, pd.DataFrame] | None = None,
+    workbooks: Mapping[str, bytes] | None = None,
     figures: Mapping[str, bytes] | None = None,
     documents: Mapping[str, Document] | None = None,
     pages: Mapping[str, str] | None = None,
@@ -26,6 +27,8 @@ def write_bundle(
         Made if need be.
     tables : mapping of str to DataFrame, optional
         Written as ``<name>.parquet`` and ``<name>.csv``.
+    workbooks : mapping of str to bytes, optional
+        Spreadsheets, written as ``<name>.xlsx``.
     figures : mapping of str to bytes, optional
         PNG pictures, written as ``figures/<name>.png``.
     documents : mapping of str to Document, optional
@@ -43,6 +46,9 @@ def write_bundle(
         write_parquet(table, out_dir / f"{name}.parquet")
         write_text(out_dir / f"{name}.csv", table.to_csv(index=False, lineterminator="\n"))
         files += [out_dir / f"{name}.parquet", out_dir / f"{name}.csv"]
+    for name, book in (workbooks or {}).items():
+        files.append(out_dir / f"{name}.xlsx")
+        write_bytes(files[-1], book)
     for name, picture in (figures or {}).items():
         files.append(out_dir / "figures" / f"{name}.png")
         write_bytes(files[-1], picture)

@@ -31,6 +31,7 @@ from dragchain.report.runs import (
     read_upstream,
     upstream_folders,
 )
+from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
 from dragchain.run.case import Assumption, load_case
 from dragchain.statistics.correlated import RELIABLE_TIMES
@@ -67,7 +68,7 @@ class Section:
 
 
 def write_report(out_dir: Path, run_dirs: Sequence[Path], advice: Path | None = None) -> None:
-    """Write ``summary.csv``, ``summary.parquet`` and ``report.html`` on process runs.
+    """Write ``summary.csv``, ``.parquet`` and ``.xlsx``, and ``report.html``, on process runs.
 
     ``network.html`` of a run is copied beside the report, which links to it.
 
@@ -102,7 +103,13 @@ def write_report(out_dir: Path, run_dirs: Sequence[Path], advice: Path | None = 
         for section, name in zip(sections, _network_pages(sections), strict=True):
             if section.network is not None:
                 write_bytes(out_dir / name, section.network.read_bytes())
-        write_bundle(out_dir, tables={"summary": table}, pages={"report": page})
+        assumed = {one.study.process.case.run: one.assumptions for one in sections}
+        write_bundle(
+            out_dir,
+            tables={"summary": table},
+            workbooks={"summary": summary_workbook(table, assumed)},
+            pages={"report": page},
+        )
     elif not any(run.scene == "process" for run in missing):
         raise TableError("no folder of a process run is given, so there is nothing to report")
     if missing:

@@ -160,6 +160,7 @@ class Case(Document):
     made_by: ClassVar[str] = "dragdeck step render"
 
     study: str
+    title: str | None = None
     scene: Scene
     run: str
     case: str | None = None

@@ -70,7 +70,7 @@ def test_csv_and_parquet_hold_the_same(process: Path, tmp_path: Path) -> None:
     assert list(text.columns) == list(table.columns)
     assert text["drag_mean_n"].tolist() == table["drag_mean_n"].tolist()
     assert sorted(path.name for path in (tmp_path / "report").iterdir()) == [
-        "report.html", "summary.csv", "summary.parquet",
+        "report.html", "summary.csv", "summary.parquet", "summary.xlsx",
     ]  # fmt: skip
 
 

@@ -401,6 +401,11 @@ class Study(Model):
     """A whole study file."""
 
     title: Line = Field(description="title in one line, for headings")
+    licence: Line | None = Field(
+        default=None,
+        description="licence under which the results may be used, as an SPDX name or an address; "
+        "the RO-Crate states it",
+    )
     gravity_m_s2: Positive = Field(default=9.81, description="gravity along -z, m/s2")
     materials: dict[MaterialName, Material]
     pairs: dict[str, Pair] = Field(

@@ -1,0 +1,130 @@
+"""A spreadsheet of the summary, with definitions and assumptions, for those who work with one."""
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from dragchain.run.case import Assumption
+
+if TYPE_CHECKING:
+    from xlsxwriter.worksheet import Worksheet
+
+Definition = tuple[str, str]
+"""Unit, empty if there is none, and meaning of a column."""
+
+_UNITS = {
+    "_kg_m3": "kg/m3", "_n_per_m": "N/m", "_j_per_m": "J/m", "_per_s": "1/s", "_m_s2": "m/s2",
+    "_m_s": "m/s", "_rad_s": "rad/s", "_n_m": "N m", "_n_s": "N s", "_percent": "%",
+    "_rad": "rad", "_deg": "degrees", "_rpm": "rpm", "_hz": "Hz", "_pa": "Pa", "_mm": "mm",
+    "_m": "m", "_s": "s", "_n": "N", "_j": "J",
+}  # fmt: skip
+"""Units by the end of a column's name; the first that fits counts."""
+
+_WORDS = {
+    "ci95 low": "95 % CI lower end", "ci95 high": "95 % CI upper end", "youngs": "Young's",
+    "std": "standard deviation", "timestep": "time step", "poissons": "Poisson's",
+}  # fmt: skip
+
+COLUMNS = Path(__file__).with_name("summary_columns.csv")
+"""Meanings by the start of a column's name; the first that fits counts."""
+
+
+def unit_of(column: str) -> str:
+    """The unit of a column by the end of its name, empty if it has none."""
+    return next((unit for end, unit in _UNITS.items() if column.endswith(end)), "")
+
+
+def definitions(
+    columns: Iterable[str], known: Mapping[str, Definition] | None = None
+) -> pd.DataFrame:
+    """What the columns of a table mean.
+
+    Parameters
+    ----------
+    columns : iterable of str
+        Names of N columns.
+    known : mapping of str to (unit, meaning), optional
+        What is known of columns; unit and meaning of the others follow from their names.
+
+    Returns
+    -------
+    DataFrame
+        N rows ``heading``, ``column``, ``unit``, ``meaning``. The heading ends with the unit.
+    """
+    meanings = list(pd.read_csv(COLUMNS).itertuples(index=False, name=None))
+    rows = []
+    for column in columns:
+        found = (text for start, text in meanings if column.startswith(start))
+        unit, meaning = (known or {}).get(column) or (unit_of(column), next(found, ""))
+        rows.append((_heading(column, unit), column, unit, meaning))
+    return pd.DataFrame(rows, columns=["heading", "column", "unit", "meaning"], dtype=object)
+
+
+def _heading(column: str, unit: str) -> str:
+    """A column's name in words, with its unit in brackets."""
+    end = next((end for end in _UNITS if column.endswith(end)), "") if unit else ""
+    text = column.removesuffix(end).replace("_", " ")
+    for word, shown in _WORDS.items():
+        text = f" {text} ".replace(f" {word} ", f" {shown} ").strip()
+    return f"{text[:1].upper()}{text[1:]}" + (f" ({unit})" if unit else "")
+
+
+def summary_workbook(
+    table: pd.DataFrame,
+    assumptions: Mapping[str, Sequence[Assumption]],
+    known: Mapping[str, Definition] | None = None,
+) -> bytes:
+    """The summary as an XLSX file with the sheets Summary, Definitions and Assumptions.
+
+    Parameters
+    ----------
+    table : DataFrame
+        The summary, one row per case.
+    assumptions : mapping of str to sequence of Assumption
+        The assumptions of each run, by its name.
+    known : mapping of str to (unit, meaning), optional
+        See `definitions`.
+    """
+    about = definitions(table.columns, known)
+    assumed = [
+        {"run": run, "field": one.field, "value": json.dumps(one.value), "reason": one.why}
+        for run, found in assumptions.items()
+        for one in found
+    ]
+    summary = table.set_axis(about["heading"], axis=1)
+    assumption_sheet = pd.DataFrame(assumed, columns=["run", "field", "value", "reason"])
+    return workbook({"Summary": summary, "Definitions": about, "Assumptions": assumption_sheet})
+
+
+def workbook(sheets: Mapping[str, pd.DataFrame]) -> bytes:
+    """Tables as the sheets of an XLSX file; text stays text, whatever it starts with."""
+    from xlsxwriter import Workbook
+
+    content = BytesIO()
+    with Workbook(content, {"in_memory": True}) as book:
+        bold = book.add_format({"bold": True, "text_wrap": True, "valign": "top"})
+        for name, table in sheets.items():
+            sheet = book.add_worksheet(name)
+            for column, (heading, values) in enumerate(table.items()):
+                sheet.write_string(0, column, str(heading), bold)
+                for row, value in enumerate(values.tolist(), start=1):
+                    _write(sheet, row, column, value)
+            sheet.freeze_panes(1, 0)
+            sheet.autofit(300)
+    return content.getvalue()
+
+
+def _write(sheet: "Worksheet", row: int, column: int, value: object) -> None:
+    """Write a cell by the type of its value; a number that there is none of stays blank."""
+    if isinstance(value, bool):
+        sheet.write_boolean(row, column, value)
+    elif isinstance(value, int | float):
+        if math.isfinite(value):
+            sheet.write_number(row, column, value)
+    elif value is not None:
+        sheet.write_string(row, column, str(value))

@@ -1,0 +1,170 @@
+"""An RO-Crate lists every file with its size and checksum, and nothing of this machine."""
+
+import hashlib
+import json
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import pandas as pd
+import pytest
+from report_files import DROP, FILLING, case_json, make_run, process_findings
+
+from dragchain.cli import main
+from dragchain.errors import ExportError, RejectedRunError
+from dragchain.report import crate
+from dragchain.report.crate import write_crate
+
+rocrate = pytest.importorskip("rocrate.rocrate")
+RUNS = [Path(f"results/small/{run}") for run in ("filling/f-1", "drop_test/d-1", "process/p-1")]
+REPORT = Path("results/small/report")
+OUT = Path("results/small/crate")
+STUDY = Path('studies/small/a study\'s "files"/s\N{LATIN SMALL LETTER O WITH DIAERESIS}.yaml')
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A project with a study of one case, its runs and report, as the present folder."""
+    monkeypatch.chdir(tmp_path)
+    results = Path("results")
+    make_run(results, case_json("filling", "f-1"), FILLING, [])
+    make_run(results, case_json("drop_test", "d-1"), DROP, ["drop_test"])
+    process = make_run(results, case_json("process", "p-1"), process_findings(), ["forces"])
+    for name in ("in.liggghts", "columns.json", "workpiece.stl", "contacts.1.dump", "state.json"):
+        (process / name).write_text(f"{tmp_path}" if name == "state.json" else name)
+    for name in ("logs/run.log", "export/paraview/run.pvd", "archive/1/run.json", ".lock"):
+        (process / name).parent.mkdir(parents=True, exist_ok=True)
+        (process / name).write_text(f"{tmp_path}")
+    (process / "tables/contacts.parquet").write_bytes(b"0123456789")
+    REPORT.mkdir()
+    for name in ("report.html", "summary.csv", "complete", "logs/report.log"):
+        (REPORT / name).parent.mkdir(exist_ok=True)
+        (REPORT / name).write_text(name)
+    STUDY.parent.mkdir(parents=True)
+    STUDY.write_text("title: small")
+    return tmp_path
+
+
+def listed(folder: Path) -> dict[str, Any]:
+    """The entities of a crate by their identity."""
+    graph = json.loads((folder / crate.METADATA).read_text())["@graph"]
+    return {entity["@id"]: entity for entity in graph}
+
+
+def sums(folder: Path) -> dict[str, tuple[int, str]]:
+    """Size and SHA-256 of all files of a folder."""
+    return {
+        str(file.relative_to(folder)): (
+            file.stat().st_size, hashlib.sha256(file.read_bytes()).hexdigest()
+        )
+        for file in folder.rglob("*") if file.is_file()
+    }  # fmt: skip
+
+
+def test_every_file_is_listed_with_size_and_checksum(project: Path) -> None:
+    write_crate(OUT, RUNS, REPORT, [STUDY])
+    files = {
+        unquote(name): (int(one["contentSize"]), one["sha256"])
+        for name, one in listed(OUT).items()
+        if one["@type"] == "File"
+    }
+    there = sums(OUT)
+    del there[crate.METADATA]
+    assert files == there
+    for name in files.keys() - {crate.LEFT_OUT, crate.PACKAGES}:
+        assert (OUT / name).read_bytes() == Path(name).read_bytes()
+    assert {str(STUDY), f"{REPORT}/report.html", f"{RUNS[2]}/in.liggghts"} <= files.keys()
+    assert f"{REPORT}/complete" not in files
+
+
+def test_raw_outputs_and_large_files_are_named_only(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (RUNS[2] / "tables/force.parquet").write_bytes(b"x" * crate.LARGEST_BYTES)
+    (RUNS[2] / "tables/contacts.parquet").write_bytes(b"x" * (crate.LARGEST_BYTES + 1))
+    write_crate(OUT, RUNS, REPORT)
+    left_out = pd.read_csv(OUT / crate.LEFT_OUT).set_index("file")
+    assert {Path(file).name for file in left_out.index} == {"contacts.1.dump", "contacts.parquet"}
+    for file, row in left_out.iterrows():
+        assert not (OUT / str(file)).exists()
+        assert (row["bytes"], row["sha256"]) == sums(Path())[str(file)]
+    assert (OUT / RUNS[2] / "tables/force.parquet").exists()
+
+
+def test_nothing_tells_of_this_machine(project: Path) -> None:
+    write_crate(OUT.absolute(), [run.absolute() for run in RUNS], REPORT.absolute())
+    for file in (file for file in OUT.rglob("*") if file.is_file()):
+        text = file.read_bytes()
+        for place in (project, Path.home(), Path(sys.prefix), Path(crate.__file__).parents[2]):
+            assert str(place).encode() not in text, file
+
+
+def test_rocrate_reads_it(project: Path) -> None:
+    write_crate(OUT, RUNS, REPORT, [STUDY], "CC-BY-4.0")
+    found = rocrate.ROCrate(OUT)
+    about = listed(OUT)[crate.METADATA]
+    assert about["conformsTo"] == {"@id": "https://w3id.org/ro/crate/1.1"}
+    root = found.root_dataset
+    assert root["license"] == "CC-BY-4.0" and "author" not in root.properties()
+    assert {"name", "description", "datePublished"} <= root.properties().keys()
+    software = {
+        (one["name"], one["version"]) for one in root["mentions"] if one.type != "CreateAction"
+    }
+    assert {("LIGGGHTS", "Engine 3.8"), ("dragdeck", "0.1.0")} <= software
+    action = found.get("#process-p-1")
+    assert {Path(one.id).name for one in action["object"]} == {
+        "in.liggghts", "columns.json", "case.json", "workpiece.stl"
+    }  # fmt: skip
+    assert {one.id for one in action["result"]} >= {f"{RUNS[2]}/run.json"}
+    assert {one["name"] for one in action["instrument"]} == {"LIGGGHTS", "dragdeck"}
+    assert "pandas==" in (OUT / crate.PACKAGES).read_text()
+
+
+def test_the_licence_is_unknown_unless_it_is_stated(project: Path) -> None:
+    write_crate(OUT, RUNS, REPORT)
+    assert listed(OUT)["./"]["license"].startswith("unknown")
+
+
+def test_a_crate_replaces_an_earlier_one_and_nothing_else(project: Path) -> None:
+    write_crate(OUT, RUNS, REPORT, [STUDY])
+    (OUT / crate.METADATA).unlink()  # as Snakemake does
+    write_crate(OUT, RUNS[:2], REPORT)
+    assert not (OUT / STUDY).exists() and not (OUT / RUNS[2]).exists()
+    with pytest.raises(ExportError, match="no crate"):
+        write_crate(REPORT, RUNS, REPORT)
+    assert (REPORT / "report.html").exists()
+
+
+def test_a_failure_keeps_the_earlier_crate(project: Path) -> None:
+    write_crate(OUT, RUNS, REPORT)
+    before = sums(OUT)
+    (RUNS[2] / "run.json").unlink()
+    with pytest.raises(RejectedRunError):
+        write_crate(OUT, RUNS, REPORT)
+    assert sums(OUT) == before
+    assert {path.name for path in OUT.parent.iterdir()} == {
+        "crate", "report", "filling", "drop_test", "process"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("file", ["../study.yaml", "/etc/hostname"])
+def test_files_of_other_folders_are_refused(project: Path, file: str) -> None:
+    with pytest.raises(ExportError, match="is not below"):
+        write_crate(OUT, RUNS, REPORT, [Path(file)])
+    assert not OUT.exists()
+
+
+def test_without_rocrate_the_remedy_is_told(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rocrate.rocrate", None)
+    with pytest.raises(ExportError, match=r"dragdeck\[crate\]"):
+        write_crate(OUT, RUNS, REPORT)
+
+
+def test_the_command_takes_what_the_rule_gives(project: Path) -> None:
+    shutil.rmtree(RUNS[1])
+    words = ["--out", str(OUT), "--report", f"{REPORT}/", "--licence=- hostile; $(x)", "--inputs"]
+    assert main(["step", "crate", *words, str(STUDY), "--", str(RUNS[0]), str(RUNS[2])]) == 0
+    assert listed(OUT)["./"]["license"] == "- hostile; $(x)"
+    assert str(STUDY) in map(unquote, listed(OUT))
