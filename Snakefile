@@ -8,6 +8,7 @@ min_version("9.0")
 include: "workflow/rules/common.smk"
 include: "workflow/rules/runs.smk"
 include: "workflow/rules/advise.smk"
+include: "workflow/rules/network.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/export.smk"
 include: "workflow/rules/crate.smk"
@@ -28,6 +29,7 @@ localrules:
     promises,
     drop_test,
     export,
+    figures,
     filling,
     pass_verdict,
     process,
@@ -74,6 +76,12 @@ rule process:
 rule report:
     input:
         rules.write_report.output,
+
+
+# The figures of the process runs for a publication: SVG, PDF and PNG at the widths of columns.
+rule figures:
+    input:
+        every("process", "figures/journal/workpiece.pdf"),
 
 
 # The process runs as time series for ParaView and OVITO, with a view for ParaView.

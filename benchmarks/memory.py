@@ -22,6 +22,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
@@ -169,7 +170,7 @@ COMMANDS: dict[str, Arguments] = {
     "figures": lambda run, _: ["figures", run],
     "report": lambda run, _: ["report", "--out", run / "report", run],
     "validate": lambda run, _: [
-        *("step", "validate", "--command", "benchmark"),
+        *("validate", "--command", "benchmark"),
         *("--out", run / "validation", run, other_filling(run)),
     ],
 }
@@ -178,10 +179,10 @@ COMMANDS: dict[str, Arguments] = {
 
 def measure(arguments: list[str]) -> dict[str, float]:
     """Run one command; this happens in a process of its own."""
-    from dragchain.cli import main as dragchain
-
+    package = "evidence.__main__" if arguments[0] == "validate" else "dragchain.cli"
+    main = import_module(package).main
     wall, processor = time.perf_counter(), time.process_time()
-    if dragchain(arguments):
+    if main(arguments):
         sys.exit(1)
     wall, processor = time.perf_counter() - wall, time.process_time() - processor
     return {"wall_s": wall, "processor_s": processor, "peak_bytes": peak_bytes()}

@@ -101,7 +101,7 @@ def made(project: Project, case: Case, kind: SceneType, bed: Bed | None) -> Path
         write_run(
             kind.build(case, bed), folder, environment(project.templates, study_templates(case))
         )
-        run(folder, say, every_s=60.0)
+        run(folder, say)
     return folder
 
 

@@ -1,4 +1,4 @@
-"""Evidence about LIGGGHTS itself: verification of its contact law, and its stable time steps.
+"""Evidence about LIGGGHTS and a study: contact law, stable time steps, agreement with a paper.
 
 No study needs it. It may import dragdeck and dragchain, and neither of them imports it.
 """

@@ -1,4 +1,4 @@
-"""What the rules of the verification suite and the stability map call: ``python -m evidence``."""
+"""What the rules of suite, stability map and validation call: ``python -m evidence``."""
 
 import argparse
 import sys
@@ -19,6 +19,7 @@ _RUN_DIRS: Argument = ("run_dirs",), {"type": Path, "nargs": "+", "metavar": "RU
 _REPORT_DIR: Argument = ("report_dir",), {"type": Path, "metavar": "DIR"}
 _REGIME: Argument = ("regime",), {"help": "impact, settle, beds, column or drag"}
 _MAP: Argument = ("--map",), {"type": Path, "required": True, "dest": "points", "help": "map.yaml"}
+_MADE_BY: Argument = ("--command",), {"required": True, "help": "for the record"}
 _LISTS: Argument = ("lists",), {"type": Path, "nargs": "+", "metavar": "POINTS"}
 
 COMMANDS: dict[str, tuple[str, str, tuple[Argument, ...]]] = {
@@ -32,6 +33,8 @@ COMMANDS: dict[str, tuple[str, str, tuple[Argument, ...]]] = {
                 "stability.map_runs:stability_command", (_REGIME, _MAP)),
     "report-map": ("write the report on a stability map",
                    "stability.report:write_stability", (_OUT_DIR, _LISTS)),
+    "validate": ("compare the runs of a study with its source",
+                 "validation.report:write_validation", (_OUT_DIR, _RUN_DIRS, _MADE_BY)),
 }  # fmt: skip
 """By name: help, function and its parameters."""
 
@@ -39,13 +42,13 @@ COMMANDS: dict[str, tuple[str, str, tuple[Argument, ...]]] = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status; see `dragdeck.cli.guarded`."""
     parser = argparse.ArgumentParser(prog="python -m evidence", description=__doc__)
-    commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="_command")
     for name, (words, _, own) in COMMANDS.items():
         command = commands.add_parser(name, help=words, description=words)
         for names, options in own:
             command.add_argument(*names, **options)
     given = vars(parser.parse_args(arguments))
-    return guarded(partial(_call, COMMANDS[given.pop("command")][1], given))
+    return guarded(partial(_call, COMMANDS[given.pop("_command")][1], given))
 
 
 def _call(function: str, options: dict[str, Any]) -> None:

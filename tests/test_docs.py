@@ -1,5 +1,6 @@
 """The pages say what is true."""
 
+import json
 import re
 
 import pytest
@@ -8,12 +9,14 @@ from paths import ROOT
 from dragchain.report.notation import MINUS
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import read_scalings, said
+from dragchain.tables.meanings import columns_of
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DropDeck
 from dragdeck.scenes.filling import FillingDeck
 from dragdeck.scenes.process import PROCESS, ProcessDeck
 from dragdeck.study.field_page import page
 
+NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 
 
@@ -62,3 +65,31 @@ def test_every_block_is_on_the_page() -> None:
     for template in (ROOT / "templates").glob("*.in.j2"):
         for block in re.findall(r"{% block (\w+) %}", template.read_text()):
             assert f"`{block}`" in text, f"{template.name}: block {block}"
+
+
+def test_the_columns_of_the_tables_are_those_on_the_page() -> None:
+    text = (ROOT / "docs/outputs.md").read_text()
+    tables = dict(re.findall(r"^\| `(\w+)\.parquet` \|[^|]*\| `([^`]*)`", text, re.MULTILINE))
+    tables |= re.findall(r"^\| `(thermo)` \|[^|]*\| `([^`]*)`", text, re.MULTILINE)
+    described = [table for table in tables if columns_of(table)]
+    assert len(described) == 11
+    for table in described:
+        of_spin = {name for name in columns_of(table) if name.startswith(("body_", "turn_"))}
+        assert set(tables[table].split()) == set(columns_of(table)) - of_spin, table
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_a_notebook_is_kept_without_outputs_and_names_its_study_first(file) -> None:
+    notebook = json.loads(file.read_text())
+    code = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert not any(cell["outputs"] or cell["execution_count"] for cell in code)
+    study = re.fullmatch(r'study_name = "([\w-]+)"', "".join(code[0]["source"]))
+    assert study is not None and Project(ROOT).cases(study[1])
+    assert not any(study[1] in "".join(cell["source"]) for cell in code[1:])
+    links = re.findall(r"\]\(([^)#:]+)", file.read_text())
+    assert all((file.parent / link).exists() for link in links)
+
+
+def test_the_notebooks_are_on_the_page() -> None:
+    text = (ROOT / "docs/python.md").read_text()
+    assert NOTEBOOKS and all(f"examples/{file.name}" in text for file in NOTEBOOKS)

@@ -35,6 +35,9 @@ SYSTEM_TOOLS = [
     "touch",
 ]
 
+SHOWN = "[--logger] [dragdeck] [--show-failed-logs]"
+"""What follows the name of Snakemake in every call."""
+
 FAKE_PYTHON = """\
 #!/bin/sh
 case "$*" in
@@ -167,7 +170,7 @@ def test_arguments_reach_snakemake_whole_and_from_anywhere(machine: Machine, tmp
     ended = machine.run("all", "--config", "study=two words", cwd=tmp_path)
     assert ended.returncode == 0
     assert machine.done()[-1].startswith(
-        f"snakemake [all] [--config] [study=two words] in {machine.clone} "
+        f"snakemake {SHOWN} [all] [--config] [study=two words] in {machine.clone} "
     )
 
 
@@ -175,13 +178,19 @@ def test_a_symbolic_link_leads_to_the_clone(machine: Machine, tmp_path: Path):
     (tmp_path / "link").symlink_to(machine.clone / "run")
     ended = machine.run("all", cwd=tmp_path, script="../link")
     assert ended.returncode == 0
-    assert machine.done()[-1].startswith(f"snakemake [all] in {machine.clone} ")
+    assert machine.done()[-1].startswith(f"snakemake {SHOWN} [all] in {machine.clone} ")
 
 
 @pytest.mark.parametrize("name", ["dragdeck", "dragchain"])
 def test_console_scripts_are_reached(machine: Machine, name: str):
     machine.run(name, "explain", "--help")
     assert machine.done()[-1].startswith(f"{name} [explain] [--help] ")
+
+
+@pytest.mark.parametrize("name", ["status", "open"])
+def test_status_and_report_are_near(machine: Machine, name: str):
+    machine.run(name, "small")
+    assert machine.done()[-1].startswith(f"dragdeck [{name}] [small] ")
 
 
 @pytest.mark.parametrize(
@@ -345,7 +354,7 @@ def test_only_the_queue_needs_its_plugin(machine: Machine):
     machine.run("all", "--workflow-profile", "profiles/slurm", FAKE_NO_PLUGIN="1")
     installed, ran = machine.done()
     assert ".[slurm]" in installed and "--constraint constraints.txt" in installed
-    assert ran.startswith("snakemake [all] [--workflow-profile] [profiles/slurm] ")
+    assert ran.startswith(f"snakemake {SHOWN} [all] [--workflow-profile] [profiles/slurm] ")
     machine.run("all", "--workflow-profile", "profiles/slurm")
     assert names(machine.done()) == ["snakemake"]
 
@@ -390,6 +399,35 @@ def test_test_runs_the_checks_then_pytest(machine: Machine):
     checks = ["ruff", "ruff", "mypy", "lint-imports", "snakefmt", "snakemake"]
     assert names(done) == [*checks, "pytest"]
     assert "[Snakefile] [workflow/rules/decks.smk]" in done[4]
+
+
+def test_the_browser_of_the_tests_is_installed_or_missed_aloud(machine: Machine):
+    machine.run("setup")
+    assert not any("chromium" in line for line in machine.done())
+    warned = machine.run("test")
+    assert warned.returncode == 0
+    assert "chromium-driver" in warned.stderr
+
+    machine.make_root()
+    machine.done()
+    machine.run("test")
+    assert any("chromium chromium-driver" in line for line in machine.done())
+    for name in ("chromium", "chromedriver"):
+        machine.add(name, FAKE_TOOL)
+    machine.run("test")
+    assert not any("apt-get" in line for line in machine.done())
+
+
+def test_bundling_scripts_needs_npm_alone(machine: Machine):
+    for name in ("liggghts", "python3"):
+        machine.remove(name)
+    refused = machine.run("web")
+    assert refused.returncode == 1
+    assert "npm is missing" in refused.stderr
+    for name in ("npm", "node"):
+        machine.add(name, FAKE_TOOL)
+    assert machine.run("web").returncode == 0
+    assert names(machine.done()) == ["npm", "node"]
 
 
 def test_a_quick_test_leaves_out_what_is_slow(machine: Machine):

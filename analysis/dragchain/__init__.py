@@ -1,5 +1,7 @@
 """Read what LIGGGHTS wrote and make tables, chains, figures and reports of it.
 
+`load` opens the results of a study, `plot` draws them.
+
 The names below are loaded when they are first used, so that the command starts at once.
 """
 
@@ -7,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from dragchain import plot
     from dragchain.dumps.any_dump import read_dump
     from dragchain.dumps.frame import Frame
     from dragchain.dumps.run_parts import iter_frames, iter_prints
@@ -19,7 +22,9 @@ if TYPE_CHECKING:
         SeriesError,
         TableError,
         TruncatedDumpError,
+        UnknownNameError,
     )
+    from dragchain.results import FinishedRun, Study, load
     from dragchain.run.case import Case, Output, load_case, load_outputs
     from dragchain.statistics.correlated import MeanEstimate, estimate_mean
     from dragchain.tables.convert import dump_to_parquet
@@ -30,20 +35,25 @@ __all__ = [
     "DocumentError",
     "DragchainError",
     "DumpError",
+    "FinishedRun",
     "Frame",
     "MeanEstimate",
     "Output",
     "RecordError",
     "RejectedRunError",
     "SeriesError",
+    "Study",
     "TableError",
     "TruncatedDumpError",
+    "UnknownNameError",
     "dump_to_parquet",
     "estimate_mean",
     "iter_frames",
     "iter_prints",
+    "load",
     "load_case",
     "load_outputs",
+    "plot",
     "read_dump",
     "write_tables",
 ]
@@ -52,6 +62,7 @@ _MODULES = {
     "dumps.any_dump": ("read_dump",),
     "dumps.frame": ("Frame",),
     "dumps.run_parts": ("iter_frames", "iter_prints"),
+    "results": ("FinishedRun", "Study", "load"),
     "run.case": ("Case", "Output", "load_case", "load_outputs"),
     "statistics.correlated": ("MeanEstimate", "estimate_mean"),
     "tables.convert": ("dump_to_parquet",),
@@ -63,4 +74,10 @@ _HOMES = {name: module for module, names in _MODULES.items() for name in names}
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name == "plot":
+        return import_module(f"{__name__}.plot")
     return getattr(import_module(f"{__name__}.{_HOMES.get(name, 'errors')}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

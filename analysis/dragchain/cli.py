@@ -74,6 +74,14 @@ COMMANDS = (
     Command("figures", "draw the figures of a run, from its tables",
             "report.run_figures:write_figures",
             (RUN_DIR,)),
+    Command("network", "write the interactive page on a run's contact network",
+            "network_page.page:write_page", (RUN_DIR,)),
+    Command("journal", "draw the figures of a process run for a publication",
+            "report.journal:write_journal_figures", (
+        RUN_DIR,
+        _argument("--paper-colours", action="store_true",
+                  help="forces from green to red, as in Uhlmann et al. (2015)"),
+    )),
     Command("export", "export a run to ParaView or OVITO", "export.write:export_command", (
         RUN_DIR,
         _argument("--to", required=True, choices=("paraview", "xyz"),
@@ -91,6 +99,9 @@ COMMANDS = (
 """What a user calls."""
 
 STEPS = (
+    Command("numbers", "print where a report is, and its main numbers",
+            "report.numbers:main_numbers",
+            (_argument("report_dir", type=Path, metavar="REPORT_DIR"),)),
     Command("measure", "make tables, chains and measures of a run of a plan",
             "tradeoff.measure_run:write_measures", (
                 RUN_DIR,
@@ -135,9 +146,6 @@ STEPS = (
         _argument("--inputs", type=Path, nargs="*", default=[], metavar="FILE",
                   help="study files, templates and meshes"),
         _argument("--licence", metavar="TEXT", help="licence of the results"))),
-    Command("validate", "compare the runs of a study with its source",
-            "validation.report:write_validation",
-            (OUT_DIR, RUN_DIRS, _argument("--command", required=True, help="for the record"))),
     Command("record", "find the impacts of a measured drop test",
             "calibration.results:write_record", (
         RECORD,

@@ -1,5 +1,7 @@
 """The errors that reading and analysing a run can end in."""
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
 
 
@@ -101,6 +103,34 @@ class TruncatedDumpError(DumpError):
 
 class TableError(DragchainError):
     """Raw outputs that are whole one by one but contradict each other."""
+
+
+_MOST = 30
+"""More known names are listed only if none of them resembles the wrong one."""
+
+
+class UnknownNameError(DragchainError):
+    """A name of a study, run, table or column that there is none of.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong, with the name and without a full stop.
+    name : str
+        The name.
+    known : iterable of str
+        The names that there are.
+    remedy : str, optional
+        What the user can do.
+    """
+
+    def __init__(
+        self, problem: str, name: str, known: Iterable[str], *, remedy: str | None = None
+    ) -> None:
+        self.known = tuple(known)
+        near = [f"did you mean {one!r}?" for one in get_close_matches(name, self.known, 1)]
+        every = [] if near and len(self.known) > _MOST else [f"known: {', '.join(self.known)}"]
+        super().__init__(_joined([problem, *near, *every], remedy))
 
 
 class ExportError(DragchainError):

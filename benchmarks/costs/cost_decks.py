@@ -187,7 +187,7 @@ def at_rest(case: Case, bed: Bed, source: str) -> AnyScene:
     begun, dt = _begun(scene, source, 0).deck, scene.deck.timestep_s
     mass = particle_mass(particle_material(study), study.media.radius_mean_m)
     deck = _RestDeck(
-        **vars(begun) | {"legs": (), "outputs": ()},
+        **vars(begun) | {"outputs": ()},
         damping_kg_s=mass / DAMPING_TIME_S,
         damped_steps=math.ceil(DAMPED_S / dt),
         free_steps=math.ceil(FREE_S / dt),

@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyvista as pv
+
+from dragchain.network.write import write_chains
 
 R = 0.003
 STEP_S = 1e-3
@@ -105,8 +108,10 @@ def network_tables() -> tuple[pd.DataFrame, pd.DataFrame]:
     head = ["step", "time_s"]
     columns = [*head, "a_id", "b_id", *(f"point_{i}_m" for i in axes)]
     columns += [*(f"force_{i}_n" for i in axes), "normal_force_n"]
+    bodies = {0: "particle-workpiece", 2: "particle-particle", -1: "particle-floor"}
+    table = pd.DataFrame(contacts, columns=columns)
     return (
-        pd.DataFrame(contacts, columns=columns),
+        table.assign(kind=table["b_id"].map(bodies).fillna("particle-side")),
         pd.DataFrame(particles, columns=[*head, "particle_id", "x_m", "y_m", "z_m", "radius_m"]),
     )
 
@@ -119,3 +124,18 @@ def workpiece_contacts_table() -> pd.DataFrame:
     behind = ahead.assign(azimuth_rad=3.0, depth_m=0.005, normal_force_n=1.0)
     table = pd.concat([ahead, behind], ignore_index=True)
     return table.assign(in_statistics=table["step"] >= 200)
+
+
+def write_process_run(run_dir: Path) -> Path:
+    """Write a process run with one peak, its tables and its chains into a folder that is there."""
+    (run_dir / "case.json").write_text(json.dumps(case_json("process")))
+    columns_json(run_dir, {"workpiece_contacts": printed(["step"], 10)})
+    contacts, particles = network_tables()
+    save(workpiece_force_table(), run_dir, "workpiece_force")
+    save(contacts, run_dir, "contacts")
+    save(particles, run_dir, "particles")
+    save(workpiece_contacts_table(), run_dir, "workpiece_contacts")
+    workpiece = pv.Cylinder(center=(0, 0, 0.025), direction=(0, 0, 1), radius=0.002, height=0.05)
+    workpiece.triangulate().save(run_dir / "workpiece.stl")
+    write_chains(run_dir)
+    return run_dir

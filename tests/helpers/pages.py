@@ -1,6 +1,7 @@
 """What tests ask of a page."""
 
 import re
+from collections.abc import Collection
 from html.parser import HTMLParser
 
 
@@ -38,14 +39,15 @@ class Page(HTMLParser):
             self.words += data.replace("\N{NO-BREAK SPACE}", " ")
 
 
-def stands_alone(text: str) -> Page:
-    """Check that a page is whole, and needs no other file and no network."""
+def stands_alone(text: str, beside: Collection[str] = ()) -> Page:
+    """Check that a page is whole, and needs no network and no file but those `beside` it."""
     page = Page(text)
     assert page.open == []
     assert page.title
     assert all(image.startswith("data:image/") for image in page.images)
     anchors = {f"#{name}" for name in page.names}
-    assert {link for link in page.references if not link.startswith("data:")} <= anchors
+    links = {link for link in page.references if not link.startswith("data:")}
+    assert links <= anchors | set(beside)
     assert not re.search(r"@import|url\(|<script|<link", text)
     assert not re.search(r"\b(None|nan|Undefined)\b", page.words)
     return page

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats
-from dragchain.validation.peaks.findings import Findings, study_of
-from dragchain.validation.peaks.lifetimes import lives
-from dragchain.validation.peaks.run_series import RunSeries
-from dragchain.validation.peaks.runs import peak_table
-from dragchain.validation.peaks.settings import SETTINGS
+from evidence.validation.peaks.findings import Findings, study_of
+from evidence.validation.peaks.lifetimes import lives
+from evidence.validation.peaks.run_series import RunSeries
+from evidence.validation.peaks.runs import peak_table
+from evidence.validation.peaks.settings import SETTINGS
 
 FRAMES = 400
 INTERVAL_S = 0.01

@@ -8,12 +8,18 @@ from pathlib import Path
 from paths import ROOT
 
 
-def snakemake(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def call_of(*arguments: str) -> tuple[list[str], dict[str, str]]:
+    """Command line and environment of a call."""
     words = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
     paths = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis"), str(ROOT)])
     scripts = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = {**os.environ, "PYTHONPATH": paths, "PATH": scripts}
     environment.pop("DISPLAY", None)
+    return words, environment
+
+
+def snakemake(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    words, environment = call_of(*arguments)
     return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
 
 

@@ -4,14 +4,18 @@ import json
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
 from paths import PROJECT, ROOT, SMALL_STUDY
+from PIL import Image
 from snakemake_calls import jobs, snakemake
 
 from dragchain import load_case
+from dragchain.figures.style import PAPER_COLOURS, force_map
+from dragchain.report.journal import COLUMN_MM, PAGE_MM, write_journal_figures
 from dragchain.run.case import Case
 from dragchain.run.kinematics import drag_phase
 
@@ -122,6 +126,31 @@ def test_the_report_compares_wake_and_fresh_bed(workpieces: list[Path], project:
         assert row["drag_in_wake_mean_n"] == pytest.approx(late["drag_n"].mean())
     page = (project / "results/small/report/report.html").read_text()
     assert "Drag in the wake" in page
+
+
+def test_figures_for_a_publication_in_three_formats(project: Path, workpieces: list[Path]) -> None:
+    assert "draw_for_journal" in jobs(project, "figures", "--config", "study=small")
+    files = write_journal_figures(workpieces[1], paper_colours=True)
+    assert force_map().name != PAPER_COLOURS.name
+    assert matplotlib.rcParams["svg.fonttype"] != "none"
+    names = {file.stem for file in files}
+    assert len(names) == 7
+    assert {file.name for file in files} == {
+        f"{name}.{ending}" for name in names for ending in ("svg", "pdf", "png")
+    }
+    for name in names:
+        with Image.open(workpieces[1] / f"figures/journal/{name}.png") as picture:
+            millimetres = COLUMN_MM if name == "force_around_workpiece" else PAGE_MM
+            assert picture.width / 300 * 25.4 == pytest.approx(millimetres, abs=0.2)
+        text = (workpieces[1] / f"figures/journal/{name}.svg").read_text()
+        assert "</text>" in text
+        assert "effective samples" not in text
+
+
+def test_other_colours_are_refused(project: Path) -> None:
+    done = snakemake(project, "figures", "--dry-run", "--config", "study=small", "colours=red")
+    assert done.returncode != 0
+    assert "uniform or paper" in done.stdout + done.stderr
 
 
 def test_nothing_is_made_again(project: Path) -> None:

@@ -12,6 +12,7 @@ from urllib.parse import unquote
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 import pyvista as pv
 import yaml
@@ -65,7 +66,10 @@ def test_the_report_has_a_row_a_case(finished: Path) -> None:
     assert (summary.drag_mean_n < summary.drag_ci95_high_n).all()
     assert summary.bed_height_m.nunique() == 1
     assert 0.5 < summary.solid_fraction[0] < 0.64
-    assert stands_alone((report / "report.html").read_text()).images
+    networks = [file.name for file in report.glob("network-*.html")]
+    assert len(networks) == 2
+    page = stands_alone((report / "report.html").read_text(), networks)
+    assert page.images and set(networks) <= set(page.references)
 
 
 def test_cases_share_their_filling_and_drop(finished: Path) -> None:
@@ -157,14 +161,48 @@ def test_all_contact_columns_would_give_the_same_tables(finished: Path, tmp_path
         pd.testing.assert_frame_equal(lean, fat, check_exact=True)
 
 
-def test_the_readmes_pandas_lines_run(finished: Path) -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
-    assert code.count("read_parquet") == 2
-    stand_in = code.replace("uhlmann2015", "small")
+@pytest.mark.parametrize("page", ["README.md", "docs/python.md"])
+def test_the_python_of_a_page_runs(finished: Path, page: str, tmp_path: Path) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL)
+    code = "\n".join(blocks)
+    stand_in = code.replace("uhlmann2015", "small").replace('.savefig("', f'.savefig("{tmp_path}/')
     done = subprocess.run(
         [sys.executable, "-c", stand_in], cwd=finished, capture_output=True, text=True, check=True
     )
     assert "drag_mean_n" in done.stdout
+    assert "negative: the bed resists (N)" in done.stdout
+    assert len(list(tmp_path.glob("*.png"))) == code.count(".savefig(") > 0
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "examples").glob("*.ipynb")), ids=lambda f: f.stem)
+def test_a_notebook_runs(finished: Path, file: Path) -> None:
+    import nbformat
+    from nbclient import NotebookClient
+
+    notebook = nbformat.read(file, as_version=4)
+    first = next(cell for cell in notebook.cells if cell.cell_type == "code")
+    first.source = 'study_name = "small"'
+    folder = {"metadata": {"path": str(finished / "studies")}}
+    NotebookClient(notebook, timeout=300, resources=folder).execute()
+    outputs = [one for cell in notebook.cells for one in cell.get("outputs", [])]
+    pictures = [one for one in outputs if "image/png" in one.get("data", {})]
+    assert len(pictures) == sum("plt." in cell.source for cell in notebook.cells)
+    assert not [one for one in outputs if "Warning" in one.get("text", "")]
+    shown = "".join(one.get("data", {}).get("text/plain", "") for one in outputs)
+    runs = [folder.name for folder in (finished / "results/small/process").iterdir()]
+    assert any(run.rsplit("-", 1)[0] in shown for run in runs)
+
+
+def test_every_column_of_the_tables_has_a_unit_and_a_description(finished: Path) -> None:
+    files = list((finished / "results/small").rglob("*.parquet"))
+    assert {file.stem for file in files} >= {"thermo", "impacts", "facets", "chains", "summary"}
+    bare = {
+        f"{file.stem}.{field.name}"
+        for file in files
+        for field in pq.read_schema(file)
+        if not {b"unit", b"description"} <= set(field.metadata or {})
+    }
+    assert not bare
 
 
 def test_nothing_is_left_to_do(finished: Path) -> None:
@@ -220,7 +258,8 @@ def test_an_edited_template_runs_what_depends_on_it(finished: Path) -> None:
     assert "rule run_process" in told
     assert "rule run_filling" not in told
     assert "rule render_filling" not in told
-    assert told.count("these inputs were run before") == 2  # a remark changes no result
+    logs = [file.read_text() for file in finished.glob("results/small/process/*/logs/run.log")]
+    assert ["these inputs were run before" in log for log in logs] == [True] * 2  # only a remark
     assert jobs(finished, *STUDY) == set()
 
 

@@ -26,6 +26,7 @@ def _argument(*names: str, **options: Any) -> tuple[tuple[str, ...], dict[str, A
 STUDY = _argument("study", help="name of a folder in studies/")
 FIDELITY = _argument("--fidelity", help="fidelity to use instead of the study's own")
 PLAN = _argument("--plan", help="use the design points of this plan instead of the study's cases")
+VERBOSE = _argument("--verbose", action="store_true", help="say all that is known of every run")
 OUT_DIR = _argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
 
 
@@ -46,10 +47,14 @@ class Command:
 
 COMMANDS = (
     Command("check", "check a study and LIGGGHTS without running anything", "commands:check",
-            (STUDY, FIDELITY)),
+            (STUDY, FIDELITY, VERBOSE)),
     Command("explain", "what the input scripts model, leave out and cost", "commands:explain", (
-        STUDY, FIDELITY,
+        STUDY, FIDELITY, VERBOSE,
         _argument("scene", nargs="?", help="drop_test, filling or process; default: all"))),
+    Command("status", "what is done, running, failed or waiting, and how long it will take",
+            "status:status", (STUDY, FIDELITY, PLAN, VERBOSE)),
+    Command("open", "print the path of a study's report, and open it where there is a display",
+            "status:open_report", (STUDY,)),
     Command("preview", "draw what a study describes, without running anything", "commands:preview",
             (STUDY, FIDELITY, _argument("--case", help="case to draw (default: the first)"))),
     Command("new", "make a study that extends another", "commands:new", (
@@ -71,8 +76,6 @@ COMMANDS = (
                   help="write the result to FILE and succeed even if the run is rejected"),
         _argument("--again", action="store_true",
                   help="start again even if the run was rejected before"),
-        _argument("--every", type=float, default=10.0, metavar="S", dest="every_s",
-                  help="seconds between reports"),
         _argument("--patience", type=float, default=1800.0, metavar="S", dest="patience_s",
                   help="seconds without any output after which LIGGGHTS is ended"))),
 )  # fmt: skip

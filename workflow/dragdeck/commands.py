@@ -1,11 +1,14 @@
 """What the commands of ``dragdeck`` do, and some of its steps."""
 
 import os
+import shutil
 import tempfile
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
+import jinja2
 from pydantic import ValidationError
 from rich.table import Table
 
@@ -24,19 +27,21 @@ from dragdeck.advice.options import with_option
 from dragdeck.advice.speed import Speed
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
-from dragdeck.cases.ranks import check_ranks
+from dragdeck.cases.ranks import check_ranks, cores_here
 from dragdeck.decks.deck import StudyScene
 from dragdeck.decks.render import deck_text, write_run, write_workpiece
 from dragdeck.decks.templates import environment
 from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
-from dragdeck.errors import InputError, choices, together
+from dragdeck.errors import DragdeckError, InputError, choices, together
 from dragdeck.files import replace_bytes, replace_text
 from dragdeck.outlook import bed as bed_outlook
 from dragdeck.outlook import fit as fit_outlook
 from dragdeck.outlook import timestep as timestep_outlook
-from dragdeck.outlook.explain import expected_cost, explanation, show
+from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, show
+from dragdeck.outlook.explain import page as page_of_scene
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_measured
+from dragdeck.outlook.runs import expected_runs, plan_in_words
 from dragdeck.outlook.stable_step import stable_step_cautions, stable_step_note
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import Layout, layout
@@ -64,35 +69,67 @@ def _scene_type(name: str) -> SceneType:
     return SCENES[name]
 
 
-def check(study: str, fidelity: str | None) -> None:
+def check(study: str, fidelity: str | None, verbose: bool) -> None:
     """Build every input script of a study and look for LIGGGHTS; run nothing."""
     project = find_project(Path.cwd())
     every = project.cases(study, fidelity)
-    templates = environment(project.templates, study_templates(every[0]))
-    notes: dict[str, None] = {}
-    errors: list[InputError] = []
-    for kind in SCENES.values():
-        for run_id, case in by_run(_but_for_the_seed(every), kind).items():
-            try:
-                scene = _built(kind, case, None)
-                deck_text(scene, templates)
-            except InputError as error:
-                errors.append(error)
-                continue
-            print(f"{kind.name} {run_id}: time step {scene.deck.timestep_s:.3g} s")
-            for what, text in _expectations(case, kind, scene):
-                print(f"  {what}: {text}")
-            notes.update(dict.fromkeys(f"{case.name}: {text}" for text in scene.warnings))
-    for note in notes:
-        print(f"warning: {note}")
-    if errors:
-        raise together(errors)
-    print(f"{study}: {len(every)} case(s) can be run; LIGGGHTS {find_engine().version}")
+    found = _Findings(environment(project.templates, study_templates(every[0])))
+    runs = [
+        run
+        for kind in SCENES.values()
+        for run in expected_runs(kind, project.run_folders(every, kind), partial(found.look, kind))
+    ]
+    warned = f"{len(found.warnings) or 'no'} warning{'' if len(found.warnings) == 1 else 's'}"
+    if found.errors:
+        wrong = together(found.errors)
+        say(f"dragdeck: {wrong}")
+        found.show(verbose)
+        errors = f"{1 + len(wrong.more)} error{'s' if wrong.more else ''}"
+        raise DragdeckError(f"{study}: {errors}, {warned}; it cannot be run")
+    found.show(verbose)
+    engine = find_engine()
+    cost, *scenes = plan_in_words(runs, cores_here())
+    print(*scenes, sep="\n")
+    print(f"{study}: no errors, {warned}; {len(every)} case(s), {cost}; LIGGGHTS {engine.version}")
 
 
-def _but_for_the_seed(cases: list[Case]) -> Iterable[Case]:
-    """The first of all cases that differ in the seed alone: nothing to check depends on it."""
-    return {str({**case.settings, "seed": 0}): case for case in reversed(cases)}.values()
+@dataclass
+class _Findings:
+    """What `check` finds, each thing once with the cases or runs that it is about."""
+
+    templates: jinja2.Environment
+    errors: list[InputError] = field(default_factory=list)
+    warnings: dict[str, list[str]] = field(default_factory=dict)
+    notes: dict[str, list[str]] = field(default_factory=dict)
+
+    def look(self, kind: SceneType, runs: Mapping[Path, Case]) -> StudyScene:
+        """Build the scene of runs that differ in the seed alone."""
+        case = next(iter(runs.values()))
+        try:
+            scene = _built(kind, case, None)
+            deck_text(scene, self.templates)
+        except InputError as error:
+            self.errors.append(error)
+            raise
+        for text in dict.fromkeys(map(str, scene.warnings)):
+            names = self.warnings.setdefault(text, [])
+            names += [case.name] if case.name not in names else []
+        lines = [f"time step: {scene.deck.timestep_s:.3g} s"]
+        lines += [f"{what}: {text}" for what, text in _expectations(case, kind, scene)]
+        names = [f"{kind.name} {folder.name}" for folder in runs]
+        self.notes.setdefault("\n  ".join(lines), []).extend(names)
+        return scene
+
+    def show(self, verbose: bool) -> None:
+        """Print the warnings; and what is expected of every run, if that is asked for."""
+        for text, names in self.warnings.items():
+            print(f"warning: {_first(names)}: {text}")
+        for text, names in self.notes.items() if verbose else ():
+            print(f"{_first(names)}\n  {text}")
+
+
+def _first(names: Sequence[str]) -> str:
+    return names[0] + (f" and {len(names) - 1} more" if names[1:] else "")
 
 
 def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
@@ -114,23 +151,24 @@ def _built(kind: SceneType, case: Case, bed: Bed | None) -> StudyScene:
     return replace(scene, warnings=[*warnings(case.study), *scene.warnings, *more])
 
 
-def explain(study: str, fidelity: str | None, scene: str | None) -> None:
+def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) -> None:
     """Show what the input scripts of a study model, leave out and cost."""
     project = find_project(Path.cwd())
     every = project.cases(study, fidelity)
-    results = project.results(study)
-    kinds = [_scene_type(scene)] if scene else list(SCENES.values())
-    runs = ((kind, case) for kind in kinds for case in by_run(every, kind).values())
-    built = ((kind, case, _built(kind, case, None)) for kind, case in runs)
-    show(
-        explanation(
-            one,
-            expected_cost(kind, one, results / kind.name),
-            _expectations(case, kind, one),
-            tradeoff_if_measured(),
-        )
-        for kind, case, one in built
-    )
+    for kind in [_scene_type(scene)] if scene else SCENES.values():
+        speeds = measured_speeds(project.results(study) / kind.name)
+        cases = list(by_run(every, kind).values())
+        for case in cases if verbose else cases[:1]:
+            one = _built(kind, case, None)
+            cost = expected_cost(kind, one, speeds)
+            if not verbose:
+                width = min(100, shutil.get_terminal_size().columns)
+                print(*page_of_scene(one, cost, len(cases), width), sep="\n")
+                continue
+            notes = _expectations(case, kind, one)
+            show([explanation(one, cost, notes, tradeoff_if_measured())])
+    if not verbose:
+        print("Every run with reasons, prices and expectations: --verbose")
 
 
 def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:

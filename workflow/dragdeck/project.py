@@ -108,6 +108,17 @@ class Project:
         """The results of a study."""
         return self.root / "results" / study
 
+    def report(self, study: str) -> Path:
+        """The page that a study's results end in."""
+        return self.results(study) / "report" / "report.html"
+
+    def run_folders(
+        self, cases: Iterable[Case], scene: SceneType, *, of_plan: bool = False
+    ) -> dict[Path, Case]:
+        """The folders of the engine runs of cases, each with its first case."""
+        runs = by_run(cases, scene).values()
+        return {self.run_folder(case, scene, of_plan=of_plan): case for case in runs}
+
     def run_folder(self, case: Case, scene: SceneType, *, of_plan: bool = False) -> Path:
         """The folder of one engine run; process runs of a plan stand apart, as points."""
         place = POINTS if of_plan and scene.needs_bed else scene.name

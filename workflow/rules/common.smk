@@ -9,6 +9,7 @@ from snakemake.exceptions import WorkflowError
 from dragdeck.campaigns.restitution_drops import record_file
 from dragdeck.decks.templates import environment, template_files
 from dragdeck.errors import DragdeckError, choices
+from dragdeck.outlook.runs import expected_runs, plan_in_words
 from dragdeck.outlook.timestep import largest_of_case
 from dragdeck.project import (
     PLACES,
@@ -21,7 +22,8 @@ from dragdeck.project import (
     study_templates,
 )
 from dragdeck.scenes.registry import SCENES
-from dragdeck.engine.reports import say
+from dragdeck.engine.reports import say, shown_bytes
+from dragdeck.engine.space import free_bytes
 from dragdeck.snakemake_lock import clear_stale_locks
 from dragdeck.source_hash import source_hash
 from dragdeck.study.base import NAME, NAME_LIMIT
@@ -46,6 +48,7 @@ DEFAULTS = {
     "fidelity": "",
     "plan": "",
     "stability_map": "studies/stability/map.yaml",
+    "colours": "uniform",
 }
 
 
@@ -64,13 +67,17 @@ def check_settings():
             refuse_setting(
                 key, "not the path of a file", "letters (a-z), digits, '.', '_', '-', '/'"
             )
+        if key == "colours" and value not in ("uniform", "paper"):
+            refuse_setting(key, "no such colours", "uniform or paper")
         if not file and not NAME.fullmatch(str(value)):
             refuse_setting(key, "not a name", NAME_LIMIT)
 
 
 check_settings()
 PROJECT = Project(Path(workflow.basedir))
-STUDY, FIDELITY, PLAN, STABILITY_MAP = (str(config.get(*item)) for item in DEFAULTS.items())
+STUDY, FIDELITY, PLAN, STABILITY_MAP, COLOURS = (
+    str(config.get(*item)) for item in DEFAULTS.items()
+)
 PLAN, VALIDATION = PLAN or "default", PLAN or "paper"
 explained(PROJECT.plan_file, PLAN)
 CASES = explained(PROJECT.cases, STUDY, FIDELITY or None)
@@ -160,6 +167,12 @@ def page_templates(*names, package="analysis/dragchain"):
     return [str(file) for file in (*own, shared / "page.html.j2", shared / "macros.html.j2")]
 
 
+def network_page_files():
+    """What a page on the contact network is made of beside the data of its run."""
+    folder = PROJECT.root / "analysis/dragchain/network_page"
+    return [str(folder / name) for name in ("network.html.j2", "network.css", "network.js")]
+
+
 # --- cases and runs ------------------------------------------------------------------
 
 
@@ -210,6 +223,25 @@ def every_packing(file):
         if case.study.model_copy(update={"seed": first.seed}) == first
     ]
     return [f"{run_path(STUDY, POINTS, run)}/{file}" for run in alike]
+
+
+def planned_runs(jobs):
+    """The engine runs of jobs: what is expected of each, and how far it is."""
+    found = {}
+    for job in jobs:
+        place = job.rule.name.removeprefix("run_")
+        if place in PLACES and place != job.rule.name:
+            folder = PROJECT.root / Path(job.output[0]).parent
+            found.setdefault(place, {})[folder] = case_of(place, job.wildcards.run)
+    runs = (expected_runs(PLACES[place], folders) for place, folders in found.items())
+    return [run.now() for several in runs for run in several]
+
+
+def tell_numbers():
+    """Say where the report is, with its main numbers; nothing if there is none."""
+    said = shell("dragchain step numbers results/{STUDY}/report 2> /dev/null || true", read=True)
+    if said.strip():
+        logger.info(said.rstrip(), extra={"shown": True})
 
 
 # --- parameters of rules, as functions of their wildcards ----------------------------

@@ -10,9 +10,10 @@ rule write_report:
         ],
         [every(name, "tables/figures.json") for name in SCENES],
         every("process", "tables/loading.json"),
+        every("process", "network.html"),
         every_extrapolated(),
         advice=asked_advice("process"),
-        templates=page_templates("report/report.html.j2", "report/summary_columns.csv"),
+        templates=page_templates("report/report.html.j2"),
     output:
         csv=of_study("report", "summary.csv"),
         parquet=of_study("report", "summary.parquet"),
@@ -38,6 +39,20 @@ rule write_report:
         "dragchain report --out $(dirname {output.csv}) {params.runs} {params.advice} > {log} 2>&1"
 
 
+# What will be run: as text, and as data for `--logger dragdeck`.
+onstart:
+    runs, cores = planned_runs(workflow.dag.needrun_jobs()), workflow.cores or 1
+    if runs:
+        first, *more = plan_in_words(runs, cores)
+        lines = [f"{STUDY}: {first}; {shown_bytes(free_bytes(PROJECT.root))} free", *more]
+        logger.info("\n".join(lines), extra={"shown": True, "plan": runs, "cores": cores})
+
+
+onsuccess:
+    if any(job.rule.name == "write_report" for job in workflow.dag.jobs):
+        tell_numbers()
+
+
 onerror:
     # Not after Ctrl-C. The mark that the report is whole goes, so that the next call makes it anew.
     file = Path(log[0] if isinstance(log, list) else log)
@@ -50,3 +65,4 @@ onerror:
             "rm -f results/{STUDY}/report/complete;"
             " dragchain report --out results/{STUDY}/report {runs} {advice} || true"
         )
+        tell_numbers()

@@ -65,8 +65,7 @@ for PLACE, SCENE in PLACES.items():
             file=of_run(PLACE, RECORD[PLACE]) if PLACE == POINTS else "",
             source=source_hash("dragdeck.engine.run_folder"),
         shell:
-            "dragdeck run $(dirname {output}) {params.outcome} {params.file} --every 60"
-            " 2>&1 | tee -i {log}"
+            "dragdeck run $(dirname {output}) {params.outcome} {params.file}" " > {log} 2>&1"
 
 
 # Workpieces beyond the first of a run: each has tables, chains and figures of its own.
@@ -170,6 +169,27 @@ for PLACE, SCENE in SCENES.items():
                 source=source_hash("dragchain.network.statistics", "dragchain.network.chains"),
             shell:
                 "dragchain chains $(dirname {input.run}) > {log} 2>&1"
+
+
+# The figures of a run for a publication; --config colours=paper: forces from green to red.
+rule draw_for_journal:
+    input:
+        tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
+        of_run("process", "tables/figures.json"),
+        run=of_run("process", "run.json"),
+    output:
+        of_run("process", "figures/journal/workpiece.pdf"),
+    log:
+        of_run("process", "logs/journal.log"),
+    benchmark:
+        of_run("process", "benchmarks/journal.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        colours="--paper-colours" if COLOURS == "paper" else "",
+        source=source_hash("dragchain.report.journal"),
+    shell:
+        "dragchain journal $(dirname {input.run}) {params.colours} > {log} 2>&1"
 
 
 # What the quantities of a run would be at the physical Young's modulus.

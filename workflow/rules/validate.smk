@@ -10,8 +10,9 @@ rule write_validation:
                 f"validation/{name}.html.j2"
                 for name in ("validation", "peaks/peaks", "scaling", "load")
             ),
-            "scaling/words.html.j2",
+            package="evidence",
         ),
+        words="analysis/dragchain/scaling/words.html.j2",
     output:
         page=report(
             of_study("validation", "report.html"),
@@ -32,7 +33,7 @@ rule write_validation:
     params:
         command=f"snakemake validate --config study={STUDY} plan={VALIDATION}",
         runs=lambda wildcards, input: [str(Path(file).parent) for file in input.measures],
-        source=source_hash("dragchain.validation.report"),
+        source=source_hash("evidence.validation.report"),
     shell:
-        "dragchain step validate --out $(dirname {output.page}) --command {params.command:q}"
+        "python -m evidence validate --out $(dirname {output.page}) --command {params.command:q}"
         " {params.runs} > {log} 2>&1"

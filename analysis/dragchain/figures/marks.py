@@ -52,7 +52,11 @@ def band(axes: Axes, x: ArrayLike, interval: _Interval, colour: str, label: str 
 
 def compass(figure: Figure, *place: int) -> Any:
     """Polar axes, ahead up and left at the left; `place` as for `Figure.add_subplot`."""
-    axes: Any = figure.add_subplot(*place, projection="polar")
+    return as_compass(figure.add_subplot(*place, projection="polar"))
+
+
+def as_compass(axes: Any) -> Any:
+    """Turn polar axes so that ahead is up and left at the left."""
     axes.set_theta_zero_location("N")
     axes.set_thetagrids(np.arange(0, 360, 45), ["ahead", "", "left", "", "behind", "", "right", ""])
     axes.set_rlabel_position(157.5)

@@ -11,9 +11,9 @@ from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
 from dragchain.arrays import Floats
-from dragchain.figures.network_picture import Scene, View, colour_map
+from dragchain.figures.network_picture import Scene, View
 from dragchain.figures.rendering import Image
-from dragchain.figures.style import CHAIN
+from dragchain.figures.style import CHAIN, force_map
 
 
 def show_network(
@@ -43,7 +43,7 @@ def show_network(
 
 def force_bar(figure: Figure, panels: Sequence[Axes], largest_n: float) -> None:
     """Put the colours of the normal force beside panels."""
-    scale = ScalarMappable(Normalize(0.0, largest_n), colour_map())
+    scale = ScalarMappable(Normalize(0.0, largest_n), force_map())
     label = "normal force per contact (N);\ncylinder radius proportional"
     figure.colorbar(scale, ax=list(panels), shrink=0.8, pad=0.02, aspect=28, label=label)
 

@@ -1,7 +1,7 @@
 """Pictures of the interaction network, as in Fig. 4b and 4c of Uhlmann et al. (2015).
 
 One cylinder a contact: from centre to centre of two particles, or from a particle's centre to its
-contact point with workpiece or bowl. Its colour runs from green (no force) to red (the frame's
+contact point with workpiece or bowl. Its colour runs from light (no force) to dark (the frame's
 largest normal force), its radius is proportional to the normal force and reaches the mean particle
 radius at the largest.
 """
@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from matplotlib.colors import Colormap, LinearSegmentedColormap
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.figures.rendering import Camera, Image, new_plotter, photograph
+from dragchain.figures.style import force_map
 from dragchain.network.chains import WidestPath, dominant_path, widest_paths
 from dragchain.network.frame import NetworkFrame, read_frames
 from dragchain.run.case import Case
@@ -31,7 +31,6 @@ View = Literal["xy", "xz"]
 _PICTURE_TIME_S = 4.5
 """Process time, counted from the start of the drag, at which the paper shows the network."""
 
-_COLOURS = ("#1e8f4e", "#f0c929", "#c8102e")
 _PIXELS_PER_MM = 10
 _SIDES = 18
 _MARGIN_M = 0.004
@@ -271,7 +270,7 @@ def _add_contacts(
     radius = cylinder_radii(force, radius_mean_m, largest)
     shown = force > 0.0 if within is None else (force > 0.0) & within
     kept = shown if look.kept is None else np.isin(np.arange(force.size), look.kept)
-    colours = {"scalars": "force", "cmap": colour_map(), "clim": (0.0, largest)}
+    colours = {"scalars": "force", "cmap": force_map(), "clim": (0.0, largest)}
     for part, opacity in ((shown & ~kept, _FADED), (shown & kept, 1.0)):
         if part.any():
             light = {"opacity": opacity, "ambient": 0.35, "diffuse": 0.7}
@@ -287,8 +286,3 @@ def _tubes(axis: Floats, force: Floats, radius: Floats) -> Any:
     mesh = pv.PolyData(axis.reshape(-1, 3), lines=lines.ravel())
     mesh["force"], mesh["radius"] = np.repeat(force, 2), np.repeat(radius, 2)
     return mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES, capping=True)
-
-
-def colour_map() -> Colormap:
-    """The colour map of the pictures, green over yellow to red."""
-    return LinearSegmentedColormap.from_list("network", list(_COLOURS))

@@ -8,6 +8,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.typing import RcKeyType
 from PIL import Image
@@ -39,10 +40,22 @@ STYLE: dict[RcKeyType, Any] = {
     "figure.titlesize": 9.5,
     "legend.frameon": False,
     "legend.fontsize": 8,
+    "image.cmap": "magma_r",
 }
+"""Its colour map, from light to dark and told apart with any kind of colour vision, is that of
+forces and loads."""
+
+PAPER_COLOURS = LinearSegmentedColormap.from_list("paper", ["#1a9850", "#d9c514", "#c8102e"])
+"""Green over yellow to red, as in Uhlmann et al. (2015)."""
+
 WIDTH_IN = 7.6
 WIDE_IN = 9.5
 _DPI = 150
+
+
+def force_map() -> Colormap:
+    """The colour map of forces and loads."""
+    return matplotlib.colormaps[matplotlib.rcParams["image.cmap"]]
 
 
 def drawing() -> AbstractContextManager[None]:

@@ -1,6 +1,6 @@
 """The picture of a workpiece: where particles press and slide on it."""
 
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,14 +8,16 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from dragchain.arrays import Floats
 from dragchain.drag.around import AZIMUTH_BINS
 from dragchain.drag.azimuth import circumference, parts
 from dragchain.figures.marks import depth_bars
 from dragchain.figures.panels import head, new_panels
 from dragchain.figures.rendering import Camera, Image, check_rendering, new_plotter, photograph
-from dragchain.figures.style import GREY, WIDTH_IN, drawing, save
+from dragchain.figures.style import GREY, WIDTH_IN, force_map
 from dragchain.loading.document import Loading, Profile
 from dragchain.loading.facets import as_polydata
 from dragchain.loading.samples import Sampled
@@ -24,7 +26,6 @@ from dragchain.run.case import Case
 from dragchain.run.kinematics import motion_of, needed, spins
 from dragchain.run.workpiece import Surface
 
-_COLOURS = "magma_r"
 _QUANTITY = "force_slide_pa"
 _LABEL = "normal force times sliding distance, per area of the workpiece\nand path length (N/m²)"
 
@@ -38,19 +39,16 @@ _VIEWS = {
 """Sides of the workpiece: where the eye is in its frame (x, y), and where it then moves to."""
 
 _PIXELS = 900
+_FACETS_PER_BIN = 6
+"""Facets around the mantle per bin, so that it looks round."""
 _BESIDE_IN, _AROUND_IN, _TALLEST_IN = 1.3, 2.3, 3.5
 """What labels take of the width and height of the figure, and how high its panels are at most."""
 
 
-def draw_workpiece(
-    run_dir: Path,
-    case: Case,
-    sampled: Sampled,
-    surface: Surface,
-    facets: pd.DataFrame,
-    loading: Loading,
-) -> Path:
-    """Draw ``figures/workpiece.png``: facets of the workpiece by force times sliding distance.
+def workpiece_figure(
+    case: Case, sampled: Sampled, surface: Surface, facets: pd.DataFrame, loading: Loading
+) -> Figure:
+    """The workpiece by force times sliding distance, averaged over areas of a particle's size.
 
     A cylinder is shown from ahead, from behind and unrolled; any other workpiece
     from its four sides. Beside it stands the profile over depth.
@@ -64,23 +62,26 @@ def draw_workpiece(
     cylinder = needed(case.workpiece, "workpiece").kind == "cylinder"
     names = ("front", "rear") if cylinder else tuple(_VIEWS)
     widths = [1.0, 1.0, 2.8, 2.4] if cylinder else [1.0] * 4 + [1.4]
-    scale = Normalize(0.0, _largest(facets))
+    shown = averaged_load(surface, facets, case)
+    scale = Normalize(0.0, _largest(facets.assign(**{_QUANTITY: shown})))
     mesh = as_polydata(surface)
-    mesh.cell_data[_QUANTITY] = facets[_QUANTITY].to_numpy()
-    with drawing():
-        height = _height_in(case, widths[0] / sum(widths))
-        figure, panels = new_panels(height, len(widths), sharey=True, width_ratios=widths)
-        for axes, name in zip(panels, names, strict=False):
-            _view(axes, mesh, name, scale, case)
-        if cylinder:
-            _unrolled(panels[2], sampled, scale, case)
-        _profile(panels[-1], loading.profiles["depth"])
-        panels[0].set(ylabel="depth (mm)", ylim=_depths(case)[::-1])
-        colours = ScalarMappable(scale, _COLOURS)
-        style: dict[str, Any] = {"location": "bottom", "extend": "max", "shrink": 0.6, "aspect": 40}
-        figure.colorbar(colours, ax=panels, label=_LABEL, **style)
-        head(figure, _title(loading, case))
-        return save(figure, run_dir / "figures" / "workpiece.png")
+    mesh.cell_data[_QUANTITY] = shown
+    bins = _unrolled_bins(sampled, case) if cylinder else None
+    if bins is not None and not spins(case):
+        scale, mesh = Normalize(0.0, float(np.quantile(bins.load_pa, 0.99)) or 1.0), _rolled(bins)
+    height = _height_in(case, widths[0] / sum(widths))
+    figure, panels = new_panels(height, len(widths), sharey=True, width_ratios=widths)
+    for axes, name in zip(panels, names, strict=False):
+        _view(axes, mesh, name, scale, case)
+    if bins is not None:
+        _unrolled(panels[2], bins, scale, case)
+    _profile(panels[-1], loading.profiles["depth"])
+    panels[0].set(ylabel="depth (mm)", ylim=_depths(case)[::-1])
+    colours = ScalarMappable(scale, force_map())
+    style: dict[str, Any] = {"location": "bottom", "extend": "max", "shrink": 0.6, "aspect": 40}
+    figure.colorbar(colours, ax=panels, label=_LABEL, **style)
+    head(figure, _title(loading, case))
+    return figure
 
 
 def _height_in(case: Case, fraction: float) -> float:
@@ -135,28 +136,74 @@ def _render(mesh: Any, eye: tuple[float, float], scale: Normalize, case: Case) -
     high, low = _depths(case)
     height = (low - high) * 1e-3
     plotter = new_plotter(max(8, round(_PIXELS * 2 * _half_width(case) / height)), _PIXELS)
-    colours = {"scalars": _QUANTITY, "cmap": _COLOURS, "clim": (scale.vmin, scale.vmax)}
-    edges = {"show_edges": True, "edge_color": "#c9ced6", "line_width": 0.5}
-    plotter.add_mesh(mesh, **colours, **edges, lighting=False, show_scalar_bar=False)
+    colours = {"scalars": _QUANTITY, "cmap": force_map(), "clim": (scale.vmin, scale.vmax)}
+    plotter.add_mesh(mesh, **colours, lighting=False, show_scalar_bar=False)
     middle = needed(case.workpiece, "workpiece").immersion_depth_m - 0.5e-3 * (high + low)
     return photograph(plotter, Camera((*eye, middle), (0.0, 0.0, middle)), height)
 
 
-def _unrolled(axes: Axes, sampled: Sampled, scale: Normalize, case: Case) -> None:
-    """Draw the mantle of a cylinder unrolled: azimuth against depth."""
+def averaged_load(surface: Surface, facets: pd.DataFrame, case: Case) -> Floats:
+    """Load of each facet, (N,) in Pa: the mean over the area of those that lie beside it.
+
+    Facets are beside each other in a cube of a particle's radius, if they face the same way.
+    Single ones are hit by chance: a map of them shows the mesh instead of the load.
+    """
+    cells = np.floor(surface.corners.mean(axis=1) / case.media.radius_mean_m)
+    faced = np.round(surface.normals)
+    _, group = np.unique(np.column_stack([cells, faced]), axis=0, return_inverse=True)
+    group = group.ravel()
+    area = facets["area_m2"].to_numpy(np.float64)
+    load = np.bincount(group, facets[_QUANTITY].to_numpy(np.float64) * area)
+    mean: Floats = load[group] / np.bincount(group, area)[group]
+    return mean
+
+
+@dataclass(frozen=True)
+class _Bins:
+    """The mantle of a cylinder: edges of azimuth (rad) and depth (m), and the load, (D, A) in Pa.
+
+    Azimuths are from the direction of motion; ``tip_m`` is the depth of the tip.
+    """
+
+    azimuth_rad: Floats
+    depth_m: Floats
+    load_pa: Floats
+    radius_m: float
+    tip_m: float
+
+
+def _unrolled_bins(sampled: Sampled, case: Case) -> _Bins:
     workpiece = needed(case.workpiece, "workpiece")
     rows = sampled.rows[sampled.rows["workpiece_z_m"] > 1e-3 * workpiece.length_m]
-    azimuths = circumference(AZIMUTH_BINS)
-    shallowest = 1e-3 * _depths(case)[0]
-    depths = np.linspace(shallowest, workpiece.immersion_depth_m, DEPTH_BINS + 1)
+    azimuths, tip = circumference(AZIMUTH_BINS), workpiece.immersion_depth_m
+    depths = np.linspace(1e-3 * _depths(case)[0], tip, DEPTH_BINS + 1)
     middles, half = 0.5 * (azimuths[:-1] + azimuths[1:]), 0.5 * rows["force_slide_n_m"]
     sums = np.zeros((DEPTH_BINS, AZIMUTH_BINS))
     for part in parts(rows["azimuth_rad"].to_numpy(np.float64), AZIMUTH_BINS):
         grid = [depths, azimuths]
         sums += np.histogram2d(rows["depth_m"], middles[part], grid, weights=half)[0]
     area = workpiece.radius_m * (azimuths[1] - azimuths[0]) * (depths[1] - depths[0])
-    shown = sums / (area * sampled.path_m)
-    axes.pcolormesh(np.degrees(azimuths), depths * 1e3, shown, cmap=_COLOURS, norm=scale)
+    return _Bins(azimuths, depths, sums / (area * sampled.path_m), workpiece.radius_m, tip)
+
+
+def _rolled(bins: _Bins) -> Any:
+    """The mantle as a mesh in the frame of the workpiece, its tip in the origin."""
+    import pyvista as pv
+
+    angle = np.linspace(-np.pi, np.pi, _FACETS_PER_BIN * bins.load_pa.shape[1] + 1)
+    angle, height = np.meshgrid(angle, bins.tip_m - bins.depth_m, indexing="ij")
+    x, y = bins.radius_m * np.cos(angle), bins.radius_m * np.sin(angle)
+    grid = pv.StructuredGrid(x[:, :, None], y[:, :, None], height[:, :, None])
+    load = np.repeat(bins.load_pa, _FACETS_PER_BIN, axis=1)
+    grid.cell_data[_QUANTITY] = load.ravel()
+    return grid.extract_surface(algorithm="dataset_surface")
+
+
+def _unrolled(axes: Axes, bins: _Bins, scale: Normalize, case: Case) -> None:
+    """Draw the mantle of a cylinder unrolled: azimuth against depth."""
+    workpiece = needed(case.workpiece, "workpiece")
+    azimuth, depth = np.degrees(bins.azimuth_rad), 1e3 * bins.depth_m
+    axes.pcolormesh(azimuth, depth, bins.load_pa, cmap=force_map(), norm=scale)
     axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle="--")
     axes.axhline(workpiece.immersion_depth_m * 1e3, color=GREY, linewidth=0.8)
     axes.set_xticks(np.arange(-180, 181, 90), ["back", "right", "ahead", "left", "back"])

@@ -4,12 +4,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pandas as pd
+from matplotlib.figure import Figure
 
 from dragchain.errors import TableError
+from dragchain.figures.style import drawing, save
 from dragchain.loading.contact_events import Thresholds, event_types, find_events
 from dragchain.loading.document import Loading
 from dragchain.loading.facets import check_facets, facet_table, write_vtp
-from dragchain.loading.figure import draw_workpiece
+from dragchain.loading.figure import workpiece_figure
 from dragchain.loading.samples import DRAWN, Sampled, sample
 from dragchain.loading.summary import summarise
 from dragchain.run.case import Case, load_case
@@ -74,10 +76,13 @@ def write_loading(run_dir: Path, limits: Thresholds | None = None) -> list[Path]
     write_parquet(found.events, events)
     found.summary.write(summary)
     write_vtp(found.surface, found.facets, mesh)
-    picture = draw_workpiece(
-        run_dir, found.case, found.sampled, found.surface, found.facets, found.summary
-    )
-    return [*files, picture]
+    with drawing():
+        return [*files, save(figure_of(found), run_dir / "figures" / "workpiece.png")]
+
+
+def figure_of(found: WorkpieceLoading) -> Figure:
+    """The figure of the workpiece; see `workpiece_figure`."""
+    return workpiece_figure(found.case, found.sampled, found.surface, found.facets, found.summary)
 
 
 def compute_loading(run_dir: Path, limits: Thresholds) -> WorkpieceLoading:

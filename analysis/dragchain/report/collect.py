@@ -47,7 +47,7 @@ def write_findings(run: RunData) -> Findings:
     SeriesError
         If the run is too short for its statistics.
     """
-    collect = {"process": _process, "filling": _filling, "drop_test": _drop}[run.case.scene]
+    collect = {"process": process_findings, "filling": _filling, "drop_test": _drop}[run.case.scene]
     findings = collect(run)
     findings.write(run.folder / FILE)
     return findings
@@ -56,7 +56,8 @@ def write_findings(run: RunData) -> Findings:
 # --- process ---------------------------------------------------------------------------------
 
 
-def _process(run: RunData) -> ProcessFindings:
+def process_findings(run: RunData) -> ProcessFindings:
+    """Compute the findings of a process run; errors are those of `write_findings`."""
     samples = read_counted(run.folder, ("step", "time_s", "drag_n"))
     forces = summarise_forces(run.folder)
     frame, frames, contacts = _workpiece_contacts(run, samples)

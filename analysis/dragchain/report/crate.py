@@ -25,7 +25,7 @@ LARGEST_BYTES = 20_000_000
 _SPECIFICATION = "1.1"
 _NO_LICENCE = "unknown: the study states none; ask its authors before you use it"
 _INPUTS = (".liggghts", ".data", ".stl", "case.json", "columns.json")
-_RESULTS = (".json", ".png", ".vtp", ".parquet")
+_RESULTS = (".json", ".png", ".svg", ".pdf", ".vtp", ".parquet")
 _NO_RESULT = {"logs", "benchmarks", "as_run", "archive", "damaged", "export", "state.json"}
 _TYPES = {".parquet": "application/vnd.apache.parquet", ".vtp": "application/xml"}
 

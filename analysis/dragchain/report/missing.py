@@ -1,14 +1,13 @@
 """Runs of a study that have no result: what went wrong with each, and what to do."""
 
 import re
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from dragchain.errors import DragchainError
 from dragchain.run.case import load_case
-from dragchain.run.completeness import CheckCode, RunRecord
+from dragchain.run.completeness import RunRecord
 
 _STEPS = ("render", "run", "tables", "chains", "loading", "figures")
 """The steps of a run that have a log, in order: the first that failed is to blame."""
@@ -16,18 +15,6 @@ _STEPS = ("render", "run", "tables", "chains", "loading", "figures")
 _LOG_BYTES = 20_000
 _SAID = re.compile(r"^(?:dragdeck|dragchain): (.*)", re.MULTILINE | re.DOTALL)
 
-_SMALLER_STEP = "choose a smaller timestep_fraction or a larger youngs_modulus_scale"
-_REMEDIES: Mapping[CheckCode, str] = {
-    "neighbour_builds": "choose a larger skin_m",
-    "at_rest": "choose a larger filling.max_time_s or filling.energy_ratio",
-    "steady_bed": "choose a longer motion.transient_m, or more motion.path.revolutions",
-    "particles_kept": _SMALLER_STEP,
-    "finite_numbers": _SMALLER_STEP,
-    "stable_timestep": _SMALLER_STEP,
-    "within_limits": _SMALLER_STEP,
-    "output_complete": "start it anew with: dragdeck run --again",
-    "ranks": "use the mpirun that belongs to this LIGGGHTS (DRAGDECK_LAUNCHER)",
-}
 _READ_SCREEN = "read the end of its last screen.*.txt"
 
 
@@ -114,7 +101,7 @@ def _of_record(record: RunRecord) -> tuple[str, str] | None:
     first, *others = record.failed_checks
     more = f"; and {len(others)} more" if others else ""
     seen = f"failed check: {first.name}: {first.seen} (limit: {first.limit}){more}"
-    return seen, _REMEDIES.get(first.code, _READ_SCREEN)
+    return seen, first.remedy or _READ_SCREEN
 
 
 def _of_log(log: Path) -> tuple[str, str] | None:

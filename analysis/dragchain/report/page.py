@@ -19,6 +19,9 @@ from dragchain.report import notation
 LARGE_PICTURE = 200_000
 """Bytes above which a page holds a picture as WebP; ``figures/`` keeps the PNG."""
 
+NETWORK_PAGE = "network.html"
+"""The interactive page on the contact network of a process run, in its folder."""
+
 _HEADING = re.compile(r'<h2 id="([^"]+)">(.*?)</h2>')
 
 Filters = Mapping[str, Callable[..., object]]
@@ -32,7 +35,7 @@ def render_page(
     Parameters
     ----------
     template : str
-        Path below this package or the given one, for example ``validation/validation.html.j2``.
+        Path below this package or the given one, for example ``tradeoff/tradeoff.html.j2``.
     filters : mapping, optional
         Filters of this page alone, by name.
     package : str

@@ -12,14 +12,14 @@ from matplotlib.figure import Figure
 from dragchain.arrays import Floats
 from dragchain.dumps.run_parts import iter_prints
 from dragchain.figures import network_picture
-from dragchain.figures.marks import compass, compass_bars, depth_bars, row, row_names
+from dragchain.figures.marks import compass, compass_bars, row, row_names
 from dragchain.figures.network_overlay import force_bar, show_network
 from dragchain.figures.panels import head, legend_below, new_figure, new_panels
-from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED, drawing, save
+from dragchain.figures.style import BLUE, RED, drawing, save
+from dragchain.report import run_panels
 from dragchain.report.collect import write_findings
 from dragchain.report.findings import (
     FIGURES,
-    Comparison,
     DropFindings,
     DropImpacts,
     FillingFindings,
@@ -27,38 +27,16 @@ from dragchain.report.findings import (
 )
 from dragchain.report.run_data import RunData
 from dragchain.run.case import Case, load_case, load_outputs
-from dragchain.run.kinematics import drag_start_s
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
-
-_RUN_IN = "#d9dde2"
-_REFERENCES = (RED, GREEN, GREY)
 
 
 def forces(run: RunData, found: ProcessFindings) -> Figure:
     """Drag and lateral force over process time, as Fig. 4a of Uhlmann et al. (2015)."""
-    trace, ours = run.drag, found.forces["drag_n"]
-    time_s = trace.process_time_s
-    span = [float(time_s[trace.counted][0]), float(time_s[-1])]
     figure, (axes,) = new_panels(3.6)
-    axes.plot(time_s, trace.lateral_n, color=ORANGE, lw=0.7, label="lateral force (left of motion)")
-    axes.plot(time_s, trace.drag_n, color=BLUE, lw=0.8, label="drag force (along motion)")
-    axes.axvspan(float(time_s[0]), span[0], color=_RUN_IN, alpha=0.6, lw=0, label="transient")
-    axes.fill_between(span, ours.ci95_low, ours.ci95_high, color="black", alpha=0.15, lw=0)
-    interval = f"{ours.ci95_low:.2f} to {ours.ci95_high:.2f}"
-    label = f"mean drag {ours.mean:.2f} N (95 % CI {interval} N)"
-    axes.plot(span, [ours.mean] * 2, color="black", label=label)
-    for one, colour in zip(found.comparison, cycle(_REFERENCES), strict=False):
-        label = f"{one.label} mean {one.mean_n:.2f} N" + _spread(one)
-        axes.plot(span, [one.mean_n] * 2, linestyle="--", color=colour, label=label)
-    axes.set(xlabel="process time (s)", ylabel="force on the workpiece (N)", xlim=(0, time_s[-1]))
-    axes.set_title(_reliability(ours))
+    run_panels.forces(axes, run, found)
+    axes.set_title(_reliability(found.forces["drag_n"]))
     return legend_below(figure)
-
-
-def _spread(row: Comparison) -> str:
-    source = f" ({row.source})" if row.source else ""
-    return source if row.std_n is None else f" ± {row.std_n:.2f} N{source}"
 
 
 def _reliability(ours: MeanEstimate) -> str:
@@ -91,33 +69,25 @@ def _ratio(ratio: Estimate) -> str:
 
 def force_depth(run: RunData, found: ProcessFindings) -> Figure:
     """The normal force of a contact, and of all contacts together, against depth."""
-    depth, slope = found.depth, found.depth.slope_n_per_m.over(1e3)
+    slope = found.depth.slope_n_per_m.over(1e3)
     figure, (left, right) = new_panels(3.9, 2, sharey=True)
-    depth_bars(left, depth.edges_m, depth.contact_n)
-    left.set(xlabel="mean normal force per contact (N)", ylabel="depth below the surface (mm)")
+    run_panels.force_over_depth(left, found)
     interval = f"95 % CI {slope.ci95_low:.4f} to {slope.ci95_high:.4f}"
     left.set_title(f"slope {slope.value:.4f} N/mm\n({interval})")
-    depth_bars(right, depth.edges_m, depth.line_load_n_per_m, 1e-3)
-    right.set(xlabel="total normal force per depth (N/mm)")
-    right.set_title("deepest bin includes the contacts\non edge and end face")
+    run_panels.load_over_depth(right, found)
+    right.set(ylabel="", title="deepest bin includes the contacts\non edge and end face")
     return figure
 
 
 def chains_peaks(run: RunData, found: ProcessFindings) -> Figure:
     """Resistance with its peaks over the bottleneck of the dominant workpiece path."""
-    trace, peaks, counted = run.drag, found.peaks, run.drag.counted
+    peaks = found.peaks
     figure, (upper, lower) = new_panels(4.4, 2, columns=1, sharex=True)
-    upper.plot(trace.process_time_s[counted], -trace.drag_n[counted], color=BLUE, linewidth=0.8)
-    upper.plot(peaks.process_time_s, -np.array(peaks.drag_n), "v", color=RED, ms=6)
-    upper.set(ylabel="drag force\n(magnitude, N)")
+    run_panels.peaks(upper, run, found)
     upper.set_title(f"{peaks.count} peaks (marked), at least {peaks.separation_s:.2f} s apart")
-    frame_s = run.network["time_s"].to_numpy(np.float64) - drag_start_s(run.case)
-    lower.plot(frame_s, run.bottlenecks_n, ".-", color=GREEN)
-    lower.set(xlabel="process time (s)", ylabel="bottleneck force of the\ndominant path (N)")
-    lower.set_ylim(bottom=0)
+    run_panels.bottlenecks(lower, run, found)
     for axes in (upper, lower):
-        for moment in peaks.process_time_s:
-            axes.axvline(moment, color=RED, linewidth=0.7, linestyle=":")
+        run_panels.peak_times(axes, found)
     return figure
 
 
@@ -253,8 +223,8 @@ _Draw = Callable[[RunData, Any], Figure | None]
 """Draws a figure of a run with its findings; None: it lacks an optional table."""
 
 
-_PROCESS = (forces, network_xy, network_xz, force_around_workpiece, force_depth, chains_peaks)
-_DRAW: Mapping[str, _Draw] = {draw.__name__: draw for draw in (*_PROCESS, filling, drop_test)}
+DRAW_PROCESS = (forces, network_xy, network_xz, force_around_workpiece, force_depth, chains_peaks)
+_DRAW: Mapping[str, _Draw] = {draw.__name__: draw for draw in (*DRAW_PROCESS, filling, drop_test)}
 
 
 def write_figures(run_dir: Path) -> list[Path]:
@@ -301,7 +271,7 @@ def drag_of_cases(
     figure, (axes,) = new_panels(1.2 + 0.32 * len(names))
     for place, force in enumerate(forces):
         row(axes, place, force.mean, force, BLUE)
-    for (label, value), colour in zip(references, cycle(_REFERENCES), strict=False):
+    for (label, value), colour in zip(references, cycle(run_panels.REFERENCES), strict=False):
         axes.axvline(value, color=colour, linestyle="--", label=f"{label} {value:.2f} N")
     row_names(axes, names)
     axes.set(xlabel="mean drag (N); bars: 95 % confidence interval")

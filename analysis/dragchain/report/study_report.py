@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 
 from dragchain.errors import DragchainError, MissingRunsError, TableError
+from dragchain.files import write_bytes
 from dragchain.loading.document import FILE as LOADING
 from dragchain.loading.document import Loading
 from dragchain.report.bundle import write_bundle
@@ -22,7 +23,7 @@ from dragchain.report.cost_check import (
 )
 from dragchain.report.findings import FIGURES, Findings
 from dragchain.report.missing import MissingRun, missing_run, scene_of
-from dragchain.report.page import data_uri, file_uri, render_page
+from dragchain.report.page import NETWORK_PAGE, data_uri, file_uri, render_page
 from dragchain.report.runs import (
     ReportedRun,
     StudyRuns,
@@ -53,11 +54,12 @@ class Picture:
 
 @dataclass(frozen=True)
 class Section:
-    """What the page shows of one process run."""
+    """What the page shows of one process run; `network` is its page on the contact network."""
 
     study: StudyRuns
     assumptions: list[Assumption]
     pictures: list[Picture]
+    network: Path | None
     loading: Loading | None
     corrections: Corrections | None
     interval: RunInterval | None
@@ -67,6 +69,8 @@ class Section:
 
 def write_report(out_dir: Path, run_dirs: Sequence[Path], advice: Path | None = None) -> None:
     """Write ``summary.csv``, ``.parquet`` and ``.xlsx``, and ``report.html``, on process runs.
+
+    ``network.html`` of a run is copied beside the report, which links to it.
 
     Parameters
     ----------
@@ -96,6 +100,9 @@ def write_report(out_dir: Path, run_dirs: Sequence[Path], advice: Path | None = 
         studies = [section.study for section in sections]
         table = summary(studies)
         page = _render(sections, table, missing)
+        for section, name in zip(sections, _network_pages(sections), strict=True):
+            if section.network is not None:
+                write_bytes(out_dir / name, section.network.read_bytes())
         assumed = {one.study.process.case.run: one.assumptions for one in sections}
         write_bundle(
             out_dir,
@@ -142,10 +149,12 @@ def _section(study: StudyRuns, options: Sequence[Option]) -> Section:
     records = {str(run.case.scene): run.record for run in study.runs}
     measured = (process.folder / LOADING).is_file()
     corrections = process.folder / "tables" / "corrections.json"
+    network = process.folder / NETWORK_PAGE
     return Section(
         study=study,
         assumptions=_assumptions(study),
         pictures=[picture for run in study.runs for picture in _pictures(run)],
+        network=network if network.is_file() else None,
         loading=Loading.read(process.folder / LOADING) if measured else None,
         corrections=Corrections.read(corrections) if corrections.is_file() else None,
         interval=actual_interval(process.case.asked, process.findings.forces, study.extrapolated),
@@ -182,12 +191,27 @@ def _render(sections: Sequence[Section], table: pd.DataFrame, missing: Sequence[
         "report/report.html.j2",
         title=", ".join(dict.fromkeys(study.process.case.study for study in studies)),
         sections=sections,
+        network_pages=_network_pages(sections),
         missing=missing,
+        runs=_engine_runs(studies),
         overview=_overview(studies) if len(studies) > 1 else None,
         columns={str(name): table[name].tolist() for name in table},
         shown=_SHOWN,
         reliable_times=RELIABLE_TIMES,
     )
+
+
+def _network_pages(sections: Sequence[Section]) -> list[str]:
+    """The name, beside the report, of each case's page on its contact network."""
+    if len(sections) == 1:
+        return [NETWORK_PAGE]
+    return [f"network-{section.study.process.folder.name}.html" for section in sections]
+
+
+def _engine_runs(studies: Sequence[StudyRuns]) -> list[ReportedRun[Findings]]:
+    """Every run of LIGGGHTS once: cases may share one, and so may workpieces."""
+    every = {(str(run.case.scene), run.case.run): run for study in studies for run in study.runs}
+    return [run for run in every.values() if run.case.output_of is None]
 
 
 def _overview(studies: Sequence[StudyRuns]) -> str:

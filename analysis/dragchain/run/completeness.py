@@ -39,6 +39,8 @@ class AcceptanceCheck(Part):
         For readers: the condition, what was seen, and what it asks for.
     number : float or None
         What was seen, where it is one number.
+    remedy : str or None
+        What to do where the check did not pass.
     """
 
     code: CheckCode
@@ -48,6 +50,7 @@ class AcceptanceCheck(Part):
     seen: str
     limit: str
     number: float | None = None
+    remedy: str | None = None
 
 
 class RunPart(Part):

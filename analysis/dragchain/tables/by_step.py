@@ -19,8 +19,8 @@ from dragchain.errors import TableError
 PIECE_ROWS = 32_768
 """Rows that come at once: what is computed of them is a multiple of their size."""
 
-_NUMBER = re.compile("^step$|_(n|m|s|j|id|pa|m_s|n_m|rad_s)$")
-"""Names of columns that hold numbers, by their units."""
+_NUMBER = re.compile("^step$|^(?!input_).*_(n|m|s|j|id|pa|m_s|n_m|rad_s)$")
+"""Names of columns that hold numbers, by their units; an input may be a list, as text."""
 
 _NEVER_EMPTY = ("network", "particles", "workpiece_contacts")
 """Tables of a bed with a workpiece in it: they always have rows."""
@@ -54,10 +54,19 @@ def intact(path: Path) -> Iterator[None]:
         ) from error
 
 
+_MADE_BY = {
+    **dict.fromkeys(("network", "chains", "clusters"), "chains"),
+    **dict.fromkeys(("facets", "contact_events"), "loading"),
+}
+"""The command that makes a table of a run, where it is not ``tables``."""
+
+
 def _command(path: Path) -> str:
-    """The command that makes a table."""
-    made_by = "chains" if path.stem in ("network", "chains", "clusters") else "tables"
-    return f"dragchain {made_by} {path.parent.parent}"
+    """The command that makes a table, which is in a folder of a run or the report of a study."""
+    folder = path.parent.parent
+    if path.stem == "summary":
+        return f"./run report --config study={folder.name}"
+    return f"dragchain {_MADE_BY.get(path.stem, 'tables')} {folder}"
 
 
 def read_groups(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from dragchain.dumps.frame import is_integer_column
 from dragchain.files import draft_of
+from dragchain.tables.meanings import described
 
 GROUP_ROWS = 131_072
 """Rows of a row group: what a table holds in memory while it is written."""
@@ -79,6 +80,8 @@ def table_writer(
 ) -> "Iterator[TableWriter]":
     """A table that is written part by part and appears under its name only once it is whole.
 
+    The metadata of the columns that ``columns.csv`` describes have their unit and description.
+
     If the block ends in an exception, nothing is left behind, and an older table of that name
     stays as it was.
 
@@ -94,7 +97,7 @@ def table_writer(
     """
     schema = _schema(columns) if columns else None
     with draft_of(file) as draft, ThreadPoolExecutor(1) as thread:
-        writer = TableWriter(draft, schema, thread, group_rows)
+        writer = TableWriter(draft, file.stem, schema, thread, group_rows)
         try:
             yield writer
             writer.finish()
@@ -109,10 +112,15 @@ class TableWriter:
     """
 
     def __init__(
-        self, draft: Path, schema: pa.Schema | None, thread: ThreadPoolExecutor, group_rows: int
+        self,
+        draft: Path,
+        name: str,
+        schema: pa.Schema | None,
+        thread: ThreadPoolExecutor,
+        group_rows: int,
     ) -> None:
         self.rows = 0
-        self._draft, self._schema, self._thread = draft, schema, thread
+        self._draft, self._name, self._schema, self._thread = draft, name, schema, thread
         self._group_rows = group_rows
         self._parts: list[pa.Table | pd.DataFrame] = []
         self._held = 0
@@ -146,7 +154,8 @@ class TableWriter:
 
     def _open(self) -> pq.ParquetWriter:
         if self._writer is None:
-            self._writer = pq.ParquetWriter(self._draft, self._schema, **_encodings(self._schema))
+            schema = described(self._schema, self._name)
+            self._writer = pq.ParquetWriter(self._draft, schema, **_encodings(schema))
         return self._writer
 
     def _flush(self) -> None:

@@ -31,12 +31,13 @@ from PIL import Image
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import Thresholds, event_types, find_events, surfaces
 from dragchain.loading.document import FILE, Loading
+from dragchain.loading.figure import averaged_load
 from dragchain.loading.samples import sample
 from dragchain.loading.write import compute_loading, write_loading
 from dragchain.run.case import load_case
 from dragchain.run.kinematics import workpiece_velocity
 from dragchain.run.paths.circle import Circle
-from dragchain.run.workpiece import off_facet, read_surface, turned
+from dragchain.run.workpiece import Surface, off_facet, read_surface, turned
 from dragchain.tables.workpiece_contacts import WallContacts
 from dragchain.tables.write import workpiece_contact_rows
 
@@ -205,6 +206,19 @@ def test_the_picture_is_whole(run: Path) -> None:
         shown = np.asarray(picture.convert("RGB"))
     assert shown.shape[0] > 500
     assert shown.std() > 10
+
+
+def test_the_load_map_averages_over_areas(run: Path) -> None:
+    """The load adds up as before; facets beside each other share theirs, others do not."""
+    rng, case = np.random.default_rng(1), load_case(run)
+    ball = pv.Sphere(radius=0.01, theta_resolution=30, phi_resolution=30)
+    surface = Surface(ball.points.astype(float)[ball.faces.reshape(-1, 4)[:, 1:]])
+    load = rng.exponential(1e3, len(surface.areas))
+    facets = pd.DataFrame({"area_m2": surface.areas, "force_slide_pa": load})
+    mean = averaged_load(surface, facets, case)
+    assert (mean * surface.areas).sum() == pytest.approx((load * surface.areas).sum())
+    assert 20 < len(np.unique(mean.round(6))) < 0.5 * len(mean)
+    assert mean.std() < 0.7 * load.std()
 
 
 def test_a_mesh_of_another_run_is_refused(tmp_path: Path) -> None:

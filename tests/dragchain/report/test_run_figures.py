@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-import pyvista as pv
 from changed import changed
 from figure_files import (
     LAST,
@@ -15,12 +14,12 @@ from figure_files import (
     R,
     case_json,
     columns_json,
-    network_tables,
     printed,
     resistance,
     save,
     workpiece_contacts_table,
     workpiece_force_table,
+    write_process_run,
 )
 from PIL import Image
 
@@ -28,7 +27,6 @@ from dragchain.errors import SeriesError, TableError
 from dragchain.figures import network_picture as scene
 from dragchain.figures.rendering import RenderError, check_rendering
 from dragchain.network.frame import NetworkFrame
-from dragchain.network.write import write_chains
 from dragchain.report.collect import compare
 from dragchain.report.findings import (
     FIGURES,
@@ -49,18 +47,7 @@ pytestmark = pytest.mark.slow  # its data take seconds to make
 @pytest.fixture(scope="module")
 def process(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a made process run with tables and chains."""
-    run_dir = tmp_path_factory.mktemp("process")
-    (run_dir / "case.json").write_text(json.dumps(case_json("process")))
-    columns_json(run_dir, {"workpiece_contacts": printed(["step"], 10)})
-    contacts, particles = network_tables()
-    save(workpiece_force_table(), run_dir, "workpiece_force")
-    save(contacts, run_dir, "contacts")
-    save(particles, run_dir, "particles")
-    save(workpiece_contacts_table(), run_dir, "workpiece_contacts")
-    workpiece = pv.Cylinder(center=(0, 0, 0.025), direction=(0, 0, 1), radius=0.002, height=0.05)
-    workpiece.triangulate().save(run_dir / "workpiece.stl")
-    write_chains(run_dir)
-    return run_dir
+    return write_process_run(tmp_path_factory.mktemp("process"))
 
 
 @pytest.fixture(scope="module")

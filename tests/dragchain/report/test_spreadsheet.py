@@ -8,13 +8,7 @@ import openpyxl
 import pandas as pd
 import pytest
 
-from dragchain.report.spreadsheet import (
-    COLUMNS,
-    definitions,
-    summary_workbook,
-    unit_of,
-    workbook,
-)
+from dragchain.report.spreadsheet import definitions, summary_workbook, workbook
 from dragchain.run.case import Assumption
 
 FORMULAE = ["=1+1", "+1", "-1", "@SUM(A1)", "{=1}", "https://example.org", "=cmd|' /C calc'!A0"]
@@ -48,39 +42,25 @@ def test_cells_keep_their_values_and_types() -> None:
 
 
 @pytest.mark.parametrize(
-    ("column", "unit"),
+    ("column", "unit", "heading"),
     [
-        ("drag_ci95_low_n", "N"), ("depth_slope_n_per_m", "N/m"), ("torque_n_m", "N m"),
-        ("input_motion_speed_m_s", "m/s"), ("input_gravity_m_s2", "m/s2"), ("steps_per_s", "1/s"),
-        ("input_media_density_kg_m3", "kg/m3"), ("drag_reliable", ""), ("coordination_number", ""),
-        ("drag_against_experiment_percent", "%"), ("wall_time_s", "s"), ("impulse_n_s", "N s"),
+        ("drag_ci95_low_n", "N", "Drag 95 % CI lower end (N)"),
+        ("depth_slope_n_per_m", "N/m", "Depth slope (N/m)"),
+        ("input_gravity_m_s2", "m/s2", "Input gravity (m/s2)"),
+        ("input_materials_x_youngs_modulus_pa", "Pa", "Input materials x Young's modulus (Pa)"),
+        ("steps_per_s", "1/s", "Steps (1/s)"),
+        ("peak_count", "1", "Peak count"),
     ],
 )  # fmt: skip
-def test_the_unit_is_the_end_of_the_name(column: str, unit: str) -> None:
-    assert unit_of(column) == unit
+def test_headings_are_words_with_units(column: str, unit: str, heading: str) -> None:
+    (row,) = definitions(pd.DataFrame({column: [1.0]})).itertuples(index=False)
+    assert (row.heading, row.column, row.unit) == (heading, column, unit)
+    assert row.meaning
 
 
-def test_headings_are_words_with_units() -> None:
-    columns = ["drag_ci95_low_n", "input_materials_steel_youngs_modulus_pa", "peak_count"]
-    assert definitions(columns)["heading"].tolist() == [
-        "Drag 95 % CI lower end (N)", "Input materials steel Young's modulus (Pa)", "Peak count"
-    ]  # fmt: skip
-
-
-def test_what_is_known_of_a_column_counts_before_its_name() -> None:
-    known = {"sliding": ("m/m", "sliding distance per path length"), "drag_mean_n": ("N", "mean")}
-    found = definitions(["drag_mean_n", "sliding", "drag_std_n"], known).set_index("column")
-    assert found.loc["sliding"].tolist() == [
-        "Sliding (m/m)", "m/m", "sliding distance per path length"
-    ]  # fmt: skip
-    assert found.loc["drag_mean_n"].tolist() == ["Drag mean (N)", "N", "mean"]
-    assert found.loc["drag_std_n", "meaning"].startswith("force on the workpiece along")
-
-
-def test_the_first_start_that_fits_is_never_hidden_by_a_shorter_one() -> None:
-    starts = pd.read_csv(COLUMNS)["start"].tolist()
-    for at, start in enumerate(starts):
-        assert not any(start.startswith(earlier) for earlier in starts[:at])
+def test_a_column_that_nobody_describes_has_no_meaning() -> None:
+    found = definitions(pd.DataFrame({"x_of_tomorrow_m": [1.0], "text": ["a"]}))
+    assert found.iloc[:, 2:].to_numpy().tolist() == [["m", ""], ["", ""]]
 
 
 def test_the_three_sheets_say_what_there_is(tmp_path: Path) -> None:

@@ -110,9 +110,8 @@ def test_page_says_how_many_contacts_were_corrected(process: Path, tmp_path: Pat
     Corrections.of(0.34, counts).write(process / "tables/corrections.json")
     write_report(tmp_path / "with", [process])
     words = page_of(tmp_path / "with").words
-    assert "cut to the limit in 17 % of the contacts between particles (4.0 % of those" in words
-    assert "removes 2.0 % of the sum" in words
-    assert "for the workpiece, 4.0 % were the second contact" in words
+    row = words[words.index("that were merged") :].split("Definitions")[0]
+    assert re.findall(r"[0-9.]+(?=\W%)", row)[:4] == ["17", "4.0", "2.0", "4.0"]
 
 
 def test_page_says_what_counts(process: Path, tmp_path: Path) -> None:
@@ -137,6 +136,32 @@ def test_two_cases_have_two_rows_and_an_overview(process: Path, tmp_path: Path) 
     page = page_of(tmp_path)
     assert len(page.images) == 2 * len(PICTURES) + 2
     assert "#workpiece-2" in page.references
+
+
+def test_the_page_on_the_contact_network_is_beside_the_report(
+    process: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    write_report(out, [process])
+    assert "There is no interactive page of this run" in page_of(out).words
+    (process / "network.html").write_text("the scene")
+    write_report(out, [process])
+    assert (out / "network.html").read_text() == "the scene"
+    page = stands_alone((out / "report.html").read_text(encoding="utf-8"), ["network.html"])
+    assert page.references.count("network.html") == 3
+    assert "There is no interactive page" not in page.words
+
+
+def test_each_case_has_its_own_page_on_the_contact_network(process: Path, tmp_path: Path) -> None:
+    case = case_json("process", "workpiece-2")
+    other = make_run(tmp_path / "results", case, process_findings(-3.0), PICTURES)
+    (other / "network.html").write_text("the second")
+    write_report(tmp_path / "out", [process, other])
+    assert (tmp_path / "out/network-workpiece-2.html").read_text() == "the second"
+    page = page_of(tmp_path / "out")
+    assert "network-workpiece-2.html" in page.references
+    assert "network-workpiece-1.html" not in page.references
+    assert "There is no interactive page of this run" in page.words
 
 
 def test_folders_of_filling_and_drop_may_be_given_too(process: Path, tmp_path: Path) -> None:

@@ -12,8 +12,6 @@ from tiny_run_files import DENSITY_KG_M3, GRAVITY_M_S2, RADIUS_M, WORKPIECE_RADI
 
 from dragchain.cli import main
 from dragchain.errors import DocumentError, TableError
-from dragchain.report.notation import MINUS
-from dragchain.report.page import page_environment
 from dragchain.scaling.document import Expectation, ScalingFile
 from dragchain.scaling.figures import draw_scalings
 from dragchain.scaling.fit import find, read_scalings, said, table, write_scaling
@@ -167,18 +165,6 @@ def test_the_scalings_of_the_package_are_whole() -> None:
         assert found.commands and found.engine and found.started
         assert vars(_refit(found)) == pytest.approx(vars(found.fit.exponent), abs=1e-4)
         assert list(table(found)[found.field]) == [level.x for level in found.levels]
-
-
-def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
-    scalings = read_scalings()
-    template = page_environment().get_template("validation/scaling.html.j2")
-    page = template.render(found=scalings, picture=lambda name: f"data:image/png;base64,{name}")
-    assert 'src="data:image/png;base64,scaling.png"' in page
-    for found in scalings:
-        value, low, high = (
-            f"{n:.2f}".replace("-", MINUS) for n in vars(found.judged.exponent).values()
-        )
-        assert f"{found.verdict}: exponent {value} ({low} to {high})" in page
 
 
 def test_the_words_name_a_lack_of_fit(write_run: Writer) -> None:

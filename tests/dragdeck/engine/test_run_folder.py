@@ -22,7 +22,7 @@ from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import fingerprint, run
-from dragdeck.engine.watch import EngineEnded, Progress, Watcher, cut_screen
+from dragdeck.engine.watch import EngineEnded, Watcher, cut_screen
 from dragdeck.errors import EngineError, InputError, RejectedRunError
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DROP_TEST, drop_scene
@@ -100,7 +100,7 @@ def slow_filling(
 
 def start(folder: Path) -> subprocess.Popen[bytes]:
     """Run in a process of its own, which can be signalled."""
-    words = [sys.executable, "-m", "dragdeck.cli", "run", str(folder), "--every", "1"]
+    words = [sys.executable, "-m", "dragdeck.cli", "run", str(folder)]
     return subprocess.Popen(words, stderr=subprocess.PIPE)
 
 
@@ -282,7 +282,7 @@ def test_a_drop_has_three_impacts(case: Case, project: Project) -> None:
     assert starts == 3
 
 
-def watcher(folder: Path, lines: list[str], **changed: Any) -> Watcher:
+def watcher(folder: Path, **changed: Any) -> Watcher:
     """The watch over a run of one output."""
     usual: dict[str, Any] = {
         "folder": folder,
@@ -295,8 +295,6 @@ def watcher(folder: Path, lines: list[str], **changed: Any) -> Watcher:
         "particles": 9,
         "ranks": 1,
         "limits": None,
-        "report": lines.append,
-        "every_s": 1.0,
         "patience_s": 60.0,
     }
     return Watcher(**{**usual, **changed})
@@ -305,19 +303,8 @@ def watcher(folder: Path, lines: list[str], **changed: Any) -> Watcher:
 HEAD = "step time_s n_particles kinetic_energy_j rotational_energy_j fastest_particle_m_s\n"
 
 
-def test_progress_waits_for_the_first_row(tmp_path: Path) -> None:
-    """The engine opens its file before it writes to it."""
-    lines: list[str] = []
-    watch = watcher(tmp_path, lines)
-    for seconds, text in ((1.0, ""), (2.0, HEAD), (3.0, HEAD + "50 0.1 9 0 0 0\n")):
-        (tmp_path / "thermo.1.txt").write_text(text)
-        watch(seconds)
-    assert len(lines) == 1
-    assert lines[0].startswith("step 50 of 100 (50 %)")
-
-
 def test_an_engine_that_writes_nothing_is_ended(tmp_path: Path) -> None:
-    watch = watcher(tmp_path, [])
+    watch = watcher(tmp_path)
     (tmp_path / "screen.1.txt").write_text("setting up\n")
     watch(50.0)
     watch(109.0)
@@ -331,13 +318,8 @@ def test_output_without_end_is_cut(tmp_path: Path) -> None:
         stream.write(b"Invalid flag in header\n")
         stream.truncate(20_000_000)
     with pytest.raises(EngineEnded, match="20 MB"):
-        watcher(tmp_path, [])(0.1)
+        watcher(tmp_path)(0.1)
     cut_screen(screen)
     kept = screen.read_bytes()
     assert len(kept) < 200_000
     assert kept.startswith(b"Invalid flag") and kept.endswith(b"printed without end]\n")
-
-
-def test_progress_says_how_long() -> None:
-    shown = str(Progress(step=250, steps=1000, steps_per_s=10.0))
-    assert shown == "step 250 of 1,000 (25 %), 10 steps/s, 1 min 15 s left"

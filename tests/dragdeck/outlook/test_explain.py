@@ -8,7 +8,7 @@ from made_tradeoff import cost as priced
 from made_tradeoff import made_tradeoff
 
 from dragdeck.cases.case import Case
-from dragdeck.outlook.explain import Cost, expected_cost, explanation, price_of
+from dragdeck.outlook.explain import Cost, expected_cost, explanation, measured_speeds, price_of
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import process_scene
 
@@ -21,14 +21,17 @@ def measured(results: Path, name: str, particles: int, steps_per_s: float) -> No
 
 
 def test_without_a_measured_run_the_speed_is_assumed(case: Case, tmp_path: Path) -> None:
-    assert "assumed" in expected_cost(FILLING, filling_scene(case), tmp_path / "none").source
+    assert (
+        "assumed"
+        in expected_cost(FILLING, filling_scene(case), measured_speeds(tmp_path / "none")).source
+    )
 
 
 def test_runs_with_as_many_particles_count_alone(case: Case, tmp_path: Path) -> None:
     scene = filling_scene(case)
     measured(tmp_path, "same", case.study.media.count, 500.0)
     measured(tmp_path, "big", 1000 * case.study.media.count, 2.0)
-    cost = expected_cost(FILLING, scene, tmp_path)
+    cost = expected_cost(FILLING, scene, measured_speeds(tmp_path))
     assert cost.wall_time_s == pytest.approx(scene.steps / 500.0)
     assert cost.source.startswith("1 run(s)")
 
@@ -36,7 +39,7 @@ def test_runs_with_as_many_particles_count_alone(case: Case, tmp_path: Path) -> 
 def test_other_runs_count_by_their_particles(case: Case, tmp_path: Path) -> None:
     scene = filling_scene(case)
     measured(tmp_path, "big", 10 * case.study.media.count, 50.0)
-    cost = expected_cost(FILLING, scene, tmp_path)
+    cost = expected_cost(FILLING, scene, measured_speeds(tmp_path))
     assert cost.wall_time_s == pytest.approx(scene.steps / 500.0)
 
 

@@ -105,7 +105,7 @@ def test_explain_names_every_pair(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(project.root)
-    assert main(["explain", "small", "process"]) == 0
+    assert main(["explain", "small", "process", "--verbose"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     for words in (
         "particle on workpiece",
@@ -125,7 +125,7 @@ def test_check_says_what_the_step_means(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(project.root)
-    assert main(["check", "small"]) == 0
+    assert main(["check", "small", "--verbose"]) == 0
     said = capsys.readouterr().out
     assert "particle on workpiece: " in said and "particle on plate: " in said
     assert "error of restitution up to" in said

@@ -133,6 +133,11 @@ def test_no_wake_on_a_short_path(carousel: Carousel) -> None:
     assert process_scene(first, BED).case.workpiece.wake_from_m is None
 
 
+def test_a_single_revolution_has_no_wake(carousel: Carousel) -> None:
+    path = {"kind": "circle", "radius_m": 0.012, "revolutions": 1}
+    assert process_scene(carousel(None, path=path), BED).case.workpiece.wake_from_m is None
+
+
 def test_a_second_revolution_is_in_the_own_wake(carousel: Carousel) -> None:
     path = {"kind": "circle", "radius_m": 0.012, "revolutions": 1.5}
     wake = process_scene(carousel(None, path=path), BED).case.workpiece.wake_from_m

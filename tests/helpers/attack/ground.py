@@ -149,7 +149,7 @@ def _make(root: Path) -> Iterator[Phase]:
     for place in PLACES:
         runs[place] = _render(root, place, runs.get("filling"))
         name = place.replace("_", " ")
-        words = command("dragdeck", "run", runs[place], "--every", "1")
+        words = command("dragdeck", "run", runs[place])
         yield _made(root, Phase(name, words, runs[place], engine=True))
         analyses = ["tables", "figures"]
         if place == "process":

@@ -46,6 +46,8 @@ _RANGE_LABELS = {
     **compared_labels(),
     "superposed_speed": "ratio of additional surface speed to mean speed along the path",
     "bowl_froude_number": "Froude number of the bowl's rotation",
+    "tilt_deg": "tilt of the workpiece (degrees)",
+    "further_workpieces": "number of further workpieces",
 }
 """The numbers of a scene that must lie within the measured range."""
 

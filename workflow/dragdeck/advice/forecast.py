@@ -17,7 +17,8 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.decks.deck import StudyScene
 from dragdeck.documents import Document, Part
-from dragdeck.outlook.explain import Cost, expected_cost
+from dragdeck.engine.reports import shown_time
+from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds
 from dragdeck.outlook.measured import MeasuredError, Tradeoff
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
@@ -207,7 +208,7 @@ def _cost(
 ) -> Cost:
     """Steps and wall time of a scene, by the speed of this machine if it was measured."""
     if speed is None or kind.single_particle:
-        return expected_cost(kind, scene, results / kind.name)
+        return expected_cost(kind, scene, measured_speeds(results / kind.name))
     here = speed.of(scene.case.media.count)
     rate = here.filling_steps_per_s
     if kind is PROCESS:
@@ -276,7 +277,7 @@ def tables(
         bound = "" if option.error is None else percent(option.error.bound)
         style = "bold" if row.role == "advised" else None
         cost, steps = f"{option.relative_cost:.3g}", f"{sum(row.steps.values()):,}"
-        wall = _clock(sum(row.wall_times_s.values()))
+        wall = shown_time(sum(row.wall_times_s.values()))
         table.add_row(row.role, str(option), error, bound, cost, steps, wall, style=style)
     yield table
     said = Table(show_header=False)
@@ -359,9 +360,3 @@ def _of_chance(advice: Advice, spread: Spread, study: Study) -> str:
 def _error_text(error: MeasuredError) -> str:
     """An error with its interval."""
     return f"{signed(error.value)} ({signed(error.ci95_low)} to {signed(error.ci95_high)})"
-
-
-def _clock(seconds: float) -> str:
-    """A time in minutes and seconds."""
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes} min {rest:02d} s"

@@ -40,6 +40,16 @@ def only_runner(folder: Path, report: Report) -> Iterator[None]:
         yield
 
 
+def is_held(folder: Path) -> bool:
+    """Whether a living process runs a folder, here or on another machine that shares its disk."""
+    with contextlib.suppress(FileNotFoundError), (folder / LOCK_FILE).open() as stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError:
+            return True
+    return False
+
+
 def _engines_in(folder: Path) -> list[psutil.Process]:
     """Processes of this machine that run the deck of a folder."""
     found = []

@@ -19,7 +19,7 @@ from dragdeck.engine.completeness import cut_outputs, first_gap, part_files
 from dragdeck.engine.decomposition import decomposition
 from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.process import Ending, Engine, command, execute
-from dragdeck.engine.record import AcceptanceCheck, CheckCode, RunPart, RunRecord
+from dragdeck.engine.record import REMEDIES, AcceptanceCheck, CheckCode, RunPart, RunRecord
 from dragdeck.engine.reports import Report
 from dragdeck.engine.space import SPARE_BYTES, check_space, free_bytes, size_of
 from dragdeck.engine.watch import EngineEnded, LimitMet, Watcher, cut_screen
@@ -28,14 +28,6 @@ from dragdeck.errors import EngineError, RejectedRunError
 STATE_FILE = "state.json"
 _WRITTEN: set[CheckCode] = {"output_complete", "packing_whole"}
 """Checks that a full disk alone can fail."""
-
-
-@dataclass(frozen=True)
-class Attention:
-    """How closely a run is followed: seconds between reports, and the longest silence."""
-
-    every_s: float = 10.0
-    patience_s: float = 1800.0
 
 
 @dataclass
@@ -58,7 +50,7 @@ class PartOfRun:
     record: RunRecord | None
     report: Report
 
-    def execute(self, digest: str, engine: Engine, attention: Attention) -> RunRecord:
+    def execute(self, digest: str, engine: Engine, patience_s: float) -> RunRecord:
         """Run LIGGGHTS to its end; whatever happens, ``state.json`` says so.
 
         Raises
@@ -76,7 +68,7 @@ class PartOfRun:
             f"{self.inputs.scene} {self.inputs.run}: part {part.part}, {ranks} "
             f"rank{'s' if ranks > 1 else ''}"
         )
-        watcher, begun = self._watcher(attention), time.monotonic()
+        watcher, begun = self._watcher(patience_s), time.monotonic()
         try:
             ending = execute(words, self.folder, self._screen, watcher)
         except LimitMet as met:
@@ -123,7 +115,7 @@ class PartOfRun:
         )
         self._update()
 
-    def _watcher(self, attention: Attention) -> Watcher:
+    def _watcher(self, patience_s: float) -> Watcher:
         part, thermo = self._record.last_part, self.columns.outputs.get("thermo")
         return Watcher(
             folder=self.folder,
@@ -136,9 +128,7 @@ class PartOfRun:
             particles=self.inputs.media.count,
             ranks=self._record.ranks,
             limits=self.inputs.limits,
-            report=self.report,
-            every_s=attention.every_s,
-            patience_s=attention.patience_s,
+            patience_s=patience_s,
         )
 
     def _end(self, wall_time_s: float, ending: Ending | None = None) -> None:
@@ -219,6 +209,10 @@ class PartOfRun:
     def _judge(self, checks: list[AcceptanceCheck]) -> RunRecord:
         """Note the checks, and that the run is complete or failed."""
         passed = all(check.passed for check in checks)
+        checks = [
+            one if one.passed else one.model_copy(update={"remedy": REMEDIES.get(one.code)})
+            for one in checks
+        ]
         self._update(state="complete" if passed else "failed", checks=checks)
         if not passed:
             raise RejectedRunError(why_rejected(self.folder, self._record))
@@ -250,5 +244,6 @@ def why_rejected(folder: Path, record: RunRecord) -> str:
     for check in record.checks:
         if not check.passed:
             lines.append(f"  check:  {check.name}: {check.seen} (limit: {check.limit})")
+            lines += [f"  remedy: {check.remedy}"] if check.remedy else []
     lines.append(f"  log:    {folder / f'screen.{record.last_part.part}.txt'}")
     return "\n".join(lines)

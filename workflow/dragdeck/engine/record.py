@@ -1,6 +1,6 @@
 """What is known of a run: the documents beside it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from pydantic import Field
@@ -23,6 +23,21 @@ CheckCode = Literal[
     "ranks",
 ]
 CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", "energy", "speed"]
+
+
+_SMALLER_STEP = "choose a smaller timestep_fraction or a larger youngs_modulus_scale"
+REMEDIES: Mapping[CheckCode, str] = {
+    "neighbour_builds": "choose a larger skin_m",
+    "at_rest": "choose a larger filling.max_time_s or filling.energy_ratio",
+    "steady_bed": "choose a longer motion.transient_m, or more motion.path.revolutions",
+    "particles_kept": _SMALLER_STEP,
+    "finite_numbers": _SMALLER_STEP,
+    "stable_timestep": _SMALLER_STEP,
+    "within_limits": _SMALLER_STEP,
+    "output_complete": "start it anew with: dragdeck run --again",
+    "ranks": "use the mpirun that belongs to this LIGGGHTS (DRAGDECK_LAUNCHER)",
+}
+"""What to do where a check did not pass; of others, the end of the screen output says it."""
 
 
 class ParticlesPerRank(Part):
@@ -61,6 +76,8 @@ class AcceptanceCheck(Part):
         For readers: the condition, what was seen, and what it asks for.
     number : float or None
         What was seen, where it is one number.
+    remedy : str, optional
+        What to do where the check did not pass.
     """
 
     code: CheckCode
@@ -70,6 +87,7 @@ class AcceptanceCheck(Part):
     seen: str
     limit: str
     number: float | None = None
+    remedy: str | None = None
 
 
 class RunPart(Part):

@@ -14,7 +14,7 @@ from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.engine.checkpoints import take_forced_restarts
 from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.lock import LOCK_FILE, only_runner
-from dragdeck.engine.part import STATE_FILE, Attention, PartOfRun, why_rejected
+from dragdeck.engine.part import STATE_FILE, PartOfRun, why_rejected
 from dragdeck.engine.process import find_engine
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import Report, say
@@ -24,7 +24,7 @@ from dragdeck.files import file_checksum
 _RESULT_FILE = "run.json"
 _ARCHIVE = "archive"
 _AS_RUN = "as_run"
-_USUAL = Attention()
+_PATIENCE_S = 1800.0
 _ANEW = (
     "write it again with: dragdeck step render, or run the scene that makes it; to change an "
     "input script, override a block of its template"
@@ -32,7 +32,7 @@ _ANEW = (
 
 
 def run(
-    folder: Path, report: Report, *, again: bool = False, attention: Attention = _USUAL
+    folder: Path, report: Report, *, again: bool = False, patience_s: float = _PATIENCE_S
 ) -> RunRecord:
     """Bring a run folder to its ``run.json``.
 
@@ -48,7 +48,8 @@ def run(
         Gets a line now and then.
     again : bool
         Start anew even if these inputs failed before.
-    attention : Attention
+    patience_s : float
+        How long LIGGGHTS may write nothing.
 
     Returns
     -------
@@ -87,13 +88,13 @@ def run(
             if record is None:
                 _keep_inputs(folder)
             part = PartOfRun(folder, inputs, columns, record, report)
-            record = part.execute(digest, engine, attention)
+            record = part.execute(digest, engine, patience_s)
         record.write(folder / _RESULT_FILE)
         return record
 
 
 def run_to_outcome(
-    folder: Path, file: Path, report: Report, *, attention: Attention = _USUAL
+    folder: Path, file: Path, report: Report, *, patience_s: float = _PATIENCE_S
 ) -> None:
     """Bring a run to its end, good or bad, and write how it ended to a file.
 
@@ -106,21 +107,18 @@ def run_to_outcome(
         As `run` does.
     """
     try:
-        run(folder, report, attention=attention)
+        run(folder, report, patience_s=patience_s)
     except RejectedRunError as error:
         report(str(error))
     RunRecord.read(folder / STATE_FILE).write(file)
 
 
-def run_command(
-    folder: Path, outcome: Path | None, again: bool, every_s: float, patience_s: float
-) -> None:
+def run_command(folder: Path, outcome: Path | None, again: bool, patience_s: float) -> None:
     """Run the input script in a folder, or resume it."""
-    attention = Attention(every_s, patience_s)
     if outcome is not None:
-        run_to_outcome(folder, outcome, say, attention=attention)
+        run_to_outcome(folder, outcome, say, patience_s=patience_s)
     else:
-        run(folder, say, again=again, attention=attention)
+        run(folder, say, again=again, patience_s=patience_s)
 
 
 def fingerprint(folder: Path, inputs: RunInputs) -> str:

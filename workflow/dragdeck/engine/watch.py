@@ -8,7 +8,7 @@ from dragdeck.engine.checkpoints import drop_old_checkpoints, name_whole_checkpo
 from dragdeck.engine.limits import breach
 from dragdeck.engine.log import Sample, read_samples
 from dragdeck.engine.record import AcceptanceCheck
-from dragdeck.engine.reports import Report, shown_bytes
+from dragdeck.engine.reports import shown_bytes
 from dragdeck.engine.space import SPARE_BYTES, free_bytes, size_of
 from dragdeck.physics.run_limits import RunLimits
 
@@ -38,33 +38,13 @@ class EngineEnded(Exception):
         super().__init__(why)
 
 
-@dataclass(frozen=True)
-class Progress:
-    """Where a running engine is."""
-
-    step: int
-    steps: int | None
-    steps_per_s: float
-
-    def __str__(self) -> str:
-        speed = f"{self.steps_per_s:,.0f} steps/s"
-        if not self.steps or not self.steps_per_s:
-            return f"step {self.step:,}, {speed}"
-        left = (self.steps - self.step) / self.steps_per_s
-        fraction = 100 * self.step / self.steps
-        return (
-            f"step {self.step:,} of {self.steps:,} ({fraction:.0f} %), {speed}, "
-            f"{left // 60:.0f} min {left % 60:02.0f} s left"
-        )
-
-
 @dataclass
 class Watcher:
     """Looks after one part of a run, each time it is called.
 
-    It names the checkpoints that are whole and deletes old ones, and reports progress now and
-    then. It ends a run that goes past a limit of its scene with `LimitMet`; one that writes
-    nothing for a long time, prints without end, or would fill its disk with `EngineEnded`.
+    It names the checkpoints that are whole and deletes old ones. It ends a run that goes past a
+    limit of its scene with `LimitMet`; one that writes nothing for a long time, prints without
+    end, or would fill its disk with `EngineEnded`.
 
     Attributes
     ----------
@@ -80,8 +60,6 @@ class Watcher:
         Steps from which to which the part runs.
     particles, ranks : int
     limits : RunLimits or None
-    report : callable
-        Gets a line about every `every_s` seconds.
     patience_s : float
         How long the engine may write nothing.
     """
@@ -96,12 +74,9 @@ class Watcher:
     particles: int
     ranks: int
     limits: RunLimits | None
-    report: Report
-    every_s: float
     patience_s: float
     _place: int = field(default=0, init=False)
     _newest: Sample | None = field(default=None, init=False)
-    _next_s: float = field(default=0.0, init=False)
     _written: int = field(default=0, init=False)
     _written_s: float = field(default=0.0, init=False)
 
@@ -115,13 +90,7 @@ class Watcher:
         if check is not None:
             raise LimitMet(check)
         self._end_before_the_disk_is_full()
-        if seconds < self._next_s:
-            return
-        self._next_s = seconds + self.every_s
         drop_old_checkpoints(self.folder)
-        if self._newest is not None and seconds > 0:
-            speed = (self._newest.step - self.first) / seconds
-            self.report(str(Progress(self._newest.step, self.last, speed)))
 
     def _new_samples(self) -> list[Sample]:
         """The whole thermo rows that came since the last look."""

@@ -1,7 +1,9 @@
 """What a deck models, what it leaves out, and what it is expected to cost."""
 
 import json
-from collections.abc import Iterable
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from dragdeck.decks.deck import StudyScene
+from dragdeck.engine.reports import shown_time
 from dragdeck.outlook.measured import MeasuredCost, Tradeoff
 from dragdeck.scenes.scene import SceneType
 
@@ -21,8 +24,13 @@ class Cost:
     wall_time_s: float
     source: str
 
+    @property
+    def basis(self) -> str:
+        """Whether its speed is ``measured`` or ``assumed``."""
+        return "assumed" if self.source.startswith("assumed") else "measured"
 
-def expected_cost(kind: SceneType, scene: StudyScene, results: Path) -> Cost:
+
+def expected_cost(kind: SceneType, scene: StudyScene, speeds: Sequence[tuple[int, float]]) -> Cost:
     """Steps and wall time to expect.
 
     Parameters
@@ -30,13 +38,13 @@ def expected_cost(kind: SceneType, scene: StudyScene, results: Path) -> Cost:
     kind : SceneType
     scene : Scene
         A case of that kind.
-    results : Path
-        The folder of the study's runs of this scene: measured ones are used, those with
-        as many particles if there are any, the others as if a step took a time a particle.
+    speeds : sequence of (int, float)
+        The `measured_speeds` of the study's runs of this scene: those with as many particles
+        count if there are any, the others as if a step took a time per particle.
     """
     single = kind.single_particle
     count = 1 if single else scene.case.media.count
-    measured = [(1 if single else particles, rate) for particles, rate in _measured(results)]
+    measured = [(1 if single else particles, rate) for particles, rate in speeds]
     measured = [(particles, rate) for particles, rate in measured if particles == count] or measured
     if measured:
         rate = sum(particles / count * rate for particles, rate in measured) / len(measured)
@@ -45,14 +53,15 @@ def expected_cost(kind: SceneType, scene: StudyScene, results: Path) -> Cost:
     return Cost(scene.steps, scene.steps / rate, "assumed: no run of this study measured here")
 
 
-def _measured(results: Path) -> Iterable[tuple[int, float]]:
-    """Particles and steps a second of each run."""
+def measured_speeds(results: Path) -> list[tuple[int, float]]:
+    """Particles and steps per second of each complete run in a folder."""
+    found = []
     for file in results.glob("*/run.json"):
-        speed = json.loads(file.read_text(encoding="utf-8"))["steps_per_s"]
-        case = file.with_name("case.json")
-        if speed and case.is_file():
-            media = json.loads(case.read_text(encoding="utf-8"))["media"]
-            yield int(media["count"]), float(speed)
+        with suppress(OSError, ValueError, LookupError, TypeError):  # damaged: tells nothing
+            speed = json.loads(file.read_text(encoding="utf-8"))["steps_per_s"]
+            media = json.loads(file.with_name("case.json").read_text(encoding="utf-8"))["media"]
+            found += [(int(media["count"]), float(speed))] if speed else []
+    return found
 
 
 def price_of(name: str, tradeoff: Tradeoff | None) -> str:
@@ -84,6 +93,36 @@ def _ratio(cost: MeasuredCost, tradeoff: Tradeoff) -> str:
     interval = "" if cost.ci95_low is None else f" ({cost.ci95_low:.3g} to {cost.ci95_high:.3g})"
     engine, date = tradeoff.versions.engine, tradeoff.measured
     return f"{cost.ratio:.3g}x{interval}, LIGGGHTS {engine}, {date}"
+
+
+def page(scene: StudyScene, cost: Cost, runs: int, width: int) -> Iterator[str]:
+    """The lines of one scene on a page that fits a terminal: names without reasons and prices.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of the first of its runs.
+    cost : Cost
+    runs : int
+        How many there are.
+    width : int
+        Of the page, characters.
+    """
+    step = scene.deck.timestep_s
+    rayleigh = f"{100 * step / scene.case.rayleigh_time_s:.3g} % of Rayleigh"
+    each = f"{cost.steps:,} steps of {step:.3g} s ({rayleigh}), {shown_time(cost.wall_time_s)}"
+    yield f"{scene.deck.scene} {scene.deck.run}" + (f" and {runs - 1} more" if runs > 1 else "")
+    rows: list[tuple[str, Iterable[str]]] = [
+        ("costs", [f"about {each} (speed {cost.basis})"]),
+        ("models", scene.models),
+    ]
+    rows += [("leaves out", scene.leaves_out), ("warning", [str(one) for one in scene.warnings])]
+    for name, texts in rows:
+        if joined := "; ".join(texts):
+            yield from textwrap.wrap(
+                joined, width, initial_indent=f"  {name:<11}", subsequent_indent=13 * " ",
+                max_lines=2, placeholder=" ...",
+            )  # fmt: skip
 
 
 def explanation(
@@ -121,8 +160,7 @@ def explanation(
         "costs", "time step", f"{deck.timestep_s:.3g} s, {100 * fraction:.3g} % of Rayleigh"
     )
     table.add_row("", "steps", f"about {cost.steps:,}")
-    minutes, seconds = divmod(round(cost.wall_time_s), 60)
-    table.add_row("", "wall time", f"about {minutes} min {seconds:02d} s ({cost.source})")
+    table.add_row("", "wall time", f"about {shown_time(cost.wall_time_s)} ({cost.source})")
     for what, text in _cheaper_choices(deck.scene, tradeoff) if tradeoff else ():
         table.add_row("cheaper", what, text)
     table.add_section()

@@ -2,10 +2,10 @@
 
 import math
 
-from dragdeck.cases.case import Case
+from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.scenes.dimensionless import describe
-from dragdeck.scenes.filling import expected_surface
-from dragdeck.scenes.fit import clearances
+from dragdeck.scenes.filling import expected_bed, expected_surface
+from dragdeck.scenes.fit import clearances, closest
 from dragdeck.scenes.workpiece import fastest_surface
 from dragdeck.study.contact_law import compared_labels
 
@@ -15,6 +15,7 @@ _RATIOS = {
     "bowl_to_particle": "diameter of the bowl / mean particle diameter",
     "superposed_speed": "(highest surface speed - speed along the path) / speed along the path",
     "bowl_froude_number": "Froude number of the bowl's rotation",
+    "tilt_deg": "tilt of the workpiece (degrees)",
 }
 
 
@@ -25,6 +26,7 @@ def notes(case: Case) -> list[tuple[str, str]]:
     return [
         ("gap between workpiece and wall", _gap(case, gaps.wall_m)),
         ("gap between workpiece and floor", _gap(case, gaps.floor_m)),
+        *_between(case),
         ("highest surface speed of the workpiece", _speed(case)),
         ("bed height", f"{1e3 * surface:.3g} mm, an estimate"),
         *_rotation(case),
@@ -44,6 +46,12 @@ def dimensionless(case: Case) -> list[tuple[str, str]]:
 def _gap(case: Case, gap_m: float) -> str:
     diameters = gap_m / (2 * case.study.media.radius_mean_m)
     return f"{diameters:.3g} particle diameters, {1e3 * gap_m:.3g} mm"
+
+
+def _between(case: Case) -> list[tuple[str, str]]:
+    """The least gap between two of several workpieces."""
+    found = closest(of_each_workpiece(case), expected_bed(case.study))
+    return [("gap between workpieces", _gap(case, found[0]))] if found else []
 
 
 def _rotation(case: Case) -> list[tuple[str, str]]:

@@ -53,6 +53,14 @@ def particle_mass(material: Material, radius_m: float) -> float:
     return 4 / 3 * math.pi * radius_m**3 * material.density_kg_m3
 
 
+def fall_energy(
+    particles: int, density_kg_m3: float, radius_m: float, gravity_m_s2: float
+) -> float:
+    """Energy of particles that fall by their diameter, N m g d, J: the unit of a settling bed."""
+    mass = 4 / 3 * math.pi * radius_m**3 * density_kg_m3
+    return particles * mass * gravity_m_s2 * 2 * radius_m
+
+
 def hertz_contact_time(
     mass_kg: float, radius_m: float, modulus_pa: float, speed_m_s: float
 ) -> float:

@@ -1,7 +1,7 @@
 """The dimensionless numbers of a process scene."""
 
 from dragdeck.cases.bed import full_stiffness_number, particle_material, tip_pressure
-from dragdeck.cases.case import Case
+from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.physics.contact_mechanics import inertial_number
 from dragdeck.scenes.workpiece import fastest_surface, workpiece_radius
 from dragdeck.study.contact_law import compared_numbers
@@ -14,7 +14,8 @@ def describe(case: Case) -> dict[str, float]:
     of the workpiece's highest surface speed over one particle diameter. ``superposed_speed``, the
     difference of this speed and the mean speed along the path divided by the latter, is absent
     without superposed motions on a path of one speed; ``bowl_froude_number``, the centripetal
-    acceleration at the bowl's wall over gravity, is absent if the bowl stands still. Other ratios
+    acceleration at the bowl's wall over gravity, is absent if the bowl stands still, and so are
+    ``tilt_deg`` without a tilt and ``further_workpieces`` of a single one. Other ratios
     are diameters, or the depth, over the mean diameter of a particle.
     """
     study = case.study
@@ -26,6 +27,9 @@ def describe(case: Case) -> dict[str, float]:
     superposed = {"superposed_speed": added} if motion.superposed() or added > 1e-9 else {}
     froude = motion.bowl_rad_s**2 * study.bowl.radius_m / study.gravity_m_s2
     rotation = {"bowl_froude_number": froude} if froude else {}
+    tilt = {"tilt_deg": abs(motion.tilt_deg)} if motion.tilt_deg else {}
+    others = len(of_each_workpiece(case.all_workpieces)) - 1
+    further = {"further_workpieces": float(others)} if others else {}
     names = study.media.material, study.workpiece.material
     return {
         "stiffness_number": full_stiffness_number(study),
@@ -40,5 +44,7 @@ def describe(case: Case) -> dict[str, float]:
         ),
         **superposed,
         **rotation,
+        **tilt,
+        **further,
         "particles": study.media.count,
     }

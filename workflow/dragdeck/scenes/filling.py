@@ -30,6 +30,7 @@ from dragdeck.physics.contact_mechanics import (
     bed_overlap,
     bed_pressure,
     effective_modulus,
+    fall_energy,
     fall_speed,
     particle_mass,
 )
@@ -268,9 +269,8 @@ def bed_limits(study: Study, top_m: float, speed_m_s: float) -> RunLimits:
 
 def _energy_unit(study: Study) -> float:
     """Number of particles times m g d of the mean particle, J."""
-    media = study.media
-    mass = particle_mass(particle_material(study), media.radius_mean_m)
-    return media.count * mass * study.gravity_m_s2 * 2 * media.radius_mean_m
+    media, density = study.media, particle_material(study).density_kg_m3
+    return fall_energy(media.count, density, media.radius_mean_m, study.gravity_m_s2)
 
 
 def _expected_time(study: Study, particles: Particles) -> float:

@@ -105,34 +105,38 @@ def check_fit(case: Case, surface_m: float, timestep_s: float) -> None:
 def check_apart(each: Sequence[Case], bed: Bed) -> None:
     """Refuse workpieces that come so close to each other that a particle touches two.
 
-    Each counts as the upright cylinder around what of it is in the bed.
-
     Raises
     ------
     InputError
         Names the two workpieces that come closest.
     """
-    if len(each) < 2:
-        return
-    reaches = [workpiece_reach(one) for one in each]
-    ways = [_way(one, bed) for one in each]
-    gaps = {
-        (a, b): float(np.hypot(*(ways[a] - ways[b]).T).min()) - reaches[a] - reaches[b]
-        for a, b in combinations(range(len(each)), 2)
-    }
-    a, b = min(gaps, key=lambda pair: gaps[pair])
-    diameter = _largest_particle(each[0])
-    if gaps[a, b] < diameter:
-        collide = gaps[a, b] <= 0
+    found, diameter = closest(each, bed), _largest_particle(each[0])
+    if found is not None and found[0] < diameter:
+        gap, first, second = found
+        problem = "collide" if gap <= 0 else "come so close that a particle touches both"
         raise InputError(
-            f"workpieces {a + 1} and {b + 1} "
-            + ("collide" if collide else "come so close that a particle touches both"),
+            f"workpieces {first} and {second} {problem}",
             file=each[0].file,
             field="workpieces",
-            value=f"a gap of {gaps[a, b]:.4g} m between them",
+            value=f"a gap of {gap:.4g} m between them",
             limit=f"at least {diameter:.4g} m, the diameter of the largest particle",
             remedy="use fewer or smaller workpieces, other angles, or a larger radius of the path",
         )
+
+
+def closest(each: Sequence[Case], bed: Bed) -> tuple[float, int, int] | None:
+    """Least gap between two of several workpieces, m, and their numbers; None for a single one.
+
+    Each counts as the upright cylinder around what of it is in the bed.
+    """
+    if len(each) < 2:
+        return None
+    reaches = [workpiece_reach(one) for one in each]
+    ways = [_way(one, bed) for one in each]
+    return min(
+        (float(np.hypot(*(ways[a] - ways[b]).T).min()) - reaches[a] - reaches[b], a + 1, b + 1)
+        for a, b in combinations(range(len(each)), 2)
+    )
 
 
 def _way(case: Case, bed: Bed) -> NDArray[np.float64]:

@@ -249,8 +249,8 @@ def _wake_from(each: Sequence[Case], number: int) -> float | None:
         return None
     others = (one.study.motion.path.ahead_deg or 0.0 for one in each)
     gap = min((other - ahead - 1e-6) % 360 + 1e-6 for other in others)
-    found = round_to(around * gap / 360, 9)
-    return found if found < path.path_length_m * (1 - 1e-9) else None
+    found = around * gap / 360
+    return round_to(found, 9) if found < path.path_length_m * (1 - 1e-6) else None
 
 
 _INPUTS = (

@@ -1,0 +1,80 @@
+"""``network.html``: the contact network of a run in the browser."""
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from dragchain.errors import RejectedRunError
+from dragchain.files import write_text
+from dragchain.network_page.columns import ROUNDING
+from dragchain.network_page.scene import Scene, load_scene
+from dragchain.report.page import NETWORK_PAGE, file_uri, page_environment
+from dragchain.run.case import Case
+from dragchain.run.completeness import read_accepted
+from dragchain.tables.run_folder import Run
+
+_PICTURES = ("network_xz", "forces")
+"""Figures of a run that stand for scene and curve where these cannot be drawn."""
+
+
+def write_page(run_dir: Path) -> str:
+    """Write ``network.html`` into the folder of a process run; what to say at the end.
+
+    The run needs its tables and chains. Without ``dragchain loading`` the page has no load map,
+    without ``dragchain figures`` no pictures for browsers that cannot draw the scene.
+
+    Raises
+    ------
+    TableError
+        If the run wrote no contact network, or a table is missing or damaged.
+    SeriesError
+        If the run is too short to have peaks.
+    """
+    run = Run.open(run_dir)
+    page = render(run.case, load_scene(run), _pictures(run_dir), _rejection(run_dir))
+    file = run_dir / NETWORK_PAGE
+    write_text(file, page)
+    return f"{len(page.encode()) / 1e6:.1f} MB: {file}"
+
+
+def render(case: Case, scene: Scene, pictures: dict[str, str | None], rejection: str) -> str:
+    """The page as HTML.
+
+    Parameters
+    ----------
+    case : Case
+    scene : Scene
+    pictures : dict of str to str or None
+        Data URIs of the static pictures.
+    rejection : str
+        Why the run is no result; empty if it is one.
+    """
+    template = page_environment().get_template("network_page/network.html.j2")
+    return template.render(
+        case=case,
+        head=scene.head,
+        data=scene.columns.text(),
+        pictures=pictures,
+        rejection=rejection,
+        place_um=1e3 * scene.head["frames"]["step"] / 2,
+        rounding=ROUNDING,
+        script=_own("network.js"),
+        style=_own("network.css"),
+    )
+
+
+def _own(name: str) -> str:
+    """A file of this package."""
+    return (files("dragchain.network_page") / name).read_text(encoding="utf-8")
+
+
+def _pictures(run_dir: Path) -> dict[str, Any]:
+    return {name: file_uri(run_dir / "figures" / f"{name}.png") for name in _PICTURES}
+
+
+def _rejection(run_dir: Path) -> str:
+    try:
+        read_accepted(run_dir)
+    except RejectedRunError as error:
+        return str(error)
+    return ""

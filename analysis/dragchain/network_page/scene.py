@@ -1,0 +1,276 @@
+"""What the page draws: frames, workpiece, bowl and force curve, in mm, N and s.
+
+`Scene.head` is what the page's scripts read as JSON; its entries have the names used there.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pandas as pd
+from matplotlib.colors import to_hex
+
+from dragchain.arrays import Floats
+from dragchain.drag.peaks import Peaks, peak_separation_s
+from dragchain.figures.style import STYLE
+from dragchain.network.frame import KINDS, PARTICLE
+from dragchain.network_page.columns import Columns
+from dragchain.network_page.frames import (
+    BODIES,
+    MOST_PARTICLES,
+    ShownFrame,
+    highest_peaks,
+    read_shown,
+    shown_frames,
+)
+from dragchain.run.kinematics import drag_phase, drag_start_s, needed
+from dragchain.run.workpiece import read_surface
+from dragchain.tables.by_step import read_table
+from dragchain.tables.columns import CENTRE, POINT, VELOCITY
+from dragchain.tables.run_folder import Run
+
+_LOADS = {
+    "force_slide_pa": (
+        "sliding load",
+        "normal force times sliding distance, per area and path length",
+        "N/m²",
+    ),
+    "mean_pressure_pa": ("mean pressure", "mean normal pressure", "Pa"),
+    "friction_work_pa": ("friction work", "friction work per area and path length", "J/m³"),
+}
+"""Columns of ``facets.parquet`` that the workpiece can be coloured by: short name, name, unit."""
+
+_MOST_SAMPLES = 50_000
+"""Of the force curve; of a longer one only every n-th sample is shown."""
+
+_SMOOTHED_DIAMETERS = 0.1
+"""Path of the workpiece, in mean particle diameters, over which the filtered curve is averaged."""
+
+_TOP = 0.999
+"""Quantile of all speeds, and of all displacements, at the top of their colour scale."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The content of a page: `head` is plain data, `columns` has the long series."""
+
+    head: dict[str, Any]
+    columns: Columns
+
+
+def load_scene(run: Run) -> Scene:
+    """Read what the page of a process run shows.
+
+    Raises
+    ------
+    TableError
+        If the run wrote no contact network, or a table is missing or damaged.
+    SeriesError
+        If the run is too short to have peaks.
+    """
+    case, columns, peaks = run.case, Columns(), highest_peaks(run)
+    series = shown_frames(run, peaks.time_s)
+    frames = list(read_shown(series))
+    start_s = drag_start_s(case)
+    times_s = series.times_s - start_s
+    bowl, surface = needed(case.bowl, "bowl"), 1e3 * needed(case.surface_m, "surface_m")
+    head = {
+        "steps": series.steps.tolist(),
+        "times": times_s.tolist(),
+        "frames": _frames(columns, frames),
+        "scales": _scales(frames),
+        "paths": _dominant_paths(run, frames),
+        "bodies": {BODIES + body: name for body, name in KINDS.items() if body != PARTICLE},
+        "bowl": {"radius": 1e3 * bowl.radius_m, "height": 1.2 * surface},
+        "surface": surface,
+        "media": {
+            "radius": 1e3 * case.media.radius_mean_m,
+            "count": max(len(frame.data.particles) for frame in frames),
+            "most": MOST_PARTICLES,
+        },
+        "workpieces": [_workpiece(columns, run, frames)],
+        "curve": _curve(columns, run, start_s),
+        "peaks": _peaks(peaks, times_s, start_s),
+        "colours": _colours(),
+    }
+    return Scene(head | {"columns": columns.entries}, columns)
+
+
+def _colours() -> list[str]:
+    """The colour map of all figures, without its palest end, which could not be seen on white."""
+    colours = matplotlib.colormaps[STYLE["image.cmap"]]
+    return [to_hex(one) for one in colours(np.linspace(0.06, 0.94, 33))]
+
+
+# --- frames ----------------------------------------------------------------------------------
+
+
+def _frames(columns: Columns, frames: list[ShownFrame]) -> dict[str, Any]:
+    """Add particles and contacts of all frames; where each frame starts, and the box of places."""
+    centres = [_vectors(one.data.particles, CENTRE)[one.particles] for one in frames]
+    points = [_outer_points(one) for one in frames]
+    box = np.concatenate([*centres, *points])
+    low, step = box.min(axis=0), float(np.ptp(box, axis=0).max()) / 0xFFFF or 1.0
+    contacts = [_table(one).iloc[one.contacts] for one in frames]
+    particles = [one.data.particles.iloc[one.particles] for one in frames]
+    places = {"centre": centres, "point": points}
+    for name, parts in places.items():
+        columns.add(name, "u16", ((np.concatenate(parts) - low) / step).round().T)
+    columns.add("id", "u32", _joined(particles, "particle_id"))
+    columns.add("radius", "f24", 1e3 * _joined(particles, "radius_m"))
+    columns.add("speed", "f24", 1e3 * _speeds(pd.concat(particles)))
+    columns.add("a", "u16", np.concatenate([one.a for one in frames]))
+    columns.add("b", "u16", np.concatenate([one.b for one in frames]))
+    columns.add("flags", "u8", np.concatenate([one.flags for one in frames]))
+    columns.add("normal", "f24", _joined(contacts, "normal_force_n"))
+    columns.add("tangential", "f24", _joined(contacts, "tangential_force_n"))
+    return {
+        "particles": [one.particles.size for one in frames],
+        "contacts": [one.contacts.size for one in frames],
+        "points": [len(part) for part in points],
+        "low": (1e3 * low).tolist(),
+        "step": 1e3 * step,
+    }
+
+
+def _table(frame: ShownFrame) -> pd.DataFrame:
+    assert frame.data.contacts is not None
+    return frame.data.contacts
+
+
+def _outer_points(frame: ShownFrame) -> Floats:
+    """The contact points on workpiece and bowl, in the order of the contacts."""
+    rows = frame.contacts[frame.b > BODIES - len(KINDS)]
+    return _vectors(_table(frame), POINT)[rows]
+
+
+def _vectors(table: pd.DataFrame, names: tuple[str, ...]) -> Floats:
+    return table[list(names)].to_numpy(np.float64)
+
+
+def _joined(tables: list[pd.DataFrame], name: str) -> Any:
+    return np.concatenate([table[name].to_numpy() for table in tables])
+
+
+def _speeds(particles: pd.DataFrame) -> Floats:
+    return np.asarray(np.linalg.norm(_vectors(particles, VELOCITY), axis=1))
+
+
+def _scales(frames: list[ShownFrame]) -> dict[str, float]:
+    """The tops of the colour scales, and the mean normal force, over all shown frames."""
+    forces = [_table(one)["normal_force_n"].to_numpy()[one.contacts] for one in frames]
+    largest = [part.max(initial=0.0) for part in forces]
+    speeds = np.concatenate([_speeds(one.data.particles)[one.particles] for one in frames])
+    return {
+        "force": float(np.median(largest)) or 1.0,
+        "largest": float(max(largest)),
+        "mean": float(np.concatenate([*forces, np.zeros(0)]).mean()),
+        "speed": float(1e3 * np.quantile(speeds, _TOP)) or 1.0,
+        "displacement": 1e3 * _displacement(frames) or 1.0,
+    }
+
+
+def _displacement(frames: list[ShownFrame]) -> float:
+    """Quantile `_TOP` of how far particles have moved at the end, m."""
+    first, last = (
+        frame.data.particles.iloc[frame.particles].set_index("particle_id")[list(CENTRE)]
+        for frame in (frames[0], frames[-1])
+    )
+    moved = (last - first).dropna().to_numpy()
+    return float(np.quantile(np.linalg.norm(moved, axis=1), _TOP)) if len(moved) else 0.0
+
+
+def _dominant_paths(run: Run, frames: list[ShownFrame]) -> list[dict[str, Any] | None]:
+    """The dominant path of each frame: bottleneck in N, particles in order, where it ends."""
+    names = ["step", "particle_ids", "bottleneck_n", "mean_force_n", "end_kind", "dominant"]
+    table = read_table(run.table("chains.parquet"), names)
+    rows = {int(row["step"]): row for row in table[table["dominant"]].to_dict("records")}
+    return [_path(rows.get(frame.data.step)) for frame in frames]
+
+
+def _path(row: Mapping[Any, Any] | None) -> dict[str, Any] | None:
+    if row is None:
+        return None
+    return {
+        "bottleneck": row["bottleneck_n"],
+        "mean": row["mean_force_n"],
+        "particles": [int(number) for number in row["particle_ids"]],
+        "end": row["end_kind"],
+    }
+
+
+# --- workpiece and force -----------------------------------------------------------------------
+
+
+def _workpiece(columns: Columns, run: Run, frames: list[ShownFrame]) -> dict[str, Any]:
+    """Add the workpiece's facets in its own frame and their loads; its poses, frame by frame."""
+    case = run.case
+    surface = read_surface(run.folder, case)
+    columns.add("corners", "f24", 1e3 * surface.corners)
+    own = needed(case.workpiece, "workpiece")
+    poses = []
+    for frame in frames:
+        assert frame.data.workpiece is not None
+        place, turn = frame.data.workpiece
+        poses.append([*(1e3 * place).tolist(), turn])
+    return {
+        "poses": poses,
+        "headings": _headings(run, frames),
+        "radius": 1e3 * own.radius_m,
+        "immersion": 1e3 * own.immersion_depth_m,
+        "loads": _loads(columns, run),
+    }
+
+
+def _loads(columns: Columns, run: Run) -> list[dict[str, Any]]:
+    """Add the columns of ``facets.parquet`` that are shown, if the table was made."""
+    file = run.table("facets.parquet")
+    if not file.is_file():
+        return []
+    table, loads = read_table(file, list(_LOADS)), []
+    for name, (short, label, unit) in _LOADS.items():
+        values = table[name].to_numpy(np.float64)
+        columns.add(name, "f24", values)
+        loaded = values[values > 0.0]
+        top = float(np.quantile(loaded, 0.99)) if loaded.size else 1.0
+        loads.append({"name": name, "short": short, "label": label, "unit": unit, "top": top})
+    return loads
+
+
+def _headings(run: Run, frames: list[ShownFrame]) -> list[float]:
+    """The direction of motion at each frame, rad."""
+    table = _force(run, ["step", "direction_rad"])
+    heading = np.unwrap(table["direction_rad"].to_numpy(np.float64))
+    steps = [frame.data.step for frame in frames]
+    return [float(one) for one in np.interp(steps, table["step"], heading)]
+
+
+def _force(run: Run, names: list[str]) -> pd.DataFrame:
+    return read_table(run.table("workpiece_force.parquet"), names)
+
+
+def _curve(columns: Columns, run: Run, start_s: float) -> dict[str, Any]:
+    """Add the force against the motion over the drag; its times, and how it is filtered."""
+    table = _force(run, ["step", "time_s", "drag_n", "in_statistics"])
+    table = table[table["step"] > drag_phase(run.case).start_step]
+    every = -(-len(table) // _MOST_SAMPLES)
+    shown = table.iloc[::every]
+    times = shown["time_s"].to_numpy(np.float64) - start_s
+    columns.add("resistance", "f24", -shown["drag_n"].to_numpy(np.float64))
+    return {
+        "first": float(times[0]),
+        "interval": float(np.diff(times).mean()),
+        "every": every,
+        "counted": float(table["time_s"][table["in_statistics"]].iloc[0]) - start_s,
+        "window": 2 * _SMOOTHED_DIAMETERS * peak_separation_s(run.case),
+    }
+
+
+def _peaks(peaks: Peaks, times_s: Floats, start_s: float) -> list[dict[str, Any]]:
+    """The highest peaks, each with its nearest frame."""
+    return [
+        {"time": time, "force": -drag, "frame": int(np.abs(times_s - time).argmin())}
+        for time, drag in zip((peaks.time_s - start_s).tolist(), peaks.drag_n.tolist(), strict=True)
+    ]

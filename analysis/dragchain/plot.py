@@ -1,0 +1,150 @@
+"""Plots of a run, each on the axes that are given, or on axes of a new figure.
+
+The panels of the report are the same. Every function returns its axes; the run is one of
+`dragchain.load`. Fonts and sizes are those of Matplotlib's settings. A table that was not made
+raises `TableError`, which names the command that makes it.
+"""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from dragchain.errors import UnknownNameError
+from dragchain.figures.marks import as_compass, compass_bars
+from dragchain.figures.style import BLUE, GREEN, RED
+from dragchain.report import run_panels
+from dragchain.results import FinishedRun
+
+_BIN = 0.25
+"""Width of the bins of contact forces, in mean forces."""
+
+
+def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axes:
+    """Drag and lateral force (N) over process time (s), means and published means.
+
+    Parameters
+    ----------
+    run : FinishedRun
+        A process run.
+    ax : Axes, optional
+    peaks : bool
+        Mark the peaks of the drag.
+    """
+    found, ax = run.findings, _axes(ax)
+    run_panels.forces(ax, run, found)
+    if peaks:
+        times_s, label = found.peaks.process_time_s, f"{found.peaks.count} peaks"
+        ax.plot(times_s, found.peaks.drag_n, "v", color=RED, label=label)
+    ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.15), frameon=False, fontsize="small")
+    return ax
+
+
+def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axes:
+    """Bottleneck force (N) of the dominant path from workpiece to bowl over process time (s).
+
+    Parameters
+    ----------
+    run : FinishedRun
+        A process run.
+    ax : Axes, optional
+    peaks : bool
+        Draw a line at the time of each peak of the drag.
+    """
+    found, ax = run.findings, _axes(ax)
+    run_panels.bottlenecks(ax, run, found)
+    if peaks:
+        run_panels.peak_times(ax, found)
+    return ax
+
+
+def force_around(run: FinishedRun, ax: Any = None) -> Any:
+    """Mean normal force (N per bin) around the workpiece with 95 % intervals, ahead up.
+
+    Parameters
+    ----------
+    run : FinishedRun
+        A process run.
+    ax : PolarAxes, optional
+        ``plt.subplots(subplot_kw={"projection": "polar"})`` makes them; `ValueError` for others.
+    """
+    around, ax = run.findings.azimuth, _axes(ax, projection="polar")
+    if ax.name != "polar":
+        raise ValueError("force_around needs polar axes: subplot_kw={'projection': 'polar'}")
+    compass_bars(as_compass(ax), around.edges_rad, around.force_n)
+    return ax
+
+
+def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = False) -> Axes:
+    """Mean normal force per contact (N) over depth (mm) with 95 % intervals.
+
+    Parameters
+    ----------
+    run : FinishedRun
+        A process run.
+    ax : Axes, optional
+    total : bool
+        Draw the sum of the normal forces per depth (N/mm) instead.
+    """
+    found, ax = run.findings, _axes(ax)
+    draw = run_panels.load_over_depth if total else run_panels.force_over_depth
+    draw(ax, found)
+    return ax
+
+
+def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
+    """Fraction of the force chains by number of particles, for both definitions.
+
+    Widest paths count if they reach the bowl.
+    """
+    chains = run.table("chains", ["definition", "n_particles", "reaches_bowl"])
+    ax = _axes(ax)
+    for name, colour in (("peters", BLUE), ("widest_path", GREEN)):
+        of_name = chains[chains["definition"] == name]
+        whole = of_name[of_name["reaches_bowl"]] if name == "widest_path" else of_name
+        found = whole["n_particles"].value_counts(normalize=True).sort_index()
+        label = f"{name} (mean {whole['n_particles'].mean():.1f})"
+        ax.plot(found.index, found, "o-", color=colour, label=label)
+    ax.locator_params(axis="x", integer=True)
+    ax.set(xlabel="particles per chain", ylabel="fraction of the chains", yscale="log")
+    ax.legend()
+    return ax
+
+
+def contact_forces(run: FinishedRun, ax: Axes | None = None, *, kind: str | None = None) -> Axes:
+    """Probability density of the normal contact forces, divided by their mean.
+
+    Parameters
+    ----------
+    run : FinishedRun
+        A process run; its network frames in the statistics are used.
+    ax : Axes, optional
+    kind : str, optional
+        Bodies of the contacts, such as ``particle-workpiece``; all contacts by default.
+        `UnknownNameError` if there are none of it.
+    """
+    contacts = run.table("contacts", ["step", "kind", "normal_force_n"])
+    contacts = contacts[contacts["step"].isin(run.network["step"])]
+    if kind is not None:
+        known = sorted(contacts["kind"].unique())
+        contacts = contacts[contacts["kind"] == kind]
+        if contacts.empty:
+            raise UnknownNameError(f"there are no contacts of kind {kind!r}", kind, known)
+    force = contacts["normal_force_n"].to_numpy(np.float64)
+    edges = np.arange(0.0, force.max() / force.mean() + _BIN, _BIN)
+    density, _ = np.histogram(force / force.mean(), edges, density=True)
+    label = f"{kind or 'all contacts'} (mean {force.mean():.3g} N)"
+    ax = _axes(ax)
+    ax.stairs(density, edges, baseline=None, label=label)
+    ax.set(xlabel="normal force / mean normal force", ylabel="probability density", yscale="log")
+    ax.legend()
+    return ax
+
+
+def _axes(ax: Any, **options: Any) -> Any:
+    """The axes, or those of a new figure."""
+    if ax is not None:
+        return ax
+    from matplotlib import pyplot
+
+    return pyplot.subplots(layout="constrained", subplot_kw=options)[1]

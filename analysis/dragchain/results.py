@@ -1,0 +1,284 @@
+"""The results of a study as Python objects: `load`."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
+from pathlib import Path
+from typing import Literal
+
+import pandas as pd
+import pyarrow.parquet as pq
+
+from dragchain.errors import RejectedRunError, TableError, UnknownNameError
+from dragchain.report.collect import process_findings
+from dragchain.report.findings import FILE, ProcessFindings
+from dragchain.report.run_data import RunData
+from dragchain.report.runs import upstream_folders
+from dragchain.run.case import Scene, load_case
+from dragchain.run.completeness import read_accepted
+from dragchain.tables.by_step import intact, read_table
+from dragchain.tables.meanings import descriptions, unit_of
+
+_ON_WORKPIECE = ("workpiece_force", "workpiece_contacts", "facets", "contact_events")
+_NETWORK = ("particles", "contacts", "network", "clusters", "chains")
+_TABLES: Mapping[Scene, tuple[str, ...]] = {
+    "process": (*_ON_WORKPIECE, *_NETWORK, "thermo"),
+    "filling": ("particles", "thermo"),
+    "drop_test": ("impacts", "thermo"),
+}
+
+
+class _Units(dict[str, str]):
+    """Units by column."""
+
+    def __missing__(self, column: str) -> str:
+        raise UnknownNameError(f"no table here has a column {column!r}", column, self)
+
+
+def _units(files: Iterable[Path]) -> _Units:
+    fields = (field for file in files if file.is_file() for field in pq.read_schema(file))
+    return _Units((field.name, unit_of(field)) for field in fields)
+
+
+def _describe(column: str, units: Mapping[str, str], tables: tuple[str, ...]) -> str:
+    """The meanings of a column in these tables and its unit."""
+    unit = f" ({units[column]})" if units[column] not in ("", "1") else ""
+    texts = {name: text for name, text in descriptions(column).items() if name in tables}
+    if len(set(texts.values())) < 2:
+        return "".join(f"{text}{unit}" for text in set(texts.values()))
+    groups = groupby(sorted(texts, key=texts.__getitem__), texts.__getitem__)
+    return "\n".join(f"{', '.join(names)}: {text}{unit}" for text, names in groups)
+
+
+def _table(name: str, rows: str) -> "cached_property[pd.DataFrame]":
+    """A table of a run that is read when it is first used."""
+
+    def read(run: "FinishedRun") -> pd.DataFrame:
+        return run.table(name)
+
+    read.__doc__ = f"``{name}.parquet``, one row per {rows}."
+    return cached_property(read)
+
+
+class FinishedRun(RunData):
+    """A run with its tables, each read when it is first used and kept.
+
+    Attributes
+    ----------
+    folder : Path
+    case : Case
+        What the run models: ``case.json``.
+    force, workpiece_contacts, facets, events : DataFrame
+        Of a process: force on the workpiece, contacts on it, its facets, contact events.
+    particles, contacts, network, clusters, chains : DataFrame
+        Of a process: the network frames. A filling has ``particles``, too.
+    impacts : DataFrame
+        Of a drop test.
+    thermo : DataFrame
+
+    Reading a table that was not made raises `TableError`, which names the command that makes it.
+    """
+
+    force = _table("workpiece_force", "sample")
+    workpiece_contacts = _table("workpiece_contacts", "contact on the workpiece and sample")
+    facets = _table("facets", "facet (mesh element) of the workpiece")
+    events = _table("contact_events", "contact event on the workpiece")
+    particles = _table("particles", "particle and frame")
+    contacts = _table("contacts", "contact and network frame")
+    network = _table("network", "network frame in the statistics")
+    clusters = _table("clusters", "threshold and network frame in the statistics")
+    chains = _table("chains", "chain and network frame in the statistics")
+    impacts = _table("impacts", "impact of the drop test")
+    thermo = _table("thermo", "output of the whole system")
+
+    @classmethod
+    def open(cls, folder: Path) -> "FinishedRun":
+        """Read the case of a run folder; `DocumentError` if it has none."""
+        return cls(folder, load_case(folder))
+
+    @property
+    def name(self) -> str:
+        """Name of the case; of a filling or a drop test the run id."""
+        return self.case.case or self.case.run
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """Units of the columns of all tables: ``1`` for plain numbers, empty for text and flags."""
+        return _units(self._file(name) for name in _TABLES[self.case.scene])
+
+    def describe(self, column: str) -> str:
+        """Meaning and unit of a column of the run's tables.
+
+        Raises
+        ------
+        UnknownNameError
+            If no table of the run has it.
+        """
+        return _describe(column, self.units, _TABLES[self.case.scene])
+
+    def table(self, name: str, columns: list[str] | None = None) -> pd.DataFrame:
+        """Read a table, or some of its columns, by the name of its file without the ending.
+
+        Raises
+        ------
+        UnknownNameError
+            If runs of this scene have no such table, or the table no such column.
+        TableError
+            If the table was not made; the message names the command that makes it.
+        """
+        tables = _TABLES[self.case.scene]
+        if name not in tables:
+            others = "".join(f", a {scene} has" for scene in _TABLES if name in _TABLES[scene])
+            problem = f"a {self.case.scene} has no table {name!r}{others}"
+            raise UnknownNameError(problem, name, tables)
+        file = self._file(name)
+        with intact(file):
+            known = pq.read_schema(file).names
+        for column in set(columns or ()) - set(known):
+            raise UnknownNameError(f"{file}: no column {column!r}", column, known)
+        return read_table(file, columns)
+
+    @cached_property
+    def findings(self) -> ProcessFindings:
+        """Means, profiles and peaks of a process run, as its report shows them.
+
+        Read from ``figures.json``, or computed where that was not made; the errors are those of
+        `write_findings`.
+        """
+        if self.case.scene != "process":
+            raise TableError(f"{self.folder}: its scene is {self.case.scene}, not process")
+        file = self.folder / FILE
+        return ProcessFindings.read(file) if file.is_file() else process_findings(self)
+
+    def upstream(self, scene: Literal["filling", "drop_test"]) -> "FinishedRun":
+        """The filling that a process run starts from, or its drop test.
+
+        Raises
+        ------
+        UnknownNameError
+            If it has none.
+        DocumentError
+            If its folder is gone.
+        """
+        folders = upstream_folders(self.folder, self.case)
+        if scene not in folders:
+            raise UnknownNameError(f"run {self.name} has no {scene}", scene, folders)
+        return FinishedRun.open(folders[scene])
+
+    def _file(self, name: str) -> Path:
+        return self.folder / "tables" / f"{name}.parquet"
+
+    def __repr__(self) -> str:
+        made = [name for name in _TABLES[self.case.scene] if self._file(name).is_file()]
+        return f"<{self.case.scene} run {self.name}: {', '.join(made) or 'no tables'}>"
+
+
+@dataclass(frozen=True, repr=False)
+class Study:
+    """The finished process runs of a study.
+
+    Attributes
+    ----------
+    folder : Path
+        ``results/<study>``.
+    runs : tuple of FinishedRun
+        Sorted by the names of their cases. Each workpiece of several is a run of its own.
+    """
+
+    folder: Path
+    runs: tuple[FinishedRun, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the study."""
+        return self.runs[0].case.study
+
+    @cached_property
+    def summary(self) -> pd.DataFrame:
+        """``summary.parquet`` of the report, one row per case; `TableError` without a report."""
+        return read_table(self._summary)
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """Units of the columns of `summary`."""
+        return _units([self._summary])
+
+    def describe(self, column: str) -> str:
+        """Meaning and unit of a column of `summary`; `UnknownNameError` if it has no such one."""
+        return _describe(column, self.units, ("summary",))
+
+    def run(self, name: str | None = None) -> FinishedRun:
+        """A run by the name of its case or its run id; without a name the only one.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such run, or no single one.
+        RejectedRunError
+            If the run is not complete, or did not pass an acceptance check.
+        """
+        found = [run for run in self.runs if name in (None, run.case.case, run.case.run)]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            which = "runs" if name is None else f"runs of case {name!r}"
+            known = [run.case.run if name else run.name for run in found]
+            raise UnknownNameError(f"{self.folder} has {len(found)} {which}: name one", "", known)
+        for run in _runs(self.folder, "case.json"):
+            if name in (run.case.case, run.case.run):
+                read_accepted(run.folder)
+        known = [run.name for run in self.runs]
+        raise UnknownNameError(f"{self.folder} has no run {name!r}", name or "", known)
+
+    @property
+    def _summary(self) -> Path:
+        return self.folder / "report" / "summary.parquet"
+
+    def __repr__(self) -> str:
+        return "\n  ".join([f"<study {self.name}:", *map(repr, self.runs)]) + ">"
+
+
+def load(study: Path | str) -> Study:
+    """Open the results of a study.
+
+    Parameters
+    ----------
+    study : Path or str
+        Name of a study whose results are in ``results/`` of the working folder or of one above
+        it; or the path of ``results/<study>``, or of the folder of one run of any scene, which is
+        then the only one and need not be finished.
+
+    Raises
+    ------
+    UnknownNameError
+        If there are no such results.
+    RejectedRunError
+        If the study has no finished process run.
+    """
+    homes = [home / "results" for home in (Path.cwd(), *Path.cwd().parents)]
+    for folder in (*(home / study for home in homes), Path(study)):
+        if (folder / "case.json").is_file():
+            return Study(folder.resolve().parents[1], (FinishedRun.open(folder),))
+        if (folder / "process").is_dir():
+            return _finished(folder)
+    known = sorted({file.parent.name for home in homes for file in home.glob("*/process")})
+    raise UnknownNameError(
+        f"no results of a study {str(study)!r} in results/ of {homes[0].parent} or above it, and no"
+        " such folder of results",
+        str(study),
+        known,
+        remedy="run the study: ./run all --config study=NAME; or give the path of its results",
+    )
+
+
+def _finished(folder: Path) -> Study:
+    runs = sorted(_runs(folder, "run.json"), key=lambda run: (run.name, run.case.run))
+    if not runs:
+        raise RejectedRunError(f"{folder}: no process run is finished")
+    return Study(folder, tuple(runs))
+
+
+def _runs(folder: Path, having: str) -> Iterator[FinishedRun]:
+    """The process runs of a study with such a file: all have a case, finished ones a record."""
+    return (FinishedRun.open(file.parent) for file in folder.glob(f"process/*/{having}"))

@@ -1,0 +1,416 @@
+"""network.html in a real browser: what it shows is what the tables say."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from browser import MISSING, NO_WEBGL, Browser
+from network_run_files import PEAK_N, PEAKS_S, accept, draw, write_network_run
+
+from dragchain.network_page.page import write_page
+from dragchain.report.notation import MINUS
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}"),
+]
+pytest.importorskip("selenium")
+
+MEDIA_RADIUS_MM = 3.0
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = write_network_run(tmp_path_factory.mktemp("made") / "run")
+    accept(folder)
+    draw(folder)
+    write_page(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    browser = Browser(tmp_path_factory.mktemp("profile"))
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def page(window: Browser, run: Path) -> Iterator[Browser]:
+    """The page, opened anew; nothing may go wrong in its console."""
+    yield window.open(run / "network.html")
+    assert window.errors() == []
+
+
+class Clicks:
+    """Counts the clicks of a task: it may take three."""
+
+    def __init__(self, page: Browser) -> None:
+        self.page, self.left = page, 3
+
+    def click(self, selector: str) -> None:
+        assert self.left > 0, "a task takes three clicks at most"
+        self.left -= 1
+        self.page.click(selector)
+
+
+@pytest.fixture
+def clicks(page: Browser) -> Clicks:
+    return Clicks(page)
+
+
+def rows(run: Path, name: str, step: int) -> pd.DataFrame:
+    table = pd.read_parquet(run / f"tables/{name}.parquet")
+    return table[table["step"] == step].reset_index(drop=True)
+
+
+def step_at(page: Browser) -> int:
+    """The step of the frame that is shown."""
+    return int(page.run("return networkPage.head.steps[networkPage.number]"))
+
+
+def shown(page: Browser) -> dict[str, str]:
+    """The table of what was chosen."""
+    lines = page.run("""return [...document.querySelectorAll("#chosen tr")]
+        .map(row => [...row.cells].map(cell => cell.textContent))""")
+    return dict(lines)
+
+
+def number(text: str) -> float:
+    """The first number of a text."""
+    found = re.search(r"-?[\d.]+(e-?\d+)?", text.replace(MINUS, "-"))
+    assert found, text
+    return float(found[0])
+
+
+def four_digits(value: float) -> object:
+    return pytest.approx(value, rel=6e-4)
+
+
+# --- the five tasks ------------------------------------------------------------------------------
+
+
+def test_the_strongest_chain_at_the_highest_peak(clicks: Clicks, run: Path) -> None:
+    page = clicks.page
+    clicks.click("#peaks li:first-child button")
+    chains = rows(run, "chains", step_at(page))
+    dominant = chains[chains["dominant"]].iloc[0]
+    said = re.search(r"bottleneck ([\d.]+) N, mean ([\d.]+) N, (\d+) particles, .* to (\w+)",
+                     page.text("#status"))  # fmt: skip
+    assert said is not None
+    assert float(said[1]) == four_digits(dominant["bottleneck_n"])
+    assert float(said[2]) == four_digits(dominant["mean_force_n"])
+    assert (int(said[3]), said[4]) == (dominant["n_particles"], dominant["end_kind"])
+    drawn = page.run("return networkPage.contacts.halos.count")
+    assert drawn == dominant["n_particles"] + 1
+
+
+def test_the_force_of_a_given_contact(clicks: Clicks, run: Path) -> None:
+    page = clicks.page
+    contacts = rows(run, "contacts", step_at(page))
+    inner = contacts[contacts["b_id"] > 0].iloc[17]
+    clicks.click("#find")
+    page.find("#find").send_keys(f"{inner['a_id']} {inner['b_id']}")
+    clicks.click("#find-button")
+    found = shown(page)
+    assert number(found["normal force"]) == four_digits(inner["normal_force_n"])
+    assert number(found["tangential force"]) == four_digits(inner["tangential_force_n"])
+
+
+def test_the_facet_with_the_highest_load(clicks: Clicks, run: Path) -> None:
+    page = clicks.page
+    clicks.click("#highest-facet")
+    facets = pd.read_parquet(run / "tables/facets.parquet")
+    highest = facets.loc[facets["force_slide_pa"].idxmax()]
+    assert page.text("#chosen h3") == f"Facet {highest['facet_id']:.0f} of the workpiece"
+    found = shown(page)
+    assert number(found["sliding load"]) == four_digits(highest["force_slide_pa"])
+    assert number(found["mean pressure"]) == four_digits(highest["mean_pressure_pa"])
+
+
+def test_contacts_above_a_threshold_at_a_time(clicks: Clicks, run: Path) -> None:
+    page = clicks.page
+    clicks.click("#peaks li:nth-child(3) button")
+    page.run("document.getElementById('threshold').select()")
+    page.find("#threshold").send_keys("0.25")
+    contacts = rows(run, "contacts", step_at(page))
+    strong = contacts[contacts["normal_force_n"] > 0.25]
+    assert page.text("#status").startswith(f"{len(strong)} of {len(contacts)} contacts shown")
+    kinds = strong["kind"].value_counts()
+    bowl = kinds.get("particle-floor", 0) + kinds.get("particle-side", 0)
+    expected = [kinds["particle-particle"], kinds.get("particle-workpiece", 0), bowl]
+    assert [int(page.text(f"#count-{kind}")) for kind in range(3)] == expected
+
+
+def test_the_time_of_the_second_highest_peak(clicks: Clicks) -> None:
+    page = clicks.page
+    assert number(page.text("#peaks li:nth-child(2)")) == pytest.approx(PEAKS_S[1], abs=5e-4)
+    clicks.click("#peaks li:nth-child(2) button")
+    said = re.search(r"Drag force ([\d.]+) N at ([\d.]+) s", page.text("#status"))
+    assert said is not None
+    assert float(said[1]) == four_digits(PEAK_N[1])
+    assert float(said[2]) == pytest.approx(PEAKS_S[1], abs=5e-4)
+
+
+# --- time and curve ------------------------------------------------------------------------------
+
+
+def test_it_plays_pauses_and_ends(page: Browser) -> None:
+    def now() -> int:
+        return int(page.run("return networkPage.number"))
+
+    speed = "networkPage.player.speed = arguments[0]"
+    page.run(f"networkPage.show(0); {speed}", 0.02)  # so slow that no machine comes to the end
+    page.click("#play")
+    assert page.text("#play") == "Pause"
+    page.wait(lambda: now() > 0, "the second frame")
+    page.click("#play")
+    assert page.text("#play") == "Play"
+    paused = now()
+    page.run("return new Promise(done => setTimeout(done, 1500))")
+    assert now() == paused
+    page.run(speed, 2)
+    page.click("#play")
+    page.wait(lambda: page.text("#play") == "Play", "the end")
+    assert page.run("return networkPage.frames.count") == now() + 1
+    page.run(speed, 0.02)
+    page.click("#play")
+    assert now() == 0
+    page.click("#next")
+    assert (now(), page.text("#play")) == (1, "Play")
+    page.find("#speed").send_keys("\N{MULTIPLICATION SIGN} 5")
+    assert page.run("return networkPage.player.speed") == 5
+
+
+def test_the_slider_moves_the_cursor_of_the_curve(page: Browser) -> None:
+    def cursor() -> float:
+        return float(page.find("#curve .cursor").get_attribute("x1"))
+
+    from selenium.webdriver import Keys
+
+    page.find("#time").send_keys(Keys.HOME)
+    first = cursor()
+    page.find("#time").send_keys(Keys.END)
+    assert cursor() > first + 100
+    time_s = page.run("return networkPage.frames.times.at(-1)")
+    assert number(page.text("#now")) == pytest.approx(time_s, abs=5e-4)
+
+
+def test_a_click_on_a_peak_of_the_curve_goes_there(page: Browser, run: Path) -> None:
+    page.run("networkPage.show(0); document.getElementById('path').click()")
+    x, y = page.run("const {x, y} = {x: networkPage.curve.x(arguments[0]), "
+                    "y: networkPage.curve.y(arguments[1])}; return [x, y]",
+                    PEAKS_S[0], PEAK_N[0])  # fmt: skip
+    page.click_at("#curve", x, y)
+    network = pd.read_parquet(run / "tables/network.parquet")
+    since = network["time_s"] - 0.1
+    assert step_at(page) == network["step"][np.abs(since - PEAKS_S[0]).argmin()]
+    assert page.find("#path").is_selected()
+    assert "Dominant path" in page.text("#status")
+
+
+def test_dragging_zooms_the_curve_and_a_button_shows_all(page: Browser) -> None:
+    page.drag("#curve", (200, 60), (400, 60))
+    first, last = page.run("return networkPage.curve.span")
+    assert 0 < first < last < 0.4 and last - first < 0.15
+    page.click("#whole")
+    assert page.run("return networkPage.curve.span") == pytest.approx([0.001, 0.4], abs=1e-6)
+
+
+def test_hovering_over_the_curve_tells_both_values(page: Browser, run: Path) -> None:
+    from selenium.webdriver import ActionChains
+
+    ActionChains(page.driver).move_to_element(page.find("#curve")).perform()
+    said = re.fullmatch(r"([\d.]+) s: raw ([\d.]+) N, filtered ([\d.]+) N", page.text("#hovered"))
+    assert said is not None
+    force = pd.read_parquet(run / "tables/workpiece_force.parquet")
+    near = force[(force["time_s"] - 0.1 - float(said[1])).abs() < 6e-4]
+    assert any(float(said[2]) == four_digits(-drag) for drag in near["drag_n"])
+
+
+# --- the scene -----------------------------------------------------------------------------------
+
+
+def test_a_click_on_a_particle_tells_its_numbers(page: Browser, run: Path) -> None:
+    """Some particle that nothing hides is clicked; what is told is of the one that was hit."""
+    page.run("document.getElementById('size').value = 100; networkPage.redraw()")
+    page.click("#presets [data-preset=above]")
+    particles = rows(run, "particles", step_at(page))
+    top = particles.loc[particles["z_m"].idxmax()]
+    place = page.run("return networkPage.view.onCanvas(arguments[0])",
+                     [1e3 * float(top[f"{axis}_m"]) for axis in "xyz"])  # fmt: skip
+    page.click_at("#canvas", *place)
+    assert page.text("#chosen h3") == f"Particle {top['particle_id']:.0f}"
+    found = shown(page)
+    speed = 1e3 * float(np.linalg.norm(top[["vx_m_s", "vy_m_s", "vz_m_s"]].to_numpy(float)))
+    assert number(found["speed"]) == four_digits(speed)
+    assert number(found["diameter"]) == four_digits(2 * MEDIA_RADIUS_MM)
+    contacts = rows(run, "contacts", step_at(page))
+    touching = (contacts[["a_id", "b_id"]] == top["particle_id"]).any(axis=1)
+    assert int(found["contacts"]) == touching.sum()
+    largest = contacts["normal_force_n"][touching].max()
+    assert number(found["largest normal force"]) == four_digits(largest)
+
+
+def test_a_click_on_a_contact_tells_its_forces(page: Browser, run: Path) -> None:
+    page.run("document.getElementById('size').value = 0; document.getElementById('path').click();"
+             "document.getElementById('load').value = 'hidden'; networkPage.redraw()")  # fmt: skip
+    contacts = rows(run, "contacts", step_at(page))
+    largest = contacts.loc[contacts["normal_force_n"].idxmax()]
+    page.find("#threshold").clear()
+    page.find("#threshold").send_keys(str(0.999 * largest["normal_force_n"]))
+    assert page.text("#status").startswith("1 of ")
+    place = page.run("""const [from, to] = networkPage.contacts.cylinders.at(0);
+        return networkPage.view.onCanvas([0, 1, 2].map(k => (from[k] + to[k]) / 2))""")
+    page.click_at("#canvas", *place)
+    assert number(shown(page)["normal force"]) == four_digits(largest["normal_force_n"])
+    assert str(largest["a_id"]) in page.text("#chosen h3").split()
+
+
+def test_classes_and_chains_are_switched(page: Browser, run: Path) -> None:
+    contacts = rows(run, "contacts", step_at(page))
+    page.click("#path")
+    page.click("#class-0")
+    outer = contacts[contacts["b_id"] <= 0]
+    assert page.run("return networkPage.contacts.rows.length") == len(outer)
+    page.click("#class-2")
+    assert page.run("return networkPage.contacts.rows.length") == (outer["b_id"] == 0).sum()
+    page.click("#class-0")
+    page.click("#chains")
+    chains = rows(run, "chains", step_at(page))
+    links = (chains[chains["definition"] == "peters"]["n_particles"] - 1).sum()
+    assert page.run("return networkPage.contacts.halos.count") == links
+
+
+@pytest.mark.parametrize("colour", ["force", "class", "speed", "displacement"])
+def test_every_colour_has_a_legend_and_changes_the_picture(page: Browser, colour: str) -> None:
+    def picture() -> str:
+        return page.run(
+            "networkPage.view.draw(1); return networkPage.view.renderer.domElement.toDataURL()"
+        )
+
+    page.run("document.getElementById('size').value = 60; networkPage.redraw()")
+    before = picture()
+    page.run("const box = document.getElementById('colour'); box.value = arguments[0];"
+             "box.dispatchEvent(new Event('change'))", colour)  # fmt: skip
+    words = {"force": "Normal force", "class": "Class", "speed": "Speed", "displacement": "Displa"}
+    assert words[colour] in page.text("#legend")
+    assert (picture() == before) == (colour == "force")
+
+
+def test_views_and_keys_turn_the_camera(page: Browser) -> None:
+    def camera() -> list[float]:
+        return page.run("return networkPage.view.camera.matrixWorld.elements.slice(0, 3)")
+
+    seen = []
+    for name in ("above", "along", "side", "follow", "overview"):
+        page.click(f"#presets [data-preset={name}]")
+        assert page.find(f"[data-preset={name}]").get_attribute("aria-pressed") == "true"
+        page.run("networkPage.view.draw()")
+        seen.append(camera())
+    assert np.unique(np.round(seen, 6), axis=0).shape[0] >= 4
+    page.run("document.getElementById('canvas').focus()")
+    from selenium.webdriver import Keys
+
+    page.find("#canvas").send_keys(Keys.ARROW_LEFT)
+    page.run("networkPage.view.draw()")
+    assert camera() != seen[-1]
+    now = page.run("return networkPage.number")
+    page.find("#canvas").send_keys(",")
+    assert page.run("return networkPage.number") == now - 1
+
+
+def test_the_workpiece_is_followed(page: Browser) -> None:
+    page.click("#presets [data-preset=follow]")
+    for number_ in (0, 9):
+        page.run("networkPage.show(arguments[0])", number_)
+        x, y = page.run(
+            "const {x, y} = networkPage.workpiece.pose(networkPage.number); return [x, y]"
+        )
+        target = page.run("return networkPage.view.controls.target.toArray()")
+        assert target[:2] == pytest.approx([x, y])
+
+
+def test_a_window_of_another_size_is_filled_again(page: Browser) -> None:
+    def part() -> float:
+        """Height of the bowl over that of the picture."""
+        low, high = page.run("""const {height} = networkPage.head.bowl;
+            return [[0, 0, 0], [0, 0, height]].map(at => networkPage.view.onCanvas(at)[1])""")
+        return (low - high) / page.run("return document.getElementById('canvas').clientHeight")
+
+    before = part()
+    page.driver.set_window_size(700, 1100)
+    page.wait(lambda: page.run("return innerWidth") < 800, "the narrow window")
+    page.wait(lambda: 0.3 < part() < 0.95, "the bowl to fit")
+    page.driver.set_window_size(1366, 900)
+    page.wait(lambda: abs(part() - before) < 0.02, "the bowl to fit again")
+
+
+def test_all_controls_have_names(page: Browser) -> None:
+    nameless = page.run("""
+        const controls = document.querySelectorAll("input, select, button, canvas, svg");
+        const named = one => one.getAttribute("aria-label") || one.textContent.trim();
+        const nameless = [...controls].filter(one => !one.labels?.length && !named(one));
+        return nameless.map(one => one.outerHTML)
+    """)
+    assert nameless == []
+
+
+# --- without a scene -----------------------------------------------------------------------------
+
+
+def test_without_webgl_a_picture_stands_for_the_scene(run: Path, tmp_path: Path) -> None:
+    page = Browser(tmp_path / "profile", NO_WEBGL)
+    try:
+        page.open(run / "network.html")
+        assert "WebGL" in page.text("#problem")
+        assert page.find("#static-scene img").is_displayed()
+        assert not page.find("#canvas").is_displayed()
+        assert not page.find("#static-curve").is_displayed()
+        page.click("#peaks li:first-child button")
+        assert float(page.find("#curve .cursor").get_attribute("x1")) > 100
+    finally:
+        page.close()
+
+
+def test_printed_it_shows_static_pictures(page: Browser) -> None:
+    page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    assert page.find("#static-scene img").is_displayed()
+    assert page.find("#static-curve img").is_displayed()
+    assert not page.find("#canvas").is_displayed()
+    page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+    assert page.find("#canvas").is_displayed()
+
+
+def test_without_scripts_it_shows_static_pictures(window: Browser, run: Path) -> None:
+    window.driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+    window.driver.get((run / "network.html").resolve().as_uri())
+    assert window.find("#static-scene img").is_displayed()
+    assert window.find("#static-curve img").is_displayed()
+    assert not window.find("#canvas").is_displayed()
+    window.driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+
+
+def test_data_that_are_damaged_are_told(window: Browser, run: Path, tmp_path: Path) -> None:
+    text = (run / "network.html").read_text(encoding="utf-8")
+    at = text.index('id="data">') + 2000
+    broken = tmp_path / "broken.html"
+    broken.write_text(text[:at] + text[at + 400 :], encoding="utf-8")
+    window.open(broken)
+    assert "could not be shown" in window.text("#problem")
+    assert window.find("#static-scene img").is_displayed()
+    window.errors()
+
+
+def test_an_stl_workpiece_and_hostile_names(window: Browser, tmp_path: Path) -> None:
+    hostile = '</script><script>document.title="taken"</script>'
+    folder = write_network_run(tmp_path / "run", "mesh", study=hostile, case=hostile)
+    write_page(folder)
+    window.open(folder / "network.html")
+    assert window.driver.title == f"{hostile}: contact network"
+    assert hostile in window.text("header")
+    assert window.run("return networkPage.workpiece.group.visible")
+    assert window.errors() == []

@@ -1,0 +1,254 @@
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from finished_runs import write_finished_run
+from report_files import DROP, FILLING, make_run
+from report_files import case_json as upstream_case
+from tiny_run_files import chain_n
+
+import dragchain
+from dragchain import (
+    DocumentError,
+    RejectedRunError,
+    SeriesError,
+    TableError,
+    UnknownNameError,
+    load,
+)
+from dragchain.report.collect import write_findings
+from dragchain.report.findings import FILE
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A project with the results of a study of two cases, one of two workpieces."""
+    project = tmp_path_factory.mktemp("project")
+    process = project / "results/small/process"
+    run = write_finished_run(process / "deep-1", case="deep")
+    for name, case in (("two-2", "two_workpiece-1"), ("two-2.2", "two_workpiece-2")):
+        shutil.copytree(run, process / name)
+        _edit(process / name / "case.json", {"case": case, "run": name})
+    return project
+
+
+@pytest.fixture
+def project(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The same to change; the working folder is a folder in it."""
+    shutil.copytree(made, tmp_path / "project")
+    (tmp_path / "project/examples").mkdir()
+    monkeypatch.chdir(tmp_path / "project/examples")
+    return tmp_path / "project"
+
+
+def _edit(file: Path, changes: dict[str, Any]) -> None:
+    file.write_text(json.dumps(json.loads(file.read_text()) | changes))
+
+
+def write_summary(project: Path) -> None:
+    folder = project / "results/small/report"
+    folder.mkdir()
+    table = pd.DataFrame({"case": ["deep"], "drag_mean_n": [-2.5], "input_motion_speed_m_s": [0.1]})
+    table.to_parquet(folder / "summary.parquet")
+
+
+def test_a_study_is_found_from_below_by_its_name_and_by_paths(project: Path) -> None:
+    folder = project / "results/small"
+    for study in (load("small"), load(folder), load(str(folder)), load("../results/small")):
+        assert study.name == "tiny"
+        assert [run.name for run in study.runs] == ["deep", "two_workpiece-1", "two_workpiece-2"]
+        assert study.folder.resolve() == folder
+
+
+def test_one_run_folder_is_a_study_of_one_run(project: Path) -> None:
+    folder = project / "results/small/process/deep-1"
+    (folder / "run.json").unlink()
+    study = load(folder)
+    assert study.run().folder == folder
+    assert study.folder == project / "results/small"
+
+
+def test_an_unknown_study_is_told_from_those_that_there_are(project: Path) -> None:
+    with pytest.raises(UnknownNameError, match=r"(?s)'smal'.*did you mean 'small'.*\./run all"):
+        load("smal")
+    with pytest.raises(UnknownNameError, match="known: small"):
+        load(project / "examples")
+
+
+def test_runs_are_found_by_case_and_by_run_id(project: Path) -> None:
+    study = load("small")
+    assert study.run("deep").case.run == "deep-1"
+    assert study.run("two-2.2").name == "two_workpiece-2"
+    with pytest.raises(UnknownNameError, match=r"(?s)no run 'depe'.*did you mean 'deep'"):
+        study.run("depe")
+    with pytest.raises(UnknownNameError, match=r"3 runs: name one.*\n.*two_workpiece-1"):
+        study.run()
+
+
+def test_a_case_with_two_runs_is_named_by_its_run_id(project: Path) -> None:
+    _edit(project / "results/small/process/two-2/case.json", {"case": "deep"})
+    study = load("small")
+    with pytest.raises(UnknownNameError, match=r"2 runs of case 'deep': name one.*\n.*deep-1, two"):
+        study.run("deep")
+    assert study.run("two-2").name == "deep"
+
+
+def test_an_unfinished_run_is_no_result(project: Path) -> None:
+    (project / "results/small/process/deep-1/run.json").unlink()
+    study = load("small")
+    assert [run.case.run for run in study.runs] == ["two-2", "two-2.2"]
+    with pytest.raises(RejectedRunError, match=r"nothing says that the run is complete"):
+        study.run("deep")
+    for run in study.runs:
+        (run.folder / "run.json").unlink()
+    with pytest.raises(RejectedRunError, match="no process run is finished"):
+        load("small")
+
+
+TABLES = {
+    "force": "workpiece_force",
+    "workpiece_contacts": "workpiece_contacts",
+    "facets": "facets",
+    "events": "contact_events",
+    "particles": "particles",
+    "contacts": "contacts",
+    "network": "network",
+    "clusters": "clusters",
+    "chains": "chains",
+    "thermo": "thermo",
+}
+
+
+@pytest.mark.parametrize(("name", "file"), TABLES.items())
+def test_tables_are_read_when_they_are_used_and_kept(project: Path, name: str, file: str) -> None:
+    run = load("small").run("deep")
+    path = run.folder / "tables" / f"{file}.parquet"
+    for other in path.parent.glob("*.parquet"):
+        if other != path:
+            other.unlink()
+    table = getattr(run, name)
+    pd.testing.assert_frame_equal(table, pd.read_parquet(path), check_exact=True)
+    path.unlink()
+    assert getattr(run, name) is table
+
+
+MADE_BY = {"contacts": "tables", "chains": "chains", "facets": "loading", "events": "loading"}
+
+
+@pytest.mark.parametrize(("name", "command"), MADE_BY.items())
+def test_a_missing_table_names_its_command(project: Path, name: str, command: str) -> None:
+    run = load("small").run("deep")
+    (run.folder / "tables" / f"{TABLES[name]}.parquet").unlink()
+    with pytest.raises(TableError, match=f"`dragchain {command} .*process/deep-1`"):
+        getattr(run, name)
+    assert f" {TABLES[name]}," not in repr(run)
+
+
+def test_some_columns_of_a_table_can_be_read(project: Path) -> None:
+    run = load("small").run("deep")
+    drag = run.table("workpiece_force", ["step", "drag_n"])
+    assert drag["drag_n"].tolist() == pytest.approx([-chain_n(step) for step in drag["step"]])
+    assert list(drag) == ["step", "drag_n"]
+    with pytest.raises(UnknownNameError, match=r"(?s)no column 'drag'.*did you mean 'drag_n'"):
+        run.table("workpiece_force", ["drag"])
+    with pytest.raises(UnknownNameError, match=r"(?s)no table 'contact'.*mean 'contacts'"):
+        run.table("contact")
+    with pytest.raises(UnknownNameError, match="no table 'impacts', a drop_test has"):
+        _ = run.impacts
+
+
+def test_columns_have_units_and_meanings(project: Path) -> None:
+    run = load("small").run("deep")
+    columns = {name for file in TABLES for name in getattr(run, file).columns}
+    assert columns == set(run.units)
+    assert (run.units["drag_n"], run.units["step"], run.units["phase"]) == ("N", "1", "")
+    assert run.describe("drag_n").endswith("negative: the bed resists (N)")
+    assert "(" not in run.describe("step")
+    meanings = run.describe("azimuth_rad").splitlines()
+    assert {line.split(":")[0] for line in meanings} == {
+        *("workpiece_contacts", "chains", "contact_events"),
+    }
+    assert all(line.endswith("(rad)") for line in meanings)
+    for ask in (run.describe, run.units.__getitem__):
+        with pytest.raises(UnknownNameError, match="did you mean 'drag_n'"):
+            ask("drga_n")
+
+
+def test_a_study_has_the_summary_of_its_report(project: Path) -> None:
+    with pytest.raises(TableError, match=r"`\./run report --config study=small`"):
+        _ = load("small").summary
+    write_summary(project)
+    study = load("small")
+    assert study.summary["drag_mean_n"].tolist() == [-2.5]
+    assert dict(study.units) == {"case": "", "drag_mean_n": "N", "input_motion_speed_m_s": "m/s"}
+    assert study.describe("drag_mean_n") == "mean of the drag force (N)"
+    with pytest.raises(UnknownNameError, match="did you mean 'drag_mean_n'"):
+        study.describe("drag_mean")
+
+
+def test_an_input_that_is_a_list_is_text_in_the_summary(project: Path) -> None:
+    write_summary(project)
+    table = pd.DataFrame({"case": ["deep"], "input_motion_plunge_at_m": ["[0.02, 0]"]})
+    table.to_parquet(project / "results/small/report/summary.parquet")
+    assert load("small").summary["input_motion_plunge_at_m"].tolist() == ["[0.02, 0]"]
+
+
+def test_filling_and_drop_test_of_a_run(project: Path) -> None:
+    run = load("small").run("deep")
+    with pytest.raises(DocumentError, match=r"filling-00000000.case\.json"):
+        run.upstream("filling")
+    make_run(project / "results", upstream_case("filling", "filling-00000000"), FILLING, [])
+    make_run(project / "results", upstream_case("drop_test", "drop-00000000"), DROP, [])
+    assert run.upstream("filling").name == "10 mm <workpiece>"
+    impacts = pd.DataFrame({"impact": [1], "restitution": [0.7]})
+    drop = run.upstream("drop_test")
+    impacts.to_parquet(drop.folder / "tables/impacts.parquet")
+    assert drop.impacts["restitution"].tolist() == [0.7]
+    assert drop.units["restitution"] == "1"
+    with pytest.raises(UnknownNameError, match="has no filling"):
+        drop.upstream("filling")
+    with pytest.raises(TableError, match="its scene is drop_test"):
+        _ = drop.findings
+
+
+def test_findings_are_those_of_the_report(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = load("small").run("deep")
+    assert not (run.folder / FILE).exists()
+    computed = run.findings
+    counted = run.force.loc[run.force["in_statistics"], "drag_n"]
+    assert computed.forces["drag_n"].mean == pytest.approx(counted.mean())
+    written = write_findings(run)
+    monkeypatch.setattr("dragchain.results.process_findings", _never)
+    again = load("small").run("deep").findings
+    assert again.model_dump_json() == computed.model_dump_json() == written.model_dump_json()
+
+
+def _never(run: object) -> None:
+    raise AssertionError("figures.json was there")
+
+
+def test_findings_of_a_run_that_is_too_short_are_refused(project: Path) -> None:
+    run = load("small").run("deep")
+    force = run.force.assign(in_statistics=np.arange(len(run.force)) == len(run.force) - 1)
+    force.to_parquet(run.folder / "tables/workpiece_force.parquet")
+    with pytest.raises(SeriesError):
+        _ = load("small").run("deep").findings
+
+
+def test_what_is_there_shows_in_a_session(project: Path) -> None:
+    study = load("small")
+    assert repr(study).startswith("<study tiny:\n  <process run deep: workpiece_force, ")
+    assert repr(study.run("deep")).endswith("chains, thermo>")
+    assert {"load", "plot", "read_dump"} <= set(dir(dragchain))
+    with pytest.raises(AttributeError, match="no attribute 'lod'"):
+        _ = dragchain.lod
+
+
+def test_every_public_name_is_there() -> None:
+    for name in dragchain.__all__:
+        found = getattr(dragchain, name)
+        assert callable(found) != (name == "plot")

@@ -1,0 +1,104 @@
+"""`dragdeck status` and `dragdeck open` on folders as runs leave them."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from dragdeck.cases.case import Case
+from dragdeck.cli import main
+from dragdeck.engine.record import AcceptanceCheck, RunPart, RunRecord
+from dragdeck.project import Project, by_run
+from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.registry import SCENES
+
+
+@pytest.fixture(autouse=True)
+def inside(project: Project, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(project.root)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+
+
+Said = pytest.CaptureFixture[str]
+
+
+def write_state(folder: Path, **values: object) -> None:
+    part = RunPart(part=1, checkpoint=None, from_step=0)
+    record = RunRecord(
+        state="complete", inputs="", started="", engine_version="3.8.0", ranks=1, parts=[part]
+    )
+    record.model_copy(update=values).write(folder / "state.json")
+
+
+def test_a_study_that_was_never_run_waits(case: Case, project: Project, capsys: Said) -> None:
+    assert main(["status", "small"]) == 0
+    *runs, last = capsys.readouterr().out.splitlines()
+    assert len(runs) == 3 and all(": waiting, about " in line for line in runs)
+    assert last.startswith("small: 0 % done; runs: 3 waiting; still to run: about ")
+    assert last.endswith("(estimates; speed assumed)")
+    assert not (project.root / "results").exists()
+
+
+def test_failed_runs_come_first_with_their_remedy(
+    case: Case, project: Project, capsys: Said
+) -> None:
+    write_state(project.run_folder(case, FILLING), steps_per_s=500.0, wall_time_s=75.0)
+    check = AcceptanceCheck(
+        code="ranks", name="split", passed=False, seen="one", limit="two", remedy="use this"
+    )
+    write_state(project.run_folder(case, PROCESS), state="failed", checks=[check])
+    assert main(["status", "small"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"process {PROCESS.run_id(case)}: failed")
+    assert "check:  split: one (limit: two)" in said and "remedy: use this" in said
+    assert f"filling {FILLING.run_id(case)}: complete, 500 steps/s, 1 min 15 s" in said
+    assert "runs: 1 failed, 1 waiting, 1 complete" in said
+
+
+def test_the_points_of_a_plan_have_a_status(case: Case, project: Project, capsys: Said) -> None:
+    plan = project.root / "two.yaml"
+    points = {"vary": {"fidelity.timestep_fraction": [0.5, 0.6]}, "seeds": 2}
+    base = {"fidelity.youngs_modulus_scale": 0.001, "fidelity.timestep_fraction": 0.5}
+    reference = {"vary": {"fidelity.youngs_modulus_scale": [0.002]}, "seeds": 1}
+    drops = {"drop_test.timestep_fraction": [0.02, 0.1]}
+    content = {"base": base, "reference": reference, "points": [points], "drop_test": drops}
+    plan.write_text(yaml.safe_dump(content))
+    assert main(["status", "small", "--plan", str(plan)]) == 0
+    counted = project.points("small", str(plan))
+    of_scenes = [len(by_run(counted.of(kind), kind)) for kind in SCENES.values()]
+    assert of_scenes == [2, 3, 5]
+    assert "runs: 10 waiting" in capsys.readouterr().out
+
+
+def test_open_says_where_the_report_is(case: Case, project: Project, capsys: Said) -> None:
+    assert main(["open", "small"]) == 1
+    assert "./run all --config study=small" in capsys.readouterr().err
+    file = project.report("small")
+    file.parent.mkdir(parents=True)
+    file.touch()
+    assert main(["open", "small"]) == 0
+    assert capsys.readouterr().out == f"{file}\n"
+    assert main(["status", "small"]) == 0
+    assert capsys.readouterr().out.endswith(f"report: {file}\n")
+
+
+def test_open_starts_the_viewer_of_a_display(
+    case: Case, project: Project, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    file = project.report("small")
+    file.parent.mkdir(parents=True)
+    file.touch()
+    opened: list[list[str]] = []
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr("shutil.which", lambda name: f"/usr/bin/{name}")
+    monkeypatch.setattr("subprocess.Popen", lambda words, **_: opened.append(words))
+    assert main(["open", "small"]) == 0
+    assert opened == [["/usr/bin/xdg-open", str(file)]]
+
+
+def test_an_unknown_study_is_named(case: Case, capsys: Said) -> None:
+    for command in ("status", "open"):
+        assert main([command, "large"]) == 1
+        assert "one of: small" in capsys.readouterr().err

@@ -1,0 +1,306 @@
+"""A validation on runs whose forces are known."""
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from changed import changed
+from scipy import stats
+
+from dragchain.errors import DocumentError, SeriesError
+from dragchain.report.notation import MINUS
+from dragchain.report.page import page_environment
+from dragchain.run.case import PublishedDrag, Reference, load_case
+from dragchain.scaling.fit import read_scalings
+from dragchain.statistics.estimate import Estimate
+from dragchain.tradeoff.measures import Measures, RunCost
+from evidence.validation import force
+from evidence.validation.around_workpiece import contacts_of
+from evidence.validation.claims import verdict
+from evidence.validation.corridor import Corridor, relative_places
+from evidence.validation.effects import effect_table, effects
+from evidence.validation.runs_by_bed import (
+    Point,
+    Points,
+    over_packings,
+    read_points,
+)
+
+RATE_HZ = 1000.0
+DIAMETER_M = 2 * 8.76e-3
+
+
+def made_point(
+    tiny_run: Path,
+    folder: Path,
+    seed: int,
+    drag: np.ndarray[Any, Any],
+    *,
+    parameters: tuple[float, float] = (1.0, 0.64),
+    varied: dict[str, Any] | None = None,
+) -> Point:
+    """A run of the tiny case with this drag."""
+    (folder / "tables").mkdir(parents=True)
+    table = pd.DataFrame({"time_s": np.arange(len(drag)) / RATE_HZ, "drag_n": drag})
+    table["lateral_n"], table["vertical_n"] = 0.1 * drag, -0.2 * drag
+    table["in_statistics"] = True
+    table.to_parquet(folder / "tables" / "workpiece_force.parquet")
+    case = changed(
+        load_case(tiny_run),
+        run=folder.name,
+        reference=Reference(
+            source="a paper",
+            experiment=PublishedDrag(drag_mean_n=-2.5, drag_std_n=0.5),
+            simulation=PublishedDrag(drag_mean_n=-2.0),
+        ),
+    )
+    modulus, step = parameters
+    measures = Measures(
+        study="small",
+        run=folder.name,
+        bed=f"bed-{seed}",
+        inputs={"seed": seed, "bowl.radius_m": 0.04, **(varied or {})},
+        fidelity=changed(
+            case.fidelity, youngs_modulus_scale=modulus, timestep_fraction=step, speed_factor=1.0
+        ),
+        single={"bed_height": 0.07},
+        arc_m=20 * DIAMETER_M,
+        cost=RunCost(
+            steps=1000,
+            wall_time_s=60.0,
+            cpu_time_s=60.0,
+            ranks=1,
+            timestep_s=1e-6,
+            axis_speed_m_s=0.1,
+            steps_per_m=1e7,
+        ),
+        versions={"dragdeck": "1"},
+        started="2026-01-01T00:00:00+00:00",
+        complete=True,
+    )
+    return Point(folder, case, measures, varied or {})
+
+
+def series(mean: float, rng: np.random.Generator, count: int = 4000) -> np.ndarray[Any, Any]:
+    """An autocorrelated drag (first order, about 20 samples) of standard deviation 0.5."""
+    noise = rng.normal(0.0, 0.5 * math.sqrt(1.0 - 0.95**2), count)
+    found = np.empty(count)
+    found[0] = rng.normal(0.0, 0.5)
+    for step in range(1, count):
+        found[step] = 0.95 * found[step - 1] + noise[step]
+    return mean + found
+
+
+@pytest.fixture
+def points(tiny_run: Path, tmp_path: Path) -> Points:
+    """Four fills, a control that is 10 % up, and soft runs with and without a wider bowl."""
+    rng = np.random.default_rng(7)
+
+    def run(name: str, seed: int, factor: float, **more: Any) -> Point:
+        return made_point(tiny_run, tmp_path / name, seed, factor * series(-2.5, rng), **more)
+
+    packings = [run(f"filling-{seed}", seed, 1.0) for seed in (1, 2, 3, 4)]
+    soft: dict[str, Any] = {"parameters": (1e-3, 0.5)}
+    others = [run("control", 1, 1.1, parameters=(1.0, 0.2))]
+    for seed in (1, 2, 3):
+        others.append(run(f"soft-{seed}", seed, 1.05, **soft))
+        wider = {"bowl.radius_m": 0.08}
+        others.append(run(f"wide-{seed}", seed, 1.05 * 0.5, **soft, varied=wider))
+    return Points(packings, others)
+
+
+def test_the_interval_over_packings_covers_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(3)
+    trials = 2000
+    found = [over_packings(rng.normal(2.0, 0.3, 4).tolist()) for _ in range(trials)]
+    covered = sum(one.ci95_low <= 2.0 <= one.ci95_high for one in found)
+    low, high = stats.binom.interval(0.999, trials, 0.95)
+    assert low <= covered <= high
+
+
+def test_ratios_are_averaged_by_their_logarithms() -> None:
+    found = over_packings([0.5, 2.0], ratio=True)
+    assert found.value == pytest.approx(1.0)
+    assert found.ci95_low * found.ci95_high == pytest.approx(1.0)
+
+
+def test_one_filling_has_no_interval() -> None:
+    with pytest.raises(SeriesError, match="needs 2 of them, not 1"):
+        over_packings([1.0])
+
+
+def test_the_mean_over_packings_is_that_of_the_drag(points: Points) -> None:
+    found = force.of_packings(points.packings)
+    drag, lateral = found.together["drag_n"], found.together["lateral_n"]
+    assert drag.mean.contains(-2.5)
+    assert drag.mean.value == pytest.approx(-2.5, abs=0.15)  # 4 s.e. of 4 packings
+    assert drag.std.value == pytest.approx(0.5, rel=0.1)
+    assert lateral.mean.value == pytest.approx(0.1 * drag.mean.value)
+    assert found.alike.p_value > 0.01
+
+
+def test_packings_that_differ_are_seen(tiny_run: Path, tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    packings = [
+        made_point(tiny_run, tmp_path / f"far-{seed}", seed, series(-2.5 - seed, rng))
+        for seed in (1, 2, 3)
+    ]
+    assert force.of_packings(packings).alike.p_value < 1e-6
+
+
+def test_half_of_a_sine_of_variance_lies_at_its_wave(tiny_run: Path, tmp_path: Path) -> None:
+    count = 4000
+    path = np.linspace(0.0, 20.0, count, endpoint=False)  # particle diameters
+    packings = [
+        made_point(tiny_run, tmp_path / f"sine-{seed}", seed, np.sin(2 * np.pi * path / 2.0))
+        for seed in (1, 2)
+    ]
+    found = force.spectrum(packings)
+    assert found.half_wave.value == pytest.approx(2.0, rel=0.1)
+    peak = int(np.argmax(found.density.mean))
+    assert found.waves_per_diameter[peak] == pytest.approx(0.5)
+
+
+def test_the_comparison_has_the_sign_of_more_drag(points: Points) -> None:
+    drag = force.Together(mean=Estimate(-2.75, -3.0, -2.5), std=Estimate(0.6, 0.5, 0.7))
+    measured, published = force.compare(drag, points.packings[0].case)
+    assert vars(measured.difference) == pytest.approx(vars(Estimate(0.1, 0.0, 0.2)))
+    assert measured.std_ratio is not None and published.std_ratio is None
+    assert vars(measured.std_ratio) == pytest.approx(vars(Estimate(1.2, 1.0, 1.4)))
+    assert published.difference.value == pytest.approx(0.375)
+
+
+def test_effects_are_found_against_what_they_change(points: Points) -> None:
+    table = effect_table(effects(points))
+    mean = table[table["quantity"] == "drag_mean"]
+    control, soft, wide = (mean.iloc[i] for i in range(3))
+    assert (control.timestep_fraction, control.field, control.runs) == (0.2, "", 1)
+    assert control.ci95_low < 0.1 < control.ci95_high
+    assert soft.ci95_low < 0.05 < soft.ci95_high and soft.runs == 3
+    assert (wide.field, wide.value, wide.reference_value) == ("bowl.radius_m", 0.08, 0.04)
+    assert wide.ci95_high < 0.0 and wide.ci95_low < -0.5 < wide.ci95_high
+    assert (
+        wide.exponent_ci95_low < -1.0 < wide.exponent_ci95_high
+    )  # half the drag at twice the radius
+    spread = table[table["quantity"] == "drag_std"]
+    assert (spread.ci95_low < spread.change).all() and (spread.change < spread.ci95_high).all()
+
+
+def test_a_shorter_run_counts_less(points: Points) -> None:
+    def half_width(arc_m: float) -> float:
+        control, *others = points.others
+        shorter = dataclasses.replace(control, measures=changed(control.measures, arc_m=arc_m))
+        row = effects(Points(points.packings, [shorter, *others]))[0]
+        return row.ci95_high - row.ci95_low
+
+    whole = points.packings[0].measures.arc_m
+    assert half_width(whole / 4.0) > 1.4 * half_width(whole)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (1.1, 1.5, "holds"),
+        (0.5, 0.9, "does not hold"),
+        (0.9, 1.5, "not resolved"),
+        (math.nan, math.nan, "not resolved"),
+    ],
+)
+def test_a_verdict_is_the_interval_against_no_effect(
+    low: float, high: float, expected: str
+) -> None:
+    assert verdict(Estimate((low + high) / 2, low, high), 1.0) == expected
+
+
+# --- statements --------------------------------------------------------------------------------
+
+
+def with_contacts(points: Points, seed: int = 0) -> list[Point]:
+    """Contacts on the workpiece: three ahead for one behind, force 1 N/m times the depth more."""
+    rng = np.random.default_rng(seed)
+    for point in points.packings:
+        workpiece = point.case.workpiece
+        assert workpiece is not None
+        ahead = rng.uniform(-np.pi / 2, np.pi / 2, 3000)
+        behind = rng.uniform(np.pi / 2, np.pi, 1000) * rng.choice([-1.0, 1.0], 1000)
+        depth = rng.uniform(0.0, workpiece.immersion_depth_m, 4000)
+        table = pd.DataFrame(
+            {
+                "azimuth_rad": np.concatenate([ahead, behind]),
+                "depth_m": depth,
+                "normal_force_n": 1.0 + depth,
+                "in_statistics": True,
+            }
+        )
+        table.to_parquet(point.folder / "tables" / "workpiece_contacts.parquet")
+    return points.packings
+
+
+def test_contacts_around_the_workpiece(points: Points) -> None:
+    rows = [contacts_of(point) for point in with_contacts(points)]
+    assert [row.ahead_behind for row in rows] == pytest.approx([3.0] * 4, rel=0.01)
+    assert [row.depth_slope_n_per_m for row in rows] == pytest.approx([1.0] * 4)
+    assert rows[0].azimuth.sum() == pytest.approx(1.0)
+    assert rows[0].front_fraction == pytest.approx(0.375, abs=0.03)
+    assert rows[0].front_over_flank == pytest.approx(1.0, abs=0.1)
+
+
+def test_silent_contacts_do_not_count(points: Points) -> None:
+    (point, *_) = with_contacts(points)
+    file = point.folder / "tables" / "workpiece_contacts.parquet"
+    before = contacts_of(point)
+    table = pd.read_parquet(file)
+    silent = table.assign(normal_force_n=0.0, azimuth_rad=0.0)
+    pd.concat([table, silent]).to_parquet(file)
+    after = vars(contacts_of(point))
+    assert all(np.array_equal(after[name], value) for name, value in vars(before).items())
+
+
+def test_the_corridor_is_along_the_motion(tmp_path: Path) -> None:
+    contacts = pd.DataFrame(
+        {
+            "point_x_m": [0.0, 0.0, 0.03],
+            "point_y_m": [0.03, -0.02, 0.0],
+            "ref_x_m": 0.0,
+            "ref_y_m": 0.02,
+            "direction_rad": np.pi / 2,
+        }
+    )
+    along, across, turned = relative_places(contacts)
+    assert along == pytest.approx([0.01, -0.04, -0.02])
+    assert across == pytest.approx([0.0, 0.0, -0.03])
+    assert np.abs(turned) == pytest.approx([0.0, np.pi, np.pi / 2])
+
+
+def test_the_reach_lies_where_half_of_the_excess_is_left() -> None:
+    corridor = Corridor(
+        edges=np.arange(0.0, 3.0, 0.5),
+        ahead=np.array([3.0, 2.5, 1.5, 1.0, 1.0]),
+        behind=np.ones(5),
+        far=1.0,
+        wall=2.5,
+    )
+    assert corridor.half_reach == pytest.approx(1.0)  # 2 N is half of the excess
+    flat = dataclasses.replace(corridor, ahead=np.full(5, 3.0))
+    assert flat.half_reach is None
+
+
+def test_a_reference_that_is_not_measured_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DocumentError, match=r"measures.json: there is no such file"):
+        read_points([tmp_path])
+
+
+def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
+    scalings = read_scalings()
+    template = page_environment(package="evidence").get_template("validation/scaling.html.j2")
+    page = template.render(found=scalings, picture=lambda name: f"data:image/png;base64,{name}")
+    assert 'src="data:image/png;base64,scaling.png"' in page
+    for found in scalings:
+        value, low, high = (
+            f"{n:.2f}".replace("-", MINUS) for n in vars(found.judged.exponent).values()
+        )
+        assert f"{found.verdict}: exponent {value} ({low} to {high})" in page

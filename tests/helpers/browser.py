@@ -1,0 +1,110 @@
+"""A headless Chromium that opens pages from files, driven by Selenium."""
+
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+MISSING = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]
+"""Programs that are not installed; without them no page can be opened."""
+
+_SWITCHES = (
+    *("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+)
+WEBGL = ("--enable-unsafe-swiftshader",)
+NO_WEBGL = ("--disable-3d-apis",)
+LONGEST_S = 60.0
+
+
+class Browser:
+    """A window of 1366 x 900 pixels, unless `size` says otherwise.
+
+    Parameters
+    ----------
+    profile : Path
+        An empty folder for what the browser stores.
+    switches : tuple of str
+        Beyond those of every test: `WEBGL` or `NO_WEBGL`.
+    """
+
+    def __init__(
+        self, profile: Path, switches: tuple[str, ...] = WEBGL, size: str = "1366,900"
+    ) -> None:
+        from selenium import webdriver
+        from selenium.webdriver.chrome.service import Service
+
+        options = webdriver.ChromeOptions()
+        options.binary_location = shutil.which("chromium")
+        own = (f"--user-data-dir={profile}", f"--window-size={size}")
+        for switch in (*_SWITCHES, *switches, *own):
+            options.add_argument(switch)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        service = Service(shutil.which("chromedriver"))
+        self.driver: Any = webdriver.Chrome(options=options, service=service)
+        self.driver.set_script_timeout(LONGEST_S)
+
+    def open(self, file: Path) -> "Browser":
+        """Open a page and wait until it is ready, or says what its problem is."""
+        self.driver.get(file.resolve().as_uri())
+        ended = (
+            'document.documentElement.dataset.ready || !document.getElementById("problem").hidden'
+        )
+        self.wait(lambda: self.run(f"return {ended}"), "the page to be ready")
+        return self
+
+    def wait(self, condition: Callable[[], object], what: str) -> None:
+        """Wait until a condition is true, for `LONGEST_S` at most."""
+        end = time.monotonic() + LONGEST_S
+        while not condition():
+            assert time.monotonic() < end, f"waited too long for {what}"
+            time.sleep(0.05)
+
+    def run(self, script: str, *values: Any) -> Any:
+        """The value that a script returns."""
+        return self.driver.execute_script(script, *values)
+
+    def find(self, selector: str) -> Any:
+        """An element."""
+        return self.driver.find_element("css selector", selector)
+
+    def text(self, selector: str) -> str:
+        """The text of an element, spaces between digits left out."""
+        return str(self.find(selector).text).replace("\u202f", "")
+
+    def click(self, selector: str) -> None:
+        """Click an element where a user would."""
+        self.find(selector).click()
+
+    def click_at(self, selector: str, x: float, y: float) -> None:
+        """Click a point of an element, in pixels from its upper left corner."""
+        from selenium.webdriver import ActionChains
+
+        element = self.find(selector)
+        size = element.size
+        off = round(x - size["width"] / 2), round(y - size["height"] / 2)
+        ActionChains(self.driver).move_to_element_with_offset(element, *off).click().perform()
+
+    def drag(self, selector: str, start: tuple[int, int], end: tuple[int, int]) -> None:
+        """Drag the mouse over an element, from and to pixels from its upper left corner."""
+        from selenium.webdriver import ActionChains
+
+        element = self.find(selector)
+        size = element.size
+        middle = size["width"] / 2, size["height"] / 2
+        (x, y), (u, v) = (
+            [round(at - half) for at, half in zip(place, middle, strict=True)]
+            for place in (start, end)
+        )
+        chain = ActionChains(self.driver).move_to_element_with_offset(element, x, y)
+        chain.click_and_hold().move_to_element_with_offset(element, u, v).release().perform()
+
+    def errors(self) -> list[str]:
+        """What the page wrote to the console, but for notes of the graphics driver."""
+        messages = [entry["message"] for entry in self.driver.get_log("browser")]
+        return [text for text in messages if "GL Driver Message" not in text]
+
+    def close(self) -> None:
+        """End the browser."""
+        self.driver.quit()

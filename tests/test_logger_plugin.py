@@ -1,0 +1,125 @@
+"""The logger plugin on records as Snakemake makes them, without a workflow."""
+
+import io
+import logging
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from rich.console import Console
+from snakemake.logging import DefaultFormatter
+from snakemake_interface_logger_plugins.common import LogEvent
+from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
+
+from dragdeck.outlook.explain import Cost
+from dragdeck.outlook.runs import StudyRun
+from snakemake_logger_plugin_dragdeck import LogHandler, LogHandlerSettings
+
+FLAGS = ("stdout", "nocolor", "dryrun", "printshellcmds", "verbose", "debug_dag")
+RUN = "results/small/process/a[bold]b-12345678"
+
+
+class Shown:
+    """The plugin with a console of its own."""
+
+    def __init__(self, terminal: bool = False, **flags: bool) -> None:
+        common = SimpleNamespace(**{name: flags.get(name, False) for name in FLAGS})
+        self.handler = LogHandler(common, LogHandlerSettings(every_s=1000.0))  # type: ignore[arg-type]
+        self.handler.setFormatter(DefaultFormatter())
+        self.stream = io.StringIO()
+        self.handler._console = Console(
+            file=self.stream, force_terminal=terminal, width=80, markup=False, highlight=False
+        )
+
+    def log(self, text: str, level: int = logging.INFO, **values: Any) -> None:
+        record = logging.LogRecord("snakemake", level, "", 0, text, None, None)
+        vars(record).update(values)
+        self.handler.emit(record)
+
+    def start(self, number: int, rule: str, output: str, command: str = "") -> None:
+        self.log(
+            f"Rule: {rule}", event=LogEvent.JOB_INFO, jobid=number, rule_name=rule, rule_msg="",
+            output=[output], shellcmd=command, local=False, is_checkpoint=False, input=[], log=[],
+            benchmark=None, reason="", wildcards={}, priority=0, threads=1, resources={},
+        )  # fmt: skip
+
+    @property
+    def text(self) -> str:
+        return self.stream.getvalue()
+
+
+def test_snakemake_finds_the_plugin() -> None:
+    assert "dragdeck" in LoggerPluginRegistry().plugins
+
+
+def test_control_characters_and_markup_stay_text() -> None:
+    shown = Shown(terminal=True)
+    shown.log("a \x1b[2Jtitle [bold]of[/bold] \x07[link=x]", level=logging.WARNING)
+    assert shown.text == "a [2Jtitle [bold]of[/bold] [link=x]\n"
+    shown.start(1, "run_process", f"{RUN}/run.json")
+    shown.log("", event=LogEvent.JOB_FINISHED, job_id=1)
+    shown.handler.close()
+    assert "process a[bold]b-12345678: waiting" in shown.text
+
+
+def test_messages_are_shown_if_nothing_is_run() -> None:
+    shown = Shown()
+    shown.log("Building DAG of jobs...")
+    shown.log("Nothing to be done")
+    assert shown.text == ""
+    shown.handler.close()
+    assert shown.text.splitlines() == ["Building DAG of jobs...", "Nothing to be done"]
+
+
+def test_messages_of_a_workflow_that_runs_are_left_to_the_log() -> None:
+    shown = Shown()
+    shown.log("Building DAG of jobs...")
+    shown.log("Job stats", event=LogEvent.RUN_INFO, stats={})
+    shown.log("Select jobs to execute...")
+    shown.start(1, "draw_process", "results/forces.png")
+    shown.log("an error", level=logging.ERROR)
+    shown.log("Complete log(s): here")
+    shown.handler.close()
+    assert shown.text.splitlines() == ["an error", "Complete log(s): here"]
+
+
+@pytest.mark.parametrize("flag", ["dryrun", "printshellcmds", "verbose", "debug_dag"])
+def test_whoever_asks_for_more_gets_everything(flag: str) -> None:
+    shown = Shown(**{flag: True})
+    shown.log("Building DAG of jobs...")
+    shown.start(1, "run_process", f"{RUN}/run.json")
+    assert "Building DAG" in shown.text and "rule run_process:" in shown.text
+    assert ": started" not in shown.text
+
+
+def test_live_lines_stop_while_a_job_prints_itself() -> None:
+    shown = Shown(terminal=True)
+    shown.start(1, "draw_process", "results/forces.png")
+    assert shown.handler._live is not None
+    shown.start(2, "advise", "results/advice.json", "dragdeck advise 2>&1 | tee -i log")
+    assert shown.handler._live is None
+    shown.log("", event=LogEvent.JOB_FINISHED, job_id=2)
+    assert shown.handler._live is not None
+    shown.log("", event=LogEvent.JOB_FINISHED, job_id=1)
+    assert shown.handler._live is None
+
+
+def test_the_plan_is_what_the_whole_is_measured_by() -> None:
+    shown = Shown()
+    cost = Cost(1000, 60.0, "assumed")
+    runs = [StudyRun("process", Path(f"/none/process/{name}"), None, 1, cost, 1e6) for name in "ab"]
+    shown.log("small: 2 runs", shown=True, plan=runs, cores=2)
+    shown.log("", event=LogEvent.PROGRESS, done=3, total=9)
+    assert shown.text == "small: 2 runs\n"
+    assert shown.handler._overall([]) == "runs 0 %, about 1 min 00 s left; 3 of 9 jobs done"
+
+
+def test_a_record_that_cannot_be_shown_does_not_end_the_display(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    shown = Shown()
+    shown.log("", event=LogEvent.JOB_FINISHED)
+    assert "KeyError" in capsys.readouterr().err
+    shown.log("still here", level=logging.WARNING)
+    assert shown.text == "still here\n"

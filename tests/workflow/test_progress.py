@@ -1,0 +1,165 @@
+"""What `./run` shows of a workflow, on the real engine: piped, on a terminal, and of a failure."""
+
+import os
+import pty
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from paths import DATA, PROJECT, ROOT
+from snakemake_calls import call_of, snakemake
+
+from dragdeck.cli import main
+
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+SHOWN = ("--logger", "dragdeck", "--show-failed-logs")
+STUDY = ("--config", "study=tiny")
+CHATTER = ("rule run_", "Select jobs", "Building DAG", "Job stats", "jobid", "Finished job")
+REJECTED = """{% extends "base/process.in.j2" %}
+{% block run %}{% if '0.005' in deck.run %}print "ERROR: on purpose"
+{% endif %}{{ super() }}{% endblock %}
+"""
+"""One of the cases does not pass its acceptance checks."""
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("project")
+    for name in PROJECT:
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "studies/tiny/templates").mkdir(parents=True)
+    shutil.copy(DATA / "tiny_study.yaml", folder / "studies/tiny/study.yaml")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def piped(project: Path) -> str:
+    """What a call without a terminal says."""
+    done = snakemake(project, *SHOWN, "--logger-dragdeck-every-s", "0.2", "all", *STUDY)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stderr
+
+
+@pytest.fixture
+def inside(project: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.chdir(project)
+    yield
+
+
+def test_a_call_says_first_what_it_will_do(piped: str) -> None:
+    lines = [line for line in piped.splitlines() if line.startswith(("tiny: ", "  "))]
+    assert re.fullmatch(
+        r"tiny: 3 runs, about .* on 2 cores, .* \(estimates; speed assumed\); .* free", lines[0]
+    )
+    scenes = {line.split(":")[0].strip() for line in lines[1:4]}
+    assert scenes == {"drop_test", "filling", "process"}
+    assert piped.index(lines[0]) < piped.index(": started")
+
+
+def test_each_run_has_plain_lines_with_percent_and_speed(piped: str) -> None:
+    for pattern in (
+        r"^filling 140-particles-\w+: running, ~\d+ %, .* steps/s, energy \S+ [<>] 1e-05",
+        r"^process quick-\w+: running, \d+ %, [\d,]+ steps/s, about \S+ s left$",
+        r"^runs \d+ %, about .* left; \d+ of \d+ jobs done",
+        r"^process quick-\w+: complete, [\d,]+ steps/s, ",
+    ):
+        assert re.search(pattern, piped, re.MULTILINE), pattern
+    assert "\x1b" not in piped
+
+
+def test_snakemakes_own_messages_are_in_its_log_alone(project: Path, piped: str) -> None:
+    assert [words for words in CHATTER if words in piped] == []
+    (log,) = re.findall(r"^Complete log\(s\): (.*)$", piped, re.MULTILINE)
+    assert "rule run_process:" in Path(log).read_text()
+
+
+def test_a_call_ends_with_the_report_and_the_main_numbers(piped: str) -> None:
+    *_, report, numbers, _ = piped.splitlines()
+    assert report == "report: results/tiny/report/report.html"
+    assert re.fullmatch(r"  quick: mean drag \S+ N \(95 % CI .* N.*\), .*workpiece", numbers)
+
+
+def test_the_numbers_are_those_of_the_summary(project: Path, piped: str) -> None:
+    row = (project / "results/tiny/report/summary.csv").read_text().splitlines()
+    values = dict(zip(row[0].split(","), row[1].split(","), strict=False))
+    assert f"mean drag {float(values['drag_mean_n']):.3g} N" in piped
+
+
+def test_status_says_that_all_is_complete(
+    piped: str, inside: None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["status", "tiny"]) == 0
+    said = capsys.readouterr().out
+    assert "tiny: 100 % done; runs: 3 complete\n" in said
+    assert said.endswith("report/report.html\n")
+
+
+def test_a_call_with_nothing_to_do_says_so(project: Path, piped: str) -> None:
+    done = snakemake(project, *SHOWN, "all", *STUDY)
+    assert "Nothing to be done" in done.stderr
+
+
+def test_what_is_wrong_with_a_call_is_told(project: Path) -> None:
+    done = snakemake(project, *SHOWN, "all", "--config", "study=large")
+    assert done.returncode != 0
+    assert "unknown study 'large'" in done.stderr and "one of: tiny" in done.stderr
+
+
+def test_a_dry_run_lists_its_jobs(project: Path, piped: str) -> None:
+    done = snakemake(project, *SHOWN, "--dry-run", "--forceall", "drop_test", *STUDY)
+    assert "rule run_drop_test:" in done.stdout + done.stderr
+
+
+def on_a_terminal(project: Path, *arguments: str) -> tuple[int, str]:
+    """Status of a call whose output is a terminal, and all that it wrote to that."""
+    ours, its = pty.openpty()
+    words, environment = call_of(*arguments)
+    environment |= {"TERM": "xterm", "COLUMNS": "100", "LINES": "24"}
+    with subprocess.Popen(words, cwd=project, env=environment, stdout=its, stderr=its) as process:
+        os.close(its)
+        found = b""
+        while True:
+            try:
+                found += os.read(ours, 4096)
+            except OSError:  # Linux: no process has the other end any more
+                break
+    os.close(ours)
+    return process.returncode, found.decode()
+
+
+def test_a_terminal_has_live_lines_and_nothing_is_left_of_them(project: Path, piped: str) -> None:
+    forced = ("--forcerun", "run_filling", "render_filling")
+    shutil.rmtree(project / "results/tiny/filling")
+    status, said = on_a_terminal(project, *SHOWN, "filling", *STUDY, *forced)
+    assert status == 0, said
+    assert "\x1b[?25l" in said and said.rindex("\x1b[?25h") > said.rindex("\x1b[?25l")
+    live = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", said).replace("\r", "\n")
+    assert re.search(r"runs \d+ %.*; \d+ of \d+ jobs done", live)
+    assert re.search(r"^filling 140-particles-\w+: complete", live, re.MULTILINE)
+    assert [words for words in CHATTER if words in live] == []
+
+
+def test_a_failed_run_is_told_in_full_and_has_a_status(
+    project: Path, piped: str, inside: None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = project / "studies/tiny/study.yaml"
+    data: dict[str, Any] = yaml.safe_load(file.read_text())
+    data["sweep"] = {"motion.immersion_depth_m": [0.005, 0.006]}
+    file.write_text(yaml.safe_dump(data))
+    (file.parent / "templates/process.in.j2").write_text(REJECTED)
+    done = snakemake(project, *SHOWN, "all", *STUDY)
+    assert done.returncode != 0
+    assert "Error in rule run_process:" in done.stderr
+    assert "check:  no engine error: ERROR: on purpose (limit: none)" in done.stderr
+    assert "report: results/tiny/report/report.html" in done.stderr
+    assert main(["status", "tiny"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("process quick_immersion_depth_m-0.005-")
+    assert "  check:  no engine error: ERROR: on purpose (limit: none)" in said
+    assert "runs: 1 failed, 3 complete" in said

@@ -1,0 +1,27 @@
+// Colours of the scene: one map for force, speed, displacement and load; one colour per class.
+
+export const INK = "#1d2733",
+  SOFT = "#aab4be",
+  PALE = "#dfe3e8",
+  MEDIA = "#b9c2cc",
+  STEEL = "#8d98a5";
+export const PATH_COLOUR = "#1fa2e8",
+  CHAIN_COLOUR = "#009e73",
+  CHOSEN = "#d55e00";
+export const CLASS_COLOURS = ["#56657a", "#d55e00", "#0072b2"]; // told apart with any colour vision
+
+export const rgb = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
+
+/** A map of numbers from 0 to 1 onto colours, from colours at equal distances. */
+export function colourMap(hexes) {
+  const table = hexes.map(rgb),
+    last = table.length - 1;
+  return (value) => {
+    const at = Math.min(Math.max(value, 0), 1) * last,
+      k = Math.min(Math.floor(at), last - 1),
+      part = at - k;
+    return table[k].map((channel, c) => channel + part * (table[k + 1][c] - channel));
+  };
+}
+
+export const blend = (one, other, part) => one.map((channel, c) => channel + part * (other[c] - channel));

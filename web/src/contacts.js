@@ -1,0 +1,84 @@
+// The contacts: one cylinder each, whose radius and colour show the normal force.
+import { Bodies } from "./bodies.js";
+import { CHAIN_COLOUR, CLASS_COLOURS, PALE, PATH_COLOUR, STEEL, blend, rgb } from "./colours.js";
+import { DOMINANT, QUASI_LINEAR } from "./frames.js";
+import { bodyMaterial } from "./shading.js";
+
+// Radii in mean particle radii: at the top of the scale of forces, least ones, and the width of a halo.
+const LARGEST = 0.6,
+  LEAST_MARKED = 0.1,
+  LEAST = 0.018,
+  HALO = 0.14;
+
+export class Contacts {
+  constructor(frames) {
+    this.frames = frames;
+    [this.cylinders, this.halos] = [0, 1].map(() => new Bodies(frames.most.contacts, bodyMaterial()));
+    this.meshes = [this.cylinders.mesh, this.halos.mesh];
+    this.rows = [];
+    this.counts = [0, 0, 0]; // shown, by class
+  }
+
+  /** Show the contacts of a frame that pass threshold and classes; see `media.js`. */
+  update(frame, look, colourOf) {
+    const { from, to } = this.frames.ends(frame),
+      { force } = this.frames.head.scales,
+      mean = this.frames.head.media.radius;
+    const kinds = this.frames.classes(frame),
+      tints = CLASS_COLOURS.map(rgb),
+      pale = rgb(PALE),
+      steel = rgb(STEEL),
+      marks = [PATH_COLOUR, CHAIN_COLOUR].map(rgb);
+    this.rows = [];
+    this.counts = [0, 0, 0];
+    this.cylinders.clear();
+    this.halos.clear();
+    for (let k = 0; k < frame.a.length; k++) {
+      const kind = kinds[k],
+        value = frame.normal[k],
+        flags = frame.flags[k];
+      const onPath = look.path && (flags & DOMINANT) > 0,
+        inChain = look.chains && (flags & QUASI_LINEAR) > 0;
+      const passes = look.classes[kind] && value > look.threshold;
+      if (passes) this.counts[kind]++;
+      const marked = onPath || (inChain && passes);
+      if (!passes && !marked) continue;
+      let tint = look.colour === "force" ? colourOf(value / force) : look.colour === "class" ? tints[kind] : steel;
+      if (look.fade && !marked) tint = blend(tint, pale, 0.8);
+      const radius = mean * Math.min(Math.max((LARGEST * value) / force, marked ? LEAST_MARKED : LEAST), LARGEST);
+      const start = from.subarray(3 * k, 3 * k + 3),
+        end = to.subarray(3 * k, 3 * k + 3);
+      this.rows.push(k);
+      this.cylinders.add(start, end, radius, 0, tint);
+      if (marked) this.halos.add(start, end, radius, HALO * mean, marks[onPath ? 0 : 1]);
+    }
+    this.cylinders.show();
+    this.halos.show();
+  }
+
+  /** The nearest contact that a ray meets, or that it passes within `near` mm: row and distance. */
+  hit(origin, direction, near) {
+    let nearest = null;
+    this.rows.forEach((row, at) => {
+      const [start, end, radius] = this.cylinders.at(at),
+        [apart, distance] = rayToLine(origin, direction, start, end);
+      if (apart <= Math.max(radius, near) && !(nearest?.distance < distance)) nearest = { row, distance };
+    });
+    return nearest;
+  }
+}
+
+/** Smallest distance of a ray from the line between two points, and how far along the ray that is. */
+function rayToLine(origin, direction, from, to) {
+  const line = [0, 1, 2].map((axis) => to[axis] - from[axis]);
+  const away = [0, 1, 2].map((axis) => from[axis] - origin[axis]);
+  const dot = (one, other) => one[0] * other[0] + one[1] * other[1] + one[2] * other[2];
+  const square = dot(line, line),
+    mixed = dot(line, direction),
+    rest = square - mixed * mixed;
+  const free = rest > 1e-9 ? (mixed * dot(direction, away) - dot(line, away)) / rest : 0;
+  const part = Math.min(Math.max(free, 0), 1);
+  const point = away.map((value, axis) => value + part * line[axis]),
+    along = dot(point, direction);
+  return [Math.sqrt(Math.max(dot(point, point) - along * along, 0)), along];
+}

@@ -1,0 +1,57 @@
+// What colours and lengths mean.
+import { CLASS_COLOURS } from "./colours.js";
+import { CLASSES } from "./frames.js";
+import { digits } from "./numbers.js";
+
+const SCALES = {
+  force: ["Normal force of a contact (N)", 1],
+  speed: ["Speed of a particle (mm/s)", 1],
+  displacement: ["Displacement of a particle (mm)", 1],
+};
+
+/** Fill the legend with the scale of the scene and that of the load on the workpiece. */
+export function showLegend(element, { colours, scales }, look, load) {
+  const key = `${look.colour} ${load?.name}`;
+  if (element.dataset.key === key) return;
+  element.dataset.key = key;
+  const parts = [look.colour === "class" ? classes() : scale(SCALES[look.colour][0], scales[look.colour], colours)];
+  if (load) parts.push(scale(`Workpiece: ${load.label} (${load.unit})`, load.top, colours));
+  element.replaceChildren(...parts);
+}
+
+function scale(title, top, colours) {
+  const bar = block("bar"),
+    ends = block("ends"),
+    part = block("", title);
+  bar.style.background = `linear-gradient(to right, ${colours.join(", ")})`;
+  ends.append(
+    ...["0", digits(top / 2, 3), `≥ ${digits(top, 3)}`].map((text) =>
+      Object.assign(document.createElement("span"), { textContent: text }),
+    ),
+  );
+  part.append(bar, ends);
+  return part;
+}
+
+function classes() {
+  const part = block("", "Class of a contact");
+  CLASSES.forEach((name, kind) => {
+    const row = block("", name.replace("-", "–")),
+      swatch = document.createElement("i");
+    swatch.style.background = CLASS_COLOURS[kind];
+    row.prepend(swatch);
+    part.append(row);
+  });
+  return part;
+}
+
+const block = (name, text = "") => Object.assign(document.createElement("div"), { className: name, textContent: text });
+
+/** Draw a bar of a round length in mm. */
+export function showScale(bar, label, millimetresPerPixel) {
+  const rough = 110 * millimetresPerPixel,
+    power = 10 ** Math.floor(Math.log10(rough));
+  const length = [5, 2, 1].map((factor) => factor * power).find((one) => one <= rough) ?? power;
+  bar.style.width = `${length / millimetresPerPixel}px`;
+  label.textContent = `${Number(length.toPrecision(1))} mm`;
+}

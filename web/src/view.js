@@ -1,0 +1,200 @@
+// The picture: renderer, camera in parallel projection, its presets, rays and the scale bar.
+import {
+  ColorManagement,
+  LinearSRGBColorSpace,
+  OrthographicCamera,
+  Raycaster,
+  Scene,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+
+ColorManagement.enabled = false; // colours are shown as they are given
+
+export const PRESETS = ["overview", "above", "along", "side", "follow"];
+const FINE = 2; // pixels of the picture per pixel of the page at rest: smooth edges
+const LEAST_RATIO = 0.6;
+const REST_MS = 180,
+  SLOW_MS = 32;
+const UP = new Vector3(0, 0, 1);
+
+export class View {
+  /** `area()`: centre, radius, reach to the sides and height, mm, of what is to be seen; `pose()`: that of the workpiece. */
+  constructor(canvas, { area, pose }) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: false, powerPreference: "high-performance" });
+    this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    this.renderer.setClearColor(0xffffff);
+    this.scene = new Scene();
+    this.camera = new OrthographicCamera();
+    this.camera.up.copy(UP);
+    this.area = area;
+    this.pose = pose;
+    this.controls = new OrbitControls(this.camera, canvas);
+    Object.assign(this.controls, { enableDamping: false, zoomToCursor: true, minZoom: 0.3, maxZoom: 40 });
+    this.controls.addEventListener("change", () => this.wanted());
+    this.controls.addEventListener("start", () => (this.framed = null));
+    this.drawn = 0; // pictures so far
+    this.pace = { ratio: devicePixelRatio, last: 0, slow: 0 };
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
+    this.resize();
+    this.preset("overview");
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.renderer.domElement.parentElement;
+    if (!width || !height) return;
+    const { radius } = this.area(),
+      half = radius * Math.max(1, height / width);
+    Object.assign(this.camera, {
+      left: (-half * width) / height,
+      right: (half * width) / height,
+      top: half,
+      bottom: -half,
+      near: 0.1 * radius,
+      far: 20 * radius,
+    });
+    this.camera.updateProjectionMatrix();
+    this.renderer.setSize(width, height, false);
+    if (this.framed) this.preset(this.framed);
+    else this.wanted();
+  }
+
+  /** Draw before the screen is next refreshed, and finer once nothing has changed for a while. */
+  wanted() {
+    this.request ??= requestAnimationFrame((now) => this.draw(this.paced(now)));
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => this.draw(Math.max(FINE, devicePixelRatio)), REST_MS);
+  }
+
+  /** Pixels of the picture per pixel of the page while it moves: fewer if pictures come too slowly. */
+  paced(now) {
+    const { pace } = this,
+      took = now - pace.last;
+    pace.last = now;
+    if (took < REST_MS) pace.slow = 0.8 * pace.slow + 0.2 * took;
+    if (pace.slow > SLOW_MS && pace.ratio > LEAST_RATIO)
+      Object.assign(pace, { ratio: Math.max(0.85 * pace.ratio, LEAST_RATIO), slow: 0 });
+    return pace.ratio;
+  }
+
+  draw(ratio = this.pace.ratio) {
+    cancelAnimationFrame(this.request);
+    this.request = undefined;
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+    this.renderer.render(this.scene, this.camera);
+    this.drawn++;
+    this.after?.();
+  }
+
+  preset(name) {
+    const { heading } = this.pose(),
+      { centre, radius } = this.area(),
+      ahead = new Vector3(Math.cos(heading), Math.sin(heading), 0);
+    const right = new Vector3().crossVectors(ahead, UP);
+    const from = {
+      overview: () =>
+        ahead
+          .clone()
+          .multiplyScalar(0.55)
+          .addScaledVector(right, 0.75)
+          .add(new Vector3(0, 0, 0.4)),
+      above: () => new Vector3(0, -1e-4, 1),
+      along: () => ahead.clone().negate(),
+      side: () => right,
+      follow: () =>
+        ahead
+          .clone()
+          .multiplyScalar(-0.75)
+          .addScaledVector(right, 0.5)
+          .add(new Vector3(0, 0, 0.45)),
+    }[name]();
+    this.follows = name === "follow" ? heading : null;
+    this.framed = name; // until the user moves the camera: a window of another size is filled again
+    this.look(
+      this.follows === null ? centre : this.nearWorkpiece(),
+      from,
+      name === "follow" ? 1.4 * this.zoomOf(from) : this.zoomOf(from),
+      radius,
+    );
+  }
+
+  /** The magnification at which the area just fits, seen from a direction. */
+  zoomOf(from) {
+    const { reach, height } = this.area(),
+      { top, right } = this.camera,
+      rise = Math.abs(from.z) / from.length();
+    const half = 0.5 * height * Math.sqrt(1 - rise * rise) + reach * rise;
+    return 0.94 * Math.min(top / half, right / reach);
+  }
+
+  /** Look at a point from a direction, with a magnification. */
+  look(target, from, zoom, radius = this.area().radius) {
+    this.controls.target.copy(target);
+    this.camera.position.copy(target).addScaledVector(from.normalize(), 8 * radius);
+    this.camera.zoom = zoom;
+    this.camera.updateProjectionMatrix();
+    this.controls.update();
+    this.camera.updateMatrixWorld();
+    this.wanted();
+  }
+
+  nearWorkpiece() {
+    const { x, y } = this.pose();
+    return new Vector3(x, y, this.area().centre.z);
+  }
+
+  /** Go along with the workpiece and turn with its heading, if that is wanted. */
+  follow() {
+    if (this.follows === null) return;
+    const { heading } = this.pose(),
+      offset = this.camera.position
+        .clone()
+        .sub(this.controls.target)
+        .applyAxisAngle(UP, heading - this.follows);
+    this.follows = heading;
+    this.look(this.nearWorkpiece(), offset, this.camera.zoom);
+  }
+
+  turn(sideways, upwards) {
+    this.framed = null;
+    const offset = this.camera.position.clone().sub(this.controls.target).applyAxisAngle(UP, sideways);
+    const tilt = Math.min(Math.max(offset.angleTo(UP) + upwards, 1e-4), Math.PI - 1e-4),
+      radius = Math.hypot(offset.x, offset.y),
+      length = offset.length();
+    const across = radius > 1e-6 ? new Vector3(offset.x / radius, offset.y / radius, 0) : new Vector3(0, -1, 0);
+    this.look(
+      this.controls.target.clone(),
+      across.multiplyScalar(Math.sin(tilt)).add(new Vector3(0, 0, Math.cos(tilt))),
+      this.camera.zoom,
+      length / 8,
+    );
+  }
+
+  magnify(factor) {
+    this.framed = null;
+    this.camera.zoom = Math.min(Math.max(this.camera.zoom * factor, this.controls.minZoom), this.controls.maxZoom);
+    this.camera.updateProjectionMatrix();
+    this.wanted();
+  }
+
+  /** Start and direction of the ray under a point of the canvas, in pixels from its corner. */
+  ray(x, y) {
+    const { clientWidth, clientHeight } = this.renderer.domElement,
+      caster = new Raycaster();
+    caster.setFromCamera(new Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.camera);
+    return { origin: caster.ray.origin.toArray(), direction: caster.ray.direction.toArray() };
+  }
+
+  /** Where a point of the scene is on the canvas, in pixels. */
+  onCanvas(point) {
+    const { clientWidth, clientHeight } = this.renderer.domElement,
+      seen = new Vector3(...point).project(this.camera);
+    return [((1 + seen.x) / 2) * clientWidth, ((1 - seen.y) / 2) * clientHeight];
+  }
+
+  get millimetresPerPixel() {
+    return (this.camera.top - this.camera.bottom) / this.camera.zoom / this.renderer.domElement.clientHeight;
+  }
+}

@@ -1,0 +1,199 @@
+"""The runs of a study: what each is expected to take, how far it is, and how long all will take."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from dragdeck.cases.case import Case
+from dragdeck.decks.deck import StudyScene
+from dragdeck.engine.reports import shown_bytes, shown_time
+from dragdeck.engine.space import expected_bytes
+from dragdeck.engine.status import RunStatus, run_status
+from dragdeck.errors import InputError
+from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds
+from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.scene import SceneType
+
+WAITING = RunStatus("waiting")
+
+
+@dataclass(frozen=True)
+class StudyRun:
+    """A run of LIGGGHTS: what it is expected to take, and how far it is.
+
+    Attributes
+    ----------
+    scene : str
+    folder : Path
+    after : Path or None
+        Folder of the filling that it starts from.
+    ranks : int
+    cost : Cost
+        Expected for the whole run.
+    size_bytes : float
+        Expected on the disk.
+    status : RunStatus
+    """
+
+    scene: str
+    folder: Path
+    after: Path | None
+    ranks: int
+    cost: Cost
+    size_bytes: float
+    status: RunStatus = WAITING
+
+    @property
+    def name(self) -> str:
+        """Scene and run id."""
+        return f"{self.scene} {self.folder.name}"
+
+    def now(self) -> "StudyRun":
+        """The same with the status that its folder has now."""
+        return replace(self, status=run_status(self.folder))
+
+    @property
+    def fraction(self) -> float:
+        """How much of it is done, by its steps; of a filling by the expected ones."""
+        if self.status.state == "complete":
+            return 1.0
+        end = self.status.last or self.cost.steps
+        return min(self.status.step / end, 0.99) if end else 0.0
+
+    @property
+    def left_s(self) -> float:
+        """Wall time that it still needs: by its own speed where that is known. An estimate."""
+        if self.status.final:
+            return 0.0
+        speed = self.status.steps_per_s
+        if speed is None:
+            return (1 - self.fraction) * self.cost.wall_time_s
+        return max(0.0, ((self.status.last or self.cost.steps) - self.status.step) / speed)
+
+    @property
+    def basis(self) -> str:
+        """Whether the speed behind `left_s` is ``measured`` or ``assumed``."""
+        return "measured" if self.status.steps_per_s else self.cost.basis
+
+    @property
+    def cells(self) -> tuple[str, str, str]:
+        """Percent, speed with what a filling waits for, and time, for a reader."""
+        status, left = self.status, f"about {shown_time(self.left_s)} left"
+        doing = f"{status.steps_per_s:,.0f} steps/s" if status.steps_per_s else ""
+        if status.final:
+            return "", doing, shown_time(status.wall_time_s) if status.wall_time_s else ""
+        if not status.step:
+            return "", "", f"about {shown_time(self.left_s)} (speed {self.cost.basis})"
+        if status.energy is not None and status.at_rest is not None:
+            sign = ">" if status.energy > status.at_rest else "<"
+            doing = f"{doing}, energy {status.energy:.1e} {sign} {status.at_rest:g}"
+        if status.last is None and status.step >= self.cost.steps:
+            left = "longer than expected"
+        about = "" if status.last else "~"  # where a filling ends is an estimate
+        return f"{about}{100 * self.fraction:.0f} %", doing.strip(", "), left
+
+    def __str__(self) -> str:
+        return f"{self.name}: {', '.join(filter(None, (self.status.state, *self.cells)))}"
+
+
+def alike(runs: Mapping[Path, Case]) -> list[dict[Path, Case]]:
+    """Runs by their folders, those that differ in the seed alone together: they cost the same."""
+    found: dict[str, dict[Path, Case]] = {}
+    for folder, case in runs.items():
+        but_for_the_seed = case.study.model_copy(update={"seed": 0})
+        found.setdefault(but_for_the_seed.model_dump_json(), {})[folder] = case
+    return list(found.values())
+
+
+def expected_runs(
+    kind: SceneType,
+    runs: Mapping[Path, Case],
+    build: Callable[[Mapping[Path, Case]], StudyScene] | None = None,
+) -> Iterator[StudyRun]:
+    """What runs of a scene are expected to take; those whose scene cannot be built are left out.
+
+    Parameters
+    ----------
+    kind : SceneType
+    runs : mapping of Path to Case
+        By their folders.
+    build : callable, optional
+        The scene of runs that differ in the seed alone, if not that of `kind`.
+    """
+    speeds = measured_speeds(next(iter(runs)).parent) if runs else []
+    for group in alike(runs):
+        first = next(iter(group.values()))
+        try:
+            scene = build(group) if build else kind.build(first, None)
+        except InputError:
+            continue
+        count = 1 if kind.single_particle else scene.case.media.count
+        outputs = {output.name: output.as_part() for output in scene.deck.outputs}
+        size, cost = expected_bytes(outputs, count), expected_cost(kind, scene, speeds)
+        ranks = 1 if kind.single_particle else first.ranks
+        for folder, case in group.items():
+            filling = folder.parents[1] / FILLING.name / FILLING.run_id(case)
+            after = filling if kind.needs_bed else None
+            yield StudyRun(kind.name, folder, after, ranks, cost, size)
+
+
+def by_their_speeds(runs: Sequence[StudyRun]) -> list[StudyRun]:
+    """Runs, those of an assumed speed corrected by the speeds of others of the same scene."""
+    seen: dict[str, list[float]] = {}
+    for run in runs:
+        if speed := run.status.steps_per_s:
+            seen.setdefault(run.scene, []).append(run.cost.steps / speed / run.cost.wall_time_s)
+    return [_corrected(run, seen.get(run.scene, [])) for run in runs]
+
+
+def _corrected(run: StudyRun, slower: Sequence[float]) -> StudyRun:
+    if not slower or run.cost.basis == "measured":
+        return run
+    time = run.cost.wall_time_s * sum(slower) / len(slower)
+    return replace(run, cost=Cost(run.cost.steps, time, f"{len(slower)} run(s) of this study here"))
+
+
+def time_left(runs: Sequence[StudyRun], cores: int) -> float:
+    """Wall time that runs still need beside each other on so many cores. An estimate.
+
+    No less than their work shared by all cores, and than any run with the filling before it.
+    """
+    left = {run.folder: run.left_s for run in runs}
+    work = sum(run.left_s * min(run.ranks, cores) for run in runs) / cores
+    chains = (run.left_s + left.get(run.after, 0.0) if run.after else run.left_s for run in runs)
+    return max(work, *chains, 0.0)
+
+
+def done_fraction(runs: Sequence[StudyRun]) -> float:
+    """How much of the expected processor time of runs is behind them."""
+    work = [run.cost.wall_time_s * run.ranks for run in runs]
+    done = sum(run.fraction * one for run, one in zip(runs, work, strict=True))
+    return done / sum(work) if sum(work) else 1.0
+
+
+def cost_in_words(runs: Sequence[StudyRun], cores: int) -> str:
+    """Time and space that runs still need, in one line."""
+    waiting = [run for run in runs if not run.status.final]
+    bases = {run.basis for run in waiting}
+    basis = "partly assumed" if bases == {"assumed", "measured"} else "".join(bases)
+    said = f"about {shown_time(time_left(runs, cores))} on {cores} core{'s' if cores > 1 else ''}"
+    size = shown_bytes(sum(run.size_bytes for run in waiting))
+    return f"{said}, {size} (estimates; speed {basis})"
+
+
+def plan_in_words(runs: Sequence[StudyRun], cores: int) -> list[str]:
+    """What will be run, as lines for a reader."""
+    todo = [run for run in runs if not run.status.final]
+    lines = [f"{_counted(todo)}, {cost_in_words(todo, cores)}"] if todo else []
+    for scene in dict.fromkeys(run.scene for run in todo):
+        mine = [run for run in todo if run.scene == scene]
+        size = shown_bytes(sum(run.size_bytes for run in mine))
+        time = shown_time(time_left(mine, cores))
+        lines.append(f"  {scene}: {_counted(mine)}, about {time}, {size}")
+    if ended := len(runs) - len(todo):
+        lines.append(f"{ended} ended before: repeated only if the input script has changed")
+    return lines
+
+
+def _counted(runs: Sequence[StudyRun]) -> str:
+    return f"{len(runs)} run{'s' if len(runs) != 1 else ''}"

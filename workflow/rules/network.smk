@@ -1,0 +1,27 @@
+# The interactive page on the contact network of each process run.
+
+
+rule write_network_page:
+    input:
+        tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
+        of_run("process", "tables/facets.parquet"),
+        [of_run("process", f"figures/{name}.png") for name in ("network_xz", "forces")],
+        network_page_files(),
+        run=of_run("process", "run.json"),
+    output:
+        report(
+            of_run("process", "network.html"),
+            caption="../report/network.rst",
+            category="Process",
+            labels={"run": "{run}", "figure": "network"},
+        ),
+    log:
+        of_run("process", "logs/network.log"),
+    benchmark:
+        of_run("process", "benchmarks/network.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        source=source_hash("dragchain.network_page.page"),
+    shell:
+        "dragchain network $(dirname {output}) > {log} 2>&1"
