@@ -1,11 +1,14 @@
 """The whole workflow on the real engine: a small study from its file to its report."""
 
+import json
 import re
 import shutil
 import subprocess
 import sys
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import pandas as pd
@@ -43,6 +46,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(ROOT / "templates", folder / "templates")
     data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
     data["sweep"] = {"motion.immersion_depth_m": [0.012, 0.016]}
+    data["licence"] = "CC-BY-4.0 $(touch run-by-shell)"
     (folder / "studies/small/templates").mkdir(parents=True)
     (folder / "studies/small/templates/process.in.j2").write_text(TOTAL_FORCES)
     (folder / "studies/small/study.yaml").write_text(yaml.safe_dump(data))
@@ -213,9 +217,35 @@ def test_frames_are_exported_when_asked_for(finished: Path) -> None:
     for run in (finished / "results/small/process").iterdir():
         times = set(pd.read_parquet(run / "tables/particles.parquet", columns=["time_s"])["time_s"])
         assert pv.PVDReader(run / "export/paraview/run.pvd").time_values == sorted(times)
+        assert json.loads((run / "export/paraview/view.json").read_text())["chains"]
+        assert (run / "export/paraview/view.py").is_file()
     assert jobs(finished, *export) == set()
     again = snakemake(finished, *export, "--forcerun", "export_paraview")
     assert again.returncode == 0, again.stderr
+
+
+def test_the_study_becomes_a_crate(finished: Path) -> None:
+    pytest.importorskip("rocrate")
+    odd = finished / "studies/small/a 'file' {of} $(touch run-by-shell).csv"
+    odd.write_text("x\n1\n")
+    crate = ("crate", "--config", "study=small")
+    assert jobs(finished, *crate) == {"crate", "write_crate"}
+    done = snakemake(finished, *crate)
+    assert done.returncode == 0, done.stderr
+    folder = finished / "results/small/crate"
+    graph = json.loads((folder / "ro-crate-metadata.json").read_text())["@graph"]
+    named = {unquote(entity["@id"]): entity for entity in graph}
+    wanted = ["studies/small/study.yaml", "templates/process.in.j2", "templates/filling.in.j2"]
+    wanted += ["studies/small/templates/process.in.j2", str(odd.relative_to(finished))]
+    wanted += [f"results/small/report/summary.{end}" for end in ("csv", "parquet", "xlsx")]
+    for name in wanted:
+        assert named[name]["sha256"] == sha256((folder / name).read_bytes()).hexdigest()
+    assert named["./"]["license"] == "CC-BY-4.0 $(touch run-by-shell)"
+    assert not list(finished.rglob("run-by-shell"))
+    for file in (file for file in folder.rglob("*") if file.is_file()):
+        assert str(finished).encode() not in file.read_bytes()
+    assert jobs(finished, *crate) == set()
+    odd.unlink()
 
 
 def test_an_edited_template_runs_what_depends_on_it(finished: Path) -> None:

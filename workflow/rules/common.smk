@@ -377,3 +377,19 @@ def scaling_options(wildcards):
     if scaling.fit_range is not None:
         options += ["--fit-range", *scaling.fit_range]
     return " ".join(quote(str(option)) for option in options)
+
+
+# --- crate ------------------------------------------------------------------------
+
+
+def crate_inputs():
+    """Study files, templates and meshes of all scenes."""
+    files = explained(study_files, CASES)
+    templates = (file for scene in SCENES for file in templates_of(scene))
+    return list(dict.fromkeys([*(str(relative(file)) for file in files), *templates]))
+
+
+def licence_option(wildcards=None):
+    """How to name the licence of the results on the command line, if the study states one."""
+    licence = CASES[0].study.licence
+    return quote(f"--licence={licence}") if licence else ""
