@@ -101,7 +101,7 @@ def test_picture_and_page_are_written_and_show_the_workpiece(
 
 
 def test_the_numbers_are_those_of_check(case: Case, capsys: pytest.CaptureFixture[str]) -> None:
-    main(["check", "small"])
+    main(["check", "small", "--verbose"])
     checked = capsys.readouterr().out
     main(["preview", "small"])
     shown = capsys.readouterr().out

@@ -331,7 +331,9 @@ class Page {
     const target = new Vector3(...centre).applyMatrix4(group.matrixWorld),
       from = new Vector3(...normals.subarray(9 * facet, 9 * facet + 3)).transformDirection(group.matrixWorld);
     Object.assign(this.view, { follows: null, framed: null });
-    this.view.look(target, from.add(new Vector3(0, 0, 0.15)), this.view.camera.zoom);
+    from.add(new Vector3(0, 0, 0.15));
+    this.view.look(target, from, 2 * this.view.zoomOf(from));
+    for (const button of byId("presets").children) button.setAttribute("aria-pressed", false);
     this.choose({ facet });
   }
 

@@ -93,7 +93,7 @@ wildcard_constraints:
 
 # A run of LIGGGHTS, and a further workpiece of one: its number follows the run's name.
 ENGINE_RUN = "[A-Za-z0-9._-]+-[0-9a-f]{8}"
-FURTHER_WORKPIECE = ENGINE_RUN + "[.][0-9]+"
+FURTHER_WORKPIECE = f"{ENGINE_RUN}[.][0-9]+"
 
 
 # --- paths ---------------------------------------------------------------------------

@@ -40,10 +40,9 @@ STYLE: dict[RcKeyType, Any] = {
     "figure.titlesize": 9.5,
     "legend.frameon": False,
     "legend.fontsize": 8,
-    "image.cmap": "magma_r",
 }
-"""Its colour map, from light to dark and told apart with any kind of colour vision, is that of
-forces and loads."""
+FORCE_COLOURS = "magma_r"
+"""From light to dark, told apart with any kind of colour vision."""
 
 PAPER_COLOURS = LinearSegmentedColormap.from_list("paper", ["#1a9850", "#d9c514", "#c8102e"])
 """Green over yellow to red, as in Uhlmann et al. (2015)."""
@@ -54,8 +53,9 @@ _DPI = 150
 
 
 def force_map() -> Colormap:
-    """The colour map of forces and loads."""
-    return matplotlib.colormaps[matplotlib.rcParams["image.cmap"]]
+    """The colour map of forces and loads: the paper's where matplotlib's default is set to it."""
+    paper = matplotlib.rcParams["image.cmap"] == PAPER_COLOURS.name
+    return PAPER_COLOURS if paper else matplotlib.colormaps[FORCE_COLOURS]
 
 
 def drawing() -> AbstractContextManager[None]:

@@ -228,6 +228,9 @@ def test_a_bed_that_does_not_come_to_rest_is_rejected_and_not_resumed(filling: P
     with pytest.raises(RejectedRunError, match="bed at rest: NOT SETTLED: energy ratio"):
         run(filling, silent)
     assert state(filling).state == "failed" and len(state(filling).parts) == 1
+    remedies = {check.code: check.remedy for check in state(filling).checks if not check.passed}
+    assert "filling.max_time_s" in (remedies["at_rest"] or "")
+    assert all(check.remedy is None for check in state(filling).checks if check.passed)
 
 
 def test_a_truncated_output_fails_its_check(filling: Path) -> None:
