@@ -4,81 +4,52 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pandas as pd
 
 from dragchain.run.case import Assumption
+from dragchain.tables.meanings import descriptions, unit_end
 
 if TYPE_CHECKING:
     from xlsxwriter.worksheet import Worksheet
-
-Definition = tuple[str, str]
-"""Unit, empty if there is none, and meaning of a column."""
-
-_UNITS = {
-    "_kg_m3": "kg/m3", "_n_per_m": "N/m", "_j_per_m": "J/m", "_per_s": "1/s", "_m_s2": "m/s2",
-    "_m_s": "m/s", "_rad_s": "rad/s", "_n_m": "N m", "_n_s": "N s", "_percent": "%",
-    "_rad": "rad", "_deg": "degrees", "_rpm": "rpm", "_hz": "Hz", "_pa": "Pa", "_mm": "mm",
-    "_m": "m", "_s": "s", "_n": "N", "_j": "J",
-}  # fmt: skip
-"""Units by the end of a column's name; the first that fits counts."""
 
 _WORDS = {
     "ci95 low": "95 % CI lower end", "ci95 high": "95 % CI upper end", "youngs": "Young's",
     "std": "standard deviation", "timestep": "time step", "poissons": "Poisson's",
 }  # fmt: skip
 
-COLUMNS = Path(__file__).with_name("summary_columns.csv")
-"""Meanings by the start of a column's name; the first that fits counts."""
 
-
-def unit_of(column: str) -> str:
-    """The unit of a column by the end of its name, empty if it has none."""
-    return next((unit for end, unit in _UNITS.items() if column.endswith(end)), "")
-
-
-def definitions(
-    columns: Iterable[str], known: Mapping[str, Definition] | None = None
-) -> pd.DataFrame:
-    """What the columns of a table mean.
+def definitions(columns: Iterable[str]) -> pd.DataFrame:
+    """What the columns of the summary mean.
 
     Parameters
     ----------
     columns : iterable of str
         Names of N columns.
-    known : mapping of str to (unit, meaning), optional
-        What is known of columns; unit and meaning of the others follow from their names.
 
     Returns
     -------
     DataFrame
         N rows ``heading``, ``column``, ``unit``, ``meaning``. The heading ends with the unit.
     """
-    meanings = list(pd.read_csv(COLUMNS).itertuples(index=False, name=None))
     rows = []
     for column in columns:
-        found = (text for start, text in meanings if column.startswith(start))
-        unit, meaning = (known or {}).get(column) or (unit_of(column), next(found, ""))
-        rows.append((_heading(column, unit), column, unit, meaning))
+        meaning = descriptions(column).get("summary", "")
+        rows.append((_heading(column), column, unit_end(column)[1], meaning))
     return pd.DataFrame(rows, columns=["heading", "column", "unit", "meaning"], dtype=object)
 
 
-def _heading(column: str, unit: str) -> str:
+def _heading(column: str) -> str:
     """A column's name in words, with its unit in brackets."""
-    end = next((end for end in _UNITS if column.endswith(end)), "") if unit else ""
+    end, unit = unit_end(column)
     text = column.removesuffix(end).replace("_", " ")
     for word, shown in _WORDS.items():
         text = f" {text} ".replace(f" {word} ", f" {shown} ").strip()
     return f"{text[:1].upper()}{text[1:]}" + (f" ({unit})" if unit else "")
 
 
-def summary_workbook(
-    table: pd.DataFrame,
-    assumptions: Mapping[str, Sequence[Assumption]],
-    known: Mapping[str, Definition] | None = None,
-) -> bytes:
+def summary_workbook(table: pd.DataFrame, assumptions: Mapping[str, Sequence[Assumption]]) -> bytes:
     """The summary as an XLSX file with the sheets Summary, Definitions and Assumptions.
 
     Parameters
@@ -87,10 +58,8 @@ def summary_workbook(
         The summary, one row per case.
     assumptions : mapping of str to sequence of Assumption
         The assumptions of each run, by its name.
-    known : mapping of str to (unit, meaning), optional
-        See `definitions`.
     """
-    about = definitions(table.columns, known)
+    about = definitions(table.columns)
     assumed = [
         {"run": run, "field": one.field, "value": json.dumps(one.value), "reason": one.why}
         for run, found in assumptions.items()

@@ -14,8 +14,8 @@ import pyarrow as pa
 _UNITS: Mapping[str, str] = {
     "n_per_m": "N/m", "j_per_m": "J/m", "per_s": "1/s", "kg_m3": "kg/m3", "m_s2": "m/s2",
     "m_s": "m/s", "rad_s": "rad/s", "n_m": "N m", "n_s": "N s", "m2": "m2", "n": "N", "m": "m",
-    "s": "s", "j": "J", "pa": "Pa", "rad": "rad", "deg": "degree", "hz": "Hz", "rpm": "1/min",
-    "percent": "%",
+    "s": "s", "j": "J", "pa": "Pa", "rad": "rad", "mm": "mm", "deg": "deg", "hz": "Hz",
+    "rpm": "1/min", "percent": "%",
 }  # fmt: skip
 """Units by the ends of names, longer ends before those that they end with."""
 
@@ -42,14 +42,17 @@ def descriptions(column: str) -> dict[str, str]:
     return found
 
 
+def unit_end(column: str) -> tuple[str, str]:
+    """The end of a column's name that is a unit, and this unit; both empty if there is none."""
+    ends = ((f"_{end}", unit) for end, unit in _UNITS.items())
+    return next(((end, unit) for end, unit in ends if column.endswith(end)), ("", ""))
+
+
 def unit_of(field: pa.Field) -> str:
     """The unit of a column: ``1`` for plain numbers, empty for ids, text and flags."""
-    name = field.name.removesuffix("_se")
-    for end, unit in _UNITS.items():
-        if name.endswith(f"_{end}"):
-            return unit
     number = pa.types.is_integer(field.type) or pa.types.is_floating(field.type)
-    return "1" if number and not name.endswith("_id") else ""
+    plain = "1" if number and not field.name.endswith("_id") else ""
+    return unit_end(field.name.removesuffix("_se"))[1] or plain
 
 
 def described(schema: pa.Schema, table: str) -> pa.Schema:

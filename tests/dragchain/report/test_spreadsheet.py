@@ -8,13 +8,7 @@ import openpyxl
 import pandas as pd
 import pytest
 
-from dragchain.report.spreadsheet import (
-    COLUMNS,
-    definitions,
-    summary_workbook,
-    unit_of,
-    workbook,
-)
+from dragchain.report.spreadsheet import definitions, summary_workbook, workbook
 from dragchain.run.case import Assumption
 
 FORMULAE = ["=1+1", "+1", "-1", "@SUM(A1)", "{=1}", "https://example.org", "=cmd|' /C calc'!A0"]
@@ -47,19 +41,6 @@ def test_cells_keep_their_values_and_types() -> None:
     assert isinstance(found[0][2], bool)
 
 
-@pytest.mark.parametrize(
-    ("column", "unit"),
-    [
-        ("drag_ci95_low_n", "N"), ("depth_slope_n_per_m", "N/m"), ("torque_n_m", "N m"),
-        ("input_motion_speed_m_s", "m/s"), ("input_gravity_m_s2", "m/s2"), ("steps_per_s", "1/s"),
-        ("input_media_density_kg_m3", "kg/m3"), ("drag_reliable", ""), ("coordination_number", ""),
-        ("drag_against_experiment_percent", "%"), ("wall_time_s", "s"), ("impulse_n_s", "N s"),
-    ],
-)  # fmt: skip
-def test_the_unit_is_the_end_of_the_name(column: str, unit: str) -> None:
-    assert unit_of(column) == unit
-
-
 def test_headings_are_words_with_units() -> None:
     columns = ["drag_ci95_low_n", "input_materials_steel_youngs_modulus_pa", "peak_count"]
     assert definitions(columns)["heading"].tolist() == [
@@ -67,20 +48,12 @@ def test_headings_are_words_with_units() -> None:
     ]  # fmt: skip
 
 
-def test_what_is_known_of_a_column_counts_before_its_name() -> None:
-    known = {"sliding": ("m/m", "sliding distance per path length"), "drag_mean_n": ("N", "mean")}
-    found = definitions(["drag_mean_n", "sliding", "drag_std_n"], known).set_index("column")
-    assert found.loc["sliding"].tolist() == [
-        "Sliding (m/m)", "m/m", "sliding distance per path length"
-    ]  # fmt: skip
-    assert found.loc["drag_mean_n"].tolist() == ["Drag mean (N)", "N", "mean"]
-    assert found.loc["drag_std_n", "meaning"].startswith("force on the workpiece along")
-
-
-def test_the_first_start_that_fits_is_never_hidden_by_a_shorter_one() -> None:
-    starts = pd.read_csv(COLUMNS)["start"].tolist()
-    for at, start in enumerate(starts):
-        assert not any(start.startswith(earlier) for earlier in starts[:at])
+def test_units_and_meanings_are_those_of_the_columns() -> None:
+    found = definitions(["drag_mean_n", "input_seed", "drag_reliable", "x"]).set_index("column")
+    assert found["unit"].tolist() == ["N", "", "", ""]
+    assert found.loc["drag_mean_n", "meaning"] == "mean of the drag force"
+    assert "study file" in found.loc["input_seed", "meaning"]
+    assert found.loc["x", "meaning"] == ""
 
 
 def test_the_three_sheets_say_what_there_is(tmp_path: Path) -> None:
