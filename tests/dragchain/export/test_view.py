@@ -1,8 +1,10 @@
 """The script for ParaView beside an export: constant, and right about what the export has."""
 
 import importlib.util
+import itertools
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -149,15 +151,22 @@ paraview = [
 ]
 
 
+SCREENS = itertools.count(1000 + 10 * (os.getpid() % 4000))
+"""Numbers of virtual screens: one that was just given up may not be free yet."""
+
+
 def pvpython(script: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
     """Run a script as on a machine without a screen; ParaView has a Python of its own."""
-    display = f"--server-num={200 + os.getpid() % 5000}"
-    words = ["xvfb-run", display, "--auto-servernum", "pvpython", "--force-offscreen-rendering"]
     kept = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
-    return subprocess.run(
-        [*words, str(script), *map(str, arguments)], cwd="/", env=kept, capture_output=True,
-        text=True, timeout=300,
-    )  # fmt: skip
+    for number in itertools.islice(SCREENS, 3):
+        screen = ["xvfb-run", f"--server-num={number}", "--auto-servernum"]
+        words = [*screen, "pvpython", "--force-offscreen-rendering", script, *arguments]
+        done = subprocess.run(
+            list(map(str, words)), cwd="/", env=kept, capture_output=True, text=True, timeout=300
+        )
+        if not re.search("X server|Xvfb", done.stderr):
+            break
+    return done
 
 
 def error_in(done: subprocess.CompletedProcess[str]) -> bool:
