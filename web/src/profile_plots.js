@@ -29,6 +29,15 @@ function round(most) {
 
 const between = (limits, bin, unit) => `${plain(limits[bin])} to ${plain(limits[bin + 1])}${unit}`;
 const total = (values) => values.reduce((sum, value) => sum + value, 0);
+/** The bin at a fraction of the way from the first limit to the last. */
+function binOf(limits, part) {
+  const value = limits[0] + part * (limits.at(-1) - limits[0]);
+  return Math.max(
+    limits.findLastIndex((limit, k) => k < limits.length - 1 && limit <= value),
+    0,
+  );
+}
+
 const highest = (values) => values.reduce((best, value, bin) => (value > values[best] ? bin : best), 0);
 
 /** Axes, and values told for the bin that the mouse or the arrow keys choose. */
@@ -206,7 +215,7 @@ class Bars extends Plot {
   }
 
   binAt(across, down) {
-    return Math.floor((this.lying ? down : across) * this.count);
+    return binOf(this.profile.limits, this.lying ? down : across);
   }
 
   beside(right, down) {
@@ -251,8 +260,7 @@ class Unrolled extends Plot {
   }
 
   binAt(across, down) {
-    const rows = this.count / this.columns;
-    return Math.floor(down * rows) * this.columns + Math.floor(across * this.columns);
+    return binOf(this.map.levels, down) * this.columns + binOf(this.map.sectors, across);
   }
 
   beside(right, down) {
@@ -265,16 +273,15 @@ class Unrolled extends Plot {
 export class ProfilePlots {
   constructor(parts, frames, colourOf) {
     const { azimuth, depth, size, map } = (this.profiles = profilesOf(frames)),
-      { head } = frames,
-      thick = depth.limits[1] - depth.limits[0];
-    const force = (values, scale) => (number) => `: ${digits(scale * total(values[number]))} N in all`;
+      { head } = frames;
+    const force = (number) => `: ${digits(total(azimuth.values[number]))} N in all`;
     this.times = frames.times;
     this.bars = [
       new Bars(parts.azimuth, azimuth, azimuthAxis, {
         label: "Normal force (N)",
         words: {
           title: "Normal force on the workpiece by azimuth from the direction of motion",
-          sum: force(azimuth.values, 1),
+          sum: force,
           bin: (limits, bin) => `Azimuth ${between(limits, bin, "°")}`,
           value: (value) => `${digits(value)} N`,
         },
@@ -284,7 +291,7 @@ export class ProfilePlots {
         label: "Normal force per depth (N/mm)",
         words: {
           title: "Normal force on the workpiece by depth below the surface",
-          sum: force(depth.values, thick),
+          sum: force,
           bin: (limits, bin) => `Depth ${between(limits, bin, " mm")}`,
           value: (value) => `${digits(value)} N/mm`,
         },

@@ -13,8 +13,10 @@ export function profilesOf(frames) {
   const { head } = frames,
     [own] = head.workpieces;
   const contacts = frames.times.map((_, number) => onWorkpiece(frames, number, own, head));
-  const levels = levelsOf(contacts.flatMap(({ depth }) => depth)),
-    thick = levels[1] - levels[0],
+  const levels = levelsOf(
+      contacts.flatMap(({ depth }) => depth),
+      head.frames.step,
+    ),
     rows = levels.length - 1;
   const azimuth = [],
     depth = [],
@@ -23,8 +25,10 @@ export function profilesOf(frames) {
     const around = new Float64Array(SECTORS),
       down = new Float64Array(rows);
     one.force.forEach((force, k) => {
-      const level = Math.min(Math.floor((one.depth[k] - levels[0]) / thick), rows - 1);
-      down[level] += force / thick;
+      // The end face may lie on a limit: what is no deeper than it, as far as rounded places tell, is above it.
+      const below = levels.findIndex((limit) => one.depth[k] <= limit + head.frames.step),
+        level = below < 0 ? rows - 1 : Math.max(below - 1, 0);
+      down[level] += force / (levels[level + 1] - levels[level]);
       for (const sector of one.sectors[k]) {
         around[sector] += force / 2;
         map[SECTORS * level + sector] += force / 2 / frames.count;
@@ -67,14 +71,15 @@ function onWorkpiece(frames, number, own, head) {
   return found;
 }
 
-/** Limits of equal levels of depth, mm, from the surface or above it to the deepest contact. */
-function levelsOf(depths) {
+/** Limits of levels of depth, mm: round ones from the surface, or above it, and at last the deepest contact. */
+function levelsOf(depths, rounding) {
   const least = depths.reduce((one, other) => Math.min(one, other), 0),
-    most = depths.reduce((one, other) => Math.max(one, other), 0) || 1;
+    deepest = depths.reduce((one, other) => Math.max(one, other), 0),
+    most = Math.max(Math.ceil(100 * (deepest - rounding)) / 100, 0) || 1;
   const step = roundStep((most - least) / (LEVELS - 2)),
     first = Math.floor(least / step),
-    last = Math.ceil(most / step);
-  return Array.from({ length: last - first + 1 }, (_, k) => (first + k) * step);
+    last = Math.max(Math.round(most / step), first + 1); // a thin last level is part of the one above it
+  return Array.from({ length: last - first + 1 }, (_, k) => (k === last - first ? most : (first + k) * step));
 }
 
 /** How many contacts have which normal force; `means`: the mean normal force of each frame, N. */

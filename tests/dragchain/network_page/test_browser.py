@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from browser import MISSING, NO_WEBGL, Browser
+from figure_files import case_json
 from network_run_files import PEAK_N, PEAKS_S, accept, draw, write_network_run
 
 from dragchain.network_page.page import write_page
@@ -460,7 +461,7 @@ def test_profiles_of_a_frame_are_those_of_the_tables(page: Browser, run: Path, f
     for plot, place, per in (("azimuth", "azimuth", 1.0), ("depth", "depth", None)):
         bars = told(page, plot)
         for (low, high), (now, _) in bars.items():
-            inside = (contacts[place] >= low) & (contacts[place] < high)
+            inside = (contacts[place] > low) & (contacts[place] <= high + 2e-3)
             width = per or high - low
             assert now == pytest.approx(force[inside].sum() / width, rel=1e-3), (plot, low)
         assert sum(now * (per or high - low) for (low, high), (now, _) in bars.items()) == (
@@ -470,11 +471,35 @@ def test_profiles_of_a_frame_are_those_of_the_tables(page: Browser, run: Path, f
     assert number(said.split(" s: ")[1]) == four_digits(force.sum())
 
 
+def test_azimuth_is_counted_from_the_motion_and_an_end_face_is_in_the_last_level(
+    window: Browser, tmp_path: Path
+) -> None:
+    motion = {"direction_rad": 2.5, "start_direction_rad": 2.5}
+    folder = write_network_run(
+        tmp_path / "run", "mesh", motion=case_json("process")["motion"] | motion
+    )
+    file = folder / "tables/contacts.parquet"
+    table = pd.read_parquet(file)
+    table.loc[table["kind"] == "particle-workpiece", "point_z_m"] = 0.03 - 0.02
+    table.to_parquet(file)
+    write_page(folder)
+    window.open(folder / "network.html")
+    contacts = on_workpiece(folder, step_at(window))
+    force = contacts["normal_force_n"]
+    for (low, high), (now, _) in told(window, "azimuth").items():
+        inside = contacts["azimuth"].between(low, high)
+        assert now == pytest.approx(force[inside].sum(), rel=1e-3)
+    levels = told(window, "depth")
+    assert max(levels) == (18, 20)
+    assert 2 * levels[18, 20][0] == pytest.approx(force.sum(), rel=1e-3)
+    assert window.errors() == []
+
+
 def test_the_mean_of_the_profiles_is_that_of_all_frames(page: Browser, run: Path) -> None:
     steps = page.run("return networkPage.head.steps")
     contacts = pd.concat([on_workpiece(run, step) for step in steps])
     force, bars = contacts["normal_force_n"], told(page, "azimuth")
-    assert list(bars)[0][0] == -180 and len(bars) == 24
+    assert next(iter(bars))[0] == -180 and len(bars) == 24
     for (low, high), (_, mean) in bars.items():
         inside = contacts["azimuth"].between(low, high, inclusive="left")
         assert mean == pytest.approx(force[inside].sum() / len(steps), rel=1e-3)
