@@ -175,6 +175,8 @@ class LogHandler(LogHandlerBase):
                 refresh_per_second=1, redirect_stdout=False, redirect_stderr=False,
             )  # fmt: skip
             self._live.start()
+        else:
+            self._live.refresh()
 
     def _hide(self) -> None:
         if self._live is not None:
@@ -215,5 +217,5 @@ class LogHandler(LogHandlerBase):
 
 
 def _unplanned(folder: Path) -> StudyRun:
-    """A run of which nothing is expected, as those of the verification."""
+    """A run of which nothing is expected, as those of the verification suite."""
     return StudyRun(folder.parent.name, folder, None, 1, Cost(0, 0.0, "assumed"), 0.0)
