@@ -1,4 +1,5 @@
 // The force against the motion over process time: raw and filtered, with zoom, cursor and peaks.
+import { plain, set, ticks } from "./axes.js";
 import { digits, seconds } from "./numbers.js";
 
 const EDGE = { left: 46, right: 10, top: 10, bottom: 30 };
@@ -229,18 +230,4 @@ function niceRange(values) {
     ),
     high = values.reduce((most, value) => Math.max(most, value), -Infinity);
   return [low, low + 1.06 * (high - low || 1)];
-}
-
-function ticks(first, last, most) {
-  const rough = (last - first) / Math.max(most, 2),
-    power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((factor) => factor * power).find((one) => one >= rough),
-    from = Math.ceil(first / step);
-  return Array.from({ length: Math.max(Math.floor(last / step + 1e-9) - from + 1, 0) }, (_, k) => (from + k) * step);
-}
-
-const plain = (value) => String(Number(value.toPrecision(6))).replace("-", "−");
-
-function set(element, attributes) {
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
 }

@@ -91,6 +91,18 @@ export class Frames {
     return (frame.classes ??= Uint8Array.from(frame.b, (b) => (b < FIRST_BODY ? 0 : ofBody(b))));
   }
 
+  /** The contacts on the workpiece: normal force (N) and contact point (mm) of each. */
+  onWorkpiece(number) {
+    const frame = this.at(number),
+      kinds = this.classes(frame),
+      found = [];
+    for (let k = 0, outer = 0; k < kinds.length; k++) {
+      if (kinds[k] === 1) found.push([frame.normal[k], frame.point.subarray(3 * outer, 3 * outer + 3)]);
+      if (kinds[k]) outer++;
+    }
+    return found;
+  }
+
   /** Name of a contact's second body: the particle's number, or workpiece, floor or side. */
   other(frame, contact) {
     const b = frame.b[contact];

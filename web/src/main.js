@@ -12,6 +12,7 @@ import { showLegend, showScale } from "./legend.js";
 import { Media } from "./media.js";
 import { digits, seconds, whole } from "./numbers.js";
 import { Player } from "./player.js";
+import { ProfilePlots } from "./profile_plots.js";
 import { numbers } from "./readout.js";
 import { PRESETS, View } from "./view.js";
 import { Workpiece } from "./workpiece.js";
@@ -27,6 +28,7 @@ class Page {
     this.number = head.peaks[0]?.frame ?? 0;
     this.look = { classes: [true, true, true], threshold: 0, chosen: null };
     this.startCurve(columns);
+    this.startProfiles();
     this.startScene(columns);
     if (head.peaks.length) this.showPeak(0);
     else this.show(0);
@@ -70,6 +72,12 @@ class Page {
       }),
     );
     if (!peaks.length) byId("peaks").append(Object.assign(document.createElement("li"), { textContent: "none" }));
+  }
+
+  startProfiles() {
+    const names = ["azimuth", "depth", "map", "size", "scale", "told"];
+    const parts = Object.fromEntries(names.map((name) => [name, byId(`profile-${name}`)]));
+    this.profiles = new ProfilePlots(parts, this.frames, this.colourOf);
   }
 
   nearest(time) {
@@ -199,6 +207,7 @@ class Page {
     this.number = Math.min(Math.max(number, 0), this.frames.count - 1);
     this.time = time ?? this.frames.times[this.number];
     this.curve.moveCursor(this.time);
+    this.profiles.show(this.number);
     if (!this.view) return;
     byId("time").value = this.number;
     byId("time").setAttribute("aria-valuetext", seconds(this.frames.times[this.number]));

@@ -17,13 +17,18 @@ from paraview import simple as pv
 
 INK, STEEL, GLASS = [0.11, 0.15, 0.20], [0.60, 0.63, 0.67], [0.75, 0.78, 0.82]
 
+SPEEDS, LOADS = "Viridis (matplotlib)", "Magma (matplotlib)"
+
 COLOURS = {
-    "speed": ("v", "Speed (m/s)", "Viridis (matplotlib)"),
-    "force": ("max_normal_force_n", "Largest normal force (N)", "Viridis (matplotlib)"),
-    "contacts": ("normal_force_n", "Normal force (N)", "Inferno (matplotlib)"),
-    "workpiece": ("mean_pressure_pa", "Mean pressure (Pa)", "Plasma (matplotlib)"),
+    "speed": ("v", "Speed (m/s)", SPEEDS),
+    "force": ("max_normal_force_n", "Largest normal force (N)", LOADS),
+    "contacts": ("normal_force_n", "Normal force (N)", LOADS),
+    "workpiece": ("mean_pressure_pa", "Mean pressure (Pa)", LOADS),
 }
-"""Array, title and colour map; the first two are choices for the particles."""
+"""Array, title and colour map; the first two are choices for the particles.
+
+Loads have the map of all figures, `dragchain.figures.style`: from light to dark.
+"""
 
 CHAINS = {"peters_chain": [0.34, 0.71, 0.91], "dominant": [0.00, 0.45, 0.70]}
 """Array and colour; only the dominant path is shown at first."""
@@ -162,7 +167,6 @@ class Picture:
         ends = pv.CellDatatoPointData(contacts, registrationName="contact ends")
         shown = pv.Show(self.cylinders(ends, "contact cylinders", 1.0), self.view)
         self.coloured(shown, "POINTS", COLOURS["contacts"])
-        pv.GetColorTransferFunction("normal_force_n").InvertTransferFunction()  # weak ones pale
         for name, colour in CHAINS.items() if self.chains else ():
             part = pv.Threshold(ends, registrationName=name, Scalars=["POINTS", name])
             part.ThresholdMethod, part.UpperThreshold = "Above Upper Threshold", 1.0
@@ -215,6 +219,8 @@ class Picture:
         pv.ColorBy(shown, (kind, name, "Magnitude") if name == "v" else (kind, name))
         colours = pv.GetColorTransferFunction(name)
         colours.ApplyPreset(preset, True)
+        if preset == LOADS:
+            colours.InvertTransferFunction()
         colours.RescaleTransferFunction(0.0, self.upper.get(name, 1.0))
         colours.AutomaticRescaleRangeMode = "Never"
         bar = pv.GetScalarBar(colours, self.view)

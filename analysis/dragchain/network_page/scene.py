@@ -7,14 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import matplotlib
 import numpy as np
 import pandas as pd
 from matplotlib.colors import to_hex
 
 from dragchain.arrays import Floats
 from dragchain.drag.peaks import Peaks, peak_separation_s
-from dragchain.figures.style import STYLE
+from dragchain.figures.style import force_map
 from dragchain.network.frame import KINDS, PARTICLE
 from dragchain.network_page.columns import Columns
 from dragchain.network_page.frames import (
@@ -100,7 +99,7 @@ def load_scene(run: Run) -> Scene:
 
 def _colours() -> list[str]:
     """The colour map of all figures, without its palest end, which could not be seen on white."""
-    colours = matplotlib.colormaps[STYLE["image.cmap"]]
+    colours = force_map()
     return [to_hex(one) for one in colours(np.linspace(0.06, 0.94, 33))]
 
 

@@ -1,5 +1,6 @@
 """network.html in a real browser: what it shows is what the tables say."""
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from browser import MISSING, NO_WEBGL, Browser
+from figure_files import case_json
 from network_run_files import PEAK_N, PEAKS_S, accept, draw, write_network_run
 
 from dragchain.network_page.page import write_page
@@ -410,7 +412,128 @@ def test_an_stl_workpiece_and_hostile_names(window: Browser, tmp_path: Path) -> 
     folder = write_network_run(tmp_path / "run", "mesh", study=hostile, case=hostile)
     write_page(folder)
     window.open(folder / "network.html")
+    contacts = on_workpiece(folder, step_at(window))
+    bars = [now for now, _ in told(window, "azimuth").values()]
+    assert sum(bars) == pytest.approx(contacts["normal_force_n"].sum(), rel=1e-3)
     assert window.driver.title == f"{hostile}: contact network"
     assert hostile in window.text("header")
     assert window.run("return networkPage.workpiece.group.visible")
     assert window.errors() == []
+
+
+# --- profiles ------------------------------------------------------------------------------------
+
+
+def on_workpiece(run: Path, step: int) -> pd.DataFrame:
+    """The contacts on the workpiece: azimuth in degrees, depth in mm."""
+    contacts, force = rows(run, "contacts", step), rows(run, "workpiece_force", step).iloc[0]
+    found = contacts[contacts["kind"] == "particle-workpiece"]
+    x, y = found["point_x_m"] - force["ref_x_m"], found["point_y_m"] - force["ref_y_m"]
+    azimuth = np.arctan2(y, x) - force["direction_rad"]
+    surface_m = json.loads((run / "case.json").read_text())["surface_m"]
+    return found.assign(azimuth=np.degrees(np.arctan2(np.sin(azimuth), np.cos(azimuth))),
+                        depth=1e3 * (surface_m - found["point_z_m"]))  # fmt: skip
+
+
+def told(page: Browser, plot: str) -> dict[tuple[float, float], list[float]]:
+    """The values told for each bar of a profile, which the arrow keys choose, by its limits."""
+    from selenium.webdriver import Keys
+
+    page.find(f"#profile-{plot}").send_keys(Keys.HOME)
+    found = {}
+    for _ in range(int(page.find(f"#profile-{plot}").get_attribute("aria-valuemax")) + 1):
+        text = page.text("#profile-told").replace(MINUS, "-")
+        assert text == page.run(
+            "return document.getElementById(arguments[0]).ariaValueText", f"profile-{plot}"
+        ).replace(MINUS, "-").replace("\u202f", "")
+        low, high, *values = (float(one) for one in re.findall(r"-?[\d.]+(?:e-\d+)?", text))
+        found[low, high] = values
+        page.find(f"#profile-{plot}").send_keys(Keys.ARROW_RIGHT)
+    return found
+
+
+@pytest.mark.parametrize("frame", [0, 7])
+def test_profiles_of_a_frame_are_those_of_the_tables(page: Browser, run: Path, frame: int) -> None:
+    page.run("networkPage.go(arguments[0])", frame)
+    contacts = on_workpiece(run, step_at(page))
+    assert len(contacts) == 6
+    force = contacts["normal_force_n"]
+    for plot, place, per in (("azimuth", "azimuth", 1.0), ("depth", "depth", None)):
+        bars = told(page, plot)
+        for (low, high), (now, _) in bars.items():
+            inside = (contacts[place] > low) & (contacts[place] <= high + 2e-3)
+            width = per or high - low
+            assert now == pytest.approx(force[inside].sum() / width, rel=1e-3), (plot, low)
+        assert sum(now * (per or high - low) for (low, high), (now, _) in bars.items()) == (
+            pytest.approx(force.sum(), rel=1e-3)
+        )
+    said = page.find("#profile-azimuth").get_attribute("aria-label")
+    assert number(said.split(" s: ")[1]) == four_digits(force.sum())
+
+
+def test_azimuth_is_counted_from_the_motion_and_an_end_face_is_in_the_last_level(
+    window: Browser, tmp_path: Path
+) -> None:
+    motion = {"direction_rad": 2.5, "start_direction_rad": 2.5}
+    folder = write_network_run(
+        tmp_path / "run", "mesh", motion=case_json("process")["motion"] | motion
+    )
+    file = folder / "tables/contacts.parquet"
+    table = pd.read_parquet(file)
+    table.loc[table["kind"] == "particle-workpiece", "point_z_m"] = 0.03 - 0.02
+    table.to_parquet(file)
+    write_page(folder)
+    window.open(folder / "network.html")
+    contacts = on_workpiece(folder, step_at(window))
+    force = contacts["normal_force_n"]
+    for (low, high), (now, _) in told(window, "azimuth").items():
+        inside = contacts["azimuth"].between(low, high)
+        assert now == pytest.approx(force[inside].sum(), rel=1e-3)
+    levels = told(window, "depth")
+    assert max(levels) == (18, 20)
+    assert 2 * levels[18, 20][0] == pytest.approx(force.sum(), rel=1e-3)
+    assert window.errors() == []
+
+
+def test_the_mean_of_the_profiles_is_that_of_all_frames(page: Browser, run: Path) -> None:
+    steps = page.run("return networkPage.head.steps")
+    contacts = pd.concat([on_workpiece(run, step) for step in steps])
+    force, bars = contacts["normal_force_n"], told(page, "azimuth")
+    assert next(iter(bars))[0] == -180 and len(bars) == 24
+    for (low, high), (_, mean) in bars.items():
+        inside = contacts["azimuth"].between(low, high, inclusive="left")
+        assert mean == pytest.approx(force[inside].sum() / len(steps), rel=1e-3)
+    cells = page.run("return Array.from(networkPage.profiles.profiles.map.values)")
+    assert sum(cells) == pytest.approx(force.sum() / len(steps), rel=1e-4)
+    largest = page.find("#profile-map").get_attribute("aria-valuetext")
+    assert float(largest.split("mean ")[1].split()[0]) == four_digits(max(cells))
+
+
+def test_the_distribution_counts_all_contacts(page: Browser, run: Path) -> None:
+    force = rows(run, "contacts", step_at(page))["normal_force_n"]
+    bars = told(page, "size")
+    counts = {low: now for (low, _), (now, _) in bars.items()}
+    assert (force >= min(counts)).sum() == pytest.approx(sum(counts.values()), abs=2)
+    for low, high in list(bars)[::5]:
+        assert abs(counts[low] - force.between(low, high).sum()) <= 2  # limits have three digits
+    said = page.find("#profile-size").get_attribute("aria-label")
+    assert number(said.split("mean ")[1]) == four_digits(force.mean())
+
+
+def test_profiles_follow_the_slider_and_the_mouse(page: Browser) -> None:
+    from selenium.webdriver import ActionChains, Keys
+
+    def drawn() -> list[str]:
+        return [page.find(f"#profile-{name} path.now").get_attribute("d")
+                for name in ("azimuth", "depth", "size")]  # fmt: skip
+
+    page.find("#time").send_keys(Keys.HOME)
+    first = drawn()
+    page.find("#time").send_keys(Keys.END)
+    assert all(one != other for one, other in zip(first, drawn(), strict=True))
+    time_s = number(page.text("#now"))
+    assert f"at {time_s:.3f} s" in page.find("#profile-depth").get_attribute("aria-label")
+    ActionChains(page.driver).move_to_element(page.find("#profile-map")).perform()
+    assert re.fullmatch(r"Azimuth .*°, depth .* mm: mean .* N", page.text("#profile-told"))
+    ActionChains(page.driver).move_to_element(page.find("#time")).perform()
+    assert page.text("#profile-told") == ""
