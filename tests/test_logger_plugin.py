@@ -146,7 +146,10 @@ def test_runs_of_no_study_do_not_end_the_display(
     shown.start(1, "run_verification", "results/verification/collide/single/run.json")
     shown.log("", event=LogEvent.JOB_FINISHED, job_id=1)
     assert shown.text.splitlines()[-1] == "collide single: complete, 50 steps/s"
-    assert shown.handler._overall([]) == "runs 100 %; no job done"
+    shown.log("", event=LogEvent.PROGRESS, done=13, total=52)
+    assert shown.handler._overall([]) == "13 of 52 jobs done"
+    shown.handler._console.print(shown.handler._screen())
+    assert shown.text.splitlines()[-1].split() == ["━" * 5, *"13 of 52 jobs done".split()]
 
 
 def test_a_record_that_cannot_be_shown_does_not_end_the_display(

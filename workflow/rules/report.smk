@@ -46,7 +46,8 @@ onstart:
     plan = plan_in_words(runs, cores)
     if plan:
         plan[0] += f"; {shown_bytes(free_bytes(PROJECT.root))} free"
-    plan.append(f"{len(jobs) - len(runs)} other jobs (their time is not estimated)")
+    others = f"{len(jobs) - len(runs)} {'other jobs' if runs else 'jobs'}"
+    plan.append(f"{others} (their time is not estimated)")
     text = f"{STUDY}: " + "\n  ".join(plan)
     logger.info(text, extra={"shown": True, "plan": runs, "cores": cores})
 
