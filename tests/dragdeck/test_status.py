@@ -34,10 +34,11 @@ def write_state(folder: Path, **values: object) -> None:
 
 def test_a_study_that_was_never_run_waits(case: Case, project: Project, capsys: Said) -> None:
     assert main(["status", "small"]) == 0
-    *runs, last = capsys.readouterr().out.splitlines()
-    assert len(runs) == 3 and all(": waiting, about " in line for line in runs)
-    assert last.startswith("small: 0 % done; runs: 3 waiting; still to run: about ")
-    assert last.endswith("(estimates; speed assumed)")
+    *runs, cost, report = capsys.readouterr().out.splitlines()
+    assert len(runs) == 3 and all(": waiting, speed assumed, about " in line for line in runs)
+    assert cost.startswith("small: runs 0 % done: 3 waiting; still to run: about ")
+    assert cost.endswith("(estimates; speed assumed)")
+    assert report == "report: none yet; ./run all --config study=small"
     assert not (project.root / "results").exists()
 
 
@@ -54,7 +55,7 @@ def test_failed_runs_come_first_with_their_remedy(
     assert said.startswith(f"process {PROCESS.run_id(case)}: failed")
     assert "check:  split: one (limit: two)" in said and "remedy: use this" in said
     assert f"filling {FILLING.run_id(case)}: complete, 500 steps/s, 1 min 15 s" in said
-    assert "runs: 1 failed, 1 waiting, 1 complete" in said
+    assert "% done: 1 failed, 1 waiting, 1 complete" in said
 
 
 def test_the_points_of_a_plan_have_a_status(case: Case, project: Project, capsys: Said) -> None:
@@ -69,7 +70,7 @@ def test_the_points_of_a_plan_have_a_status(case: Case, project: Project, capsys
     counted = project.points("small", str(plan))
     of_scenes = [len(by_run(counted.of(kind), kind)) for kind in SCENES.values()]
     assert of_scenes == [2, 3, 5]
-    assert "runs: 10 waiting" in capsys.readouterr().out
+    assert "runs 0 % done: 10 waiting" in capsys.readouterr().out
 
 
 def test_open_says_where_the_report_is(case: Case, project: Project, capsys: Said) -> None:

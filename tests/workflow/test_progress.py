@@ -59,6 +59,7 @@ def test_a_call_says_first_what_it_will_do(piped: str) -> None:
     )
     scenes = {line.split(":")[0].strip() for line in lines[1:4]}
     assert scenes == {"drop_test", "filling", "process"}
+    assert re.fullmatch(r"  \d\d other jobs \(their time is not estimated\)", lines[4])
     assert piped.index(lines[0]) < piped.index(": started")
 
 
@@ -96,7 +97,7 @@ def test_status_says_that_all_is_complete(
 ) -> None:
     assert main(["status", "tiny"]) == 0
     said = capsys.readouterr().out
-    assert "tiny: 100 % done; runs: 3 complete\n" in said
+    assert "tiny: runs 100 % done: 3 complete\n" in said
     assert said.endswith("report/report.html\n")
 
 
@@ -162,4 +163,4 @@ def test_a_failed_run_is_told_in_full_and_has_a_status(
     said = capsys.readouterr().out
     assert said.startswith("process quick_immersion_depth_m-0.005-")
     assert "  check:  no engine error: ERROR: on purpose (limit: none)" in said
-    assert "runs: 1 failed, 3 complete" in said
+    assert "% done: 1 failed, 3 complete" in said

@@ -89,7 +89,7 @@ def check(study: str, fidelity: str | None, verbose: bool) -> None:
     found.show(verbose)
     engine = find_engine()
     cost, *scenes = plan_in_words(runs, cores_here())
-    print(*scenes, sep="\n")
+    print(*(f"  {line}" for line in scenes), sep="\n")
     print(f"{study}: no errors, {warned}; {len(every)} case(s), {cost}; LIGGGHTS {engine.version}")
 
 

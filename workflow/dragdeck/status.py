@@ -42,9 +42,10 @@ def status(study: str, fidelity: str | None, plan: str | None, verbose: bool) ->
     counts = {state: sum(run.status.state == state for run in runs) for state in _ORDER}
     said = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
     cost = f"; still to run: {cost_in_words(left, cores_here())}" if left else ""
-    print(f"{study}: {100 * done_fraction(runs):.0f} % done; runs: {said}{cost}")
-    if not plan and (file := project.report(study)).is_file():
-        print(f"report: {file}")
+    print(f"{study}: runs {100 * done_fraction(runs):.0f} % done: {said}{cost}")
+    if not plan:
+        file = project.report(study)
+        print("report:", file if file.is_file() else f"none yet; ./run all --config study={study}")
 
 
 def _show_state(state: RunState, runs: Sequence[StudyRun], verbose: bool) -> None:

@@ -41,11 +41,15 @@ rule write_report:
 
 # What will be run: as text, and as data for `--logger dragdeck`.
 onstart:
-    runs, cores = planned_runs(workflow.dag.needrun_jobs()), workflow.cores or 1
-    if runs:
-        first, *more = plan_in_words(runs, cores)
-        lines = [f"{STUDY}: {first}; {shown_bytes(free_bytes(PROJECT.root))} free", *more]
-        logger.info("\n".join(lines), extra={"shown": True, "plan": runs, "cores": cores})
+    jobs, cores = list(workflow.dag.needrun_jobs()), workflow.cores or 1
+    runs = planned_runs(jobs)
+    plan = plan_in_words(runs, cores)
+    if plan:
+        plan[0] += f"; {shown_bytes(free_bytes(PROJECT.root))} free"
+    others = f"{len(jobs) - len(runs)} {'other jobs' if runs else 'jobs'}"
+    plan.append(f"{others} (their time is not estimated)")
+    text = f"{STUDY}: " + "\n  ".join(plan)
+    logger.info(text, extra={"shown": True, "plan": runs, "cores": cores})
 
 
 onsuccess:

@@ -65,7 +65,7 @@ for PLACE, SCENE in PLACES.items():
             file=of_run(PLACE, RECORD[PLACE]) if PLACE == POINTS else "",
             source=source_hash("dragdeck.engine.run_folder"),
         shell:
-            "dragdeck run $(dirname {output}) {params.outcome} {params.file}" " > {log} 2>&1"
+            "dragdeck run $(dirname {output}) {params.outcome} {params.file} > {log} 2>&1"
 
 
 # Workpieces beyond the first of a run: each has tables, chains and figures of its own.

@@ -76,7 +76,7 @@ class LogHandler(LogHandlerBase):
         self._jobs: dict[int, _Job] = {}
         self._runs: dict[Path, StudyRun] = {}
         self._cores = 1
-        self._progress = ""
+        self._done, self._all = 0, 0
         self._live: Live | None = None
         self._ending = threading.Event()
         if not self._console.is_terminal:
@@ -115,7 +115,7 @@ class LogHandler(LogHandlerBase):
         elif event == LogEvent.JOB_ERROR:
             self._ended(values["jobid"])
         elif event == LogEvent.PROGRESS:
-            self._progress = f"{values['done']} of {values['total']} jobs done"
+            self._done, self._all = values["done"], values["total"]
         elif "plan" in values:
             self._runs = {run.folder: run for run in values["plan"]}
             self._cores = values["cores"]
@@ -175,6 +175,8 @@ class LogHandler(LogHandlerBase):
                 refresh_per_second=1, redirect_stdout=False, redirect_stderr=False,
             )  # fmt: skip
             self._live.start()
+        else:
+            self._live.refresh()
 
     def _hide(self) -> None:
         if self._live is not None:
@@ -194,13 +196,15 @@ class LogHandler(LogHandlerBase):
         overall = Table.grid(padding=(0, 1))
         overall.add_column(min_width=_BAR)
         overall.add_column(no_wrap=True, overflow="ellipsis")
-        done = done_fraction(self._together(active))
+        runs = self._together(active)
+        done = done_fraction(runs) if runs else self._done / max(1, self._all)
         overall.add_row(ProgressBar(1.0, done, width=_BAR), Text(self._overall(active)))
         return Group(lines, overall) if active else Group(overall)
 
     def _together(self, active: list[StudyRun]) -> list[StudyRun]:
+        """All runs of which it is known what to expect."""
         runs = {**self._runs, **{run.folder: run for run in active}}
-        return by_their_speeds(list(runs.values()))
+        return by_their_speeds([run for run in runs.values() if run.cost.steps])
 
     def _overall(self, active: list[StudyRun]) -> str:
         """How far the whole study is; only of runs of LIGGGHTS is known how long they take."""
@@ -211,9 +215,10 @@ class LogHandler(LogHandlerBase):
             said = [f"runs {100 * done_fraction(runs):.0f} %{time}"]
         others = dict.fromkeys(job.rule for job in list(self._jobs.values()) if not job.folder)
         now = f": {', '.join(others)}" if others else ""
-        return "; ".join([*said, f"{self._progress or 'no job done'}{now}"])
+        jobs = f"{self._done} of {self._all} jobs done" if self._all else "no job done"
+        return "; ".join([*said, f"{jobs}{now}"])
 
 
 def _unplanned(folder: Path) -> StudyRun:
-    """A run of which nothing is expected, as those of the verification."""
+    """A run of which nothing is expected, as those of the verification suite."""
     return StudyRun(folder.parent.name, folder, None, 1, Cost(0, 0.0, "assumed"), 0.0)

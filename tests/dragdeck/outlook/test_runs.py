@@ -64,7 +64,17 @@ def test_where_a_filling_ends_is_an_estimate() -> None:
 
 
 def test_a_waiting_run_says_that_its_speed_is_assumed() -> None:
-    assert str(a_run("a", 30.0)) == "filling a: waiting, about 30 s (speed assumed)"
+    assert str(a_run("a", 30.0)) == "filling a: waiting, speed assumed, about 30 s left"
+
+
+def test_nothing_is_said_of_what_is_not_expected() -> None:
+    nothing = Cost(0, 0.0, "assumed")
+    status = RunStatus("running", step=40, steps_per_s=20.0)
+    run = replace(a_run("a", 1.0, status), cost=nothing)
+    assert str(run) == "filling a: running, 20 steps/s"
+    complete = replace(run, status=RunStatus("complete", step=40, final=True, steps_per_s=20.0))
+    assert by_their_speeds([run, complete]) == [run, complete]
+    assert time_left([run, complete], 2) == 0.0
 
 
 def test_a_failed_run_takes_no_time_and_is_not_done() -> None:
@@ -92,8 +102,8 @@ def test_the_plan_counts_what_is_left() -> None:
     lines = plan_in_words([a_run("f", 10.0), complete, a_run("b", 30.0, after="f")], 1)
     assert lines == [
         "2 runs, about 40 s on 1 core, 2 MB (estimates; speed assumed)",
-        "  filling: 1 run, about 10 s, 1 MB",
-        "  process: 1 run, about 30 s, 1 MB",
+        "filling: 1 run, about 10 s, 1 MB",
+        "process: 1 run, about 30 s, 1 MB",
         "1 ended before: repeated only if the input script has changed",
     ]
 

@@ -21,7 +21,6 @@ from dragdeck.physics.contact_mechanics import fall_energy
 RunState = Literal["waiting", "running", "interrupted", "failed", "complete"]
 
 _TAIL_BYTES = 20_000
-"""More than a row of ``thermo`` takes, and than the message that ends a log."""
 """More than a row of ``thermo``, or the message that ends a log."""
 
 

@@ -82,8 +82,10 @@ class StudyRun:
         doing = f"{status.steps_per_s:,.0f} steps/s" if status.steps_per_s else ""
         if status.final:
             return "", doing, shown_time(status.wall_time_s) if status.wall_time_s else ""
+        if not (status.last or self.cost.steps):  # of no study: nothing is expected of it
+            return "", doing, ""
         if not status.step:
-            return "", "", f"about {shown_time(self.left_s)} (speed {self.cost.basis})"
+            return "", f"speed {self.cost.basis}", left
         if status.energy is not None and status.at_rest is not None:
             sign = ">" if status.energy > status.at_rest else "<"
             doing = f"{doing}, energy {status.energy:.1e} {sign} {status.at_rest:g}"
@@ -141,7 +143,8 @@ def by_their_speeds(runs: Sequence[StudyRun]) -> list[StudyRun]:
     """Runs, those of an assumed speed corrected by the speeds of others of the same scene."""
     seen: dict[str, list[float]] = {}
     for run in runs:
-        if speed := run.status.steps_per_s:
+        speed = run.status.steps_per_s
+        if speed and run.cost.wall_time_s:
             seen.setdefault(run.scene, []).append(run.cost.steps / speed / run.cost.wall_time_s)
     return [_corrected(run, seen.get(run.scene, [])) for run in runs]
 
@@ -189,7 +192,7 @@ def plan_in_words(runs: Sequence[StudyRun], cores: int) -> list[str]:
         mine = [run for run in todo if run.scene == scene]
         size = shown_bytes(sum(run.size_bytes for run in mine))
         time = shown_time(time_left(mine, cores))
-        lines.append(f"  {scene}: {_counted(mine)}, about {time}, {size}")
+        lines.append(f"{scene}: {_counted(mine)}, about {time}, {size}")
     if ended := len(runs) - len(todo):
         lines.append(f"{ended} ended before: repeated only if the input script has changed")
     return lines
