@@ -16,8 +16,8 @@ from typing import Any
 import pandas as pd
 import pytest
 import yaml
-from paths import PROJECT, ROOT, SMALL_STUDY
-from snakemake_calls import snakemake
+from paths import ROOT
+from snakemake_calls import copy_of_project, snakemake
 
 pytestmark = pytest.mark.slurm
 
@@ -53,14 +53,6 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
     yield Cluster(folder)
     subprocess.run([SCRIPT, "stop", folder], check=True)
     assert not folder.exists()
-
-
-def copy_of_project(folder: Path) -> Path:
-    for name in PROJECT:
-        (folder / name).symlink_to(ROOT / name)
-    (folder / "studies/small").mkdir(parents=True)
-    (folder / "studies/small/study.yaml").write_text(SMALL_STUDY.read_text())
-    return folder
 
 
 def edit(folder: Path, **values: Any) -> None:

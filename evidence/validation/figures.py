@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
+from dragchain.drag.peaks import drag_peaks
 from dragchain.figures.marks import band, compass, compass_bars, depth_bars, row, row_names
 from dragchain.figures.panels import legend_below, new_figure, new_panels
 from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
@@ -37,7 +37,7 @@ def traces(packings: Sequence[Point], compared: Sequence[Compared]) -> Figure:
 def _trace(axes: Axes, point: Point) -> None:
     samples = read_counted(point.folder, ("time_s", "drag_n"))
     time_s, drag = samples["time_s"].to_numpy(np.float64), samples["drag_n"].to_numpy(np.float64)
-    peaks = find_drag_peaks(time_s, drag, min_separation_s=peak_separation_s(point.case))
+    peaks = drag_peaks(samples, point.case)
     zero = drag_start_s(point.case)
     axes.plot(time_s - zero, drag, color=BLUE, linewidth=0.5)
     axes.plot(peaks.time_s - zero, peaks.drag_n, "v", color=RED, label="peak")

@@ -4,8 +4,20 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
-from paths import ROOT
+import yaml
+from paths import PROJECT, ROOT, SMALL_STUDY
+
+
+def copy_of_project(folder: Path, study: dict[str, Any] | None = None) -> Path:
+    """A project in a folder, its only study ``small``: this content, or that of the tests."""
+    for name in PROJECT:
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "studies/small").mkdir(parents=True)
+    text = SMALL_STUDY.read_text() if study is None else yaml.safe_dump(study)
+    (folder / "studies/small/study.yaml").write_text(text)
+    return folder
 
 
 def call_of(*arguments: str) -> tuple[list[str], dict[str, str]]:

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from paths import PROJECT, ROOT, SMALL_STUDY
+from paths import SMALL_STUDY
 from PIL import Image
-from snakemake_calls import jobs, snakemake
+from snakemake_calls import copy_of_project, jobs, snakemake
 
 from dragchain import load_case
 from dragchain.figures.style import PAPER_COLOURS, force_map
@@ -30,9 +30,6 @@ REPORT = ("report", "--config", "study=small")
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the project in which the small study has three thin workpieces that spin."""
-    folder = tmp_path_factory.mktemp("carousel")
-    for name in PROJECT:
-        (folder / name).symlink_to(ROOT / name)
     data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
     data["workpiece"]["shape"] = {"kind": "cylinder", "radius_m": 0.002, "facet_size_m": 0.001}
     data["workpieces"] = {"count": COUNT}
@@ -41,8 +38,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "spin": {"rpm": 100},
         "oscillation": {"amplitude_m": AMPLITUDE_M, "frequency_hz": HERTZ},
     }
-    (folder / "studies/small").mkdir(parents=True)
-    (folder / "studies/small/study.yaml").write_text(yaml.safe_dump(data))
+    folder = copy_of_project(tmp_path_factory.mktemp("carousel"), data)
     done = snakemake(folder, *REPORT)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 import yaml
-from paths import PROJECT, ROOT, SMALL_STUDY
-from snakemake_calls import jobs, snakemake
+from paths import SMALL_STUDY
+from snakemake_calls import copy_of_project, jobs, snakemake
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -17,9 +17,6 @@ SCALING = ("scaling", "--config", "study=small")
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the project with a small study of four depths."""
-    folder = tmp_path_factory.mktemp("scaling")
-    for name in PROJECT:
-        (folder / name).symlink_to(ROOT / name)
     data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
     data["sweep"] = {"motion.immersion_depth_m": [0.008, 0.012, 0.016, 0.020]}
     data["scaling"] = {
@@ -28,9 +25,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "source": "nobody",
     }
     data["fidelity"] = {"youngs_modulus_scale": 1e-4, "timestep_fraction": 0.5, "ranks": 1}
-    (folder / "studies/small").mkdir(parents=True)
-    (folder / "studies/small/study.yaml").write_text(yaml.safe_dump(data))
-    return folder
+    return copy_of_project(tmp_path_factory.mktemp("scaling"), data)
 
 
 def test_the_drag_grows_with_the_depth(project: Path) -> None:

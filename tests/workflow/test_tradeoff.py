@@ -8,8 +8,7 @@ import pandas as pd
 import pytest
 import yaml
 from pages import stands_alone
-from paths import PROJECT, ROOT, SMALL_STUDY
-from snakemake_calls import jobs, snakemake
+from snakemake_calls import copy_of_project, jobs, snakemake
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -35,11 +34,7 @@ TRADEOFF = ("tradeoff", "--config", "study=small", "plan=plan.yaml")
 @pytest.fixture(scope="module")
 def traded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the project in which the plan was run on the small study."""
-    folder = tmp_path_factory.mktemp("tradeoff")
-    for name in PROJECT:
-        (folder / name).symlink_to(ROOT / name)
-    (folder / "studies/small").mkdir(parents=True)
-    (folder / "studies/small/study.yaml").write_text(SMALL_STUDY.read_text())
+    folder = copy_of_project(tmp_path_factory.mktemp("tradeoff"))
     (folder / "plan.yaml").write_text(yaml.safe_dump(PLAN))
     done = snakemake(folder, *TRADEOFF)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats
@@ -28,6 +29,12 @@ class Peaks:
     time_s: Floats
     drag_n: Floats
     prominence_n: Floats
+
+
+def drag_peaks(samples: pd.DataFrame, case: Case) -> Peaks:
+    """The peaks of counted samples with ``time_s`` and ``drag_n``; see `find_drag_peaks`."""
+    time_s, drag_n = (samples[name].to_numpy(np.float64) for name in ("time_s", "drag_n"))
+    return find_drag_peaks(time_s, drag_n, min_separation_s=peak_separation_s(case))
 
 
 def find_drag_peaks(

@@ -40,7 +40,7 @@ _VIEWS = {
 
 _PIXELS = 900
 _FACETS_PER_BIN = 6
-"""Facets around the mantle per bin, so that it looks round."""
+"""Facets around a cylinder per bin, so that it looks round."""
 _BESIDE_IN, _AROUND_IN, _TALLEST_IN = 1.3, 2.3, 3.5
 """What labels take of the width and height of the figure, and how high its panels are at most."""
 
@@ -62,13 +62,14 @@ def workpiece_figure(
     cylinder = needed(case.workpiece, "workpiece").kind == "cylinder"
     names = ("front", "rear") if cylinder else tuple(_VIEWS)
     widths = [1.0, 1.0, 2.8, 2.4] if cylinder else [1.0] * 4 + [1.4]
-    shown = averaged_load(surface, facets, case)
-    scale = Normalize(0.0, _largest(facets.assign(**{_QUANTITY: shown})))
-    mesh = as_polydata(surface)
-    mesh.cell_data[_QUANTITY] = shown
     bins = _unrolled_bins(sampled, case) if cylinder else None
     if bins is not None and not spins(case):
-        scale, mesh = Normalize(0.0, float(np.quantile(bins.load_pa, 0.99)) or 1.0), _rolled(bins)
+        largest, mesh = float(np.quantile(bins.load_pa, 0.99)) or 1.0, _rolled(bins, case)
+    else:
+        shown = averaged_load(surface, facets, case)
+        largest, mesh = _largest(facets.assign(**{_QUANTITY: shown})), as_polydata(surface)
+        mesh.cell_data[_QUANTITY] = shown
+    scale = Normalize(0.0, largest)
     height = _height_in(case, widths[0] / sum(widths))
     figure, panels = new_panels(height, len(widths), sharey=True, width_ratios=widths)
     for axes, name in zip(panels, names, strict=False):
@@ -160,39 +161,38 @@ def averaged_load(surface: Surface, facets: pd.DataFrame, case: Case) -> Floats:
 
 @dataclass(frozen=True)
 class _Bins:
-    """The mantle of a cylinder: edges of azimuth (rad) and depth (m), and the load, (D, A) in Pa.
+    """The lateral surface of a cylinder: edges of azimuth and depth, and the load, (D, A) in Pa.
 
-    Azimuths are from the direction of motion; ``tip_m`` is the depth of the tip.
+    Azimuths are from the direction of motion.
     """
 
     azimuth_rad: Floats
     depth_m: Floats
     load_pa: Floats
-    radius_m: float
-    tip_m: float
 
 
 def _unrolled_bins(sampled: Sampled, case: Case) -> _Bins:
     workpiece = needed(case.workpiece, "workpiece")
     rows = sampled.rows[sampled.rows["workpiece_z_m"] > 1e-3 * workpiece.length_m]
-    azimuths, tip = circumference(AZIMUTH_BINS), workpiece.immersion_depth_m
-    depths = np.linspace(1e-3 * _depths(case)[0], tip, DEPTH_BINS + 1)
+    azimuths, shallowest = circumference(AZIMUTH_BINS), 1e-3 * _depths(case)[0]
+    depths = np.linspace(shallowest, workpiece.immersion_depth_m, DEPTH_BINS + 1)
     middles, half = 0.5 * (azimuths[:-1] + azimuths[1:]), 0.5 * rows["force_slide_n_m"]
     sums = np.zeros((DEPTH_BINS, AZIMUTH_BINS))
     for part in parts(rows["azimuth_rad"].to_numpy(np.float64), AZIMUTH_BINS):
         grid = [depths, azimuths]
         sums += np.histogram2d(rows["depth_m"], middles[part], grid, weights=half)[0]
     area = workpiece.radius_m * (azimuths[1] - azimuths[0]) * (depths[1] - depths[0])
-    return _Bins(azimuths, depths, sums / (area * sampled.path_m), workpiece.radius_m, tip)
+    return _Bins(azimuths, depths, sums / (area * sampled.path_m))
 
 
-def _rolled(bins: _Bins) -> Any:
-    """The mantle as a mesh in the frame of the workpiece, its tip in the origin."""
+def _rolled(bins: _Bins, case: Case) -> Any:
+    """The lateral surface as a mesh in the frame of the workpiece, its tip in the origin."""
     import pyvista as pv
 
+    workpiece = needed(case.workpiece, "workpiece")
     angle = np.linspace(-np.pi, np.pi, _FACETS_PER_BIN * bins.load_pa.shape[1] + 1)
-    angle, height = np.meshgrid(angle, bins.tip_m - bins.depth_m, indexing="ij")
-    x, y = bins.radius_m * np.cos(angle), bins.radius_m * np.sin(angle)
+    angle, height = np.meshgrid(angle, workpiece.immersion_depth_m - bins.depth_m, indexing="ij")
+    x, y = workpiece.radius_m * np.cos(angle), workpiece.radius_m * np.sin(angle)
     grid = pv.StructuredGrid(x[:, :, None], y[:, :, None], height[:, :, None])
     load = np.repeat(bins.load_pa, _FACETS_PER_BIN, axis=1)
     grid.cell_data[_QUANTITY] = load.ravel()
@@ -200,7 +200,7 @@ def _rolled(bins: _Bins) -> Any:
 
 
 def _unrolled(axes: Axes, bins: _Bins, scale: Normalize, case: Case) -> None:
-    """Draw the mantle of a cylinder unrolled: azimuth against depth."""
+    """Draw the lateral surface of a cylinder unrolled: azimuth against depth."""
     workpiece = needed(case.workpiece, "workpiece")
     azimuth, depth = np.degrees(bins.azimuth_rad), 1e3 * bins.depth_m
     axes.pcolormesh(azimuth, depth, bins.load_pa, cmap=force_map(), norm=scale)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import Peaks, find_drag_peaks, peak_separation_s
+from dragchain.drag.peaks import Peaks, drag_peaks
 from dragchain.errors import TableError
 from dragchain.export.frames import FrameData, FrameSeries
 from dragchain.network.frame import NetworkFrame
@@ -66,9 +66,7 @@ def highest_peaks(run: Run) -> Peaks:
     SeriesError
         If the run is too short to have peaks.
     """
-    samples = read_counted(run.folder, ("time_s", "drag_n"))
-    times, drag = (samples[name].to_numpy(np.float64) for name in ("time_s", "drag_n"))
-    peaks = find_drag_peaks(times, drag, min_separation_s=peak_separation_s(run.case))
+    peaks = drag_peaks(read_counted(run.folder, ("time_s", "drag_n")), run.case)
     order = np.argsort(peaks.drag_n, kind="stable")[:PEAKS]
     return Peaks(
         peaks.index[order], peaks.time_s[order], peaks.drag_n[order], peaks.prominence_n[order]

@@ -9,7 +9,7 @@ import pandas as pd
 from dragchain.arrays import Ints
 from dragchain.drag.around import ahead_behind, azimuth_profile, depth_profile, depth_slope
 from dragchain.drag.force import read_counted, summarise_forces
-from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
+from dragchain.drag.peaks import drag_peaks, peak_separation_s
 from dragchain.errors import SeriesError
 from dragchain.report.findings import (
     FILE,
@@ -111,8 +111,7 @@ def _ratio(above: MeanEstimate, below: MeanEstimate) -> Estimate:
     """Ratio of two independent means; its relative error is the root of the sum of squares."""
     value = above.mean / below.mean
     relative = (0.5 * (one.ci95_high - one.ci95_low) / one.mean for one in (above, below))
-    half = abs(value) * math.hypot(*relative)
-    return Estimate(value, value - half, value + half)
+    return Estimate.around(value, abs(value) * math.hypot(*relative))
 
 
 def compare(ours: MeanEstimate, reference: ReferenceDrag) -> Comparison:
@@ -130,19 +129,14 @@ def compare(ours: MeanEstimate, reference: ReferenceDrag) -> Comparison:
 
 
 def _peaks(samples: pd.DataFrame, run: RunData) -> Peaks:
-    separation = peak_separation_s(run.case)
-    peaks = find_drag_peaks(
-        samples["time_s"].to_numpy(np.float64),
-        samples["drag_n"].to_numpy(np.float64),
-        min_separation_s=separation,
-    )
+    peaks = drag_peaks(samples, run.case)
     process_s = peaks.time_s - drag_start_s(run.case)
     return Peaks(
         count=len(peaks.index),
         process_time_s=tuple(process_s.tolist()),
         drag_n=tuple(peaks.drag_n.tolist()),
         largest_n=peaks.drag_n.min(initial=np.inf),
-        separation_s=separation,
+        separation_s=peak_separation_s(run.case),
     )
 
 

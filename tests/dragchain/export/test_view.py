@@ -16,16 +16,15 @@ import numpy as np
 import pandas as pd
 import pytest
 import pyvista as pv
+from analysed_run import analysed_tiny_run
 from PIL import Image
-from tiny_run_files import BOWL_RADIUS_M, LAST, TIMESTEP_S, workpiece_x_m, write_tiny_run
+from tiny_run_files import BOWL_RADIUS_M, LAST, TIMESTEP_S, workpiece_x_m
 
 from dragchain.export import view_data
 from dragchain.export.view_data import View
 from dragchain.export.write import write_export
-from dragchain.network.write import write_chains
 from dragchain.run.case import load_case
 from dragchain.run.workpiece import read_surface
-from dragchain.tables.write import write_tables
 
 PACKAGED = Path(view_data.__file__).with_name("view.py")
 HOSTILE = "'\"}}; import os; os._exit(7) #\\"
@@ -34,11 +33,7 @@ HOSTILE = "'\"}}; import os; os._exit(7) #\\"
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The tiny run with tables, chains and a load map that rises with the number of the facet."""
-    folder = write_tiny_run(tmp_path_factory.mktemp("made") / "tiny")
-    write_tables(folder)
-    write_chains(folder)
-    workpiece = pv.Cylinder(center=(0, 0, 0.03), direction=(0, 0, 1), radius=0.005, height=0.06)
-    workpiece.triangulate().save(folder / "workpiece.stl")
+    folder = analysed_tiny_run(tmp_path_factory.mktemp("made") / "tiny")
     facets(len(read_surface(folder, load_case(folder)).corners)).to_parquet(
         folder / "tables/facets.parquet"
     )

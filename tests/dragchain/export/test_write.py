@@ -14,6 +14,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 import pyvista as pv
+from analysed_run import analysed_tiny_run
 from paths import ROOT
 from tiny_run_files import (
     CHAIN_Z_M,
@@ -21,7 +22,6 @@ from tiny_run_files import (
     RADIUS_M,
     TIMESTEP_S,
     workpiece_x_m,
-    write_tiny_run,
 )
 
 from dragchain.cli import main
@@ -39,9 +39,7 @@ from dragchain.network.chains import (
 )
 from dragchain.network.frame import NetworkFrame, read_frames
 from dragchain.network.statistics import contact_counts
-from dragchain.network.write import write_chains
 from dragchain.tables.run_folder import Run
-from dragchain.tables.write import write_tables
 
 STEPS = range(0, LAST + 1, 20)
 COUNTED = range(40, LAST + 1, 20)
@@ -54,12 +52,7 @@ FORCE = ["force_x_n", "force_y_n", "force_z_n"]
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The tiny run with its tables, chains and a mesh of the workpiece; not to be changed."""
-    folder = write_tiny_run(tmp_path_factory.mktemp("made") / "tiny")
-    write_tables(folder)
-    write_chains(folder)
-    workpiece = pv.Cylinder(center=(0, 0, 0.03), direction=(0, 0, 1), radius=0.005, height=0.06)
-    workpiece.triangulate().save(folder / "workpiece.stl")
-    return folder
+    return analysed_tiny_run(tmp_path_factory.mktemp("made") / "tiny")
 
 
 @pytest.fixture

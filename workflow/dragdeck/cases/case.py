@@ -106,7 +106,7 @@ class Case:
 def of_each_workpiece(case: Case) -> list[Case]:
     """The case of each workpiece alone; the case itself if there is one, or it is one of these."""
     studies = case.study.of_each_workpiece()
-    if studies == [case.study]:
+    if studies[0] is case.study:
         return [case]
     return [
         replace(case, study=study, whole=case, number=number if studies[1:] else 0)

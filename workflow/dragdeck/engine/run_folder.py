@@ -9,7 +9,7 @@ import hashlib
 import shutil
 from pathlib import Path
 
-from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE
+from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, RUN_FILE
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.engine.checkpoints import take_forced_restarts
 from dragdeck.engine.inputs import RunInputs
@@ -21,7 +21,6 @@ from dragdeck.engine.reports import Report, say
 from dragdeck.errors import InputError, RejectedRunError
 from dragdeck.files import file_checksum
 
-_RESULT_FILE = "run.json"
 _ARCHIVE = "archive"
 _AS_RUN = "as_run"
 _PATIENCE_S = 1800.0
@@ -89,7 +88,7 @@ def run(
                 _keep_inputs(folder)
             part = PartOfRun(folder, inputs, columns, record, report)
             record = part.execute(digest, engine, patience_s)
-        record.write(folder / _RESULT_FILE)
+        record.write(folder / RUN_FILE)
         return record
 
 

@@ -39,7 +39,7 @@ from dragdeck.study.remarks import Accepted, Assumption
 from dragdeck.study.superposed.kind import SuperposedMotion, SuperposedOfRun
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin, SpinStage
-from dragdeck.study.workpiece import Carousel, Workpiece
+from dragdeck.study.workpiece import Carousel, Station, Workpiece
 
 Ranks = Annotated[
     Annotated[Literal["auto"], Tag("a-word")]
@@ -442,10 +442,9 @@ class Study(Model):
     def of_each_workpiece(self) -> Sequence["Study"]:
         """The study of each workpiece alone, its path and its place of immersion turned.
 
-        Several workpieces are immersed where their drag begins unless the study says other.
+        Several workpieces are immersed where their drag begins unless the study says otherwise.
         """
-        stations = self.workpieces.stations if self.workpieces else ()
-        if len(stations) < 2 and not any(one.angle_deg or one.shape for one in stations):
+        if not self._stations:
             return [self]
         return [
             self.model_copy(
@@ -457,13 +456,19 @@ class Study(Model):
                     "workpieces": None,
                 }
             )
-            for one in stations
+            for one in self._stations
         ]
+
+    @property
+    def _stations(self) -> Sequence[Station]:
+        """The workpieces of the carousel; none where one stands as the study gives it."""
+        found = self.workpieces.stations if self.workpieces else ()
+        differ = len(found) > 1 or any(one.angle_deg or one.shape for one in found)
+        return found if differ else ()
 
     def absent(self) -> set[str]:
         """The carousel, too, where it has one workpiece as the study gives it."""
-        alone = self.of_each_workpiece() == [self]
-        return super().absent() | ({"workpieces"} if alone else set())
+        return super().absent() | (set() if self._stations else {"workpieces"})
 
     def type_names(self) -> list[str]:
         """Materials in the order of the engine's types: particle, bowl, workpiece, each once."""

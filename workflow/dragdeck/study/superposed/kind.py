@@ -48,13 +48,15 @@ class EngineMotion:
 
     def ending(self, ending: str) -> "EngineMotion":
         """The same motion with an ending after the name of each of its variables."""
-        own = "|".join([*self.variables, "reference_[xyz]"])
-        name = re.compile(rf"(v_|\$\{{)({own})\b")
+        if not ending:
+            return self
+        names = "|".join([*self.variables, "reference_[xyz]"])
+        used = re.compile(rf"(v_|\$\{{)({names})\b")
 
         def renamed(text: str) -> str:
-            return type(text)(name.sub(rf"\g<0>{ending}", text)) if ending else text
+            return type(text)(used.sub(rf"\g<0>{ending}", text))
 
-        variables = {f"{own}{ending}": renamed(text) for own, text in self.variables.items()}
+        variables = {f"{name}{ending}": renamed(text) for name, text in self.variables.items()}
         return EngineMotion(variables, renamed(self.mover))
 
 
