@@ -87,7 +87,6 @@ STEPS = (
         _argument("scene", help="drop_test, filling or process"),
         _argument("run", help="run id, as `dragdeck cases` lists it"),
         _argument("--packing", type=Path, help="packing.json of the settled bed (process)"))),
-    Command("fields", "print the fields of a study file as a page", "study.field_page:show", ()),
     Command("drops", "run the drop tests that a calibration needs",
             "campaigns.restitution_drops:drops_command", (
                 STUDY, FIDELITY, OUT_DIR,

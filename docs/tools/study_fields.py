@@ -1,5 +1,6 @@
-"""The fields of a study file as a page, made from the model itself."""
+"""The fields of a study file as tables, made from the model itself."""
 
+import re
 import types
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -11,30 +12,21 @@ from pydantic_core import PydanticUndefined
 
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
 
-_INTRODUCTION = """# The study file
-
-`studies/<name>/study.yaml` is a YAML file. All values are in SI units; a value that is hardly
-meant in them gives a warning or is refused. Numbers are decimal and may be written as `5e6`;
-`0300` and `1:30` are refused. A key that is not listed here is refused. `*` stands for a name of
-your choice. Names of studies, materials and fidelities have up to 64 letters (a-z), digits, `.`,
-`_` and `-`, those of materials no `-`. Error messages, `sweep` and `assumptions` refer to a
-field by its dotted name, such as `motion.speed_m_s`. Coefficients, fractions and multipliers are
-dimensionless.
-
-`extends: <name>` at the top takes every field from another study of `studies/`; the file then
-states only what differs. Fields are replaced one by one, lists, `fidelity`, `sweep` and a part with
-another `kind` as a whole. Meshes and templates of the other study are found, too.
-
-This page is generated from the model: `./run dragdeck step fields > docs/study.md`.
-"""
+def fields() -> str:
+    """One row per field, in one table per top-level key that has fields of its own."""
+    groups: dict[str, list[tuple[str, str, str, str]]] = {}
+    for row in _rows(Study, ""):
+        head, dot, _ = row[0].partition(".")
+        groups.setdefault(re.sub(r"\[.*", "", head) if dot or "[" in head else "", []).append(row)
+    alone = groups.pop("", [])
+    parts = [_table(alone)]
+    parts += [f"### `{name}`\n\n{_table(rows)}" for name, rows in groups.items()]
+    return "\n\n".join(parts)
 
 
-def page() -> str:
-    """Return the page as Markdown."""
-    lines = [_INTRODUCTION, "| field | limits | default | meaning |", "| --- | --- | --- | --- |"]
-    for name, limits, default, meaning in _rows(Study, ""):
-        lines.append(f"| `{name}` | {limits} | {default} | {meaning} |")
-    lines += ["", "## Built-in fidelities", "", _fidelities(), ""]
+def _table(rows: list[tuple[str, str, str, str]]) -> str:
+    lines = ["| field | limits | default | meaning |", "| --- | --- | --- | --- |"]
+    lines += [f"| `{name}` | {limits} | {default} | {meaning} |" for name, limits, default, meaning in rows]
     return "\n".join(lines)
 
 
@@ -111,7 +103,8 @@ def _default(field: FieldInfo) -> str:
     return f"{field.default!r}"
 
 
-def _fidelities() -> str:
+def fidelities() -> str:
+    """The built-in fidelities and their settings."""
     names = list(Fidelity.model_fields)
     lines = ["| name | " + " | ".join(names) + " |", "| --- " * (len(names) + 1) + "|"]
     for name, fidelity in BUILT_IN_FIDELITIES.items():
@@ -119,8 +112,3 @@ def _fidelities() -> str:
         shown = ["none" if value is None else f"{value:g}" for value in values]
         lines.append(f"| `{name}` | " + " | ".join(shown) + " |")
     return "\n".join(lines)
-
-
-def show() -> None:
-    """Print the page."""
-    print(page(), end="")

@@ -1,4 +1,4 @@
-"""Draw the figures of the documentation from the records in docs/data: python docs/figures.py."""
+"""The figures of the documentation, drawn from the records: python docs/tools --figures."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from dragchain.figures.style import BLUE, ORANGE, drawing, png
 from dragchain.statistics.estimate import student_quantile
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).resolve().parents[1]
 PACKINGS = 3
 """Of each level of the spin."""
 
@@ -37,12 +37,9 @@ def spin() -> Figure:
 FIGURES: dict[str, Callable[[], Figure]] = {"spin": spin}
 
 
-def main() -> None:
-    """Draw all of them."""
+def draw_all() -> None:
+    """Draw all figures into docs/images."""
     with drawing():
         for name, draw in FIGURES.items():
             (DOCS / "images" / f"{name}.png").write_bytes(png(draw()))
 
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,28 @@
+"""Settings of Sphinx for the documentation: ./run docs."""
+
+from importlib.metadata import version as version_of
+
+project = "dragdeck"
+author = "The developers of dragdeck"
+project_copyright = f"2026, {author}"
+release = version = version_of("dragdeck")
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_copybutton"]
+exclude_patterns = ["tools", "data"]
+nitpicky = False
+
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "amsmath"]
+myst_heading_anchors = 4
+numpydoc_show_class_members = False
+autodoc_typehints = "none"
+copybutton_prompt_text = r"\$ "
+
+html_theme = "pydata_sphinx_theme"
+html_title = "dragdeck"
+html_show_sourcelink = False
+html_theme_options = {
+    "navigation_with_keys": False,
+    "show_nav_level": 1,
+    "show_toc_level": 2,
+    "secondary_sidebar_items": ["page-toc"],
+}

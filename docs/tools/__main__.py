@@ -1,0 +1,33 @@
+"""Make what the pages take from records, and draw the figures: python docs/tools [--check] [--figures].
+
+Without options, every block of every page is made anew (see `blocks`). ``--check`` only says which
+pages would change.
+"""
+
+import argparse
+import sys
+
+from pages import changed_pages
+from figures import draw_all
+
+
+def main() -> int:
+    """Do what the options ask for; 1 if a check found a page that is not up to date."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--check", action="store_true", help="change nothing, list stale pages")
+    parser.add_argument("--figures", action="store_true", help="draw the figures, too")
+    parser.add_argument("page", nargs="*", help="only pages whose path contains this")
+    options = parser.parse_args()
+    stale = False
+    for page, text in changed_pages(options.page):
+        stale = True
+        print(page)
+        if not options.check:
+            page.write_text(text, encoding="utf-8")
+    if options.figures:
+        draw_all()
+    return int(options.check and stale)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

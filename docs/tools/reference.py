@@ -1,0 +1,224 @@
+"""Texts of the reference pages that are made from the code."""
+
+import argparse
+import ast
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from pybtex.database import parse_file
+from pybtex.plugin import find_plugin
+from study_fields import fidelities, fields
+
+from dragchain import cli as dragchain_cli
+from dragchain.tables.meanings import _UNITS as UNITS
+from dragchain.tables.meanings import _rows, columns_of, descriptions, unit_end
+from dragdeck import cli as dragdeck_cli
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+
+
+# --- command line --------------------------------------------------------------------
+
+
+def commands(parser: argparse.ArgumentParser) -> str:
+    """Every command of a program with its arguments."""
+    return "\n\n".join(_commands(parser))
+
+
+def _commands(parser: argparse.ArgumentParser) -> Iterator[str]:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield from _commands(command)
+            return
+    program = parser.prog
+    usage = " ".join(parser.format_usage().split()).removeprefix("usage: ")
+    yield f"### `{program}`\n\n{_sentence(parser.description or '')}\n\n```text\n{usage}\n```"
+    rows = [
+        [f"`{_names(action)}`", (action.help or "").replace("%(default)s", str(action.default)).replace("|", "\\|")]
+        for action in parser._actions
+        if "--help" not in action.option_strings
+    ]
+    if rows:
+        yield _table(["argument", "meaning"], rows)
+
+
+def _names(action: argparse.Action) -> str:
+    if not action.option_strings:
+        return str(action.metavar or action.dest)
+    value = "" if action.nargs == 0 else f" {action.metavar or action.dest.upper()}"
+    return ", ".join(action.option_strings) + value
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+
+
+# --- results --------------------------------------------------------------------------
+
+
+def columns(table: str) -> str:
+    """The columns of a table: name, unit, meaning."""
+    rows = []
+    for name in columns_of(table):
+        text = descriptions(name).get(table, "")
+        rows.append([f"`{name}`", _unit(name), text])
+    return _table(["column", "unit", "meaning"], rows)
+
+
+def _unit(name: str) -> str:
+    return UNITS.get(unit_end(name.removesuffix("*")), "")
+
+
+def all_columns() -> str:
+    """A section for each table."""
+    tables = dict.fromkeys(table for _, tables, _ in _rows() for table in tables)
+    return "\n\n".join(f"### `{table}`\n\n{columns(table)}" for table in tables)
+
+
+# --- documents -------------------------------------------------------------------------
+
+
+def contracts() -> str:
+    """A section for each document, made from its schema."""
+    files = sorted((ROOT / "contract").glob("*.schema.json"))
+    return "\n\n".join(_document(file) for file in files)
+
+
+def _document(file: Path) -> str:
+    schema = json.loads(file.read_text())
+    name = file.name.removesuffix(".schema.json")
+    parts = [f"## `{name}`", _first(schema), _keys(schema)]
+    for part, inner in schema.get("$defs", {}).items():
+        parts += [f"**{part}**: {_first(inner)}", _keys(inner)]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _first(schema: dict[str, Any]) -> str:
+    """The first paragraph of what a schema says of itself."""
+    return " ".join(str(schema.get("description", "")).partition("\n\n")[0].split())
+
+
+def _keys(schema: dict[str, Any]) -> str:
+    required = schema.get("required", [])
+    said = _attributes(str(schema.get("description", "")))
+    rows = [
+        [f"`{key}`", _type(inner), "yes" if key in required else "no", said.get(key, "")]
+        for key, inner in schema.get("properties", {}).items()
+    ]
+    return _table(["key", "type", "required", "meaning"], rows) if rows else ""
+
+
+def _type(schema: dict[str, Any]) -> str:
+    """The type of a value in words."""
+    if "$ref" in schema:
+        return schema["$ref"].rsplit("/", 1)[-1]
+    if "const" in schema:
+        return f"`{schema['const']}`"
+    if "enum" in schema:
+        return " or ".join(f"`{value}`" for value in schema["enum"])
+    if "anyOf" in schema or "oneOf" in schema:
+        return " or ".join(_type(one) for one in schema.get("anyOf", schema.get("oneOf")))
+    kind = str(schema.get("type", "any"))
+    if kind == "array":
+        return f"list of {_type(schema['items'])}" if "items" in schema else "list"
+    if kind == "object":
+        inner = schema.get("additionalProperties")
+        return f"mapping to {_type(inner)}" if isinstance(inner, dict) else "mapping"
+    return kind
+
+
+def _attributes(text: str) -> dict[str, str]:
+    """What a docstring says of each attribute."""
+    _, found, text = text.partition("Attributes\n----------\n")
+    said = {}
+    for names, body in re.findall(r"^(\S[^:\n]*?) : [^\n]*\n((?:[ ]+[^\n]*\n?)*)", text, re.M):
+        for name in names.split(", "):
+            said[name] = " ".join(body.split())
+    return said if found else {}
+
+
+# --- messages ---------------------------------------------------------------------------
+
+
+def messages() -> str:
+    """Every error that the packages raise on purpose, by the file that raises it."""
+    parts = []
+    for package in ("workflow/dragdeck", "analysis/dragchain"):
+        for file in sorted((ROOT / package).rglob("*.py")):
+            rows = [[_cell(one) for one in row] for row in raised(file.read_text())]
+            if rows:
+                name = str(file.relative_to(ROOT / Path(package).parent))
+                heads = ["message", "limit", "remedy"]
+                parts.append(f"## `{name}`\n\n{_table(heads, list(dict.fromkeys(map(tuple, rows))))}")
+    return "\n\n".join(parts)
+
+
+ERRORS = re.compile(r"^(_?[a-z_]*error|[A-Z]\w*Error|Refusal|EngineEnded)$")
+
+
+def raised(source: str) -> Iterator[tuple[str, str, str]]:
+    """Message, limit and remedy of every error that a module makes; a dot stands for a value."""
+    for node in ast.walk(ast.parse(source)):
+        name = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+        if not ERRORS.match(name) or name in ("ValueError", "TypeError", "AttributeError"):
+            continue
+        assert isinstance(node, ast.Call)
+        texts = [text for argument in node.args if (text := _text(argument))]
+        given = {item.arg: _text(item.value) for item in node.keywords if item.arg}
+        texts += [given[key] for key in ("problem", "message") if given.get(key)]
+        if texts:
+            message = max(texts, key=len)
+            yield message, given.get("limit") or "", given.get("remedy") or ""
+
+
+def _text(node: ast.expr) -> str:
+    """A text as it stands in the code, with an ellipsis for each value."""
+    if isinstance(node, ast.Constant):
+        return node.value if isinstance(node.value, str) else ""
+    if isinstance(node, ast.JoinedStr):
+        return "".join(_text(part) or "…" for part in node.values)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        return _text(node.left) + _text(node.right)
+    if isinstance(node, ast.IfExp):
+        return " / ".join(filter(None, (_text(node.body), _text(node.orelse))))
+    return ""
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
+
+
+# --- bibliography ------------------------------------------------------------------------
+
+
+def bibliography() -> str:
+    """Every source, under an anchor of its key."""
+    entries = parse_file(str(ROOT / "docs/references.bib"))
+    style = find_plugin("pybtex.style.formatting", "plain")()
+    backend = find_plugin("pybtex.backends", "markdown")()
+    formatted = sorted(style.format_entries(entries.entries.values()), key=lambda one: one.key)
+    return "\n\n".join(
+        f"## {one.key}\n\n{one.text.render(backend)}" for one in formatted
+    )
+
+
+TEXTS: dict[str, Callable[[], str]] = {
+    "study_fields": fields,
+    "built_in_fidelities": fidelities,
+    "dragdeck_commands": lambda: commands(dragdeck_cli._parser()),
+    "dragchain_commands": lambda: commands(dragchain_cli._parser()),
+    "columns": all_columns,
+    "contracts": contracts,
+    "messages": messages,
+    "bibliography": bibliography,
+}
+"""What a block ``text`` can name."""
