@@ -129,3 +129,6 @@ STORE = Store()
 def table(name: str) -> pd.DataFrame:
     """A table of the committed records."""
     return STORE.table(name)
+
+
+import derived_explanation  # noqa: E402, F401
