@@ -90,3 +90,10 @@ def _stiffness(store: Store) -> pd.DataFrame:
     for prefix, part in zip(("first", "second", "full"), parts, strict=True):
         rows = rows.join(part.add_prefix(f"{prefix}_"))
     return rows.reset_index()
+
+
+@derived("timestep/law")
+def _law(store: Store) -> pd.DataFrame:
+    """The law of the stability number, its largest deviation upwards as a fraction."""
+    found = store.table("stiffness/stable_step")
+    return found.assign(largest_fraction=found["largest"].map(math.expm1))

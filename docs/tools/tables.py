@@ -132,3 +132,7 @@ def table(name: str) -> pd.DataFrame:
 
 
 import derived_explanation  # noqa: E402, F401
+import derived_cost  # noqa: E402, F401
+import derived_settings  # noqa: E402, F401
+import derived_validation  # noqa: E402, F401
+import derived_tradeoff  # noqa: E402, F401
