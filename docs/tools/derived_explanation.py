@@ -5,6 +5,7 @@ import math
 import pandas as pd
 
 from dragchain.contact_law.hertz import tangential_damping_ratio
+from dragchain.statistics.estimate import student_quantile
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, full_stiffness_number
 from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear, shear_modulus
 from dragdeck.physics.damping import damping_ratio
@@ -97,3 +98,11 @@ def _law(store: Store) -> pd.DataFrame:
     """The law of the stability number, its largest deviation upwards as a fraction."""
     found = store.table("stiffness/stable_step")
     return found.assign(largest_fraction=found["largest"].map(math.expm1))
+
+
+@derived("statistics/quantiles")
+def _quantiles(store: Store) -> pd.DataFrame:
+    """Half-width of a 95 % interval in standard errors, by the number of packings."""
+    return pd.DataFrame(
+        {"packings": count, "quantile": student_quantile(count - 1)} for count in (2, 3, 4, 8)
+    )

@@ -60,6 +60,11 @@ def settings_cell(setting: Row) -> str:
     return text if speed == 1 else f"{text}, speed x {speed:g}"
 
 
+def _modulus_name(scale: float) -> str:
+    """Column of a factor on Young's modulus: ``m2`` for 0.01."""
+    return f"m{round(-math.log10(scale))}"
+
+
 def _settings(store: Store) -> list[Row]:
     found: list[Row] = store.record("tradeoff")["settings"]
     return found
@@ -103,7 +108,7 @@ def _modulus(store: Store) -> pd.DataFrame:
     for quantity in store.record("tradeoff")["quantities"]:
         row = {"quantity": quantity, "label": LABELS[quantity]}
         for setting in plain:
-            name, error = f"e{setting['youngs_modulus_scale']:g}", setting["errors"][quantity]
+            name, error = _modulus_name(setting["youngs_modulus_scale"]), setting["errors"][quantity]
             row |= {f"{name}_{key}": value for key, value in error.items()}
             row[name] = error_cell(error)
         rows.append(row)
@@ -285,7 +290,7 @@ def _cells(rows: pd.DataFrame) -> pd.DataFrame:
 # --- extrapolation ---------------------------------------------------------------------------
 
 
-_PLANS = {frozenset({"0.001"}): "e0.001", frozenset({"0.01"}): "e0.01", frozenset({"0.001", "0.01"}): "both"}
+_PLANS = {frozenset({"0.001"}): "m3", frozenset({"0.01"}): "m2", frozenset({"0.001", "0.01"}): "both"}
 
 
 def _extrapolations(rows: Iterable[Row], laws: Iterable[str]) -> pd.DataFrame:
@@ -339,7 +344,7 @@ def _checks(store: Store) -> pd.DataFrame:
     """One row per quantity: change predicted by the law and measured, at two moduli."""
     rows: dict[str, dict[str, Any]] = {}
     for check in store.record("stiffness")["checks"]:
-        name, plan = check["quantity"], f"e{check['scale']:g}"
+        name, plan = check["quantity"], _modulus_name(check["scale"])
         own = rows.setdefault(name, {"quantity": name, "label": LABELS[name]})
         own[f"{plan}_law"], own[f"{plan}_measured"] = check["predicted"], error_cell(
             {"value": check["measured"], **check}
@@ -438,7 +443,8 @@ def _merged(store: Store) -> pd.DataFrame:
         own = found.setdefault(
             row["quantity"], {"quantity": row["quantity"], "label": LABELS[row["quantity"]]}
         )
-        own |= {f"e{row['youngs_modulus_scale']:g}_{key}": row[key] for key in ("change", "corrected", "half_width")}
+        name = _modulus_name(row["youngs_modulus_scale"])
+        own |= {f"{name}_{key}": row[key] for key in ("change", "corrected", "half_width")}
     return pd.DataFrame(found.values())
 
 

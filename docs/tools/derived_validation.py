@@ -44,15 +44,6 @@ QUANTITIES = {
     "coverage": "fraction of the peaks with a strong chain nearby",
     "reverse": "fraction of the strong chains with a peak nearby",
     "orientation": "resultant length of the azimuths (1: all parallel)",
-    "mean_contacts": "loaded contacts on the workpiece at one time",
-    "normal_impulse_n_s": "normal impulse per path length",
-    "sliding_m": "sliding distance of all contacts per path length",
-    "force_slide_n_m": "Archard load-distance integral per path length",
-    "friction_work_j": "friction work per path length",
-    "friction_fraction_of_work": "friction work / work done by the workpiece",
-    "front_fraction_normal_impulse": "fraction of the normal impulse on the front half",
-    "front_fraction_force_slide": "fraction of the load-distance integral on the front half",
-    "load_while_sliding_fraction": "fraction of the normal impulse carried while sliding",
 }
 
 
@@ -121,11 +112,6 @@ def _peak_fractions(store: Store) -> pd.DataFrame:
     """The tests of fractions and of the orientation."""
     table = _worded(store.table("validation/peak_tests"), "test", QUANTITIES)
     return table[table["effect"].isna()]
-
-
-@derived("validation/loads")
-def _loads(store: Store) -> pd.DataFrame:
-    return _worded(store.table("validation/load"), "label", QUANTITIES)
 
 
 # --- stability ---------------------------------------------------------------------------------
