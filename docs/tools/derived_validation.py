@@ -114,6 +114,19 @@ def _peak_fractions(store: Store) -> pd.DataFrame:
     return table[table["effect"].isna()]
 
 
+@derived("verification/excess")
+def _excess(store: Store) -> pd.DataFrame:
+    """Excess of the tangential impulse as a range."""
+    table = store.table("verification/coulomb_excess")
+    spans = [
+        f"{row.bound if isinstance(row.bound, str) else ''} "
+        + _span(100 * row.excess_low, 100 * row.excess_high, "{:g} %")
+        for row in table.assign(excess_low=table["excess_low"].fillna(table["excess_high"])).itertuples()
+    ]
+    remarks = [f"({remark})" if isinstance(remark, str) else "" for remark in table["remark"]]
+    return table.assign(excess=spans, remark=remarks)
+
+
 # --- stability ---------------------------------------------------------------------------------
 
 REGIMES = {
@@ -177,14 +190,9 @@ def _forecast_error(store: Store) -> pd.DataFrame:
     return pd.DataFrame([{"lowest": errors.min(), "highest": errors.max()}])
 
 
-@derived("stability/law")
-def _law(store: Store) -> pd.DataFrame:
-    """The law of the stability number: constants, scatter, largest deviation upwards."""
-    law = dict(store.record("stiffness")["stable_step"])
-    kappa, restitution = law.pop("stiffness_numbers"), law.pop("restitutions")
-    numbers = {"kappa_low": kappa[0], "kappa_high": kappa[1]}
-    numbers |= {"restitution_low": restitution[0], "restitution_high": restitution[1]}
-    return pd.DataFrame([law | numbers | {"upwards": math.expm1(law["largest"])}])
+@derived("stability/engine_minutes")
+def _engine_minutes(store: Store) -> pd.DataFrame:
+    return pd.DataFrame({"minutes": store.table("stability")["engine_wall_time_s"] / 60})
 
 
 # --- motion ------------------------------------------------------------------------------------

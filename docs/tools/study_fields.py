@@ -11,6 +11,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
+from dragdeck.study.plausible import _RANGES as RANGES
 
 def fields() -> str:
     """One row per field, in one table per top-level key that has fields of its own."""
@@ -75,7 +76,7 @@ _SIGNS = {Gt: ("above", "gt"), Ge: ("at least", "ge"), Lt: ("below", "lt"), Le: 
 
 def _limits(field: FieldInfo) -> str:
     if get_origin(field.annotation) is Literal:
-        return " or ".join(repr(value) for value in get_args(field.annotation))
+        return " or ".join(f"`{value}`" for value in get_args(field.annotation))
     parts = get_args(field.annotation) if _is_union(field.annotation) else ()
     parts = tuple(part for part in parts if part is not types.NoneType)
     if parts and all(get_origin(part) is Annotated for part in parts):
@@ -103,7 +104,7 @@ def _default(field: FieldInfo) -> str:
         return "required"
     if field.default is PydanticUndefined or field.default is None:
         return "none"
-    return f"{field.default!r}"
+    return f"`{field.default}`" if isinstance(field.default, str) else f"{field.default!r}"
 
 
 def fidelities() -> str:
@@ -114,4 +115,13 @@ def fidelities() -> str:
         values = [getattr(fidelity, field) for field in names]
         shown = ["none" if value is None else f"{value:g}" for value in values]
         lines.append(f"| `{name}` | " + " | ".join(shown) + " |")
+    return "\n".join(lines)
+
+
+def plausible_ranges() -> str:
+    """The values that give a warning, those that are refused, and the units that are tried."""
+    lines = ["| field | warning outside | refused outside | other units tried |", "| --- | --- | --- | --- |"]
+    for name, one in RANGES.items():
+        usual, known = f"{one.low:g} to {one.high:g}", f"{one.least:g} to {one.most:g}"
+        lines.append(f"| `{name}` | {usual} | {known} | {', '.join(one.slips)} |")
     return "\n".join(lines)
