@@ -131,7 +131,7 @@ def content(block: Block, records: Records) -> str:
 
 def _row(what: str, records: Records) -> str:
     query, _, template = what.partition(" : ")
-    rows = list(_rows(query, records))
+    rows = list(selected(query, records))
     if len(rows) != 1:
         raise ValueError(f"{len(rows)} rows instead of one")
     return template.strip().format(**rows[0])
@@ -148,12 +148,12 @@ def _table(what: str, records: Records) -> str:
     lines = [heads, rules]
     lines += [
         [template.format(**row) for template in templates]
-        for row in _rows(first.removeprefix("table "), records)
+        for row in selected(first.removeprefix("table "), records)
     ]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 
-def _rows(query: str, records: Records) -> Iterator[dict[str, Any]]:
+def selected(query: str, records: Records) -> Iterator[dict[str, Any]]:
     """The rows of a table that have the values of a query."""
     name, *conditions = shlex.split(query)
     table, labels = records.table(name), records.labels(name)

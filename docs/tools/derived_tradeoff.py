@@ -12,6 +12,7 @@ from dragchain.report.notation import MINUS
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import said
 from dragchain.statistics.estimate import student_quantile
+from dragchain.tradeoff.notation import in_percent
 from dragchain.tradeoff.quantities import QUANTITIES
 from dragdeck.advice.advise import advise
 from dragdeck.advice.options import Option
@@ -22,6 +23,9 @@ from dragdeck.study.model import Tolerance
 LABELS = {quantity.name: quantity.label for quantity in QUANTITIES}
 SCATTER = 1.96
 """Half-width of a 95 % interval in standard deviations, as the advisor takes it."""
+
+FOLD = 2
+"""Relative errors from this on are shown as multiples."""
 
 Row = Mapping[str, Any]
 
@@ -35,17 +39,17 @@ def percent(value: float, digits: int = 1) -> str:
     return text if float(text) else text[1:]
 
 
-def error_cell(error: Row) -> str:
+def error_cell(error: Row, shown: Callable[[float], str] = percent, fold: float = FOLD) -> str:
     """An error with its interval in per cent; its interval alone if that includes zero.
 
     A table that was typed in has no value where the interval includes zero.
     """
-    ends = f"({percent(error['ci95_low'])} to {percent(error['ci95_high'])})"
+    ends = f"({shown(error['ci95_low'])} to {shown(error['ci95_high'])})"
     if math.isnan(error["value"]) or error["ci95_low"] < 0 < error["ci95_high"]:
         return f"n.s. {ends}"
-    if error["value"] >= 2:
+    if error["value"] >= fold:
         return f"{1 + error['value']:.0f}-fold"
-    return f"{percent(error['value'])} {ends}"
+    return f"{shown(error['value'])} {ends}"
 
 
 def fold(ratio: float) -> str:
@@ -274,6 +278,10 @@ def _half_widths(store: Store) -> pd.DataFrame:
     return pd.DataFrame([{"low": half.min(), "high": half.max()}])
 
 
+def _coarsely(value: float) -> str:
+    return in_percent(value).replace(MINUS, "-")
+
+
 def _cells(rows: pd.DataFrame) -> pd.DataFrame:
     """A column of text for each quantity that has a value and an interval; empty if not measured."""
     shown = rows.copy()
@@ -281,7 +289,11 @@ def _cells(rows: pd.DataFrame) -> pd.DataFrame:
         shown[name] = [
             ""
             if math.isnan(row[f"{name}_ci95_low"])
-            else error_cell({key: row[f"{name}_{key}"] for key in ("value", "ci95_low", "ci95_high")})
+            else error_cell(
+                {key: row[f"{name}_{key}"] for key in ("value", "ci95_low", "ci95_high")},
+                _coarsely,
+                math.inf,
+            )
             for row in rows.to_dict("records")
         ]
     return shown
@@ -306,7 +318,8 @@ def _extrapolations(rows: Iterable[Row], laws: Iterable[str]) -> pd.DataFrame:
                 "used": "yes" if name in laws else "no",
             },
         )
-        own[f"{plan}_raw"] = row["raw_root_mean_square"]
+        raw = own[f"{plan}_raw"] = row["raw_root_mean_square"]
+        own[f"{plan}_as_is"] = f"{100 * raw:.0f}" if raw >= 1 else f"{100 * raw:.2g}"
         own[f"{plan}_corrected"] = row["root_mean_square"]
         own[f"{plan}_inside"], own[f"{plan}_scenes"] = row["inside"], row["scenes"]
         own[plan] = f"{100 * row['root_mean_square']:.2g} ({row['inside']:g} of {row['scenes']:g})"
@@ -531,7 +544,7 @@ def _scaling(store: Store) -> pd.DataFrame:
             row |= {f"{end}_{key}": value for key, value in level.items() if not isinstance(value, dict)}
         if found["shifted"]:
             offset, terms = found["shifted"]["offset"], found["two_terms"]
-            diameter = 1e3 * found["scene"]["particle_diameter_m"]
+            diameter = 2e3 * _base().media.radius_mean_m
             row |= {
                 "offset": _with_interval(
                     {key: 1e3 * value for key, value in offset.items()}, lambda value: f"{value:.1f}"
@@ -611,8 +624,8 @@ def _common(store: Store) -> pd.DataFrame:
                 "packings": len(runs),
                 "drag_n": drag.mean(),
                 "drag_half_width_n": reach * drag.std(ddof=1),
-                "drag_std": drag.std(ddof=1) / drag.mean(),
-                "standard_error": np.mean([run["standard_error_n"] for run in runs]) / drag.mean(),
+                "drag_std_n": drag.std(ddof=1),
+                "standard_error_n": np.mean([run["standard_error_n"] for run in runs]),
                 "eta": eta.mean(),
                 "eta_half_width": reach * eta.std(ddof=1),
                 "cpu_minutes": store.table("scaling/summary")["cpu_minutes"].sum(),
@@ -629,15 +642,15 @@ SOLID_FRACTION, STRESS_RATIO = 0.6, 0.6
 """Assumed in the estimates: solid fraction of the bed, horizontal over vertical stress."""
 
 
-@derived("scaling/estimates")
+@derived("study/drag_estimates")
 def _estimates(store: Store) -> pd.DataFrame:
-    """One row: friction on the flat tip, and what Janssen's screening does to the exponent of the depth."""
+    """One row, from inputs: friction on the tip, and the effect of Janssen's screening on the exponent of the depth."""
     base = _base()
     depth, radius = base.motion.immersion_depth_m, base.workpiece.shape.radius_m
     friction = base.pairs["ceramic-steel"].friction
     weight = base.materials["ceramic"].density_kg_m3 * 9.81 * SOLID_FRACTION
     length = base.bowl.radius_m / (2 * friction * STRESS_RATIO)
-    levels = np.array([one["x"] for one in store.record("scaling/drag-depth")["levels"]])
+    levels = np.unique([case.study.motion.immersion_depth_m for case in Project(ROOT).cases("drag-depth")])
     screened = levels - length * (1 - np.exp(-levels / length))
     return pd.DataFrame(
         [

@@ -127,6 +127,44 @@ def _excess(store: Store) -> pd.DataFrame:
     return table.assign(excess=spans, remark=remarks)
 
 
+# --- calibration -------------------------------------------------------------------------------
+
+
+@derived("calibration/rebounds")
+def _rebounds(store: Store) -> pd.DataFrame:
+    """Effective by entered restitution, one column per fidelity, purpose and contact option."""
+    table = store.table("calibration/bias")
+    limit = table["limit_force"].map({True: "limited", False: "unlimited"})
+    columns = table["fidelity"] + "_" + table["purpose"] + "_" + limit
+    wide = table.assign(column=columns).pivot(
+        index="restitution_entered", columns="column", values="restitution_effective"
+    )
+    return wide.dropna().reset_index()
+
+
+@derived("calibration/put_for")
+def _put_for(store: Store) -> pd.DataFrame:
+    """The value to enter by settings, with the contact option in words."""
+    table = store.table("calibration/entered_values")
+    full = table["purpose"] == "reference"
+    return table.assign(
+        limit=table["limit_force"].map({True: "on", False: "off"}),
+        settings=table["fidelity"].map("`{}`".format).mask(full, "physical modulus, 1 % step"),
+    )
+
+
+@derived("calibration/scatter")
+def _scatter(store: Store) -> pd.DataFrame:
+    """Largest deviation of a single production impact from the mean, per fidelity."""
+    table = store.table("calibration/bias")
+    limited = table[(table["purpose"] == "production") & table["limit_force"]]
+    highest = limited["highest"] - limited["restitution_effective"]
+    lowest = limited["restitution_effective"] - limited["lowest"]
+    largest = pd.Series(np.maximum(highest, lowest)).groupby(limited["fidelity"]).max()
+    elastic = limited[limited["restitution_entered"] == 1].set_index("fidelity")["highest"]
+    return pd.DataFrame({"largest": largest, "elastic": elastic}).reset_index()
+
+
 # --- stability ---------------------------------------------------------------------------------
 
 REGIMES = {
@@ -228,15 +266,33 @@ def _neighbours(store: Store) -> pd.DataFrame:
 
 @derived("motion/workpieces")
 def _workpieces(store: Store) -> pd.DataFrame:
-    """One row per workpiece, with its arrangement in words."""
+    """One row per workpiece: how many there are, its number, its packing."""
     table = store.table("motion/carousel")
     cases = table["case"]
-    count = cases.str.extract(r"count-(\d)")[0].map({"1": "one", "3": "three"})
     return table.assign(
-        count=count,
-        workpiece=cases.str.extract(r"workpiece-(\d)")[0].fillna(""),
+        count=cases.str.extract(r"count-(\d)")[0].map({"1": "single", "3": "of three"}),
+        workpiece=cases.str.extract(r"workpiece-(\d)")[0].fillna("1"),
         packing=cases.str.extract(r"seed-(\d)")[0].fillna("1"),
+        wake=[
+            _with_span(row.drag_wake_ratio, row.drag_wake_ratio_ci95_low, row.drag_wake_ratio_ci95_high)
+            for row in table.itertuples()
+        ],
     )
+
+
+def _with_span(value: float, low: float, high: float) -> str:
+    return "" if math.isnan(value) else f"{value:.2f} ({low:.2f} to {high:.2f})"
+
+
+@derived("motion/gaps")
+def _gaps(store: Store) -> pd.DataFrame:
+    """Clear distance between three workpieces at equal angles, in particle diameters."""
+    rows = []
+    for name in ("carousel", "carousel-wide"):
+        study = Project(ROOT).cases(name)[0].study
+        apart = math.sqrt(3.0) * study.motion.path.radius_m - 2 * study.workpiece.shape.radius_m
+        rows.append({"study": name, "gap_diameters": apart / (2 * study.media.radius_mean_m)})
+    return pd.DataFrame(rows)
 
 
 @derived("motion/spins")
