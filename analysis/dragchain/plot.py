@@ -1,8 +1,8 @@
-"""Plots of a run, each on the axes that are given, or on axes of a new figure.
+"""Plots of a run, on given axes or on axes of a new figure.
 
-The panels of the report are the same. Every function returns its axes; the run is one of
-`dragchain.load`. Fonts and sizes are those of Matplotlib's settings. A table that was not made
-raises `TableError`, which names the command that makes it.
+Every function takes a run from `dragchain.load` and returns its axes. Fonts and sizes are those of
+Matplotlib's settings. A table that was not made raises `TableError`, which names the command that
+makes it. The panels of the report are the same.
 """
 
 from typing import Any
@@ -21,13 +21,14 @@ _BIN = 0.25
 
 
 def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axes:
-    """Drag and lateral force (N) over process time (s), means and published means.
+    """Drag and lateral force (N) over process time (s), with their means and published means.
 
     Parameters
     ----------
     run : FinishedRun
         A process run.
     ax : Axes, optional
+        Axes to draw on.
     peaks : bool
         Mark the peaks of the drag.
     """
@@ -48,6 +49,7 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
     run : FinishedRun
         A process run.
     ax : Axes, optional
+        Axes to draw on.
     peaks : bool
         Draw a line at the time of each peak of the drag.
     """
@@ -59,14 +61,21 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
 
 
 def force_around(run: FinishedRun, ax: Any = None) -> Any:
-    """Mean normal force (N per bin) around the workpiece with 95 % intervals, ahead up.
+    """Mean normal force around the workpiece (N per bin) with 95 % confidence intervals.
+
+    The direction of motion points upwards.
 
     Parameters
     ----------
     run : FinishedRun
         A process run.
     ax : PolarAxes, optional
-        ``plt.subplots(subplot_kw={"projection": "polar"})`` makes them; `ValueError` for others.
+        ``plt.subplots(subplot_kw={"projection": "polar"})`` makes them.
+
+    Raises
+    ------
+    ValueError
+        If the axes are not polar.
     """
     around, ax = run.findings.azimuth, _axes(ax, projection="polar")
     if ax.name != "polar":
@@ -76,13 +85,14 @@ def force_around(run: FinishedRun, ax: Any = None) -> Any:
 
 
 def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = False) -> Axes:
-    """Mean normal force per contact (N) over depth (mm) with 95 % intervals.
+    """Mean normal force per contact (N) over depth (mm) with 95 % confidence intervals.
 
     Parameters
     ----------
     run : FinishedRun
         A process run.
     ax : Axes, optional
+        Axes to draw on.
     total : bool
         Draw the sum of the normal forces per depth (N/mm) instead.
     """
@@ -95,7 +105,14 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
 def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
     """Fraction of the force chains by number of particles, for both definitions.
 
-    Widest paths count if they reach the bowl.
+    Of the widest paths, only those that reach the bowl are included.
+
+    Parameters
+    ----------
+    run : FinishedRun
+        A process run.
+    ax : Axes, optional
+        Axes to draw on.
     """
     chains = run.table("chains", ["definition", "n_particles", "reaches_bowl"])
     ax = _axes(ax)
@@ -119,9 +136,14 @@ def contact_forces(run: FinishedRun, ax: Axes | None = None, *, kind: str | None
     run : FinishedRun
         A process run; its network frames in the statistics are used.
     ax : Axes, optional
+        Axes to draw on.
     kind : str, optional
         Bodies of the contacts, such as ``particle-workpiece``; all contacts by default.
-        `UnknownNameError` if there are none of it.
+
+    Raises
+    ------
+    UnknownNameError
+        If there are no contacts of this kind.
     """
     contacts = run.table("contacts", ["step", "kind", "normal_force_n"])
     contacts = contacts[contacts["step"].isin(run.network["step"])]

@@ -64,9 +64,12 @@ def _table(name: str, rows: str) -> "cached_property[pd.DataFrame]":
 class FinishedRun(RunData):
     """A run with its tables, each read when it is first used and kept.
 
+    Reading a table that was not made raises `TableError`, which names the command that makes it.
+
     Attributes
     ----------
     folder : Path
+        The run folder.
     case : Case
         What the run models: ``case.json``.
     force, workpiece_contacts, facets, events : DataFrame
@@ -76,8 +79,7 @@ class FinishedRun(RunData):
     impacts : DataFrame
         Of a drop test.
     thermo : DataFrame
-
-    Reading a table that was not made raises `TableError`, which names the command that makes it.
+        Energies of all particles; not of a drop test.
     """
 
     force = _table("workpiece_force", "sample")
@@ -110,15 +112,37 @@ class FinishedRun(RunData):
     def describe(self, column: str) -> str:
         """Meaning and unit of a column of the run's tables.
 
+        Parameters
+        ----------
+        column : str
+            Name of the column.
+
+        Returns
+        -------
+        str
+            One line, or one line per meaning if tables use the name differently.
+
         Raises
         ------
         UnknownNameError
-            If no table of the run has it.
+            If no table of the run has such a column.
         """
         return _describe(column, self.units, _TABLES[self.case.scene])
 
     def table(self, name: str, columns: list[str] | None = None) -> pd.DataFrame:
-        """Read a table, or some of its columns, by the name of its file without the ending.
+        """Read a table, or some of its columns.
+
+        Parameters
+        ----------
+        name : str
+            Name of the file without its ending, such as ``contacts``.
+        columns : list of str, optional
+            Columns to read; all by default.
+
+        Returns
+        -------
+        DataFrame
+            A new one with every call.
 
         Raises
         ------
@@ -143,8 +167,7 @@ class FinishedRun(RunData):
     def findings(self) -> ProcessFindings:
         """Means, profiles and peaks of a process run, as its report shows them.
 
-        Read from ``figures.json``, or computed where that was not made; the errors are those of
-        `write_findings`.
+        They are read from ``figures.json``, or computed if that was not made.
         """
         if self.case.scene != "process":
             raise TableError(f"{self.folder}: its scene is {self.case.scene}, not process")
@@ -154,12 +177,22 @@ class FinishedRun(RunData):
     def upstream(self, scene: Literal["filling", "drop_test"]) -> "FinishedRun":
         """The filling that a process run starts from, or its drop test.
 
+        Parameters
+        ----------
+        scene : {"filling", "drop_test"}
+            Which of the two.
+
+        Returns
+        -------
+        FinishedRun
+            That run.
+
         Raises
         ------
         UnknownNameError
-            If it has none.
+            If the run has none.
         DocumentError
-            If its folder is gone.
+            If its folder does not exist any more.
         """
         folders = upstream_folders(self.folder, self.case)
         if scene not in folders:
@@ -205,16 +238,26 @@ class Study:
         return _units([self._summary])
 
     def describe(self, column: str) -> str:
-        """Meaning and unit of a column of `summary`; `UnknownNameError` if it has no such one."""
+        """Meaning and unit of a column of `summary`; `UnknownNameError` for an unknown column."""
         return _describe(column, self.units, ("summary",))
 
     def run(self, name: str | None = None) -> FinishedRun:
-        """A run by the name of its case or its run id; without a name the only one.
+        """A run by the name of its case or its run id.
+
+        Parameters
+        ----------
+        name : str, optional
+            Not needed if the study has a single run.
+
+        Returns
+        -------
+        FinishedRun
+            The run.
 
         Raises
         ------
         UnknownNameError
-            If there is no such run, or no single one.
+            If there is no such run, or more than one.
         RejectedRunError
             If the run is not complete, or did not pass an acceptance check.
         """
@@ -246,8 +289,13 @@ def load(study: Path | str) -> Study:
     ----------
     study : Path or str
         Name of a study whose results are in ``results/`` of the working folder or of one above
-        it; or the path of ``results/<study>``, or of the folder of one run of any scene, which is
-        then the only one and need not be finished.
+        it; or the path of ``results/<study>``; or the folder of a single run of any scene, which
+        is then the only one and need not be finished.
+
+    Returns
+    -------
+    Study
+        The finished process runs with their tables.
 
     Raises
     ------

@@ -13,6 +13,7 @@ from pydantic_core import PydanticUndefined
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
 from dragdeck.study.plausible import _RANGES as RANGES
 
+
 def fields() -> str:
     """One row per field, in one table per top-level key that has fields of its own."""
     groups: dict[str, list[tuple[str, str, str, str]]] = {}
@@ -27,7 +28,10 @@ def fields() -> str:
 
 def _table(rows: list[tuple[str, str, str, str]]) -> str:
     lines = ["| field | limits | default | meaning |", "| --- | --- | --- | --- |"]
-    lines += [f"| `{name}` | {limits} | {default} | {meaning} |" for name, limits, default, meaning in rows]
+    lines += [
+        f"| `{name}` | {limits} | {default} | {meaning} |"
+        for name, limits, default, meaning in rows
+    ]
     return "\n".join(lines)
 
 
@@ -83,8 +87,11 @@ def _limits(field: FieldInfo) -> str:
         return " or ".join(filter(None, map(_limits_of_part, parts)))
     bounds = [(_SIGNS[type(item)], item) for item in field.metadata if type(item) in _SIGNS]
     found = [f"{words} {getattr(item, name):.10g}" for (words, name), item in bounds]
-    lengths = [getattr(item, "min_length", None) or item.max_length for item in field.metadata if type(item) in (MinLen, MaxLen)]
-    return ", ".join([*found, *([f"{' to '.join(map(str, lengths))} entries"] if lengths else [])])
+    lengths = [item.min_length for item in field.metadata if isinstance(item, MinLen)]
+    lengths += [item.max_length for item in field.metadata if isinstance(item, MaxLen)]
+    if lengths:
+        found.append(f"{' to '.join(map(str, lengths))} entries")
+    return ", ".join(found)
 
 
 def _is_union(annotation: Any) -> bool:
@@ -120,7 +127,8 @@ def fidelities() -> str:
 
 def plausible_ranges() -> str:
     """The values that give a warning, those that are refused, and the units that are tried."""
-    lines = ["| field | warning outside | refused outside | other units tried |", "| --- | --- | --- | --- |"]
+    heads = "| field | warning outside | refused outside | other units tried |"
+    lines = [heads, "| --- | --- | --- | --- |"]
     for name, one in RANGES.items():
         usual, known = f"{one.low:g} to {one.high:g}", f"{one.least:g} to {one.most:g}"
         lines.append(f"| `{name}` | {usual} | {known} | {', '.join(one.slips)} |")

@@ -16,7 +16,7 @@ from tables import STORE, Store
 
 INPUTS = {
     "youngs_modulus_scale", "timestep_fraction", "speed_factor", "tolerance", "level", "scale",
-    "schema", "seed", "confidence", "x", "revolutions",
+    "schema", "seed", "confidence", "x", "revolutions", "restitution_entered",
 }  # fmt: skip
 """Keys of what was chosen, not measured: rows are told apart by them."""
 

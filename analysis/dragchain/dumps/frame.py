@@ -32,19 +32,18 @@ class Layout(Protocol):
 
 @dataclass(frozen=True)
 class Frame:
-    """What an output holds at one step.
+    """The content of an output at one step.
 
     Attributes
     ----------
     step : int
         The step.
     columns : dict of str to (N,) ndarray
-        The columns by our names, N rows in no particular order; ids are int64,
-        all else is float64. N may be zero and may change between frames.
+        The columns, N rows in no particular order; ids are int64, all others float64.
+        N may be zero and may change between frames.
     opening : bool
-        Whether it is the first frame of its file. If a run starts on a step at
-        which frames are due, the engine writes one before it makes a step, and
-        the forces in it are evaluated anew rather than the applied ones.
+        Whether it is the first frame of its file. LIGGGHTS may write it before the first
+        step, with re-evaluated forces instead of the applied ones.
     """
 
     step: int
@@ -65,7 +64,7 @@ class Frame:
         return np.asarray(self.columns[name], dtype=np.int64)
 
     def take(self, order: NDArray[np.int64]) -> "Frame":
-        """The rows `order` in that order."""
+        """Some rows, in the given order."""
         columns: Columns = {name: values[order] for name, values in self.columns.items()}
         return Frame(self.step, columns, self.opening)
 

@@ -67,9 +67,8 @@ class Table:
 def write_tables(run_dir: Path | str) -> list[Path]:
     """Make the tables of a run.
 
-    Every table appears under its name only once it is whole. An output that
-    ``columns.json`` does not list was not written, and the tables that need it
-    are not made.
+    A table appears under its name only once it is complete. Tables that need an output
+    that ``columns.json`` does not list are not made.
 
     Parameters
     ----------
