@@ -190,6 +190,7 @@ def selected(query: str, records: Records) -> Iterator[dict[str, Any]]:
     """The rows of a table that have the values of a query."""
     name, *conditions = shlex.split(query)
     table, labels = records.table(name), records.labels(name)
+    labels = labels if len(labels) == len(table) else table
     chosen = pd.Series(True, index=labels.index)
     for condition in conditions:
         column, _, value = condition.partition("=")
