@@ -28,7 +28,7 @@ COUNTS = {
 """Columns of numbers of rows: they follow the rows of a record, not its numbers."""
 
 TEXTS = {
-    "change", "engine", "facets", "label", "levels", "measured", "number_high", "number_low",
+    "change", "engine", "facets", "label", "levels", "map", "measured", "number_high", "number_low",
     "output", "processes", "program", "scene", "setting", "started", "versions_engine", "what",
     "words",
 }  # fmt: skip
