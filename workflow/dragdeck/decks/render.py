@@ -26,7 +26,7 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
     """
     with explained():
         template = templates.get_template(scene.template)
-        names = "templates: " + ", ".join(used(templates, scene.template))
+        names = ", ".join(used(templates, scene.template))
         outputs = in_writing_order(scene.deck.outputs)
         text = template.render(deck=replace(scene.deck, templates=names, outputs=outputs))
     if f'\nprint "{END}"\n' not in text or not all(c.isprintable() or c in "\n\t" for c in text):

@@ -81,6 +81,7 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene[DropTe
         gravity_m_s2=study.gravity_m_s2,
         skin_m=radius,
         timestep_s=dt,
+        rayleigh_time_s=rayleigh,
         outputs=(outputs.impacts(),),
         plate_type=len(names),
         particle_radius_m=radius,

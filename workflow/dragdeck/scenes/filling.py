@@ -86,7 +86,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     longest = study.filling.max_time_s
     types = _filling_types(study)
     deck = FillingDeck(
-        title=f"Fill: {study.title}",
+        title=f"Filling: {study.title}",
         study=case.study_name,
         scene="filling",
         run=FILLING.run_id(case),
@@ -96,6 +96,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         gravity_m_s2=study.gravity_m_s2,
         skin_m=skin(study),
         timestep_s=dt,
+        rayleigh_time_s=rayleigh,
         outputs=(outputs.thermo(check_steps, None), outputs.settled_particles()),
         thermo_steps=check_steps,
         checkpoint_steps=5 * check_steps,

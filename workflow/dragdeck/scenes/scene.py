@@ -249,6 +249,7 @@ def material_table(study: Study, names: Sequence[str], scale: float, case: Case)
         youngs_moduli_pa=moduli,
         poissons_ratios=[material.poissons_ratio for material in materials],
         law=law,
+        youngs_modulus_scale=scale,
     )
 
 
