@@ -5,7 +5,7 @@ import types
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
@@ -77,10 +77,13 @@ def _limits(field: FieldInfo) -> str:
     if get_origin(field.annotation) is Literal:
         return " or ".join(repr(value) for value in get_args(field.annotation))
     parts = get_args(field.annotation) if _is_union(field.annotation) else ()
+    parts = tuple(part for part in parts if part is not types.NoneType)
     if parts and all(get_origin(part) is Annotated for part in parts):
         return " or ".join(filter(None, map(_limits_of_part, parts)))
     bounds = [(_SIGNS[type(item)], item) for item in field.metadata if type(item) in _SIGNS]
-    return ", ".join(f"{words} {getattr(item, name):g}" for (words, name), item in bounds)
+    found = [f"{words} {getattr(item, name):.10g}" for (words, name), item in bounds]
+    lengths = [getattr(item, "min_length", None) or item.max_length for item in field.metadata if type(item) in (MinLen, MaxLen)]
+    return ", ".join([*found, *([f"{' to '.join(map(str, lengths))} entries"] if lengths else [])])
 
 
 def _is_union(annotation: Any) -> bool:

@@ -129,3 +129,10 @@ STORE = Store()
 def table(name: str) -> pd.DataFrame:
     """A table of the committed records."""
     return STORE.table(name)
+
+
+import derived_explanation  # noqa: E402, F401
+import derived_cost  # noqa: E402, F401
+import derived_settings  # noqa: E402, F401
+import derived_validation  # noqa: E402, F401
+import derived_tradeoff  # noqa: E402, F401

@@ -8,7 +8,7 @@ from dragchain.documents import Part
 from dragchain.statistics.estimate import Estimate
 from evidence.validation.around_workpiece import Statements
 
-Verdict = Literal["holds", "does not hold", "not resolved"]
+Verdict = Literal["confirmed", "contradicted", "not significant"]
 
 
 class Claim(Part):
@@ -17,7 +17,7 @@ class Claim(Part):
     Attributes
     ----------
     statement, number : str
-        What is said, and of what; the page has the words.
+        Their names; the page has the words.
     null : float
         The value of no effect; the statement says that the number is above it.
     unit : str
@@ -36,12 +36,12 @@ class Claim(Part):
 
 
 def verdict(estimate: Estimate, null: float) -> Verdict:
-    """A claim holds if the whole interval lies above the null, does not if it lies below."""
+    """Confirmed if the whole interval lies above the null, contradicted if it lies below."""
     if not estimate.known:
-        return "not resolved"
+        return "not significant"
     if estimate.ci95_low > null:
-        return "holds"
-    return "does not hold" if estimate.ci95_high < null else "not resolved"
+        return "confirmed"
+    return "contradicted" if estimate.ci95_high < null else "not significant"
 
 
 def claims(found: Statements) -> tuple[Claim, ...]:

@@ -55,7 +55,7 @@ def effects(points: Points) -> list[Effect]:
 
     All runs are fitted together (`bed_effects`): one mean per setting, one variance for all, in
     inverse proportion to the path. What runs from one bed have in common is not made use of: it
-    was measured to be little (docs/tradeoff.md), and these are too few runs to tell.
+    was measured to be little (docs/evidence/tradeoff.md), and these are too few runs to tell.
 
     Raises
     ------

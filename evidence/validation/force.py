@@ -178,7 +178,7 @@ def _alike(drags: Sequence[MeanEstimate]) -> Likeness:
 
 
 def _peaks(packings: Sequence[Point]) -> Peaks:
-    """Peaks by the rule of docs/outputs.md, at three least prominences."""
+    """Peaks by the rule of docs/reference/results.md, at three least prominences."""
     counts: dict[float, list[float]] = {factor: [] for factor in _PROMINENCES}
     times, largest = [], []
     for point in packings:

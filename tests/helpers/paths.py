@@ -5,5 +5,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "tests" / "data"
 SMALL_STUDY = DATA / "small_study.yaml"
-PROJECT = ("workflow", "analysis", "evidence", "meshes", "profiles", "templates", "Snakefile")
+PROJECT = (
+    *("analysis", "config", "evidence", "meshes", "profiles", "templates", "workflow", "Snakefile"),
+)
 """What a copy of the project needs beside its studies."""

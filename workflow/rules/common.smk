@@ -4,6 +4,8 @@ from functools import cache
 from pathlib import Path
 from shlex import quote
 
+import yaml
+from jsonschema import Draft202012Validator
 from snakemake.exceptions import WorkflowError
 
 from dragdeck.campaigns.restitution_drops import record_file
@@ -26,7 +28,6 @@ from dragdeck.engine.reports import say, shown_bytes
 from dragdeck.engine.space import free_bytes
 from dragdeck.snakemake_lock import clear_stale_locks
 from dragdeck.source_hash import source_hash
-from dragdeck.study.base import NAME, NAME_LIMIT
 from dragdeck.study.check import warnings
 from evidence.stability.map import bed_names
 from evidence.verification.suite import suite_of
@@ -42,41 +43,27 @@ def explained(function, *arguments):
         raise WorkflowError(str(error))
 
 
-# What --config may set; without a plan, each target has its own.
-DEFAULTS = {
-    "study": "uhlmann2015",
-    "fidelity": "",
-    "plan": "",
-    "stability_map": "studies/stability/map.yaml",
-    "colours": "uniform",
-}
-
-
-def refuse_setting(key, problem, limit):
-    """End the workflow because of a key or value of --config."""
-    raise WorkflowError(f"--config {key}={config[key]}: {problem}\n  limit:  {limit}")
+SCHEMA = yaml.safe_load(Path(workflow.source_path("../schemas/config.schema.yaml")).read_text())
 
 
 def check_settings():
-    """Refuse keys of --config that nothing reads, and values that no path or command can hold."""
+    """Refuse unknown keys and unfit values of config/config.yaml and --config."""
     for key, value in config.items():
-        if key not in DEFAULTS:
-            refuse_setting(key, "unknown key", choices(str(key), DEFAULTS))
-        file = key == "stability_map" or (key == "plan" and str(value).endswith(".yaml"))
-        if file and not re.fullmatch("[A-Za-z0-9._/-]+", str(value)):
-            refuse_setting(
-                key, "not the path of a file", "letters (a-z), digits, '.', '_', '-', '/'"
-            )
-        if key == "colours" and value not in ("uniform", "paper"):
-            refuse_setting(key, "no such colours", "uniform or paper")
-        if not file and not NAME.fullmatch(str(value)):
-            refuse_setting(key, "not a name", NAME_LIMIT)
+        text = config[key] = "" if value is None else str(value)
+        known = SCHEMA["properties"].get(key)
+        if known is None:
+            problem, limit = "unknown key", choices(str(key), SCHEMA["properties"])
+        elif not Draft202012Validator(known).is_valid(text):
+            problem, limit = known["title"], known["description"]
+        else:
+            continue
+        raise WorkflowError(f"--config {key}={text}: {problem}\n  limit:  {limit}")
 
 
 check_settings()
 PROJECT = Project(Path(workflow.basedir))
 STUDY, FIDELITY, PLAN, STABILITY_MAP, COLOURS = (
-    str(config.get(*item)) for item in DEFAULTS.items()
+    config.get(key, "") for key in SCHEMA["properties"]
 )
 PLAN, VALIDATION = PLAN or "default", PLAN or "paper"
 explained(PROJECT.plan_file, PLAN)

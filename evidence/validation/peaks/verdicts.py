@@ -1,14 +1,14 @@
 """Verdicts on the paper's statements about peaks and chains.
 
-A statement is judged by its tests at the default thresholds that hold no force on the workpiece;
+A statement is judged by its tests at the default thresholds that contain no force on the workpiece;
 for a definition without such a test, by those in which it only decides which chain counts.
 
 Supported
     At least one has a p-value below `LEVEL` after Holm's adjustment for all tests of claims, and
     the sign claimed at most thresholds; a statement about most peaks or most chains must also find
     a fraction above one half.
-Proved
-    All of them hold no force on the workpiece and have the sign claimed at every threshold, and
+Confirmed
+    All of them contain no force on the workpiece and have the sign claimed at every threshold, and
     their intervals over the packings exclude a zero effect.
 Refuted
     None is supported, and the interval over the packings of each lies below `SMALL` standard
@@ -33,7 +33,7 @@ LEVEL = 0.05
 SMALL = 0.2
 """An effect below this many standard deviations is small (Cohen 1988)."""
 
-Verdict = Literal["proved", "supported", "refuted", "not supported", "cannot be told"]
+Verdict = Literal["confirmed", "supported", "refuted", "not supported", "undetermined"]
 _FREE: Definition = "free_path"
 """The only definition free of what is built in: its verdict is that of a statement."""
 
@@ -47,7 +47,7 @@ class Outcome(Part):
         Of the test.
     as_claimed, thresholds : int
         Number of thresholds at which the effect has the sign claimed, and of all thresholds.
-    supports, proves, refutes : bool
+    supports, confirms, refutes : bool
     """
 
     descriptor: str
@@ -58,7 +58,7 @@ class Outcome(Part):
     as_claimed: int
     thresholds: int
     supports: bool
-    proves: bool
+    confirms: bool
     refutes: bool
 
 
@@ -106,10 +106,10 @@ def _judgement(tests: Sequence[PeakTest]) -> Judgement:
 def _verdict(outcomes: Sequence[Outcome], level: BuiltIn) -> Verdict:
     full = [outcome for outcome in outcomes if outcome.built_in != "against"]
     if not outcomes:
-        return "cannot be told"
+        return "undetermined"
     if any(outcome.supports for outcome in outcomes):
-        proved = level == "none" and full and all(outcome.proves for outcome in full)
-        return "proved" if proved else "supported"
+        confirmed = level == "none" and full and all(outcome.confirms for outcome in full)
+        return "confirmed" if confirmed else "supported"
     refuted = full and all(outcome.refutes for outcome in full)
     return "refuted" if refuted else "not supported"
 
@@ -127,7 +127,7 @@ def _outcome(test: PeakTest, judged: Sequence[PeakTest]) -> Outcome:
         "as_claimed": as_claimed,
         "thresholds": len(like),
         "supports": supports,
-        "proves": supports and as_claimed == len(like) and low > 0.0,
+        "confirms": supports and as_claimed == len(like) and low > 0.0,
         "refutes": not supports and high < small,
     }
     return Outcome.model_validate({**dict(test), **numbers})

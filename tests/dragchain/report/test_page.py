@@ -42,7 +42,7 @@ PAGE = """{% extends "report/page.html.j2" %}
 {{ section("Force on the workpiece") }}
 {{ section("Case 1", "run-1") }}
 {% call table("tight") %}
-<tr><th>drag</th><td>{{ estimate(drag) }}</td>{{ verdict("holds") }}</tr>
+<tr><th>drag</th><td>{{ estimate(drag) }}</td>{{ verdict("confirmed") }}</tr>
 {% endcall %}
 {% call box("assumed") %}
 <p>The <b>radius</b>: 5 %.</p>

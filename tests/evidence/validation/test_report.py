@@ -204,10 +204,10 @@ def test_a_shorter_run_counts_less(points: Points) -> None:
 @pytest.mark.parametrize(
     ("low", "high", "expected"),
     [
-        (1.1, 1.5, "holds"),
-        (0.5, 0.9, "does not hold"),
-        (0.9, 1.5, "not resolved"),
-        (math.nan, math.nan, "not resolved"),
+        (1.1, 1.5, "confirmed"),
+        (0.5, 0.9, "contradicted"),
+        (0.9, 1.5, "not significant"),
+        (math.nan, math.nan, "not significant"),
     ],
 )
 def test_a_verdict_is_the_interval_against_no_effect(

@@ -96,7 +96,7 @@ def new_project(folder: Path, *, whole: bool = False) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     names = ["templates", "meshes"]
     if whole:
-        names += ["workflow", "analysis", "evidence", "profiles", "Snakefile"]
+        names += ["workflow", "analysis", "config", "evidence", "profiles", "Snakefile"]
     for name in names:
         (folder / name).symlink_to(ROOT / name)
     (folder / "studies").mkdir()

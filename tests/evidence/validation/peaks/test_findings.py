@@ -25,9 +25,9 @@ def verdicts(findings: Findings) -> dict[str, str]:
 
 def test_chains_that_make_the_peaks_are_found() -> None:
     found = verdicts(findings(11, 3.0))
-    assert found["presence"] == found["dominance"] == "proved"
-    assert found["coverage"] in ("supported", "proved")
-    assert found["reverse"] in ("supported", "proved")
+    assert found["presence"] == found["dominance"] == "confirmed"
+    assert found["coverage"] in ("supported", "confirmed")
+    assert found["reverse"] in ("supported", "confirmed")
     assert found["orientation"] == "not supported" or found["orientation"] == "refuted"
 
 
@@ -98,7 +98,7 @@ def test_a_built_in_test_alone_proves_nothing() -> None:
     assert row.by_definition["widest_path"].verdict == "supported"
     assert row.by_definition["widest_path"].built_in == "value"
     assert row.verdict == "refuted"
-    assert row.by_definition["peters"].verdict == "cannot be told"
+    assert row.by_definition["peters"].verdict == "undetermined"
 
 
 def test_a_peak_row_ranks_its_chain() -> None:

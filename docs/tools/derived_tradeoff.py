@@ -1,0 +1,650 @@
+"""Derived tables of the trade-off, of the extrapolation, of simplified scenes and of scaling laws."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from tables import ROOT, Store, derived
+
+from dragchain.report.notation import MINUS
+from dragchain.scaling.document import ScalingFile
+from dragchain.scaling.fit import said
+from dragchain.statistics.estimate import student_quantile
+from dragchain.tradeoff.quantities import QUANTITIES
+from dragdeck.advice.advise import advise
+from dragdeck.advice.options import Option
+from dragdeck.outlook.measured import StiffnessRecord, Tradeoff
+from dragdeck.project import Project
+from dragdeck.study.model import Tolerance
+
+LABELS = {quantity.name: quantity.label for quantity in QUANTITIES}
+SCATTER = 1.96
+"""Half-width of a 95 % interval in standard deviations, as the advisor takes it."""
+
+Row = Mapping[str, Any]
+
+
+# --- cells -------------------------------------------------------------------------------
+
+
+def percent(value: float, digits: int = 1) -> str:
+    """A fraction in per cent with its sign."""
+    text = f"{100 * value:+.{digits}f}"
+    return text if float(text) else text[1:]
+
+
+def error_cell(error: Row) -> str:
+    """An error with its interval in per cent; its interval alone if that includes zero.
+
+    A table that was typed in has no value where the interval includes zero.
+    """
+    ends = f"({percent(error['ci95_low'])} to {percent(error['ci95_high'])})"
+    if math.isnan(error["value"]) or error["ci95_low"] < 0 < error["ci95_high"]:
+        return f"n.s. {ends}"
+    if error["value"] >= 2:
+        return f"{1 + error['value']:.0f}-fold"
+    return f"{percent(error['value'])} {ends}"
+
+
+def fold(ratio: float) -> str:
+    """A saving with three digits."""
+    return f"{float(f'{ratio:.3g}'):g}-fold"
+
+
+def settings_cell(setting: Row) -> str:
+    """The three settings in words."""
+    text = f"E x {setting['youngs_modulus_scale']:g}, {100 * setting['timestep_fraction']:.3g} %"
+    speed = setting["speed_factor"]
+    return text if speed == 1 else f"{text}, speed x {speed:g}"
+
+
+def _modulus_name(scale: float) -> str:
+    """Column of a factor on Young's modulus: ``m2`` for 0.01."""
+    return f"m{round(-math.log10(scale))}"
+
+
+def _settings(store: Store) -> list[Row]:
+    found: list[Row] = store.record("tradeoff")["settings"]
+    return found
+
+
+# --- trade-off -----------------------------------------------------------------------------
+
+
+@derived("tradeoff/all_settings")
+def _all_settings(store: Store) -> pd.DataFrame:
+    """One row per setting: cost, and error of the mean drag."""
+    rows = []
+    for setting in _settings(store):
+        error = setting["errors"].get("drag_mean")
+        text = f"rejected: {setting['failed']:g} of {setting['runs']:g} runs"
+        if error:
+            ends = f"({percent(error['ci95_low'])} to {percent(error['ci95_high'])})"
+            text = f"{percent(error['value'])} {ends}" + (", **unstable**" if setting["breaks"] else "")
+        rows.append(
+            {
+                **{key: value for key, value in setting.items() if key != "errors"},
+                "setting": settings_cell(setting),
+                "saving": 1 / setting["relative_cost"],
+                "bound": error["bound"] if error else math.nan,
+                "error": text,
+                **{f"drag_{key}": value for key, value in (error or {}).items()},
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+@derived("tradeoff/modulus")
+def _modulus(store: Store) -> pd.DataFrame:
+    """One row per quantity: its errors by modulus, at 50 % of the Rayleigh time and speed x 1."""
+    plain = [
+        setting
+        for setting in _settings(store)
+        if setting["timestep_fraction"] == 0.5 and setting["speed_factor"] == 1
+    ]
+    rows = []
+    for quantity in store.record("tradeoff")["quantities"]:
+        row = {"quantity": quantity, "label": LABELS[quantity]}
+        for setting in plain:
+            name, error = _modulus_name(setting["youngs_modulus_scale"]), setting["errors"][quantity]
+            row |= {f"{name}_{key}": value for key, value in error.items()}
+            row[name] = error_cell(error)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+@derived("tradeoff/speed")
+def _speed(store: Store) -> pd.DataFrame:
+    """One row per speed of the workpiece, at E x 0.01 and 50 % of the Rayleigh time."""
+    inertial = store.record("tradeoff")["scene"]["inertial_number"]
+    return pd.DataFrame(
+        {
+            "speed_factor": setting["speed_factor"],
+            "inertial_number": inertial * setting["speed_factor"],
+            **{name: error_cell(error) for name, error in setting["errors"].items()},
+            **{f"{name}_value": error["value"] for name, error in setting["errors"].items()},
+        }
+        for setting in _settings(store)
+        if (setting["youngs_modulus_scale"], setting["timestep_fraction"]) == (0.01, 0.5)
+    )
+
+
+@derived("tradeoff/scatter")
+def _scatter(store: Store) -> pd.DataFrame:
+    """One row per quantity: half-width of the 95 % CI of one run over the compared path."""
+    return pd.DataFrame(
+        {"quantity": name, "label": LABELS[name], "half_width": SCATTER * one["run_std"], **one}
+        for name, one in store.record("tradeoff")["quantities"].items()
+    )
+
+
+@derived("tradeoff/unstable")
+def _unstable(store: Store) -> pd.DataFrame:
+    """One row: smallest and largest loss of drag at unstable time steps that no check rejected."""
+    losses = [
+        -setting["errors"]["drag_mean"]["value"]
+        for setting in _settings(store)
+        if setting["breaks"] and "drag_mean" in setting["errors"]
+    ]
+    return pd.DataFrame([{"smallest": min(losses), "largest": max(losses)}])
+
+
+@derived("tradeoff/plain")
+def _plain(store: Store) -> pd.DataFrame:
+    """One row: cost of the plain input script at the physical modulus over that of the reference."""
+    found = store.record("tradeoff")
+    plain = next(one["ratio"] for one in found["costs"] if one["name"] == "plain_full")
+    base = next(
+        one["relative_cost"]
+        for one in found["settings"]
+        if (one["youngs_modulus_scale"], one["timestep_fraction"], one["speed_factor"]) == (0.01, 0.5, 1)
+    )
+    return pd.DataFrame([{"ratio": plain * base}])
+
+
+ADVISED = (
+    "drag_mean",
+    "drag_std",
+    "workpiece_contacts",
+    "contact_force_mean",
+    "contact_force_p90",
+    "coordination_number",
+    "network_force_mean",
+    "chain_count",
+    "chain_length",
+    "path_bottleneck",
+    "sliding_distance",
+    "friction_work",
+    "restitution",
+)
+
+
+@derived("tradeoff/advised")
+def _advised(store: Store) -> pd.DataFrame:
+    """One row per quantity and tolerance: what the advisor takes for uhlmann2015."""
+    laws = StiffnessRecord.model_validate(store.record("stiffness"))
+    known = Tradeoff.model_validate(store.record("tradeoff")).model_copy(update={"stiffness": laws})
+    case = Project(ROOT).cases("uhlmann2015")[0]
+    rows = []
+    for quantity in ADVISED:
+        for tolerance in (0.05, 0.1, 0.2):
+            advice = advise(case, Tolerance(tolerance=tolerance, quantity=quantity), known)
+            rows.append(
+                {
+                    "quantity": quantity,
+                    "label": LABELS.get(quantity, "restitution (drop test)"),
+                    "tolerance": tolerance,
+                    **advice.chosen.fidelity.model_dump(),
+                    "saving": advice.speedup,
+                    "text": _advised_cell(advice.chosen, advice.speedup, bool(advice.fallback)),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def _advised_cell(option: Option, saving: float, fallback: bool) -> str:
+    if fallback:
+        return "none"
+    if option.drop_timestep_fraction is not None:
+        return f"time step {100 * option.drop_timestep_fraction:.3g} %: {fold(saving)}"
+    text = settings_cell(option.fidelity.model_dump())
+    return f"{text}{', extrapolated' if option.extrapolated else ''}: {fold(saving)}"
+
+
+@derived("tradeoff/recommended")
+def _recommended(store: Store) -> pd.DataFrame:
+    """One row per quantity, one column per tolerance in per cent."""
+    rows = store.table("tradeoff/advised")
+    rows = rows.assign(column=[f"within_{round(100 * one)}" for one in rows["tolerance"]])
+    wide = rows.pivot(index=["quantity", "label"], columns="column", values="text").reset_index()
+    return wide.set_index("quantity").loc[list(ADVISED)].reset_index()
+
+
+@derived("tradeoff/measured_choice")
+def _measured_choice(store: Store) -> pd.DataFrame:
+    """One row per tolerance: the measured setting behind the advice on the mean drag."""
+    rows = []
+    for tolerance in (0.05, 0.1):
+        advised = store.table("tradeoff/advised").query("quantity == 'drag_mean' & tolerance == @tolerance").iloc[0]
+        same = [
+            one
+            for one in _settings(store)
+            if one["youngs_modulus_scale"] == advised["youngs_modulus_scale"]
+            and one["speed_factor"] == advised["speed_factor"]
+            and one["timestep_fraction"] >= advised["timestep_fraction"]
+            and not one["breaks"]
+        ]
+        best = min(same, key=lambda one: one["timestep_fraction"])
+        rows.append(
+            {
+                "tolerance": tolerance,
+                "measured": settings_cell(best),
+                "measured_saving": 1 / best["relative_cost"],
+                "advised": settings_cell(advised.to_dict()),
+                "advised_saving": advised["saving"],
+                **best["errors"]["drag_mean"],
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+@derived("tradeoff/further_shown")
+def _further(store: Store) -> pd.DataFrame:
+    """One row per simplification, with its CPU time per step."""
+    costs = {one["name"]: one["per_step"] for one in store.record("tradeoff")["costs"]}
+    return _cells(store.table("tradeoff/further")).assign(
+        per_step=lambda rows: [costs.get(name, math.nan) for name in rows["cost"]]
+    )
+
+
+@derived("scenes/simplifications_shown")
+def _simplifications(store: Store) -> pd.DataFrame:
+    """One row per change of the scene."""
+    return _cells(store.table("scenes/simplifications"))
+
+
+@derived("scenes/simplifications_half_widths")
+def _half_widths(store: Store) -> pd.DataFrame:
+    """One row: half-widths of the CI of the mean drag, without coarse graining."""
+    rows = store.table("scenes/simplifications")
+    rows = rows[rows["relative_cpu_time"] > 0.5]
+    half = (rows["drag_mean_ci95_high"] - rows["drag_mean_ci95_low"]) / 2
+    return pd.DataFrame([{"low": half.min(), "high": half.max()}])
+
+
+def _cells(rows: pd.DataFrame) -> pd.DataFrame:
+    """A column of text for each quantity that has a value and an interval; empty if not measured."""
+    shown = rows.copy()
+    for name in [column.removesuffix("_ci95_low") for column in rows if column.endswith("_ci95_low")]:
+        shown[name] = [
+            ""
+            if math.isnan(row[f"{name}_ci95_low"])
+            else error_cell({key: row[f"{name}_{key}"] for key in ("value", "ci95_low", "ci95_high")})
+            for row in rows.to_dict("records")
+        ]
+    return shown
+
+
+# --- extrapolation ---------------------------------------------------------------------------
+
+
+_PLANS = {frozenset({"0.001"}): "m3", frozenset({"0.01"}): "m2", frozenset({"0.001", "0.01"}): "both"}
+
+
+def _extrapolations(rows: Iterable[Row], laws: Iterable[str]) -> pd.DataFrame:
+    """One row per quantity: errors as they are and corrected, for each way to extrapolate."""
+    found: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        name, plan = row["quantity"], _PLANS[frozenset(row["runs"])]
+        own = found.setdefault(
+            name,
+            {
+                "quantity": name,
+                "label": LABELS[name],
+                "used": "yes" if name in laws else "no",
+            },
+        )
+        own[f"{plan}_raw"] = row["raw_root_mean_square"]
+        own[f"{plan}_corrected"] = row["root_mean_square"]
+        own[f"{plan}_inside"], own[f"{plan}_scenes"] = row["inside"], row["scenes"]
+        own[plan] = f"{100 * row['root_mean_square']:.2g} ({row['inside']:g} of {row['scenes']:g})"
+    return pd.DataFrame(found.values())
+
+
+@derived("stiffness/left_out_shown")
+def _left_out(store: Store) -> pd.DataFrame:
+    found = store.record("stiffness")
+    return _extrapolations(found["left_out"], found["laws"])
+
+
+@derived("scenes/extrapolations")
+def _new_scenes(store: Store) -> pd.DataFrame:
+    laws = store.record("stiffness")["laws"]
+    return _extrapolations(store.record("scenes/promises")["extrapolations"], laws)
+
+
+@derived("stiffness/scene_ranges")
+def _ranges(store: Store) -> pd.DataFrame:
+    """One row: smallest and largest of each number of the designed scenes; runs."""
+    scenes = [one for one in store.record("stiffness")["scenes"] if one["runs"]]
+    row: dict[str, float] = {}
+    for name in scenes[0]["numbers"]:
+        values = [scene["numbers"][name] for scene in scenes]
+        row |= {f"{name}_low": min(values), f"{name}_high": max(values)}
+    row["scenes"] = len(scenes)
+    row["rejected"] = sum(scene["failed"] for scene in scenes)
+    row["runs"] = row["rejected"] + sum(sum(scene["runs"].values()) for scene in scenes)
+    return pd.DataFrame([row])
+
+
+@derived("stiffness/checks_shown")
+def _checks(store: Store) -> pd.DataFrame:
+    """One row per quantity: change predicted by the law and measured, at two moduli."""
+    rows: dict[str, dict[str, Any]] = {}
+    for check in store.record("stiffness")["checks"]:
+        name, plan = check["quantity"], _modulus_name(check["scale"])
+        own = rows.setdefault(name, {"quantity": name, "label": LABELS[name]})
+        own[f"{plan}_law"], own[f"{plan}_measured"] = check["predicted"], error_cell(
+            {"value": check["measured"], **check}
+        )
+    return pd.DataFrame(rows.values())
+
+
+@derived("stiffness/checks_count")
+def _checks_count(store: Store) -> pd.DataFrame:
+    checks = store.record("stiffness")["checks"]
+    overlaps = [
+        (1 + one["measured"]) / (1 + one["predicted"]) - 1
+        for one in checks
+        if one["quantity"] in ("workpiece_overlap", "overlap_p99") and one["scale"] < 0.1
+    ]
+    return pd.DataFrame(
+        [
+            {
+                "pairs": len(checks),
+                "inside": sum(one["inside"] for one in checks),
+                "moduli": len({one["scale"] for one in checks}),
+                "overlap_excess_low": min(overlaps),
+                "overlap_excess_high": max(overlaps),
+            }
+        ]
+    )
+
+
+@derived("scenes/promises_shown")
+def _promises(store: Store) -> pd.DataFrame:
+    """One row per new scene, with both predictions."""
+    rows: dict[float, dict[str, Any]] = {}
+    for one in store.record("scenes/promises")["promises"]:
+        numbers, name = one["numbers"], one["quantity"]
+        own = rows.setdefault(numbers["inertial_number"], dict(numbers))
+        own[f"{name}_step"] = one["timestep_fraction"]
+        error = one["error"]
+        ends = f"({percent(error['ci95_low'])} to {percent(error['ci95_high'])})"
+        own[name] = f"{percent(error['value'])} {ends}"
+    return pd.DataFrame(rows.values()).sort_values("inertial_number")
+
+
+@derived("scenes/promises_summary")
+def _promises_summary(store: Store) -> pd.DataFrame:
+    """One row per quantity that was promised: verdicts, half-widths, root mean square of the errors."""
+    found = store.record("scenes/promises")
+    rows = []
+    for name in ("drag_mean", "workpiece_contacts"):
+        own = [one for one in found["promises"] if one["quantity"] == name]
+        errors = [one["error"] for one in own]
+        half = [(error["ci95_high"] - error["ci95_low"]) / 2 for error in errors]
+        rows.append(
+            {
+                "quantity": name,
+                "label": LABELS[name],
+                "scenes": len(own),
+                "confirmed": sum(one["verdict"] == "kept" for one in own),
+                "violated": sum(one["verdict"] == "broken" for one in own),
+                "half_width_low": min(half),
+                "half_width_high": max(half),
+                "root_mean_square": math.sqrt(np.mean([error["value"] ** 2 for error in errors])),
+                "largest": max(abs(error["value"]) for error in errors),
+                "kappa_low": min(one["numbers"]["stiffness_number"] for one in own),
+                "kappa_high": max(one["numbers"]["stiffness_number"] for one in own),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+@derived("scenes/promises_total")
+def _promises_total(store: Store) -> pd.DataFrame:
+    """One row: predictions over both quantities; the scene whose advised runs were all rejected."""
+    found = store.record("scenes/promises")
+    summary = store.table("scenes/promises_summary")
+    rejected = [one for one in found["failed"] if one["asked"]]
+    numbers = [float(one["seen"].split()[2]) for one in rejected]
+    return pd.DataFrame(
+        [
+            {
+                "confirmed": summary["confirmed"].sum(),
+                "violated": summary["violated"].sum(),
+                "rejected": len(rejected),
+                "number_low": min(numbers),
+                "number_high": max(numbers),
+            }
+        ]
+    )
+
+
+@derived("scenes/merged_shown")
+def _merged(store: Store) -> pd.DataFrame:
+    """One row per quantity: changes by two reduced moduli, as they are and corrected."""
+    rows = store.table("scenes/merged")
+    found: dict[str, dict[str, Any]] = {}
+    for row in rows.to_dict("records"):
+        own = found.setdefault(
+            row["quantity"], {"quantity": row["quantity"], "label": LABELS[row["quantity"]]}
+        )
+        name = _modulus_name(row["youngs_modulus_scale"])
+        own |= {f"{name}_{key}": row[key] for key in ("change", "corrected", "half_width")}
+    return pd.DataFrame(found.values())
+
+
+@derived("scenes/cost_ranges")
+def _cost_ranges(store: Store) -> pd.DataFrame:
+    """One row per archive and modulus, or also time step: by how much steps and CPU time fall."""
+    rows = store.table("scenes/costs")
+    rows = pd.concat([rows.assign(step="any"), rows.assign(step=rows["timestep_fraction"].map("{:g}".format))])
+    groups = rows.groupby(["archive", "youngs_modulus_scale", "step"])[["steps_ratio", "cpu_time_ratio"]]
+    found = groups.agg(["min", "max"])
+    found.columns = ["_".join(names) for names in found.columns]
+    return found.reset_index()
+
+
+# --- predictions in unseen scenes of the trade-off ---------------------------------------------
+
+
+@derived("tradeoff/unseen_shown")
+def _unseen(store: Store) -> pd.DataFrame:
+    """One row per scene and set of settings: error in per cent, and whether the prediction holds."""
+    rows = store.table("tradeoff/unseen").copy()
+    rows["setting"] = [settings_cell(row) for row in rows.to_dict("records")]
+    rows["error"] = [
+        "no comparison"
+        if math.isnan(row["value"])
+        else f"{percent(row['value'])} ({percent(row['ci95_low'])} to {percent(row['ci95_high'])})"
+        for row in rows.to_dict("records")
+    ]
+    return rows
+
+
+# --- scaling laws -----------------------------------------------------------------------------
+
+
+SWEEPS = {
+    "drag-depth": ("depth of the tip", 1e3, "mm", 1),
+    "drag-diameter": ("diameter of the workpiece", 1e3, "mm", 2),
+    "drag-speed": ("speed", 1e3, "mm/s", 1),
+    "drag-friction": ("friction of particle on workpiece", 1, "", 1),
+}
+"""Label, factor, unit, and what a level is multiplied by in the summary (a radius by two)."""
+
+
+def _level(value: float, factor: float, unit: str) -> str:
+    return f"{factor * value:.3g} {unit}".strip()
+
+
+def _with_interval(one: Row, form: Callable[[float], str]) -> str:
+    return f"{form(one['value'])} ({form(one['ci95_low'])} to {form(one['ci95_high'])})"
+
+
+def _two(value: float) -> str:
+    return f"{value:.2f}".replace("-0.00", "0.00")
+
+
+@derived("scaling/summary")
+def _scaling(store: Store) -> pd.DataFrame:
+    """One row per sweep: exponent, verdict, lack of fit, other forms, and what changes beside it."""
+    rows = []
+    for study, (label, factor, unit, times) in SWEEPS.items():
+        found = store.record(f"scaling/{study}")
+        fit, levels = found["fit"], found["levels"]
+        rejected = fit["lack_of_fit"] < 0.05
+        agrees = found["verdict"] == "agrees"
+        verdict = "exponent agrees, power law rejected" if agrees and rejected else found["verdict"]
+        row = {
+            "study": study,
+            "label": label,
+            "levels": f"{factor * times * levels[0]['x']:.3g} to {_level(levels[-1]['x'], factor * times, unit)}",
+            "runs": len(found["runs"]),
+            "packings": len({run["seed"] for run in found["runs"]}),
+            "expected": found["expected"]["exponent"],
+            "exponent": _with_interval(fit["exponent"], _two),
+            "verdict": verdict,
+            "lack_of_fit": fit["lack_of_fit"],
+            "eta": _with_interval(found["eta"], lambda value: f"{value:.1f}"),
+            "per_decade": _with_interval(fit["change_per_decade"], lambda value: percent(value, 0)),
+            "said": _said(found),
+            "cpu_minutes": found["cpu_time_s"] / 60,
+            "started": found["started"][:10],
+            "engine": found["engine"],
+        }
+        for end, level in (("first", levels[0]), ("last", levels[-1])):
+            row |= {f"{end}_{key}": value for key, value in level.items() if not isinstance(value, dict)}
+        if found["shifted"]:
+            offset, terms = found["shifted"]["offset"], found["two_terms"]
+            diameter = 1e3 * found["scene"]["particle_diameter_m"]
+            row |= {
+                "offset": _with_interval(
+                    {key: 1e3 * value for key, value in offset.items()}, lambda value: f"{value:.1f}"
+                ),
+                "offset_particles": _with_interval(
+                    {key: 1e3 * value / diameter for key, value in offset.items()},
+                    lambda value: f"{value:.1f}",
+                ),
+                "offset_p": found["shifted"]["lack_of_fit"],
+                "lower_power": _with_interval(
+                    {key: 100 * value for key, value in terms["lower_fraction"].items()},
+                    lambda value: f"{value:.0f}",
+                ),
+                "terms_p": terms["lack_of_fit"],
+            }
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _said(found: Row) -> str:
+    """The first statement that the command prints on a scaling."""
+    text = said(ScalingFile.model_validate(found)).splitlines()[0].replace(MINUS, "-")
+    return text.removeprefix(f"{found['field']}: ")
+
+
+@derived("scaling/local")
+def _local(store: Store) -> pd.DataFrame:
+    """One row per pair of neighbouring levels of each sweep."""
+    return pd.DataFrame(_local_rows(store))
+
+
+def _local_rows(store: Store) -> Iterator[Row]:
+    for study, (_, factor, unit, times) in SWEEPS.items():
+        found = store.record(f"scaling/{study}")
+        ends = zip(found["levels"], found["levels"][1:], found["local_exponents"], strict=False)
+        for low, high, local in ends:
+            yield {
+                "study": study,
+                "label": SWEEPS[study][0],
+                "levels": f"{factor * times * low['x']:.3g} to {_level(high['x'], factor * times, unit)}",
+                "exponent": _with_interval(local, _two),
+            }
+
+
+@derived("scaling/levels")
+def _levels(store: Store) -> pd.DataFrame:
+    """One row per level of each sweep."""
+    rows = []
+    for study, (_, factor, unit, times) in SWEEPS.items():
+        for level in store.record(f"scaling/{study}")["levels"]:
+            rows.append({"study": study, "level": _level(level["x"], factor * times, unit), **level})
+    return pd.json_normalize(rows, sep="_")
+
+
+@derived("scaling/common_scene")
+def _common(store: Store) -> pd.DataFrame:
+    """One row: the scene that is a level of every sweep, over all its packings."""
+    base = _base()
+    values = {
+        "drag-depth": base.motion.immersion_depth_m,
+        "drag-diameter": base.workpiece.shape.radius_m,
+        "drag-speed": base.motion.speed_m_s,
+        "drag-friction": base.pairs["ceramic-steel"].friction,
+    }
+    runs = [
+        run
+        for study, level in values.items()
+        for run in store.record(f"scaling/{study}")["runs"]
+        if math.isclose(run["level"], level)
+    ]
+    drag = np.array([run["drag_n"] for run in runs])
+    eta = np.array([run["eta"] for run in runs])
+    reach = student_quantile(len(runs) - 1) / math.sqrt(len(runs))
+    return pd.DataFrame(
+        [
+            {
+                "packings": len(runs),
+                "drag_n": drag.mean(),
+                "drag_half_width_n": reach * drag.std(ddof=1),
+                "drag_std": drag.std(ddof=1) / drag.mean(),
+                "standard_error": np.mean([run["standard_error_n"] for run in runs]) / drag.mean(),
+                "eta": eta.mean(),
+                "eta_half_width": reach * eta.std(ddof=1),
+                "cpu_minutes": store.table("scaling/summary")["cpu_minutes"].sum(),
+            }
+        ]
+    )
+
+
+def _base() -> Any:
+    return Project(ROOT).cases("uhlmann2015")[0].study
+
+
+SOLID_FRACTION, STRESS_RATIO = 0.6, 0.6
+"""Assumed in the estimates: solid fraction of the bed, horizontal over vertical stress."""
+
+
+@derived("scaling/estimates")
+def _estimates(store: Store) -> pd.DataFrame:
+    """One row: friction on the flat tip, and what Janssen's screening does to the exponent of the depth."""
+    base = _base()
+    depth, radius = base.motion.immersion_depth_m, base.workpiece.shape.radius_m
+    friction = base.pairs["ceramic-steel"].friction
+    weight = base.materials["ceramic"].density_kg_m3 * 9.81 * SOLID_FRACTION
+    length = base.bowl.radius_m / (2 * friction * STRESS_RATIO)
+    levels = np.array([one["x"] for one in store.record("scaling/drag-depth")["levels"]])
+    screened = levels - length * (1 - np.exp(-levels / length))
+    return pd.DataFrame(
+        [
+            {
+                "tip_n": friction * weight * depth * math.pi * radius**2,
+                "length_mm": 1e3 * length,
+                "exponent_change": np.polyfit(np.log(levels), np.log(screened), 1)[0] - 2,
+            }
+        ]
+    )
