@@ -86,7 +86,7 @@ COMMANDS = (
             "status:status", (
         STUDY, FIDELITY, PLAN,
         _argument("--verbose", action="store_true",
-                  help="list every run (default: all failed and at most eight of each other state)")),
+                  help="list every run (default: all failed, at most eight of each other state)")),
             "dragdeck status uhlmann2015"),
     Command("open", "open the report of a study",
             "Print the path of results/STUDY/report/report.html and open it if there is a display.",
@@ -126,7 +126,7 @@ COMMANDS = (
                   "workpiece_contacts or restitution; docs/reference/study.md lists all (default: "
                   "the study's, or drag_mean)"),
         _argument("--quick", action="store_true",
-                  help="estimate costs from earlier runs, without measuring the speed of LIGGGHTS")),
+                  help="estimate costs from earlier runs instead of measuring the speed here")),
             "dragdeck advise uhlmann2015 --tolerance 0.05 --quantity drag_mean"),
     Command("run", "run or resume one input script",
             "Run the input script in.liggghts of a run folder with LIGGGHTS, or resume it from its "

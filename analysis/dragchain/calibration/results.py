@@ -57,7 +57,7 @@ class PutFor(Part):
 
 
 class CalibrationFile(Document):
-    """The content of ``result.json``; docs/calibration.md describes its keys.
+    """The content of ``result.json``; docs/evidence/calibration.md explains it.
 
     Attributes
     ----------

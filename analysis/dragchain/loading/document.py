@@ -1,4 +1,4 @@
-"""The document of a run's loading, ``loading.json``; docs/loading.md explains its numbers."""
+"""The document ``loading.json`` of a run; docs/explanation/loading.md explains its numbers."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -167,7 +167,7 @@ class ScaledRun(Part):
 
 
 class ScalingFile(Document):
-    """The content of ``scaling.json``; docs/scaling.md describes its keys."""
+    """The content of ``scaling.json``; docs/evidence/scaling.md explains it."""
 
     made_by: ClassVar[str] = "snakemake scaling"
 

@@ -16,8 +16,8 @@ from dragchain.tradeoff.promises import check_promises, failures, verdict, write
 
 FULL, SOFT = (1.0, 0.64, 1.0), (0.01, 0.64, 1.0)
 LOST = {
-    "code": "within_limits", "name": "within its limits", "passed": False, "seen": "1 particle",
-    "limit": "2",
+    "code": "within_limits", "name": "energy and speed within limits", "passed": False,
+    "seen": "1 particle", "limit": "2",
 }  # fmt: skip
 ASKED = {"tolerance": 0.1, "quantity": "drag_mean"}
 

@@ -243,10 +243,11 @@ def test_a_truncated_output_fails_its_check(filling: Path) -> None:
             "packing.restart",
         ),
     )
-    with pytest.raises(EngineError, match=r"(?s)particles\.1\.bin is cut short.*disk has space"):
+    with pytest.raises(EngineError, match=r"(?s)particles\.1\.bin is truncated.*disk has space"):
         run(filling, silent)
     assert not (filling / "run.json").exists()
-    with pytest.raises(RejectedRunError, match=r"particles whole: particles\.2\.bin is cut short"):
+    complete = r"output particles complete: particles\.2\.bin is truncated"
+    with pytest.raises(RejectedRunError, match=complete):
         run(filling, silent)
 
 

@@ -27,14 +27,14 @@ CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", 
 
 _SMALLER_STEP = "choose a smaller timestep_fraction or a larger youngs_modulus_scale"
 REMEDIES: Mapping[CheckCode, str] = {
-    "neighbour_builds": "choose a larger skin_m",
+    "neighbour_builds": "choose a larger fidelity.skin_m",
     "at_rest": "choose a larger filling.max_time_s or filling.energy_ratio",
     "steady_bed": "choose a longer motion.transient_m, or more motion.path.revolutions",
     "particles_kept": _SMALLER_STEP,
     "finite_numbers": _SMALLER_STEP,
     "stable_timestep": _SMALLER_STEP,
     "within_limits": _SMALLER_STEP,
-    "output_complete": "start it anew with: dragdeck run --again",
+    "output_complete": "start the run again with: dragdeck run --again",
     "ranks": "use the mpirun that belongs to this LIGGGHTS (DRAGDECK_LAUNCHER)",
 }
 """What to do where a check did not pass; of others, the end of the screen output says it."""
@@ -126,7 +126,7 @@ class RunRecord(Document):
         Whether it was stopped because it passed a limit.
     """
 
-    remedy = "delete it: the run starts anew, and what is there moves to archive/"
+    remedy = "delete it: the run then starts again, and its files are moved to archive/"
 
     state: State
     inputs: str

@@ -63,7 +63,7 @@ class Media(Model):
         if self.radius_std_m > 0.3 * self.radius_mean_m:
             raise ValueError(
                 f"radius_std_m {self.radius_std_m} exceeds 0.3 of radius_mean_m "
-                f"{self.radius_mean_m}: the smallest particles would vanish"
+                f"{self.radius_mean_m}: the smallest radii would approach zero"
             )
         return self
 
@@ -155,7 +155,9 @@ class Motion(Superposed):
     @model_validator(mode="after")
     def _path(self) -> "Motion":
         if self.counted_from_revolution is not None and self.path.revolution_m is None:
-            raise ValueError("counted_from_revolution is for circles: this path has no revolutions")
+            raise ValueError(
+                "counted_from_revolution applies to circles only: this path has no revolutions"
+            )
         if self.path.turning and self.spin is not None:
             raise ValueError("spin and waypoints that turn cannot be combined: remove one of them")
         if self.tilt_deg and (self.spin is not None or self.path.turning):
@@ -285,9 +287,8 @@ class Outputs(Model):
     def _order(self) -> "Outputs":
         if not self.workpiece_force_hz >= self.workpiece_contacts_hz >= self.network_hz:
             raise ValueError(
-                "rates must fall from workpiece_force_hz over workpiece_contacts_hz to "
-                "network_hz, because "
-                "each frame of a slower output is compared with one of the faster"
+                "the rates must not increase from workpiece_force_hz to workpiece_contacts_hz to "
+                "network_hz: each frame of a slower output is compared with one of a faster output"
             )
         return self
 
@@ -311,7 +312,8 @@ class Fidelity(Model):
         default=None, description="neighbour skin, m; none: 0.1 of the mean particle radius"
     )
     ranks: Ranks = Field(
-        default=2, description="MPI ranks; auto: from particles, cases and cores (docs/big.md)"
+        default=2,
+        description="MPI ranks; auto: from particles, cases and cores (docs/howto/scale_up.md)",
     )
 
 
@@ -335,7 +337,7 @@ Quantity = Literal[
     "path_bottleneck",
     "restitution",
 ]
-"""What a tolerance can be about; docs/tradeoff.md defines each."""
+"""Quantities to which a tolerance can apply; docs/evidence/tradeoff.md defines each."""
 
 
 class Tolerance(Model):
@@ -380,10 +382,11 @@ class Scaling(Model):
     @model_validator(mode="after")
     def _order(self) -> "Scaling":
         if self.field == "seed":
-            raise ValueError("the seed is no field to fit a power law over")
+            raise ValueError("a power law cannot be fitted as a function of the seed")
         if self.fit_range is not None and self.fit_range[0] >= self.fit_range[1]:
             raise ValueError(
-                f"fit_range goes from {self.fit_range[0]:g} to {self.fit_range[1]:g}: not up"
+                f"fit_range must increase, but goes from {self.fit_range[0]:g} to "
+                f"{self.fit_range[1]:g}"
             )
         return self
 
@@ -486,7 +489,7 @@ class Study(Model):
         for key in (f"{first}-{second}", f"{second}-{first}"):
             if key in self.pairs:
                 return self.pairs[key]
-        raise ValueError(f"pairs has no entry '{first}-{second}', and these two will touch")
+        raise ValueError(f"pairs has no entry '{first}-{second}', although these come into contact")
 
     @property
     def bowl_facet_size_m(self) -> float | None:

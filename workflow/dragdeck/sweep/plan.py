@@ -124,7 +124,9 @@ def plan_points(plan: Plan, plan_file: Path, base: Case, resolve: Resolve | None
         A point names no field of a study, or one beyond its limits.
     """
     if _size(plan.reference) != 1:
-        raise InputError("the reference is one point", file=plan_file, field="reference.vary")
+        raise InputError(
+            "the reference must be a single point", file=plan_file, field="reference.vary"
+        )
     blocks = [plan.reference, *plan.points]
     found: dict[str, Case] = {}
     for scene, block in itertools.product(plan.scenes.values(), blocks):
