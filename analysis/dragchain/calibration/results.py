@@ -286,7 +286,7 @@ def confirmed(drops: Drops) -> Confirmed:
     """
     runs = drops.select("confirm")
     if len(runs) < 2:
-        raise TableError("there are no confirming drops; run `snakemake calibrate`")
+        raise TableError("the confirming drop tests are missing; run `snakemake calibrate`")
     rebound = np.array([run.effective for run in runs])
     std = float(rebound.std(ddof=1))
     restitution, mean = runs[0].drop.restitution, float(rebound.mean())
@@ -297,8 +297,7 @@ def calibrate_command(record: Path, drops_file: Path, out_dir: Path) -> str:
     """Fit a drop test as the command line asks for; what to put into the study."""
     found = write_calibration(record, drops_file, out_dir)
     return (
-        f"put restitution: {found.put.value:g} into pairs.{found.known.pair}\n"
-        f"  95 % interval {found.fit.ci95_low:.4f} to {found.fit.ci95_high:.4f}\n"
-        f"  the particle then rebounds with {found.effective:.4f}; measured "
-        f"{found.measured.value:.4f}"
+        f"set pairs.{found.known.pair}.restitution: {found.put.value:g}\n"
+        f"  95 % CI {found.fit.ci95_low:.4f} to {found.fit.ci95_high:.4f}\n"
+        f"  effective restitution {found.effective:.4f}; measured {found.measured.value:.4f}"
     )

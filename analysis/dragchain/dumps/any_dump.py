@@ -95,11 +95,11 @@ def layout_of(file: Path, columns: Sequence[str] | None) -> DumpLayout:
     if not wanted:
         raise DumpError(
             file,
-            "a binary dump does not say what its columns are",
-            remedy="give their names in the order of the deck's dump command",
+            "a binary dump does not contain the names of its columns",
+            remedy="give their names in the order of the dump command in the input script",
         )
     if len(set(wanted)) < len(wanted):
-        raise DumpError(file, f"the columns {' '.join(wanted)} name one twice")
+        raise DumpError(file, f"a column is given twice: {' '.join(wanted)}")
     return DumpLayout(kind, wanted, binary=name.suffix == ".bin")
 
 
@@ -112,10 +112,11 @@ def _header(file: Path) -> tuple[str, list[str]]:
     if len(words) < 3 or words[0] != b"ITEM:" or words[1] not in _KINDS:
         raise DumpError(
             file,
-            f"found {lines[0][:60]!r}, and no names of columns",
+            f"found {lines[0][:60]!r}, but no names of columns",
             frame=0,
             offset=0,
             expected="the header of a text dump of LIGGGHTS",
-            remedy="give a dump custom or a dump local; a binary one must be named .bin",
+            remedy="give a file of dump custom or dump local; the name of a binary file "
+            "must end with .bin",
         )
     return _KINDS[words[1]], [word.decode("ascii", "replace") for word in words[2:]]

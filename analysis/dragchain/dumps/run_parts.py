@@ -47,7 +47,7 @@ def part_files(run_dir: Path | str, output: Output) -> list[Path]:
         raise DumpError(
             Path(run_dir) / output.pattern,
             f"there is no file of the output {output.name}",
-            remedy="run the engine first, or leave the output out of the study",
+            remedy="run the case first, or remove the output from the study",
         )
     return [file for _, file in parts]
 
@@ -173,7 +173,7 @@ class _Schedule:
             file,
             f"{self.output.name} {problem}",
             expected=f"{expected}, as columns.json says",
-            remedy="let the run go on to its end, then make the tables again",
+            remedy="complete the run, then make the tables again",
         )
 
 

@@ -99,11 +99,12 @@ class FrameSeries:
             If ``particles.parquet`` is not there.
         """
         if selection.every < 1:
-            raise ExportError(f"--every is {selection.every}, not at least 1")
+            raise ExportError(f"--every must be at least 1, but is {selection.every}")
         if not run.wrote("particles"):
             raise ExportError(
                 f"{run.folder}: this {run.case.scene} run wrote no output particles, so there is"
-                " nothing to export\n  remedy: export a fill or a process that lists particles in"
+                " nothing to export\n  remedy: export a filling or a process that lists "
+                "particles in"
                 " its outputs"
             )
         steps, times_s = _frame_times(run.table("particles.parquet"))
@@ -211,7 +212,7 @@ class _Track:
         self._blocks = read_groups(run.table("workpiece_force.parquet"), WORKPIECE_COLUMNS)
         first = next(self._blocks, None)
         if first is None:
-            raise TableError(f"{run.table('workpiece_force.parquet')} holds no samples")
+            raise TableError(f"{run.table('workpiece_force.parquet')} contains no samples")
         self._rows = first
 
     def at(self, step: int) -> tuple[Floats, float]:

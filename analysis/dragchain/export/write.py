@@ -83,7 +83,7 @@ def write_export(
         If there is nothing to export, no room for it, or something in its place.
     """
     if to not in _FORMATS:
-        raise ExportError(f"the format is {to!r}, not one of {', '.join(_FORMATS)}")
+        raise ExportError(f"unknown format {to!r}; known: {', '.join(_FORMATS)}")
     main, writer_of = _FORMATS[to]
     run = Run.open(run_dir)
     series = FrameSeries.of(run, Selection() if selection is None else selection)
@@ -117,10 +117,10 @@ def _foresee(folder: Path, frames: int, report: Report) -> None:
     report(f"{frames} frames, about {size / 1e6:.1f} MB")
     if size > free:
         raise ExportError(
-            f"{folder.parent}: there is no room for {frames} frames\n"
+            f"{folder.parent}: not enough free disk space for {frames} frames\n"
             f"  value:  about {size / 1e6:.0f} MB\n"
             f"  limit:  {free / 1e6:.0f} MB are free\n"
-            "  remedy: take fewer with --every, --from-time and --to-time, or name a folder on"
+            "  remedy: export fewer with --every, --from-time and --to-time, or name a folder on"
             " another disk with --out"
         )
 

@@ -83,7 +83,7 @@ def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanE
     """
     samples = _checked(series)
     if not 0.0 < confidence < 1.0:
-        raise SeriesError(f"the confidence is {confidence}, not between 0 and 1")
+        raise SeriesError(f"the confidence must lie between 0 and 1, but is {confidence}")
     count = len(samples)
     mean, std = float(samples.mean()), float(samples.std(ddof=1))
     tau = autocorrelation_time(samples)
@@ -169,10 +169,11 @@ def _checked(series: ArrayLike) -> Floats:
     samples = np.asarray(series, dtype=np.float64)
     if samples.ndim != 1 or len(samples) < MIN_SAMPLES:
         raise SeriesError(
-            f"the series has shape {samples.shape}, statistics need {MIN_SAMPLES} samples in a row;"
-            " let the run go on for longer, or shorten its transient"
+            f"the series has shape {samples.shape}, but statistics require {MIN_SAMPLES} "
+            "samples in a"
+            " row; use a longer path or a shorter transient"
         )
     if not np.isfinite(samples).all():
         bad = int(np.flatnonzero(~np.isfinite(samples))[0])
-        raise SeriesError(f"sample {bad} of the series is {samples[bad]}, not a finite number")
+        raise SeriesError(f"sample {bad} of the series is not a finite number: {samples[bad]}")
     return samples

@@ -67,7 +67,7 @@ def fit_stable_step(runs: Sequence[Measures]) -> StableStepLaw:
     """
     rows = np.array([_row(run) for run in runs if run.stability_number and run.numbers])
     if len(rows) < _FEWEST_RUNS:
-        raise SeriesError(f"{len(rows)} runs have a stability number, too few for a law of it")
+        raise SeriesError(f"{len(rows)} runs have a stability number, too few to fit a law")
     number, kappa, restitution, fraction, spread = rows.T
     reach = fraction * kappa**-0.25
     damping = damping_ratio(restitution) * reach

@@ -177,7 +177,7 @@ def test_files_that_cannot_be_used_are_refused(tmp_path: Path) -> None:
         read_runs(write(tmp_path / "b", found), tmp_path)
     rng = np.random.default_rng(1)
     failed = write(tmp_path / "c", [measures(REFERENCE, 1, rng, failure=FAILURE)])
-    with pytest.raises(TableError, match="no run of the trade is complete"):
+    with pytest.raises(TableError, match="no run of the trade-off is complete"):
         read_runs(failed, failed[0].parent)
 
 

@@ -102,7 +102,7 @@ def test_a_failed_run_does_not_count(tmp_path: Path) -> None:
 def test_without_full_stiffness_there_is_nothing_to_compare_with(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     runs = read(tmp_path, [run for run in scene(0.05, 1.0, rng) if run["asked"]])
-    with pytest.raises(TableError, match="no run at full stiffness"):
+    with pytest.raises(TableError, match="no run with the physical Young's modulus"):
         check_promises(runs)
 
 

@@ -82,13 +82,39 @@ class Forecast:
 
 
 class SettingsOfOption(Fidelity):
-    """The settings of an option, with the ranks that its runs will get."""
+    """The settings of an option, with the MPI ranks of its runs.
+
+    Attributes
+    ----------
+    ranks : int
+        MPI ranks.
+    """
 
     ranks: int
 
 
 class OptionEntry(Part):
-    """An option of ``advice.json``: settings, their error, and what their runs will take."""
+    """An option of ``advice.json``: settings, their error and their expected cost.
+
+    Attributes
+    ----------
+    role : str
+        ``advised``, ``cheaper``, ``dearer``, ``reference`` or ``own``.
+    settings : SettingsOfOption
+        Settings of filling and process.
+    drop_timestep_fraction : float or None
+        Time step of the drop test as a fraction of the Rayleigh time.
+    error : MeasuredError or None
+        Expected error; None for the reference.
+    relative_cost : float
+        CPU time / CPU time of the reference settings.
+    inputs : mapping
+        Inputs of the process run, as in its ``case.json``.
+    steps, wall_time_s, steps_per_s : mapping
+        Expected steps, wall-clock time (s) and speed, by scene.
+    source : str
+        Where the speed comes from.
+    """
 
     role: str
     settings: SettingsOfOption
@@ -103,7 +129,17 @@ class OptionEntry(Part):
 
 
 class AdvisedCase(Part):
-    """A case of ``advice.json``: its process run, what was asked, and the options."""
+    """A case of ``advice.json``: its process run and its options.
+
+    Attributes
+    ----------
+    case, run : str
+        Name of the case, and its run id.
+    asked : AdvisedSettings
+        The tolerance, and the expected error of the advised settings.
+    options : sequence of OptionEntry
+        The advised settings first.
+    """
 
     case: str
     run: str
@@ -112,7 +148,17 @@ class AdvisedCase(Part):
 
 
 class AdviceFile(Document):
-    """``advice.json``: what the runs of a study will take, and how far they may err."""
+    """``advice.json``: settings for a tolerance, with their expected error and cost.
+
+    Attributes
+    ----------
+    date : str
+        Date on which it was written.
+    speed : Speed or None
+        Measured speed of LIGGGHTS on this machine.
+    cases : sequence of AdvisedCase
+        One entry per process run.
+    """
 
     study: str
     date: str

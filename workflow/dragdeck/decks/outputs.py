@@ -16,7 +16,7 @@ Kind = Literal["print", "custom", "local"]
 
 
 class OutputOfRun(Part):
-    """A raw output file, for whoever reads it.
+    """A raw output file and its columns.
 
     Attributes
     ----------
@@ -30,6 +30,8 @@ class OutputOfRun(Part):
         When frames are written. `last_step` is None where the engine decides.
     rows_per_particle : float
         Rows to expect in a frame, for each particle of the run; a frame has at least one.
+    binary : bool
+        Whether it is a binary dump.
     """
 
     kind: Kind
