@@ -1,8 +1,8 @@
-"""Plots of a run, each on the axes that are given, or on axes of a new figure.
+"""Plots of a run, on given axes or on those of a new figure.
 
-The panels of the report are the same. Every function returns its axes; the run is one of
-`dragchain.load`. Fonts and sizes are those of Matplotlib's settings. A table that was not made
-raises `TableError`, which names the command that makes it.
+The report contains the same panels. Each function returns its axes and takes a run of
+`dragchain.load`. Fonts and sizes follow the settings of Matplotlib. A missing table raises
+`TableError`, which names the command that makes it.
 """
 
 from typing import Any
@@ -21,7 +21,7 @@ _BIN = 0.25
 
 
 def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axes:
-    """Drag and lateral force (N) over process time (s), means and published means.
+    """Plot drag and lateral force (N) against process time (s), with mean and published means.
 
     Parameters
     ----------
@@ -29,7 +29,11 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
         A process run.
     ax : Axes, optional
     peaks : bool
-        Mark the peaks of the drag.
+        Whether to mark the peaks of the drag.
+
+    Returns
+    -------
+    Axes
     """
     found, ax = run.findings, _axes(ax)
     run_panels.forces(ax, run, found)
@@ -41,7 +45,9 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
 
 
 def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axes:
-    """Bottleneck force (N) of the dominant path from workpiece to bowl over process time (s).
+    """Plot the bottleneck force (N) of the dominant path against process time (s).
+
+    The dominant path of a frame is the path from workpiece to bowl with the largest bottleneck.
 
     Parameters
     ----------
@@ -49,7 +55,11 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
         A process run.
     ax : Axes, optional
     peaks : bool
-        Draw a line at the time of each peak of the drag.
+        Whether to draw a line at the time of each peak of the drag.
+
+    Returns
+    -------
+    Axes
     """
     found, ax = run.findings, _axes(ax)
     run_panels.bottlenecks(ax, run, found)
@@ -59,24 +69,35 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
 
 
 def force_around(run: FinishedRun, ax: Any = None) -> Any:
-    """Mean normal force (N per bin) around the workpiece with 95 % intervals, ahead up.
+    """Plot the mean normal force (N per bin) around the workpiece; the direction of motion is up.
+
+    Bars show the 95 % confidence intervals.
 
     Parameters
     ----------
     run : FinishedRun
         A process run.
     ax : PolarAxes, optional
-        ``plt.subplots(subplot_kw={"projection": "polar"})`` makes them; `ValueError` for others.
+        Made by ``plt.subplots(subplot_kw={"projection": "polar"})``.
+
+    Returns
+    -------
+    PolarAxes
+
+    Raises
+    ------
+    ValueError
+        If `ax` is not polar.
     """
     around, ax = run.findings.azimuth, _axes(ax, projection="polar")
     if ax.name != "polar":
-        raise ValueError("force_around needs polar axes: subplot_kw={'projection': 'polar'}")
+        raise ValueError("force_around requires polar axes: subplot_kw={'projection': 'polar'}")
     compass_bars(as_compass(ax), around.edges_rad, around.force_n)
     return ax
 
 
 def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = False) -> Axes:
-    """Mean normal force per contact (N) over depth (mm) with 95 % intervals.
+    """Plot the mean normal force per contact (N) against depth (mm), with 95 % CIs.
 
     Parameters
     ----------
@@ -84,7 +105,11 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
         A process run.
     ax : Axes, optional
     total : bool
-        Draw the sum of the normal forces per depth (N/mm) instead.
+        Whether to plot the sum of the normal forces per depth (N/mm) instead.
+
+    Returns
+    -------
+    Axes
     """
     found, ax = run.findings, _axes(ax)
     draw = run_panels.load_over_depth if total else run_panels.force_over_depth
@@ -93,9 +118,19 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
 
 
 def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
-    """Fraction of the force chains by number of particles, for both definitions.
+    """Plot the fraction of force chains by number of particles, for both definitions.
 
-    Widest paths count if they reach the bowl.
+    Widest paths are included if they reach the bowl.
+
+    Parameters
+    ----------
+    run : FinishedRun
+        A process run.
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
     """
     chains = run.table("chains", ["definition", "n_particles", "reaches_bowl"])
     ax = _axes(ax)
@@ -112,16 +147,24 @@ def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
 
 
 def contact_forces(run: FinishedRun, ax: Axes | None = None, *, kind: str | None = None) -> Axes:
-    """Probability density of the normal contact forces, divided by their mean.
+    """Plot the probability density of the normal contact forces relative to their mean.
 
     Parameters
     ----------
     run : FinishedRun
-        A process run; its network frames in the statistics are used.
+        A process run; the network frames in its statistics are used.
     ax : Axes, optional
     kind : str, optional
-        Bodies of the contacts, such as ``particle-workpiece``; all contacts by default.
-        `UnknownNameError` if there are none of it.
+        Kind of contact, such as ``particle-workpiece``; all contacts by default.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    UnknownNameError
+        If there are no contacts of this kind.
     """
     contacts = run.table("contacts", ["step", "kind", "normal_force_n"])
     contacts = contacts[contacts["step"].isin(run.network["step"])]

@@ -211,7 +211,7 @@ def test_filling_and_drop_test_of_a_run(project: Path) -> None:
     assert drop.units["restitution"] == "1"
     with pytest.raises(UnknownNameError, match="has no filling"):
         drop.upstream("filling")
-    with pytest.raises(TableError, match="its scene is drop_test"):
+    with pytest.raises(TableError, match="the scene is drop_test"):
         _ = drop.findings
 
 

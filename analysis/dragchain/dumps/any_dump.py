@@ -15,32 +15,32 @@ _KINDS = {b"ENTRIES": "local", b"ATOMS": "custom"}
 
 
 def read_dump(source: Path | str, columns: Sequence[str] | None = None) -> Iterator[Frame]:
-    """Frames of a ``dump custom`` or ``dump local``, text or binary.
+    """Read the frames of a ``dump custom`` or ``dump local``, text or binary.
 
     Parameters
     ----------
     source : Path or str
-        The file; or, of a dump of one frame a file, its pattern with ``*`` for the step.
-        A name that ends in ``.bin`` is that of a binary dump; one that ends in ``.gz``,
-        ``.zst``, ``.bz2`` or ``.lz4`` besides that of a compressed one.
+        The file; or, for a dump with one file per frame, its pattern with ``*`` for the step.
+        The ending ``.bin`` marks a binary dump; an additional ``.gz``, ``.zst``, ``.bz2`` or
+        ``.lz4`` marks a compressed one.
     columns : sequence of str, optional
-        Names of the columns. A binary dump does not hold them and needs them, in order;
-        a text dump must have all of these, in any order. By default those of its header.
+        Names of the columns: required for a binary dump, in the order of its dump command; a text
+        dump must contain all of them, in any order. By default those in its header.
 
     Yields
     ------
     Frame
         In the order of the file, or of the steps in the names of the files. Columns
-        named ``id``, ``type`` or ``..._id`` are int64, all others float64. Memory is
-        bounded by the largest frame.
+        named ``id``, ``type`` or ``..._id`` are int64, all others float64. At most one frame is in
+        memory.
 
     Raises
     ------
     TruncatedDumpError
         If a file ends inside a frame.
     DumpError
-        If there is no such file, it is not such a dump, or a number is not finite.
-        Either error names file, frame and byte; the frames before have come by then.
+        If there is no such file, it is not such a dump, or a number is not finite. Both errors
+        name file, frame and byte; the frames before it have been yielded by then.
     """
     files = dump_files(source)
     yield from read_frames(files, layout_of(files[0], columns))
@@ -82,7 +82,7 @@ class DumpLayout:
 
 
 def layout_of(file: Path, columns: Sequence[str] | None) -> DumpLayout:
-    """What a file holds, by its name and its first lines.
+    """Layout of a dump file, from its name and first lines.
 
     Raises
     ------

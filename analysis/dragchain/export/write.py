@@ -52,23 +52,23 @@ def write_export(
 ) -> Exported:
     """Write the frames of a run for another program.
 
-    Memory is bounded by the largest frame. Before the second frame the size of the whole
-    is told, and refused if the disk has less room.
+    At most one frame is in memory. Before the second frame, the expected total size is reported;
+    an export that does not fit on the disk is refused.
 
     Parameters
     ----------
     run_dir : Path or str
-        Folder of a fill or process run with its tables made.
+        Folder of a filling or process run with its tables.
     to : str
         ``paraview`` or ``xyz``.
     out : Path, optional
-        The folder; ``export/<to>`` in the run's if None. It must be new or empty.
+        Folder for the export, new or empty; ``export/<to>`` in the run's folder if None.
     selection : Selection, optional
         The frames; all if None.
     replace : bool
-        Whether an earlier export in `out` may go.
+        Whether an earlier export in `out` may be replaced.
     report : callable
-        Takes a sentence for the user.
+        Receives messages for the user.
 
     Returns
     -------

@@ -18,7 +18,7 @@ from dragchain.tables.parquet import table_writer, write_parquet
 def write_chains(run_dir: Path) -> None:
     """Write the tables ``network``, ``clusters`` and ``chains`` of a process run.
 
-    They contain the frames of the drag that enter the statistics. One frame is in memory at a time.
+    They contain the frames of the drag that enter the statistics. At most one frame is in memory.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The mean of a correlated series, and how well it is known."""
+"""The mean of a correlated series and its uncertainty."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ _WINDOW = 5.0
 """Lags are summed up to this many autocorrelation times (Sokal 1997, section 3)."""
 
 RELIABLE_TIMES = 50.0
-"""A series shorter than this many autocorrelation times is not to be relied on."""
+"""The interval of a series shorter than this many autocorrelation times is not reliable."""
 
 
 @dataclass(frozen=True)
@@ -32,16 +32,16 @@ class MeanEstimate:
     autocorrelation_samples : float
         Integrated autocorrelation time, in samples; 1/2 for independent ones.
     effective_samples : float
-        Number of independent samples that would know the mean as well.
+        Number of independent samples with the same standard error of the mean.
     se : float
         Standard error of the mean, in the unit of the series.
     ci95_low, ci95_high : float
         Confidence interval of the mean.
     confidence : float
-        Its level.
+        Confidence level of the interval.
     reliable : bool
         Whether the series is at least 50 autocorrelation times long and not
-        constant. If not, the interval is too narrow more often than it says.
+        constant. If not, the interval is probably too narrow.
     """
 
     mean: float
@@ -57,7 +57,7 @@ class MeanEstimate:
 
 
 def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanEstimate:
-    """Mean of a correlated series, with an interval that allows for the correlation.
+    """Estimate the mean of a correlated series and its confidence interval.
 
     The standard error is ``std / sqrt(n)`` with ``n = N / (2 tau)`` (Sokal 1997,
     section 2), the interval Student's t with n - 1 degrees of freedom (1 at
@@ -73,7 +73,7 @@ def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanE
     Returns
     -------
     MeanEstimate
-        The mean and what is known about it.
+        Mean, standard error, confidence interval and autocorrelation time.
 
     Raises
     ------

@@ -12,14 +12,14 @@ from dragchain.tables.parquet import table_writer
 def dump_to_parquet(
     source: Path | str, target: Path | str, columns: Sequence[str] | None = None
 ) -> int:
-    """Write the frames of a dump into one Parquet table, as they are read.
+    """Convert a dump to one Parquet table, frame by frame.
 
     Parameters
     ----------
     source, columns
         As in `read_dump`.
     target : Path or str
-        The table: ``step``, then the dump's columns.
+        Parquet file to write, with the column ``step`` and those of the dump.
 
     Returns
     -------
@@ -29,7 +29,7 @@ def dump_to_parquet(
     Raises
     ------
     TruncatedDumpError, DumpError
-        As in `read_dump`. The table then holds the frames before, as the error says.
+        As in `read_dump`. The table then contains the frames before the error.
     """
     files = dump_files(source)
     output = layout_of(files[0], columns)

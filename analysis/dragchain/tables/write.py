@@ -67,9 +67,8 @@ class Table:
 def write_tables(run_dir: Path | str) -> list[Path]:
     """Make the tables of a run.
 
-    Every table appears under its name only once it is whole. An output that
-    ``columns.json`` does not list was not written, and the tables that need it
-    are not made.
+    A table gets its final name only when it is complete. Tables whose outputs are not listed in
+    ``columns.json`` are not made.
 
     Parameters
     ----------
@@ -79,14 +78,14 @@ def write_tables(run_dir: Path | str) -> list[Path]:
     Returns
     -------
     list of Path
-        The files made, in ``tables/``.
+        The files in ``tables/``.
 
     Raises
     ------
     DocumentError, DumpError
         If an input cannot be read.
     TableError
-        If the outputs contradict each other.
+        If the outputs are inconsistent with each other.
     """
     run = Run.open(run_dir)
     tables = [table for table in _TABLES[run.case.scene] if run.wrote(*table.needs)]
