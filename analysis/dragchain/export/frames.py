@@ -171,7 +171,7 @@ def _inside(times_s: Floats, selection: Selection, case: Case) -> np.ndarray:
 
 def _nothing(run: Run, times_s: Floats, selection: Selection) -> str:
     if not times_s.size:
-        return f"{run.table('particles.parquet')} holds no frames, so there is nothing to export"
+        return f"{run.table('particles.parquet')} contains no frames, so there is nothing to export"
     wanted = [
         f"{word} {value:g} s"
         for word, value in (("from", selection.first_s), ("to", selection.last_s))

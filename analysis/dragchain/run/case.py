@@ -283,7 +283,7 @@ class Output(Part):
         )
         assert len(self.header) == len(self.columns), "engine_columns has another length"
         assert self.kind != "print" or self.columns[0] == "step", (
-            "columns does not begin with step, as a print output must"
+            "columns does not start with step, which a print output requires"
         )
         return self
 

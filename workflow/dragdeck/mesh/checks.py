@@ -281,7 +281,11 @@ def _turned_normals(mesh: Trimesh) -> list[Finding]:
         return []
     if turned is None:
         remedy = "repair the mesh: a body has an inside and an outside"
-        return [Finding("the surface has one side only", "no way to turn it", limit, remedy)]
+        return [
+            Finding(
+                "the surface has one side only", "inside and outside are undefined", limit, remedy
+            )
+        ]
     problem = "the normals do not all point out of the body"
     value = "all point inwards" if mesh.is_winding_consistent else "mixed directions"
     remedy = "they are turned outwards for the run; turn them in the file too"
