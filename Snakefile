@@ -63,7 +63,7 @@ rule drop_test:
         every("drop_test", "tables/impacts.parquet"),
 
 
-# The settled beds.
+# The settled packings.
 rule filling:
     input:
         every("filling", "tables/packing.json"),
@@ -99,13 +99,13 @@ rule crate:
         rules.write_crate.output,
 
 
-# The restitution that a measured drop test asks for.
+# Fit of the restitution to a measured drop test.
 rule calibrate:
     input:
         rules.write_calibration_report.output,
 
 
-# The contact law against exact formulae and published impacts.
+# The contact law, compared with exact formulae and published impacts.
 rule verify:
     input:
         rules.judge_verification.output,
@@ -118,31 +118,31 @@ rule stability:
         rules.write_stability.output,
 
 
-# What speed costs in accuracy: the points of a plan against the reference.
+# The speed-accuracy trade-off: the points of a plan relative to the reference.
 rule tradeoff:
     input:
         rules.write_tradeoff.output,
 
 
-# Whether the advisor's promises hold on other scenes: --config plan=promises
+# Test of the advisor's predictions on unseen cases: --config plan=promises
 rule promises:
     input:
         rules.write_promises.output,
 
 
-# What a reduced Young's modulus does to each quantity: --config plan=scenes
+# Effect of a reduced Young's modulus on each quantity: --config plan=scenes
 rule stiffness:
     input:
         rules.write_stiffness.output,
 
 
-# The study beside its source: several fills, a control, what is assumed.
+# Comparison with the publication: several packings, a control, assumptions.
 rule validate:
     input:
         rules.write_validation.output,
 
 
-# How the mean drag depends on the field that the study's block scaling names.
+# Mean drag as a function of the field in the study's block scaling.
 rule scaling:
     input:
         rules.write_scaling.output,

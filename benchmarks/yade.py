@@ -130,7 +130,7 @@ def _contact(moduli: Mapping[str, float]) -> dict[str, float]:
 
     Both dashpots are proportional to the root of mass and tangent stiffness, and LIGGGHTS has a
     factor of the root of 5/6. ``en`` of Yade is the effective restitution, which LIGGGHTS'
-    coefficient is not (docs/engine.md).
+    coefficient is not (docs/development/liggghts.md).
     """
     log = -math.log(moduli["restitution"])
     return {

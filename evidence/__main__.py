@@ -1,4 +1,4 @@
-"""What the rules of suite, stability map and validation call: ``python -m evidence``."""
+"""Commands behind verification suite, stability map and validation: python -m evidence."""
 
 import argparse
 import sys
@@ -14,26 +14,45 @@ from dragdeck.errors import DragdeckError
 
 Argument = tuple[tuple[str, ...], dict[str, Any]]
 
-_OUT_DIR: Argument = ("--out",), {"type": Path, "required": True, "dest": "out_dir"}
-_RUN_DIRS: Argument = ("run_dirs",), {"type": Path, "nargs": "+", "metavar": "RUN_DIR"}
-_REPORT_DIR: Argument = ("report_dir",), {"type": Path, "metavar": "DIR"}
-_REGIME: Argument = ("regime",), {"help": "impact, settle, beds, column or drag"}
-_MAP: Argument = ("--map",), {"type": Path, "required": True, "dest": "points", "help": "map.yaml"}
-_MADE_BY: Argument = ("--command",), {"required": True, "help": "for the record"}
-_LISTS: Argument = ("lists",), {"type": Path, "nargs": "+", "metavar": "POINTS"}
+_OUT_DIR: Argument = ("--out",), {
+    "type": Path, "required": True, "dest": "out_dir", "metavar": "DIR",
+    "help": "folder for the results; required",
+}  # fmt: skip
+_RUN_DIRS: Argument = ("run_dirs",), {
+    "type": Path, "nargs": "+", "metavar": "RUN_DIR", "help": "folders of the runs",
+}  # fmt: skip
+_REPORT_DIR: Argument = ("report_dir",), {
+    "type": Path, "metavar": "DIR", "help": "folder of the report on the verification suite",
+}  # fmt: skip
+_REGIME: Argument = ("regime",), {
+    "metavar": "REGIME",
+    "help": "impact, settle, column or drag; beds: only the packings from which drags start",
+}  # fmt: skip
+_MAP: Argument = ("--map",), {
+    "type": Path, "required": True, "dest": "points", "metavar": "FILE",
+    "help": "map.yaml, the points of the stability map; required",
+}  # fmt: skip
+_MADE_BY: Argument = ("--command",), {
+    "required": True, "metavar": "TEXT",
+    "help": "command that made the runs, to be recorded with the results; required",
+}  # fmt: skip
+_LISTS: Argument = ("lists",), {
+    "type": Path, "nargs": "+", "metavar": "POINTS",
+    "help": "points/REGIME.json of each regime, made by run-map",
+}  # fmt: skip
 
 COMMANDS: dict[str, tuple[str, str, tuple[Argument, ...]]] = {
-    "render-suite": ("write the input scripts of the verification suite",
+    "render-suite": ("write the input scripts of all cases of the verification suite",
                      "verification.suite:render_suite", (STUDY, FIDELITY)),
-    "judge-suite": ("check the runs of the verification suite",
+    "judge-suite": ("compare the runs of the verification suite with reference solutions",
                     "verification.report:write_verification", (_OUT_DIR, _RUN_DIRS)),
-    "verdict": ("fail if a quantity of the suite failed",
+    "verdict": ("print the verdict of the verification suite; fail if a quantity failed",
                 "verification.report:verdict", (_REPORT_DIR,)),
-    "run-map": ("run one regime of the stability map",
+    "run-map": ("run all points of one regime of the stability map",
                 "stability.map_runs:stability_command", (_REGIME, _MAP)),
     "report-map": ("write the report on a stability map",
                    "stability.report:write_stability", (_OUT_DIR, _LISTS)),
-    "validate": ("compare the runs of a study with its source",
+    "validate": ("compare the runs of a study with the publication it reproduces; write the report",
                  "validation.report:write_validation", (_OUT_DIR, _RUN_DIRS, _MADE_BY)),
 }  # fmt: skip
 """By name: help, function and its parameters."""
@@ -44,7 +63,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m evidence", description=__doc__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="_command")
     for name, (words, _, own) in COMMANDS.items():
-        command = commands.add_parser(name, help=words, description=words)
+        command = commands.add_parser(
+            name, help=words, description=f"{words[0].upper()}{words[1:]}."
+        )
         for names, options in own:
             command.add_argument(*names, **options)
     given = vars(parser.parse_args(arguments))

@@ -59,7 +59,7 @@ def test_what_is_expected_leaves_no_log(
         (expected("what is wrong"), "what is wrong"),
         (PermissionError(13, "Permission denied", "results/x"), "results/x: Permission denied"),
         (OSError(36, "File name too long", "a" * 300), "a" * 20),
-        (MemoryError("8 TiB"), "there is not enough memory: 8 TiB"),
+        (MemoryError("8 TiB"), "not enough memory: 8 TiB"),
     ]
     for error, words in errors:
         assert guarded(raising(error)) == 1

@@ -1,8 +1,8 @@
-"""Read what LIGGGHTS wrote and make tables, chains, figures and reports of it.
+"""Read the output of LIGGGHTS and make tables, force chains, figures and reports.
 
 `load` opens the results of a study, `plot` draws them.
 
-The names below are loaded when they are first used, so that the command starts at once.
+The names below are imported on first use, so that the command line starts without delay.
 """
 
 from importlib import import_module

@@ -30,31 +30,38 @@ def _argument(*names: str, **options: Any) -> Argument:
     return Argument(names, options)
 
 
-RUN_DIR = _argument("run_dir", type=Path, metavar="RUN_DIR", help="folder of one run")
-RUN_DIRS = _argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="run folders")
-OUT_DIR = _argument(
-    "--out", type=Path, required=True, metavar="DIR", dest="out_dir", help="folder of the results"
-)
-MADE_BY = _argument("--command", help="command that made the runs, for the record")
-DROPS = _argument("--drops", type=Path, required=True, dest="drops_file", help="drops.json")
-RECORD = _argument("record", type=Path, metavar="RECORD", help="CSV of force against time")
-STIFFNESS = _argument("--record", type=Path, required=True, metavar="FILE", help="stiffness.json")
-MEASURES = _argument(
-    "measures", type=Path, nargs="+", metavar="MEASURES", help="measures.json of the runs"
-)
+RUN_DIR = _argument("run_dir", type=Path, metavar="RUN_DIR",
+                    help="folder of the run: results/STUDY/SCENE/RUN")  # fmt: skip
+RUN_DIRS = _argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR",
+                     help="folders of the runs: results/STUDY/process/RUN")  # fmt: skip
+OUT_DIR = _argument("--out", type=Path, required=True, metavar="DIR", dest="out_dir",
+                    help="folder for the results; required")  # fmt: skip
+MADE_BY = _argument("--command", metavar="TEXT",
+                    help="command that made the runs, to be recorded with the results")  # fmt: skip
+DROPS = _argument("--drops", type=Path, required=True, metavar="FILE", dest="drops_file",
+                  help="drops.json of the simulated drop tests (sweep); required")  # fmt: skip
+RECORD = _argument("record", type=Path, metavar="RECORD",
+                   help="measured drop test: CSV file of force against time")  # fmt: skip
+STIFFNESS = _argument("--record", type=Path, required=True, metavar="FILE",
+                      help="stiffness.json, from dragchain step stiffness; required")  # fmt: skip
+MEASURES = _argument("measures", type=Path, nargs="+", metavar="MEASURES",
+                     help="measures.json of each run, made by dragchain step measure")  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Command:
     """A command: the function that it calls, and that function's parameters.
 
-    What the function returns is printed if it is text.
+    `help` is for the list of commands, `about` for the command's own help. What the function
+    returns is printed if it is text.
     """
 
     name: str
     help: str
+    about: str
     function: str
     arguments: tuple[Argument, ...]
+    example: str = ""
 
     def run(self, options: Mapping[str, object]) -> None:
         """Import the function and call it."""
@@ -65,105 +72,173 @@ class Command:
 
 
 COMMANDS = (
-    Command("tables", "make the tables of a run from its raw outputs", "tables.write:write_tables",
-            (RUN_DIR,)),
-    Command("chains", "find contact network and force chains of a run, from its tables",
+    Command("tables", "make the tables of a run",
+            "Make the tables of a run. It reads the raw output, case.json and columns.json in "
+            "RUN_DIR and writes Parquet tables and documents to RUN_DIR/tables.",
+            "tables.write:write_tables", (RUN_DIR,),
+            "dragchain tables results/uhlmann2015/process/RUN"),
+    Command("chains", "find contact networks and force chains",
+            "Find the contact network, its clusters and force chains in each frame of a process "
+            "run. It reads the tables of the run and writes network.parquet, clusters.parquet and "
+            "chains.parquet to RUN_DIR/tables.",
             "network.write:write_chains", (RUN_DIR,)),
-    Command("loading", "map load, sliding and friction work on the workpiece",
+    Command("loading", "map the load on the workpiece",
+            "Map load, sliding distance and friction work on the workpiece and classify its "
+            "contact events. It reads the tables of a process run and writes facets.parquet, "
+            "contact_events.parquet, loading.json and workpiece.vtp to RUN_DIR/tables.",
             "loading.write:write_loading", (RUN_DIR,)),
-    Command("figures", "draw the figures of a run, from its tables",
-            "report.run_figures:write_figures",
-            (RUN_DIR,)),
-    Command("network", "write the interactive page on a run's contact network",
+    Command("figures", "draw the figures of a run",
+            "Draw the figures of a run. It reads the tables and writes PNG files to "
+            "RUN_DIR/figures and their values to RUN_DIR/tables/figures.json.",
+            "report.run_figures:write_figures", (RUN_DIR,)),
+    Command("network", "write the interactive page on the contact network",
+            "Write network.html, an interactive page on the contact network of a process run. It "
+            "reads the tables and force chains of the run and writes the page to RUN_DIR.",
             "network_page.page:write_page", (RUN_DIR,)),
-    Command("journal", "draw the figures of a process run for a publication",
+    Command("journal", "draw the figures of a run for a publication",
+            "Draw the figures of a process run in the format of a journal, as SVG, PDF and PNG. It "
+            "reads the tables and figures.json of the run and writes to RUN_DIR/figures/journal.",
             "report.journal:write_journal_figures", (
         RUN_DIR,
         _argument("--paper-colours", action="store_true",
-                  help="forces from green to red, as in Uhlmann et al. (2015)"),
-    )),
-    Command("export", "export a run to ParaView or OVITO", "export.write:export_command", (
+                  help="show forces from green to red, as in Uhlmann et al. (2015) (default: "
+                  "a map for every kind of colour vision)"))),
+    Command("export", "export a run to ParaView or OVITO",
+            "Export the frames of a run to other programs. It reads the tables of the run and "
+            "writes one file per frame for ParaView, or one file for OVITO.",
+            "export.write:export_command", (
         RUN_DIR,
         _argument("--to", required=True, choices=("paraview", "xyz"),
-                  help="VTP files with a PVD time series, or extended XYZ"),
-        _argument("--out", type=Path, metavar="DIR", help="default: export/TO in the run's folder"),
-        _argument("--from-time", type=float, metavar="S", help="first simulated time, s"),
-        _argument("--to-time", type=float, metavar="S", help="last simulated time, s"),
-        _argument("--every", type=int, default=1, metavar="N", help="every N-th frame only"),
-        _argument("--replace", action="store_true", help="overwrite an earlier export"))),
-    Command("report", "write the report on the process runs of a study",
+                  help="paraview: VTP files with a PVD time series; xyz: extended XYZ for OVITO; "
+                  "required"),
+        _argument("--out", type=Path, metavar="DIR",
+                  help="folder for the export (default: export/paraview or export/xyz in RUN_DIR)"),
+        _argument("--from-time", type=float, metavar="S",
+                  help="simulated time of the first frame, s (default: start of the run)"),
+        _argument("--to-time", type=float, metavar="S",
+                  help="simulated time of the last frame, s (default: end of the run)"),
+        _argument("--every", type=int, default=1, metavar="N",
+                  help="export every N-th frame only (default: %(default)s)"),
+        _argument("--replace", action="store_true",
+                  help="overwrite an earlier export (default: refuse to)")),
+            "dragchain export results/uhlmann2015/process/RUN --to paraview --every 10"),
+    Command("report", "write the report on a study",
+            "Write the report on the process runs of a study. It reads their tables and figures "
+            "and writes report.html and summary.csv, .parquet and .xlsx to the folder.",
             "report.study_report:write_report", (
         OUT_DIR, RUN_DIRS,
-        _argument("--advice", type=Path, metavar="FILE", help="advice.json of the study"))),
+        _argument("--advice", type=Path, metavar="FILE",
+                  help="advice.json, made by dragdeck advise, to compare its predicted costs "
+                  "with the actual ones"))),
 )  # fmt: skip
 """What a user calls."""
 
 STEPS = (
-    Command("numbers", "print where a report is, and its main numbers",
+    Command("numbers", "print the main numbers of a report",
+            "Print the path of a report and the mean drag of each case. It reads summary.parquet.",
             "report.numbers:main_numbers",
-            (_argument("report_dir", type=Path, metavar="REPORT_DIR"),)),
-    Command("measure", "make tables, chains and measures of a run of a plan",
+            (_argument("report_dir", type=Path, metavar="REPORT_DIR",
+                       help="folder of the report: results/STUDY/report"),)),
+    Command("measure", "measure a run of a plan",
+            "Make tables and force chains of one run of a plan and measure its quantities. It "
+            "reads the raw output and outcome.json of the run and writes measures.json to RUN_DIR.",
             "tradeoff.measure_run:write_measures", (
                 RUN_DIR,
-                _argument("--packing", type=Path, required=True, dest="packing_table",
-                          help="packing.json of its packing"))),
-    Command("tradeoff", "write the report on speed and accuracy",
+                _argument("--packing", type=Path, required=True, metavar="FILE",
+                          dest="packing_table",
+                          help="packing.json of the packing at the start of the run; required"))),
+    Command("tradeoff", "write the report on the speed-accuracy trade-off",
+            "Estimate the error and cost of each setting from the runs of a plan. It reads "
+            "measures.json of the runs and writes report.html, tradeoff.json, runs.csv and "
+            "errors.csv to the folder.",
             "tradeoff.report:write_tradeoff", (
         OUT_DIR, MEASURES, MADE_BY,
         _argument("--reference", type=Path, required=True, metavar="RUN_DIR",
-                  dest="reference_run", help="a run at the reference settings"),
+                  dest="reference_run", help="folder of a run at the reference settings; required"),
         _argument("--drops", type=Path, nargs="*", default=[], metavar="RUN_DIR",
-                  help="drop tests"),
-        _argument("--costs", type=Path, metavar="FILE", help="costs.json"),
-        _argument("--promises", type=Path, metavar="FILE", help="promises.json"),
-        _argument("--plan", default="", metavar="NAME", help="name of the plan"),
-        _argument("--largest-step", type=float, default=math.inf,
-                  help="largest fraction of the Rayleigh time to recommend"))),
-    Command("promises", "test the advisor's predictions on other scenes",
+                  help="folders of drop tests with other settings (default: none)"),
+        _argument("--costs", type=Path, metavar="FILE",
+                  help="costs.json: measured CPU time of model and output options"),
+        _argument("--promises", type=Path, metavar="FILE",
+                  help="promises.json: predictions tested on unseen cases"),
+        _argument("--plan", default="", metavar="NAME", help="name of the plan, for the report"),
+        _argument("--largest-step", type=float, default=math.inf, metavar="X",
+                  help="largest time step to recommend, as a fraction of the Rayleigh time "
+                  "(default: no limit)"))),
+    Command("promises", "test the predictions of the advisor on unseen cases",
+            "Compare the errors that the advisor predicts with those in cases that were not used "
+            "to derive the predictions. It reads measures.json of the runs and writes "
+            "promises.json and promises.csv to the folder.",
             "tradeoff.promises:promises_command", (OUT_DIR, MEASURES, STIFFNESS)),
-    Command("stiffness", "fit what a reduced Young's modulus does to each quantity",
+    Command("stiffness", "fit the effect of a reduced Young's modulus",
+            "Fit the effect of a reduced Young's modulus on each quantity. It reads measures.json "
+            "of the runs and writes stiffness.json.",
             "tradeoff.stiffness_record:stiffness_command", (
                 MEASURES,
                 _argument("--out", type=Path, required=True, metavar="FILE", dest="out_file",
-                          help="stiffness.json"),
+                          help="file to write: stiffness.json; required"),
                 _argument("--tradeoff", type=Path, required=True, metavar="FILE",
-                          help="tradeoff.json of a scene to check the laws with"))),
-    Command("extrapolate", "extrapolate a run's quantities to the physical Young's modulus",
+                          help="tradeoff.json of another scene, on which the fit is tested; "
+                          "required"))),
+    Command("extrapolate", "extrapolate a run to the physical Young's modulus",
+            "Extrapolate the quantities of a run with reduced stiffness to the physical Young's "
+            "modulus. It reads the tables of the run and writes extrapolated.json to RUN_DIR.",
             "tradeoff.extrapolate:extrapolate_run", (RUN_DIR, STIFFNESS)),
-    Command("scaling", "fit a power law of the mean drag over one field",
+    Command("scaling", "fit a power law to the mean drag",
+            "Fit a power law of the mean drag as a function of one field of the study. It reads "
+            "the tables of the runs and writes scaling.json, .csv and .png to the folder.",
             "scaling.fit:scaling_command", (
         OUT_DIR, RUN_DIRS, MADE_BY,
-        _argument("--field", required=True, help="dotted name of the field"),
-        _argument("--expected", type=float, metavar="N", help="expected exponent"),
-        _argument("--source", help="source of the expected exponent"),
+        _argument("--field", required=True, metavar="FIELD",
+                  help="dotted name of the field, for example motion.immersion_depth_m; required"),
+        _argument("--expected", type=float, metavar="N",
+                  help="expected exponent, with which the fitted one is compared"),
+        _argument("--source", metavar="TEXT", help="source of the expected exponent"),
         _argument("--fit-range", type=float, nargs=2, metavar=("LOW", "HIGH"),
-                  help="levels for which the exponent is expected"))),
-    Command("crate", "write a study's inputs, runs and report as an RO-Crate",
+                  help="lowest and highest level at which the exponent is expected (default: all "
+                  "levels)"))),
+    Command("crate", "pack a study as an RO-Crate",
+            "Pack the inputs, runs and report of a study as an RO-Crate, with a checksum for each "
+            "file. It reads the given folders and writes the crate to the folder.",
             "report.crate:write_crate", (
         OUT_DIR, RUN_DIRS,
         _argument("--report", type=Path, required=True, metavar="DIR", dest="report_dir",
-                  help="folder of the study's report"),
+                  help="folder of the study's report; required"),
         _argument("--inputs", type=Path, nargs="*", default=[], metavar="FILE",
-                  help="study files, templates and meshes"),
-        _argument("--licence", metavar="TEXT", help="licence of the results"))),
+                  help="study files, templates and meshes to include (default: none)"),
+        _argument("--licence", metavar="TEXT",
+                  help="licence of the results: SPDX name or address (default: unknown)"))),
     Command("record", "find the impacts of a measured drop test",
+            "Find the impacts in the force record of a drop test. It reads the CSV file and writes "
+            "record.json.",
             "calibration.results:write_record", (
         RECORD,
         _argument("--fall-time", type=float, required=True, metavar="S", dest="fall_time_s",
-                  help="free fall before the first impact, s"),
-        _argument("--out", type=Path, required=True, metavar="FILE", help="record.json"))),
+                  help="duration of the free fall before the first impact, s; required"),
+        _argument("--out", type=Path, required=True, metavar="FILE",
+                  help="file to write: record.json; required"))),
     Command("calibrate", "fit the restitution to a measured drop test",
+            "Fit the coefficient of restitution to a measured drop test. It reads the CSV file and "
+            "the simulated drop tests, writes result.json, impacts.csv and bias.csv to the folder, "
+            "and prints the value for the study.",
             "calibration.results:calibrate_command", (RECORD, DROPS, OUT_DIR)),
-    Command("trials", "recover known restitutions from synthetic records",
+    Command("trials", "test the calibration on synthetic records",
+            "Test whether the calibration recovers known restitutions from synthetic force records "
+            "with noise. It reads simulated drop tests and writes trials.json and trials.csv.",
             "calibration.trials:write_trials", (
                 DROPS,
-                _argument("--trials", type=Path, required=True, dest="trials_file",
-                          help="drops.json of the trials"),
-                _argument("--seed", type=int, default=1,
-                          help="seed of the sensors and their noise"),
-                _argument("--records", type=int, default=1, help="number of records per drop"),
-                _argument("--out", type=Path, required=True, metavar="FILE", help="trials.json"))),
-    Command("calibration-report", "write figures and page of a calibration",
+                _argument("--trials", type=Path, required=True, metavar="FILE",
+                          dest="trials_file",
+                          help="drops.json of the drop tests with random restitutions; required"),
+                _argument("--seed", type=int, default=1, metavar="N",
+                          help="random seed of sensors and noise (default: %(default)s)"),
+                _argument("--records", type=int, default=1, metavar="N",
+                          help="number of records per drop test (default: %(default)s)"),
+                _argument("--out", type=Path, required=True, metavar="FILE",
+                          help="file to write: trials.json; required"))),
+    Command("calibration-report", "write the report on a calibration",
+            "Write the report on a calibration. It reads the CSV file and the results in DIR, and "
+            "writes report.html and figures to DIR.",
             "calibration.report:write_report", (
                 RECORD,
                 _argument("folder", type=Path, metavar="DIR", help="folder of the calibration"))),
@@ -188,7 +263,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def guarded(call: Callable[[], None]) -> int:
     """Call a function; whatever goes wrong becomes one message on standard error.
 
-    What nobody expected goes to a log file with its traceback, and the message names the file.
+    An unexpected error is written to a log file with its traceback; the message names the file.
 
     Returns
     -------
@@ -204,25 +279,25 @@ def guarded(call: Callable[[], None]) -> int:
         print("dragchain: interrupted", file=sys.stderr)
         return 130
     except Exception as error:
-        print(f"dragchain: {_told(error)}", file=sys.stderr)
+        print(f"dragchain: {_message(error)}", file=sys.stderr)
         return 1
     return 0
 
 
-def _told(error: Exception) -> str:
-    """What the user is told of an error."""
+def _message(error: Exception) -> str:
+    """The message of an error."""
     if isinstance(error, DragchainError):
         return str(error)
     if isinstance(error, OSError) and error.strerror:
         where = f"{error.filename}: " if error.filename else ""
-        remedy = "check that the place is there, who may read and write it, and its free space"
+        remedy = "check that the path exists, its permissions, and the free space on the disk"
         return f"{where}{error.strerror}\n  remedy: {remedy}"
     if isinstance(error, MemoryError):
-        return f"there is not enough memory: {error}\n  remedy: use a machine with more memory"
+        return f"not enough memory: {error}\n  remedy: use a machine with more memory"
     return (
         f"unexpected error: {type(error).__name__}: {str(error)[:300]}\n  log:    {_kept(error)}\n"
-        "  remedy: if an input file was damaged, make it again; else report this with the log,"
-        " see README.md, section Reporting a problem"
+        "  remedy: if an input file is damaged, create it again; otherwise report the problem with "
+        "the log: README.md, section Reporting a problem"
     )
 
 
@@ -245,18 +320,23 @@ if TYPE_CHECKING:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="dragchain", description="Tables, figures and reports of what LIGGGHTS wrote."
+        prog="dragchain",
+        description="Make tables, figures and reports from the output of LIGGGHTS.",
+        epilog="Each command has its own help: dragchain COMMAND --help",
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add(commands, COMMANDS)
-    step = commands.add_parser("step", help="a step of the workflow: dragchain step --help")
+    step = commands.add_parser("step", help="run a step of the workflow: dragchain step --help")
     _add(step.add_subparsers(required=True, metavar="STEP"), STEPS)
     return parser
 
 
 def _add(parsers: "Parsers", commands: Sequence[Command]) -> None:
     for command in commands:
-        parser = parsers.add_parser(command.name, help=command.help, description=command.help)
+        example = f"example: {command.example}" if command.example else None
+        parser = parsers.add_parser(
+            command.name, help=command.help, description=command.about, epilog=example
+        )
         for argument in command.arguments:
             parser.add_argument(*argument.names, **argument.options)
         parser.set_defaults(_command=command)

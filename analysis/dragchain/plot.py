@@ -1,8 +1,8 @@
-"""Plots of a run, on given axes or on axes of a new figure.
+"""Plots of a run, on given axes or on those of a new figure.
 
-Every function takes a run from `dragchain.load` and returns its axes. Fonts and sizes are those of
-Matplotlib's settings. A table that was not made raises `TableError`, which names the command that
-makes it. The panels of the report are the same.
+The report contains the same panels. Each function returns its axes and takes a run of
+`dragchain.load`. Fonts and sizes follow the settings of Matplotlib. A missing table raises
+`TableError`, which names the command that makes it.
 """
 
 from typing import Any
@@ -21,7 +21,7 @@ _BIN = 0.25
 
 
 def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axes:
-    """Drag and lateral force (N) over process time (s), with their means and published means.
+    """Plot drag and lateral force (N) against process time (s), with mean and published means.
 
     Parameters
     ----------
@@ -30,7 +30,11 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
     ax : Axes, optional
         Axes to draw on.
     peaks : bool
-        Mark the peaks of the drag.
+        Whether to mark the peaks of the drag.
+
+    Returns
+    -------
+    Axes
     """
     found, ax = run.findings, _axes(ax)
     run_panels.forces(ax, run, found)
@@ -42,7 +46,9 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
 
 
 def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axes:
-    """Bottleneck force (N) of the dominant path from workpiece to bowl over process time (s).
+    """Plot the bottleneck force (N) of the dominant path against process time (s).
+
+    The dominant path of a frame is the path from workpiece to bowl with the largest bottleneck.
 
     Parameters
     ----------
@@ -51,7 +57,11 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
     ax : Axes, optional
         Axes to draw on.
     peaks : bool
-        Draw a line at the time of each peak of the drag.
+        Whether to draw a line at the time of each peak of the drag.
+
+    Returns
+    -------
+    Axes
     """
     found, ax = run.findings, _axes(ax)
     run_panels.bottlenecks(ax, run, found)
@@ -61,31 +71,35 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
 
 
 def force_around(run: FinishedRun, ax: Any = None) -> Any:
-    """Mean normal force around the workpiece (N per bin) with 95 % confidence intervals.
+    """Plot the mean normal force (N per bin) around the workpiece; the direction of motion is up.
 
-    The direction of motion points upwards.
+    Bars show the 95 % confidence intervals.
 
     Parameters
     ----------
     run : FinishedRun
         A process run.
     ax : PolarAxes, optional
-        ``plt.subplots(subplot_kw={"projection": "polar"})`` makes them.
+        Made by ``plt.subplots(subplot_kw={"projection": "polar"})``.
+
+    Returns
+    -------
+    PolarAxes
 
     Raises
     ------
     ValueError
-        If the axes are not polar.
+        If `ax` is not polar.
     """
     around, ax = run.findings.azimuth, _axes(ax, projection="polar")
     if ax.name != "polar":
-        raise ValueError("force_around needs polar axes: subplot_kw={'projection': 'polar'}")
+        raise ValueError("force_around requires polar axes: subplot_kw={'projection': 'polar'}")
     compass_bars(as_compass(ax), around.edges_rad, around.force_n)
     return ax
 
 
 def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = False) -> Axes:
-    """Mean normal force per contact (N) over depth (mm) with 95 % confidence intervals.
+    """Plot the mean normal force per contact (N) against depth (mm), with 95 % CIs.
 
     Parameters
     ----------
@@ -94,7 +108,11 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
     ax : Axes, optional
         Axes to draw on.
     total : bool
-        Draw the sum of the normal forces per depth (N/mm) instead.
+        Whether to plot the sum of the normal forces per depth (N/mm) instead.
+
+    Returns
+    -------
+    Axes
     """
     found, ax = run.findings, _axes(ax)
     draw = run_panels.load_over_depth if total else run_panels.force_over_depth
@@ -103,16 +121,19 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
 
 
 def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
-    """Fraction of the force chains by number of particles, for both definitions.
+    """Plot the fraction of force chains by number of particles, for both definitions.
 
-    Of the widest paths, only those that reach the bowl are included.
+    Widest paths are included if they reach the bowl.
 
     Parameters
     ----------
     run : FinishedRun
         A process run.
     ax : Axes, optional
-        Axes to draw on.
+
+    Returns
+    -------
+    Axes
     """
     chains = run.table("chains", ["definition", "n_particles", "reaches_bowl"])
     ax = _axes(ax)
@@ -129,16 +150,20 @@ def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
 
 
 def contact_forces(run: FinishedRun, ax: Axes | None = None, *, kind: str | None = None) -> Axes:
-    """Probability density of the normal contact forces, divided by their mean.
+    """Plot the probability density of the normal contact forces relative to their mean.
 
     Parameters
     ----------
     run : FinishedRun
-        A process run; its network frames in the statistics are used.
+        A process run; the network frames in its statistics are used.
     ax : Axes, optional
         Axes to draw on.
     kind : str, optional
-        Bodies of the contacts, such as ``particle-workpiece``; all contacts by default.
+        Kind of contact, such as ``particle-workpiece``; all contacts by default.
+
+    Returns
+    -------
+    Axes
 
     Raises
     ------

@@ -33,7 +33,7 @@ class _Units(dict[str, str]):
     """Units by column."""
 
     def __missing__(self, column: str) -> str:
-        raise UnknownNameError(f"no table here has a column {column!r}", column, self)
+        raise UnknownNameError(f"no table of this run has a column {column!r}", column, self)
 
 
 def _units(files: Iterable[Path]) -> _Units:
@@ -62,7 +62,7 @@ def _table(name: str, rows: str) -> "cached_property[pd.DataFrame]":
 
 
 class FinishedRun(RunData):
-    """A run with its tables, each read when it is first used and kept.
+    """A run with its tables, each of which is read on first use and kept in memory.
 
     Reading a table that was not made raises `TableError`, which names the command that makes it.
 
@@ -71,15 +71,20 @@ class FinishedRun(RunData):
     folder : Path
         The run folder.
     case : Case
-        What the run models: ``case.json``.
+        Content of ``case.json``: the simulated case and its settings.
     force, workpiece_contacts, facets, events : DataFrame
-        Of a process: force on the workpiece, contacts on it, its facets, contact events.
+        Process only: force on the workpiece, contacts on it, its facets, and contact events.
     particles, contacts, network, clusters, chains : DataFrame
-        Of a process: the network frames. A filling has ``particles``, too.
+        Process only: the frames of the contact network. A filling also has ``particles``.
     impacts : DataFrame
-        Of a drop test.
+        Drop test only: one row per impact.
     thermo : DataFrame
-        Energies of all particles; not of a drop test.
+        Kinetic energies over time.
+
+    Raises
+    ------
+    TableError
+        When a table is read that does not exist; the message names the command that makes it.
     """
 
     force = _table("workpiece_force", "sample")
@@ -96,17 +101,17 @@ class FinishedRun(RunData):
 
     @classmethod
     def open(cls, folder: Path) -> "FinishedRun":
-        """Read the case of a run folder; `DocumentError` if it has none."""
+        """Open the folder of a run; `DocumentError` if it contains no ``case.json``."""
         return cls(folder, load_case(folder))
 
     @property
     def name(self) -> str:
-        """Name of the case; of a filling or a drop test the run id."""
+        """Name of the case; for a filling or a drop test the run id."""
         return self.case.case or self.case.run
 
     @cached_property
     def units(self) -> Mapping[str, str]:
-        """Units of the columns of all tables: ``1`` for plain numbers, empty for text and flags."""
+        """Unit of each column of all tables: ``1`` if dimensionless, empty for text and flags."""
         return _units(self._file(name) for name in _TABLES[self.case.scene])
 
     def describe(self, column: str) -> str:
@@ -125,7 +130,7 @@ class FinishedRun(RunData):
         Raises
         ------
         UnknownNameError
-            If no table of the run has such a column.
+            If no table of the run has this column.
         """
         return _describe(column, self.units, _TABLES[self.case.scene])
 
@@ -135,21 +140,16 @@ class FinishedRun(RunData):
         Parameters
         ----------
         name : str
-            Name of the file without its ending, such as ``contacts``.
+            Name of the file without ``.parquet``.
         columns : list of str, optional
-            Columns to read; all by default.
-
-        Returns
-        -------
-        DataFrame
-            A new one with every call.
+            Columns to read; all if None.
 
         Raises
         ------
         UnknownNameError
-            If runs of this scene have no such table, or the table no such column.
+            If the scene has no such table, or the table no such column.
         TableError
-            If the table was not made; the message names the command that makes it.
+            If the table does not exist; the message names the command that makes it.
         """
         tables = _TABLES[self.case.scene]
         if name not in tables:
@@ -167,15 +167,16 @@ class FinishedRun(RunData):
     def findings(self) -> ProcessFindings:
         """Means, profiles and peaks of a process run, as its report shows them.
 
-        They are read from ``figures.json``, or computed if that was not made.
+        They are read from ``figures.json``, or computed if it does not exist; errors as in
+        `write_findings`.
         """
         if self.case.scene != "process":
-            raise TableError(f"{self.folder}: its scene is {self.case.scene}, not process")
+            raise TableError(f"{self.folder}: the scene is {self.case.scene}, not process")
         file = self.folder / FILE
         return ProcessFindings.read(file) if file.is_file() else process_findings(self)
 
     def upstream(self, scene: Literal["filling", "drop_test"]) -> "FinishedRun":
-        """The filling that a process run starts from, or its drop test.
+        """Filling or drop test that belongs to a process run.
 
         Parameters
         ----------
@@ -190,9 +191,9 @@ class FinishedRun(RunData):
         Raises
         ------
         UnknownNameError
-            If the run has none.
+            If there is none.
         DocumentError
-            If its folder does not exist any more.
+            If its folder does not exist.
         """
         folders = upstream_folders(self.folder, self.case)
         if scene not in folders:
@@ -216,7 +217,7 @@ class Study:
     folder : Path
         ``results/<study>``.
     runs : tuple of FinishedRun
-        Sorted by the names of their cases. Each workpiece of several is a run of its own.
+        Sorted by name of the case. With several workpieces, each is a separate run.
     """
 
     folder: Path
@@ -238,21 +239,11 @@ class Study:
         return _units([self._summary])
 
     def describe(self, column: str) -> str:
-        """Meaning and unit of a column of `summary`; `UnknownNameError` for an unknown column."""
+        """Meaning and unit of a column of `summary`; `UnknownNameError` if it does not exist."""
         return _describe(column, self.units, ("summary",))
 
     def run(self, name: str | None = None) -> FinishedRun:
-        """A run by the name of its case or its run id.
-
-        Parameters
-        ----------
-        name : str, optional
-            Not needed if the study has a single run.
-
-        Returns
-        -------
-        FinishedRun
-            The run.
+        """A run by the name of its case or its run id; without a name the only run.
 
         Raises
         ------
@@ -288,14 +279,13 @@ def load(study: Path | str) -> Study:
     Parameters
     ----------
     study : Path or str
-        Name of a study whose results are in ``results/`` of the working folder or of one above
-        it; or the path of ``results/<study>``; or the folder of a single run of any scene, which
-        is then the only one and need not be finished.
+        Name of a study with results in ``results/`` of the working folder or a folder above it;
+        or the path of ``results/<study>``; or the folder of a single run of any scene, finished
+        or not.
 
     Returns
     -------
     Study
-        The finished process runs with their tables.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The cost of each option that a study's input scripts omit (docs/costs.md).
+"""The cost of each option that a study's input scripts omit (docs/evidence/costs.md).
 
     python benchmarks/costs STUDY --out FILE [--rounds 3] [--seconds 0.15] [--only NAME ...]
 

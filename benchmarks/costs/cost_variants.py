@@ -36,7 +36,7 @@ Change = Literal[
 
 _LONGEST_STEP = 0.64
 """Fraction of the Rayleigh time at which full stiffness is timed against the plain
-deck: the largest that docs/stability.md recommends for a slow drag."""
+deck: the largest that docs/evidence/stability.md recommends for a slow drag."""
 
 
 @dataclass(frozen=True)

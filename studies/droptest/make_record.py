@@ -1,6 +1,6 @@
 """Make a synthetic record of a drop test: a drop of the engine as a force sensor would show it.
 
-How ``record.csv`` was made stands in docs/calibration.md.
+How ``record.csv`` was made is described in docs/evidence/calibration.md.
 """
 
 import argparse
@@ -27,7 +27,7 @@ def synthetic_record(run: DropRun, sensor: Sensor, seed: int) -> str:
         f"# sensor: {sensor.rate_hz:g} Hz, noise {sensor.noise_n:g} N (standard deviation),",
         f"#   offset {sensor.offset_n:g} N, drift {sensor.drift_n_per_s:g} N/s,",
         f"#   resolution {sensor.resolution_n:g} N, seed {seed}",
-        "# how it was made: docs/calibration.md",
+        "# how it was made: docs/evidence/calibration.md",
         "time_s,force_n",
     ]
     digits = max(0, math.ceil(-math.log10(sensor.resolution_n))) if sensor.resolution_n else 6

@@ -101,7 +101,7 @@ def test_an_unfinished_run_is_no_result(project: Path) -> None:
     (project / "results/small/process/deep-1/run.json").unlink()
     study = load("small")
     assert [run.case.run for run in study.runs] == ["two-2", "two-2.2"]
-    with pytest.raises(RejectedRunError, match=r"nothing says that the run is complete"):
+    with pytest.raises(RejectedRunError, match=r"not known to be complete"):
         study.run("deep")
     for run in study.runs:
         (run.folder / "run.json").unlink()
@@ -211,7 +211,7 @@ def test_filling_and_drop_test_of_a_run(project: Path) -> None:
     assert drop.units["restitution"] == "1"
     with pytest.raises(UnknownNameError, match="has no filling"):
         drop.upstream("filling")
-    with pytest.raises(TableError, match="its scene is drop_test"):
+    with pytest.raises(TableError, match="the scene is drop_test"):
         _ = drop.findings
 
 

@@ -62,7 +62,7 @@ def test_a_process_is_never_rendered_on_a_guess(
     case: Case, project: Project, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["step", "render", "small", "process", PROCESS.run_id(case)]) == 1
-    assert "needs the settled bed" in capsys.readouterr().err
+    assert "requires the settled packing" in capsys.readouterr().err
     assert not project.run_folder(case, PROCESS).exists()
 
 
@@ -94,7 +94,10 @@ def test_a_new_study_can_be_run_at_once(
     (mine,) = project.cases("mine")
     assert PROCESS.run_id(mine) == PROCESS.run_id(case)
     written = mine.file.read_text()
-    for name, problem in (("mine", "has that name already"), ("../x", "no name for a study")):
+    for name, problem in (
+        ("mine", "has that name already"),
+        ("../x", "this name cannot be used for a study"),
+    ):
         assert main(["new", name, "--from", "small"]) == 1
         assert problem in capsys.readouterr().err
     assert main(["new", "other", "--from", "none"]) == 1

@@ -38,7 +38,7 @@ def test_a_study_that_was_never_run_waits(case: Case, project: Project, capsys: 
     assert len(runs) == 3 and all(": waiting, speed assumed, about " in line for line in runs)
     assert cost.startswith("small: runs 0 % done: 3 waiting; still to run: about ")
     assert cost.endswith("(estimates; speed assumed)")
-    assert report == "report: none yet; ./run all --config study=small"
+    assert report == "report: none yet; make it with: ./run all --config study=small"
     assert not (project.root / "results").exists()
 
 

@@ -73,7 +73,7 @@ def run_json(**more: Any) -> dict[str, Any]:
 
 
 def particles_kept(seen: int) -> dict[str, Any]:
-    return {"code": "particles_kept", "name": "every particle kept", "passed": seen == 1422,
+    return {"code": "particles_kept", "name": "no particle lost", "passed": seen == 1422,
             "seen": str(seen), "limit": "1422",
             "remedy": None if seen == 1422 else "choose a smaller timestep_fraction"}  # fmt: skip
 

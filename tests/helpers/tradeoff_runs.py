@@ -16,7 +16,7 @@ FAILURE = [
     {
         "code": "particles_kept",
         "passed": False,
-        "name": "every particle kept",
+        "name": "no particle lost",
         "seen": "12 particles",
         "limit": "1422",
     }

@@ -157,10 +157,10 @@ def test_a_failed_run_is_told_in_full_and_has_a_status(
     done = snakemake(project, *SHOWN, "all", *STUDY)
     assert done.returncode != 0
     assert "Error in rule run_process:" in done.stderr
-    assert "check:  no engine error: ERROR: on purpose (limit: none)" in done.stderr
+    assert "check:  no LIGGGHTS error: ERROR: on purpose (limit: none)" in done.stderr
     assert "report: results/tiny/report/report.html" in done.stderr
     assert main(["status", "tiny"]) == 0
     said = capsys.readouterr().out
     assert said.startswith("process quick_immersion_depth_m-0.005-")
-    assert "  check:  no engine error: ERROR: on purpose (limit: none)" in said
+    assert "  check:  no LIGGGHTS error: ERROR: on purpose (limit: none)" in said
     assert "% done: 1 failed, 3 complete" in said

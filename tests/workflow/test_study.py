@@ -259,7 +259,9 @@ def test_an_edited_template_runs_what_depends_on_it(finished: Path) -> None:
     assert "rule run_filling" not in told
     assert "rule render_filling" not in told
     logs = [file.read_text() for file in finished.glob("results/small/process/*/logs/run.log")]
-    assert ["these inputs were run before" in log for log in logs] == [True] * 2  # only a remark
+    assert ["already complete with these inputs" in log for log in logs] == [
+        True
+    ] * 2  # only a remark
     assert jobs(finished, *STUDY) == set()
 
 
@@ -288,7 +290,7 @@ def test_a_failed_case_is_listed_and_the_others_are_reported(finished: Path) -> 
     assert "1 run(s) have no result" in done.stderr
     report = finished / "results/small/report"
     assert len(pd.read_parquet(report / "summary.parquet")) == 2
-    assert "ended by itself" in (report / "report.html").read_text()
+    assert "LIGGGHTS ended normally" in (report / "report.html").read_text()
     data["sweep"]["motion.immersion_depth_m"] = [0.012, 0.016]
     file.write_text(yaml.safe_dump(data))
     assert "write_report" in jobs(finished, *STUDY)

@@ -54,7 +54,7 @@ def test_a_point_that_fails_is_a_finding(traded: Path) -> None:
     runs = pd.read_parquet(traded / "results/small/tradeoff/plan/runs.parquet")
     failed = runs[runs.timestep_fraction == 1.9]
     assert len(failed) == 2 and not failed.complete.any()
-    assert failed.failure.str.contains("within its limits").all()
+    assert failed.failure.str.contains("energy and speed within limits").all()
     assert runs[runs.timestep_fraction == 0.5].complete.all()
 
 

@@ -23,21 +23,35 @@ def _argument(*names: str, **options: Any) -> tuple[tuple[str, ...], dict[str, A
     return names, options
 
 
-STUDY = _argument("study", help="name of a folder in studies/")
-FIDELITY = _argument("--fidelity", help="fidelity to use instead of the study's own")
-PLAN = _argument("--plan", help="use the design points of this plan instead of the study's cases")
-VERBOSE = _argument("--verbose", action="store_true", help="say all that is known of every run")
-OUT_DIR = _argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
+STUDY = _argument("study", metavar="STUDY", help="name of the study: a folder in studies/")
+FIDELITY = _argument(
+    "--fidelity", metavar="NAME",
+    help="use these settings for speed and accuracy instead of the study's: draft, standard, fine, "
+    "full, reference, or a name under fidelities in the study (default: those of the study)",
+)  # fmt: skip
+PLAN = _argument(
+    "--plan", metavar="NAME",
+    help="use the design points of this plan in workflow/plans/ instead of the study's cases",
+)  # fmt: skip
+OUT_DIR = _argument(
+    "--out", type=Path, required=True, metavar="DIR", help="folder for the results; required"
+)
+SCENE = "drop_test, filling or process"
 
 
 @dataclass(frozen=True)
 class Command:
-    """A command: the function that it calls, and that function's parameters."""
+    """A command: the function that it calls, and that function's parameters.
+
+    `help` is for the list of commands, `about` for the command's own help.
+    """
 
     name: str
     help: str
+    about: str
     function: str
     arguments: tuple[tuple[tuple[str, ...], dict[str, Any]], ...]
+    example: str = ""
 
     def run(self, options: dict[str, Any]) -> None:
         """Import the function and call it."""
@@ -46,54 +60,117 @@ class Command:
 
 
 COMMANDS = (
-    Command("check", "check a study and LIGGGHTS without running anything", "commands:check",
-            (STUDY, FIDELITY, VERBOSE)),
-    Command("explain", "what the input scripts model, leave out and cost", "commands:explain", (
-        STUDY, FIDELITY, VERBOSE,
-        _argument("scene", nargs="?", help="drop_test, filling or process; default: all"))),
-    Command("status", "what is done, running, failed or waiting, and how long it will take",
-            "status:status", (STUDY, FIDELITY, PLAN, VERBOSE)),
-    Command("open", "print the path of a study's report, and open it where there is a display",
+    Command("check", "check a study without running it",
+            "Check a study: build every input script in memory, look for LIGGGHTS, and print the "
+            "expected number and cost of the runs, and warnings. It reads studies/STUDY and writes "
+            "nothing.",
+            "commands:check", (
+        STUDY, FIDELITY,
+        _argument("--verbose", action="store_true",
+                  help="also print time step, packing and clearances expected for each run")),
+            "dragdeck check uhlmann2015 --fidelity draft"),
+    Command("explain", "explain what the input scripts model",
+            "Explain what the input scripts of a study model, what they leave out, and what both "
+            "cost. It reads studies/STUDY and the speeds of earlier runs, and writes nothing.",
+            "commands:explain", (
+        STUDY, FIDELITY,
+        _argument("--verbose", action="store_true",
+                  help="print every run, with reasons, costs and expectations"),
+        _argument("scene", nargs="?", metavar="SCENE",
+                  help=f"explain one scene only: {SCENE} (default: all three)")),
+            "dragdeck explain uhlmann2015 process"),
+    Command("status", "show the progress of a study",
+            "Show which runs of a study are complete, running, interrupted, failed or waiting, and "
+            "how long the remaining ones will take. It reads results/STUDY and writes nothing, so "
+            "it can be called at any time.",
+            "status:status", (
+        STUDY, FIDELITY, PLAN,
+        _argument("--verbose", action="store_true",
+                  help="list every run (default: all failed, at most eight of each other state)")),
+            "dragdeck status uhlmann2015"),
+    Command("open", "open the report of a study",
+            "Print the path of results/STUDY/report/report.html and open it if there is a display.",
             "status:open_report", (STUDY,)),
-    Command("preview", "draw what a study describes, without running anything", "commands:preview",
-            (STUDY, FIDELITY, _argument("--case", help="case to draw (default: the first)"))),
-    Command("new", "make a study that extends another", "commands:new", (
-        _argument("study", help="its name"),
+    Command("preview", "draw the set-up of a study",
+            "Draw bowl, packing, workpiece and path of one case, and print its clearances and "
+            "dimensionless numbers. It runs nothing and writes preview.png and preview.html to "
+            "results/STUDY.",
+            "commands:preview", (
+        STUDY, FIDELITY,
+        _argument("--case", metavar="NAME",
+                  help="case to draw, as dragdeck cases lists it (default: the first)")),
+            "dragdeck preview planetary"),
+    Command("new", "create a study",
+            "Create studies/STUDY/study.yaml, a study that extends another: fields that it does "
+            "not set are taken from the other study.",
+            "commands:new", (
+        _argument("study", metavar="STUDY", help="name of the new study, without spaces"),
         _argument("--from", default="uhlmann2015", metavar="STUDY", dest="base",
-                  help="the study that it extends (default: %(default)s)"))),
-    Command("cases", "list the cases of a study and their runs", "commands:cases",
-            (STUDY, FIDELITY, PLAN)),
-    Command("advise", "find settings for a tolerance, with their error and cost",
+                  help="study to extend (default: %(default)s)")),
+            "dragdeck new my-part --from uhlmann2015"),
+    Command("cases", "list the cases of a study",
+            "List the cases of a study with the run ids of their drop test, filling and process. "
+            "It reads studies/STUDY and writes nothing.",
+            "commands:cases", (STUDY, FIDELITY, PLAN)),
+    Command("advise", "find settings for a tolerance",
+            "Find the cheapest settings that keep the error of a quantity within a tolerance, and "
+            "show the error and cost of each setting. It reads the measured trade-off, measures "
+            "the speed of LIGGGHTS on this machine, and writes results/STUDY/advice.json.",
             "commands:advise", (
         STUDY, FIDELITY,
-        _argument("--tolerance", type=float, help="tolerance to use instead of the study's own"),
-        _argument("--quantity", help="quantity to which the tolerance applies"),
-        _argument("--quick", action="store_true", help="do not measure the speed of LIGGGHTS"))),
-    Command("run", "run the input script in a folder, or resume it",
+        _argument("--tolerance", type=float, metavar="X",
+                  help="largest relative error caused by the settings, from 0 to 1 (default: "
+                  "the study's, or 0.05)"),
+        _argument("--quantity", metavar="NAME",
+                  help="quantity to which the tolerance applies, for example drag_mean, drag_std, "
+                  "workpiece_contacts or restitution; docs/reference/study.md lists all (default: "
+                  "the study's, or drag_mean)"),
+        _argument("--quick", action="store_true",
+                  help="estimate costs from earlier runs instead of measuring the speed here")),
+            "dragdeck advise uhlmann2015 --tolerance 0.05 --quantity drag_mean"),
+    Command("run", "run or resume one input script",
+            "Run the input script in.liggghts of a run folder with LIGGGHTS, or resume it from its "
+            "last checkpoint, and apply the acceptance checks. It writes the raw output and "
+            "state.json to that folder.",
             "engine.run_folder:run_command", (
-        _argument("folder", type=Path),
+        _argument("folder", type=Path, metavar="RUN_DIR",
+                  help="folder of the run: results/STUDY/SCENE/RUN"),
         _argument("--outcome", type=Path, metavar="FILE",
-                  help="write the result to FILE and succeed even if the run is rejected"),
+                  help="write the result of the run to FILE and exit with 0 even if the run is "
+                  "rejected (default: exit with 1)"),
         _argument("--again", action="store_true",
-                  help="start again even if the run was rejected before"),
-        _argument("--patience", type=float, default=1800.0, metavar="S", dest="patience_s",
-                  help="seconds without any output after which LIGGGHTS is ended"))),
+                  help="start again from the beginning if the run was rejected before"),
+        _argument("--patience", type=float, default=1800, metavar="S", dest="patience_s",
+                  help="terminate LIGGGHTS after this many seconds without output (default: "
+                  "%(default)s)")),
+            "dragdeck run results/uhlmann2015/filling/RUN"),
 )  # fmt: skip
 """What a user calls."""
 
 STEPS = (
-    Command("render", "write the input script of one run", "commands:render", (
+    Command("render", "write the input script of one run",
+            "Write in.liggghts, case.json, columns.json, initial particles and meshes of one run "
+            "to results/STUDY/SCENE/RUN.",
+            "commands:render", (
         STUDY, FIDELITY, PLAN,
-        _argument("scene", help="drop_test, filling or process"),
-        _argument("run", help="run id, as `dragdeck cases` lists it"),
-        _argument("--packing", type=Path, help="packing.json of the settled bed (process)"))),
-    Command("drops", "run the drop tests that a calibration needs",
+        _argument("scene", metavar="SCENE", help=f"scene of the run: {SCENE}"),
+        _argument("run", metavar="RUN", help="run id, as dragdeck cases lists it"),
+        _argument("--packing", type=Path, metavar="FILE",
+                  help="packing.json of the settled packing; required for a process"))),
+    Command("drops", "run the drop tests of a calibration",
+            "Run the drop tests that the calibration of the restitution requires, and write "
+            "drops.json to the folder.",
             "campaigns.restitution_drops:drops_command", (
                 STUDY, FIDELITY, OUT_DIR,
-                _argument("set", choices=("sweep", "confirm", "trials")),
-                _argument("--fit", type=Path, help="result.json of the fit (confirm)"),
-                _argument("--count", type=int, default=10, help="number of trials (trials)"),
-                _argument("--seed", type=int, default=1, help="seed of the trials (trials)"))),
+                _argument("set", choices=("sweep", "confirm", "trials"),
+                          help="sweep: a range of restitutions; confirm: the fitted one; trials: "
+                          "random ones, to test the fit"),
+                _argument("--fit", type=Path, metavar="FILE",
+                          help="result.json of the fit; required for confirm"),
+                _argument("--count", type=int, default=10, metavar="N",
+                          help="number of trials (default: %(default)s)"),
+                _argument("--seed", type=int, default=1, metavar="N",
+                          help="random seed of the trials (default: %(default)s)"))),
 )  # fmt: skip
 """What the rules call: ``dragdeck step NAME``."""
 
@@ -108,7 +185,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def guarded(call: Callable[[], None]) -> int:
     """Call a function; whatever goes wrong becomes one message on standard error.
 
-    What nobody expected goes to a log file with its traceback, and the message names the file.
+    An unexpected error is written to a log file with its traceback; the message names the file.
 
     Returns
     -------
@@ -124,25 +201,25 @@ def guarded(call: Callable[[], None]) -> int:
         print("dragdeck: interrupted", file=sys.stderr)
         return 130
     except Exception as error:
-        print(f"dragdeck: {_told(error)}", file=sys.stderr)
+        print(f"dragdeck: {_message(error)}", file=sys.stderr)
         return 1
     return 0
 
 
-def _told(error: Exception) -> str:
-    """What the user is told of an error."""
+def _message(error: Exception) -> str:
+    """The message of an error."""
     if isinstance(error, DragdeckError):
         return str(error)
     if isinstance(error, OSError) and error.strerror:
         where = f"{error.filename}: " if error.filename else ""
-        remedy = "check that the place is there, who may read and write it, and its free space"
+        remedy = "check that the path exists, its permissions, and the free space on the disk"
         return f"{where}{error.strerror}\n  remedy: {remedy}"
     if isinstance(error, MemoryError):
-        return f"there is not enough memory: {error}\n  remedy: use a machine with more memory"
+        return f"not enough memory: {error}\n  remedy: use a machine with more memory"
     return (
         f"unexpected error: {type(error).__name__}: {str(error)[:300]}\n  log:    {_kept(error)}\n"
-        "  remedy: if an input file was damaged, make it again; else report this with the log,"
-        " see README.md, section Reporting a problem"
+        "  remedy: if an input file is damaged, create it again; otherwise report the problem with "
+        "the log: README.md, section Reporting a problem"
     )
 
 
@@ -161,19 +238,24 @@ def _kept(error: Exception) -> str:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="dragdeck", description="From a study file to LIGGGHTS input scripts and runs."
+        prog="dragdeck",
+        description="Write LIGGGHTS input scripts for the cases of a study, run and check them.",
+        epilog="Each command has its own help: dragdeck COMMAND --help",
     )
     parser.add_argument("--version", action="version", version=f"dragdeck {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add(commands, COMMANDS)
-    step = commands.add_parser("step", help="a step of the workflow: dragdeck step --help")
+    step = commands.add_parser("step", help="run a step of the workflow: dragdeck step --help")
     _add(step.add_subparsers(required=True, metavar="STEP"), STEPS)
     return parser
 
 
 def _add(parsers: Any, commands: Sequence[Command]) -> None:
     for command in commands:
-        parser = parsers.add_parser(command.name, help=command.help, description=command.help)
+        example = f"example: {command.example}" if command.example else None
+        parser = parsers.add_parser(
+            command.name, help=command.help, description=command.about, epilog=example
+        )
         for names, options in command.arguments:
             parser.add_argument(*names, **options)
         parser.set_defaults(_command=command)

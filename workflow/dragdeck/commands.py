@@ -168,7 +168,7 @@ def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) 
             notes = _expectations(case, kind, one)
             show([explanation(one, cost, notes, tradeoff_if_measured())])
     if not verbose:
-        print("Every run with reasons, prices and expectations: --verbose")
+        print("For every run, with reasons, costs and expectations: --verbose")
 
 
 def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:
@@ -253,7 +253,7 @@ def _judged(case: Case) -> tuple[list[str], list[InputError]]:
 def new(study: str, base: str) -> None:
     """Make the folder of a study that extends another."""
     file = new_study(find_project(Path.cwd()).studies, study, base)
-    say(f"{file}: change it, then dragdeck check {study}")
+    say(f"{file}: edit it, then run: dragdeck check {study}")
 
 
 def cases(study: str, fidelity: str | None, plan: str | None) -> None:
@@ -356,8 +356,8 @@ def _bed(kind: SceneType, packing: Path | None) -> Bed | None:
         return None
     if packing is None:
         raise InputError(
-            f"a {kind.name} needs the settled bed",
+            f"the scene {kind.name} requires the settled packing",
             field="--packing",
-            remedy="give the packing.json that dragchain made of the filling",
+            remedy="give the packing.json that dragchain tables made of the filling",
         )
     return read_bed(packing)

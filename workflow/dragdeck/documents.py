@@ -46,10 +46,12 @@ class Document(Part):
         except FileNotFoundError:
             raise InputError("there is no such file", file=file, remedy=cls.remedy) from None
         except (ValueError, AttributeError, RecursionError):
-            raise InputError("is not a JSON object", file=file, remedy=cls.remedy) from None
+            raise InputError(
+                "the file is not a JSON object", file=file, remedy=cls.remedy
+            ) from None
         if version != SCHEMA:
             raise InputError(
-                "another schema: another version of dragdeck wrote it",
+                "the file was written by another version of dragdeck",
                 file=file,
                 field="schema",
                 value=version,

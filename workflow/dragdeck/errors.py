@@ -1,4 +1,4 @@
-"""The errors and warnings a user can meet before and after an engine run."""
+"""Errors and warnings before, during and after a run."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,15 +19,15 @@ class InputError(DragdeckError):
     problem : str
         What is wrong, in one sentence without a full stop.
     file : Path or str, optional
-        Where it stands.
+        The file with the problem.
     field : str, optional
         The dotted field name, or ``line N``.
     value : object, optional
-        The value found there.
+        The value of the field.
     limit : str, optional
-        What would be accepted.
+        Accepted values.
     remedy : str, optional
-        What the user can do.
+        Instruction for the user.
 
     Attributes
     ----------
@@ -95,11 +95,11 @@ def choices(word: str, known: Iterable[str]) -> str:
 
 
 class EngineError(DragdeckError):
-    """The engine is missing, too old, refused the deck or was stopped."""
+    """LIGGGHTS is missing or too old, rejected the input script, or was stopped."""
 
 
 class RejectedRunError(DragdeckError):
-    """A run ended, but what it left cannot be trusted."""
+    """A run ended but did not pass the acceptance checks."""
 
 
 CautionCode = Literal[

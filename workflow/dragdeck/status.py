@@ -45,7 +45,10 @@ def status(study: str, fidelity: str | None, plan: str | None, verbose: bool) ->
     print(f"{study}: runs {100 * done_fraction(runs):.0f} % done: {said}{cost}")
     if not plan:
         file = project.report(study)
-        print("report:", file if file.is_file() else f"none yet; ./run all --config study={study}")
+        print(
+            "report:",
+            file if file.is_file() else f"none yet; make it with: ./run all --config study={study}",
+        )
 
 
 def _show_state(state: RunState, runs: Sequence[StudyRun], verbose: bool) -> None:
@@ -56,7 +59,7 @@ def _show_state(state: RunState, runs: Sequence[StudyRun], verbose: bool) -> Non
         if run.status.problem:
             print("  " + run.status.problem.replace("\n", "\n  "))
         if state == "interrupted" and "remedy:" not in run.status.problem:
-            print("  remedy: give the same command again: it goes on from its last checkpoint")
+            print("  remedy: give the same command again: the run resumes from its last checkpoint")
     if runs[len(shown) :]:
         print(f"and {len(runs) - len(shown)} more {state} (--verbose)")
 

@@ -354,7 +354,7 @@ def scaling_options(wildcards):
     if scaling is None:
         raise WorkflowError(
             f"{relative(CASES[0].file)}: scaling: a required key is missing\n"
-            "  remedy: name the field to fit a power law over, see docs/scaling.md"
+            "  remedy: name the field to fit a power law over, see docs/howto/sweep.md"
         )
     options = ["--field", scaling.field]
     if scaling.expected_exponent is not None:

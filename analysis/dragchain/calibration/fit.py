@@ -183,10 +183,11 @@ def _edge(above: Callable[[float], float], best: float, end: float) -> float:
     if above(end) <= 0.0:
         raise RecordError(
             "range",
-            "the restitution that fits is not inside the sweep",
-            value=f"{best:.3f}, with an interval past {end:g}",
-            limit="inside the sweep's range with its whole interval",
-            remedy="check drop.height_m and the record: is it this particle on this plate?",
+            "the fitted restitution lies outside the sweep",
+            value=f"{best:.3f}, confidence interval beyond {end:g}",
+            limit="value and confidence interval within the range of the sweep",
+            remedy="check drop_test.height_m, and that particle and plate of the record "
+            "are those of the study",
         )
     return float(brentq(above, best, end, xtol=1e-10))
 

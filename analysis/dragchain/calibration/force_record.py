@@ -74,7 +74,7 @@ def parse_record(text: str) -> tuple[Floats, Floats]:
     """Times in s and forces in N of a CSV text; see `read_record`."""
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if not lines:
-        raise RecordError("columns", "the file holds no line", remedy="write a header and samples")
+        raise RecordError("columns", "the file is empty", remedy="write a header line and samples")
     separator = next((mark for mark in (";", "\t") if mark in lines[0]), ",")
     names = [name.strip().strip('"').lower() for name in lines[0].split(separator)]
     time_name, force_name = (_column(names, known) for known in (TIME_COLUMNS, FORCE_COLUMNS))
@@ -87,7 +87,7 @@ def parse_record(text: str) -> tuple[Floats, Floats]:
         raise RecordError(
             "numbers",
             f"a value is not a number: {error}",
-            remedy="write numbers with a point; between columns , or ; or a tab",
+            remedy="use a decimal point, and a comma, semicolon or tab between columns",
         ) from None
     return time * TIME_COLUMNS[time_name], force * FORCE_COLUMNS[force_name]
 
@@ -97,7 +97,7 @@ def _column(names: Sequence[str], known: dict[str, float]) -> str:
     if len(found) != 1:
         raise RecordError(
             "columns",
-            f"{len(found) or 'no'} column(s) with a name that says the unit",
+            f"{len(found) or 'no'} column(s) with a recognised name",
             value=", ".join(names)[:200],
             limit=f"one of {', '.join(known)}",
             remedy="name the columns in the first line, for example time_s,force_n",
@@ -121,9 +121,9 @@ def check_samples(time_s: Floats, force_n: Floats) -> Record:
     if len(bad):
         raise RecordError(
             "numbers",
-            "a sample is no finite number",
-            value=f"{len(bad)} of them, the first in row {bad[0] + 1}",
-            remedy="remove what the sensor did not measure, or record again",
+            "a sample is not a finite number",
+            value=f"{len(bad)} samples, the first in row {bad[0] + 1}",
+            remedy="remove these samples, or record again",
         )
     back = np.flatnonzero(np.diff(time_s) <= 0.0)
     if len(back):
@@ -133,7 +133,7 @@ def check_samples(time_s: Floats, force_n: Floats) -> Record:
             "time",
             f"time {word}",
             value=f"{time_s[row]:.9g} s then {time_s[row + 1]:.9g} s, rows {row + 1}, {row + 2}",
-            remedy="export one trigger only, with enough decimals in the time",
+            remedy="export a single trigger, with enough decimals in the time",
         )
     interval = float((time_s[-1] - time_s[0]) / (len(time_s) - 1))
     even = time_s[0] + interval * np.arange(len(time_s))
@@ -142,10 +142,10 @@ def check_samples(time_s: Floats, force_n: Floats) -> Record:
         row = int(np.argmax(off))
         raise RecordError(
             "uneven",
-            "the times are not at an even interval",
+            "the sampling interval is not constant",
             value=f"row {row + 1} is {off[row] / interval:.2g} intervals off",
             limit=f"{_JITTER:g} intervals of {interval:.3g} s",
-            remedy="export every sample at the sensor's own rate",
+            remedy="export every sample at the sampling rate of the sensor",
         )
     centre = float(np.median(force_n))
     if centre - float(force_n.min()) > float(force_n.max()) - centre:

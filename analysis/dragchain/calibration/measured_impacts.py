@@ -228,10 +228,10 @@ def _pulses(force: Floats, threshold: float, dead: int) -> list[tuple[int, int]]
 def _too_few(count: int) -> RecordError:
     return RecordError(
         "impacts",
-        "fewer than two whole impacts",
+        "fewer than two complete impacts",
         value=str(count),
         limit="at least 2, better 3",
-        remedy="record for longer, from before the first impact on",
+        remedy="record for a longer time, starting before the first impact",
     )
 
 
@@ -245,15 +245,15 @@ def _check_count(pulses: Sequence[tuple[int, int]], force: Floats, noise: float)
             "no quiet baseline before the first impact",
             value=f"{first} samples",
             limit=f"at least {_QUIET_SAMPLES}",
-            remedy="trigger earlier, so that the record begins before the particle lands",
+            remedy="trigger earlier, so that the record starts before the first impact",
         )
     if float(force.max()) < _SIGNAL_TO_NOISE * noise:
         raise RecordError(
             "baseline",
-            "no quiet baseline: the impacts hardly stand out of the noise",
+            "no quiet baseline: the signal-to-noise ratio of the impacts is too low",
             value=f"largest force {force.max():.3g} N, noise {noise:.3g} N (standard deviation)",
             limit=f"a ratio of at least {_SIGNAL_TO_NOISE:g}",
-            remedy="drop from higher, or use a more sensitive range",
+            remedy="use a larger drop height, or a more sensitive range",
         )
 
 
@@ -282,9 +282,9 @@ def pulse(
     if last - first < 1:
         raise RecordError(
             "coarse",
-            "sampled too coarsely to see an impact",
+            "the sampling rate is too low to resolve an impact",
             value=f"one sample at {time[first]:.6g} s, interval {interval:.3g} s",
-            limit="at least 2 samples an impact",
+            limit="at least 2 samples per impact",
             remedy="record at a higher rate",
         )
     top = first + int(np.argmax(force[first : last + 1]))
@@ -345,9 +345,9 @@ def _check_tops(
 def _clipped(problem: str, largest: Sequence[float]) -> RecordError:
     return RecordError(
         "clipped",
-        f"{problem}: the sensor or its amplifier was at its limit",
+        f"{problem}: the sensor or its amplifier reached its limit",
         value=", ".join(f"{value:.6g} N" for value in largest),
-        remedy="choose a wider range, or drop from lower",
+        remedy="use a wider range, or a smaller drop height",
     )
 
 
@@ -357,8 +357,7 @@ def _check_order(impacts: Sequence[Impact]) -> None:
     if len(flights) > 1 and flights[1] > flights[0] * (1.0 + 1e-3):
         raise RecordError(
             "order",
-            "the second flight is longer than the first, which no rebound is",
+            "the second flight is longer than the first, which is impossible for rebounds",
             value=f"{flights[0] * 1e3:.3g} ms, then {flights[1] * 1e3:.3g} ms",
-            remedy="cut what was recorded before the first impact, and after the "
-            "particle was caught",
+            remedy="remove everything before the first impact, and after the particle was caught",
         )

@@ -27,18 +27,33 @@ PURPOSES: tuple[SweepPurpose, ...] = ("production", "reference")
 
 
 class Put(Part):
-    """What to put into which field of the study."""
+    """The value to set in a field of the study.
+
+    Attributes
+    ----------
+    field : str
+        Dotted name of the field.
+    value : float
+        Value for the study.
+    """
 
     field: str
     value: float
 
 
 class Direct(Part):
-    """Rebound straight from the times, without a model of the contact.
+    """Restitution calculated directly from the flight times, without a contact law.
 
-    The first impact's is the flight time over twice the fall time, which needs the
-    height; the second's is the second flight over the first, which does not.
-    Contact times are left out of the flights.
+    That of the first impact is flight time / (2 x fall time), which depends on the drop height;
+    that of the second is the ratio of the second to the first flight time, which does not.
+    Contact times are not part of the flights.
+
+    Attributes
+    ----------
+    first_impact : float
+        Of the first impact.
+    second_impact : float or None
+        Of the second impact.
     """
 
     first_impact: float
@@ -46,7 +61,19 @@ class Direct(Part):
 
 
 class PutFor(Part):
-    """The deck value for the measured rebound, None outside the sweep."""
+    """The input value that reproduces the measured rebound with given settings.
+
+    Attributes
+    ----------
+    purpose : str
+        ``production`` (settings of the study) or ``reference``.
+    limit_force : bool
+        Whether tensile forces are suppressed.
+    used : bool
+        Whether the study uses these settings.
+    value, ci95_low, ci95_high : float or None
+        Input value and its interval; None outside the sweep.
+    """
 
     purpose: SweepPurpose
     limit_force: bool
@@ -57,22 +84,36 @@ class PutFor(Part):
 
 
 class CalibrationFile(Document):
-    """The content of ``result.json``; docs/calibration.md describes its keys.
+    """The content of ``result.json``; docs/evidence/calibration.md explains it.
 
     Attributes
     ----------
     measured : Estimate
-        The particle's rebound.
+        Measured coefficient of restitution.
     effective : float
-        Rebound of the production drop at the fitted value.
+        Effective restitution of the production drop at the fitted value.
     fit, fit_full : Fit
-        At production and by the drops at full modulus.
+        Fits at the production settings and at the physical modulus.
     width_ratio : float
-        Width of the first impact over that of the simulated one, sampled alike.
+        Ratio of the widths of the first impact, measured / simulated with the same sampling.
     correction : float
-        Fitted value less measured rebound.
+        Fitted input value minus measured restitution.
     scatter_of_one_drop : float
-        Standard deviation of one production drop's rebound.
+        Standard deviation of the restitution of a single production drop.
+    known : DropTest
+        The study and its drop test.
+    put : Put
+        The value to set in the study.
+    peaks_compared : bool
+        Whether peak forces were fitted too.
+    direct : Direct
+        Restitution without a contact law.
+    put_for : tuple of PutFor
+        Input values for other settings.
+    settings : mapping
+        Modulus and time step by purpose.
+    record : Measured
+        Impacts of the measured record.
     """
 
     made_by: ClassVar[str] = "snakemake calibrate"
@@ -286,7 +327,7 @@ def confirmed(drops: Drops) -> Confirmed:
     """
     runs = drops.select("confirm")
     if len(runs) < 2:
-        raise TableError("there are no confirming drops; run `snakemake calibrate`")
+        raise TableError("the confirming drop tests are missing; run `snakemake calibrate`")
     rebound = np.array([run.effective for run in runs])
     std = float(rebound.std(ddof=1))
     restitution, mean = runs[0].drop.restitution, float(rebound.mean())
@@ -297,8 +338,7 @@ def calibrate_command(record: Path, drops_file: Path, out_dir: Path) -> str:
     """Fit a drop test as the command line asks for; what to put into the study."""
     found = write_calibration(record, drops_file, out_dir)
     return (
-        f"put restitution: {found.put.value:g} into pairs.{found.known.pair}\n"
-        f"  95 % interval {found.fit.ci95_low:.4f} to {found.fit.ci95_high:.4f}\n"
-        f"  the particle then rebounds with {found.effective:.4f}; measured "
-        f"{found.measured.value:.4f}"
+        f"set pairs.{found.known.pair}.restitution: {found.put.value:g}\n"
+        f"  95 % CI {found.fit.ci95_low:.4f} to {found.fit.ci95_high:.4f}\n"
+        f"  effective restitution {found.effective:.4f}; measured {found.measured.value:.4f}"
     )

@@ -71,7 +71,7 @@ def sample_impact(shape: Waveform, measured: Measured, peak_n: float) -> Samplin
     if len(found) < _SAMPLINGS / 2:
         raise RecordError(
             "coarse",
-            "sampled too coarsely to see an impact of this particle",
+            "the sampling rate is too low to resolve an impact of this particle",
             value=f"interval {step:.3g} s, contact {shape.up_s - shape.down_s:.3g} s",
             limit="2 samples above the noise in most impacts",
             remedy="record at a higher rate",

@@ -188,7 +188,7 @@ def _read_drop(folder: Path, drop: Drop) -> DropRun:
     rows = pd.concat([pd.DataFrame({name: block[name] for name in _SAMPLES}) for block in blocks])
     windows = [window for _, window in rows.groupby((rows["step"].diff() != 1).cumsum())]
     if len(windows) < IMPACTS:
-        raise TableError(f"{folder}: {len(windows)} impacts, a calibration needs {IMPACTS}")
+        raise TableError(f"{folder}: {len(windows)} impacts; a calibration requires {IMPACTS}")
     radius, gravity = case.media.radius_mean_m, case.gravity_m_s2
     pieces = [
         waveform({name: window[name].to_numpy(np.float64) for name in _SAMPLES}, radius, gravity)
@@ -221,7 +221,9 @@ def waveform(
     gap = window["z_m"] - radius_m
     inside = np.flatnonzero(gap < 0.0)
     if not len(inside) or inside[0] == 0 or inside[-1] == len(gap) - 1:
-        raise TableError("an impact of a drop is not whole in its window; widen the window")
+        raise TableError(
+            "an impact of a drop test is not entirely within its window; widen the window"
+        )
     before, after = inside[0] - 1, inside[-1] + 1
     near = [before, after]
     down, up = speed_at_plate(speed[near], gap[near], gravity_m_s2).tolist()

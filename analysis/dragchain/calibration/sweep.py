@@ -85,7 +85,7 @@ def emulate(
     """
     value = np.array([run.drop.restitution for run in runs])
     if len(np.unique(value)) <= _DEGREE + 1:
-        raise TableError(f"a sweep needs more than {_DEGREE + 1} values of the restitution")
+        raise TableError(f"a sweep requires more than {_DEGREE + 1} values of the restitution")
     scale = np.sqrt(height_m / np.array([run.drop.height_m for run in runs]))
     speeds = np.array([run.speeds_m_s[: IMPACTS + 1] for run in runs])
     peaks = np.log([[impact.peak_n for impact in run.impacts[:IMPACTS]] for run in runs])

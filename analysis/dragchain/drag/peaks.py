@@ -76,11 +76,11 @@ def find_drag_peaks(
     from scipy.signal import find_peaks
 
     if len(time_s) < 3:
-        raise SeriesError(f"peaks need at least 3 samples, the series has {len(time_s)}")
+        raise SeriesError(f"peaks require at least 3 samples; the series has {len(time_s)}")
     intervals = np.diff(time_s)
     interval = float(np.median(intervals))
     if not np.allclose(intervals, interval, rtol=1e-3, atol=0.0):
-        raise SeriesError("peaks need samples at equal intervals, these are not")
+        raise SeriesError("peaks require a constant sampling interval")
     prominence = float(np.std(drag_n, ddof=1)) if min_prominence_n is None else min_prominence_n
     distance = max(1.0, min_separation_s / interval)
     index, found = find_peaks(-drag_n, prominence=prominence, distance=distance)

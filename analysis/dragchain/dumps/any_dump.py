@@ -15,32 +15,32 @@ _KINDS = {b"ENTRIES": "local", b"ATOMS": "custom"}
 
 
 def read_dump(source: Path | str, columns: Sequence[str] | None = None) -> Iterator[Frame]:
-    """Frames of a ``dump custom`` or ``dump local``, text or binary.
+    """Read the frames of a ``dump custom`` or ``dump local``, text or binary.
 
     Parameters
     ----------
     source : Path or str
-        The file; or, of a dump with one file per frame, its pattern with ``*`` for the step.
-        A name that ends in ``.bin`` is that of a binary dump. Compressed files end in ``.gz``,
-        ``.zst``, ``.bz2`` or ``.lz4``.
+        The file; or, for a dump with one file per frame, its pattern with ``*`` for the step.
+        The ending ``.bin`` marks a binary dump; an additional ``.gz``, ``.zst``, ``.bz2`` or
+        ``.lz4`` marks a compressed one.
     columns : sequence of str, optional
-        Names of the columns. A binary dump does not contain them: name all, in their order.
-        Of a text dump, name those of its header, in any order, or none.
+        Names of the columns: required for a binary dump, in the order of its dump command; a text
+        dump must contain all of them, in any order. By default those in its header.
 
     Yields
     ------
     Frame
         In the order of the file, or of the steps in the names of the files. Columns
-        named ``id``, ``type`` or ``..._id`` are int64, all others float64. Memory is
-        bounded by the largest frame.
+        named ``id``, ``type`` or ``..._id`` are int64, all others float64. At most one frame is in
+        memory.
 
     Raises
     ------
     TruncatedDumpError
         If a file ends inside a frame.
     DumpError
-        If there is no such file, it is not such a dump, or a number is not finite.
-        Either error names file, frame and byte. The frames before it have been yielded.
+        If there is no such file, it is not such a dump, or a number is not finite. Both errors
+        name file, frame and byte; the frames before it have been yielded by then.
     """
     files = dump_files(source)
     yield from read_frames(files, layout_of(files[0], columns))
@@ -82,7 +82,7 @@ class DumpLayout:
 
 
 def layout_of(file: Path, columns: Sequence[str] | None) -> DumpLayout:
-    """What a file holds, by its name and its first lines.
+    """Layout of a dump file, from its name and first lines.
 
     Raises
     ------
@@ -95,11 +95,11 @@ def layout_of(file: Path, columns: Sequence[str] | None) -> DumpLayout:
     if not wanted:
         raise DumpError(
             file,
-            "a binary dump does not say what its columns are",
-            remedy="give their names in the order of the deck's dump command",
+            "a binary dump does not contain the names of its columns",
+            remedy="give their names in the order of the dump command in the input script",
         )
     if len(set(wanted)) < len(wanted):
-        raise DumpError(file, f"the columns {' '.join(wanted)} name one twice")
+        raise DumpError(file, f"a column is given twice: {' '.join(wanted)}")
     return DumpLayout(kind, wanted, binary=name.suffix == ".bin")
 
 
@@ -112,10 +112,11 @@ def _header(file: Path) -> tuple[str, list[str]]:
     if len(words) < 3 or words[0] != b"ITEM:" or words[1] not in _KINDS:
         raise DumpError(
             file,
-            f"found {lines[0][:60]!r}, and no names of columns",
+            f"found {lines[0][:60]!r}, but no names of columns",
             frame=0,
             offset=0,
             expected="the header of a text dump of LIGGGHTS",
-            remedy="give a dump custom or a dump local; a binary one must be named .bin",
+            remedy="give a file of dump custom or dump local; the name of a binary file "
+            "must end with .bin",
         )
     return _KINDS[words[1]], [word.decode("ascii", "replace") for word in words[2:]]

@@ -95,7 +95,8 @@ class _Cursor:
             offset=self.offset,
             expected=expected,
             kept=self.kept(),
-            remedy="read what the run's deck writes, all of it; else run the engine again",
+            remedy="check that the file is complete and belongs to this run; otherwise "
+            "repeat the run",
         )
 
     def kept(self) -> str | None:
@@ -126,7 +127,7 @@ class _Cursor:
             offset=self.offset,
             expected=expected,
             kept=self.kept(),
-            remedy="let the run go on from its last checkpoint, or run it again",
+            remedy="resume the run from its last checkpoint, or repeat it",
         )
 
     def take(self, count: int, what: str) -> bytes:

@@ -1,8 +1,7 @@
 """Streams over the raw outputs of a run, its parts merged.
 
-An interrupted run goes on from its last checkpoint and writes new files, so
-that an output consists of parts that overlap. Where they do, the later part
-counts.
+An interrupted run resumes from its last checkpoint and writes new files, so that the parts of an
+output may overlap. In an overlap, the later part is used.
 """
 
 import re
@@ -47,13 +46,13 @@ def part_files(run_dir: Path | str, output: Output) -> list[Path]:
         raise DumpError(
             Path(run_dir) / output.pattern,
             f"there is no file of the output {output.name}",
-            remedy="run the engine first, or leave the output out of the study",
+            remedy="run the case first, or remove the output from the study",
         )
     return [file for _, file in parts]
 
 
 def iter_frames(run_dir: Path | str, output: Output) -> Iterator[Frame]:
-    """Frames of a ``dump custom`` or ``dump local``, parts merged.
+    """Read the frames of a ``dump custom`` or ``dump local`` of a run, its parts merged.
 
     Parameters
     ----------
@@ -65,15 +64,14 @@ def iter_frames(run_dir: Path | str, output: Output) -> Iterator[Frame]:
     Yields
     ------
     Frame
-        Steps strictly increasing. Memory is bounded by the largest frame.
+        With strictly increasing steps. At most one frame is in memory.
 
     Raises
     ------
     TruncatedDumpError
         If a file ends inside a frame that no later part covers.
     DumpError
-        If a file is not such a dump, or its frames are not those that ``columns.json``
-        announces.
+        If a file is not such a dump, or its frames are not those that ``columns.json`` announces.
     """
 
     def read(file: Path) -> Iterator[_Piece]:
@@ -85,7 +83,7 @@ def iter_frames(run_dir: Path | str, output: Output) -> Iterator[Frame]:
 
 
 def iter_prints(run_dir: Path | str, output: Output) -> Iterator[Columns]:
-    """Blocks of rows of a ``fix print`` output, parts merged.
+    """Read blocks of rows of a ``fix print`` output of a run, its parts merged.
 
     Parameters
     ----------
@@ -97,7 +95,7 @@ def iter_prints(run_dir: Path | str, output: Output) -> Iterator[Columns]:
     Yields
     ------
     dict of str to (N,) ndarray
-        The columns of up to 20,000 rows, steps strictly increasing.
+        Columns of up to 20,000 rows, with strictly increasing steps.
 
     Raises
     ------
@@ -157,7 +155,7 @@ class _Schedule:
             wrong = steps != wanted
         if wrong.any():
             found, missing = int(steps[wrong][0]), int(wanted[wrong][0])
-            self._fail(file, f"goes on with step {found}", f"step {missing}")
+            self._fail(file, f"continues with step {found}", f"step {missing}")
         self.next = piece.last + period
 
     def finish(self) -> None:
@@ -166,14 +164,14 @@ class _Schedule:
         if last is not None and self.next <= last:
             self._fail(self.file, f"ends before step {self.next}", f"frames up to step {last}")
         if self.next == self.output.first_step:
-            self._fail(self.file, "has no frame at all", f"one from step {self.next} on")
+            self._fail(self.file, "contains no frame", f"one from step {self.next} on")
 
     def _fail(self, file: Path, problem: str, expected: str) -> None:
         raise DumpError(
             file,
             f"{self.output.name} {problem}",
-            expected=f"{expected}, as columns.json says",
-            remedy="let the run go on to its end, then make the tables again",
+            expected=f"{expected}, according to columns.json",
+            remedy="complete the run, then make the tables again",
         )
 
 

@@ -136,6 +136,7 @@ class _Links:
 
     def _missing(self, what: str) -> TableError:
         return TableError(
-            f"a chain of step {self._frame.step} has a {what} that particles.parquet and"
-            " contacts.parquet do not have\n  remedy: make the chains again with `dragchain chains`"
+            f"a chain of step {self._frame.step} has a {what} that is missing in "
+            "particles.parquet or"
+            " contacts.parquet\n  remedy: make the chains again with `dragchain chains`"
         )

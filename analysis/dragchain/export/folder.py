@@ -87,11 +87,11 @@ def _old_files(target: Path, replace: bool) -> set[str]:
     listed = target / LIST
     if not listed.is_file():
         raise ExportError(
-            f"{target} holds files that are no export of dragchain\n  remedy: {_ELSEWHERE}"
+            f"{target} contains files that are not an export of dragchain\n  remedy: {_ELSEWHERE}"
         )
     if not replace:
         raise ExportError(
-            f"{target} holds an export already\n  remedy: {_ELSEWHERE}, or replace it with"
+            f"{target} already contains an export\n  remedy: {_ELSEWHERE}, or replace it with"
             " --replace"
         )
     try:
@@ -106,7 +106,7 @@ def _move(draft: Path, target: Path, old: set[str]) -> None:
     for file in new:
         if str(file) not in old and (target / file).exists():
             raise ExportError(
-                f"{target / file} is in the way, and no earlier export wrote it\n"
+                f"{target / file} already exists and does not belong to an earlier export\n"
                 f"  remedy: {_ELSEWHERE}"
             )
     for name in old:

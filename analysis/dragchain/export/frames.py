@@ -99,11 +99,12 @@ class FrameSeries:
             If ``particles.parquet`` is not there.
         """
         if selection.every < 1:
-            raise ExportError(f"--every is {selection.every}, not at least 1")
+            raise ExportError(f"--every must be at least 1, but is {selection.every}")
         if not run.wrote("particles"):
             raise ExportError(
                 f"{run.folder}: this {run.case.scene} run wrote no output particles, so there is"
-                " nothing to export\n  remedy: export a fill or a process that lists particles in"
+                " nothing to export\n  remedy: export a filling or a process that lists "
+                "particles in"
                 " its outputs"
             )
         steps, times_s = _frame_times(run.table("particles.parquet"))
@@ -170,7 +171,7 @@ def _inside(times_s: Floats, selection: Selection, case: Case) -> np.ndarray:
 
 def _nothing(run: Run, times_s: Floats, selection: Selection) -> str:
     if not times_s.size:
-        return f"{run.table('particles.parquet')} holds no frames, so there is nothing to export"
+        return f"{run.table('particles.parquet')} contains no frames, so there is nothing to export"
     wanted = [
         f"{word} {value:g} s"
         for word, value in (("from", selection.first_s), ("to", selection.last_s))
@@ -211,7 +212,7 @@ class _Track:
         self._blocks = read_groups(run.table("workpiece_force.parquet"), WORKPIECE_COLUMNS)
         first = next(self._blocks, None)
         if first is None:
-            raise TableError(f"{run.table('workpiece_force.parquet')} holds no samples")
+            raise TableError(f"{run.table('workpiece_force.parquet')} contains no samples")
         self._rows = first
 
     def at(self, step: int) -> tuple[Floats, float]:

@@ -52,23 +52,23 @@ def write_export(
 ) -> Exported:
     """Write the frames of a run for another program.
 
-    Memory is bounded by the largest frame. Before the second frame the size of the whole
-    is told, and refused if the disk has less room.
+    At most one frame is in memory. Before the second frame, the expected total size is reported;
+    an export that does not fit on the disk is refused.
 
     Parameters
     ----------
     run_dir : Path or str
-        Folder of a fill or process run with its tables made.
+        Folder of a filling or process run with its tables.
     to : str
         ``paraview`` or ``xyz``.
     out : Path, optional
-        The folder; ``export/<to>`` in the run's if None. It must be new or empty.
+        Folder for the export, new or empty; ``export/<to>`` in the run's folder if None.
     selection : Selection, optional
         The frames; all if None.
     replace : bool
-        Whether an earlier export in `out` may go.
+        Whether an earlier export in `out` may be replaced.
     report : callable
-        Takes a sentence for the user.
+        Receives messages for the user.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def write_export(
         If there is nothing to export, no room for it, or something in its place.
     """
     if to not in _FORMATS:
-        raise ExportError(f"the format is {to!r}, not one of {', '.join(_FORMATS)}")
+        raise ExportError(f"unknown format {to!r}; known: {', '.join(_FORMATS)}")
     main, writer_of = _FORMATS[to]
     run = Run.open(run_dir)
     series = FrameSeries.of(run, Selection() if selection is None else selection)
@@ -117,10 +117,10 @@ def _foresee(folder: Path, frames: int, report: Report) -> None:
     report(f"{frames} frames, about {size / 1e6:.1f} MB")
     if size > free:
         raise ExportError(
-            f"{folder.parent}: there is no room for {frames} frames\n"
+            f"{folder.parent}: not enough free disk space for {frames} frames\n"
             f"  value:  about {size / 1e6:.0f} MB\n"
             f"  limit:  {free / 1e6:.0f} MB are free\n"
-            "  remedy: take fewer with --every, --from-time and --to-time, or name a folder on"
+            "  remedy: export fewer with --every, --from-time and --to-time, or name a folder on"
             " another disk with --out"
         )
 

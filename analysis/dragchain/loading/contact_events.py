@@ -24,7 +24,7 @@ AMOUNTS = (
     *("normal_impulse_n_s", "tangential_impulse_n_s", "relative_path_m", "sliding_m"),
     *("force_slide_n_m", "friction_work_j"),
 )
-"""What is summed over contacts and time; see docs/loading.md."""
+"""What is summed over contacts and time; see docs/explanation/loading.md."""
 
 POINT = ["workpiece_x_m", "workpiece_y_m", "workpiece_z_m"]
 SLIP = ["workpiece_slip_x_m_s", "workpiece_slip_y_m_s", "workpiece_slip_z_m_s"]

@@ -1,4 +1,4 @@
-"""The document of a run's loading, ``loading.json``; docs/loading.md explains its numbers."""
+"""The document ``loading.json`` of a run; docs/explanation/loading.md explains its numbers."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -42,7 +42,13 @@ class Totals(Part):
 
 
 class Quantiles(Part):
-    """Quartiles and 95th percentile over the events of a type; unknown if it has none."""
+    """Quartiles and 95th percentile over the events of a type; null if there are none.
+
+    Attributes
+    ----------
+    p25, p50, p75, p95 : float or None
+        Percentiles.
+    """
 
     p25: Real
     p50: Real
@@ -51,7 +57,17 @@ class Quantiles(Part):
 
 
 class ContactType(Part):
-    """Contact events of a type: their number, fractions of all amounts, and intensity."""
+    """Contact events of one type.
+
+    Attributes
+    ----------
+    events : int
+        Number of events.
+    fraction_of : mapping
+        Fraction of each amount due to this type.
+    intensity : mapping
+        Distribution of duration, peak force and other measures of an event.
+    """
 
     events: int
     fraction_of: Mapping[str, Estimate]
@@ -59,14 +75,30 @@ class ContactType(Part):
 
 
 class Sensitivity(Part):
-    """Fractions by type with one of the limits halved or doubled."""
+    """Fractions by type with one of the limits halved or doubled.
+
+    Attributes
+    ----------
+    limits : str
+        Which limit was changed, and how.
+    fraction_of : mapping
+        Fraction of each amount, by type.
+    """
 
     limits: str
     fraction_of: Fractions
 
 
 class MobilisedLimit(Part):
-    """Sums with another limit of a sliding contact, see `Thresholds.mobilised`."""
+    """Sums with another limit for sliding, see `Thresholds.mobilised`.
+
+    Attributes
+    ----------
+    limit : float
+        Ratio of tangential force to the Coulomb limit from which a contact slides.
+    load_while_sliding_fraction, sliding_m, force_slide_n_m : float
+        Sums with this limit.
+    """
 
     limit: float
     load_while_sliding_fraction: float
@@ -75,24 +107,53 @@ class MobilisedLimit(Part):
 
 
 class Gap(Part):
-    """Number of events if so many samples without force may lie within one."""
+    """Number of events if samples without force are tolerated within an event.
+
+    Attributes
+    ----------
+    samples : int
+        Tolerated number of consecutive samples without force.
+    events : int
+        Number of events.
+    """
 
     samples: int
     events: int
 
 
 class Profile(Part):
-    """Force times sliding distance per metre of path in bins of depth (m) or azimuth (rad)."""
+    """Normal force times sliding distance per metre of path in bins of depth (m) or azimuth (rad).
+
+    Attributes
+    ----------
+    edges : tuple of float
+        Edges of the bins.
+    force_slide : EstimateColumns
+        N m per m of path in each bin.
+    """
 
     edges: tuple[float, ...]
     force_slide: EstimateColumns
 
 
 class Thinned(Part):
-    """What every n-th sample alone would give.
+    """The results if only every n-th sample was used.
 
     The errors of the sums are the largest over the n possible starts, the number of events is
     the mean over them; the fractions by type are those of the first start.
+
+    Attributes
+    ----------
+    every : int
+        n.
+    samples_hz : float
+        Resulting sampling rate, Hz.
+    largest_relative_error : mapping
+        By amount.
+    events : float
+        Number of events.
+    fraction_of : mapping
+        Fraction of each amount, by type.
     """
 
     every: int
@@ -103,7 +164,13 @@ class Thinned(Part):
 
 
 class Impulse(Part):
-    """Impulse on the workpiece in its frame, N s."""
+    """Impulse on the workpiece in the frame of its motion, N s.
+
+    Attributes
+    ----------
+    drag, lateral, vertical : float
+        Along the direction of motion, to its left, and upwards.
+    """
 
     drag: float
     lateral: float
@@ -111,7 +178,19 @@ class Impulse(Part):
 
 
 class Closure(Part):
-    """How the sums over facets and events agree with those of the workpiece."""
+    """Agreement of the sums over facets and events with the total force on the workpiece.
+
+    Attributes
+    ----------
+    workpiece_impulse_n_s, facets_impulse_n_s : Impulse
+        From the total force, and summed over the facets.
+    unplaced_impulse_n_s : Impulse
+        Of contacts that belong to no facet.
+    workpiece_relative_error, facets_relative_error, events_relative_error : float
+        Relative differences between these sums.
+    point_off_facet_max_m : float
+        Largest distance of a contact point from its facet, m.
+    """
 
     workpiece_impulse_n_s: Impulse
     facets_impulse_n_s: Impulse
@@ -123,7 +202,33 @@ class Closure(Part):
 
 
 class Loading(Totals, Document):
-    """Load, sliding and friction work on a workpiece."""
+    """Load, sliding and friction work on the workpiece of a process run.
+
+    Attributes
+    ----------
+    confidence : float
+        Confidence level of all intervals.
+    samples, sample_interval_s : float
+        Number of samples in the statistics, and time between two, s.
+    time_s, path_m : float
+        Time and path length of the statistics, s and m.
+    friction_coefficient : float
+        Of particle and workpiece.
+    contact_time_s : float
+        Hertz contact time of an impact at the speed of the workpiece, s.
+    impact_seen_fraction : float
+        Probability that a sample records such an impact.
+    limits : Thresholds
+        Limits between the types of contact events.
+    types : mapping of ContactType
+        By type: impact, sliding, rolling, resting.
+    sensitivity, mobilised, gaps, sampling : tuple
+        Effect of the limits, of gaps and of the sampling rate on the results.
+    profiles : mapping of Profile
+        By depth and azimuth.
+    closure : Closure
+        Check of the sums.
+    """
 
     made_by: ClassVar[str] = "dragchain loading"
 

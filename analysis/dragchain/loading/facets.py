@@ -31,9 +31,9 @@ def check_facets(sampled: Sampled, surface: Surface, case: Case) -> float:
     facet = sampled.rows["facet_id"].to_numpy()
     if facet.min() < 0 or facet.max() >= len(surface.corners):
         raise TableError(
-            f"workpiece_contacts.parquet names facet {facet.max()}, but the workpiece's "
-            f"mesh has facets"
-            f" 0 to {len(surface.corners) - 1}: is it the mesh of this run?"
+            f"workpiece_contacts.parquet contains facet {facet.max()}, but the mesh of "
+            "the workpiece "
+            f"has facets 0 to {len(surface.corners) - 1}: check that it is the mesh of this run"
         )
     point = sampled.rows[POINT].to_numpy()
     parts = np.array_split(np.arange(len(facet)), 1 + len(facet) // _BLOCK_ROWS)
@@ -42,8 +42,8 @@ def check_facets(sampled: Sampled, surface: Surface, case: Case) -> float:
     worst = int(off.argmax())
     if off[worst] > limit:
         raise TableError(
-            f"a contact point of facet {facet[worst]} lies {off[worst]:.3g} m off it, more than"
-            f" {limit:.3g} m: facet numbers and mesh do not belong together"
+            f"a contact point of facet {facet[worst]} is {off[worst]:.3g} m away from it, more than"
+            f" {limit:.3g} m: facet numbers and mesh do not match"
         )
     return float(off[worst])
 

@@ -102,7 +102,10 @@ def sample(run_dir: Path, case: Case, limits: Thresholds) -> Sampled:
         at = workpiece.reindex(contacts["step"])
         parts.append(_with_amounts(contacts, at, case, interval_s, limits))
     if not parts:
-        raise TableError(f"{run_dir}: no particle touches the workpiece in the counted drag")
+        raise TableError(
+            f"{run_dir}: no particle touches the workpiece in the part of "
+            "the drag that enters the statistics"
+        )
     impulse = workpiece[["drag_n", "lateral_n", "vertical_n"]].to_numpy().sum(axis=0) * interval_s
     path = motion_of(case).axis_speed_m_s * interval_s * len(steps)
     return Sampled(pd.concat(parts, ignore_index=True), len(steps), interval_s, path, impulse)
@@ -127,9 +130,8 @@ def _read_contacts(file: Path, run_dir: Path) -> Iterator[pd.DataFrame]:
         loaded = contacts[_loaded(contacts)].reset_index(drop=True)
         if loaded[_VELOCITY].isna().any(axis=None):
             raise TableError(
-                f"{file}: slip_x_m_s is not known: the run's workpiece_particles holds no "
-                f"velocities,"
-                " as runs did before it was asked for them; run the case again, then "
+                f"{file}: slip_x_m_s is missing: the output workpiece_particles of this older "
+                "run contains no velocities; run the case again, then "
                 f"dragchain tables {run_dir}"
             )
         if len(loaded):

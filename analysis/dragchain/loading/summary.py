@@ -1,7 +1,7 @@
 """What the particles do to the workpiece as a whole: load, sliding and friction work.
 
 These are the quantities a law of wear starts from; no wear coefficient enters,
-so none of them is a removed volume. See docs/loading.md.
+so none of them is a removed volume. See docs/explanation/loading.md.
 """
 
 from collections.abc import Mapping

@@ -93,7 +93,7 @@ def frame_of(
     twice = np.flatnonzero(np.diff(particle_id) == 0)
     if twice.size:
         raise TableError(
-            f"particles.parquet has particle {particle_id[twice[0]]} twice in step {step}"
+            f"particles.parquet contains particle {particle_id[twice[0]]} twice in step {step}"
         )
     b_id = np.asarray(contacts["b_id"], dtype=np.int64)
     b = np.full(b_id.shape, -1, dtype=np.int64)
@@ -125,9 +125,8 @@ def _rows_of(ids: Ints, particle_id: Ints, step: int) -> Ints:
     unknown = ids[rows < 0]
     if unknown.size:
         raise TableError(
-            f"contacts of step {step} name particle {unknown[0]}, which particles.parquet "
-            f"does not have "
-            "in that step: make the tables again from whole dumps"
+            f"contacts of step {step} contain particle {unknown[0]}, which is missing in "
+            f"particles.parquet in that step: make the tables again from complete dumps"
         )
     return rows
 
@@ -144,12 +143,14 @@ def counted_range(workpiece_force: pd.DataFrame) -> tuple[int, int]:
     where = np.flatnonzero(counted)
     if not where.size:
         raise TableError(
-            "workpiece_force.parquet holds no counted sample: the run ended before the "
-            "drag's transient "
-            "was over; run longer or set a shorter statistics.transient_s"
+            "workpiece_force.parquet contains no sample of the statistics: the run ended "
+            "before the "
+            "transient of the drag was over; use a longer path or a shorter motion.transient_m"
         )
     if not counted[where[0] : where[-1] + 1].all():
-        raise TableError("the counted samples of workpiece_force.parquet are not one stretch")
+        raise TableError(
+            "the samples of workpiece_force.parquet in the statistics are not contiguous"
+        )
     step = workpiece_force["step"].to_numpy(np.int64)
     return int(step[where[0]]), int(step[where[-1]])
 

@@ -18,13 +18,12 @@ from dragchain.tables.parquet import table_writer, write_parquet
 def write_chains(run_dir: Path) -> None:
     """Write the tables ``network``, ``clusters`` and ``chains`` of a process run.
 
-    They hold the frames of the counted stretch of the drag and no others. One frame is in memory
-    at a time.
+    They contain the frames of the drag that enter the statistics. At most one frame is in memory.
 
     Raises
     ------
     TableError
-        If a table is missing, or if the counted stretch holds no network frame.
+        If a table is missing, or if the statistics contain no frame of the network.
     """
     network: list[dict[str, float]] = []
     grown: list[dict[str, NDArray[Any]]] = []
@@ -37,8 +36,8 @@ def write_chains(run_dir: Path) -> None:
             found.write(chain_table(frame))
         if not network:
             raise TableError(
-                f"{run_dir}: the counted stretch of the drag holds no network frame; "
-                "write the outputs contacts and particles more often or run longer"
+                f"{run_dir}: the statistics contain no frame of the contact network; "
+                "increase outputs.network_hz or use a longer path"
             )
     write_parquet(pd.DataFrame(network), tables / "network.parquet")
     columns = {name: np.concatenate([part[name] for part in grown]) for name in grown[0]}

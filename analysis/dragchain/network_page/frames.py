@@ -83,8 +83,8 @@ def shown_frames(run: Run, peak_time_s: Floats) -> FrameSeries:
     """
     if not run.wrote("contacts", "particles", "workpiece_contacts", "workpiece_particles"):
         raise TableError(
-            f"{run.folder}: this {run.case.scene} run wrote no contact network, so there is no"
-            " page on it\n  remedy: list contacts and particles in its outputs"
+            f"{run.folder}: this {run.case.scene} run wrote no contact network, which the"
+            " page requires\n  remedy: use the outputs contacts and particles"
         )
     network = read_table(run.table("network.parquet"), ["step", "time_s"])
     steps, times = network["step"].to_numpy(np.int64), network["time_s"].to_numpy(np.float64)
@@ -93,7 +93,9 @@ def shown_frames(run: Run, peak_time_s: Floats) -> FrameSeries:
     rows = np.union1d(even, nearest)
     series = FrameSeries(run, steps[rows], times[rows])
     if not series.has_chains:
-        raise TableError(f"{run.folder}: there are no chains: run `dragchain chains {run.folder}`")
+        raise TableError(
+            f"{run.folder}: the force chains are missing: run `dragchain chains {run.folder}`"
+        )
     return series
 
 

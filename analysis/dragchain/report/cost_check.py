@@ -1,6 +1,6 @@
 """What a run was expected to cost and to err, beside what it did.
 
-The expectation is ``advice.json`` of `dragdeck advise`; docs/outputs.md
+The expectation is ``advice.json`` of `dragdeck advise`; docs/reference/results.md
 describes it.
 """
 

@@ -43,7 +43,21 @@ class Comparison(Part):
 
 
 class Peaks(Part):
-    """Peaks of the resistance: process times, drag there, and the least time between two."""
+    """Peaks of the drag force magnitude.
+
+    Attributes
+    ----------
+    count : int
+        Number of peaks.
+    process_time_s : tuple of float
+        Process times of the peaks, s.
+    drag_n : tuple of float
+        Drag at the peaks, N; negative: opposes the motion.
+    largest_n : float
+        Largest magnitude, N.
+    separation_s : float
+        Minimum time between two peaks, s.
+    """
 
     count: int
     process_time_s: tuple[float, ...]
@@ -53,7 +67,30 @@ class Peaks(Part):
 
 
 class Chains(Part):
-    """Force chains and workpiece paths, means over the network frames."""
+    """Force chains and paths from workpiece to bowl, means over the network frames.
+
+    Attributes
+    ----------
+    peters_per_frame, peters_particles_mean : float
+        Quasi-linear chains per frame, and their mean number of particles.
+    widest_paths_per_frame : float
+        Paths from workpiece to bowl per frame.
+    workpiece_contacts_without_path_per_frame : float
+        Contacts above the mean force from which no path leads to the bowl.
+    widest_paths_to_side_fraction : float
+        Fraction of the paths that end at the side wall.
+    dominant_frames : int
+        Frames with a dominant path.
+    dominant_bottleneck_mean_n, dominant_bottleneck_max_n : float
+        Bottleneck force of the dominant paths, N.
+    dominant_particles_mean : float
+        Mean number of particles of the dominant paths.
+    dominant_altitude_mean_m, dominant_altitude_std_m : float
+        Height of the dominant paths above the floor, m.
+    dominant_azimuth_mean_rad, dominant_azimuth_resultant : float
+        Circular mean of their direction from that of the motion, rad, and its resultant length
+        (1: all equal).
+    """
 
     peters_per_frame: float
     peters_particles_mean: Real
@@ -71,7 +108,15 @@ class Chains(Part):
 
 
 class AheadBehind(Part):
-    """Normal force within 90 degrees of the direction of motion and beyond, mean of a frame."""
+    """Sums of the normal force ahead of and behind the workpiece, means over the samples.
+
+    Attributes
+    ----------
+    ahead_n, behind_n : Estimate
+        Within 90 degrees of the direction of motion, and beyond, N.
+    ratio, fraction_ahead : Estimate
+        Ratio ahead / behind, and fraction ahead of both.
+    """
 
     ahead_n: Estimate
     behind_n: Estimate
@@ -80,14 +125,34 @@ class AheadBehind(Part):
 
 
 class AzimuthProfile(Part):
-    """Normal force of a frame in bins around the workpiece."""
+    """Normal force per sample in bins around the workpiece.
+
+    Attributes
+    ----------
+    edges_rad : tuple of float
+        Edges of the bins, from the direction of motion.
+    force_n : EstimateColumns
+        Sum of the normal forces of each bin, N.
+    """
 
     edges_rad: tuple[float, ...]
     force_n: EstimateColumns
 
 
 class DepthProfile(Part):
-    """Normal force of a contact, and of all contacts per metre of depth, in bins of depth."""
+    """Normal force in bins of depth below the settled surface.
+
+    Attributes
+    ----------
+    edges_m : tuple of float
+        Edges of the bins, m.
+    contact_n : EstimateColumns
+        Mean normal force per contact, N.
+    line_load_n_per_m : EstimateColumns
+        Sum of the normal forces per metre of depth, N/m.
+    slope_n_per_m : Estimate
+        Slope of the normal force per contact with depth, N/m.
+    """
 
     edges_m: tuple[float, ...]
     contact_n: EstimateColumns
@@ -96,9 +161,16 @@ class DepthProfile(Part):
 
 
 class Wake(Part):
-    """Mean drag before a workpiece comes to a wake, in the wake, and their ratio.
+    """Mean drag before a workpiece enters a wake, in the wake, and their ratio.
 
     The last diameter of the workpiece before the wake is in neither.
+
+    Attributes
+    ----------
+    fresh_n, wake_n : MeanEstimate
+        Mean drag before and in the wake, N.
+    ratio : Estimate
+        Ratio wake / before.
     """
 
     fresh_n: MeanEstimate
@@ -115,7 +187,7 @@ class Findings(Document):
 
 
 class ProcessFindings(Findings):
-    """The findings of a process.
+    """The findings of a process run.
 
     Attributes
     ----------
@@ -127,6 +199,18 @@ class ProcessFindings(Findings):
         Means of the columns of ``network.parquet``, and the number of ``frames``.
     wake : Wake or None
         None if the workpiece comes to no wake, or has too few samples before or in it.
+    comparison : tuple of Comparison
+        One entry per published mean drag.
+    peaks : Peaks
+        Of the drag force.
+    chains : Chains
+        Force chains.
+    confidence : float
+        Confidence level of all intervals.
+    workpiece_frames : int
+        Samples of the contacts on the workpiece.
+    ahead_behind, azimuth, depth : AheadBehind, AzimuthProfile, DepthProfile
+        Distribution of the normal force on the workpiece.
     """
 
     scene: Literal["process"] = "process"
@@ -145,7 +229,15 @@ class ProcessFindings(Findings):
 
 
 class FillingFindings(Findings):
-    """The findings of a filling: ``packing.json``, and below which energy ratio it is at rest."""
+    """The findings of a filling.
+
+    Attributes
+    ----------
+    bed : mapping
+        Content of ``packing.json``.
+    rest_energy_ratio : float or None
+        Settling criterion: kinetic energy / (m g d).
+    """
 
     scene: Literal["filling"] = "filling"
     bed: Mapping[str, int | float]
@@ -153,7 +245,17 @@ class FillingFindings(Findings):
 
 
 class DropRestitution(Part):
-    """Restitution over all impacts of a drop, beside the input of the deck."""
+    """Restitution over all impacts of a drop test.
+
+    Attributes
+    ----------
+    mean, lowest, highest : float
+        Over the impacts.
+    impacts : int
+        Number of impacts.
+    input : float or None
+        Coefficient of restitution in the input script.
+    """
 
     mean: float
     lowest: float
@@ -163,7 +265,7 @@ class DropRestitution(Part):
 
 
 class DropImpacts(Part):
-    """The impacts of a drop in the order of time."""
+    """The impacts of a drop test in order of time; see ``impacts.parquet``."""
 
     start_time_s: tuple[float, ...]
     duration_s: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""What a run models (``case.json``) and what its outputs hold (``columns.json``)."""
+"""Content of ``case.json`` (the simulated case) and ``columns.json`` (its raw outputs)."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -21,7 +21,7 @@ OutputKind = Literal["print", "custom", "local"]
 
 
 class Fidelity(Part):
-    """How much accuracy a run spends on speed."""
+    """The settings for speed and accuracy of a run."""
 
     name: str
     youngs_modulus_scale: PositiveFloat
@@ -32,7 +32,7 @@ class Fidelity(Part):
 
 
 class Media(Part):
-    """The particles, as asked for in the study."""
+    """The media as specified in the study."""
 
     count: int
     radius_mean_m: PositiveFloat
@@ -80,7 +80,7 @@ class Phase(Part):
 
 
 class Assumption(Part):
-    """A value that the study's source does not give."""
+    """A value that the source of the study does not report."""
 
     field: str
     value: JsonValue
@@ -95,7 +95,7 @@ class ContactModuli(Part):
 
 
 class SettlingCriterion(Part):
-    """When a bed rests: mean kinetic energy of a particle over m g d."""
+    """When a packing counts as settled: mean kinetic energy per particle / (m g d)."""
 
     energy_ratio: PositiveFloat
 
@@ -132,14 +132,14 @@ class Statistics(Part):
 
 
 class PublishedDrag(Part):
-    """A drag force that the study's source gives, N; negative: against the motion."""
+    """A drag force reported by the source of the study, N; negative: opposes the motion."""
 
     drag_mean_n: float
     drag_std_n: float | None = None
 
 
 class Reference(Part):
-    """Published figures to stand beside the results."""
+    """Published values to compare with the results."""
 
     source: str
     experiment: PublishedDrag | None = None
@@ -283,7 +283,7 @@ class Output(Part):
         )
         assert len(self.header) == len(self.columns), "engine_columns has another length"
         assert self.kind != "print" or self.columns[0] == "step", (
-            "columns does not begin with step, as a print output must"
+            "columns does not start with step, which a print output requires"
         )
         return self
 

@@ -142,9 +142,9 @@ def read_accepted(run_dir: Path) -> RunRecord:
     file = run_dir / "run.json"
     if not file.is_file():
         raise RejectedRunError(
-            f"{file}: there is no such file, so nothing says that the run is complete"
+            f"{file}: the file is missing, so the run is not known to be complete"
         )
     record = RunRecord.read(file)
     if (reason := refusal(record)) is not None:
-        raise RejectedRunError(f"{run_dir} is refused: {reason}")
+        raise RejectedRunError(f"{run_dir} cannot be used: {reason}")
     return record

@@ -45,7 +45,7 @@ def phase_codes(steps: Ints, phases: Sequence[Phase]) -> NDArray[np.int8]:
         If a step lies outside all phases.
     """
     if not phases:
-        raise TableError("case.json lists no phases, so no step can be given one")
+        raise TableError("case.json lists no phases, so steps cannot be assigned to phases")
     first, last = phases[0].start_step, phases[-1].end_step
     outside = (steps < first) | (steps > last)
     if outside.any():
@@ -88,14 +88,14 @@ def drag_phase(case: Case) -> Phase:
 def needed(value: T | None, name: str) -> T:
     """A value that this scene must have."""
     if value is None:
-        raise TableError(f"case.json has no {name}, which these tables need")
+        raise TableError(f"case.json has no {name}, which these tables require")
     return value
 
 
 def motion_of(case: Case) -> WorkpiecePath:
     """The motion of the workpiece in the drag."""
     if case.motion is None:
-        raise TableError("case.json has no motion, which these tables need")
+        raise TableError("case.json has no motion, which these tables require")
     return case.motion
 
 

@@ -51,7 +51,7 @@ def reference_drags(reference: Reference | None) -> list[ReferenceDrag]:
             continue
         if drag.drag_mean_n == 0.0:
             raise TableError(
-                f"case.json: reference.{label}.drag_mean_n is 0, nothing to compare with"
+                f"case.json: reference.{label}.drag_mean_n is 0, so no relative difference exists"
             )
         found.append(ReferenceDrag(label, drag.drag_mean_n, drag.drag_std_n, reference.source))
     return found

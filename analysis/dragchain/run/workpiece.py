@@ -30,7 +30,9 @@ def workpiece_mesh(run_dir: Path, case: Case) -> Any:
 def _mesh_file(run_dir: Path, case: Case) -> Path:
     file = run_dir / needed(case.workpiece, "workpiece").mesh
     if not file.is_file():
-        raise TableError(f"{file} is not there, though case.json names it as the workpiece's mesh")
+        raise TableError(
+            f"{file} is missing, although case.json names it as the mesh of the workpiece"
+        )
     return file
 
 

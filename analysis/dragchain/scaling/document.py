@@ -30,7 +30,7 @@ _AXES: Mapping[str, Axis] = {
 
 
 class Expectation(Part):
-    """What is expected of a field.
+    """The expected power law of a field.
 
     Attributes
     ----------
@@ -47,21 +47,37 @@ class Expectation(Part):
 
 
 class CurvePoint(Part):
-    """A point of a curve: level and drag in N."""
+    """A point of a curve.
+
+    Attributes
+    ----------
+    x : float
+        Value of the field.
+    value : float
+        Drag, N.
+    """
 
     x: float
     value: float
 
 
 class BandPoint(CurvePoint):
-    """A point of a curve with its 95 % interval, N."""
+    """A point of a curve with its 95 % confidence interval.
+
+    Attributes
+    ----------
+    x : float
+        Value of the field.
+    value, ci95_low, ci95_high : float
+        Drag and its interval, N.
+    """
 
     ci95_low: float
     ci95_high: float
 
 
 class FittedLaw(Part):
-    """A power law from the level `lowest` to the level `highest`.
+    """A power law fitted to the levels from `lowest` to `highest`.
 
     Attributes
     ----------
@@ -72,10 +88,20 @@ class FittedLaw(Part):
     degrees : int
         Degrees of freedom of the intervals.
     spread, bed_fraction : float
-        Standard deviation between runs in logarithms, and the fraction of that
-        variance which runs of one bed have in common.
+        Standard deviation between runs, of the logarithm, and the fraction of this variance that
+        is common to runs with the same packing.
     lack_of_fit : float or None
-        Probability of so much disagreement with a power law by chance alone.
+        p-value of the lack-of-fit test.
+    exponent : Estimate
+        Fitted exponent.
+    drag_at_centre_n : Estimate
+        Drag at `centre`, N.
+    from, to : float
+        Lowest and highest level.
+    runs : int
+        Number of runs.
+    curve : tuple of BandPoint
+        The law with its confidence band.
     """
 
     exponent: Estimate
@@ -119,9 +145,9 @@ class Level(Part):
     floor_particles : float
         Gap between tip and floor in mean particle diameters.
     drag_n : Estimate
-        Of the level alone, N.
+        Mean of this level alone, N.
     fitted_n : float
-        By the power law over all levels, N.
+        Drag according to the power law fitted to all levels, N.
     deviation : Estimate or None
         Relative difference from the law of the other levels; None for too few runs.
     """
@@ -147,11 +173,11 @@ class ScaledRun(Part):
     level : float
         Value of the field.
     drag_n, standard_error_n : float
-        Size of the mean drag and its standard error, autocorrelation counted, N.
+        Magnitude of the mean drag and its standard error with autocorrelation, N.
     reliable : bool
         Whether the series was long enough to rely on that error.
     eta : float
-        Drag over ``rho g d H^2``, with d the diameter of the workpiece, H the depth
+        Drag / ``(rho g d H^2)``, with d the diameter of the workpiece, H the depth
         of its tip and rho the density of a particle (Albert et al. 1999, Phys. Rev.
         Lett. 82, 205).
     """
@@ -167,7 +193,39 @@ class ScaledRun(Part):
 
 
 class ScalingFile(Document):
-    """The content of ``scaling.json``; docs/scaling.md describes its keys."""
+    """The content of ``scaling.json``; docs/evidence/scaling.md explains it.
+
+    Attributes
+    ----------
+    field : str
+        Dotted name of the field.
+    confidence : float
+        Confidence level of all intervals.
+    expected : Expectation
+        The expected exponent.
+    verdict : str
+        ``agrees`` if the interval of the fitted exponent contains the expected one.
+    fit, fit_within : FittedLaw
+        Fit to all levels, and to those at which the exponent is expected.
+    two_terms, shifted : TwoTerms, ShiftedLaw or None
+        Alternative forms of the law.
+    eta : Estimate
+        Dimensionless drag, see `ScaledRun`.
+    levels : tuple of Level
+        One entry per level.
+    local_exponents : tuple of Estimate
+        Exponents between neighbouring levels.
+    runs : tuple of ScaledRun
+        One entry per run.
+    scene : mapping
+        Dimensionless numbers of the scene.
+    engine : str or None
+        Version of LIGGGHTS.
+    cpu_time_s : float or None
+        CPU time of all runs, s.
+    started : str or None
+        Date and time of the first start.
+    """
 
     made_by: ClassVar[str] = "snakemake scaling"
 

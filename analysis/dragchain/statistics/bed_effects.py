@@ -69,9 +69,9 @@ def fit_effects(
     """
     runs, number = design.shape
     if runs <= number:
-        raise SeriesError(f"{runs} runs cannot tell {number} effects: run more seeds")
+        raise SeriesError(f"{runs} runs are too few to estimate {number} effects: run more seeds")
     if np.linalg.matrix_rank(design) < number:
-        raise SeriesError("the effects cannot be told apart: vary one setting at a time as well")
+        raise SeriesError("the effects are confounded: vary one setting at a time as well")
     same_bed = same(beds)
     if bed_fraction is None:
         shared = len(set(beds)) < runs

@@ -67,7 +67,9 @@ def estimates(sums: Floats, statistic: Callable[[Floats], Floats]) -> list[Estim
         If there are too few frames to resample in blocks.
     """
     if len(sums) < MIN_SAMPLES:
-        raise SeriesError(f"an interval needs at least {MIN_SAMPLES} frames, not {len(sums)}")
+        raise SeriesError(
+            f"a confidence interval requires at least {MIN_SAMPLES} frames; there are {len(sums)}"
+        )
     with np.errstate(divide="ignore", invalid="ignore"):
         value = statistic(sums.mean(axis=0))
         resampled = statistic(bootstrap_means(sums, block_length(sums)))

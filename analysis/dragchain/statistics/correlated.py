@@ -1,4 +1,4 @@
-"""The mean of a correlated series, and how well it is known."""
+"""The mean of a correlated series and its uncertainty."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ _WINDOW = 5.0
 """Lags are summed up to this many autocorrelation times (Sokal 1997, section 3)."""
 
 RELIABLE_TIMES = 50.0
-"""A series shorter than this many autocorrelation times is not to be relied on."""
+"""The interval of a series shorter than this many autocorrelation times is not reliable."""
 
 
 @dataclass(frozen=True)
@@ -32,16 +32,16 @@ class MeanEstimate:
     autocorrelation_samples : float
         Integrated autocorrelation time, in samples; 1/2 for independent ones.
     effective_samples : float
-        Number of independent samples whose mean has the same standard error.
+        Number of independent samples with the same standard error of the mean.
     se : float
         Standard error of the mean, in the unit of the series.
     ci95_low, ci95_high : float
         Confidence interval of the mean.
     confidence : float
-        Its level.
+        Confidence level of the interval.
     reliable : bool
         Whether the series is at least 50 autocorrelation times long and not
-        constant. If not, the interval contains the mean less often than its level states.
+        constant. If not, the interval is probably too narrow.
     """
 
     mean: float
@@ -57,7 +57,7 @@ class MeanEstimate:
 
 
 def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanEstimate:
-    """Mean of a correlated series, with a confidence interval that accounts for the correlation.
+    """Estimate the mean of a correlated series and its confidence interval.
 
     The standard error is ``std / sqrt(n)`` with ``n = N / (2 tau)`` (Sokal 1997,
     section 2). The interval uses Student's t with n - 1 degrees of freedom, at least 1.
@@ -72,7 +72,7 @@ def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanE
     Returns
     -------
     MeanEstimate
-        The mean with its standard error and interval.
+        Mean, standard error, confidence interval and autocorrelation time.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanE
     """
     samples = _checked(series)
     if not 0.0 < confidence < 1.0:
-        raise SeriesError(f"the confidence is {confidence}, not between 0 and 1")
+        raise SeriesError(f"the confidence must lie between 0 and 1, but is {confidence}")
     count = len(samples)
     mean, std = float(samples.mean()), float(samples.std(ddof=1))
     tau = autocorrelation_time(samples)
@@ -168,10 +168,11 @@ def _checked(series: ArrayLike) -> Floats:
     samples = np.asarray(series, dtype=np.float64)
     if samples.ndim != 1 or len(samples) < MIN_SAMPLES:
         raise SeriesError(
-            f"the series has shape {samples.shape}, statistics need {MIN_SAMPLES} samples in a row;"
-            " let the run go on for longer, or shorten its transient"
+            f"the series has shape {samples.shape}, but statistics require {MIN_SAMPLES} "
+            "samples in a"
+            " row; use a longer path or a shorter transient"
         )
     if not np.isfinite(samples).all():
         bad = int(np.flatnonzero(~np.isfinite(samples))[0])
-        raise SeriesError(f"sample {bad} of the series is {samples[bad]}, not a finite number")
+        raise SeriesError(f"sample {bad} of the series is not a finite number: {samples[bad]}")
     return samples

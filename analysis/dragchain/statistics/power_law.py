@@ -86,13 +86,18 @@ class Runs:
     def __post_init__(self) -> None:
         numbers = np.array([self.x, self.values, self.errors])
         if not (np.isfinite(numbers).all() and (numbers[:2] > 0.0).all()):
-            raise SeriesError("a power law needs levels and means that are finite and above zero")
+            raise SeriesError(
+                "a power law requires levels and means that are finite and above zero"
+            )
         if len(self.levels) < _LEAST_LEVELS:
             raise SeriesError(
-                f"{len(self.levels)} level(s) cannot test a power law: give {_LEAST_LEVELS} or more"
+                f"{len(self.levels)} level(s) are too few to test a power law: use "
+                f"{_LEAST_LEVELS} or more"
             )
         if self.degrees(2) < 1:
-            raise SeriesError(f"{len(self.x)} runs leave nothing to tell chance by: run more seeds")
+            raise SeriesError(
+                f"{len(self.x)} runs are too few to estimate the scatter: run more seeds"
+            )
 
     @cached_property
     def levels(self) -> Floats:

@@ -13,7 +13,7 @@ from dragchain.run.kinematics import needed
 
 
 class Packing(Document):
-    """A settled bed: ``packing.json``.
+    """The settled packing: ``packing.json``.
 
     Attributes
     ----------
@@ -28,6 +28,10 @@ class Packing(Document):
     kinetic_energy_ratio : float
         Mean translational kinetic energy of a particle over what the mean particle gains in a
         fall through its own diameter, ``mean(m v^2 / 2) / (mean(m) g d)``.
+    n_particles : int
+        Number of particles.
+    radius_mean_m : float
+        Mean radius, m.
     """
 
     made_by: ClassVar[str] = "dragchain tables"
@@ -58,7 +62,7 @@ def describe_bed(particles: Frame, case: Case) -> Packing:
     """
     if particles.rows == 0:
         raise TableError(
-            f"step {particles.step}: the last frame of particles is empty, there is no bed"
+            f"step {particles.step}: the last frame of particles is empty, so there is no packing"
         )
     radius = particles.vectors("radius_m")[:, 0]
     bowl_radius = needed(case.bowl, "bowl").radius_m

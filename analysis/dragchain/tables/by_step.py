@@ -39,18 +39,19 @@ def intact(path: Path) -> Iterator[None]:
         If the file is not there or is damaged, or lacks a column that is asked for.
     """
     if not path.is_file():
-        raise TableError(f"{path} is not there: run `{_command(path)}`")
+        raise TableError(f"{path} is missing: run `{_command(path)}`")
     try:
         found = pq.read_metadata(path)
         if path.stem in _NEVER_EMPTY and found.num_rows == 0:
             raise pa.ArrowInvalid("it has no rows")
         for field in found.schema.to_arrow_schema():
             if field.type in (pa.string(), pa.large_string()) and _NUMBER.search(field.name):
-                raise pa.ArrowTypeError(f"column {field.name} holds text instead of numbers")
+                raise pa.ArrowTypeError(f"column {field.name} contains text instead of numbers")
         yield
     except (pa.ArrowException, OSError) as error:
         raise TableError(
-            f"{path} is damaged or older than this ({error}): make it again: `{_command(path)}`"
+            f"{path} is damaged or was made by an older version ({error}): make it again: "
+            f"`{_command(path)}`"
         ) from error
 
 
@@ -109,8 +110,8 @@ def _groups(path: Path, columns: Sequence[str], steps: Steps | None) -> Iterator
     with intact(path), pq.ParquetFile(path) as file:
         if missing := [name for name in columns if name not in file.schema_arrow.names]:
             raise TableError(
-                f"{path}: has no column {missing[0]}: it is older than this; make the tables"
-                f" again: {_command(path)}"
+                f"{path}: column {missing[0]} is missing: an older version made the table;"
+                f" make it again: {_command(path)}"
             )
         for number in range(file.num_row_groups):
             if steps is None or _may_hold(file, number, steps):
@@ -168,7 +169,7 @@ def _last_of_rising(path: Path, step: Ints) -> Ints:
     if falls.size:
         before, after = step[falls[0] :][:2]
         raise TableError(
-            f"{path} is not in the order of its steps: step {after} comes after step {before}:"
+            f"{path} is not sorted by step: step {after} follows step {before}:"
             f" make the tables again: {_command(path)}"
         )
     return step[-1:]

@@ -66,7 +66,9 @@ def find_impacts(rows: Columns, timestep_s: float, radius_m: float, gravity_m_s2
     first, last = _runs(touching)
     speed = np.asarray(rows["vz_m_s"], dtype=np.float64)
     if not ((speed[first - 1] < 0.0) & (speed[last + 1] > 0.0)).all():
-        raise TableError("a particle does not come down before, or go up after, one of its impacts")
+        raise TableError(
+            "the velocity before or after an impact does not have the sign of an impact"
+        )
     gap = np.asarray(rows["z_m"], dtype=np.float64) - radius_m
     speed_in, speed_out = (
         speed_at_plate(speed[near], gap[near], gravity_m_s2) for near in (first - 1, last + 1)
@@ -87,15 +89,17 @@ def find_impacts(rows: Columns, timestep_s: float, radius_m: float, gravity_m_s2
 
 def _check_stretches(steps: Ints, stretch: Ints, touching: NDArray[np.bool_]) -> None:
     if not touching.any():
-        raise TableError("impacts holds no sample with a force: the particle never met the plate")
+        raise TableError(
+            "impacts contains no sample with a force: the particle never touched the plate"
+        )
     begins = np.flatnonzero(np.diff(stretch, prepend=stretch[0] - 1))
     ends = np.append(begins[1:], len(steps)) - 1
     for begin, end in zip(begins, ends, strict=True):
         where = f"impacts, steps {steps[begin]} to {steps[end]}"
         if not touching[begin : end + 1].any():
-            raise TableError(f"{where}: no force among them; the window missed the impact")
+            raise TableError(f"{where}: no force; the window does not contain the impact")
         if touching[begin] or touching[end]:
-            raise TableError(f"{where}: they begin or end inside an impact; widen the window")
+            raise TableError(f"{where}: the window starts or ends during an impact; widen it")
 
 
 def _runs(mask: NDArray[np.bool_]) -> tuple[Ints, Ints]:

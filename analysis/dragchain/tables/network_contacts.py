@@ -64,7 +64,7 @@ class _Particles:
         lost = np.flatnonzero(rows < 0)
         if lost.size:
             raise TableError(
-                f"step {self.step}: particle {int(ids[lost[0]])} is in a contact but not "
+                f"step {self.step}: particle {int(ids[lost[0]])} is in a contact, but missing "
                 f"in particles"
             )
         return rows
@@ -107,7 +107,8 @@ def contact_rows(
     """
     if particles.step != contacts.step:
         raise TableError(
-            f"contacts has step {contacts.step} where particles has step {particles.step}"
+            f"the next step of contacts is {contacts.step}, but that of particles is "
+            f"{particles.step}"
         )
     particles = particles.take(np.argsort(particles.ids("particle_id")))
     known = _Particles(
@@ -119,7 +120,7 @@ def contact_rows(
     twice = np.flatnonzero(np.diff(known.ids) == 0)
     if twice.size:
         raise TableError(
-            f"step {particles.step}: particles has particle {int(known.ids[twice[0]])} twice"
+            f"step {particles.step}: particles contains particle {int(known.ids[twice[0]])} twice"
         )
     groups = [
         _particle_particle(known, contacts, friction),

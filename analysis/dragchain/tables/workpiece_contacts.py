@@ -164,9 +164,8 @@ def join_workpiece_frames(
     for one, other in zip(particles, contacts, strict=True):
         if one.step != other.step:
             raise TableError(
-                f"workpiece_particles has step {one.step} where workpiece_contacts has "
-                f"step {other.step};"
-                " both must be written with one period"
+                f"the next step of workpiece_particles is {one.step}, but that of "
+                f"workpiece_contacts is {other.step}: both must be written with the same period"
             )
     frames = (*particles, *contacts)
     above = 1 + max(int(frame.ids("particle_id").max(initial=0)) for frame in frames)
@@ -177,7 +176,7 @@ def join_workpiece_frames(
     twice = known[1:][np.diff(known) == 0]
     if twice.size:
         raise TableError(
-            f"step {particles[twice[0] // above].step}: workpiece_particles holds a particle "
+            f"step {particles[twice[0] // above].step}: workpiece_particles contains a particle "
             "more than once"
         )
     written = int(np.count_nonzero(_on(touching) == meshes.workpiece))

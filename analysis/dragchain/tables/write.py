@@ -67,8 +67,8 @@ class Table:
 def write_tables(run_dir: Path | str) -> list[Path]:
     """Make the tables of a run.
 
-    A table appears under its name only once it is complete. Tables that need an output
-    that ``columns.json`` does not list are not made.
+    A table gets its final name only when it is complete. Tables whose outputs are not listed in
+    ``columns.json`` are not made.
 
     Parameters
     ----------
@@ -78,14 +78,14 @@ def write_tables(run_dir: Path | str) -> list[Path]:
     Returns
     -------
     list of Path
-        The files made, in ``tables/``.
+        The files in ``tables/``.
 
     Raises
     ------
     DocumentError, DumpError
         If an input cannot be read.
     TableError
-        If the outputs contradict each other.
+        If the outputs are inconsistent with each other.
     """
     run = Run.open(run_dir)
     tables = [table for table in _TABLES[run.case.scene] if run.wrote(*table.needs)]
@@ -167,7 +167,7 @@ class WorkpieceSamples:
         self._blocks = iter(blocks)
         self._block = next(self._blocks, None)
         if self._block is None:
-            raise TableError("workpiece_force holds no samples")
+            raise TableError("workpiece_force contains no samples")
         self.first_step = int(self._block["step"][0])
 
     def at(self, step: int) -> WorkpieceSample | None:
@@ -214,8 +214,8 @@ def _write_workpiece_contacts(run: Run, file: Path) -> None:
         closure.record().write(run.table("closure.json"))
         if (problem := closure.problem()) is not None:
             raise RejectedRunError(
-                f"{run.folder}: the force closure acceptance check does not pass: {problem};"
-                " workpiece_contacts.parquet was not written, closure.json has the figures"
+                f"{run.folder}: the check of force closure failed: {problem};"
+                " workpiece_contacts.parquet was not written; closure.json contains the values"
             )
 
 
@@ -336,7 +336,7 @@ def _contact_columns(step: int, rows: ContactRows, case: Case) -> Rows:
 def _write_impacts(run: Run, file: Path) -> None:
     blocks = list(run.prints("impacts"))
     if not blocks:
-        raise TableError(f"{run.folder}: impacts holds no samples")
+        raise TableError(f"{run.folder}: impacts contains no samples")
     rows = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
     radius, gravity = run.case.media.radius_mean_m, run.case.gravity_m_s2
     _write_all(file, IMPACTS, [find_impacts(rows, run.case.timestep_s, radius, gravity)])
@@ -345,7 +345,7 @@ def _write_impacts(run: Run, file: Path) -> None:
 def _write_packing(run: Run, file: Path) -> None:
     last = deque(run.frames("particles"), maxlen=1)
     if not last:
-        raise TableError(f"{run.folder}: particles holds no frames")
+        raise TableError(f"{run.folder}: particles contains no frames")
     describe_bed(last[0], run.case).write(file)
 
 

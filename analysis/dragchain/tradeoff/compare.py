@@ -135,14 +135,14 @@ def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting
     rows = [(run, own) for run in runs for own in run.stretches if quantity.name in own]
     settings = [run.setting for run, _ in rows]
     if reference not in settings:
-        raise SeriesError("no run at the reference has it")
+        raise SeriesError("no run at the reference settings has this quantity")
     values = np.array([own[quantity.name] for _, own in rows])
     if quantity.signed:
         drags = [own["drag_mean"] for run, own in rows if run.setting == reference]
         scale = abs(float(np.mean(drags)))
         values = values / scale
     elif (values == 0.0).any() or len(set(np.sign(values))) > 1:
-        raise SeriesError("it is zero or changes its sign, so that no relative error exists")
+        raise SeriesError("it is zero or changes its sign, so no relative error exists")
     else:
         scale = float(np.sign(values[0]))
         values = np.log(np.abs(values))

@@ -81,7 +81,7 @@ def read_drops(folders: Sequence[Path]) -> list[Drop]:
 def _read_drop(folder: Path) -> _DropRun:
     case = load_case(folder)
     if case.scene != "drop_test":
-        raise TableError(f"{folder}: this is a {case.scene}, not a drop")
+        raise TableError(f"{folder}: the scene is {case.scene}, not drop_test")
     impacts = read_table(folder / "tables" / "impacts.parquet", ["restitution"])
     record = RunRecord.read(folder / "run.json")
     if not record.complete:

@@ -39,7 +39,9 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
     case, known = load_case(run_dir), StiffnessRecord.read(record)
     scale, factor = case.fidelity.youngs_modulus_scale, case.fidelity.speed_factor
     if factor != 1.0:
-        raise TableError(f"{case.run}: no law is known for a workpiece {factor:g} times as fast")
+        raise TableError(
+            f"{case.run}: the laws do not apply to a workpiece {factor:g} times as fast"
+        )
     along = quantities_along(run_dir, case)
     diameters = along.arc_m / (2.0 * case.media.radius_mean_m)
     values = along.values()

@@ -32,7 +32,7 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
     """
     file = run_dir / "outcome.json"
     if not file.is_file():
-        raise TableError(f"{file} is not there: `dragdeck run --outcome` writes it")
+        raise TableError(f"{file} is missing: `dragdeck run --outcome` writes it")
     outcome, case = RunRecord.read(file), load_case(run_dir)
     measures = Measures.model_validate(
         {

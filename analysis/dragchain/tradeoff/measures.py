@@ -23,7 +23,23 @@ _TELLING_CHECKS = ("within_limits", "no_engine_error")
 
 
 class RunCost(Part):
-    """What a run cost; `steps_per_m` are those for a metre of path."""
+    """The cost of a run.
+
+    Attributes
+    ----------
+    steps : int
+        Number of time steps.
+    wall_time_s, cpu_time_s : float
+        Wall-clock time, and CPU time of all ranks, s.
+    ranks : int
+        MPI ranks.
+    timestep_s : float
+        Time step, s.
+    axis_speed_m_s : float
+        Speed of the workpiece along its path, m/s.
+    steps_per_m : float
+        Time steps per metre of path.
+    """
 
     steps: int
     wall_time_s: float
@@ -43,6 +59,17 @@ class Asked(Part):
     """The tolerance that a run's settings were chosen for.
 
     If `extrapolated`, for the value at the physical Young's modulus.
+
+    Attributes
+    ----------
+    quantity : str
+        Quantity to which the tolerance applies.
+    tolerance : float
+        Requested relative error.
+    held_to : float or None
+        Tolerance that the settings meet.
+    extrapolated : bool
+        Whether it applies to the value at the physical modulus.
     """
 
     quantity: str

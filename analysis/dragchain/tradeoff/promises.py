@@ -175,7 +175,9 @@ def _pooled(pairs: Sequence[_Pair]) -> tuple[float, int]:
     groups = [group for pair in pairs for group in pair.logarithms()]
     degrees = sum(len(group) - 1 for group in groups)
     if degrees < 1:
-        raise TableError("one run of each setting says nothing of their scatter: run more seeds")
+        raise TableError(
+            "the scatter cannot be estimated from one run of each setting: run more seeds"
+        )
     return math.sqrt(sum(float(((g - g.mean()) ** 2).sum()) for g in groups) / degrees), degrees
 
 
@@ -183,13 +185,17 @@ def _pairs(runs: Sequence[Measures], laws: Mapping[str, LawEntry]) -> Iterator[_
     signed = {quantity.name for quantity in QUANTITIES if quantity.signed}
     for scene, everyone in by_scene(runs):
         if all(run.asked for run in everyone):
-            raise TableError(f"scene {scene}: no run at full stiffness to compare with")
+            raise TableError(
+                f"scene {scene}: no run with the physical Young's modulus to compare with"
+            )
         references = [run for run in everyone if _is_reference(run)]
         for asked in _asked(everyone) if references else ():
             own = [run for run in everyone if run.asked and run.asked.same(asked)]
             complete = [run for run in own if run.complete]
             if asked.quantity in signed:
-                raise TableError(f"{asked.quantity} may change its sign: it has no promise")
+                raise TableError(
+                    f"{asked.quantity} may change its sign, so nothing is predicted for it"
+                )
             law = laws[asked.quantity] if asked.extrapolated else None
             yield _Pair(scene, asked, complete, references, len(own) - len(complete), law)
 

@@ -121,7 +121,7 @@ def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Se
     every = {file: Measures.read(file) for file in files}
     standard = every.get(reference_run / FILE)
     if standard is None:
-        raise TableError(f"{reference_run}: the reference is not among the runs of the trade")
+        raise TableError(f"{reference_run}: the reference is not among the runs of the trade-off")
     longest: dict[tuple[Setting, str | None], Measures] = {}
     for measures in every.values():
         key = (_setting(measures, standard), measures.bed)
@@ -129,7 +129,7 @@ def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Se
             longest[key] = measures
     complete = [measures.arc_m for measures in longest.values() if measures.complete]
     if not complete:
-        raise TableError("no run of the trade is complete, so there is nothing to compare")
+        raise TableError("no run of the trade-off is complete, so there is nothing to compare")
     arc = min(complete)
     runs = [_run(setting, bed, own, arc) for (setting, bed), own in longest.items()]
     return runs, _setting(standard, standard), arc

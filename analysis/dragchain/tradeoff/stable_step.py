@@ -1,10 +1,13 @@
 """The stability number of a time step, as a law of stiffness, damping and step.
 
-The acceptance check has its largest eigenvalue from ``dt^2 K + 2 dt C`` (docs/stability.md). In a
-bed the contacts' frequency times the Rayleigh time goes with the stiffness number as kappa^(-1/4),
-since the stiffness of a Hertz contact goes with the root of its overlap. With the step f over the
-Rayleigh time, which is that of the smallest particle, the damping ratio z of a contact between two
-particles and the relative standard deviation s of their radii::
+The acceptance check takes its largest eigenvalue from ``dt^2 K + 2 dt C``, see
+docs/evidence/stability.md.
+
+In a packing, the product of contact frequency and Rayleigh time is proportional to kappa^(-1/4),
+with the stiffness number kappa, since the stiffness of a Hertz contact is proportional to the
+square root of its overlap. With the step f over the Rayleigh time, which is that of the smallest
+particle, the damping ratio z of a contact between two particles and the relative standard
+deviation s of their radii::
 
     number^2 = (a u^2 + b z u) exp(2 c s),    u = f kappa^(-1/4)
 
@@ -64,7 +67,7 @@ def fit_stable_step(runs: Sequence[Measures]) -> StableStepLaw:
     """
     rows = np.array([_row(run) for run in runs if run.stability_number and run.numbers])
     if len(rows) < _FEWEST_RUNS:
-        raise SeriesError(f"{len(rows)} runs have a stability number, too few for a law of it")
+        raise SeriesError(f"{len(rows)} runs have a stability number, too few to fit a law")
     number, kappa, restitution, fraction, spread = rows.T
     reach = fraction * kappa**-0.25
     damping = damping_ratio(restitution) * reach

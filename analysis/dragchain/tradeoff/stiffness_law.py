@@ -131,7 +131,7 @@ def fit_stiffness_law(scenes: Sequence[ScaledRuns]) -> StiffnessLaw:
     if len(useful) < 5:
         raise SeriesError("fewer than five scenes were run at two moduli")
     if np.linalg.matrix_rank(np.array([one.of_amplitude for one in useful])) < 3:
-        raise SeriesError("the scenes are too alike in inertial number or friction")
+        raise SeriesError("the scenes differ too little in inertial number or friction")
 
     def against(point: Floats) -> float:
         return -_likelihood(useful, *np.exp(point))[0]

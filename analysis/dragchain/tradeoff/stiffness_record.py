@@ -57,7 +57,9 @@ def stiffness_record(
         known = [one for one in found if one is not None]
         try:
             if quantity.signed or len(known) < _FEWEST_SCENES:
-                raise SeriesError(f"{len(known)} of {len(scenes)} scenes have it with one sign")
+                raise SeriesError(
+                    f"only {len(known)} of {len(scenes)} scenes have this quantity with one sign"
+                )
             law = fit_stiffness_law(known)
         except SeriesError as error:
             without[quantity.name] = str(error)

@@ -155,7 +155,7 @@ def test_a_window_that_cuts_an_impact_is_refused() -> None:
         "vz_m_s": np.zeros(5),
         "force_n": np.ones(5),
     }
-    with pytest.raises(TableError, match="not whole"):
+    with pytest.raises(TableError, match="not entirely within"):
         waveform(window, 0.003, G)
 
 

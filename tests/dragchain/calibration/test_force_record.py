@@ -257,7 +257,7 @@ REFUSALS: dict[str, tuple[Change, str]] = {
     "noise as high as the impacts": (drowned, "baseline"),
     "no impact": (nothing, "impacts"),
     "one impact": (one_impact, "impacts"),
-    "sampled too coarsely": (slow, "coarse"),
+    "sampling rate is too low": (slow, "coarse"),
     "not one particle's impacts": (long_flight, "order"),
 }
 

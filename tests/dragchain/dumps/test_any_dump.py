@@ -113,7 +113,7 @@ def test_reads_binary_by_the_names_given(tmp_path: Path, raw, suffix, size) -> N
 
 def test_a_binary_dump_needs_names(tmp_path: Path, raw) -> None:
     (tmp_path / "a.bin").write_bytes(binary(raw))
-    with pytest.raises(DumpError, match="does not say what its columns are"):
+    with pytest.raises(DumpError, match="does not contain the names of its columns"):
         next(read_dump(tmp_path / "a.bin"))
 
 

@@ -306,8 +306,8 @@ def test_a_cut_frame_in_the_last_part_is_an_error(tmp_path: Path, raw) -> None:
 @pytest.mark.parametrize(
     ("steps", "message"),
     [
-        ([0, 20], r"goes on with step 20\n  expected: step 10"),
-        ([10, 20], r"goes on with step 10\n  expected: step 0"),
+        ([0, 20], r"continues with step 20\n  expected: step 10"),
+        ([10, 20], r"continues with step 10\n  expected: step 0"),
         ([0, 10], r"ends before step 20\n  expected: frames up to step 20"),
         ([], "ends before step 0"),
     ],
@@ -330,7 +330,7 @@ def test_an_open_output_may_leave_out_steps_but_not_leave_the_grid(tmp_path: Pat
     (block,) = iter_prints(tmp_path, output)
     assert block["step"].tolist() == [4, 6, 20]
     (tmp_path / "force.1.txt").write_bytes(force_file(raw, [4, 7]))
-    with pytest.raises(DumpError, match="goes on with step 7"):
+    with pytest.raises(DumpError, match="continues with step 7"):
         list(iter_prints(tmp_path, output))
 
 

@@ -393,33 +393,33 @@ def test_row_groups_without_a_wanted_frame_are_not_read(run: Path, monkeypatch) 
 @pytest.mark.parametrize("name", ["particles", "contacts", "workpiece_force"])
 def test_a_missing_table_is_named_with_its_command(run: Path, name: str) -> None:
     (run / f"tables/{name}.parquet").unlink()
-    with pytest.raises(TableError, match=rf"{name}.parquet is not there: run `dragchain tables"):
+    with pytest.raises(TableError, match=rf"{name}.parquet is missing: run `dragchain tables"):
         write_export(run, "xyz")
     assert not any((run / "export").glob("*"))
 
 
 def test_a_missing_mesh_of_the_workpiece_is_an_error(run: Path) -> None:
     (run / "workpiece.stl").unlink()
-    with pytest.raises(TableError, match=r"workpiece.stl is not there, though case.json names it"):
+    with pytest.raises(TableError, match=r"workpiece.stl is missing, although case.json names it"):
         write_export(run, "paraview")
 
 
 def test_steps_that_fall_are_an_error(run: Path) -> None:
     table(run, "contacts")[::-1].to_parquet(run / "tables/contacts.parquet")
     (run / "tables/chains.parquet").unlink()
-    with pytest.raises(TableError, match=r"contacts.parquet .*: step 80 comes after step 100: .*"):
+    with pytest.raises(TableError, match=r"contacts.parquet .*: step 80 follows step 100: .*"):
         write_export(run, "xyz")
 
 
 def test_chains_without_a_column_name_the_command_that_makes_them(run: Path) -> None:
     file = run / "tables/chains.parquet"
     table(run, "chains").drop(columns="dominant").to_parquet(file)
-    with pytest.raises(TableError, match=r"no column dominant: .* again: dragchain chains"):
+    with pytest.raises(TableError, match=r"column dominant is missing: .* again: dragchain chains"):
         write_export(run, "xyz")
 
 
 def test_an_unknown_format_is_an_error(run: Path, capsys) -> None:
-    with pytest.raises(ExportError, match="'vtk', not one of paraview, xyz"):
+    with pytest.raises(ExportError, match="'vtk'; known: paraview, xyz"):
         write_export(run, "vtk")
     with pytest.raises(SystemExit) as caught:
         main(["export", str(run), "--to", "vtk"])
@@ -429,7 +429,7 @@ def test_an_unknown_format_is_an_error(run: Path, capsys) -> None:
 def test_an_interval_without_frames_says_where_they_are(run: Path) -> None:
     with pytest.raises(ExportError, match=r"no frame from 0.5 s to 0.7 s\n.* of 0 to 0.1 s\n"):
         write_export(run, "xyz", selection=Selection(0.5, 0.7))
-    with pytest.raises(ExportError, match="--every is 0"):
+    with pytest.raises(ExportError, match="--every must be at least 1, but is 0"):
         write_export(run, "xyz", selection=Selection(every=0))
 
 
@@ -460,7 +460,7 @@ def test_the_list_names_every_file(run: Path) -> None:
 def test_an_export_is_not_written_over_unasked(run: Path) -> None:
     folder = write_export(run, "xyz").file.parent
     before = {file: file.read_bytes() for file in folder.iterdir()}
-    with pytest.raises(ExportError, match="holds an export already"):
+    with pytest.raises(ExportError, match="already contains an export"):
         write_export(run, "xyz", selection=Selection(every=2))
     assert {file: file.read_bytes() for file in folder.iterdir()} == before
 
@@ -480,7 +480,7 @@ def test_replacing_takes_the_files_of_the_export_and_no_others(run: Path) -> Non
 def test_a_file_of_the_user_is_never_written_over(run: Path) -> None:
     folder = write_export(run, "paraview", selection=Selection(0.1)).file.parent
     (folder / "frames/000.vtm").write_text("mine")
-    with pytest.raises(ExportError, match=r"000.vtm is in the way"):
+    with pytest.raises(ExportError, match=r"000.vtm already exists"):
         write_export(run, "paraview", replace=True)
     assert (folder / "frames/000.vtm").read_text() == "mine"
     assert len(series(folder / "run.pvd")) == 1
@@ -515,7 +515,7 @@ def test_a_folder_with_other_files_is_left_alone(run: Path, tmp_path: Path, repl
     write_export(run, "xyz", mine)
     shutil.move(mine / "run.xyz", mine / "export.json")
     (mine / "export.json").rename(mine / "data.xyz")
-    with pytest.raises(ExportError, match="files that are no export"):
+    with pytest.raises(ExportError, match="files that are not an export"):
         write_export(run, "xyz", mine, replace=replace)
     with pytest.raises(ExportError, match="is a file, not a folder"):
         write_export(run, "xyz", mine / "data.xyz", replace=replace)
@@ -533,7 +533,9 @@ def test_no_more_is_written_than_the_disk_has_room_for(run: Path, monkeypatch) -
     usage = shutil.disk_usage(run)._replace(free=20_000)
     monkeypatch.setattr("shutil.disk_usage", lambda folder: usage)
     told: list[str] = []
-    with pytest.raises(ExportError, match=r"no room for 6 frames\n.*\n.* 0 MB are free"):
+    with pytest.raises(
+        ExportError, match=r"not enough free disk space for 6 frames\n.*\n.* 0 MB are free"
+    ):
         write_export(run, "paraview", report=told.append)
     assert told[0].startswith("6 frames, about 0.")
     assert not any((run / "export").iterdir())
@@ -548,7 +550,7 @@ def test_the_command_tells_size_and_file(run: Path, tmp_path: Path, capsys) -> N
     told = capsys.readouterr().out.splitlines()
     assert told == ["2 frames, about 0.0 MB", f"2 frames, 0.0 MB: {tmp_path / 'out/run.xyz'}"]
     assert main(["export", str(run), *arguments]) == 1
-    assert "holds an export already" in capsys.readouterr().err
+    assert "already contains an export" in capsys.readouterr().err
     assert main(["export", str(run), *arguments, "--replace"]) == 0
 
 

@@ -226,10 +226,10 @@ def test_a_mesh_of_another_run_is_refused(tmp_path: Path) -> None:
     first, second = PLATE.split("facet normal", 2)[1:]
     swapped = f"solid plate\nfacet normal{second.replace('endsolid plate', '').rstrip()}\n"
     (folder / "workpiece.stl").write_text(f"{swapped}facet normal{first}endsolid plate\n")
-    with pytest.raises(TableError, match="do not belong together"):
+    with pytest.raises(TableError, match="do not match"):
         write_loading(folder)
     (folder / "workpiece.stl").write_text(PLATE.split("endfacet")[0] + "endfacet\nendsolid plate\n")
-    with pytest.raises(TableError, match="names facet 1, but"):
+    with pytest.raises(TableError, match="contains facet 1, but"):
         write_loading(folder)
 
 

@@ -258,7 +258,7 @@ def test_a_rejected_run_is_marked(tmp_path: Path) -> None:
     accept(run, passed=False)
     write_page(run)
     text = (run / "network.html").read_text(encoding="utf-8")
-    assert "This run is not a result" in text and "every particle kept" in text
+    assert "This run is not a result" in text and "no particle lost" in text
     accept(run)
     write_page(run)
     assert "This run is not a result" not in (run / "network.html").read_text(encoding="utf-8")

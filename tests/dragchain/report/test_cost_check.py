@@ -68,7 +68,7 @@ def test_the_report_compares_cost_and_tolerance(run: Path, tmp_path: Path) -> No
     assert "Predicted and actual cost" in words
     assert "150 000 160 000 3000 2100 50 76 1.52 a short run" in spaced(tmp_path)
     assert "mean drag within 5 %" in words and "+1.2 %" in words and "+3.7 %" in words
-    assert "outside of 6 to 8" in words and "held to 2.5 %" in words
+    assert "outside of 6 to 8" in words and "limited to 2.5 %" in words
     assert "4.0 %" in words  # 0.1 N either way of 2.5 N
 
 

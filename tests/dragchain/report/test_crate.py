@@ -132,7 +132,7 @@ def test_a_crate_replaces_an_earlier_one_and_nothing_else(project: Path) -> None
     (OUT / crate.METADATA).unlink()  # as Snakemake does
     write_crate(OUT, RUNS[:2], REPORT)
     assert not (OUT / STUDY).exists() and not (OUT / RUNS[2]).exists()
-    with pytest.raises(ExportError, match="no crate"):
+    with pytest.raises(ExportError, match="not a crate"):
         write_crate(REPORT, RUNS, REPORT)
     assert (REPORT / "report.html").exists()
 

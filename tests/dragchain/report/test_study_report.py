@@ -119,7 +119,7 @@ def test_page_says_what_counts(process: Path, tmp_path: Path) -> None:
     words = page_of(tmp_path).words
     for expected in (
         "10 mm <workpiece>", "\N{MINUS SIGN}3.5 %", "\N{MINUS SIGN}7.3 % to +0.4 %", "assumed",
-        "a plausible fraction", "bowl.radius_m", "Engine 3.8", "every particle kept", "passed",
+        "a plausible fraction", "bowl.radius_m", "Engine 3.8", "no particle lost", "passed",
         "a paper",
         "70.3 mm", "Peters et al. (2005)", "Thornton 2000",
     ):  # fmt: skip
@@ -191,12 +191,12 @@ def test_a_run_that_failed_a_check_is_listed_and_the_others_are_reported(
     file = process.parent.parent / scene / "state.json"
     file.write_text(json.dumps(run_json(state="failed", checks=[particles_kept(1421)])))
     (file.parent / "run.json").unlink()
-    with pytest.raises(MissingRunsError, match=r"(?s)every particle kept: 1421.*timestep_fraction"):
+    with pytest.raises(MissingRunsError, match=r"(?s)no particle lost: 1421.*timestep_fraction"):
         write_report(tmp_path / "report", [process, other])
     table = pd.read_parquet(tmp_path / "report" / "summary.parquet")
     assert table["drag_mean_n"].tolist() == [-3.0]
     words = page_of(tmp_path / "report").words
-    assert "every particle kept: 1421 (limit: 1422)" in words
+    assert "no particle lost: 1421 (limit: 1422)" in words
     assert "smaller timestep_fraction" in words
     assert "without a result" in words
 

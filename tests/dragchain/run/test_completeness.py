@@ -10,7 +10,7 @@ from dragchain.run.completeness import CheckCode, CheckReason, RunRecord, State,
 from dragdeck.engine import record as written
 
 KEPT = written.AcceptanceCheck(
-    code="particles_kept", name="every particle kept", passed=True, seen="4", limit="4"
+    code="particles_kept", name="no particle lost", passed=True, seen="4", limit="4"
 )
 
 
@@ -49,7 +49,7 @@ def test_unknown_processor_time_is_the_wall_time_of_all_ranks(
         ({"checks": []}, "no acceptance checks"),
         (
             {"checks": [KEPT.model_copy(update={"passed": False, "seen": "3"})]},
-            "every particle kept .saw 3, limit 4",
+            "no particle lost .saw 3, limit 4",
         ),
     ],
 )

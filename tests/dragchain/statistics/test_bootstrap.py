@@ -59,7 +59,7 @@ def test_bootstrap_by_whole_circles_is_the_mean() -> None:
 
 
 def test_too_few_frames_have_no_interval() -> None:
-    with pytest.raises(SeriesError, match="at least 8 frames, not 7"):
+    with pytest.raises(SeriesError, match="at least 8 frames; there are 7"):
         interval_of_mean(np.arange(7.0))
 
 

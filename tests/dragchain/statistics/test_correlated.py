@@ -86,10 +86,10 @@ def test_scale_and_shift_pass_through(shift, scale, seed) -> None:
     ("series", "message"),
     [
         ([], r"shape \(0,\)"),
-        ([1.0] * 7, "need 8 samples"),
+        ([1.0] * 7, "require 8 samples"),
         (np.zeros((10, 2)), r"shape \(10, 2\)"),
-        ([*[1.0] * 9, float("nan")], "sample 9 of the series is nan"),
-        ([*[1.0] * 9, float("inf")], "sample 9 of the series is inf"),
+        ([*[1.0] * 9, float("nan")], "sample 9 of the series is not a finite number: nan"),
+        ([*[1.0] * 9, float("inf")], "sample 9 of the series is not a finite number: inf"),
     ],
 )
 def test_refuses_a_series_without_statistics(series, message) -> None:
@@ -99,7 +99,7 @@ def test_refuses_a_series_without_statistics(series, message) -> None:
 
 @pytest.mark.parametrize("level", [0.0, 1.0, 95])
 def test_refuses_a_confidence_outside_0_to_1(level) -> None:
-    with pytest.raises(SeriesError, match="not between 0 and 1"):
+    with pytest.raises(SeriesError, match="must lie between 0 and 1"):
         estimate_mean(np.arange(10.0), confidence=level)
 
 

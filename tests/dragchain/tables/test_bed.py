@@ -90,5 +90,5 @@ def test_the_spread_of_radii_is_that_of_the_bed(tiny_run: Path) -> None:
 
 
 def test_an_empty_bowl_is_an_error(tiny_run: Path) -> None:
-    with pytest.raises(TableError, match="there is no bed"):
+    with pytest.raises(TableError, match="there is no packing"):
         describe_bed(frame([]), load_case(tiny_run))

@@ -98,26 +98,26 @@ def test_rising_steps_have_their_rows_or_none(tmp_path: Path, group: int) -> Non
 def test_the_rest_of_rising_steps_is_checked_at_the_end(tmp_path: Path) -> None:
     rows = RisingSteps(written(tmp_path, TABLE.iloc[[0, 2, 5, 4]], group=3), ["step", "x_m"])
     assert rows.at(0)["x_m"].tolist() == [0.0]
-    with pytest.raises(TableError, match="step 10 comes after step 30: make the tables again"):
+    with pytest.raises(TableError, match="step 10 follows step 30: make the tables again"):
         rows.finish()
 
 
 def test_a_table_out_of_order_is_refused(tmp_path: Path) -> None:
     file = written(tmp_path, TABLE.iloc[[0, 5, 2]])
-    with pytest.raises(TableError, match="not in the order of its steps"):
+    with pytest.raises(TableError, match="not sorted by step"):
         list(read_steps(file, ["step", "x_m"]))
 
 
 def test_order_holds_across_groups_too(tmp_path: Path) -> None:
     file = written(tmp_path, TABLE.iloc[[5, 2]], group=1)
-    with pytest.raises(TableError, match="not in the order of its steps"):
+    with pytest.raises(TableError, match="not sorted by step"):
         list(read_steps(file, ["step", "x_m"]))
 
 
 def test_a_missing_table_or_column_is_named(tmp_path: Path) -> None:
     with pytest.raises(TableError, match="run `dragchain tables"):
         next(read_groups(tmp_path / "tables" / "t.parquet", ["step"]))
-    with pytest.raises(TableError, match="no column y_m"):
+    with pytest.raises(TableError, match="column y_m is missing"):
         next(read_groups(written(tmp_path), ["step", "y_m"]))
 
 
@@ -125,5 +125,5 @@ def test_text_instead_of_numbers_is_named(tmp_path: Path) -> None:
     file = tmp_path / "tables/contacts.parquet"
     file.parent.mkdir()
     pd.DataFrame({"step": [1], "phase": ["drag"], "force_n": ["a"]}).to_parquet(file)
-    with pytest.raises(TableError, match=r"contacts\.parquet .*column force_n holds text"):
+    with pytest.raises(TableError, match=r"contacts\.parquet .*column force_n contains text"):
         read_table(file)

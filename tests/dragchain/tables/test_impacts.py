@@ -83,11 +83,11 @@ def test_gravity_between_the_surface_and_a_sample_is_taken_out() -> None:
 @pytest.mark.parametrize(
     ("samples", "message"),
     [
-        ([(0, -1, 0), (1, -2, 0)], "the particle never met the plate"),
-        ([*FIRST, (40, -3, 0), (41, -3, 0)], "steps 40 to 41: no force among them"),
-        (FIRST[1:], "steps 11 to 14: they begin or end inside an impact"),
-        (FIRST + SECOND[:2], "steps 40 to 41: they begin or end inside an impact"),
-        ([(0, 1, 0), (1, 0, 8), (2, 2, 0)], "does not come down before"),
+        ([(0, -1, 0), (1, -2, 0)], "the particle never touched the plate"),
+        ([*FIRST, (40, -3, 0), (41, -3, 0)], "steps 40 to 41: no force; the window"),
+        (FIRST[1:], "steps 11 to 14: the window starts or ends during an impact"),
+        (FIRST + SECOND[:2], "steps 40 to 41: the window starts or ends during an impact"),
+        ([(0, 1, 0), (1, 0, 8), (2, 2, 0)], "does not have the sign of an impact"),
     ],
 )
 def test_refuses_samples_that_do_not_show_impacts(samples, message) -> None:

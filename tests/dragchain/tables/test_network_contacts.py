@@ -168,17 +168,17 @@ def test_an_empty_frame_has_no_contacts() -> None:
 @pytest.mark.parametrize("particles", [[], [[1, 0, 0, 5, 2, *CALM]]])
 def test_a_contact_of_an_unknown_particle_is_an_error(particles) -> None:
     with pytest.raises(
-        TableError, match=r"step 100: particle [12] is in a contact but not in particles"
+        TableError, match=r"step 100: particle [12] is in a contact, but missing in particles"
     ):
         rows_of(particles, [[1, 2, -3, 0, 4, 0.1]])
 
 
 def test_frames_of_different_steps_are_an_error() -> None:
-    with pytest.raises(TableError, match="contacts has step 9 where particles has step 100"):
+    with pytest.raises(TableError, match="contacts is 9, but that of particles is 100"):
         contact_rows(frame(PARTICLES, []), frame(CONTACTS, [], step=9), wall(), wall(), 10.0, 0.3)
 
 
 def test_a_particle_that_is_there_twice_is_refused() -> None:
     particles = [[1, 0, 0, 5, 2, *CALM], [2, 2.9, 0, 5, 1, *CALM], [1, 9, 0, 5, 2, *CALM]]
-    with pytest.raises(TableError, match="step 100: particles has particle 1 twice"):
+    with pytest.raises(TableError, match="step 100: particles contains particle 1 twice"):
         rows_of(particles)

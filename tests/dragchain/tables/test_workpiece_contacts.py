@@ -163,10 +163,12 @@ def test_a_batch_has_the_contacts_of_each_of_its_frames() -> None:
 
 
 def test_frames_that_do_not_belong_together_are_refused() -> None:
-    with pytest.raises(TableError, match="step 100 where workpiece_contacts has step 200"):
+    with pytest.raises(
+        TableError, match="workpiece_particles is 100, but that of workpiece_contacts is 200"
+    ):
         joined_of(frame(PARTICLES, []), frame(CONTACTS, [], step=200))
     twice = frame(PARTICLES, [[5, 3, 0, 0, 1, 2, 0, 1], [5, 3, 0, 0, 1, 2, 0, 1]])
-    with pytest.raises(TableError, match="holds a particle more than once"):
+    with pytest.raises(TableError, match="contains a particle more than once"):
         joined_of(twice, frame(CONTACTS, []))
     same = frame(CONTACTS, [[3, 0, 0, 9, 5, 1, 0, 0, 1e-6]])
     with pytest.raises(TableError, match="coincides with a particle's centre"):

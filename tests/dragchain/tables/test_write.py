@@ -131,7 +131,7 @@ def test_a_run_without_velocities_has_tables_but_no_slip(tiny_run: Path, edit_js
         .all(axis=None)
     )
     assert (contacts["normal_force_n"] > 0).all()
-    with pytest.raises(TableError, match="workpiece_particles holds no velocities"):
+    with pytest.raises(TableError, match="contains no velocities"):
         write_loading(tiny_run)
 
 

@@ -96,7 +96,7 @@ def test_a_setting_with_one_run_or_a_failed_one_is_not_offered(tmp_path: Path) -
     tradeoff = made(tmp_path, found)
     assert choose(tradeoff, ["workpiece_contacts"], 0.2).setting == Setting(*SOFT)
     table = run_table(tradeoff)
-    assert table["failure"].tolist()[-1] == "every particle kept: 12 particles"
+    assert table["failure"].tolist()[-1] == "no particle lost: 12 particles"
     assert table["complete"].sum() == len(found) - 1
     assert math.isnan(table["drag_mean"].iloc[-1])
 
@@ -177,7 +177,7 @@ def test_files_that_cannot_be_used_are_refused(tmp_path: Path) -> None:
         read_runs(write(tmp_path / "b", found), tmp_path)
     rng = np.random.default_rng(1)
     failed = write(tmp_path / "c", [measures(REFERENCE, 1, rng, failure=FAILURE)])
-    with pytest.raises(TableError, match="no run of the trade is complete"):
+    with pytest.raises(TableError, match="no run of the trade-off is complete"):
         read_runs(failed, failed[0].parent)
 
 

@@ -132,10 +132,14 @@ def test_a_run_by_hand(tiny_run: Path) -> None:
 
 def test_a_failed_run_says_only_how_it_failed(tiny_run: Path) -> None:
     limits = AcceptanceCheck(
-        code="within_limits", name="within its limits", passed=False, seen="3 m/s", limit="1"
+        code="within_limits",
+        name="energy and speed within limits",
+        passed=False,
+        seen="3 m/s",
+        limit="1",
     )
     checks = [
-        {"code": "particles_kept", "name": "every particle kept", "passed": False,
+        {"code": "particles_kept", "name": "no particle lost", "passed": False,
          "seen": "3 particles", "limit": "4"},
         {"code": "finite_numbers", "name": "finite numbers", "passed": True, "seen": "all",
          "limit": "no NaN"},

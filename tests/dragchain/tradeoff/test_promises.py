@@ -16,8 +16,8 @@ from dragchain.tradeoff.promises import check_promises, failures, verdict, write
 
 FULL, SOFT = (1.0, 0.64, 1.0), (0.01, 0.64, 1.0)
 LOST = {
-    "code": "within_limits", "name": "within its limits", "passed": False, "seen": "1 particle",
-    "limit": "2",
+    "code": "within_limits", "name": "energy and speed within limits", "passed": False,
+    "seen": "1 particle", "limit": "2",
 }  # fmt: skip
 ASKED = {"tolerance": 0.1, "quantity": "drag_mean"}
 
@@ -102,7 +102,7 @@ def test_a_failed_run_does_not_count(tmp_path: Path) -> None:
 def test_without_full_stiffness_there_is_nothing_to_compare_with(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     runs = read(tmp_path, [run for run in scene(0.05, 1.0, rng) if run["asked"]])
-    with pytest.raises(TableError, match="no run at full stiffness"):
+    with pytest.raises(TableError, match="no run with the physical Young's modulus"):
         check_promises(runs)
 
 

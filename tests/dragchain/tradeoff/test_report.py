@@ -96,7 +96,7 @@ def test_the_page_says_what_to_choose_and_what_softness_ruins(text: Text) -> Non
     words = " ".join(" ".join(text.parts).replace("\N{NO-BREAK SPACE}", " ").split())
     assert "E x 0.01, 50 % of Rayleigh (20 times cheaper than the reference" in words
     assert "The <plain> deck: 2 times (1.9 to 2.1)" in words
-    assert "every particle kept" in words and "12 particles" in words
+    assert "no particle lost" in words and "12 particles" in words
     assert "Inertial number of the scene: 0.004 at speed x 1, 0.02 at speed x 5" in words
 
 

@@ -98,5 +98,5 @@ def test_too_few_scenes_are_refused() -> None:
 
 @pytest.mark.parametrize("same", [{"inertial_number": 0.1}, {"friction": 0.4}])
 def test_scenes_that_are_alike_say_nothing_of_what_they_share(same: dict[str, float]) -> None:
-    with pytest.raises(SeriesError, match="too alike"):
+    with pytest.raises(SeriesError, match="differ too little"):
         fit_stiffness_law([replace(one, **same) for one in scenes(2)])

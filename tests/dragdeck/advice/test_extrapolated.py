@@ -30,7 +30,7 @@ def elsewhere(case: Case) -> Tradeoff:
 
 
 def test_a_quantity_without_a_law_or_an_error_is_refused(case: Case) -> None:
-    with pytest.raises(InputError, match="no error of this quantity was measured") as caught:
+    with pytest.raises(InputError, match="the error of this quantity was not measured") as caught:
         advise(case, Tolerance(tolerance=0.1, quantity="friction_work"), with_laws(case))
     assert "workpiece_contacts" in str(caught.value)
 

@@ -69,7 +69,7 @@ def test_steps_per_second_are_those_of_the_last_run_command() -> None:
         "Loop time of 2.5 on 2 procs for 500 steps with 300 atoms\n"
     )
     assert last_loop(text) == 200.0
-    with pytest.raises(EngineError, match="how long"):
+    with pytest.raises(EngineError, match="no duration"):
         last_loop("ERROR\n")
 
 

@@ -117,9 +117,9 @@ def test_a_calibration_does_not_rename_any_run(case: Case, measured_case: Case) 
 
 
 def test_a_study_without_a_record_is_told_so(case: Case, measured_case: Case) -> None:
-    with pytest.raises(InputError, match="names no measured drop test"):
+    with pytest.raises(InputError, match="has no measured drop test"):
         settings(case)
-    with pytest.raises(InputError, match="no such record"):
+    with pytest.raises(InputError, match="the record of the drop test does not exist"):
         record_file(measured_case)
     (measured_case.file.parent / "record.csv").write_text("")
     assert record_file(measured_case).name == "record.csv"

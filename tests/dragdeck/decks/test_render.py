@@ -174,8 +174,8 @@ def test_the_tip_ends_at_the_asked_depth(case: Case) -> None:
         (("motion", "path"), {"kind": "circle", "radius_m": 0.016}, "no particle fits"),
         (("motion", "immersion_depth_m"), 0.05, "below the floor"),
         (("motion", "immersion_depth_m"), 0.035, "crush particles"),
-        (("media", "count"), 5000, "more particles than the bowl holds"),
-        (("fidelities", "quick"), {"youngs_modulus_scale": 1e-5}, "so soft a material"),
+        (("media", "count"), 5000, "more particles than fit into the bowl"),
+        (("fidelities", "quick"), {"youngs_modulus_scale": 1e-5}, "below the minimum of LIGGGHTS"),
         (("media", "radius_mean_m"), 0.022, "does not fit into the bowl"),
     ],
 )
@@ -204,7 +204,7 @@ def test_a_workpiece_never_crosses_a_radius_in_a_step(
     small["fidelities"]["quick"]["speed_factor"] = 100
     small["motion"]["plunge_speed_m_s"] = 29
     (case,) = load_cases(write_study(small))
-    with pytest.raises(InputError, match="crosses a particle's radius in one step") as caught:
+    with pytest.raises(InputError, match="moves by more than a particle radius per step") as caught:
         process_scene(case, BED)
     assert caught.value.field == "motion.speed_m_s"
 

@@ -25,7 +25,7 @@ def test_a_run_has_the_name_of_its_folder_and_is_not_repeated(case: Case, batch:
     first, again = (batch.run("one", drop_scene(case)) for _ in range(2))
     assert first == again and first.state == "complete"
     assert json.loads((batch.folder / "one" / "case.json").read_text())["run"] == "one"
-    assert "run one\n" in (batch.folder / "one" / "in.liggghts").read_text()
+    assert "Run:         one\n" in (batch.folder / "one" / "in.liggghts").read_text()
 
 
 def test_a_rejected_run_has_a_record_but_is_no_result(case: Case, batch: Batch) -> None:

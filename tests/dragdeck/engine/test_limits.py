@@ -115,7 +115,9 @@ def test_an_unstable_run_is_stopped_early_with_the_reason(unstable: Path) -> Non
     deck = unstable / "in.liggghts"
     assert "thermo_modify lost error" in deck.read_text()
     rewrite(deck, deck.read_text().replace("lost error", "lost ignore"))
-    with pytest.raises(RejectedRunError, match=r"within its limits: .* at step .*limit: "):
+    with pytest.raises(
+        RejectedRunError, match=r"energy and speed within limits: .* at step .*limit: "
+    ):
         run(unstable, lambda line: None)
     assert state(unstable).state == "failed"
     assert list(failed_checks(unstable)) == ["within_limits"]

@@ -41,5 +41,7 @@ def test_an_engine_without_a_runner_is_ended(tmp_path: Path) -> None:
         with only_runner(elsewhere, lines.append):
             assert psutil.Process(left.pid).status() != psutil.STATUS_ZOMBIE and lines == []
         with only_runner(tmp_path, lines.append):
-            assert lines == [f"ended an engine that had lost its runner: process {left.pid}"]
+            assert lines == [
+                f"ended LIGGGHTS, which had outlived its dragdeck process: process {left.pid}"
+            ]
         assert not psutil.pid_exists(left.pid)

@@ -19,7 +19,7 @@ def test_late_neighbour_lists_of_all_commands_count() -> None:
     [
         ("DRAGDECK SETTLED: energy ratio 1e-7\n", True, "SETTLED: energy ratio 1e-7"),
         ("DRAGDECK NOT SETTLED: energy ratio 1\n", False, "NOT SETTLED: energy ratio 1"),
-        ("print DRAGDECK SETTLED\n", False, "no word of it"),
+        ("print DRAGDECK SETTLED\n", False, "no message of the settling criterion"),
     ],
 )
 def test_a_bed_rests_if_the_input_script_says_so(screen: str, rests: bool, words: str) -> None:

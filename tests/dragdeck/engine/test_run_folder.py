@@ -129,7 +129,7 @@ def test_a_stop_leaves_a_checkpoint_and_the_run_goes_on(
     process.send_signal(number)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 1
-    assert b"stopped as asked" in said
+    assert b"stopped on request" in said
     assert b"checkpoint at step" in said
     assert state(folder).state == "stopped"
     assert not (folder / "run.json").exists()
@@ -150,7 +150,7 @@ def test_a_killed_engine_is_never_a_result(
         os.kill(child.pid, signal.SIGKILL)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 1
-    assert b"the engine was killed" in said
+    assert b"LIGGGHTS was killed" in said
     assert not (folder / "run.json").exists()
     assert run(folder, silent).state == "complete"
 
@@ -197,7 +197,7 @@ def test_a_queue_that_signals_the_engine_too_stops_the_run(
     (engine,) = psutil.Process(process.pid).children()
     engine.send_signal(signal.SIGTERM)
     _, said = process.communicate(timeout=60)
-    assert b"stopped as asked" in said
+    assert b"stopped on request" in said
     assert state(folder).parts[0].exit_status == 0
     assert not list(folder.glob("restart_forced_*"))
 
@@ -225,7 +225,7 @@ def test_the_engines_error_reaches_the_user_and_is_not_retried(filling: Path) ->
 def test_a_bed_that_does_not_come_to_rest_is_rejected_and_not_resumed(filling: Path) -> None:
     deck = filling / "in.liggghts"
     rewrite(deck, deck.read_text().replace("variable check loop 500", "variable check loop 3"))
-    with pytest.raises(RejectedRunError, match="bed at rest: NOT SETTLED: energy ratio"):
+    with pytest.raises(RejectedRunError, match="packing settled: NOT SETTLED: energy ratio"):
         run(filling, silent)
     assert state(filling).state == "failed" and len(state(filling).parts) == 1
     remedies = {check.code: check.remedy for check in state(filling).checks if not check.passed}
@@ -243,10 +243,11 @@ def test_a_truncated_output_fails_its_check(filling: Path) -> None:
             "packing.restart",
         ),
     )
-    with pytest.raises(EngineError, match=r"(?s)particles\.1\.bin is cut short.*disk has space"):
+    with pytest.raises(EngineError, match=r"(?s)particles\.1\.bin is truncated.*disk has space"):
         run(filling, silent)
     assert not (filling / "run.json").exists()
-    with pytest.raises(RejectedRunError, match=r"particles whole: particles\.2\.bin is cut short"):
+    complete = r"output particles complete: particles\.2\.bin is truncated"
+    with pytest.raises(RejectedRunError, match=complete):
         run(filling, silent)
 
 
@@ -311,7 +312,7 @@ def test_an_engine_that_writes_nothing_is_ended(tmp_path: Path) -> None:
     (tmp_path / "screen.1.txt").write_text("setting up\n")
     watch(50.0)
     watch(109.0)
-    with pytest.raises(EngineEnded, match="wrote nothing for 61 s"):
+    with pytest.raises(EngineEnded, match="produced no output for 61 s"):
         watch(111.0)
 
 

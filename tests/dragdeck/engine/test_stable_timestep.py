@@ -105,7 +105,7 @@ def test_an_accepted_step_passes_and_says_so(tmp_path: Path) -> None:
     check = checked(tmp_path, [HEAVY] * 4, unsafe_timestep="to see it break")
     assert check.passed
     assert number(check) > 1
-    assert check.limit == "1; accepted beyond it: to see it break"
+    assert check.limit == "1; exceeded on purpose: to see it break"
     fine = checked(tmp_path, [LIGHT] * 4, unsafe_timestep="to see it break")
     assert (fine.passed, fine.limit) == (True, "1")
 

@@ -102,13 +102,13 @@ def test_looking_does_not_keep_a_runner_waiting(process: Path) -> None:
 
 def test_a_failed_run_names_its_check_and_the_remedy(process: Path) -> None:
     check = AcceptanceCheck(
-        code="particles_kept", name="every particle kept", passed=False,
+        code="particles_kept", name="no particle lost", passed=False,
         seen="8 particles", limit="9 asked", remedy="choose less",
     )  # fmt: skip
     write_state(process, "failed", checks=[check])
     status = run_status(process)
     assert status.state == "failed"
-    assert "check:  every particle kept: 8 particles (limit: 9 asked)" in status.problem
+    assert "check:  no particle lost: 8 particles (limit: 9 asked)" in status.problem
     assert "remedy: choose less" in status.problem
 
 

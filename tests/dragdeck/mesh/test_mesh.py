@@ -201,8 +201,8 @@ def test_nodes_that_are_there_twice_are_merged_with_a_word(tmp_path: Path):
     for name, said in (("body.obj", 1), ("body.ply", 1), ("body.vtk", 1), ("body.stl", 0)):
         loose.write(tmp_path / name)
         found = m.check(m.read(tmp_path / name, "m"))
-        assert [one.problem for one in found] == said * ["nodes are there twice"]
-        assert not said or found[0].value.startswith("8 beside the 4")
+        assert [one.problem for one in found] == said * ["nodes are duplicated"]
+        assert not said or found[0].value.startswith("8 merged, 4 remain")
 
 
 def test_weld_joins_nodes_within_the_precision_only():
@@ -238,7 +238,7 @@ def test_degenerate_facets():
 def test_duplicate_facet_whichever_way_it_runs():
     for again in ([0, 2, 1], [1, 2, 0]):
         found = problems(with_facets(*TETRAHEDRON.faces.tolist(), again))
-        assert found[0] == "a facet is there twice"
+        assert found[0] == "a facet is duplicated"
 
 
 def test_open_box():
@@ -328,13 +328,13 @@ def test_a_hollow_body_is_refused():
         np.vstack([TETRAHEDRON.vertices, void.vertices]),
         np.vstack([TETRAHEDRON.faces, void.faces + 4]),
     )
-    assert problems(hollow) == ["the mesh holds several bodies"]
+    assert problems(hollow) == ["the mesh contains several bodies"]
 
 
 def test_sharp_angles():
     assert problems(needle(0.6)) == []
     assert [f.severity for f in m.findings(needle(0.3))] == ["warning"]
-    assert "the angle of a facet is too sharp for the engine" in problems(needle(0.2))
+    assert "the angle of a facet is too sharp for LIGGGHTS" in problems(needle(0.2))
 
 
 def fan(blades: int) -> Trimesh:
@@ -365,7 +365,10 @@ def test_coplanar_facets_on_top_of_each_other():
 
 @pytest.mark.parametrize(
     ("factor", "remedy"),
-    [(1e3, "in millimetres, declared as metres?"), (1e-3, "in metres, declared as millimetres?")],
+    [
+        (1e3, "in millimetres, but declared in metres?"),
+        (1e-3, "in metres, but declared in millimetres?"),
+    ],
 )
 def test_wrong_unit_is_named(factor: float, remedy: str):
     workpiece = m.cylinder(0.005, 0.08, 0.005)
@@ -376,7 +379,7 @@ def test_wrong_unit_is_named(factor: float, remedy: str):
 
 
 def test_workpiece_wider_than_the_bowl():
-    with pytest.raises(InputError, match="no sense in this bowl"):
+    with pytest.raises(InputError, match="not plausible in this bowl"):
         m.check(m.cylinder(0.041, 0.08, 0.01), surroundings=SCENE)
 
 
@@ -514,7 +517,7 @@ def test_a_fine_workpiece_is_checked_in_seconds(tmp_path: Path):
     begun = time.process_time()
     read = m.read(tmp_path / "fan.stl", "m")
     assert len(read.vertices) == fan + 2
-    assert "the angle of a facet is too sharp for the engine" in problems(read)
+    assert "the angle of a facet is too sharp for LIGGGHTS" in problems(read)
     assert time.process_time() - begun < 10.0
 
 

@@ -46,9 +46,9 @@ def test_other_runs_count_by_their_particles(case: Case, tmp_path: Path) -> None
 def test_a_price_is_quoted_with_engine_and_date(case: Case) -> None:
     costs = [priced("bowl_facets", 1.9, ci95_low=1.85, ci95_high=1.951), priced("bowl_fine", 1.9)]
     tradeoff = made_tradeoff(case, costs=costs)
-    said = "putting it back costs 1.9x (1.85 to 1.95), LIGGGHTS 3.8.0, 2026-01-02"
+    said = "enabling it costs 1.9x (1.85 to 1.95), LIGGGHTS 3.8.0, 2026-01-02"
     assert price_of("bowl_facets", tradeoff) == said
-    assert price_of("bowl_fine", tradeoff).startswith("putting it back costs 1.9x, LIGGGHTS")
+    assert price_of("bowl_fine", tradeoff).startswith("enabling it costs 1.9x, LIGGGHTS")
     assert "not measured" in price_of("two_ranks", tradeoff)
     assert "not measured" in price_of("bowl_facets", None)
 

@@ -104,7 +104,7 @@ def test_the_plan_counts_what_is_left() -> None:
         "2 runs, about 40 s on 1 core, 2 MB (estimates; speed assumed)",
         "filling: 1 run, about 10 s, 1 MB",
         "process: 1 run, about 30 s, 1 MB",
-        "1 ended before: repeated only if the input script has changed",
+        "1 already ended: repeated only if the input script has changed",
     ]
 
 

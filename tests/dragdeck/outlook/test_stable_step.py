@@ -29,7 +29,7 @@ MEASURED = [
     (1e-3, 0.2, 0.37), (1e-3, 0.5, 0.72), (1e-3, 0.64, 0.87), (1e-3, 0.8, 1.06), (1e-3, 1.0, 1.24),
     (1e-4, 0.5, 0.975), (1e-4, 0.64, 1.17), (1e-2, 0.5, 0.53), (1e-2, 1.2, 1.07), (1e-2, 1.5, 1.28),
 ]  # fmt: skip
-"""Modulus scale, step and stability number of runs of the paper's scene (docs/stability.md)."""
+"""Modulus scale, step and stability number of runs of uhlmann2015 (docs/evidence/stability.md)."""
 
 
 @pytest.mark.parametrize(("scale", "fraction", "number"), MEASURED)

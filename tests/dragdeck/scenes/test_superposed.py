@@ -151,12 +151,12 @@ def test_a_workpiece_that_oscillates_is_as_much_longer(with_motion: Callable[...
         ({"oscillation": {"amplitude_m": 0.012, "frequency_hz": 1}, "immersion_depth_m": 0.025},
          "motion.oscillation", "too deep"),
         ({"oscillation": {"amplitude_m": 0.005, "frequency_hz": 1}, "immersion_depth_m": 0.005},
-         "motion.oscillation", "out of the bed"),
-        ({"spin": {"rpm": 30000}}, "motion.spin", "neighbour skin in one step"),
+         "motion.oscillation", "out of the packing"),
+        ({"spin": {"rpm": 30000}}, "motion.spin", "neighbour skin per step"),
         ({"spin": {"schedule": [{"until_s": 1, "rpm": 1}, {"until_s": 2, "rpm": -30000}]}},
-         "motion.spin", "neighbour skin in one step"),
+         "motion.spin", "neighbour skin per step"),
         ({"oscillation": {"amplitude_m": 1e-3, "frequency_hz": 3000}},
-         "motion.oscillation", "neighbour skin in one step"),
+         "motion.oscillation", "neighbour skin per step"),
     ],
 )  # fmt: skip
 def test_motions_that_cannot_be(
@@ -185,11 +185,11 @@ def test_the_limit_of_a_spin_is_the_skin(with_motion: Callable[..., Case]) -> No
         ({"spin": {}}, "either rpm or schedule"),
         ({"spin": {"rpm": 1, "schedule": SCHEDULE}}, "either rpm or schedule"),
         ({"spin": {"schedule": SCHEDULE[::-1]}}, r"schedule.1.until_s is 0.1, not above the 0.15"),
-        ({"spin": {"schedule": [SCHEDULE[0]] * 2}}, "in the order of their times"),
+        ({"spin": {"schedule": [SCHEDULE[0]] * 2}}, "sort the entries by time"),
         ({"spin": {"schedule": []}}, "at least 1 item"),
         ({"oscillation": {"amplitude_m": 0, "frequency_hz": 1}}, "greater than 0"),
         ({"path": {"kind": "line", "start_m": [0, 0], "length_m": 0.1},
-          "counted_from_revolution": 1}, "for circles"),
+          "counted_from_revolution": 1}, "to circles only"),
     ],
 )  # fmt: skip
 def test_blocks_that_cannot_be(block: dict[str, Any], words: str) -> None:

@@ -186,7 +186,7 @@ def test_a_missing_file_is_named(made: Made, name: str) -> None:
         ({"points": []}, "motion.path.points: List should have at least 2"),
         ({"points": [[0, 0, 0], [1, 0]]}, "motion.path.points.1.2: a required"),
         ({"points": [[0, 0, 0], [1, 0, 0, 0, 0, 0]]}, "motion.path.points.1: NamedTuple "),
-        ({"points": [[0, 0, 0], [1, True, 0]]}, "motion.path.points.1.1: a truth value"),
+        ({"points": [[0, 0, 0], [1, True, 0]]}, "motion.path.points.1.1: a number is required"),
         ({"points": [[0, 0, 0], [0, 0.01, 0]]}, "motion.path.points.1.0: the time does not"),
         ({"points": [[0, 0, 0], [1, 0, 0, 0.01]]}, "does not move horizontally"),
         ({"points": [[0, 0, 0], [1, 0, 0]]}, "does not move horizontally"),
@@ -217,7 +217,7 @@ def test_neither_file_nor_points(small: dict[str, Any], write_study: Any) -> Non
     ("motion", "words"),
     [
         ({"speed_m_s": 0.01}, "are both given: remove speed_m_s"),
-        ({"counted_from_revolution": 1}, "for circles: this path has no revolutions"),
+        ({"counted_from_revolution": 1}, "to circles only: this path has no revolutions"),
         ({"transient_m": 1.01 * LENGTH}, "no path is left for the statistics"),
         (
             {"path": {"kind": "waypoints", "points": TURNING}, "spin": {"rpm": 9}},
@@ -308,7 +308,7 @@ def test_no_stage_is_without_a_step() -> None:
         ([[0, 0.017, 0], [1, 0, 0]], 0.015, "no particle fits"),
         ([[0, 0, 0], [1, 0.01, 0, -0.017]], 0.015, "takes the workpiece too deep"),
         ([[0, 0, 0, -0.017], [1, 0.01, 0]], 0.015, "takes the workpiece too deep"),
-        ([[0, 0, 0], [1, 0.01, 0, 0.015]], 0.015, "takes the workpiece out of the bed"),
+        ([[0, 0, 0], [1, 0.01, 0, 0.015]], 0.015, "takes the workpiece out of the packing"),
     ],
 )
 def test_a_path_that_does_not_fit(made: Made, points: Any, depth: float, words: str) -> None:
@@ -335,7 +335,7 @@ def test_a_path_that_dips_has_a_longer_workpiece(made: Made) -> None:
 
 def test_a_path_that_crosses_particles_in_a_step_is_refused(made: Made) -> None:
     case = made(points=[[0, 0, 0], [1, 0.01, 0], [1.0004, 0.014, 0]], factor=60)
-    with pytest.raises(InputError, match="crosses a particle's radius") as caught:
+    with pytest.raises(InputError, match="moves by more than a particle radius") as caught:
         process_scene(case, BED)
     assert caught.value.field == "motion.path"
 

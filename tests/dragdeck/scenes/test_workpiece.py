@@ -77,7 +77,7 @@ def test_the_default_axis_names_no_new_run(dragged: Dragged) -> None:
 @pytest.mark.parametrize(
     ("shape", "field", "words"),
     [
-        ({"file": "a.STEP"}, "facet_size_m", "size of the facets is missing"),
+        ({"file": "a.STEP"}, "facet_size_m", "but the facet size is missing"),
         ({"file": "a.stl", "facet_size_m": 0.001}, "facet_size_m", "a mesh already"),
         ({"file": "a.obj", "edge_facet_size_m": 0.001}, "edge_facet_size_m", "a mesh already"),
         (

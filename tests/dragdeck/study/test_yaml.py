@@ -190,12 +190,12 @@ def test_a_pair_may_be_given_twice_with_the_same_values(small: dict[str, Any]) -
         ("title: A bowl\n".encode("utf-16"), "not UTF-8 text"),
         ("title: Schüssel\n".encode("latin-1"), "not UTF-8 text"),
         (b"title: a\x00b\n", "not YAML"),
-        (b"title: !!binary aGVsbG8=\n", "a binary is no plain value"),
-        (b"sweep: !!set {a, b}\n", "a set is no plain value"),
+        (b"title: !!binary aGVsbG8=\n", "a binary is not a plain value"),
+        (b"sweep: !!set {a, b}\n", "a set is not a plain value"),
         (b"? [a, b]\n: 1\n", "not YAML"),
         (b"a: " + 5000 * b"[", "nested too deeply"),
         (5000 * b"{a: ", "nested too deeply"),
-        (b"", "a study is a mapping"),
+        (b"", "a study must be a mapping"),
     ],
 )
 def test_each_is_named_with_its_file(tmp_path: Path, content: bytes, words: str) -> None:

@@ -92,7 +92,7 @@ def test_a_matrix_makes_every_combination(
         ({"motion.colour": [1]}, "motion.colour: unknown key"),
         ({"seed": []}, "sweep.seed: no values"),
         ({"seed": [1, 1]}, "given twice"),
-        ({"bowl.radius_m.deeper": [1]}, "leads through a value"),
+        ({"bowl.radius_m.deeper": [1]}, "below a single value"),
         ({"motion.speed_m_s": [0.01, -1]}, "motion.speed_m_s"),
         ({"motion.speed_m_s": [0.01, "1e-2"]}, "given twice"),
         ({"seed": [1, 1.0]}, "given twice"),
@@ -186,7 +186,7 @@ def test_a_scaling_is_part_of_no_run(
     ("scaling", "sweep", "field", "words"),
     [
         ({"field": "motion.depth_m"}, {}, "scaling.field", "not a field of sweep"),
-        ({}, {"motion.speed_m_s": [0.01, 0.02]}, "sweep", "another field varies"),
+        ({}, {"motion.speed_m_s": [0.01, 0.02]}, "sweep", "exactly one field"),
         (
             {},
             {"motion.immersion_depth_m": [0.01, 0.02]},
@@ -194,7 +194,7 @@ def test_a_scaling_is_part_of_no_run(
             "too few levels",
         ),
         ({"fit_range": [0.01, 0.015]}, {}, "sweep.motion.immersion_depth_m", "too few levels"),
-        ({"fit_range": [0.02, 0.01]}, {}, "scaling", "not up"),
+        ({"fit_range": [0.02, 0.01]}, {}, "scaling", "fit_range must increase"),
         ({"field": "seed"}, {}, "scaling", "seed"),
         ({"slope": 2}, {}, "scaling.slope", "unknown key"),
         (

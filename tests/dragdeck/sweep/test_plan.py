@@ -92,10 +92,10 @@ def test_a_scene_may_have_a_path_of_its_own(make: Callable[..., Points]) -> None
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"reference": {"vary": {"seed": [1, 2]}}}, "the reference is one point"),
+        ({"reference": {"vary": {"seed": [1, 2]}}}, "the reference must be a single point"),
         ({"points": [{"vary": {"motion.sped_m_s": [1]}}]}, "unknown key"),
         ({"points": [{"vary": {"fidelity.speed_factor": [0.1]}}]}, "at least 1"),
-        ({"points": [{"vary": {"title.long": [1]}}]}, "leads through a value"),
+        ({"points": [{"vary": {"title.long": [1]}}]}, "below a single value"),
         ({"seeds": 0}, "at least 1"),
         ({"parameters": {}}, "unknown key"),
     ],

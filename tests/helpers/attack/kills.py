@@ -149,5 +149,5 @@ def _missing(project: Path, phase: Phase, ground: Ground) -> list[str]:
         if not other.is_file():
             problems.append(f"{file.name} is missing")
         elif other.stat().st_size < 0.9 * file.stat().st_size:
-            problems.append(f"{file.name} is cut short")
+            problems.append(f"{file.name} is truncated")
     return problems

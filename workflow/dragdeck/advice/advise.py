@@ -1,7 +1,7 @@
-"""From an asked tolerance to settings: what is cheapest of all that was measured to hold it.
+"""From a tolerance to settings: the cheapest measured settings that meet it.
 
-Pure arithmetic on the measured trade-off (docs/tradeoff.md) and on a study. Nothing here runs
-an engine.
+Pure arithmetic on the measured trade-off (docs/evidence/tradeoff.md) and on a study. Nothing here
+runs LIGGGHTS.
 """
 
 import math
@@ -62,7 +62,9 @@ class Outside:
     high: float
 
     def __str__(self) -> str:
-        return f"{self.field} {self.value:.3g} is outside of {self.low:.3g} to {self.high:.3g}"
+        return (
+            f"{self.field} {self.value:.3g} is outside the range {self.low:.3g} to {self.high:.3g}"
+        )
 
 
 @dataclass(frozen=True)
@@ -232,12 +234,12 @@ def _check_quantity(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> None:
     known += [name for name in {**tradeoff.quantities, **laws} if name not in known]
     if asked.quantity not in known:
         raise InputError(
-            "no error of this quantity was measured",
+            "the error of this quantity was not measured",
             file=case.file,
             field="fidelity.quantity",
             value=asked.quantity,
             limit=f"one of: {', '.join(known)}",
-            remedy="ask for one of these; or name settings with the physical Young's modulus: "
+            remedy="choose one of these, or settings with the physical Young's modulus: "
             "fidelity: {youngs_modulus_scale: 1}",
         )
 
@@ -331,16 +333,16 @@ def _fallback(
 ) -> str:
     """Why the reference: nothing cheaper meets the tolerance; and what is known of it."""
     best = min((option.error.limit for option in options if option.error), default=None)
-    smallest = "" if best is None else f"; the smallest bound is {percent(best)}"
+    smallest = "" if best is None else f" (smallest upper bound: {percent(best)})"
     text = (
-        f"no measured setting is known to err by less than {percent(held_to)}{smallest}: "
-        f"the reference settings are taken ({reference})"
+        f"no measured setting has an error below {percent(held_to)}{smallest}: "
+        f"the reference settings are used ({reference})"
     )
     quantity = tradeoff.quantities.get(asked.quantity)
     if quantity is None or not quantity.reference or quantity.se is None:
         return text
     known = percent(quantity.se)
-    return f"{text}; the reference itself is known only to a standard error of {known}"
+    return f"{text}; the reference itself has a standard error of {known}"
 
 
 def _spread(study: Study, asked: Tolerance, tradeoff: Tradeoff) -> Spread | None:

@@ -82,13 +82,39 @@ class Forecast:
 
 
 class SettingsOfOption(Fidelity):
-    """The settings of an option, with the ranks that its runs will get."""
+    """The settings of an option, with the MPI ranks of its runs.
+
+    Attributes
+    ----------
+    ranks : int
+        MPI ranks.
+    """
 
     ranks: int
 
 
 class OptionEntry(Part):
-    """An option of ``advice.json``: settings, their error, and what their runs will take."""
+    """An option of ``advice.json``: settings, their error and their expected cost.
+
+    Attributes
+    ----------
+    role : str
+        ``advised``, ``cheaper``, ``dearer``, ``reference`` or ``own``.
+    settings : SettingsOfOption
+        Settings of filling and process.
+    drop_timestep_fraction : float or None
+        Time step of the drop test as a fraction of the Rayleigh time.
+    error : MeasuredError or None
+        Expected error; None for the reference.
+    relative_cost : float
+        CPU time / CPU time of the reference settings.
+    inputs : mapping
+        Inputs of the process run, as in its ``case.json``.
+    steps, wall_time_s, steps_per_s : mapping
+        Expected steps, wall-clock time (s) and speed, by scene.
+    source : str
+        Where the speed comes from.
+    """
 
     role: str
     settings: SettingsOfOption
@@ -103,7 +129,17 @@ class OptionEntry(Part):
 
 
 class AdvisedCase(Part):
-    """A case of ``advice.json``: its process run, what was asked, and the options."""
+    """A case of ``advice.json``: its process run and its options.
+
+    Attributes
+    ----------
+    case, run : str
+        Name of the case, and its run id.
+    asked : AdvisedSettings
+        The tolerance, and the expected error of the advised settings.
+    options : sequence of OptionEntry
+        The advised settings first.
+    """
 
     case: str
     run: str
@@ -112,7 +148,17 @@ class AdvisedCase(Part):
 
 
 class AdviceFile(Document):
-    """``advice.json``: what the runs of a study will take, and how far they may err."""
+    """``advice.json``: settings for a tolerance, with their expected error and cost.
+
+    Attributes
+    ----------
+    date : str
+        Date on which it was written.
+    speed : Speed or None
+        Measured speed of LIGGGHTS on this machine.
+    cases : sequence of AdvisedCase
+        One entry per process run.
+    """
 
     study: str
     date: str
@@ -297,9 +343,9 @@ def _about(
     yield "errors", f"relative to the reference settings, {advice.source}"
     yield "wall time", f"{' and '.join(advised.steps)}; speed: {advised.source}"
     if case.asked is None:
-        yield "asked", "the study asks for no tolerance; it keeps its own fidelity"
+        yield "tolerance", "the study sets no tolerance and keeps its own fidelity"
     if case.asked is None and advice.chosen.drop_timestep_fraction is None:
-        yield "its own", _of_own(case, advice, own)
+        yield "own fidelity", _of_own(case, advice, own)
 
 
 def _of_own(case: Case, advice: Advice, own: Option | None) -> str:
@@ -308,7 +354,7 @@ def _of_own(case: Case, advice: Advice, own: Option | None) -> str:
     if advice.reference.same_settings(settings):
         return f"{name} has the reference settings"
     if own is None or own.error is None:
-        return f"{name} is none of the measured settings that may be used here"
+        return f"{name} is not among the measured settings that apply here"
     return (
         f"{name}: error of {advice.label} {_error_text(own.error)}, "
         f"bound {percent(own.error.bound)}, cost {own.relative_cost:.3g}"
@@ -320,14 +366,14 @@ def remarks(advice: Advice, study: Study) -> list[tuple[str, str]]:
     found = [("outside", str(number)) for number in advice.outside]
     if advice.outside:
         text = (
-            f"the error is held to {percent(advice.held_to)} instead (an assumption: nothing "
-            "measured says how it grows there)"
+            f"the error is therefore limited to {percent(advice.held_to)} (an assumption: its "
+            "growth outside the measured range is unknown)"
         )
         found.append(("safe side", text))
     if advice.chosen.extrapolated:
         text = (
             f"the {advice.label} of the run is extrapolated to the physical Young's modulus; the "
-            "error is that of the law, and the report shows both values"
+            "error is that of the extrapolation; the report shows both values"
         )
         found.append(("extrapolated", text))
     if advice.fallback:
@@ -335,18 +381,18 @@ def remarks(advice: Advice, study: Study) -> list[tuple[str, str]]:
     cheaper = advice.cheaper
     if cheaper is not None and cheaper.error is not None:
         bound = cheaper.error.limit
-        text = f"may err by up to {percent(bound)}, {percent(bound - advice.held_to)} too much"
+        text = f"error up to {percent(bound)}, {percent(bound - advice.held_to)} above the limit"
         found.append(("cheaper", f"{cheaper}: {text}"))
     if advice.spread is not None:
-        found.append(("chance", _of_chance(advice, advice.spread, study)))
+        found.append(("scatter", _of_chance(advice, advice.spread, study)))
     return found
 
 
 def _of_chance(advice: Advice, spread: Spread, study: Study) -> str:
     """The uncertainty of one run, and what would bring it below the tolerance."""
     text = (
-        f"one run's {advice.label} is uncertain by {percent(spread.half_width)} either way (95 %) "
-        f"over {spread.counted_m:.3g} m of counted path"
+        f"the {advice.label} of a single run has a 95 % confidence interval of +/- "
+        f"{percent(spread.half_width)} over {spread.counted_m:.3g} m of path in the statistics"
     )
     if spread.half_width <= advice.asked.tolerance:
         return text
@@ -354,7 +400,7 @@ def _of_chance(advice: Advice, spread: Spread, study: Study) -> str:
     around = study.motion.path.revolution_m
     whole = f"{length:.3g} m" if around is None else f"{length / around:.3g} revolutions"
     seeds = math.ceil(spread.needed_m / spread.counted_m)
-    return f"{text}: more than the tolerance, which takes {whole}, or the mean over {seeds} seeds"
+    return f"{text}: more than the tolerance, which requires {whole} or the mean of {seeds} seeds"
 
 
 def _error_text(error: MeasuredError) -> str:

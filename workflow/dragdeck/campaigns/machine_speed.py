@@ -87,7 +87,8 @@ def _result(batch: Batch, kind: SceneType, case: Case, bed: Bed | None) -> RunRe
         return batch.result(kind.run_id(case), kind.build(case, bed))
     except RejectedRunError as error:
         raise RejectedRunError(
-            f"{error}\n  the measurement of the speed failed; without it: dragdeck advise --quick"
+            f"{error}\n  the speed of LIGGGHTS could not be measured; "
+            "to skip the measurement: dragdeck advise --quick"
         ) from None
 
 
@@ -101,7 +102,7 @@ def last_loop(screen: str) -> float:
     """
     timed = loops(screen)
     if not timed or timed[-1].wall_time_s <= 0:
-        raise EngineError("LIGGGHTS does not say how long its last run took")
+        raise EngineError("LIGGGHTS printed no duration of its last run")
     return timed[-1].steps_per_s
 
 

@@ -139,10 +139,10 @@ def settings(case: Case) -> Calibration:
     """
     if case.study.calibration is None:
         raise InputError(
-            "the study names no measured drop test",
+            "the study has no measured drop test",
             file=case.file,
             field="calibration",
-            remedy="add calibration: {record: FILE.csv}; docs/calibration.md describes the file",
+            remedy="add calibration: {record: FILE.csv}, see docs/start/restitution.md",
         )
     return case.study.calibration
 
@@ -159,12 +159,12 @@ def record_file(case: Case) -> Path:
     file = folder / settings(case).record
     if not file.is_file() or not file.resolve().is_relative_to(folder.resolve()):
         raise InputError(
-            "no such record in the study's folder",
+            "the record of the drop test does not exist",
             file=case.file,
             field="calibration.record",
             value=settings(case).record,
             limit=f"a file in {folder}",
-            remedy="put the CSV there, or correct the name",
+            remedy="put the CSV file there, or correct its name",
         )
     return file
 
@@ -344,6 +344,10 @@ def drops_command(
         fitted = FitFile.read(fit)
         drops = list(confirmation(case.study, fitted.fit.restitution, fitted.fit_full.restitution))
     else:
-        raise InputError("nothing to confirm", field="--fit", remedy="give the fit's result.json")
+        raise InputError(
+            "the result of the fit is missing",
+            field="--fit",
+            remedy="give the path of its result.json",
+        )
     batch = Batch(out, environment(project.templates, study_templates(case)))
     run_drops(case, drops, batch, say)

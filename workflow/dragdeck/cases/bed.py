@@ -95,8 +95,8 @@ def outrun(study: Study, field: str, who: str, speed_m_s: float) -> Iterator[Cau
         settings[field] = rounded(fraction * widest / needed, up=False)
     yield Caution(
         "skin",
-        f"{who} at up to {speed_m_s:.2g} m/s, more than half the neighbour skin of {has:.2g} m "
-        f"in a step: the run may fail for dangerous neighbour builds; take a fidelity.skin_m of "
+        f"{who} at up to {speed_m_s:.2g} m/s, more than half the neighbour skin ({has:.2g} m) per "
+        f"step: dangerous neighbour-list builds may fail the run; use a fidelity.skin_m of "
         f"at least {least:g}, or a smaller fidelity.{field}",
         settings,
     )
@@ -125,5 +125,5 @@ def skin(study: Study) -> float:
 
 
 def widest_skin(study: Study) -> float:
-    """Widest neighbour skin that was measured to cost nothing significant, m (docs/costs.md)."""
+    """Widest neighbour skin without a measurable cost, m (docs/evidence/costs.md)."""
     return round_to(0.3 * study.media.radius_mean_m, 3)

@@ -6,7 +6,7 @@ from dragdeck.documents import Part
 
 
 class AdvisedSettings(Part):
-    """The tolerance that a run's settings were chosen for, and what is expected of them.
+    """The tolerance for which the settings of a run were chosen, and their expected error.
 
     Attributes
     ----------
@@ -19,6 +19,18 @@ class AdvisedSettings(Part):
         Expected error, its interval and the bound of its size; None for the reference.
     half_width : float or None
         Of the 95 % interval of one run's value, relative.
+    tolerance : float
+        Requested relative error.
+    quantity, label : str
+        Quantity to which the tolerance applies: name and wording.
+    relative_cost : float
+        CPU time / CPU time of the reference settings.
+    outside : sequence of str
+        Dimensionless numbers outside the measured range.
+    fallback : str or None
+        Why the reference settings are used.
+    source : str
+        Measurement on which the advice is based.
     """
 
     tolerance: float

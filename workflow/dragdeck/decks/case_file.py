@@ -24,7 +24,21 @@ class CountOfRun(Part):
 
 
 class FidelityOfRun(RanksOfRun):
-    """The settings of a run that trade accuracy for speed."""
+    """The settings for speed and accuracy of a run.
+
+    Attributes
+    ----------
+    name : str
+        Name of the fidelity.
+    youngs_modulus_scale, speed_factor : float
+        Multipliers of every Young's modulus and of the speed of the workpiece.
+    timestep_fraction, filling_timestep_fraction : float
+        Time steps of process and filling as fractions of the Rayleigh time.
+    skin_m : float
+        Neighbour skin, m.
+    ranks : int
+        MPI ranks.
+    """
 
     name: str
     youngs_modulus_scale: float
@@ -35,7 +49,17 @@ class FidelityOfRun(RanksOfRun):
 
 
 class MediaOfRun(CountOfRun):
-    """The particles: their number, and the radii and density that the study asks for."""
+    """The media: number of particles, and their radii and density as specified in the study.
+
+    Attributes
+    ----------
+    count : int
+        Number of particles.
+    radius_mean_m, radius_std_m : float
+        Mean and standard deviation of the radii, m.
+    density_kg_m3 : float
+        Density, kg/m3.
+    """
 
     radius_mean_m: float
     radius_std_m: float
@@ -43,14 +67,32 @@ class MediaOfRun(CountOfRun):
 
 
 class BowlOfRun(Part):
-    """The bowl: a cylinder about the z axis that stands on z = 0."""
+    """The bowl: a cylinder about the z axis with its floor at z = 0.
+
+    Attributes
+    ----------
+    radius_m : float
+        Inner radius, m.
+    walls : str
+        ``primitive`` (analytical plane and cylinder) or ``mesh``.
+    """
 
     radius_m: float
     walls: Literal["primitive", "mesh"]
 
 
 class AssumptionOfRun(Part):
-    """A value that the study's source does not give."""
+    """A value that the source of the study does not report.
+
+    Attributes
+    ----------
+    field : str
+        Dotted name of the field.
+    value : JSON value
+        The assumed value.
+    why : str
+        Reason for the value.
+    """
 
     field: str
     value: JsonValue
@@ -58,7 +100,15 @@ class AssumptionOfRun(Part):
 
 
 class Phase(Part):
-    """A stretch of the run: the steps after the first one up to the last."""
+    """A phase of the run: the steps after `start_step` up to `end_step`.
+
+    Attributes
+    ----------
+    name : str
+        For a process ``plunge``, ``approach`` or ``drag``.
+    start_step, end_step : int
+        First and last step.
+    """
 
     name: str
     start_step: int
@@ -66,7 +116,7 @@ class Phase(Part):
 
 
 class CaseFile(Document):
-    """What the case files of all scenes share.
+    """Content that the case files of all scenes share.
 
     Attributes
     ----------
@@ -76,6 +126,10 @@ class CaseFile(Document):
         The values that the run depends on, by dotted name; of a process all of the study.
     files : mapping
         SHA-256 of every file that the run starts from, as they were written.
+    timestep_s, rayleigh_time_s : float
+        Time step and Rayleigh time of the smallest particle, s.
+    phases : sequence of Phase
+        Empty if LIGGGHTS determines the number of steps.
     """
 
     study: str
@@ -90,7 +144,7 @@ class CaseFile(Document):
 
 
 class CaseOfStudy(CaseFile):
-    """A run of a study's case.
+    """A run of a case of a study.
 
     Attributes
     ----------
@@ -98,6 +152,12 @@ class CaseOfStudy(CaseFile):
         Of a particle with a ``particle``, the ``bowl`` and the ``workpiece``.
     unsafe_timestep : str or None
         Why a step of the process beyond the stable one is accepted.
+    fidelity : FidelityOfRun
+        Settings for speed and accuracy.
+    assumptions : sequence of AssumptionOfRun
+        Values that the source of the study does not report.
+    reference : Reference or None
+        Published values to compare with.
     """
 
     gravity_m_s2: float
@@ -112,7 +172,21 @@ class CaseOfStudy(CaseFile):
 
 
 class DropTestCase(CaseOfStudy):
-    """A drop test: the restitution of the input script, and the factor on every modulus."""
+    """A drop test.
+
+    Attributes
+    ----------
+    restitution : float
+        Coefficient of restitution in the input script.
+    youngs_modulus_scale : float
+        Multiplier of every Young's modulus.
+    files : mapping
+        SHA-256 of every file from which the run starts.
+    inputs : mapping
+        Values that the run depends on, by dotted name.
+    contact_moduli : mapping
+        Contact constants of a particle with ``particle``, ``bowl`` and ``workpiece``.
+    """
 
     scene: Literal["drop_test"] = "drop_test"
     restitution: float
@@ -120,13 +194,19 @@ class DropTestCase(CaseOfStudy):
 
 
 class SettlingCriterion(Part):
-    """When a bed rests: mean kinetic energy of a particle over m g d."""
+    """When a packing counts as settled.
+
+    Attributes
+    ----------
+    energy_ratio : float
+        Largest mean kinetic energy per particle / (m g d).
+    """
 
     energy_ratio: float
 
 
 class SteadyCriterion(Part):
-    """When the bed in a rotating bowl moves steadily.
+    """When the packing in a rotating bowl moves steadily.
 
     From the step `from_step` on, the mean kinetic energy of a particle in the first third differs
     from that in the last third by at most the fraction `energy_drift`.
@@ -137,7 +217,21 @@ class SteadyCriterion(Part):
 
 
 class FillingCase(CaseOfStudy):
-    """A filling."""
+    """A filling.
+
+    Attributes
+    ----------
+    settled : SettlingCriterion
+        When the packing counts as settled.
+    limits : RunLimits
+        Limits of energy and speed; beyond them the run is stopped.
+    files : mapping
+        SHA-256 of every file from which the run starts.
+    inputs : mapping
+        Values that the run depends on, by dotted name.
+    contact_moduli : mapping
+        Contact constants of a particle with ``particle``, ``bowl`` and ``workpiece``.
+    """
 
     scene: Literal["filling"] = "filling"
     settled: SettlingCriterion

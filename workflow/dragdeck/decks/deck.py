@@ -50,14 +50,17 @@ class Materials:
     names : sequence of str
         The material of each type, in LIGGGHTS's order; the particles are first.
     youngs_moduli_pa, poissons_ratios : sequence of float
-        One per type.
+        One per type, as simulated.
     law : ContactLaw
+    youngs_modulus_scale : float
+        Factor by which the physical Young's moduli were multiplied.
     """
 
     names: Sequence[str]
     youngs_moduli_pa: Sequence[float]
     poissons_ratios: Sequence[float]
     law: ContactLaw
+    youngs_modulus_scale: float = 1.0
 
 
 def contact_law(pairs: Sequence[Sequence[Pair]]) -> ContactLaw:
@@ -84,6 +87,10 @@ class Deck:
         Steps between restart points; 0 for none.
     processors : str
         How the ranks are laid out along x, y and z.
+    case : str
+        Name of the case; empty for a run that cases share.
+    rayleigh_time_s : float
+        Rayleigh time of the smallest particle; 0 if the time step is not a fraction of it.
     """
 
     title: str
@@ -101,6 +108,8 @@ class Deck:
     thermo_steps: int = 0
     checkpoint_steps: int = 0
     processors: str = ENGINE_CHOOSES
+    case: str = ""
+    rayleigh_time_s: float = 0.0
     version: str = __version__
     templates: str = ""
 

@@ -40,7 +40,7 @@ def _command(command: str, source: str) -> Iterator[tuple[str, str]]:
         yield command, "read the environment"
     elif not (first == "variable" and words[2:3] in (["equal"], ["atom"])):
         paths = (word for word in words[1:] if word != source and _OUTSIDE.match(word))
-        yield from ((command, f"reach outside of the run's folder: {word}") for word in paths)
+        yield from ((command, f"access a file outside the run's folder: {word}") for word in paths)
     for inner in _inner(words):
         yield from _command(inner, source)
 

@@ -16,7 +16,7 @@ Kind = Literal["print", "custom", "local"]
 
 
 class OutputOfRun(Part):
-    """A raw output file, for whoever reads it.
+    """A raw output file and its columns.
 
     Attributes
     ----------
@@ -30,6 +30,8 @@ class OutputOfRun(Part):
         When frames are written. `last_step` is None where the engine decides.
     rows_per_particle : float
         Rows to expect in a frame, for each particle of the run; a frame has at least one.
+    binary : bool
+        Whether it is a binary dump.
     """
 
     kind: Kind
@@ -87,6 +89,8 @@ class Output:
     binary : bool
     rows_per_particle : float
         Rows to expect in a frame, for each particle of the run; a frame has at least one.
+    purpose : str
+        For the comment in the input script: content, and the result made from it.
     """
 
     name: str
@@ -97,6 +101,7 @@ class Output:
     last_step: int | None
     binary: bool = False
     rows_per_particle: float = 0.0
+    purpose: str = ""
 
     @property
     def pattern(self) -> str:
@@ -170,13 +175,15 @@ def thermo(period: int, last: int | None) -> Output:
         Column("rotational_energy_j", "c_rotation"),
         Column("fastest_particle_m_s", "c_fastest_particle"),
     )
-    return Output("thermo", "print", columns, period, period, last)
+    purpose = "particle count, energies, largest speed, for acceptance checks and thermo.parquet"
+    return Output("thermo", "print", columns, period, period, last, purpose=purpose)
 
 
 def settled_particles() -> Output:
     """Every particle of the settled bed, one frame."""
     columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS)
-    return Output("particles", "custom", columns, 1, 0, None, True, 1.0)
+    purpose = "settled packing, one frame, for packing.json"
+    return Output("particles", "custom", columns, 1, 0, None, True, 1.0, purpose)
 
 
 def workpiece_force(period: int, last: int, workpiece: str) -> Output:
@@ -189,14 +196,24 @@ def workpiece_force(period: int, last: int, workpiece: str) -> Output:
         *_vector("ref", "m", f"f_{workpiece}", 7),
     )
     name = workpiece.replace("workpiece", WORKPIECE_FORCE)
-    return Output(name, "print", columns, period, period, last)
+    purpose = "force, torque and position of the workpiece, for workpiece_force.parquet (drag)"
+    return Output(name, "print", columns, period, period, last, purpose=purpose)
 
 
 def workpiece_particles(period: int, first: int, last: int) -> Output:
     """Particles that the workpiece pushes: how they move, and the force as applied."""
     force = _vector("force", "n", "f_force_workpiece_wall")
     columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *force)
-    return Output("workpiece_particles", "custom", columns, period, first, last, binary=True)
+    return Output(
+        "workpiece_particles",
+        "custom",
+        columns,
+        period,
+        first,
+        last,
+        binary=True,
+        purpose="particles on the workpiece and the force applied, for workpiece_contacts.parquet",
+    )
 
 
 def workpiece_contacts(period: int, first: int, last: int, several: bool) -> Output:
@@ -213,7 +230,8 @@ def workpiece_contacts(period: int, first: int, last: int, several: bool) -> Out
         *_vector("force", "n", "c_workpiece_contacts", 10),
         Column("overlap_m", "c_workpiece_contacts[13]"),
     )
-    return Output("workpiece_contacts", "local", columns, period, first, last)
+    purpose = "contacts with mesh elements, evaluated again, for workpiece_contacts.parquet"
+    return Output("workpiece_contacts", "local", columns, period, first, last, purpose=purpose)
 
 
 def contacts(period: int, first: int, last: int) -> Output:
@@ -225,7 +243,14 @@ def contacts(period: int, first: int, last: int) -> Output:
         Column("overlap_m", "c_particle_contacts[7]"),
     )
     return Output(
-        "contacts", "local", columns, period, first, last, rows_per_particle=_CONTACTS_PER_PARTICLE
+        "contacts",
+        "local",
+        columns,
+        period,
+        first,
+        last,
+        rows_per_particle=_CONTACTS_PER_PARTICLE,
+        purpose="contacts between particles, for contacts.parquet and force chains",
     )
 
 
@@ -236,7 +261,8 @@ def particles(period: int, first: int, last: int, bowl_facets: bool) -> Output:
         *_vector("side_force", "n", "f_force_side"),
     )
     columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *(() if bowl_facets else bowl))
-    return Output("particles", "custom", columns, period, first, last, True, 1.0)
+    purpose = "all particles, for particles.parquet and force chains"
+    return Output("particles", "custom", columns, period, first, last, True, 1.0, purpose)
 
 
 def bodies(period: int, last: int, walls: Sequence[str]) -> Output:
@@ -247,7 +273,8 @@ def bodies(period: int, last: int, walls: Sequence[str]) -> Output:
         *(Column(f"torque_{axis}_n_m", f"tq{axis}") for axis in "xyz"),
         *(column for wall in walls for column in _vector(f"{wall}_force", "n", f"f_force_{wall}")),
     )
-    return Output("bodies", "custom", columns, period, 0, last, True, 1.0)
+    purpose = "all particles with their forces, for the comparison with reference solutions"
+    return Output("bodies", "custom", columns, period, 0, last, True, 1.0, purpose)
 
 
 def impacts() -> Output:
@@ -259,11 +286,13 @@ def impacts() -> Output:
         Column("vz_m_s", "vcm(all,z)"),
         Column("force_n", "c_plate_force"),
     )
-    return Output("impacts", "print", columns, 1, 0, None)
+    purpose = "height, velocity and force at every step around an impact, for impacts.parquet"
+    return Output("impacts", "print", columns, 1, 0, None, purpose=purpose)
 
 
 def particles_and_forces(period: int, last: int) -> Output:
     """Every particle with the total force on it, as applied."""
     force = tuple(Column(f"force_{axis}_n", f"f{axis}") for axis in "xyz")
     columns = (_ID, *_POSITION, *_VELOCITY, *_SPIN, _RADIUS, *force)
-    return Output("particles", "custom", columns, period, 0, last, True, 1.0)
+    purpose = "all particles with their total force, for the stability map"
+    return Output("particles", "custom", columns, period, 0, last, True, 1.0, purpose)

@@ -13,7 +13,7 @@ from dragdeck.study.model import AnyPathOfRun, AnySuperposedOfRun
 
 
 class WorkpieceOfRun(Part):
-    """The workpiece: radius of the cylinder around it, length, mesh file, depth of its tip.
+    """The workpiece.
 
     Attributes
     ----------
@@ -22,6 +22,16 @@ class WorkpieceOfRun(Part):
     wake_from_m : float or None
         Path length from which on its axis goes where a workpiece went before; the key is absent
         if it never does, or if the path is no circle.
+    kind : str
+        ``cylinder`` or ``mesh``.
+    radius_m : float
+        Radius of the vertical cylinder around its immersed part, m.
+    length_m : float
+        Height, m.
+    mesh : str
+        File of its mesh.
+    immersion_depth_m : float
+        Depth of its tip below the settled surface, m.
     """
 
     kind: Literal["cylinder", "mesh"]
@@ -35,13 +45,19 @@ class WorkpieceOfRun(Part):
 
 
 class StatisticsOfRun(Part):
-    """The first seconds of the drag that no statistic counts."""
+    """The part of the drag that is excluded from the statistics.
+
+    Attributes
+    ----------
+    transient_s : float
+        Initial time of the drag, s of simulated time.
+    """
 
     transient_s: float
 
 
 class ProcessCase(CaseOfStudy):
-    """A process run: the workpiece dragged through a settled bed.
+    """A process run: the workpiece is dragged through the settled packing.
 
     Attributes
     ----------
@@ -59,6 +75,26 @@ class ProcessCase(CaseOfStudy):
         What is superposed on the path; the key is absent if nothing is.
     steady : SteadyCriterion
         When the bed moves steadily; the key is absent if the bowl stands still.
+    workpiece : WorkpieceOfRun
+        Geometry and immersion.
+    motion : mapping
+        Path of the drag as simulated.
+    statistics : StatisticsOfRun
+        Transient that is excluded.
+    limits : RunLimits
+        Limits of energy and speed; beyond them the run is stopped.
+    asked : AdvisedSettings or None
+        Tolerance from which the settings were derived.
+    files : mapping
+        SHA-256 of every file from which the run starts.
+    inputs : mapping
+        All values of the study, by dotted name.
+    contact_moduli : mapping
+        Contact constants of a particle with ``particle``, ``bowl`` and ``workpiece``.
+    phases : sequence of Phase
+        Plunge, approach and drag.
+    unsafe_timestep : str or None
+        Why an unstable time step is accepted.
     """
 
     scene: Literal["process"] = "process"

@@ -26,12 +26,12 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
     """
     with explained():
         template = templates.get_template(scene.template)
-        names = "templates: " + ", ".join(used(templates, scene.template))
+        names = ", ".join(used(templates, scene.template))
         outputs = in_writing_order(scene.deck.outputs)
         text = template.render(deck=replace(scene.deck, templates=names, outputs=outputs))
     if f'\nprint "{END}"\n' not in text or not all(c.isprintable() or c in "\n\t" for c in text):
         raise InputError(
-            "the input script is no text that ends as it should",
+            "the input script is not printable text, or lacks its last command",
             file=file_of(templates, scene.template),
             limit=f"printable characters, and the last command of base.in.j2: print {END}",
             remedy="extend the project's template, and override blocks of it",
@@ -41,7 +41,7 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
             f"the input script would {why}",
             file=file_of(templates, scene.template),
             value=ascii(command),
-            remedy="remove the command from the template; see docs/templates.md",
+            remedy="remove the command from the template; see docs/reference/templates.md",
         )
     return text
 

@@ -36,14 +36,20 @@ _MOST_SECONDS, _MOST_BYTES = 3.0, 2**30
 
 
 _FAILURES: Mapping[type[BaseException], tuple[str, str]] = {
-    RecursionError: ("extends or calls itself without end", 'extend "base/<name>" instead'),
-    MemoryError: ("needs more memory than a template may have", "make it smaller"),
-    TimeoutError: (f"takes longer than {_MOST_SECONDS:g} s", "make it smaller"),
-    SecurityError: ("is not allowed: ", "docs/templates.md lists what a template may use"),
+    RecursionError: (
+        "the template extends or calls itself endlessly",
+        'extend "base/<name>" instead',
+    ),
+    MemoryError: ("the template requires more memory than allowed", "make it smaller"),
+    TimeoutError: (f"the template takes longer than {_MOST_SECONDS:g} s", "make it smaller"),
+    SecurityError: (
+        "is not allowed: ",
+        "docs/reference/templates.md lists what a template may use",
+    ),
     jinja2.TemplateNotFound: ("no such template: ", "put it into templates/, or correct the name"),
-    jinja2.TemplateSyntaxError: ("template syntax: ", "see docs/templates.md"),
-    jinja2.UndefinedError: ("a value is missing: ", "docs/templates.md lists the values"),
-    Exception: ("a value cannot be used: ", "docs/templates.md lists the values"),
+    jinja2.TemplateSyntaxError: ("template syntax: ", "see docs/reference/templates.md"),
+    jinja2.UndefinedError: ("a value is missing: ", "docs/reference/templates.md lists the values"),
+    Exception: ("a value cannot be used: ", "docs/reference/templates.md lists the values"),
 }
 """What a template may raise: the problem, which goes on with the exception if it ends with a space,
 and the remedy."""
@@ -137,7 +143,7 @@ def quoted(value: object) -> Markup:
     bad = {char for char in value if char in _NOT_IN_A_VALUE or not char.isprintable()}
     if bad:
         shown = " ".join(ascii(char) for char in sorted(bad))
-        raise ValueError(f"{value[:80]!a} cannot stand in an input script: it has {shown}")
+        raise ValueError(f"{value[:80]!a} is not allowed in an input script: it contains {shown}")
     return Markup(value)
 
 
@@ -230,7 +236,7 @@ def _parsed(templates: jinja2.Environment, name: str) -> nodes.Template:
         return _tree(templates, source, name, found)
     except (RecursionError, UnicodeDecodeError) as error:
         problem = "not UTF-8 text" if isinstance(error, ValueError) else "nested too deeply"
-        raise InputError(problem, file=file, remedy="see docs/templates.md") from None
+        raise InputError(problem, file=file, remedy="see docs/reference/templates.md") from None
 
 
 @lru_cache(maxsize=64)
@@ -256,12 +262,12 @@ def _check_own(templates: jinja2.Environment, study: Path, project: Path) -> Non
     known = {str(file.relative_to(project)) for file in project.rglob("*.j2")}
     reached = set(used(templates, *sorted(files & known)))
     found = [
-        InputError("no input script uses it", file=study / name, limit=choices(name, known))
+        InputError("no input script uses this file", file=study / name, limit=choices(name, known))
         for name in sorted(files - reached)
     ]
     for name in sorted(known):
         if (study / name).is_dir() or ((study / name).is_symlink() and not (study / name).exists()):
-            found.append(InputError("is not a file", file=study / name))
+            found.append(InputError("this is not a file", file=study / name))
     for name in sorted(files & reached):
         found += _idle_blocks(templates, name)
     if found:

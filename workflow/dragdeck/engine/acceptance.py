@@ -98,16 +98,16 @@ def _text(file: Path) -> str:
 
 def _ended(screen: str, exit_status: int) -> AcceptanceCheck:
     at_end = log.reached_end(screen)
-    seen = f"exit status {exit_status}, {'end' if at_end else 'no end'} of the deck reached"
+    seen = f"exit status {exit_status}, end {'reached' if at_end else 'not reached'}"
     passed = at_end and exit_status == 0
-    return _check("ended", "ended by itself", passed, seen, "exit status 0 at the end")
+    return _check("ended", "LIGGGHTS ended normally", passed, seen, "exit status 0, end reached")
 
 
 def _no_errors(screen: str) -> AcceptanceCheck:
     errors = log.engine_errors(screen)
     seen = "; ".join(errors) or "none"
     reason: CheckReason = "lost_particles" if "Lost atoms" in seen else "other"
-    return _check("no_engine_error", "no engine error", not errors, seen, "none", reason)
+    return _check("no_engine_error", "no LIGGGHTS error", not errors, seen, "none", reason)
 
 
 def _neighbour_builds(screens: str) -> AcceptanceCheck:
@@ -117,7 +117,7 @@ def _neighbour_builds(screens: str) -> AcceptanceCheck:
 
 def _at_rest(screen: str) -> AcceptanceCheck:
     rests, seen = log.settling(screen)
-    return _check("at_rest", "bed at rest", rests, seen, "SETTLED")
+    return _check("at_rest", "packing settled", rests, seen, "SETTLED")
 
 
 def _steady(samples: Sequence[log.Sample], asked: SteadyCriterion) -> AcceptanceCheck:
@@ -127,16 +127,16 @@ def _steady(samples: Sequence[log.Sample], asked: SteadyCriterion) -> Acceptance
     drift = math.nan
     if third:
         drift = abs(sum(energies[:third]) / sum(energies[-third:]) - 1)
-    seen = f"mean kinetic energy changes by {100 * drift:.2g} % while it is counted"
+    seen = f"mean kinetic energy changes by {100 * drift:.2g} % during the statistics"
     limit = f"at most {100 * asked.energy_drift:g} %"
     passed = drift <= asked.energy_drift
-    return _check("steady_bed", "bed moves steadily", passed, seen, limit, number=drift)
+    return _check("steady_bed", "packing in steady motion", passed, seen, limit, number=drift)
 
 
 def _packing(file: Path, particles: int, ranks: int) -> AcceptanceCheck:
     whole = file.is_file() and is_whole(file, particles, ranks)
-    seen = "every particle in it" if whole else f"{file.name} is missing or cut short"
-    return _check("packing_whole", "packing whole", whole, seen, f"{particles} particles")
+    seen = "all particles present" if whole else f"{file.name} is missing or truncated"
+    return _check("packing_whole", "packing complete", whole, seen, f"{particles} particles")
 
 
 def _samples(folder: Path, output: OutputOfRun, parts: Sequence[RunPart]) -> list[log.Sample]:
@@ -150,9 +150,9 @@ def _samples(folder: Path, output: OutputOfRun, parts: Sequence[RunPart]) -> lis
 def _thermo(samples: list[log.Sample], count: int) -> list[AcceptanceCheck]:
     finite = bool(samples) and all(sample.finite for sample in samples)
     fewest = min((sample.n_particles for sample in samples), default=0)
-    seen, limit = f"{fewest} particles at the fewest", f"{count} asked"
+    seen, limit = f"smallest number of particles {fewest}", f"{count} particles"
     return [
-        _check("particles_kept", "every particle kept", fewest == count, seen, limit),
+        _check("particles_kept", "no particle lost", fewest == count, seen, limit),
         _check("finite_numbers", "finite numbers", finite, f"{len(samples)} thermo rows", "no NaN"),
     ]
 
@@ -168,13 +168,13 @@ def _complete(
     if not file.is_file() and not promised:  # a part from a checkpoint at the end writes nothing
         seen = f"no {file.name}"
     elif not found.steps or found.damaged:
-        seen = f"{file.name} is cut short or empty"
+        seen = f"{file.name} is truncated or empty"
     elif found.gap is not None:
         seen = f"step {found.gap} is missing"
     else:
         passed = True
-    limit = "every frame whole" if output.last_step is None else f"to step {output.last_step}"
-    return _check("output_complete", f"{name} whole", passed, seen, limit)
+    limit = "every frame complete" if output.last_step is None else f"to step {output.last_step}"
+    return _check("output_complete", f"output {name} complete", passed, seen, limit)
 
 
 def _stable_timestep(
@@ -188,7 +188,7 @@ def _stable_timestep(
     number, reason, limit = float(np.median(found or [0.0])), case.unsafe_timestep, "1"
     if number > 1:
         stable = f"{number**-2:.2g} times the time step is stable"
-        limit = f"1; accepted beyond it: {reason}" if reason else f"1; {stable}"
+        limit = f"1; exceeded on purpose: {reason}" if reason else f"1; {stable}"
     seen = f"stability number {number:.3g} of the contacts, median of {len(found)} frames"
     passed, known = number <= 1 or bool(reason), found and math.isfinite(number)
     return _check(

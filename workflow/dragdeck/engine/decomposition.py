@@ -26,13 +26,13 @@ def ranks_check(split: Decomposition | None, ranks: int) -> AcceptanceCheck:
     A LIGGGHTS that was built for another MPI than its launcher's runs once per rank, each
     with all particles, and all write the same files.
     """
-    name, limit = "split as asked", f"{ranks} rank{'s' if ranks > 1 else ''}"
+    name, limit = "MPI ranks as requested", f"{ranks} rank{'s' if ranks > 1 else ''}"
     if split is None:
         return AcceptanceCheck(
             code="ranks",
             name=name,
             passed=False,
-            seen="LIGGGHTS names no processor grid",
+            seen="LIGGGHTS printed no processor grid",
             limit=limit,
         )
     seen = " by ".join(map(str, split.grid))

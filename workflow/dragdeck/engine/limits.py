@@ -37,7 +37,7 @@ def _past(sample: Sample, limits: RunLimits) -> tuple[CheckReason, str, str] | N
 def within(limits: RunLimits) -> AcceptanceCheck:
     """The acceptance check of a run that passed no limit."""
     most = limits.mean_kinetic_energy_j
-    return _check(True, "no limit passed", f"{most:.3g} J per particle, {limits.why}")
+    return _check(True, "no limit exceeded", f"{most:.3g} J per particle, {limits.why}")
 
 
 def _check(
@@ -46,7 +46,7 @@ def _check(
     return AcceptanceCheck(
         code="within_limits",
         reason=reason,
-        name="within its limits",
+        name="energy and speed within limits",
         passed=passed,
         seen=seen,
         limit=limit,

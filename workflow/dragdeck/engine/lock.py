@@ -27,14 +27,14 @@ def only_runner(folder: Path, report: Report) -> Iterator[None]:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             stream.seek(0)
-            holder = stream.read().strip() or "one that does not say which"
+            holder = stream.read().strip() or "an unknown process"
             report(f"waiting for another process that runs this folder: {holder}")
             fcntl.flock(stream, fcntl.LOCK_EX)
         stream.truncate(0)
         stream.write(f"process {os.getpid()} on {socket.gethostname()}\n")
         stream.flush()
         for orphan in _engines_in(folder):
-            report(f"ended an engine that had lost its runner: process {orphan.pid}")
+            report(f"ended LIGGGHTS, which had outlived its dragdeck process: process {orphan.pid}")
             end_tree(orphan)
             psutil.wait_procs([orphan], timeout=10)
         yield

@@ -26,7 +26,11 @@ def dangerous_builds(screen: str) -> int:
 def settling(screen: str) -> tuple[bool, str]:
     """Whether a bed came to rest, and the words in which the input script says so."""
     line = re.search(r"^DRAGDECK ((NOT )?SETTLED: .*)$", screen, flags=re.MULTILINE)
-    return (False, "no word of it") if line is None else (line.group(2) is None, line.group(1))
+    return (
+        (False, "no message of the settling criterion")
+        if line is None
+        else (line.group(2) is None, line.group(1))
+    )
 
 
 def never_settled(screen: str) -> bool:

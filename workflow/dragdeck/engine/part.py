@@ -102,7 +102,7 @@ class PartOfRun:
         newest = newest_checkpoint(self.folder, count, ranks, gap, self.report)
         first = checkpoint_step(newest) if newest else 0
         for name in cut_outputs(self.folder, outputs, parts, first if newest else -1):
-            self.report(f"{name} was cut short or has a hole: it is written again from there")
+            self.report(f"{name} is truncated or has a gap: it is rewritten from there")
         checkpoint = newest.name if newest else None
         part = RunPart(part=len(parts) + 1, checkpoint=checkpoint, from_step=first)
         self.record = RunRecord(
@@ -180,16 +180,16 @@ class PartOfRun:
         """Why an engine that did not reach its end can go on; None where its input is at fault."""
         errors = log.engine_errors(screen)
         if asked:
-            return "stopped as asked"
+            return "stopped on request"
         full = free_bytes(self.folder) < SPARE_BYTES
         if full or any("Cannot open" in error for error in errors):
-            said = "; ".join(errors) or "no word of LIGGGHTS"
+            said = "; ".join(errors) or "no message of LIGGGHTS"
             return f"the disk is full, or a file cannot be written ({said})"
         if errors or log.never_settled(screen):
             return None
         killed = ending.exit_status < 0 or ending.exit_status >= 128
-        how = "was killed" if killed else "ended before its end without a word"
-        return f"the engine {how} (exit status {ending.exit_status})"
+        how = "was killed" if killed else "ended prematurely without a message"
+        return f"LIGGGHTS {how} (exit status {ending.exit_status})"
 
     def _refuse_new_gap(self, checks: list[AcceptanceCheck]) -> None:
         """A hole in what was written may come from a full disk: it is written again, but once."""
@@ -231,10 +231,10 @@ class PartOfRun:
         newest = newest_checkpoint(self.folder, count, ranks, gap, self.report)
         lines = [f"{self.folder}: {why}"]
         if newest is None:
-            lines.append(f"  remedy: {first}run it again from its start: no checkpoint is of use")
+            lines.append(f"  remedy: {first}run it again from its start: no usable checkpoint")
         else:
             lines.append(f"  value:  checkpoint at step {checkpoint_step(newest):,}")
-            lines.append(f"  remedy: {first}run it again, and it goes on from there")
+            lines.append(f"  remedy: {first}run it again; it resumes from there")
         return EngineError("\n".join(lines))
 
 

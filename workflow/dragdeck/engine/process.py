@@ -85,7 +85,7 @@ def find_engine() -> Engine:
     path = shutil.which(wanted)
     if path is None:
         raise EngineError(
-            f"no engine: {wanted!r} is not an executable file\n"
+            f"LIGGGHTS was not found: {wanted!r} is not an executable file\n"
             f"  remedy: install Debian's package liggghts, or set {ENGINE_VARIABLE} "
             "to the path of a LIGGGHTS of your own"
         )
@@ -102,7 +102,7 @@ def _version(path: str) -> str:
     oldest = ".".join(map(str, OLDEST_VERSION))
     if found is None:
         raise EngineError(
-            f"{path} does not say that it is LIGGGHTS\n"
+            f"{path} is not recognised as LIGGGHTS\n"
             f"  limit:  LIGGGHTS {oldest} or newer\n  remedy: correct {ENGINE_VARIABLE}"
         )
     version = tuple(int(part) for part in found.groups())
@@ -138,7 +138,7 @@ def command(engine: Engine, deck: str, ranks: int, part: int, source: Path | Non
     launcher = shutil.which("mpirun")
     if launcher is None:
         raise EngineError(
-            f"{ranks} ranks were asked for, but there is no mpirun\n"
+            f"{ranks} MPI ranks are requested, but mpirun is missing\n"
             "  remedy: install Open MPI (it comes with Debian's liggghts), or set ranks to 1"
         )
     idle = ["--mca", "mpi_yield_when_idle", "1"]  # free, and kind to whoever shares the cores
@@ -150,7 +150,7 @@ def _own_launcher() -> list[str]:
     words = shlex.split(os.environ.get(LAUNCHER_VARIABLE, ""))
     if words and shutil.which(words[0]) is None:
         raise EngineError(
-            f"no launcher: {words[0]!r} is not an executable file\n"
+            f"the MPI launcher was not found: {words[0]!r} is not an executable file\n"
             f"  remedy: correct {LAUNCHER_VARIABLE}, or unset it to use mpirun"
         )
     return words

@@ -27,21 +27,27 @@ CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", 
 
 _SMALLER_STEP = "choose a smaller timestep_fraction or a larger youngs_modulus_scale"
 REMEDIES: Mapping[CheckCode, str] = {
-    "neighbour_builds": "choose a larger skin_m",
+    "neighbour_builds": "choose a larger fidelity.skin_m",
     "at_rest": "choose a larger filling.max_time_s or filling.energy_ratio",
     "steady_bed": "choose a longer motion.transient_m, or more motion.path.revolutions",
     "particles_kept": _SMALLER_STEP,
     "finite_numbers": _SMALLER_STEP,
     "stable_timestep": _SMALLER_STEP,
     "within_limits": _SMALLER_STEP,
-    "output_complete": "start it anew with: dragdeck run --again",
+    "output_complete": "start the run again with: dragdeck run --again",
     "ranks": "use the mpirun that belongs to this LIGGGHTS (DRAGDECK_LAUNCHER)",
 }
 """What to do where a check did not pass; of others, the end of the screen output says it."""
 
 
 class ParticlesPerRank(Part):
-    """Mean, largest and smallest number of particles on a rank."""
+    """Number of particles per MPI rank.
+
+    Attributes
+    ----------
+    mean, most, least : float
+        Mean, largest and smallest number.
+    """
 
     mean: float
     most: int
@@ -49,7 +55,7 @@ class ParticlesPerRank(Part):
 
 
 class Decomposition(Part):
-    """The split that LIGGGHTS made of the simulation box.
+    """The decomposition of the simulation box among MPI ranks.
 
     Attributes
     ----------
@@ -78,6 +84,8 @@ class AcceptanceCheck(Part):
         What was seen, where it is one number.
     remedy : str, optional
         What to do where the check did not pass.
+    passed : bool
+        Whether the condition is met.
     """
 
     code: CheckCode
@@ -97,6 +105,16 @@ class RunPart(Part):
     ----------
     gap : int or None
         The first step that some output lacks after a part that came to its end.
+    part : int
+        Number, from 1.
+    from : str or None
+        Checkpoint from which it resumed; None for the start of the run.
+    from_step, to_step : int
+        First and last step.
+    wall_time_s, cpu_time_s : float
+        Wall-clock time, and CPU time of all ranks, s.
+    exit_status : int or None
+        Exit status of LIGGGHTS; None if it was stopped.
     """
 
     part: int
@@ -110,7 +128,7 @@ class RunPart(Part):
 
 
 class RunRecord(Document):
-    """How far a run is, or how it ended: ``state.json``, ``run.json`` and ``outcome.json``.
+    """The state of a run, or how it ended: ``state.json``, ``run.json`` and ``outcome.json``.
 
     Steps, times and checks are those of a run that has ended.
 
@@ -124,9 +142,25 @@ class RunRecord(Document):
         Of all parts; None for a run too short to measure it.
     stopped_early : bool
         Whether it was stopped because it passed a limit.
+    state : str
+        ``running``, ``stopped``, ``failed`` or ``complete``.
+    engine_version : str
+        Version of LIGGGHTS.
+    ranks : int
+        MPI ranks.
+    parts : sequence of RunPart
+        Parts of the run in order.
+    checks : sequence of AcceptanceCheck
+        Acceptance checks; empty before the end.
+    decomposition : Decomposition or None
+        Particles per MPI rank.
+    steps : int
+        Steps of all parts.
+    wall_time_s, cpu_time_s : float
+        Wall-clock time, and CPU time of all ranks, of all parts, s.
     """
 
-    remedy = "delete it: the run starts anew, and what is there moves to archive/"
+    remedy = "delete it: the run then starts again, and its files are moved to archive/"
 
     state: State
     inputs: str

@@ -25,7 +25,7 @@ _ARCHIVE = "archive"
 _AS_RUN = "as_run"
 _PATIENCE_S = 1800.0
 _ANEW = (
-    "write it again with: dragdeck step render, or run the scene that makes it; to change an "
+    "write it again with: dragdeck step render, or run the scene that creates it; to change an "
     "input script, override a block of its template"
 )
 
@@ -77,7 +77,7 @@ def run(
             _archive(folder, record.inputs[:8], report)
             record = None
         if record and record.state == "complete":
-            report("these inputs were run before and the run is complete")
+            report("the run is already complete with these inputs")
         elif record and record.state == "failed":
             raise RejectedRunError(
                 why_rejected(folder, record) + "\n  remedy: change the study, or run it --again"

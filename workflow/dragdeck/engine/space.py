@@ -62,7 +62,7 @@ def check_space(
     free, needed = free_bytes(folder), expected_bytes(outputs, particles) - written
     if free < needed:
         raise EngineError(
-            f"{folder}: the disk cannot hold this run\n  value:  {shown_bytes(free)} free\n"
+            f"{folder}: too little disk space for this run\n  value:  {shown_bytes(free)} free\n"
             f"  limit:  {shown_bytes(needed)}, estimated from its outputs\n"
-            "  remedy: make space, or ask for fewer frames in the study's block outputs"
+            "  remedy: free disk space, or reduce the rates under outputs in the study"
         )

@@ -108,7 +108,7 @@ class Watcher:
         size = size_of(self.screen)
         if size > SCREEN_BYTES:
             raise EngineEnded(
-                f"LIGGGHTS printed {shown_bytes(size)}, which no sound run does",
+                f"LIGGGHTS printed {shown_bytes(size)}, far more than any normal run",
                 f"read the beginning in {self.screen.name}; the rest was cut",
             )
 
@@ -118,8 +118,8 @@ class Watcher:
             self._written, self._written_s = written, seconds
         elif seconds - self._written_s > self.patience_s:
             raise EngineEnded(
-                f"LIGGGHTS wrote nothing for {seconds - self._written_s:.0f} s",
-                "find out what holds it, or allow more with --patience",
+                f"LIGGGHTS produced no output for {seconds - self._written_s:.0f} s",
+                "find the cause, or allow more time with --patience",
             )
 
     def _end_before_the_disk_is_full(self) -> None:
@@ -128,7 +128,7 @@ class Watcher:
             raise EngineEnded(
                 f"the disk is nearly full: {shown_bytes(free)} are free, and the run still needs "
                 f"{shown_bytes(needed)}",
-                "make space",
+                "free disk space",
             )
 
     def _still_to_write(self) -> float:

@@ -165,7 +165,7 @@ def _not_finite(mesh: Trimesh) -> list[Finding]:
 def _implausible_size(mesh: Trimesh, scene: Surroundings) -> list[Finding]:
     if _plausible(mesh, 1.0, scene):
         return []
-    problem = "the size of the workpiece makes no sense in this bowl"
+    problem = "the size of the workpiece is not plausible in this bowl"
     value = " x ".join(f"{length:.4g}" for length in mesh.extents) + " m"
     limit = (
         f"narrower than the bowl (diameter {2 * scene.bowl_radius_m:g} m), no longer than ten "
@@ -184,31 +184,31 @@ def _plausible(mesh: Trimesh, factor: float, scene: Surroundings) -> bool:
 
 def _unit_remedy(mesh: Trimesh, scene: Surroundings) -> str:
     if _plausible(mesh, 1e-3, scene):
-        return "check the unit: in millimetres, declared as metres?"
+        return "check the unit: is the file in millimetres, but declared in metres?"
     if _plausible(mesh, 1e3, scene):
-        return "check the unit: in metres, declared as millimetres?"
+        return "check the unit: is the file in metres, but declared in millimetres?"
     return "check the unit of the file and the axis of the part, or use a workpiece of another size"
 
 
 def _degenerate(mesh: Trimesh) -> list[Finding]:
     bad = ~mesh.nondegenerate_faces(height=NODE_PRECISION_M)
-    limit = f"higher than the engine's precision, {NODE_PRECISION_M:g} m"
+    limit = f"a height above the precision of LIGGGHTS, {NODE_PRECISION_M:g} m"
     remedy = "remove degenerate facets in a mesh workpiece and export again"
     return _facets(bad, "a facet has no area", limit, remedy)
 
 
 def _duplicates(mesh: Trimesh) -> list[Finding]:
     remedy = "remove duplicate facets in a mesh workpiece and export again"
-    return _facets(~mesh.unique_faces(), "a facet is there twice", "every facet once", remedy)
+    return _facets(~mesh.unique_faces(), "a facet is duplicated", "every facet once", remedy)
 
 
 def _sharp_angles(mesh: Trimesh) -> list[Finding]:
     smallest = np.degrees(mesh.face_angles.min(axis=1))
     remedy, measured = "remesh with better shaped triangles", f"{smallest.min():.4g} degrees; "
-    problem = "the angle of a facet is too sharp for the engine"
+    problem = "the angle of a facet is too sharp for LIGGGHTS"
     limit = f"above the curvature of the mesh, {_CURVATURE_DEG:g} degrees"
     errors = _facets(smallest <= _CURVATURE_DEG, problem, limit, remedy, measured)
-    problem = "needle-like facets slow the engine down"
+    problem = "needle-like facets slow LIGGGHTS down"
     limit = f"above {_ANGLE_WARNING_DEG:g} degrees"
     doubts = _facets(smallest <= _ANGLE_WARNING_DEG, problem, limit, remedy, measured)
     return errors or [doubt._replace(severity="warning") for doubt in doubts]
@@ -270,9 +270,9 @@ def _several_bodies(mesh: Trimesh) -> list[Finding]:
     if len(facets) == 1:
         return []
     value = f"{len(facets)} bodies; the largest has {facets.max()} of {len(mesh.faces)} facets"
-    remedy = "join them to one body, or remove all others, and inner walls, then export again"
+    remedy = "join them into one body, or remove all others, and inner walls, then export again"
     limit = "one body: the surface leads from every facet to every other"
-    return [Finding("the mesh holds several bodies", value, limit, remedy)]
+    return [Finding("the mesh contains several bodies", value, limit, remedy)]
 
 
 def _turned_normals(mesh: Trimesh) -> list[Finding]:
@@ -281,7 +281,11 @@ def _turned_normals(mesh: Trimesh) -> list[Finding]:
         return []
     if turned is None:
         remedy = "repair the mesh: a body has an inside and an outside"
-        return [Finding("the surface has one side only", "no way to turn it", limit, remedy)]
+        return [
+            Finding(
+                "the surface has one side only", "inside and outside are undefined", limit, remedy
+            )
+        ]
     problem = "the normals do not all point out of the body"
     value = "all point inwards" if mesh.is_winding_consistent else "mixed directions"
     remedy = "they are turned outwards for the run; turn them in the file too"
@@ -292,10 +296,10 @@ def _merged_nodes(mesh: Trimesh) -> list[Finding]:
     merged = mesh.metadata.get(MERGED, 0)
     if not merged:
         return []
-    value = f"{merged} beside the {len(mesh.vertices)} that are left"
-    limit = f"one node within the engine's precision, {NODE_PRECISION_M:g} m"
+    value = f"{merged} merged, {len(mesh.vertices)} remain"
+    limit = f"one node within the precision of LIGGGHTS, {NODE_PRECISION_M:g} m"
     remedy = "they are merged for the run; merge them in the file too"
-    return [Finding("nodes are there twice", value, limit, remedy, "warning")]
+    return [Finding("nodes are duplicated", value, limit, remedy, "warning")]
 
 
 def _lost_volume(mesh: Trimesh) -> list[Finding]:

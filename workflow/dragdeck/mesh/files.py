@@ -132,7 +132,7 @@ def _damage(path: Path) -> Iterator[None]:
         raise
     except Exception as error:
         raise InputError(
-            f"the mesh file is damaged, or not the {path.suffix[1:].upper()} that is read",
+            f"the mesh file is damaged, or a variant of {path.suffix[1:].upper()} not read here",
             file=path,
             value=str(error).strip() or type(error).__name__,
             remedy="export it again; VTK polygon data as STL or as an unstructured grid",
@@ -182,7 +182,7 @@ def _triangles(kind: str, cells: ArrayLike, points: Floats, path: Path) -> Integ
     if kind == "quad":
         return _split(nodes, points)
     raise InputError(
-        "the mesh holds cells that are neither triangles nor quadrilaterals",
+        "the mesh contains cells that are neither triangles nor quadrilaterals",
         file=path,
         value=f"{len(nodes)} of type {kind}",
         limit="triangles or quadrilaterals",

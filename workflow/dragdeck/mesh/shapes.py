@@ -147,20 +147,20 @@ def bowl(radius_m: float, height_m: float, facet_size_m: float) -> Trimesh:
 def _require_facet_size(facet_size_m: float, radius_m: float, length_m: float) -> None:
     if facet_size_m > radius_m:
         raise InputError(
-            "the facets are too coarse for the curve they stand for",
+            "the mesh elements are too coarse for the curvature of the surface",
             field="facet_size_m",
             value=facet_size_m,
             limit=f"at most the radius, {radius_m:g} m",
-            remedy="ask for a smaller facet size",
+            remedy="use a smaller facet size",
         )
     facets = 2.0 * math.tau * radius_m * (length_m + radius_m) / facet_size_m**2
     if facets > _MAX_FACETS:
         raise InputError(
-            f"about {facets:.3g} facets would be needed",
+            f"the mesh would need about {facets:.3g} facets",
             field="facet_size_m",
             value=facet_size_m,
             limit=f"at most {_MAX_FACETS} facets",
-            remedy="ask for a larger facet size, in metres",
+            remedy="use a larger facet size, in metres",
         )
 
 

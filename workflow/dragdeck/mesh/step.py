@@ -91,7 +91,7 @@ def _check_text(path: Path, unit: str) -> None:
     text = path.read_text(encoding="latin-1")
     if not text.lstrip().startswith(_START):
         limit, remedy = f"{_START} at its start", "export the part as STEP"
-        raise _refused(path, "the file is no STEP file", repr(text[:20]), limit, remedy)
+        raise _refused(path, "the file is not a STEP file", repr(text[:20]), limit, remedy)
     stated = set(_units(text)) or {"mm"}
     if unit not in stated:
         problem = "the STEP file states another unit than the study"

@@ -104,7 +104,9 @@ def _solid(gmsh: Any, file: str) -> int:
     if len(solids) == 1:
         return int(solids[0])
     faces = len(gmsh.model.getEntities(2))
-    problem = "the STEP file holds several parts" if solids else "the STEP file holds no solid"
+    problem = (
+        "the STEP file contains several parts" if solids else "the STEP file contains no solid"
+    )
     value = f"{len(solids)} solids, {faces} faces"
     raise Refusal(problem, value, "one solid: the workpiece is one body", EXPORT)
 

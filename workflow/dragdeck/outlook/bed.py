@@ -14,7 +14,7 @@ def _overlap(case: Case) -> str:
     overlap = floor_overlap(case.study)
     verdict = "within" if overlap <= MOST_OVERLAP else "ABOVE"
     return (
-        f"{100 * overlap:.2g} % of a diameter between particles at the floor, by the bed's weight: "
+        f"{100 * overlap:.2g} % of a diameter between particles at the floor, by the weight above: "
         f"{verdict} {100 * MOST_OVERLAP:g} % (an assumption)"
     )
 

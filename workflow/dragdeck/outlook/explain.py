@@ -77,8 +77,8 @@ def price_of(name: str, tradeoff: Tradeoff | None) -> str:
     """
     cost = tradeoff.cost(name) if tradeoff else None
     if tradeoff is None or cost is None:
-        return "cost of putting it back: not measured"
-    return f"putting it back costs {_ratio(cost, tradeoff)}"
+        return "cost of enabling it: not measured"
+    return f"enabling it costs {_ratio(cost, tradeoff)}"
 
 
 def _cheaper_choices(scene: str, tradeoff: Tradeoff) -> Iterable[tuple[str, str]]:
@@ -86,7 +86,10 @@ def _cheaper_choices(scene: str, tradeoff: Tradeoff) -> Iterable[tuple[str, str]
     for cost in tradeoff.costs:
         sure = cost.ci95_high is not None and cost.ci95_high < 1
         if sure and cost.scene == scene and cost.unit == "per_second":
-            yield cost.what, f"{_ratio(cost, tradeoff)}; what it does to the results is not said"
+            yield (
+                cost.what,
+                f"{_ratio(cost, tradeoff)}; its effect on the results is not stated here",
+            )
 
 
 def _ratio(cost: MeasuredCost, tradeoff: Tradeoff) -> str:

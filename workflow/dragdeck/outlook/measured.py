@@ -255,8 +255,9 @@ class Tradeoff(Document):
     """
 
     remedy = (
-        "name a fidelity instead of a tolerance; or measure the trade, `snakemake tradeoff --config"
-        " study=uhlmann2015 plan=long`, and copy its tradeoff.json to workflow/dragdeck/data/"
+        "name a fidelity instead of a tolerance; or measure the trade-off, `snakemake "
+        "tradeoff --config study=uhlmann2015 plan=long`, and copy its "
+        "tradeoff.json to workflow/dragdeck/data/"
     )
 
     measured: str

@@ -194,7 +194,7 @@ def plan_in_words(runs: Sequence[StudyRun], cores: int) -> list[str]:
         time = shown_time(time_left(mine, cores))
         lines.append(f"{scene}: {_counted(mine)}, about {time}, {size}")
     if ended := len(runs) - len(todo):
-        lines.append(f"{ended} ended before: repeated only if the input script has changed")
+        lines.append(f"{ended} already ended: repeated only if the input script has changed")
     return lines
 
 

@@ -1,7 +1,7 @@
 """Whether the contacts of a bed will be stable with a time step, before the run is made.
 
 The acceptance check measures a stability number on the frames of a run, and rejects it above 1
-(docs/stability.md). A law that was fitted to the numbers of many runs says what it will be.
+(docs/evidence/stability.md). A law fitted to the numbers of many runs predicts it.
 """
 
 import math
@@ -62,8 +62,8 @@ def stable_step_note(case: Case) -> tuple[str, str]:
     verdict = "below" if own < limit else "NOT BELOW"
     runs = measured_stiffness().stable_step.runs
     return "stable step", (
-        f"{100 * own:.3g} % is {verdict} {100 * limit:.3g} %, at which the contacts of this bed "
-        f"become unstable (law of {runs} runs)"
+        f"{100 * own:.3g} % is {verdict} {100 * limit:.3g} %, at which the contacts of this "
+        f"packing become unstable (law of {runs} runs)"
     )
 
 
@@ -85,6 +85,6 @@ def check_timestep(case: Case) -> None:
             file=case.file,
             field="fidelity.timestep_fraction",
             value=chosen.timestep_fraction,
-            limit=f"{stable:g} of the Rayleigh time (docs/stability.md)",
-            remedy="choose a smaller one; or, if you mean it, say why in accepted.unsafe_timestep",
+            limit=f"{stable:g} of the Rayleigh time (docs/evidence/stability.md)",
+            remedy="choose a smaller one, or give a reason in accepted.unsafe_timestep",
         )

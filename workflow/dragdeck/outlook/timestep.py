@@ -67,7 +67,7 @@ class PairOutlook:
     error: Expected
 
     def __str__(self) -> str:
-        outside = "" if self.error.measured else " (outside of the measured range)"
+        outside = "" if self.error.measured else " (outside the measured range)"
         return (
             f"{100 * self.rayleigh_fraction:.3g} % of the Rayleigh time ({self.limiting}), "
             f"{self.steps_per_contact:.3g} steps per contact at {self.speed_m_s:.3g} m/s, "

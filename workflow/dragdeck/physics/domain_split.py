@@ -160,13 +160,13 @@ def warnings(found: Split) -> list[Caution]:
     ranks, text = len(found.particles), ""
     if found.idle:
         text = (
-            f"{found.idle} of {ranks} ranks would have no particle, in a grid of "
-            f"{' x '.join(map(str, found.grid))}: take another number (fidelity.ranks)"
+            f"{found.idle} of {ranks} MPI ranks would have no particle, in a grid of "
+            f"{' x '.join(map(str, found.grid))}: use another number (fidelity.ranks)"
         )
     elif found.most_over_mean > _MOST_OVER_MEAN:
         text = (
-            f"the fullest of {ranks} ranks would have {found.most_over_mean:.2g} times the mean "
-            f"number of particles, more than {_MOST_OVER_MEAN:g}: a number with more factors "
+            f"the fullest of {ranks} MPI ranks would have {found.most_over_mean:.2g} times the "
+            f"mean number of particles, more than {_MOST_OVER_MEAN:g}: a number with more factors "
             "splits more evenly (fidelity.ranks)"
         )
     return [Caution("ranks", text, {"ranks": 1})] if text else []

@@ -16,7 +16,7 @@ squeezed out between others gets more."""
 
 @dataclass(frozen=True)
 class RunLimits:
-    """What no sample of a run may be beyond, and why.
+    """Limits that no sample of a run may exceed.
 
     Attributes
     ----------
@@ -26,6 +26,8 @@ class RunLimits:
         Of a particle, spin included.
     speed_m_s : float
         Of the fastest particle.
+    why : str
+        How the limits were derived.
     """
 
     n_particles: int

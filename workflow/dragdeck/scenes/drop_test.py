@@ -81,6 +81,7 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene[DropTe
         gravity_m_s2=study.gravity_m_s2,
         skin_m=radius,
         timestep_s=dt,
+        rayleigh_time_s=rayleigh,
         outputs=(outputs.impacts(),),
         plate_type=len(names),
         particle_radius_m=radius,
@@ -104,7 +105,7 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene[DropTe
         steps=round(_duration(study) / dt),
         files={"particle.data": lambda: _particle_data(study, len(names))},
         models={
-            "particle against plate": "the only contact there is",
+            "particle against plate": "the only contact",
             **_modulus(scale),
             "every step near an impact": "peak force and rebound are read from it",
         },
@@ -122,7 +123,7 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene[DropTe
 def _modulus(scale: float) -> dict[str, str]:
     if scale == 1.0:
         return {"full Young's modulus": "one particle is cheap at any stiffness"}
-    return {f"Young's modulus times {scale:g}": "as asked, to see what it changes"}
+    return {f"Young's modulus times {scale:g}": "as requested, to measure its effect"}
 
 
 def _slowest_contact_time(study: Study, scale: float = 1.0) -> float:

@@ -86,7 +86,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
     longest = study.filling.max_time_s
     types = _filling_types(study)
     deck = FillingDeck(
-        title=f"Fill: {study.title}",
+        title=f"Filling: {study.title}",
         study=case.study_name,
         scene="filling",
         run=FILLING.run_id(case),
@@ -96,6 +96,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         gravity_m_s2=study.gravity_m_s2,
         skin_m=skin(study),
         timestep_s=dt,
+        rayleigh_time_s=rayleigh,
         outputs=(outputs.thermo(check_steps, None), outputs.settled_particles()),
         thermo_steps=check_steps,
         checkpoint_steps=5 * check_steps,
@@ -123,16 +124,18 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
         steps=round(_expected_time(study, particles) / dt),
         files={"particles.data": lambda: _particles_data(particles, study, top, len(types))},
         models={
-            "every particle by name": "exactly the asked number, mean and spread of radii",
-            "rest by a criterion": f"kinetic energy below {study.filling.energy_ratio:g} m "
-            f"g d a particle",
-            "a step of its own": "particles in flight collide faster than a bed at rest",
+            "every particle individually": "exact number, mean and standard deviation of radii",
+            "settling by a criterion": f"kinetic energy below {study.filling.energy_ratio:g} m "
+            f"g d per particle",
+            "a separate time step": "falling particles collide faster than a packing at rest",
         },
         leaves_out={
-            "the workpiece": LeftOut("it comes later; cases that differ in it share this fill"),
-            "contact output": LeftOut("nobody reads contacts before the drag", "filling_contacts"),
+            "the workpiece": LeftOut("added later; cases with other workpieces share this filling"),
+            "contact output": LeftOut(
+                "contacts before the drag are not analysed", "filling_contacts"
+            ),
             "facets of the bowl": LeftOut(
-                "particles fall the same onto an exact plane and cylinder"
+                "particles settle in the same way on an exact plane and cylinder"
             ),
         },
         warnings=list(filling_cautions(case)),
@@ -170,13 +173,13 @@ def _check_capacity(case: Case) -> None:
     if height > bowl.height_m:
         most = math.floor(media.count * bowl.height_m / height)
         raise InputError(
-            "more particles than the bowl holds",
+            "more particles than fit into the bowl",
             file=case.file,
             field="media.count",
-            value=f"{media.count}, which stand at least {height:.4g} m high",
+            value=f"{media.count}, which fill it to at least {height:.4g} m",
             limit=f"{most} particles in a bowl {bowl.height_m:g} m high, at a solid fraction of "
             f"{DENSEST_RANDOM_PACKING} (random close packing)",
-            remedy="take fewer particles, or a wider or higher bowl",
+            remedy="use fewer particles, or a wider or higher bowl",
         )
 
 
@@ -251,12 +254,12 @@ def _overlap_caution(study: Study) -> Iterator[Caution]:
     if overlap <= MOST_OVERLAP * JUST_BEYOND:
         return
     stiffer = min(1.0, rounded(scale * (overlap / MOST_OVERLAP) ** 1.5, up=True))
-    remedy = f"take a fidelity.youngs_modulus_scale of at least {stiffer:g}"
+    remedy = f"use a fidelity.youngs_modulus_scale of at least {stiffer:g}"
     yield Caution(
         "overlap",
-        f"the weight of the bed presses particles at the floor {100 * overlap:.2g} % of a diameter "
-        f"into each other, more than {100 * MOST_OVERLAP:g} %: "
-        + (f"the bed is denser than a real one; {remedy}" if scale < 1 else "Hertz assumes less"),
+        f"the weight of the packing makes particles at the floor overlap by {100 * overlap:.2g} % "
+        f"of a diameter, more than {100 * MOST_OVERLAP:g} %: "
+        + (f"the packing is too dense; {remedy}" if scale < 1 else "too much for Hertz's theory"),
         {"youngs_modulus_scale": stiffer} if scale < 1 else {},
     )
 

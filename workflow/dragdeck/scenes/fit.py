@@ -155,7 +155,7 @@ def process_cautions(case: Case) -> Iterator[Caution]:
         yield Caution(
             "gap",
             f"the gap between workpiece and bowl is {gap:.2g} particle diameters, less than "
-            f"{_JAMMING_GAP:g}: particles can jam in it, with forces far beyond those of the bed",
+            f"{_JAMMING_GAP:g}: particles may jam there and cause very large forces",
         )
     fidelity = study.chosen_fidelity()
     surface = fidelity.speed_factor * fastest_surface(case)
@@ -166,7 +166,8 @@ def process_cautions(case: Case) -> Iterator[Caution]:
         yield Caution(
             "steps_per_contact",
             f"a contact at the workpiece's speed takes {steps:.1f} steps, fewer than "
-            f"{_FEWEST_STEPS_PER_CONTACT}: single impacts are not resolved",
+            f"{_FEWEST_STEPS_PER_CONTACT}: single impacts are not resolved; use a smaller "
+            "fidelity.timestep_fraction",
             {"timestep_fraction": rounded(shorter, up=False)},
         )
     # seen: 2 to 3 times the workpiece's speed, once 6 times; or the fall into a slow one's wake
@@ -188,8 +189,8 @@ def _beside(case: Case, gap: float) -> Iterator[InputError]:
             file=case.file,
             field="motion.path",
             value=f"axis up to {reach:.4g} m from the bowl's axis, workpiece radius {radius:.4g} m",
-            limit=f"together at most {study.bowl.radius_m - diameter:.4g} m: the bowl's radius "
-            "minus one particle",
+            limit=f"sum at most {study.bowl.radius_m - diameter:.4g} m: the bowl's radius "
+            "minus a particle diameter",
             remedy="use a smaller path or workpiece, or a wider bowl",
         )
 
@@ -198,12 +199,12 @@ def _below(case: Case, tip_m: float) -> Iterator[InputError]:
     depth, length = case.study.motion.immersion_depth_m, workpiece_length(case)
     if length < depth:
         yield InputError(
-            "the workpiece is shorter than its immersion: particles would close above it",
+            "the workpiece is shorter than its immersion depth: particles would cover it",
             file=case.file,
             field="motion.immersion_depth_m",
             value=depth,
             limit=f"at most the length of the workpiece, {length:.4g} m",
-            remedy="submerge the workpiece less, or model it with the shaft that holds it",
+            remedy="reduce the immersion depth, or include the shaft of the workpiece in its mesh",
         )
     largest = _largest_particle(case)
     if tip_m < largest:
@@ -214,9 +215,9 @@ def _below(case: Case, tip_m: float) -> Iterator[InputError]:
             file=case.file,
             field="motion.immersion_depth_m",
             value=depth,
-            limit=f"at most {depth + tip_m - largest:.4g} m: a bed {depth + tip_m:.4g} m high "
-            "minus one largest particle",
-            remedy="submerge the workpiece less, or fill in more particles",
+            limit=f"at most {depth + tip_m - largest:.4g} m: a packing {depth + tip_m:.4g} m "
+            "high minus the diameter of the largest particle",
+            remedy="reduce the immersion depth, or use more particles",
         )
 
 
@@ -234,7 +235,7 @@ def _up_and_down(case: Case, tip_m: float) -> Iterator[InputError]:
     moving += [name for name, one in motion.superposed().items() if one.vertical_reach_m]
     problems = (
         (depth <= deepest < depth - low, "takes the workpiece too deep", deepest - depth),
-        (high >= depth, "takes the workpiece out of the bed", depth),
+        (high >= depth, "takes the workpiece out of the packing", depth),
     )
     for wrong, problem, limit in problems:
         if moving and wrong:
@@ -245,7 +246,7 @@ def _up_and_down(case: Case, tip_m: float) -> Iterator[InputError]:
                 value=f"{-low:.4g} m below and {high:.4g} m above an immersion of {depth:.4g} m",
                 limit=f"below {limit:.4g} m: the tip stays at a depth between 0 and {deepest:.4g} "
                 "m, one largest particle above the floor and no deeper than the workpiece is long",
-                remedy="move it less up and down, or change motion.immersion_depth_m",
+                remedy="reduce the vertical motion, or change motion.immersion_depth_m",
             )
 
 
@@ -253,7 +254,7 @@ def _per_step(case: Case, timestep_s: float) -> Iterator[InputError]:
     moved, radius = fastest_motion(case) * timestep_s, smallest_radius(case.study)
     if moved >= radius:
         yield InputError(
-            "the workpiece crosses a particle's radius in one step: contacts would be missed",
+            "the workpiece moves by more than a particle radius per step: contacts would be missed",
             file=case.file,
             field="motion.path" if case.study.motion.speed_m_s is None else "motion.speed_m_s",
             value=f"{moved:.3g} m in a step of {timestep_s:.3g} s",
@@ -266,7 +267,7 @@ def _per_step(case: Case, timestep_s: float) -> Iterator[InputError]:
         radius = workpiece_radius(case)
         name = max(superposed, key=lambda name: superposed[name].surface_speed_m_s(radius))
         yield InputError(
-            "a surface point of the workpiece moves farther than the neighbour skin in one step",
+            "the surface of the workpiece moves by more than the neighbour skin per step",
             file=case.file,
             field=f"motion.{name}",
             value=f"{moved:.3g} m in a step of {timestep_s:.3g} s",
@@ -295,10 +296,10 @@ def check_headroom(case: Case, tip_m: float, top_m: float) -> None:
     longest = top_m - tip_m - 0.001
     if workpiece_length(case) > longest:
         raise InputError(
-            "the workpiece is longer than the simulation box above the bed",
+            "the workpiece is longer than the simulation box above the packing",
             file=case.file,
             field="workpiece.shape",
             value=f"length {workpiece_length(case):.4g} m",
             limit=f"at most {longest:.4g} m",
-            remedy="cut the mesh off higher up, or state a higher bowl (bowl.height_m)",
+            remedy="shorten the mesh at its upper end, or use a higher bowl (bowl.height_m)",
         )

@@ -109,6 +109,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     deck = ProcessDeck(
         title=study.title,
         study=whole.study_name,
+        case=whole.name,
         scene="process",
         run=PROCESS.run_id(whole),
         source=f"../../filling/{FILLING.run_id(whole)}/{PACKING_FILE}",
@@ -117,6 +118,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         gravity_m_s2=study.gravity_m_s2,
         skin_m=skin(study),
         timestep_s=dt,
+        rayleigh_time_s=bed_rayleigh_time(study),
         outputs=_outputs(periods, steps, [one.name for one in moved], facets),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, steps.end),
@@ -278,20 +280,20 @@ def _bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
 
 def _models(study: Study) -> dict[str, str]:
     optional, _ = explained(study.pairs.values())
-    exact, why = study.bowl_facet_size_m is None, "facets, as asked"
+    exact, why = study.bowl_facet_size_m is None, "facets, as requested"
     if study.motion.bowl_rad_s:
         why = "facets, whose surface moves with the rotation"
     bowl = "exact plane and cylinder" if exact else why
     return {
-        "particle-particle, particle-workpiece, particle-bowl": "all three carry the chains",
-        f"bowl: {bowl}": "its contacts end the chains, read from the force on each particle",
-        **{words: "as the study gives it" for words in optional},
-        "workpiece as facets": "the engine moves meshes only",
-        **{f"{name} of the workpiece": "as the study gives it" for name in superposed(study)},
+        "particle-particle, particle-workpiece, particle-bowl": "force chains run through all",
+        f"bowl: {bowl}": "force chains end there; the force on each particle gives its contacts",
+        **{words: "as given in the study" for words in optional},
+        "workpiece as facets": "LIGGGHTS moves meshes only",
+        **{f"{name} of the workpiece": "as given in the study" for name in superposed(study)},
         f"total force, {study.outputs.workpiece_force_hz:g} Hz": "drag, its spread and its peaks",
         f"workpiece contacts, "
-        f"{study.outputs.workpiece_contacts_hz:g} Hz": "few, so cheap at a high rate",
-        f"network and particles, {study.outputs.network_hz:g} Hz": "chains; positions serve both",
+        f"{study.outputs.workpiece_contacts_hz:g} Hz": "few contacts, so a high rate is cheap",
+        f"network and particles, {study.outputs.network_hz:g} Hz": "force chains and positions",
     }
 
 
@@ -300,20 +302,22 @@ def _leaves_out(study: Study) -> dict[str, LeftOut]:
     workpiece, network = study.outputs.workpiece_contacts_hz, study.outputs.network_hz
     found = {
         "positions, torques, areas of contacts": LeftOut(
-            "the particles of the same step have the positions; no report reads the rest",
+            "the particles of the same step have the positions; no report uses the rest",
             "contact_columns",
         ),
         "network during plunge and approach": LeftOut(
             "no statistic counts them", "network_before_drag"
         ),
-        "wear, stress and heat of the mesh": LeftOut("no report reads them"),
-        **{words: LeftOut("the study gives none") for words in absent},
+        "wear, stress and heat of the mesh": LeftOut("no report uses them"),
+        **{words: LeftOut("not given in the study") for words in absent},
     }
     if network < workpiece:
-        found[f"network at {workpiece:g} Hz"] = LeftOut("chains need no such rate", "network_rate")
+        found[f"network at {workpiece:g} Hz"] = LeftOut(
+            "force chains do not require this rate", "network_rate"
+        )
     if study.bowl_facet_size_m is None:
         found["facets of the bowl"] = LeftOut(
-            "slower, and no report asks for contacts per bowl facet", "bowl_facets"
+            "slower; no report uses contacts per facet of the bowl", "bowl_facets"
         )
     shape = study.workpiece.shape
     if isinstance(shape, CylinderShape) and shape.facet_length_m > shape.facet_size_m:

@@ -249,6 +249,7 @@ def material_table(study: Study, names: Sequence[str], scale: float, case: Case)
         youngs_moduli_pa=moduli,
         poissons_ratios=[material.poissons_ratio for material in materials],
         law=law,
+        youngs_modulus_scale=scale,
     )
 
 
@@ -257,10 +258,10 @@ def _check_modulus(name: str, modulus_pa: float, scale: float, case: Case) -> No
         return
     least = ENGINE_SOFTEST_PA / case.study.materials[name].youngs_modulus_pa
     raise InputError(
-        "LIGGGHTS refuses so soft a material",
+        "the Young's modulus is below the minimum of LIGGGHTS",
         file=case.file,
         field="fidelity.youngs_modulus_scale",
-        value=f"{scale:g}, which makes {name} {modulus_pa:.3g} Pa",
+        value=f"{scale:g}, which gives {modulus_pa:.3g} Pa for {name}",
         limit=f"at least {ENGINE_SOFTEST_PA:.0e} Pa, a scale of {least:.3g} for {name}",
         remedy="choose a larger scale",
     )

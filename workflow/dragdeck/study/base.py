@@ -25,7 +25,7 @@ _LONGEST_LINE = 300
 def _number(value: object) -> object:
     """Accept ``5e6``, which YAML 1.1 reads as text; refuse truth values, ``0300`` and ``1:30``."""
     if isinstance(value, bool):
-        raise ValueError("a truth value stands where a number belongs")
+        raise ValueError("a number is required, not true or false")
     if isinstance(value, str):
         if not DECIMAL.fullmatch(value):
             raise ValueError(f"{value!r} is text, not a number: write it as 300, 0.5 or 5e6")
@@ -50,7 +50,9 @@ def _name(text: str) -> str:
 
 def _material_name(text: str) -> str:
     if "-" in text:
-        raise ValueError("the name of a material has no '-', which joins a pair of them")
+        raise ValueError(
+            "the name of a material must not contain '-', which separates the materials of a pair"
+        )
     return _name(text)
 
 

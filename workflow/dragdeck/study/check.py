@@ -107,7 +107,10 @@ def _problem(issue: ErrorDetails) -> InputError:
     value: object = issue["input"]
     if kind == "extra_forbidden":
         hint = near(str(issue["loc"][-1]), _every_key())
-        problem, remedy = "unknown key", f"{hint}remove it, or see docs/study.md for its spelling"
+        problem, remedy = (
+            "unknown key",
+            f"{hint}remove it, or see docs/reference/study.md for its spelling",
+        )
     elif kind == "missing":
         problem, remedy, value = "a required key is missing", "add it", None
     if isinstance(value, Mapping | BaseModel):

@@ -45,13 +45,21 @@ def _pairs(study: Study) -> _Found:
     every = ["-".join(both) for both in product(study.materials, repeat=2)]
     for key, pair in study.pairs.items():
         back = "-".join(key.split("-")[::-1])
-        yield from _known(f"pairs.{key}", key, every, "no pair of two materials:")
+        yield from _known(f"pairs.{key}", key, every, "not a pair of two materials:")
         if key < back and study.pairs.get(back, pair) != pair:
-            yield f"pairs.{back}", f"differs from {key}, which is the same pair", "one of them"
+            yield (
+                f"pairs.{back}",
+                f"differs from {key}, which is the same pair",
+                "one entry per pair",
+            )
     for other in study.type_names():
         key, back = f"{study.media.material}-{other}", f"{other}-{study.media.material}"
         if key in every and not {key, back} & set(study.pairs):
-            yield "pairs", f"has no entry {key!r}, and these two will touch", "all that touch"
+            yield (
+                "pairs",
+                f"has no entry {key!r}, although these come into contact",
+                "every pair in contact",
+            )
 
 
 def _shape(study: Study) -> _Found:
@@ -61,7 +69,7 @@ def _shape(study: Study) -> _Found:
     size, edge = shape.facet_size_m, shape.edge_facet_size_m
     if shape.file.lower().endswith((".step", ".stp")):
         if size is None:
-            problem = f"{shape.file} is meshed here, and the size of the facets is missing"
+            problem = f"{shape.file} is meshed by dragdeck, but the facet size is missing"
             yield f"{field}.facet_size_m", problem, "a target edge length, such as 0.0015"
         elif edge is not None and edge > size:
             problem = "the facets at edges are larger than the others"
@@ -91,14 +99,14 @@ def _motion(study: Study) -> _Found:
 def _sweep(study: Study) -> _Found:
     for field, values in study.sweep.items():
         if not all(field.split(".")):
-            yield "sweep", f"{field!r} is no field", "a dotted name, such as motion.speed_m_s"
+            yield "sweep", f"{field!r} is not a field", "a dotted name, such as motion.speed_m_s"
         if not values:
             yield f"sweep.{field}", "no values", "one value or more"
         if field.split(".")[0] in _NO_SWEEP:
             yield f"sweep.{field}", "no run depends on it", "a field that the runs depend on"
     count, most = math.prod(map(len, study.sweep.values())), study.accepted.cases
     if count > most:
-        limit = f"{most}; if you mean it, set accepted.cases: {count}"
+        limit = f"{most}; if this is intended, set accepted.cases: {count}"
         yield "sweep", f"makes {count} cases, more than are accepted", limit
     if study.scaling is not None:
         yield from _scaling(study.scaling, study)
@@ -111,7 +119,7 @@ def _scaling(scaling: Scaling, study: Study) -> _Found:
         yield "scaling.field", f"{field} is not a field of sweep", choices(field, others)
         return
     if len(others) > 1:
-        problem = "another field varies too, so that the drag is no function of one"
+        problem = "scaling requires a sweep over exactly one field, besides seed"
         yield "sweep", problem, f"{field} and seed"
     levels = [_level(value) for value in study.sweep[field]]
     low, high = scaling.fit_range or (0.0, math.inf)

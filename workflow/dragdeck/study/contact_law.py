@@ -46,7 +46,7 @@ class Coefficient:
 
 
 class Pair(Model):
-    """What two materials do to each other.
+    """The contact coefficients of two materials.
 
     A coefficient with a default is absent at its default: it is then no part of the contact
     model, of the input script, or of a run's name.

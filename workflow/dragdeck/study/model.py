@@ -1,7 +1,7 @@
-"""The study file: what a user may say, in which unit, within which limits.
+"""The study file: fields, units and limits.
 
-A study is plain data. Nothing here knows of the engine's syntax, of files other
-than the study itself, or of how a scene is run.
+A study is plain data, independent of the syntax of LIGGGHTS, of other files and of how a scene is
+run.
 """
 
 import math
@@ -49,9 +49,9 @@ Ranks = Annotated[
 
 
 class Media(Model):
-    """The particles."""
+    """The media: spherical particles."""
 
-    material: str = Field(description="name of an entry of materials")
+    material: str = Field(description="material of the particles: a name under `materials`")
     count: Annotated[Whole, Field(ge=1)] = Field(description="number of particles")
     radius_mean_m: Positive = Field(description="mean particle radius, m")
     radius_std_m: NonNegative = Field(
@@ -63,7 +63,7 @@ class Media(Model):
         if self.radius_std_m > 0.3 * self.radius_mean_m:
             raise ValueError(
                 f"radius_std_m {self.radius_std_m} exceeds 0.3 of radius_mean_m "
-                f"{self.radius_mean_m}: the smallest particles would vanish"
+                f"{self.radius_mean_m}: the smallest radii would approach zero"
             )
         return self
 
@@ -71,9 +71,9 @@ class Media(Model):
 class Bowl(Model):
     """A flat-bottomed cylindrical bowl about the z axis, floor at z = 0."""
 
-    material: str = Field(description="name of an entry of materials")
-    radius_m: Positive = Field(description="inner radius, m")
-    height_m: Positive = Field(description="inner height from the floor to the rim, m")
+    material: str = Field(description="material of the bowl: a name under `materials`")
+    radius_m: Positive = Field(description="inner radius of the bowl, m")
+    height_m: Positive = Field(description="inner height of the bowl from floor to rim, m")
     facet_size_m: Positive | None = Field(
         default=None,
         description="edge length of the bowl's mesh elements, m; none: analytical walls, or a "
@@ -116,7 +116,7 @@ else:
 
 
 class Motion(Superposed):
-    """How the workpiece goes in and where it goes."""
+    """Immersion and path of the workpiece."""
 
     path: Annotated[AnyPath, Field(discriminator="kind")]
     speed_m_s: Positive | None = Field(
@@ -139,9 +139,11 @@ class Motion(Superposed):
         description="x and y at which the workpiece is immersed, m; none: the bowl's axis for a "
         "circle, else the start of the path",
     )
-    plunge_speed_m_s: Positive = Field(default=0.05, description="plunge speed, m/s")
+    plunge_speed_m_s: Positive = Field(
+        default=0.05, description="vertical speed of the workpiece during the plunge, m/s"
+    )
     approach_speed_m_s: Positive = Field(
-        default=0.02, description="speed from the plunge position to the path, m/s"
+        default=0.02, description="speed of the workpiece from the plunge position to the path, m/s"
     )
     transient_m: NonNegative = Field(
         description="initial path length excluded from all statistics, m"
@@ -155,7 +157,9 @@ class Motion(Superposed):
     @model_validator(mode="after")
     def _path(self) -> "Motion":
         if self.counted_from_revolution is not None and self.path.revolution_m is None:
-            raise ValueError("counted_from_revolution is for circles: this path has no revolutions")
+            raise ValueError(
+                "counted_from_revolution applies to circles only: this path has no revolutions"
+            )
         if self.path.turning and self.spin is not None:
             raise ValueError("spin and waypoints that turn cannot be combined: remove one of them")
         if self.tilt_deg and (self.spin is not None or self.path.turning):
@@ -228,12 +232,14 @@ class Motion(Superposed):
 class DropTest(Model):
     """The drop test: one mean particle on a plate of the workpiece's material."""
 
-    height_m: Positive = Field(default=0.010, description="free height below the particle, m")
+    height_m: Positive = Field(
+        default=0.010, description="drop height: gap between particle and plate at the start, m"
+    )
     impacts: Annotated[Whole, Field(ge=1, le=20)] = Field(
-        default=3, description="number of impacts"
+        default=3, description="number of impacts that the drop test simulates"
     )
     timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=0.02, description="time step as a fraction of the Rayleigh time"
+        default=0.02, description="time step of the drop test as a fraction of the Rayleigh time"
     )
 
 
@@ -241,23 +247,24 @@ class Calibration(Model):
     """A measured drop test, to find the restitution of particle on workpiece material."""
 
     record: Line = Field(
-        pattern=r"^[^{}]*$", description="CSV of force against time; relative to the study's folder"
+        pattern=r"^[^{}]*$", description="CSV file of force against time; relative to the study"
     )
     height_std_m: Positive = Field(
         default=1e-4, description="standard uncertainty of drop_test.height_m in the test, m"
     )
     peaks: Literal["auto", "yes", "no"] = Field(
         default="auto",
-        description="also fit the ratios of the peak forces; auto: if the sensor is fast enough",
+        description="whether to fit the ratios of the peak forces too; auto: if the "
+        "sensor is fast enough",
     )
 
 
 class Filling(Model):
-    """When a bed counts as settled."""
+    """When a packing counts as settled."""
 
     energy_ratio: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=1e-5,
-        description="settling criterion: mean kinetic energy per particle / (m g d)",
+        description="settling criterion: largest mean kinetic energy per particle / (m g d)",
     )
     max_time_s: Positive = Field(
         default=10.0,
@@ -266,10 +273,10 @@ class Filling(Model):
 
 
 class Outputs(Model):
-    """How often a process run writes; every rate is a lower bound, in process time."""
+    """Sampling rates of a process run; each is a lower bound, in process time."""
 
     workpiece_force_hz: Positive = Field(
-        default=1000.0, description="minimum sampling rate of total force and torque, Hz"
+        default=1000.0, description="minimum sampling rate of force and torque on the workpiece, Hz"
     )
     workpiece_contacts_hz: Positive = Field(
         default=200.0, description="minimum sampling rate of the contacts on the workpiece, Hz"
@@ -278,25 +285,24 @@ class Outputs(Model):
         default=20.0, description="minimum sampling rate of all contacts and particles, Hz"
     )
     n_checkpoints: Annotated[Whole, Field(ge=0, le=1000)] = Field(
-        default=50, description="number of restart points per run"
+        default=50, description="number of checkpoints of a run, from which it can be resumed"
     )
 
     @model_validator(mode="after")
     def _order(self) -> "Outputs":
         if not self.workpiece_force_hz >= self.workpiece_contacts_hz >= self.network_hz:
             raise ValueError(
-                "rates must fall from workpiece_force_hz over workpiece_contacts_hz to "
-                "network_hz, because "
-                "each frame of a slower output is compared with one of the faster"
+                "the rates must not increase from workpiece_force_hz to workpiece_contacts_hz to "
+                "network_hz: each frame of a slower output is compared with one of a faster output"
             )
         return self
 
 
 class Fidelity(Model):
-    """What a user trades between speed and accuracy."""
+    """Settings for speed and accuracy."""
 
     youngs_modulus_scale: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=1.0, description="multiplier of every Young's modulus"
+        default=1.0, description="multiplier of every Young's modulus; 1: physical stiffness"
     )
     timestep_fraction: Annotated[Number, Field(gt=0, le=2)] = Field(
         default=0.2, description="time step of the process as a fraction of the Rayleigh time"
@@ -305,13 +311,15 @@ class Fidelity(Model):
         default=0.25, description="time step of the filling as a fraction of the Rayleigh time"
     )
     speed_factor: Annotated[Number, Field(ge=1, le=100)] = Field(
-        default=1.0, description="multiplier of the speed of the workpiece"
+        default=1.0, description="multiplier of the speed of the workpiece; 1: real speed"
     )
     skin_m: Positive | None = Field(
-        default=None, description="neighbour skin, m; none: 0.1 of the mean particle radius"
+        default=None, description="neighbour skin, m; none: 10 % of the mean particle radius"
     )
     ranks: Ranks = Field(
-        default=2, description="MPI ranks; auto: from particles, cases and cores (docs/big.md)"
+        default=2,
+        description="number of MPI ranks; auto: chosen from particles, cases and cores "
+        "(docs/howto/scale_up.md)",
     )
 
 
@@ -335,11 +343,11 @@ Quantity = Literal[
     "path_bottleneck",
     "restitution",
 ]
-"""What a tolerance can be about; docs/tradeoff.md defines each."""
+"""Quantities to which a tolerance can apply; docs/evidence/tradeoff.md defines each."""
 
 
 class Tolerance(Model):
-    """An error to stay within, instead of settings; the advisor finds them."""
+    """A tolerance instead of settings; the advisor selects settings that meet it."""
 
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
         description="largest relative error caused by the settings"
@@ -365,25 +373,28 @@ AnyFidelity = Annotated[
 
 
 class Scaling(Model):
-    """A power law to look for in the mean drag over the levels of one sweep field."""
+    """A power law of the mean drag as a function of one sweep field."""
 
-    field: str = Field(description="dotted name of a field of sweep; its levels must be above 0")
+    field: str = Field(
+        description="dotted name of the `sweep` field of the power law; its values must be above 0"
+    )
     expected_exponent: Number | None = Field(
-        default=None, description="exponent with which the fitted one is compared"
+        default=None, description="exponent with which the fitted exponent is compared"
     )
     source: str | None = Field(default=None, description="source of the expected exponent")
     fit_range: tuple[Positive, Positive] | None = Field(
         default=None,
-        description="lowest and highest level at which the exponent is expected; none: all levels",
+        description="lowest and highest value at which the exponent is expected; none: all",
     )
 
     @model_validator(mode="after")
     def _order(self) -> "Scaling":
         if self.field == "seed":
-            raise ValueError("the seed is no field to fit a power law over")
+            raise ValueError("a power law cannot be fitted as a function of the seed")
         if self.fit_range is not None and self.fit_range[0] >= self.fit_range[1]:
             raise ValueError(
-                f"fit_range goes from {self.fit_range[0]:g} to {self.fit_range[1]:g}: not up"
+                f"fit_range must increase, but goes from {self.fit_range[0]:g} to "
+                f"{self.fit_range[1]:g}"
             )
         return self
 
@@ -400,16 +411,18 @@ BUILT_IN_FIDELITIES: Mapping[str, Fidelity] = {
 class Study(Model):
     """A whole study file."""
 
-    title: Line = Field(description="title in one line, for headings")
+    title: Line = Field(description="title of the study in one line, used in headings")
     licence: Line | None = Field(
         default=None,
         description="licence under which the results may be used, as an SPDX name or an address; "
         "the RO-Crate states it",
     )
-    gravity_m_s2: Positive = Field(default=9.81, description="gravity along -z, m/s2")
+    gravity_m_s2: Positive = Field(
+        default=9.81, description="gravitational acceleration along -z, m/s2"
+    )
     materials: dict[MaterialName, Material]
     pairs: dict[str, Pair] = Field(
-        description="'a-b': coefficients of the contact of materials a and b"
+        description="'a-b': contact coefficients of the materials a and b"
     )
     media: Media
     bowl: Bowl
@@ -423,7 +436,7 @@ class Study(Model):
     outputs: Outputs = Outputs()
     fidelity: AnyFidelity = Field(
         default="standard",
-        description="name of a fidelity, or settings, or a tolerance that selects settings",
+        description="settings for speed and accuracy: a name, a block, or a tolerance to meet",
     )
     fidelities: dict[Name, Fidelity] = Field(default_factory=dict)
     seed: Annotated[Whole, Field(ge=0, lt=2**32)] = Field(
@@ -432,7 +445,7 @@ class Study(Model):
     )
     sweep: dict[str, list[Any]] = Field(
         default_factory=dict,
-        description="dotted field: list of values; every combination is a case",
+        description="dotted field name: list of values; every combination is a case",
     )
     scaling: Scaling | None = None
     accepted: Accepted = Accepted()
@@ -476,7 +489,7 @@ class Study(Model):
         return list(dict.fromkeys(owner.material for owner in owners))
 
     def pair(self, first: str, second: str) -> Pair:
-        """What two materials do to each other.
+        """The contact coefficients of two materials.
 
         Raises
         ------
@@ -486,7 +499,7 @@ class Study(Model):
         for key in (f"{first}-{second}", f"{second}-{first}"):
             if key in self.pairs:
                 return self.pairs[key]
-        raise ValueError(f"pairs has no entry '{first}-{second}', and these two will touch")
+        raise ValueError(f"pairs has no entry '{first}-{second}', although these come into contact")
 
     @property
     def bowl_facet_size_m(self) -> float | None:

@@ -8,15 +8,17 @@ from dragdeck.study.base import Model, NonNegative, Number
 class Drag(Model):
     """A published drag force along the motion; negative: against it."""
 
-    drag_mean_n: Number = Field(description="mean drag, N; negative: against the motion")
+    drag_mean_n: Number = Field(
+        description="published mean drag force, N; negative: opposes the motion"
+    )
     drag_std_n: NonNegative | None = Field(
-        default=None, description="standard deviation over time, N"
+        default=None, description="published standard deviation of the drag force over time, N"
     )
 
 
 class Reference(Model):
     """Published figures to stand beside the results."""
 
-    source: str = Field(description="source of the figures")
-    experiment: Drag | None = Field(default=None, description="measured values")
-    simulation: Drag | None = Field(default=None, description="simulated values")
+    source: str = Field(description="publication from which the values are taken")
+    experiment: Drag | None = Field(default=None, description="values measured in an experiment")
+    simulation: Drag | None = Field(default=None, description="values simulated by others")

@@ -10,7 +10,7 @@ from dragdeck.study.base import Line, Model, Whole
 class Assumption(Model):
     """A value that the source of the study does not give."""
 
-    field: str = Field(description="dotted name of the assumed value")
+    field: str = Field(description="dotted name of the field whose value is assumed")
     why: str = Field(description="what the source reports, and the reason for the value")
 
 
@@ -23,5 +23,5 @@ class Accepted(Model):
         "for accepting its run; shown among assumptions and acceptance checks of the report",
     )
     cases: Annotated[Whole, Field(ge=1)] = Field(
-        default=200, description="largest number of cases that sweep may have"
+        default=200, description="largest accepted number of cases of `sweep`"
     )

@@ -11,18 +11,30 @@ from dragdeck.study.base import Line, Model, Number, Positive, Whole
 class CylinderShape(Model):
     """A generated round workpiece with flat ends."""
 
-    kind: Literal["cylinder"] = Field(description="a generated cylinder")
-    radius_m: Positive = Field(description="radius, m")
-    facet_size_m: Positive = Field(default=0.0015, description="mesh size around the axis, m")
-    facet_length_m: Positive = Field(default=0.01, description="mesh size along the axis, m")
+    kind: Literal["cylinder"] = Field(
+        description="cylinder: dragdeck generates the mesh of a cylinder"
+    )
+    radius_m: Positive = Field(description="radius of the cylinder, m")
+    facet_size_m: Positive = Field(
+        default=0.0015, description="mesh size of the cylinder around its axis, m"
+    )
+    facet_length_m: Positive = Field(
+        default=0.01, description="mesh size of the cylinder along its axis, m"
+    )
 
 
 class MeshShape(Model):
     """A workpiece from a mesh or CAD file, turned upright, its lowest point the tip."""
 
-    kind: Literal["mesh"] = Field(description="a mesh from a file")
-    file: Line = Field(description="STL, OBJ, PLY, VTK, STEP; relative to the study or to meshes/")
-    unit: Literal["m", "cm", "mm", "um", "in"] = Field(description="unit of the file's numbers")
+    kind: Literal["mesh"] = Field(description="mesh: the workpiece is read from a file")
+    file: Line = Field(
+        description="mesh file in STL, OBJ, PLY, VTK or STEP format; its "
+        "path is relative to the study "
+        "or to meshes/"
+    )
+    unit: Literal["m", "cm", "mm", "um", "in"] = Field(
+        description="unit of length in the mesh file"
+    )
     facet_size_m: Positive | None = Field(
         default=None,
         description="target edge length of the mesh of a STEP part, m; required for STEP and for "
@@ -30,17 +42,19 @@ class MeshShape(Model):
     )
     edge_facet_size_m: Positive | None = Field(
         default=None,
-        description="the same at sharp edges of a STEP part, m; none: as everywhere",
+        description="target edge length of the mesh at sharp edges of a STEP part, m; none: "
+        "`facet_size_m`",
     )
     axis: Literal["+x", "-x", "+y", "-y", "+z", "-z"] = Field(
         default="+z",
         exclude_if=lambda value: value == "+z",
-        description="direction in the file of the clamping axis, from the tip to the clamp; it is "
-        "turned upright, x about y and all others about x",
+        description="direction of the clamping axis in the mesh file, from tip to clamp; "
+        "the mesh is "
+        "turned until this axis is vertical, about y for x, about x for the others",
     )
     offset_m: tuple[Number, Number] | None = Field(
         default=None,
-        description="x and y of the clamping axis in the file, turned upright, m; none: the middle "
+        description="x and y of the clamping axis in the file after this turn, m; none: the centre "
         "of the bounding box",
     )
 
@@ -51,7 +65,7 @@ Shape = Annotated[CylinderShape | MeshShape, Field(discriminator="kind")]
 class Workpiece(Model):
     """The workpiece that is dragged."""
 
-    material: str = Field(description="name of an entry of materials")
+    material: str = Field(description="material of the workpiece: a name under `materials`")
     shape: Shape
 
 

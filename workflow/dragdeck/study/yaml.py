@@ -23,7 +23,7 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         """A node of the file, if it stands there itself."""
         if self.check_event(yaml.AliasEvent):
-            problem, events = "aliases are not read; write the value again", cast(Any, self)
+            problem, events = "aliases are not supported; repeat the value", cast(Any, self)
             raise yaml.composer.ComposerError(None, None, problem, events.peek_event().start_mark)
         return super().compose_node(parent, index)
 
@@ -43,7 +43,7 @@ def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
 def _refused(_: _Loader, node: yaml.Node) -> None:
     kind = node.tag.rpartition(":")[2]
     raise yaml.constructor.ConstructorError(
-        None, None, f"a {kind} is no plain value; put text in quotes", node.start_mark
+        None, None, f"a {kind} is not a plain value; put text in quotes", node.start_mark
     )
 
 
@@ -94,7 +94,9 @@ def read_yaml(file: Path) -> dict[str, Any]:
     except (yaml.YAMLError, ValueError, TypeError) as error:
         raise InputError(f"not YAML of plain values: {error}", file=file) from None
     if not isinstance(data, dict):
-        raise InputError("a study is a mapping of fields", file=file, value=type(data).__name__)
+        raise InputError(
+            "a study must be a mapping of fields", file=file, value=type(data).__name__
+        )
     return data
 
 

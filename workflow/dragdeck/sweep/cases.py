@@ -117,7 +117,7 @@ def settle_case(
             field="fidelity.tolerance",
             value=study.fidelity.tolerance,
             limit="the name of a fidelity, or its settings",
-            remedy="take the settings that dragdeck advise shows for it",
+            remedy="use the settings that dragdeck advise shows for it",
         )
     return resolve(case, study.fidelity)
 
@@ -137,16 +137,16 @@ def study_file(studies: Path, name: str) -> Path:
             f"unknown study {name!a}",
             file=studies,
             limit=choices(name, filter(NAME.fullmatch, known)),
-            remedy=f"choose one of these, or make a folder; its name has {NAME_LIMIT}",
+            remedy=f"choose one of these, or create a folder; its name has {NAME_LIMIT}",
         )
     return file
 
 
 _NEW_STUDY = """\
-# States only what differs from {base}; docs/study.md lists every field.
+# Only the fields that differ from {base}; docs/reference/study.md lists all fields.
 title: {name}
 extends: {base}
-reference: null  # values to compare with, if there are any
+reference: null  # measured or published values to compare with, if any
 
 # fidelity: {{tolerance: 0.1}}
 # motion: {{speed_m_s: 0.02}}
@@ -166,7 +166,9 @@ def new_study(studies: Path, name: str, base: str) -> Path:
     folder = studies / name
     if not NAME.fullmatch(name) or folder.exists():
         raise InputError(
-            "a study has that name already" if folder.exists() else "no name for a study",
+            "a study has that name already"
+            if folder.exists()
+            else "this name cannot be used for a study",
             file=studies,
             value=name,
             limit=f"a name has {NAME_LIMIT}",
@@ -190,7 +192,7 @@ def _set(data: dict[str, Any], field: str, value: Any, file: Path) -> None:
         place = place.setdefault(name, {})
         if not isinstance(place, dict):
             raise InputError(
-                "leads through a value",
+                "the field would lie below a single value",
                 file=file,
                 field=field,
                 remedy="give the dotted name of one field",

@@ -31,39 +31,52 @@ Settings = Mapping[str, Any]
 class Block(Model):
     """Points that belong together: every combination of the values that vary."""
 
-    vary: dict[str, list[Any]] = Field(description="dotted field: values")
+    vary: dict[str, list[Any]] = Field(
+        description="dotted field name: list of values; every combination is a design point"
+    )
     one_by_one: dict[str, list[Any]] = Field(
         default_factory=dict,
-        description="dotted field: values; each of them goes with every combination above, and "
-        "never two at once",
+        description="dotted field name: list of values that are varied one at a time, at every "
+        "combination of `vary`",
     )
     seeds: Annotated[Whole, Field(ge=1)] | None = Field(
         default=None,
-        description="how many, from the study's or scene's own on; none: as the plan says",
+        description="number of seeds per point, starting with that of the study or scene; "
+        "none: that "
+        "of the plan",
     )
     arc: Positive | None = Field(
-        default=None, description="share of the study's path; none: as the plan says"
+        default=None,
+        description="fraction of the study's path that is dragged; none: that of the plan",
     )
 
 
 class Plan(Model):
-    """What a trade runs."""
+    """The design points of a trade-off."""
 
-    base: dict[str, Any] = Field(description="dotted field: its value where no point says other")
-    reference: Block = Field(description="what errors are measured against; one point")
-    arc: Positive = Field(default=1.0, description="share of the study's path that is dragged")
-    seeds: Annotated[Whole, Field(ge=1)] = Field(default=2, description="beds a point is run on")
+    base: dict[str, Any] = Field(
+        description="dotted field name: value at all points that do not set it"
+    )
+    reference: Block = Field(
+        description="reference settings, to which errors are relative; a single point"
+    )
+    arc: Positive = Field(default=1.0, description="fraction of the study's path that is dragged")
+    seeds: Annotated[Whole, Field(ge=1)] = Field(
+        default=2, description="number of seeds (packings) per point"
+    )
     points: list[Block] = Field(default_factory=list)
     scenes: dict[str, dict[str, Any]] = Field(
         default={"as it is": {}},
-        description="name: dotted fields and values that change the study, a seed to begin with "
-        "among them; every point is run in each of them",
+        description="name of a scene: dotted field names and values that change the "
+        "study, among them "
+        "the first seed; every point is run in every scene",
     )
     cost_rounds: Annotated[Whole, Field(ge=0)] = Field(
-        default=3, description="rounds of timing what decks leave out; 0: not at all"
+        default=3, description="rounds in which optional features are timed; 0: none"
     )
     drop_test: dict[str, list[Any]] = Field(
-        default_factory=dict, description="dotted field: values, one after the other, in the drop"
+        default_factory=dict,
+        description="dotted field name: values that are varied one at a time in the drop test",
     )
 
 
@@ -124,7 +137,9 @@ def plan_points(plan: Plan, plan_file: Path, base: Case, resolve: Resolve | None
         A point names no field of a study, or one beyond its limits.
     """
     if _size(plan.reference) != 1:
-        raise InputError("the reference is one point", file=plan_file, field="reference.vary")
+        raise InputError(
+            "the reference must be a single point", file=plan_file, field="reference.vary"
+        )
     blocks = [plan.reference, *plan.points]
     found: dict[str, Case] = {}
     for scene, block in itertools.product(plan.scenes.values(), blocks):

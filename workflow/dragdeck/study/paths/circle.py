@@ -22,16 +22,19 @@ class CirclePath(AroundBowl, Model):
 
     part: ClassVar[type[PathOfRun]] = CircleOfRun
 
-    kind: Literal["circle"] = Field(description="a circle about the bowl's axis")
+    kind: Literal["circle"] = Field(
+        description="circle: the path is a circle about the bowl's axis"
+    )
     radius_m: Positive = Field(description="radius of the path of the workpiece's axis, m")
     start_deg: Number = Field(
         default=0.0,
-        description="angle of the start about the bowl's axis from +x, degrees",
+        description="polar angle of the start of the path about the bowl's axis, from +x, degrees",
         exclude_if=lambda value: value == 0,
     )
-    revolutions: Positive = Field(default=1.0, description="path length, revolutions")
+    revolutions: Positive = Field(default=1.0, description="length of the path in revolutions")
     direction: Literal["ccw", "cw"] = Field(
-        default="ccw", description="direction seen from above: ccw (counter-clockwise) or cw"
+        default="ccw",
+        description="direction of motion seen from above: ccw (counter-clockwise) or cw",
     )
 
     @property

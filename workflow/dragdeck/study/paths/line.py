@@ -31,9 +31,13 @@ class LinePath(WorkpiecePath, Model):
     part: ClassVar[type[PathOfRun]] = LineOfRun
     length_field: ClassVar[str] = "length_m"
 
-    kind: Literal["line"] = Field(description="a straight line")
-    start_m: tuple[Number, Number] = Field(description="x and y at the start of the drag, m")
-    direction_deg: Number = Field(default=0.0, description="direction of motion from +x, degrees")
+    kind: Literal["line"] = Field(description="line: the path is a straight line")
+    start_m: tuple[Number, Number] = Field(
+        description="x and y of the workpiece's axis at the start of the drag, m"
+    )
+    direction_deg: Number = Field(
+        default=0.0, description="angle of the direction of motion from +x, degrees"
+    )
     length_m: Positive = Field(description="length of the drag, m")
 
     @property

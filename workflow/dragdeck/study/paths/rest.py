@@ -25,18 +25,22 @@ class RestPath(AroundBowl, Model):
 
     part: ClassVar[type[PathOfRun]] = RestOfRun
 
-    kind: Literal["rest"] = Field(description="the workpiece stands still and the bowl rotates")
-    radius_m: Positive = Field(description="distance of the workpiece's axis from the bowl's, m")
+    kind: Literal["rest"] = Field(
+        description="rest: the workpiece stands still and the bowl rotates"
+    )
+    radius_m: Positive = Field(description="distance between the axes of workpiece and bowl, m")
     bowl_rpm: Number = Field(
         description="rotational speed of the bowl, 1/min; positive: counter-clockwise seen from "
         "above"
     )
     start_deg: Number = Field(
         default=0.0,
-        description="angle of the start about the bowl's axis from +x, degrees",
+        description="polar angle of the start of the path about the bowl's axis, from +x, degrees",
         exclude_if=lambda value: value == 0,
     )
-    revolutions: Positive = Field(default=1.0, description="revolutions of the bowl")
+    revolutions: Positive = Field(
+        default=1.0, description="length of the drag in revolutions of the bowl"
+    )
 
     @field_validator("bowl_rpm")
     @classmethod

@@ -46,23 +46,25 @@ class WaypointsPath(WorkpiecePath, Model):
     length_field: ClassVar[str] = "fraction"
 
     kind: Literal["waypoints"] = Field(
-        description="a recorded path, straight between waypoints, at its own speed; lengths count "
-        "at its mean speed. The workpiece turns as the waypoints say, whatever `orientation` says"
+        description="waypoints: a recorded path, straight between waypoints, at its own speed. "
+        "Lengths along the path refer to its mean speed. The waypoints also define the rotation of "
+        "the workpiece; `orientation` has no effect"
     )
     file: Line | None = Field(
         default=None,
-        description="CSV file with the columns time_s, x_m, y_m and optionally z_m and turn_deg, "
-        "beside the study; either this or `points`",
+        description="CSV file with the columns time_s, x_m, y_m and optionally z_m and turn_deg; "
+        "relative to the study; either this or `points`",
     )
     points: Annotated[list[Waypoint], Field(min_length=2, max_length=MOST_POINTS)] = Field(
         default_factory=list,
-        description="2 to 100 waypoints [time, x, y, z, turn]: time, s; place of the workpiece's "
-        "axis, m; height of the tip above the immersion depth, m, 0 if absent; turn about the "
-        "vertical, degrees, positive: counter-clockwise, 0 if absent, of which only differences "
-        "count. Equal places are a pause",
+        description="2 to 100 waypoints [time, x, y, z, turn]: time, s; position of the "
+        "workpiece's "
+        "axis, m; height of the tip above the immersion depth, m (default 0); angle about the "
+        "vertical, degrees, positive: counter-clockwise (default 0; only differences matter). "
+        "Equal positions are a pause",
     )
     fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=1.0, description="fraction of the path's time that is driven, from its start"
+        default=1.0, description="fraction of the recorded time that is simulated, from its start"
     )
 
     @field_validator("points")

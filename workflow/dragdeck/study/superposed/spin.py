@@ -63,8 +63,7 @@ class Spin(SuperposedMotion, Model):
             if after.until_s <= before.until_s:
                 raise ValueError(
                     f"schedule.{number}.until_s is {after.until_s:g}, not above the "
-                    f"{before.until_s:g} of the entry before: put the entries in the order of "
-                    "their times"
+                    f"{before.until_s:g} of the previous entry: sort the entries by time"
                 )
         return self
 
