@@ -30,7 +30,6 @@ from machine import machine
 
 PACKAGES = ("numpy", "numba", "scipy", "pandas")
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "benchmarks" / "chains.md"
 FRAME = ROOT / "tests" / "dragchain" / "data" / "real_frame"
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
 
@@ -330,8 +329,6 @@ def report(run: Path | None, rounds: int, largest: int) -> None:
     source = "the frame of the tests" if run is None else "a frame of a run"
     output = "\n\n".join([f"{machine(*PACKAGES)}. {rounds} rounds, {source}.", *tables])
     print(output)
-    before, mark, _ = PAGE.read_text().partition("<!-- output -->\n")
-    PAGE.write_text(f"{before}{mark}\n{output}\n")
 
 
 def main() -> None:

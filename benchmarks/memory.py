@@ -31,7 +31,6 @@ from machine import machine
 from reading import PACKAGES, peak_bytes
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "benchmarks" / "memory.md"
 MORE_BYTES = 500e6
 """The process time is given for which a command needs this much more."""
 
@@ -272,8 +271,6 @@ def main() -> None:
     head = f"{machine(*PACKAGES)}. {case['media']['count']} particles; {rates(options.run, drag)}."
     output = f"{head}\n\n{table(found, drag)}"
     print(output)
-    before, mark, _ = PAGE.read_text().partition("<!-- output -->\n")
-    PAGE.write_text(f"{before}{mark}\n{output}\n")
 
 
 if __name__ == "__main__":

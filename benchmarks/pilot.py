@@ -44,7 +44,6 @@ from dragdeck.study.yaml import read_study
 from dragdeck.sweep.cases import settle_case
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "benchmarks" / "pilot.md"
 TIMED = ROOT / "benchmarks" / "results" / "pilot"
 STUDY = "pilot"
 SMALL_BOWL_M = 0.040
@@ -361,8 +360,6 @@ def main() -> None:
         ]
     output = "\n\n".join(parts)
     print(output)
-    before, mark, _ = PAGE.read_text().partition("<!-- output -->\n")
-    PAGE.write_text(f"{before}{mark}\n{output}\n")
 
 
 if __name__ == "__main__":

@@ -28,7 +28,6 @@ from machine import machine
 
 PACKAGES = ("numpy", "numba", "pyarrow", "pandas", "ovito")
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "benchmarks" / "reading.md"
 CONTACTS = [f"c_particle_contacts[{i}]" for i in (1, 2, 4, 5, 6, 7)]
 PARTICLES = (
     *("particle_id", "x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s"),
@@ -279,8 +278,6 @@ def main() -> None:
     frames = "made frames" if options.run is None else "real frames, repeated"
     output = "\n\n".join([f"{machine(*PACKAGES)}. {options.rounds} rounds, {frames}.", *tables])
     print(output)
-    before, mark, _ = PAGE.read_text().partition("<!-- output -->\n")
-    PAGE.write_text(f"{before}{mark}\n{output}\n")
 
 
 if __name__ == "__main__":

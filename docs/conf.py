@@ -1,13 +1,18 @@
 """Settings of Sphinx for the documentation: ./run docs."""
 
+import sys
 from importlib.metadata import version as version_of
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).with_name("tools")))
 
 project = "dragdeck"
 author = "The developers of dragdeck"
 project_copyright = f"2026, {author}"
 release = version = version_of("dragdeck")
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_copybutton"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_copybutton", "mathml"]
+html_math_renderer = "mathml"
 exclude_patterns = ["tools", "data"]
 nitpicky = False
 

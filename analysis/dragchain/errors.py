@@ -42,7 +42,7 @@ class DocumentError(DragchainError):
 
 
 class DumpError(DragchainError):
-    """A raw output whose content is not that announced in ``columns.json``.
+    """A raw output that does not contain what ``columns.json`` describes.
 
     Parameters
     ----------
@@ -55,9 +55,9 @@ class DumpError(DragchainError):
     offset : int, optional
         Byte offset into the file at which the frame or the row starts.
     expected : str, optional
-        What was expected instead.
+        What was expected there.
     kept : str, optional
-        Intact content before it.
+        What precedes it and is valid.
     remedy : str, optional
         What the user can do.
     """
@@ -98,11 +98,11 @@ class DumpError(DragchainError):
 
 
 class TruncatedDumpError(DumpError):
-    """A raw output that ends inside a frame; the frames before it are intact."""
+    """A raw output that ends within a frame; the frames before it are complete."""
 
 
 class TableError(DragchainError):
-    """Raw outputs or tables that are missing, damaged or inconsistent with each other."""
+    """A table that was not made, or raw outputs that contradict each other."""
 
 
 _MOST = 30
@@ -110,7 +110,7 @@ _MOST = 30
 
 
 class UnknownNameError(DragchainError):
-    """An unknown name of a study, run, table or column.
+    """A name of a study, run, table or column that does not exist.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class UnknownNameError(DragchainError):
     name : str
         The name.
     known : iterable of str
-        The names that there are.
+        The names that exist.
     remedy : str, optional
         What the user can do.
     """
@@ -138,11 +138,11 @@ class ExportError(DragchainError):
 
 
 class SeriesError(DragchainError):
-    """A series of samples without usable statistics."""
+    """A series of samples that does not allow for statistics."""
 
 
 class RejectedRunError(DragchainError):
-    """A run that did not pass the acceptance checks, or is not complete."""
+    """A run that did not pass its acceptance checks."""
 
 
 class MissingRunsError(DragchainError):
@@ -159,7 +159,7 @@ class RecordError(DragchainError):
     problem : str
         What is wrong, without a full stop.
     value, limit, remedy : str, optional
-        What was found, what would do, what the user can do.
+        What was found, what is accepted, what the user can do.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
-"""Plots of a run, on given axes or on those of a new figure.
+"""Plots of a run, on given axes or on axes of a new figure.
 
-The report contains the same panels. Each function returns its axes and takes a run of
-`dragchain.load`. Fonts and sizes follow the settings of Matplotlib. A missing table raises
-`TableError`, which names the command that makes it.
+Every function takes a run from `dragchain.load` and returns its axes. Fonts and sizes are those of
+Matplotlib's settings. A table that was not made raises `TableError`, which names the command that
+makes it. The panels of the report are the same.
 """
 
 from typing import Any
@@ -21,13 +21,14 @@ _BIN = 0.25
 
 
 def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axes:
-    """Plot drag and lateral force (N) against process time (s), with mean and published means.
+    """Drag and lateral force (N) over process time (s), with their means and published means.
 
     Parameters
     ----------
     run : FinishedRun
         A process run.
     ax : Axes, optional
+        Axes to draw on.
     peaks : bool
         Whether to mark the peaks of the drag.
 
@@ -54,6 +55,7 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
     run : FinishedRun
         A process run.
     ax : Axes, optional
+        Axes to draw on.
     peaks : bool
         Whether to draw a line at the time of each peak of the drag.
 
@@ -69,25 +71,21 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
 
 
 def force_around(run: FinishedRun, ax: Any = None) -> Any:
-    """Plot the mean normal force (N per bin) around the workpiece; the direction of motion is up.
+    """Mean normal force around the workpiece (N per bin) with 95 % confidence intervals.
 
-    Bars show the 95 % confidence intervals.
+    The direction of motion points upwards.
 
     Parameters
     ----------
     run : FinishedRun
         A process run.
     ax : PolarAxes, optional
-        Made by ``plt.subplots(subplot_kw={"projection": "polar"})``.
-
-    Returns
-    -------
-    PolarAxes
+        ``plt.subplots(subplot_kw={"projection": "polar"})`` makes them.
 
     Raises
     ------
     ValueError
-        If `ax` is not polar.
+        If the axes are not polar.
     """
     around, ax = run.findings.azimuth, _axes(ax, projection="polar")
     if ax.name != "polar":
@@ -97,13 +95,14 @@ def force_around(run: FinishedRun, ax: Any = None) -> Any:
 
 
 def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = False) -> Axes:
-    """Plot the mean normal force per contact (N) against depth (mm), with 95 % CIs.
+    """Mean normal force per contact (N) over depth (mm) with 95 % confidence intervals.
 
     Parameters
     ----------
     run : FinishedRun
         A process run.
     ax : Axes, optional
+        Axes to draw on.
     total : bool
         Whether to plot the sum of the normal forces per depth (N/mm) instead.
 
@@ -120,17 +119,14 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
 def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
     """Plot the fraction of force chains by number of particles, for both definitions.
 
-    Widest paths are included if they reach the bowl.
+    Of the widest paths, only those that reach the bowl are included.
 
     Parameters
     ----------
     run : FinishedRun
         A process run.
     ax : Axes, optional
-
-    Returns
-    -------
-    Axes
+        Axes to draw on.
     """
     chains = run.table("chains", ["definition", "n_particles", "reaches_bowl"])
     ax = _axes(ax)
@@ -154,12 +150,9 @@ def contact_forces(run: FinishedRun, ax: Axes | None = None, *, kind: str | None
     run : FinishedRun
         A process run; the network frames in its statistics are used.
     ax : Axes, optional
+        Axes to draw on.
     kind : str, optional
-        Kind of contact, such as ``particle-workpiece``; all contacts by default.
-
-    Returns
-    -------
-    Axes
+        Bodies of the contacts, such as ``particle-workpiece``; all contacts by default.
 
     Raises
     ------

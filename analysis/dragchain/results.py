@@ -64,9 +64,12 @@ def _table(name: str, rows: str) -> "cached_property[pd.DataFrame]":
 class FinishedRun(RunData):
     """A run with its tables, each of which is read on first use and kept in memory.
 
+    Reading a table that was not made raises `TableError`, which names the command that makes it.
+
     Attributes
     ----------
     folder : Path
+        The run folder.
     case : Case
         Content of ``case.json``: the simulated case and its settings.
     force, workpiece_contacts, facets, events : DataFrame
@@ -76,12 +79,7 @@ class FinishedRun(RunData):
     impacts : DataFrame
         Drop test only: one row per impact.
     thermo : DataFrame
-        Kinetic energies over time.
-
-    Raises
-    ------
-    TableError
-        When a table is read that does not exist; the message names the command that makes it.
+        Energies of all particles; not of a drop test.
     """
 
     force = _table("workpiece_force", "sample")
@@ -114,10 +112,20 @@ class FinishedRun(RunData):
     def describe(self, column: str) -> str:
         """Meaning and unit of a column of the run's tables.
 
+        Parameters
+        ----------
+        column : str
+            Name of the column.
+
+        Returns
+        -------
+        str
+            One line, or one line per meaning if tables use the name differently.
+
         Raises
         ------
         UnknownNameError
-            If no table of the run has this column.
+            If no table of the run has such a column.
         """
         return _describe(column, self.units, _TABLES[self.case.scene])
 
@@ -127,9 +135,14 @@ class FinishedRun(RunData):
         Parameters
         ----------
         name : str
-            Name of the file without ``.parquet``.
+            Name of the file without its ending, such as ``contacts``.
         columns : list of str, optional
-            Columns to read; all if None.
+            Columns to read; all by default.
+
+        Returns
+        -------
+        DataFrame
+            A new one with every call.
 
         Raises
         ------
@@ -154,8 +167,7 @@ class FinishedRun(RunData):
     def findings(self) -> ProcessFindings:
         """Means, profiles and peaks of a process run, as its report shows them.
 
-        They are read from ``figures.json``, or computed if it does not exist; errors as in
-        `write_findings`.
+        They are read from ``figures.json``, or computed if that was not made.
         """
         if self.case.scene != "process":
             raise TableError(f"{self.folder}: the scene is {self.case.scene}, not process")
@@ -165,12 +177,22 @@ class FinishedRun(RunData):
     def upstream(self, scene: Literal["filling", "drop_test"]) -> "FinishedRun":
         """Filling or drop test that belongs to a process run.
 
+        Parameters
+        ----------
+        scene : {"filling", "drop_test"}
+            Which of the two.
+
+        Returns
+        -------
+        FinishedRun
+            That run.
+
         Raises
         ------
         UnknownNameError
-            If there is none.
+            If the run has none.
         DocumentError
-            If its folder does not exist.
+            If its folder does not exist any more.
         """
         folders = upstream_folders(self.folder, self.case)
         if scene not in folders:
@@ -216,11 +238,21 @@ class Study:
         return _units([self._summary])
 
     def describe(self, column: str) -> str:
-        """Meaning and unit of a column of `summary`; `UnknownNameError` if it does not exist."""
+        """Meaning and unit of a column of `summary`; `UnknownNameError` for an unknown column."""
         return _describe(column, self.units, ("summary",))
 
     def run(self, name: str | None = None) -> FinishedRun:
-        """A run by the name of its case or its run id; without a name the only run.
+        """A run by the name of its case or its run id.
+
+        Parameters
+        ----------
+        name : str, optional
+            Not needed if the study has a single run.
+
+        Returns
+        -------
+        FinishedRun
+            The run.
 
         Raises
         ------
@@ -256,13 +288,14 @@ def load(study: Path | str) -> Study:
     Parameters
     ----------
     study : Path or str
-        Name of a study with results in ``results/`` of the working folder or a folder above it;
-        or the path of ``results/<study>``; or the folder of a single run of any scene, finished
-        or not.
+        Name of a study whose results are in ``results/`` of the working folder or of one above
+        it; or the path of ``results/<study>``; or the folder of a single run of any scene, which
+        is then the only one and need not be finished.
 
     Returns
     -------
     Study
+        The finished process runs with their tables.
 
     Raises
     ------

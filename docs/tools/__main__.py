@@ -7,7 +7,7 @@ pages would change.
 import argparse
 import sys
 
-from pages import changed_pages
+from page_files import changed_pages
 from figures import draw_all
 
 

@@ -96,9 +96,22 @@ class Records:
     text: Mapping[str, Callable[[], str]]
 
 
+FENCE = re.compile(r"^( *)(```+).*?^\1\2 *$", re.M | re.S)
+"""A block of code, in which nothing is made."""
+
+
+def _typed(text: str, work: Callable[[str], str]) -> str:
+    """A text whose parts outside of code blocks are replaced by what a function makes of them."""
+    parts, end = [], 0
+    for code in FENCE.finditer(text):
+        parts += [work(text[end : code.start()]), code[0]]
+        end = code.end()
+    return "".join([*parts, work(text[end:])])
+
+
 def blocks(page: Path, text: str) -> Iterator[Block]:
     """Every block of a page."""
-    for found in BLOCK.finditer(text):
+    for found in BLOCK.finditer(FENCE.sub("", text)):
         yield Block(page, found["what"], found["made"])
 
 
@@ -107,8 +120,28 @@ def without_blocks(text: str) -> str:
     return BLOCK.sub(" ", text)
 
 
+ROW = r"(?=<!-- (?!table |text |end)[a-z][^>]*? : )"
+LINE_START = re.compile(rf"(?<=[^\n])\n(?:> )?[ \t]*{ROW}")
+PARAGRAPH_START = re.compile(rf"(?:^|\n)[ \t]*(?:[-*] +|\d+\. +|> +)?{ROW}(.*)")
+"""Where Markdown takes a comment for the start of HTML code."""
+
+
 def renewed(page: Path, text: str, records: Records) -> str:
-    """A page with every block made anew."""
+    """A page with every block made anew; a row that starts a line moves to the line before.
+
+    Raises
+    ------
+    BlockError
+        If a block cannot be made, or if a row starts a paragraph.
+    """
+    return _typed(text, lambda part: _renewed(page, part, records))
+
+
+def _renewed(page: Path, text: str, records: Records) -> str:
+    """A part of a page outside of code with every block made anew."""
+    text = LINE_START.sub(" ", text)
+    if found := PARAGRAPH_START.search(text):
+        raise BlockError(f"{page}: a paragraph must not start with a row: {found[1][:80]}")
 
     def made(found: re.Match[str]) -> str:
         block = Block(page, found["what"], found["made"])
@@ -131,7 +164,7 @@ def content(block: Block, records: Records) -> str:
 
 def _row(what: str, records: Records) -> str:
     query, _, template = what.partition(" : ")
-    rows = list(_rows(query, records))
+    rows = list(selected(query, records))
     if len(rows) != 1:
         raise ValueError(f"{len(rows)} rows instead of one")
     return template.strip().format(**rows[0])
@@ -148,15 +181,16 @@ def _table(what: str, records: Records) -> str:
     lines = [heads, rules]
     lines += [
         [template.format(**row) for template in templates]
-        for row in _rows(first.removeprefix("table "), records)
+        for row in selected(first.removeprefix("table "), records)
     ]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 
-def _rows(query: str, records: Records) -> Iterator[dict[str, Any]]:
+def selected(query: str, records: Records) -> Iterator[dict[str, Any]]:
     """The rows of a table that have the values of a query."""
     name, *conditions = shlex.split(query)
     table, labels = records.table(name), records.labels(name)
+    labels = labels if len(labels) == len(table) else table
     chosen = pd.Series(True, index=labels.index)
     for condition in conditions:
         column, _, value = condition.partition("=")

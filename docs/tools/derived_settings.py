@@ -1,13 +1,12 @@
 """Errors of the default settings in the quantities that most users look at."""
 
 import pandas as pd
-
 from tables import Store, derived
 
 _LABELS = {
     "drag_mean": "mean drag",
     "drag_std": "standard deviation of the drag",
-    "drag_std_short": "fluctuations of the drag with wavelengths below a quarter of the particle diameter",
+    "drag_std_short": "fluctuations of the drag below a quarter of the particle diameter",
     "workpiece_contacts": "number of contacts on the workpiece",
     "contact_force_mean": "mean contact force on the workpiece",
     "contact_force_p50": "median contact force on the workpiece",

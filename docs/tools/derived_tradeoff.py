@@ -1,4 +1,4 @@
-"""Derived tables of the trade-off, of the extrapolation, of simplified scenes and of scaling laws."""
+"""Derived tables of the trade-off, the extrapolation, simplified scenes, and scaling laws."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -12,6 +12,8 @@ from dragchain.report.notation import MINUS
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import said
 from dragchain.statistics.estimate import student_quantile
+from dragchain.statistics.power_law import Runs, fit_power_law
+from dragchain.tradeoff.notation import in_percent
 from dragchain.tradeoff.quantities import QUANTITIES
 from dragdeck.advice.advise import advise
 from dragdeck.advice.options import Option
@@ -22,6 +24,9 @@ from dragdeck.study.model import Tolerance
 LABELS = {quantity.name: quantity.label for quantity in QUANTITIES}
 SCATTER = 1.96
 """Half-width of a 95 % interval in standard deviations, as the advisor takes it."""
+
+FOLD = 2
+"""Relative errors from this on are shown as multiples."""
 
 Row = Mapping[str, Any]
 
@@ -35,17 +40,17 @@ def percent(value: float, digits: int = 1) -> str:
     return text if float(text) else text[1:]
 
 
-def error_cell(error: Row) -> str:
+def error_cell(error: Row, shown: Callable[[float], str] = percent, fold: float = FOLD) -> str:
     """An error with its interval in per cent; its interval alone if that includes zero.
 
     A table that was typed in has no value where the interval includes zero.
     """
-    ends = f"({percent(error['ci95_low'])} to {percent(error['ci95_high'])})"
+    ends = f"({shown(error['ci95_low'])} to {shown(error['ci95_high'])})"
     if math.isnan(error["value"]) or error["ci95_low"] < 0 < error["ci95_high"]:
         return f"n.s. {ends}"
-    if error["value"] >= 2:
+    if error["value"] >= fold:
         return f"{1 + error['value']:.0f}-fold"
-    return f"{percent(error['value'])} {ends}"
+    return f"{shown(error['value'])} {ends}"
 
 
 def fold(ratio: float) -> str:
@@ -82,7 +87,9 @@ def _all_settings(store: Store) -> pd.DataFrame:
         text = f"rejected: {setting['failed']:g} of {setting['runs']:g} runs"
         if error:
             ends = f"({percent(error['ci95_low'])} to {percent(error['ci95_high'])})"
-            text = f"{percent(error['value'])} {ends}" + (", **unstable**" if setting["breaks"] else "")
+            text = f"{percent(error['value'])} {ends}" + (
+                ", **unstable**" if setting["breaks"] else ""
+            )
         rows.append(
             {
                 **{key: value for key, value in setting.items() if key != "errors"},
@@ -108,7 +115,10 @@ def _modulus(store: Store) -> pd.DataFrame:
     for quantity in store.record("tradeoff")["quantities"]:
         row = {"quantity": quantity, "label": LABELS[quantity]}
         for setting in plain:
-            name, error = _modulus_name(setting["youngs_modulus_scale"]), setting["errors"][quantity]
+            name, error = (
+                _modulus_name(setting["youngs_modulus_scale"]),
+                setting["errors"][quantity],
+            )
             row |= {f"{name}_{key}": value for key, value in error.items()}
             row[name] = error_cell(error)
         rows.append(row)
@@ -135,7 +145,7 @@ def _speed(store: Store) -> pd.DataFrame:
 def _scatter(store: Store) -> pd.DataFrame:
     """One row per quantity: half-width of the 95 % CI of one run over the compared path."""
     return pd.DataFrame(
-        {"quantity": name, "label": LABELS[name], "half_width": SCATTER * one["run_std"], **one}
+        {**one, "quantity": name, "label": LABELS[name], "half_width": SCATTER * one["run_std"]}
         for name, one in store.record("tradeoff")["quantities"].items()
     )
 
@@ -153,13 +163,14 @@ def _unstable(store: Store) -> pd.DataFrame:
 
 @derived("tradeoff/plain")
 def _plain(store: Store) -> pd.DataFrame:
-    """One row: cost of the plain input script at the physical modulus over that of the reference."""
+    """One row: cost of the plain input script at the physical modulus over the reference's."""
     found = store.record("tradeoff")
     plain = next(one["ratio"] for one in found["costs"] if one["name"] == "plain_full")
     base = next(
         one["relative_cost"]
         for one in found["settings"]
-        if (one["youngs_modulus_scale"], one["timestep_fraction"], one["speed_factor"]) == (0.01, 0.5, 1)
+        if (one["youngs_modulus_scale"], one["timestep_fraction"], one["speed_factor"])
+        == (0.01, 0.5, 1)
     )
     return pd.DataFrame([{"ratio": plain * base}])
 
@@ -227,7 +238,11 @@ def _measured_choice(store: Store) -> pd.DataFrame:
     """One row per tolerance: the measured setting behind the advice on the mean drag."""
     rows = []
     for tolerance in (0.05, 0.1):
-        advised = store.table("tradeoff/advised").query("quantity == 'drag_mean' & tolerance == @tolerance").iloc[0]
+        advised = (
+            store.table("tradeoff/advised")
+            .query("quantity == 'drag_mean' & tolerance == @tolerance")
+            .iloc[0]
+        )
         same = [
             one
             for one in _settings(store)
@@ -274,14 +289,24 @@ def _half_widths(store: Store) -> pd.DataFrame:
     return pd.DataFrame([{"low": half.min(), "high": half.max()}])
 
 
+def _coarsely(value: float) -> str:
+    return in_percent(value).replace(MINUS, "-")
+
+
 def _cells(rows: pd.DataFrame) -> pd.DataFrame:
-    """A column of text for each quantity that has a value and an interval; empty if not measured."""
+    """A column of text for each quantity that has an interval; empty if not measured."""
     shown = rows.copy()
-    for name in [column.removesuffix("_ci95_low") for column in rows if column.endswith("_ci95_low")]:
+    for name in [
+        column.removesuffix("_ci95_low") for column in rows if column.endswith("_ci95_low")
+    ]:
         shown[name] = [
             ""
             if math.isnan(row[f"{name}_ci95_low"])
-            else error_cell({key: row[f"{name}_{key}"] for key in ("value", "ci95_low", "ci95_high")})
+            else error_cell(
+                {key: row[f"{name}_{key}"] for key in ("value", "ci95_low", "ci95_high")},
+                _coarsely,
+                math.inf,
+            )
             for row in rows.to_dict("records")
         ]
     return shown
@@ -290,7 +315,11 @@ def _cells(rows: pd.DataFrame) -> pd.DataFrame:
 # --- extrapolation ---------------------------------------------------------------------------
 
 
-_PLANS = {frozenset({"0.001"}): "m3", frozenset({"0.01"}): "m2", frozenset({"0.001", "0.01"}): "both"}
+_PLANS = {
+    frozenset({"0.001"}): "m3",
+    frozenset({"0.01"}): "m2",
+    frozenset({"0.001", "0.01"}): "both",
+}
 
 
 def _extrapolations(rows: Iterable[Row], laws: Iterable[str]) -> pd.DataFrame:
@@ -306,7 +335,8 @@ def _extrapolations(rows: Iterable[Row], laws: Iterable[str]) -> pd.DataFrame:
                 "used": "yes" if name in laws else "no",
             },
         )
-        own[f"{plan}_raw"] = row["raw_root_mean_square"]
+        raw = own[f"{plan}_raw"] = row["raw_root_mean_square"]
+        own[f"{plan}_as_is"] = f"{100 * raw:.0f}" if raw >= 1 else f"{100 * raw:.2g}"
         own[f"{plan}_corrected"] = row["root_mean_square"]
         own[f"{plan}_inside"], own[f"{plan}_scenes"] = row["inside"], row["scenes"]
         own[plan] = f"{100 * row['root_mean_square']:.2g} ({row['inside']:g} of {row['scenes']:g})"
@@ -346,8 +376,9 @@ def _checks(store: Store) -> pd.DataFrame:
     for check in store.record("stiffness")["checks"]:
         name, plan = check["quantity"], _modulus_name(check["scale"])
         own = rows.setdefault(name, {"quantity": name, "label": LABELS[name]})
-        own[f"{plan}_law"], own[f"{plan}_measured"] = check["predicted"], error_cell(
-            {"value": check["measured"], **check}
+        own[f"{plan}_law"], own[f"{plan}_measured"] = (
+            check["predicted"],
+            error_cell({"value": check["measured"], **check}),
         )
     return pd.DataFrame(rows.values())
 
@@ -389,7 +420,7 @@ def _promises(store: Store) -> pd.DataFrame:
 
 @derived("scenes/promises_summary")
 def _promises_summary(store: Store) -> pd.DataFrame:
-    """One row per quantity that was promised: verdicts, half-widths, root mean square of the errors."""
+    """One row per promised quantity: verdicts, half-widths, root mean square of the errors."""
     found = store.record("scenes/promises")
     rows = []
     for name in ("drag_mean", "workpiece_contacts"):
@@ -452,8 +483,12 @@ def _merged(store: Store) -> pd.DataFrame:
 def _cost_ranges(store: Store) -> pd.DataFrame:
     """One row per archive and modulus, or also time step: by how much steps and CPU time fall."""
     rows = store.table("scenes/costs")
-    rows = pd.concat([rows.assign(step="any"), rows.assign(step=rows["timestep_fraction"].map("{:g}".format))])
-    groups = rows.groupby(["archive", "youngs_modulus_scale", "step"])[["steps_ratio", "cpu_time_ratio"]]
+    rows = pd.concat(
+        [rows.assign(step="any"), rows.assign(step=rows["timestep_fraction"].map("{:g}".format))]
+    )
+    groups = rows.groupby(["archive", "youngs_modulus_scale", "step"])[
+        ["steps_ratio", "cpu_time_ratio"]
+    ]
     found = groups.agg(["min", "max"])
     found.columns = ["_".join(names) for names in found.columns]
     return found.reset_index()
@@ -464,7 +499,7 @@ def _cost_ranges(store: Store) -> pd.DataFrame:
 
 @derived("tradeoff/unseen_shown")
 def _unseen(store: Store) -> pd.DataFrame:
-    """One row per scene and set of settings: error in per cent, and whether the prediction holds."""
+    """One row per scene and set of settings: error in per cent, and prediction."""
     rows = store.table("tradeoff/unseen").copy()
     rows["setting"] = [settings_cell(row) for row in rows.to_dict("records")]
     rows["error"] = [
@@ -492,6 +527,10 @@ def _level(value: float, factor: float, unit: str) -> str:
     return f"{factor * value:.3g} {unit}".strip()
 
 
+def _between(low: Row, high: Row, factor: float, unit: str) -> str:
+    return f"{factor * low['x']:.3g} to {_level(high['x'], factor, unit)}"
+
+
 def _with_interval(one: Row, form: Callable[[float], str]) -> str:
     return f"{form(one['value'])} ({form(one['ci95_low'])} to {form(one['ci95_high'])})"
 
@@ -502,7 +541,7 @@ def _two(value: float) -> str:
 
 @derived("scaling/summary")
 def _scaling(store: Store) -> pd.DataFrame:
-    """One row per sweep: exponent, verdict, lack of fit, other forms, and what changes beside it."""
+    """One row per sweep: exponent, verdict, lack of fit, other forms, what changes beside it."""
     rows = []
     for study, (label, factor, unit, times) in SWEEPS.items():
         found = store.record(f"scaling/{study}")
@@ -513,7 +552,7 @@ def _scaling(store: Store) -> pd.DataFrame:
         row = {
             "study": study,
             "label": label,
-            "levels": f"{factor * times * levels[0]['x']:.3g} to {_level(levels[-1]['x'], factor * times, unit)}",
+            "levels": _between(levels[0], levels[-1], factor * times, unit),
             "runs": len(found["runs"]),
             "packings": len({run["seed"] for run in found["runs"]}),
             "expected": found["expected"]["exponent"],
@@ -528,13 +567,16 @@ def _scaling(store: Store) -> pd.DataFrame:
             "engine": found["engine"],
         }
         for end, level in (("first", levels[0]), ("last", levels[-1])):
-            row |= {f"{end}_{key}": value for key, value in level.items() if not isinstance(value, dict)}
+            row |= {
+                f"{end}_{key}": value for key, value in level.items() if not isinstance(value, dict)
+            }
         if found["shifted"]:
             offset, terms = found["shifted"]["offset"], found["two_terms"]
-            diameter = 1e3 * found["scene"]["particle_diameter_m"]
+            diameter = 2e3 * _base().media.radius_mean_m
             row |= {
                 "offset": _with_interval(
-                    {key: 1e3 * value for key, value in offset.items()}, lambda value: f"{value:.1f}"
+                    {key: 1e3 * value for key, value in offset.items()},
+                    lambda value: f"{value:.1f}",
                 ),
                 "offset_particles": _with_interval(
                     {key: 1e3 * value / diameter for key, value in offset.items()},
@@ -571,7 +613,7 @@ def _local_rows(store: Store) -> Iterator[Row]:
             yield {
                 "study": study,
                 "label": SWEEPS[study][0],
-                "levels": f"{factor * times * low['x']:.3g} to {_level(high['x'], factor * times, unit)}",
+                "levels": _between(low, high, factor * times, unit),
                 "exponent": _with_interval(local, _two),
             }
 
@@ -582,7 +624,9 @@ def _levels(store: Store) -> pd.DataFrame:
     rows = []
     for study, (_, factor, unit, times) in SWEEPS.items():
         for level in store.record(f"scaling/{study}")["levels"]:
-            rows.append({"study": study, "level": _level(level["x"], factor * times, unit), **level})
+            rows.append(
+                {"study": study, "level": _level(level["x"], factor * times, unit), **level}
+            )
     return pd.json_normalize(rows, sep="_")
 
 
@@ -611,14 +655,28 @@ def _common(store: Store) -> pd.DataFrame:
                 "packings": len(runs),
                 "drag_n": drag.mean(),
                 "drag_half_width_n": reach * drag.std(ddof=1),
-                "drag_std": drag.std(ddof=1) / drag.mean(),
-                "standard_error": np.mean([run["standard_error_n"] for run in runs]) / drag.mean(),
+                "drag_std_n": drag.std(ddof=1),
+                "standard_error_n": np.mean([run["standard_error_n"] for run in runs]),
                 "eta": eta.mean(),
                 "eta_half_width": reach * eta.std(ddof=1),
                 "cpu_minutes": store.table("scaling/summary")["cpu_minutes"].sum(),
             }
         ]
     )
+
+
+@derived("scaling/friction_first")
+def _friction_first(store: Store) -> pd.DataFrame:
+    """One row: exponent of the friction of the workpiece from its first four levels."""
+    runs = [run for run in store.record("scaling/drag-friction")["runs"] if run["level"] < 1]
+    drag = np.array([run["drag_n"] for run in runs])
+    sample = Runs(
+        np.array([run["level"] for run in runs]),
+        drag,
+        np.array([run["standard_error_n"] for run in runs]) / drag,
+        [run["bed"] for run in runs],
+    )
+    return pd.DataFrame([vars(fit_power_law(sample).exponent)])
 
 
 def _base() -> Any:
@@ -629,15 +687,17 @@ SOLID_FRACTION, STRESS_RATIO = 0.6, 0.6
 """Assumed in the estimates: solid fraction of the bed, horizontal over vertical stress."""
 
 
-@derived("scaling/estimates")
+@derived("study/drag_estimates")
 def _estimates(store: Store) -> pd.DataFrame:
-    """One row: friction on the flat tip, and what Janssen's screening does to the exponent of the depth."""
+    """One row, from inputs: friction on the tip, and Janssen's screening of the depth."""
     base = _base()
     depth, radius = base.motion.immersion_depth_m, base.workpiece.shape.radius_m
     friction = base.pairs["ceramic-steel"].friction
     weight = base.materials["ceramic"].density_kg_m3 * 9.81 * SOLID_FRACTION
     length = base.bowl.radius_m / (2 * friction * STRESS_RATIO)
-    levels = np.array([one["x"] for one in store.record("scaling/drag-depth")["levels"]])
+    levels = np.unique(
+        [case.study.motion.immersion_depth_m for case in Project(ROOT).cases("drag-depth")]
+    )
     screened = levels - length * (1 - np.exp(-levels / length))
     return pd.DataFrame(
         [

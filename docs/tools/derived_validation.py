@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 import pandas as pd
+from tables import ROOT, Store, derived
 
 from dragchain.statistics.estimate import Estimate, student_quantile
 from dragdeck.cases.bed import full_stiffness_number
-from dragdeck.outlook.measured import measured_stiffness
 from dragdeck.physics.damping import damping_ratio
 from dragdeck.project import Project
 from evidence.validation.runs_by_bed import over_packings
-from tables import ROOT, Store, derived
 
 STATEMENTS = {
     "ahead_above_behind": "Forces ahead of the workpiece are far above those behind it",
@@ -20,13 +19,13 @@ STATEMENTS = {
     "forces_grow_with_depth": "Contact forces increase with depth",
     "most_intense_at_front": "Contacts are most intense at the front",
     "outer_surfaces_hit_hardest": "Surfaces facing the bowl wall are loaded most",
-    "presence": "At a peak of the drag, the chain from workpiece to bowl is stronger than at other times.",
-    "dominance": "It is stronger than the general increase of the forces around the workpiece explains.",
+    "presence": "At a drag peak, the chain from workpiece to bowl is stronger than at other times.",
+    "dominance": "It is stronger than the general rise of forces around the workpiece explains.",
     "order": "The chain is stronger before the peak than after it.",
     "breaking": "The chain of a peak ends sooner than chains at other times.",
     "coverage": "Most peaks coincide with a strong chain.",
     "reverse": "Most strong chains coincide with a peak.",
-    "orientation": "Chains at peaks share one orientation in the xy plane more than chains at other times.",
+    "orientation": "Chains at peaks share one orientation in the xy plane more than others.",
 }
 QUANTITIES = {
     "ahead_behind": "normal force on the workpiece, ratio ahead / behind",
@@ -43,7 +42,7 @@ QUANTITIES = {
     "remaining_lifetime": "remaining lifetime of the chain",
     "coverage": "fraction of the peaks with a strong chain nearby",
     "reverse": "fraction of the strong chains with a peak nearby",
-    "orientation": "resultant length of the azimuths (1: all parallel)",
+    "orientation": "resultant length of the azimuths (one: all parallel)",
 }
 
 
@@ -62,11 +61,12 @@ def _force(store: Store) -> pd.DataFrame:
     for name in ("drag_n", "lateral_n", "vertical_n"):
         mean = over_packings(packings[f"{name}_mean"].to_list())
         std = over_packings(packings[f"{name}_std"].to_list(), ratio=True)
-        parts = {"mean": mean, "std": std}
-        rows.append(
-            {"name": name}
-            | {f"{part}_{key}": value for part, one in parts.items() for key, value in vars(one).items()}
-        )
+        numbers = [
+            (f"{part}_{key}", value)
+            for part, one in (("mean", mean), ("std", std))
+            for key, value in vars(one).items()
+        ]
+        rows.append({"name": name, **dict(numbers)})
     return pd.DataFrame(rows).assign(path_mm=1000 * packings["arc_m"].mean())
 
 
@@ -114,6 +114,73 @@ def _peak_fractions(store: Store) -> pd.DataFrame:
     return table[table["effect"].isna()]
 
 
+@derived("verification/shown")
+def _verification(store: Store) -> pd.DataFrame:
+    """The results, with the numbers of the tests, and with what a row is about in words."""
+    table, rows = store.table("verification/results"), []
+    for row in table.itertuples():
+        numbers = (
+            f"{row.test:g}" if row.test == row.last_test else f"{row.test:g}, {row.last_test:g}"
+        )
+        steps = (
+            f", {row.steps_per_contact:g} steps per contact" if row.steps_per_contact > 0 else ""
+        )
+        order = f" ({row.order:g} for an expected 1)" if row.order > 0 else ""
+        rows.append({"tests": numbers, "about": f"{row.quantity}{steps}{order}"})
+    return table.join(pd.DataFrame(rows))
+
+
+@derived("verification/excess")
+def _excess(store: Store) -> pd.DataFrame:
+    """Excess of the tangential impulse as a range."""
+    table = store.table("verification/coulomb_excess")
+    lowest, bounds = table["excess_low"].fillna(table["excess_high"]), table["bound"].fillna("")
+    spans = [
+        f"{bound} {_span(100 * low, 100 * high, '{:g} %')}".strip()
+        for bound, low, high in zip(bounds, lowest, table["excess_high"], strict=True)
+    ]
+    remarks = [f"({remark})" if isinstance(remark, str) else "" for remark in table["remark"]]
+    return table.assign(excess=spans, remark=remarks)
+
+
+# --- calibration -------------------------------------------------------------------------------
+
+
+@derived("calibration/rebounds")
+def _rebounds(store: Store) -> pd.DataFrame:
+    """Effective by entered restitution, one column per fidelity, purpose and contact option."""
+    table = store.table("calibration/bias")
+    limit = table["limit_force"].map({True: "limited", False: "unlimited"})
+    columns = table["fidelity"] + "_" + table["purpose"] + "_" + limit
+    wide = table.assign(column=columns).pivot(
+        index="restitution_entered", columns="column", values="restitution_effective"
+    )
+    return wide.dropna().reset_index()
+
+
+@derived("calibration/put_for")
+def _put_for(store: Store) -> pd.DataFrame:
+    """The value to enter by settings, with the contact option in words."""
+    table = store.table("calibration/entered_values")
+    full = table["purpose"] == "reference"
+    return table.assign(
+        limit=table["limit_force"].map({True: "on", False: "off"}),
+        settings=table["fidelity"].map("`{}`".format).mask(full, "physical modulus, small step"),
+    )
+
+
+@derived("calibration/scatter")
+def _scatter(store: Store) -> pd.DataFrame:
+    """Largest deviation of a single production impact from the mean, per fidelity."""
+    table = store.table("calibration/bias")
+    limited = table[(table["purpose"] == "production") & table["limit_force"]]
+    highest = limited["highest"] - limited["restitution_effective"]
+    lowest = limited["restitution_effective"] - limited["lowest"]
+    largest = pd.Series(np.maximum(highest, lowest)).groupby(limited["fidelity"]).max()
+    elastic = limited[limited["restitution_entered"] == 1].set_index("fidelity")["highest"]
+    return pd.DataFrame({"largest": largest, "elastic": elastic}).reset_index()
+
+
 # --- stability ---------------------------------------------------------------------------------
 
 REGIMES = {
@@ -141,31 +208,51 @@ def _span(low: float, high: float, form: str) -> str:
 def _detected(store: Store) -> pd.DataFrame:
     """Runs and how the check judged them, with number and error as ranges."""
     table = store.table("stability/detection")
-    numbers = [
-        f"{row.number:.2f}" + (f" ({row.range_low:.2f} to {row.range_high:.2f})" if row.range_low > 0 else "")
-        if row.number > 0
-        else _span(row.range_low, row.range_high, "{:.2f}")
-        for row in table.itertuples()
-    ]
-    errors = [
-        row.lost if isinstance(row.lost, str) else _span(100 * row.error_low, 100 * row.error_high, "{:+.0f} %")
-        for row in table.itertuples()
-    ]
+    numbers, errors = [], []
+    for row in table.itertuples():
+        span = _span(row.range_low, row.range_high, "{:.2f}")
+        around = f" ({span})" if span else ""
+        numbers.append(f"{row.number:.2f}{around}" if row.number > 0 else span)
+        error = _span(100 * row.error_low, 100 * row.error_high, "{:+.0f} %")
+        errors.append(row.lost if isinstance(row.lost, str) else error)
     return table.assign(numbers=numbers, errors=errors)
+
+
+@derived("stability/observed")
+def _observed(store: Store) -> pd.DataFrame:
+    """Observables of runs with a correct drag and with a wrong one, as ranges."""
+    table = store.table("stability/observables")
+    texts = {"correct": [], "wrong": []}
+    for row in table.to_dict("records"):
+        for kind, cells in texts.items():
+            low, high = row[f"{kind}_low"], row[f"{kind}_high"]
+            cells.append(_range(low, high) + _fast(row.get(f"{kind}_fast", math.nan)))
+    return table.assign(**texts)
+
+
+def _range(low: float, high: float) -> str:
+    if math.isnan(low):
+        return f"up to {high:g}"
+    return f"from {low:g}" if math.isnan(high) else f"{low:g} to {high:g}"
+
+
+def _fast(value: float) -> str:
+    return "" if math.isnan(value) else f"; {value:g} at ten times the speed"
 
 
 @derived("stability/forecasts")
 def _forecasts(store: Store) -> pd.DataFrame:
     """Forecast and measured stability numbers, with the relative error of the forecast."""
-    table, law = store.table("stability/forecast"), measured_stiffness().stable_step
+    table, law = store.table("stability/forecast"), store.record("stiffness")["stable_step"]
     study = Project(ROOT).cases("uhlmann2015")[0].study
     restitution = study.pair(study.media.material, study.media.material).restitution
     spread = study.media.radius_std_m / study.media.radius_mean_m
-    u = table["timestep_fraction"] / (
-        full_stiffness_number(study) * table["youngs_modulus_scale"] ** (2 / 3)
-    ) ** 0.25
-    squared = law.stiffness * u**2 + law.damping * damping_ratio(restitution) * u
-    table = table.assign(forecast=np.sqrt(squared) * math.exp(law.spread * spread))
+    u = (
+        table["timestep_fraction"]
+        / (full_stiffness_number(study) * table["youngs_modulus_scale"] ** (2 / 3)) ** 0.25
+    )
+    squared = law["stiffness"] * u**2 + law["damping"] * damping_ratio(restitution) * u
+    table = table.assign(forecast=np.sqrt(squared) * math.exp(law["spread"] * spread))
     middle = (table["measured_low"] + table["measured_high"]) / 2
     spans = [_span(row.measured_low, row.measured_high, "{:.2f}") for row in table.itertuples()]
     return table.assign(measured=spans, error=table["forecast"] / middle - 1)
@@ -177,20 +264,25 @@ def _forecast_error(store: Store) -> pd.DataFrame:
     return pd.DataFrame([{"lowest": errors.min(), "highest": errors.max()}])
 
 
-@derived("stability/law")
-def _law(store: Store) -> pd.DataFrame:
-    """The law of the stability number: constants, scatter, largest deviation upwards."""
-    law = dict(store.record("stiffness")["stable_step"])
-    kappa, restitution = law.pop("stiffness_numbers"), law.pop("restitutions")
-    numbers = {"kappa_low": kappa[0], "kappa_high": kappa[1]}
-    numbers |= {"restitution_low": restitution[0], "restitution_high": restitution[1]}
-    return pd.DataFrame([law | numbers | {"upwards": math.expm1(law["largest"])}])
+@derived("stability/engine_minutes")
+def _engine_minutes(store: Store) -> pd.DataFrame:
+    return pd.DataFrame({"minutes": store.table("stability")["engine_wall_time_s"] / 60})
 
 
 # --- motion ------------------------------------------------------------------------------------
 
 SPIN_PACKINGS = 3
 """Of each level of the spin."""
+
+ORDINALS = {"1": "first", "2": "second", "3": "third"}
+
+COSTS = {
+    "spin": "spin",
+    "oscillation": "vertical oscillation",
+    "tilt": "tilt",
+    "workpieces": "three workpieces on the circle",
+    "rotating_bowl": "rotating bowl of facets, workpiece at rest",
+}
 
 
 def _drags(store: Store, study: str, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -220,26 +312,49 @@ def _neighbours(store: Store) -> pd.DataFrame:
 
 @derived("motion/workpieces")
 def _workpieces(store: Store) -> pd.DataFrame:
-    """One row per workpiece, with its arrangement in words."""
+    """One row per workpiece: how many there are, its number, its packing."""
     table = store.table("motion/carousel")
-    cases = table["case"]
-    count = cases.str.extract(r"count-(\d)")[0].map({"1": "one", "3": "three"})
+    cases, ratio = table["case"], "drag_wake_ratio"
     return table.assign(
-        count=count,
-        workpiece=cases.str.extract(r"workpiece-(\d)")[0].fillna(""),
-        packing=cases.str.extract(r"seed-(\d)")[0].fillna("1"),
+        count=cases.str.extract(r"count-(\d)")[0].map({"1": "single", "3": "of three"}),
+        workpiece=cases.str.extract(r"workpiece-(\d)")[0].fillna("1").map(ORDINALS),
+        packing=cases.str.extract(r"seed-(\d)")[0].fillna("1").map(ORDINALS),
+        wake=[
+            "" if math.isnan(value) else f"{value:.2f} ({low:.2f} to {high:.2f})"
+            for value, low, high in table[
+                [ratio, f"{ratio}_ci95_low", f"{ratio}_ci95_high"]
+            ].to_numpy()
+        ],
     )
+
+
+@derived("study/carousel_gaps")
+def _gaps(store: Store) -> pd.DataFrame:
+    """Clear distance between three workpieces at equal angles, in particle diameters."""
+    rows = []
+    for name in ("carousel", "carousel-wide"):
+        study = Project(ROOT).cases(name)[0].study
+        apart = math.sqrt(3.0) * study.motion.path.radius_m - 2 * study.workpiece.shape.radius_m
+        rows.append({"study": name, "gap_diameters": apart / (2 * study.media.radius_mean_m)})
+    return pd.DataFrame(rows)
 
 
 @derived("motion/spins")
 def _spins(store: Store) -> pd.DataFrame:
-    """Drag, lateral force and torque against the spin ratio, with 95 % intervals over the packings."""
+    """Drag, lateral force and torque against the spin ratio, with 95 % intervals."""
     table = store.table("motion/spin")
     times = student_quantile(SPIN_PACKINGS - 1)
     halves = {
         f"{name}_half": times * table[error]
         for name, error in (
-            ("drag", "drag_se_n"), ("lateral", "lateral_se_n"), ("torque", "torque_se_mn_m"),
+            ("drag", "drag_se_n"),
+            ("lateral", "lateral_se_n"),
+            ("torque", "torque_se_mn_m"),
         )
     }
     return table.assign(**halves, change=table["drag_n"] / table["drag_n"].iloc[0] - 1)
+
+
+@derived("motion/option_costs")
+def _option_costs(store: Store) -> pd.DataFrame:
+    return _worded(store.table("motion/costs/costs"), "name", COSTS)

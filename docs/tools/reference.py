@@ -10,7 +10,7 @@ from typing import Any
 
 from pybtex.database import parse_file
 from pybtex.plugin import find_plugin
-from study_fields import fidelities, fields
+from study_fields import fidelities, fields, plausible_ranges
 
 from dragchain import cli as dragchain_cli
 from dragchain.tables.meanings import _UNITS as UNITS
@@ -214,6 +214,7 @@ def bibliography() -> str:
 TEXTS: dict[str, Callable[[], str]] = {
     "study_fields": fields,
     "built_in_fidelities": fidelities,
+    "plausible_ranges": plausible_ranges,
     "dragdeck_commands": lambda: commands(dragdeck_cli._parser()),
     "dragchain_commands": lambda: commands(dragchain_cli._parser()),
     "columns": all_columns,

@@ -1,7 +1,8 @@
 """Tables from the measures of many scenes: python docs/tools/scene_records.py.
 
-The archives ``docs/data/scenes/*.tar.xz`` contain the ``measures.json`` of each run. What pages show
-of them, and what neither ``promises.json`` nor ``stiffness.json`` contains, becomes a CSV beside them.
+The archives ``docs/data/scenes/*.tar.xz`` contain the ``measures.json`` of each run. What pages
+show of them, and neither ``promises.json`` nor ``stiffness.json`` contains, becomes a CSV beside
+them.
 """
 
 import json
@@ -157,7 +158,11 @@ def _distance(one: Sequence[Floats], other: Sequence[Floats]) -> float:
 def _between_pairs(maps: Sequence[Floats]) -> float:
     """Between the means of two pairs of four maps, over the three ways to pair them."""
     first, second, third, fourth = maps[:4]
-    pairs = (([first, second], [third, fourth]), ([first, third], [second, fourth]), ([first, fourth], [second, third]))
+    pairs = (
+        ([first, second], [third, fourth]),
+        ([first, third], [second, fourth]),
+        ([first, fourth], [second, third]),
+    )
     return float(np.mean([_distance(*pair) for pair in pairs]))
 
 
@@ -169,17 +174,31 @@ def outcomes() -> Iterator[Row]:
             failures = [run.telling_failure for run in own if not run.complete]
             checks = Counter(one.name for one in failures if one is not None)
             if own:
-                yield {"archive": name, "part": part, "check": "any", "runs": len(own), "rejected": len(failures)}
+                yield {
+                    "archive": name,
+                    "part": part,
+                    "check": "any",
+                    "runs": len(own),
+                    "rejected": len(failures),
+                }
             for check, count in checks.items():
-                yield {"archive": name, "part": part, "check": check, "runs": len(own), "rejected": count}
+                yield {
+                    "archive": name,
+                    "part": part,
+                    "check": check,
+                    "runs": len(own),
+                    "rejected": count,
+                }
 
 
 def friction_of_sliding() -> Iterator[Row]:
-    """Errors of the sliding distance in scenes left out, by the coefficient of friction in its law."""
+    """Errors of the sliding distance in scenes left out, by the friction in its law."""
     scenes = [own for _, own in by_scene(runs_of("measures"))]
     sliding = next(one for one in QUANTITIES if one.name == "sliding_distance")
     for friction in ("workpiece_friction", "particle_friction"):
-        found = [one for own in scenes if (one := scaled_runs(own, replace(sliding, friction=friction)))]
+        found = [
+            one for own in scenes if (one := scaled_runs(own, replace(sliding, friction=friction)))
+        ]
         plans = ({0.001: 1}, {0.01: 1})
         for plan, errors in zip(plans, left_out(found, plans), strict=True):
             entry, _ = errors_entry(sliding, plan, np.array(errors), 2.0)

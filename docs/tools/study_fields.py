@@ -11,6 +11,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
+from dragdeck.study.plausible import _RANGES as RANGES
+
 
 def fields() -> str:
     """One row per field, in one table per top-level key that has fields of its own."""
@@ -26,7 +28,10 @@ def fields() -> str:
 
 def _table(rows: list[tuple[str, str, str, str]]) -> str:
     lines = ["| field | limits | default | meaning |", "| --- | --- | --- | --- |"]
-    lines += [f"| `{name}` | {limits} | {default} | {meaning} |" for name, limits, default, meaning in rows]
+    lines += [
+        f"| `{name}` | {limits} | {default} | {meaning} |"
+        for name, limits, default, meaning in rows
+    ]
     return "\n".join(lines)
 
 
@@ -75,15 +80,18 @@ _SIGNS = {Gt: ("above", "gt"), Ge: ("at least", "ge"), Lt: ("below", "lt"), Le: 
 
 def _limits(field: FieldInfo) -> str:
     if get_origin(field.annotation) is Literal:
-        return " or ".join(repr(value) for value in get_args(field.annotation))
+        return " or ".join(f"`{value}`" for value in get_args(field.annotation))
     parts = get_args(field.annotation) if _is_union(field.annotation) else ()
     parts = tuple(part for part in parts if part is not types.NoneType)
     if parts and all(get_origin(part) is Annotated for part in parts):
         return " or ".join(filter(None, map(_limits_of_part, parts)))
     bounds = [(_SIGNS[type(item)], item) for item in field.metadata if type(item) in _SIGNS]
     found = [f"{words} {getattr(item, name):.10g}" for (words, name), item in bounds]
-    lengths = [getattr(item, "min_length", None) or item.max_length for item in field.metadata if type(item) in (MinLen, MaxLen)]
-    return ", ".join([*found, *([f"{' to '.join(map(str, lengths))} entries"] if lengths else [])])
+    lengths = [item.min_length for item in field.metadata if isinstance(item, MinLen)]
+    lengths += [item.max_length for item in field.metadata if isinstance(item, MaxLen)]
+    if lengths:
+        found.append(f"{' to '.join(map(str, lengths))} entries")
+    return ", ".join(found)
 
 
 def _is_union(annotation: Any) -> bool:
@@ -103,7 +111,7 @@ def _default(field: FieldInfo) -> str:
         return "required"
     if field.default is PydanticUndefined or field.default is None:
         return "none"
-    return f"{field.default!r}"
+    return f"`{field.default}`" if isinstance(field.default, str) else f"{field.default!r}"
 
 
 def fidelities() -> str:
@@ -114,4 +122,14 @@ def fidelities() -> str:
         values = [getattr(fidelity, field) for field in names]
         shown = ["none" if value is None else f"{value:g}" for value in values]
         lines.append(f"| `{name}` | " + " | ".join(shown) + " |")
+    return "\n".join(lines)
+
+
+def plausible_ranges() -> str:
+    """The values that give a warning, those that are refused, and the units that are tried."""
+    heads = "| field | warning outside | refused outside | other units tried |"
+    lines = [heads, "| --- | --- | --- | --- |"]
+    for name, one in RANGES.items():
+        usual, known = f"{one.low:g} to {one.high:g}", f"{one.least:g} to {one.most:g}"
+        lines.append(f"| `{name}` | {usual} | {known} | {', '.join(one.slips)} |")
     return "\n".join(lines)

@@ -39,11 +39,11 @@ class Frame:
     step : int
         Number of the time step.
     columns : dict of str to (N,) ndarray
-        Columns by name, N rows in no particular order; ids are int64, all others float64. N may be
-        zero and may differ between frames.
+        The columns, N rows in no particular order; ids are int64, all others float64.
+        N may be zero and may change between frames.
     opening : bool
-        Whether it is the first frame of its file. If a run starts at a step with output, LIGGGHTS
-        writes this frame before its first step; its forces are re-evaluated, not those applied.
+        Whether it is the first frame of its file. LIGGGHTS may write it before the first
+        step, with re-evaluated forces instead of the applied ones.
     """
 
     step: int
@@ -64,7 +64,7 @@ class Frame:
         return np.asarray(self.columns[name], dtype=np.int64)
 
     def take(self, order: NDArray[np.int64]) -> "Frame":
-        """The rows `order` in that order."""
+        """Some rows, in the given order."""
         columns: Columns = {name: values[order] for name, values in self.columns.items()}
         return Frame(self.step, columns, self.opening)
 

@@ -149,12 +149,12 @@ class Reference(Part):
 class Case(Document):
     """The content of ``case.json`` of a run of a study.
 
-    ``case``, ``workpiece``, ``motion``, ``surface_m`` and ``statistics`` are None outside a
-    process; ``superposed`` is what is superposed on the path; ``restitution`` is None outside a
-    drop test, ``settled`` outside a filling. ``contact_moduli`` are those of a particle with a
-    ``particle``, the ``bowl`` and the ``workpiece``; a further workpiece of a run is read from the
-    run ``output_of``; ``numbers`` are the dimensionless numbers of
-    a process; ``asked`` is the tolerance that its settings were chosen for, if any.
+    The attributes are the keys of the document. ``case``, ``workpiece``, ``motion``, ``surface_m``
+    and ``statistics`` are None outside a process, ``restitution`` outside a drop test, ``settled``
+    outside a filling. ``contact_moduli`` are those of a particle with a ``particle``, the ``bowl``
+    and the ``workpiece``, ``numbers`` the dimensionless numbers of a process. ``superposed`` lists
+    the superposed motions, ``asked`` is the tolerance for which the settings were chosen, and
+    ``output_of`` the run from whose raw output a further workpiece is read.
     """
 
     made_by: ClassVar[str] = "dragdeck step render"
@@ -253,8 +253,8 @@ class Output(Part):
     """One raw output of LIGGGHTS, as ``columns.json`` describes it.
 
     Frames are expected at ``first_step`` and every ``period_steps`` after it up
-    to ``last_step``. Where that is None LIGGGHTS decides during the run: any
-    of these steps may be left out, and there is no known last one.
+    to ``last_step``. If that is None, LIGGGHTS decides during the run: any of
+    these steps may be absent, and the last one is not known beforehand.
     """
 
     name: str = ""

@@ -16,10 +16,12 @@ def dump_to_parquet(
 
     Parameters
     ----------
-    source, columns
+    source : Path or str
         As in `read_dump`.
     target : Path or str
-        Parquet file to write, with the column ``step`` and those of the dump.
+        The table: ``step``, then the dump's columns.
+    columns : sequence of str, optional
+        As in `read_dump`.
 
     Returns
     -------
@@ -29,7 +31,8 @@ def dump_to_parquet(
     Raises
     ------
     TruncatedDumpError, DumpError
-        As in `read_dump`. The table then contains the frames before the error.
+        As in `read_dump`. The table then contains the frames before it, and the error states
+        how many.
     """
     files = dump_files(source)
     output = layout_of(files[0], columns)

@@ -14,6 +14,8 @@ from dragchain.figures.style import drawing
 IMAGES = Path(__file__).resolve().parents[2] / "images"
 
 FIGURES = (
+    "architecture",
+    "calibration",
     "forces",
     "geometry",
     "load_map",
@@ -22,6 +24,7 @@ FIGURES = (
     "stability",
     "tradeoff",
     "validation",
+    "verification",
     "workflow",
 )
 """Names of modules, which are also those of the files."""

@@ -1,0 +1,125 @@
+"""Commands and examples run as the pages print them."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+from doc_pages import PAGES, fences, name_of
+from paths import PROJECT, ROOT
+
+from dragdeck.project import Project
+
+STUDY = "quickstart"
+SHORT_S = 300
+"""No command takes as long."""
+
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+
+def blocks_of(kind: str) -> list[tuple[Path, str]]:
+    return [(page, text) for page in PAGES for info, text in fences(page) if info == kind]
+
+
+SHELL, LONG, PYTHON, STUDIES = map(blocks_of, ("sh", "sh long", "python", "yaml"))
+
+
+def numbered(pages: list[tuple[Path, str]]) -> list[str]:
+    return [f"{name_of(page)}-{place}" for place, (page, _) in enumerate(pages)]
+
+
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A project whose packages are those of this one, in which the first study has been run."""
+    folder = tmp_path_factory.mktemp("clone")
+    for name in (*PROJECT, "examples", "benchmarks", "contract", "docs", "tests", "evidence"):
+        if not (folder / name).exists():
+            (folder / name).symlink_to(ROOT / name)
+    shutil.copytree(ROOT / "studies", folder / "studies")
+    for name in ("run", "pyproject.toml", "constraints.txt"):
+        shutil.copy(ROOT / name, folder / name)
+    (folder / ".venv").mkdir()
+    (folder / ".venv/bin").symlink_to(Path(sys.executable).parent)
+    wanted = "printf '%s\\n' \"$PWD\" && cat pyproject.toml constraints.txt | cksum"
+    stamp = subprocess.run(["sh", "-c", wanted], cwd=folder, capture_output=True, check=True)
+    (folder / ".venv/dragdeck-stamp").write_bytes(stamp.stdout)
+    ran = shell(f"./run all --cores 2 --config study={STUDY}", folder)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    return folder
+
+
+def shell(text: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    words = ["bash", "-euo", "pipefail", "-c", text]
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment['PATH']}"
+    environment.pop("DISPLAY", None)
+    return subprocess.run(
+        words, cwd=folder, env=environment, capture_output=True, text=True, timeout=SHORT_S
+    )
+
+
+@pytest.mark.parametrize(("page", "text"), SHELL, ids=numbered(SHELL))
+def test_a_command_runs(clone: Path, page: Path, text: str) -> None:
+    ran = shell(text, clone)
+    assert ran.returncode == 0, f"{ran.stdout[-2000:]}\n{ran.stderr[-2000:]}"
+
+
+def calls(text: str) -> Iterator[list[str]]:
+    """The words of each line, without comments."""
+    for line in re.sub(r"\\\n\s*", " ", text).splitlines():
+        if words := re.sub(r"(^|\s)#.*", "", line).split():
+            yield words
+
+
+NOT_SNAKEMAKE = ("dragdeck", "dragchain", "setup", "test", "docs", "web", "status", "open")
+
+
+@pytest.mark.parametrize(("page", "text"), LONG, ids=numbered(LONG))
+def test_a_long_command_would_run(clone: Path, page: Path, text: str) -> None:
+    """Targets of Snakemake run dry; of other programs the help must know the option."""
+    for words in calls(text):
+        match words:
+            case ["./run", target, *_] if target not in NOT_SNAKEMAKE:
+                ran = shell(" ".join([*words, "--dry-run"]), clone)
+            case ["snakemake", *_]:
+                ran = shell(" ".join([*words, "--dry-run", "--cores", "1"]), clone)
+            case ["./run", "dragdeck" | "dragchain" as program, command, *_]:
+                ran = shell(f"{program} {command} --help", clone)
+            case ["./run", own, *_]:
+                ran = shell(f"./run --help | grep -F 'run {own}'", clone)
+            case ["python", script, *_]:
+                ran = shell(f"python {script} --help", clone)
+            case _:
+                pytest.fail(f"{name_of(page)}: {' '.join(words)}: mark it `sh elsewhere`")
+        assert ran.returncode == 0, f"{' '.join(words)}\n{ran.stdout[-2000:]}\n{ran.stderr[-2000:]}"
+
+
+@pytest.mark.parametrize("page", sorted({page for page, _ in PYTHON}), ids=name_of)
+def test_the_python_of_a_page_runs(clone: Path, page: Path) -> None:
+    script = clone / "example.py"
+    script.write_text("\n".join(text for own, text in PYTHON if own == page))
+    ran = shell("python example.py", clone)
+    assert ran.returncode == 0, ran.stderr[-2000:]
+
+
+@pytest.mark.parametrize(("page", "text"), STUDIES, ids=numbered(STUDIES))
+def test_an_example_of_a_study_is_valid(clone: Path, page: Path, text: str) -> None:
+    example = yaml.safe_load(text)
+    base = {} if "materials" in example and "motion" in example else {"extends": "uhlmann2015"}
+    folder = clone / "studies/example"
+    folder.mkdir(exist_ok=True)
+    (folder / "study.yaml").write_text(yaml.safe_dump({**base, "title": "Example", **example}))
+    assert Project(clone).cases("example")
+
+
+def test_only_known_kinds_of_code_are_on_the_pages() -> None:
+    """A misspelt kind would not be run."""
+    kinds = {info for page in PAGES for info, _ in fences(page)}
+    known = {"sh", "sh long", "sh elsewhere", "python", "yaml", "text", "json", "csv", "markdown"}
+    others = {kind for kind in kinds - known if not kind.startswith("{")}
+    assert others <= {"jinja", "yaml fragment", "lammps", "bibtex", "python elsewhere"}

@@ -1,0 +1,85 @@
+"""The pages become a site; links, anchors and figures exist."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from doc_pages import PAGES, name_of
+from figures import FIGURES, IMAGES, svg
+from paths import ROOT
+
+README_LINES = 90
+LINK = re.compile(r"(?<!\\)\]\(([^)\s]+)\)")
+
+
+@pytest.mark.slow
+def test_sphinx_builds_the_site_without_a_warning(tmp_path: Path) -> None:
+    words = ["sphinx-build", "--quiet", "--fail-on-warning", "--keep-going", "docs", tmp_path]
+    ran = subprocess.run(
+        [sys.executable, "-m", "sphinx", *map(str, words[1:])],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert ran.returncode == 0, ran.stderr[-3000:]
+    assert (tmp_path / "index.html").is_file()
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of the headings of a page, as code hosting sites and Sphinx make them."""
+    found: set[str] = set()
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    for heading in re.findall(r"^#+ (.*)$", text, re.M):
+        heading = re.sub(r"<!--.*?-->", "", heading)
+        words = re.sub(r"[^\w\- ]", "", re.sub(r"\]\([^)]*\)", "", heading).lower())
+        slug, count = words.strip().replace(" ", "-"), 0
+        while (name := f"{slug}-{count}" if count else slug) in found:
+            count += 1
+        found.add(name)
+    return found
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_link_leads_somewhere(page: Path) -> None:
+    missing = []
+    for link in LINK.findall(re.sub(r"```.*?```", "", page.read_text(), flags=re.S)):
+        path, _, anchor = link.partition("#")
+        if ":" in path:
+            continue
+        target = page.parent / path if path else page
+        if not target.exists() or (
+            anchor and target.suffix == ".md" and anchor not in anchors(target)
+        ):
+            missing.append(link)
+    assert missing == []
+
+
+def test_every_page_of_the_documentation_is_in_a_table_of_contents() -> None:
+    listed = set()
+    for page in (ROOT / "docs").rglob("*.md"):
+        for tree in re.findall(r"```{toctree}\n(.*?)```", page.read_text(), re.S):
+            names = [line for line in tree.splitlines() if line and line[0] != ":"]
+            listed |= {(page.parent / f"{name}.md").resolve() for name in names}
+    own = {page.resolve() for page in (ROOT / "docs").rglob("*.md")}
+    own -= {(ROOT / "docs/index.md").resolve(), (ROOT / "docs/data/README.md").resolve()}
+    assert own == listed
+
+
+def test_the_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_text().splitlines()) <= README_LINES
+
+
+def test_every_image_is_shown_and_every_figure_is_drawn() -> None:
+    text = "".join(page.read_text() for page in PAGES)
+    files = {file.name for file in IMAGES.iterdir()}
+    assert {name for name in files if f"images/{name}" not in text} == set()
+    assert {f"{name}.svg" for name in FIGURES} == {name for name in files if name.endswith(".svg")}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_figure_can_be_drawn_from_the_records(name: str) -> None:
+    drawn = svg(name)
+    assert drawn.startswith("<?xml") and len(drawn) > 5000

@@ -1,0 +1,35 @@
+"""The pages of the documentation as the tests read them."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from blocks import without_blocks
+from page_files import pages
+from paths import ROOT
+
+HISTORY = {"CHANGELOG.md"}
+"""Pages about earlier versions."""
+
+PAGES = [page for page in pages() if page.name not in HISTORY]
+FENCE = re.compile(r"^( *)(```+|:::+)(?P<info>[^\n`]*)\n(?P<body>.*?)^\1\2 *$", re.M | re.S)
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def fences(page: Path) -> Iterator[tuple[str, str]]:
+    """Language and text of every code block."""
+    for found in FENCE.finditer(page.read_text(encoding="utf-8")):
+        yield found["info"].strip(), found["body"]
+
+
+def prose(page: Path) -> str:
+    """What is typed as text: no blocks from records, no code, no comments, no targets of links."""
+    text = without_blocks(page.read_text(encoding="utf-8"))
+    text = FENCE.sub("\n", text)
+    text = re.sub(r"<!--.*?-->", " ", text, flags=re.S)
+    text = re.sub(r"\$\$.*?\$\$|\$[^$\n]+\$", " ", text, flags=re.S)
+    text = re.sub(r"``[^`]*``|`[^`\n]*`", " ", text)
+    return re.sub(r"\]\([^)]*\)", "]", text)
