@@ -138,8 +138,8 @@ def sphere_beside_a_box() -> None:
 @pytest.mark.parametrize(
     ("draw", "problem", "value"),
     [
-        (sphere_beside_a_box, "holds several parts", "2 solids, 7 faces"),
-        (lambda: gmsh.model.occ.addRectangle(0, 0, 0, 9, 9), "holds no solid", "0 solids, 1 faces"),
+        (sphere_beside_a_box, "contains several parts", "2 solids, 7 faces"),
+        (lambda: gmsh.model.occ.addRectangle(0, 0, 0, 9, 9), "contains no solid", "0 solids, 1 faces"),
     ],
 )
 def test_one_solid_is_a_workpiece(
