@@ -58,9 +58,18 @@ def draw() -> Figure:
     figure = Figure(figsize=(11.0, 4.2), layout="constrained")
     axes = figure.subplots()
     for start, end in edges:
-        axes.annotate("", places[end], places[start], arrowprops={
-            "arrowstyle": "-|>", "color": GREY, "lw": 0.9, "shrinkA": 26, "shrinkB": 28,
-        })  # fmt: skip
+        axes.annotate(
+            "",
+            places[end],
+            places[start],
+            arrowprops={
+                "arrowstyle": "-|>",
+                "color": GREY,
+                "lw": 0.9,
+                "shrinkA": 26,
+                "shrinkB": 28,
+            },
+        )
     for one, (x, y) in places.items():
         colour = COLOURS.get(labels[one].partition("_")[0], GREY)
         text = labels[one].removesuffix("_of_process").replace("_", "\n", 1)
