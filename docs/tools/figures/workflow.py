@@ -30,7 +30,7 @@ def rule_graph() -> tuple[dict[str, str], set[tuple[str, str]]]:
 def shortest(edges: set[tuple[str, str]]) -> set[tuple[str, str]]:
     """The edges that no longer way replaces."""
     after = defaultdict(set)
-    for start, end in edges:
+    for start, end in sorted(edges):
         after[start].add(end)
 
     def reached(start: str) -> set[str]:
@@ -57,7 +57,7 @@ def draw() -> Figure:
         places[one] = place
     figure = Figure(figsize=(11.0, 4.2), layout="constrained")
     axes = figure.subplots()
-    for start, end in edges:
+    for start, end in sorted(edges):
         axes.annotate(
             "",
             places[end],
