@@ -1,4 +1,4 @@
-"""The errors of reading and analysing a run."""
+"""The errors that reading and analysing a run can end in."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -83,7 +83,7 @@ class DumpError(DragchainError):
         super().__init__()
 
     def __str__(self) -> str:
-        """Problem with its place, what was expected, and what is intact."""
+        """What was found where, what should have stood there, what is kept."""
         place = [f"{self.file}"]
         if self.frame is not None:
             place.append(f"frame {self.frame}")
@@ -134,7 +134,7 @@ class UnknownNameError(DragchainError):
 
 
 class ExportError(DragchainError):
-    """An export that cannot be made, or not in this place."""
+    """A run that cannot be written for another program, or not there."""
 
 
 class SeriesError(DragchainError):

@@ -30,11 +30,7 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
     ax : Axes, optional
         Axes to draw on.
     peaks : bool
-        Whether to mark the peaks of the drag.
-
-    Returns
-    -------
-    Axes
+        Mark the peaks of the drag.
     """
     found, ax = run.findings, _axes(ax)
     run_panels.forces(ax, run, found)
@@ -46,9 +42,7 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
 
 
 def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axes:
-    """Plot the bottleneck force (N) of the dominant path against process time (s).
-
-    The dominant path of a frame is the path from workpiece to bowl with the largest bottleneck.
+    """Bottleneck force (N) of the dominant path from workpiece to bowl over process time (s).
 
     Parameters
     ----------
@@ -57,11 +51,7 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
     ax : Axes, optional
         Axes to draw on.
     peaks : bool
-        Whether to draw a line at the time of each peak of the drag.
-
-    Returns
-    -------
-    Axes
+        Draw a line at the time of each peak of the drag.
     """
     found, ax = run.findings, _axes(ax)
     run_panels.bottlenecks(ax, run, found)
@@ -104,11 +94,7 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
     ax : Axes, optional
         Axes to draw on.
     total : bool
-        Whether to plot the sum of the normal forces per depth (N/mm) instead.
-
-    Returns
-    -------
-    Axes
+        Draw the sum of the normal forces per depth (N/mm) instead.
     """
     found, ax = run.findings, _axes(ax)
     draw = run_panels.load_over_depth if total else run_panels.force_over_depth
@@ -117,7 +103,7 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
 
 
 def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
-    """Plot the fraction of force chains by number of particles, for both definitions.
+    """Fraction of the force chains by number of particles, for both definitions.
 
     Of the widest paths, only those that reach the bowl are included.
 
@@ -143,12 +129,12 @@ def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
 
 
 def contact_forces(run: FinishedRun, ax: Axes | None = None, *, kind: str | None = None) -> Axes:
-    """Plot the probability density of the normal contact forces relative to their mean.
+    """Probability density of the normal contact forces, divided by their mean.
 
     Parameters
     ----------
     run : FinishedRun
-        A process run; the network frames in its statistics are used.
+        A process run; its network frames in the statistics are used.
     ax : Axes, optional
         Axes to draw on.
     kind : str, optional

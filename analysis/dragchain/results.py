@@ -62,7 +62,7 @@ def _table(name: str, rows: str) -> "cached_property[pd.DataFrame]":
 
 
 class FinishedRun(RunData):
-    """A run with its tables, each of which is read on first use and kept in memory.
+    """A run with its tables, each read when it is first used and kept.
 
     Reading a table that was not made raises `TableError`, which names the command that makes it.
 
@@ -71,13 +71,13 @@ class FinishedRun(RunData):
     folder : Path
         The run folder.
     case : Case
-        Content of ``case.json``: the simulated case and its settings.
+        What the run models: ``case.json``.
     force, workpiece_contacts, facets, events : DataFrame
-        Process only: force on the workpiece, contacts on it, its facets, and contact events.
+        Of a process: force on the workpiece, contacts on it, its facets, contact events.
     particles, contacts, network, clusters, chains : DataFrame
-        Process only: the frames of the contact network. A filling also has ``particles``.
+        Of a process: the network frames. A filling has ``particles``, too.
     impacts : DataFrame
-        Drop test only: one row per impact.
+        Of a drop test.
     thermo : DataFrame
         Energies of all particles; not of a drop test.
     """
@@ -96,17 +96,17 @@ class FinishedRun(RunData):
 
     @classmethod
     def open(cls, folder: Path) -> "FinishedRun":
-        """Open the folder of a run; `DocumentError` if it contains no ``case.json``."""
+        """Read the case of a run folder; `DocumentError` if it has none."""
         return cls(folder, load_case(folder))
 
     @property
     def name(self) -> str:
-        """Name of the case; for a filling or a drop test the run id."""
+        """Name of the case; of a filling or a drop test the run id."""
         return self.case.case or self.case.run
 
     @cached_property
     def units(self) -> Mapping[str, str]:
-        """Unit of each column of all tables: ``1`` if dimensionless, empty for text and flags."""
+        """Units of the columns of all tables: ``1`` for plain numbers, empty for text and flags."""
         return _units(self._file(name) for name in _TABLES[self.case.scene])
 
     def describe(self, column: str) -> str:
@@ -147,9 +147,9 @@ class FinishedRun(RunData):
         Raises
         ------
         UnknownNameError
-            If the scene has no such table, or the table no such column.
+            If runs of this scene have no such table, or the table no such column.
         TableError
-            If the table does not exist; the message names the command that makes it.
+            If the table was not made; the message names the command that makes it.
         """
         tables = _TABLES[self.case.scene]
         if name not in tables:
@@ -175,7 +175,7 @@ class FinishedRun(RunData):
         return ProcessFindings.read(file) if file.is_file() else process_findings(self)
 
     def upstream(self, scene: Literal["filling", "drop_test"]) -> "FinishedRun":
-        """Filling or drop test that belongs to a process run.
+        """The filling that a process run starts from, or its drop test.
 
         Parameters
         ----------
@@ -216,7 +216,7 @@ class Study:
     folder : Path
         ``results/<study>``.
     runs : tuple of FinishedRun
-        Sorted by name of the case. With several workpieces, each is a separate run.
+        Sorted by the names of their cases. Each workpiece of several is a run of its own.
     """
 
     folder: Path

@@ -139,7 +139,11 @@ def sphere_beside_a_box() -> None:
     ("draw", "problem", "value"),
     [
         (sphere_beside_a_box, "contains several parts", "2 solids, 7 faces"),
-        (lambda: gmsh.model.occ.addRectangle(0, 0, 0, 9, 9), "contains no solid", "0 solids, 1 faces"),
+        (
+            lambda: gmsh.model.occ.addRectangle(0, 0, 0, 9, 9),
+            "contains no solid",
+            "0 solids, 1 faces",
+        ),
     ],
 )
 def test_one_solid_is_a_workpiece(
