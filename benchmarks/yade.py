@@ -6,7 +6,7 @@ The scene is that of the input script: bed, bowl, workpiece, contact law, time s
 Plunge and approach are run before the counted steps, which are the first of the drag; with
 ``--skip-insertion`` Yade starts with the bed and the workpiece that LIGGGHTS had then. Yade
 (Debian package ``yade``) has its own Python, so ``yade_scene.py`` runs there and gets its numbers
-from a JSON file. ``docs/benchmarks/yade.md`` lists what differs between the two programs.
+from a JSON file. ``docs/evidence/yade.md`` lists what differs between the two programs.
 """
 
 import argparse

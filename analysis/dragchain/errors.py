@@ -42,7 +42,7 @@ class DocumentError(DragchainError):
 
 
 class DumpError(DragchainError):
-    """A raw output that does not contain what ``columns.json`` describes.
+    """A raw output whose content is not that announced in ``columns.json``.
 
     Parameters
     ----------
@@ -55,9 +55,9 @@ class DumpError(DragchainError):
     offset : int, optional
         Byte offset into the file at which the frame or the row starts.
     expected : str, optional
-        What was expected there.
+        What was expected instead.
     kept : str, optional
-        What precedes it and is valid.
+        Intact content before it.
     remedy : str, optional
         What the user can do.
     """
@@ -98,11 +98,11 @@ class DumpError(DragchainError):
 
 
 class TruncatedDumpError(DumpError):
-    """A raw output that ends within a frame; the frames before it are complete."""
+    """A raw output that ends inside a frame; the frames before it are intact."""
 
 
 class TableError(DragchainError):
-    """A table that was not made, or raw outputs that contradict each other."""
+    """Raw outputs or tables that are missing, damaged or inconsistent with each other."""
 
 
 _MOST = 30
@@ -110,7 +110,7 @@ _MOST = 30
 
 
 class UnknownNameError(DragchainError):
-    """A name of a study, run, table or column that does not exist.
+    """An unknown name of a study, run, table or column.
 
     Parameters
     ----------
@@ -138,11 +138,11 @@ class ExportError(DragchainError):
 
 
 class SeriesError(DragchainError):
-    """A series of samples that does not allow for statistics."""
+    """A series of samples without usable statistics."""
 
 
 class RejectedRunError(DragchainError):
-    """A run that did not pass its acceptance checks."""
+    """A run that did not pass the acceptance checks, or is not complete."""
 
 
 class MissingRunsError(DragchainError):

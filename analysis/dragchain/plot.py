@@ -1,8 +1,8 @@
-"""Plots of a run, on given axes or on axes of a new figure.
+"""Plots of a run, on given axes or on those of a new figure.
 
-Every function takes a run from `dragchain.load` and returns its axes. Fonts and sizes are those of
-Matplotlib's settings. A table that was not made raises `TableError`, which names the command that
-makes it. The panels of the report are the same.
+The report contains the same panels. Each function returns its axes and takes a run of
+`dragchain.load`. Fonts and sizes follow the settings of Matplotlib. A missing table raises
+`TableError`, which names the command that makes it.
 """
 
 from typing import Any
@@ -21,7 +21,7 @@ _BIN = 0.25
 
 
 def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axes:
-    """Drag and lateral force (N) over process time (s), with their means and published means.
+    """Plot drag and lateral force (N) against process time (s), with mean and published means.
 
     Parameters
     ----------
@@ -61,21 +61,25 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
 
 
 def force_around(run: FinishedRun, ax: Any = None) -> Any:
-    """Mean normal force around the workpiece (N per bin) with 95 % confidence intervals.
+    """Plot the mean normal force (N per bin) around the workpiece; the direction of motion is up.
 
-    The direction of motion points upwards.
+    Bars show the 95 % confidence intervals.
 
     Parameters
     ----------
     run : FinishedRun
         A process run.
     ax : PolarAxes, optional
-        ``plt.subplots(subplot_kw={"projection": "polar"})`` makes them.
+        Made by ``plt.subplots(subplot_kw={"projection": "polar"})``.
+
+    Returns
+    -------
+    PolarAxes
 
     Raises
     ------
     ValueError
-        If the axes are not polar.
+        If `ax` is not polar.
     """
     around, ax = run.findings.azimuth, _axes(ax, projection="polar")
     if ax.name != "polar":
@@ -85,7 +89,7 @@ def force_around(run: FinishedRun, ax: Any = None) -> Any:
 
 
 def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = False) -> Axes:
-    """Mean normal force per contact (N) over depth (mm) with 95 % confidence intervals.
+    """Plot the mean normal force per contact (N) against depth (mm), with 95 % CIs.
 
     Parameters
     ----------
@@ -105,14 +109,17 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
 def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
     """Fraction of the force chains by number of particles, for both definitions.
 
-    Of the widest paths, only those that reach the bowl are included.
+    Widest paths are included if they reach the bowl.
 
     Parameters
     ----------
     run : FinishedRun
         A process run.
     ax : Axes, optional
-        Axes to draw on.
+
+    Returns
+    -------
+    Axes
     """
     chains = run.table("chains", ["definition", "n_particles", "reaches_bowl"])
     ax = _axes(ax)
@@ -138,7 +145,11 @@ def contact_forces(run: FinishedRun, ax: Axes | None = None, *, kind: str | None
     ax : Axes, optional
         Axes to draw on.
     kind : str, optional
-        Bodies of the contacts, such as ``particle-workpiece``; all contacts by default.
+        Kind of contact, such as ``particle-workpiece``; all contacts by default.
+
+    Returns
+    -------
+    Axes
 
     Raises
     ------

@@ -79,7 +79,12 @@ class FinishedRun(RunData):
     impacts : DataFrame
         Of a drop test.
     thermo : DataFrame
-        Energies of all particles; not of a drop test.
+        Kinetic energies over time.
+
+    Raises
+    ------
+    TableError
+        When a table is read that does not exist; the message names the command that makes it.
     """
 
     force = _table("workpiece_force", "sample")
@@ -125,7 +130,7 @@ class FinishedRun(RunData):
         Raises
         ------
         UnknownNameError
-            If no table of the run has such a column.
+            If no table of the run has this column.
         """
         return _describe(column, self.units, _TABLES[self.case.scene])
 
@@ -135,14 +140,9 @@ class FinishedRun(RunData):
         Parameters
         ----------
         name : str
-            Name of the file without its ending, such as ``contacts``.
+            Name of the file without ``.parquet``.
         columns : list of str, optional
-            Columns to read; all by default.
-
-        Returns
-        -------
-        DataFrame
-            A new one with every call.
+            Columns to read; all if None.
 
         Raises
         ------
@@ -167,7 +167,8 @@ class FinishedRun(RunData):
     def findings(self) -> ProcessFindings:
         """Means, profiles and peaks of a process run, as its report shows them.
 
-        They are read from ``figures.json``, or computed if that was not made.
+        They are read from ``figures.json``, or computed if it does not exist; errors as in
+        `write_findings`.
         """
         if self.case.scene != "process":
             raise TableError(f"{self.folder}: the scene is {self.case.scene}, not process")
@@ -190,9 +191,9 @@ class FinishedRun(RunData):
         Raises
         ------
         UnknownNameError
-            If the run has none.
+            If there is none.
         DocumentError
-            If its folder does not exist any more.
+            If its folder does not exist.
         """
         folders = upstream_folders(self.folder, self.case)
         if scene not in folders:
@@ -238,21 +239,11 @@ class Study:
         return _units([self._summary])
 
     def describe(self, column: str) -> str:
-        """Meaning and unit of a column of `summary`; `UnknownNameError` for an unknown column."""
+        """Meaning and unit of a column of `summary`; `UnknownNameError` if it does not exist."""
         return _describe(column, self.units, ("summary",))
 
     def run(self, name: str | None = None) -> FinishedRun:
-        """A run by the name of its case or its run id.
-
-        Parameters
-        ----------
-        name : str, optional
-            Not needed if the study has a single run.
-
-        Returns
-        -------
-        FinishedRun
-            The run.
+        """A run by the name of its case or its run id; without a name the only run.
 
         Raises
         ------
@@ -288,14 +279,13 @@ def load(study: Path | str) -> Study:
     Parameters
     ----------
     study : Path or str
-        Name of a study whose results are in ``results/`` of the working folder or of one above
-        it; or the path of ``results/<study>``; or the folder of a single run of any scene, which
-        is then the only one and need not be finished.
+        Name of a study with results in ``results/`` of the working folder or a folder above it;
+        or the path of ``results/<study>``; or the folder of a single run of any scene, finished
+        or not.
 
     Returns
     -------
     Study
-        The finished process runs with their tables.
 
     Raises
     ------

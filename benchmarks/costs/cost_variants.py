@@ -238,7 +238,7 @@ def _steps(study: Study) -> Iterator[Variant]:
     softest = min(material.youngs_modulus_pa for material in study.materials.values())
     for scale in (1.0, 0.1, 0.01, 1e-3, 1e-4):
         if scale * softest >= ENGINE_SOFTEST_PA:
-            what = f"Young's moduli times {scale:g}, at the same share of Rayleigh"
+            what = f"Young's moduli times {scale:g}, at the same fraction of Rayleigh"
             fields = {"fidelity.youngs_modulus_scale": scale}
             yield Variant(f"modulus_{scale:g}", what, fields, unit="per_step")
     for fraction in (0.2, 0.8):

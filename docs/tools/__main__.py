@@ -1,4 +1,4 @@
-"""Make what the pages take from records, and draw the figures: python docs/tools [--check] [--figures].
+"""Make what the pages take from records, and draw the figures: python docs/tools [OPTION].
 
 Without options, every block of every page is made anew (see `blocks`). ``--check`` only says which
 pages would change.
@@ -7,8 +7,8 @@ pages would change.
 import argparse
 import sys
 
-from page_files import changed_pages
 from figures import draw_all
+from page_files import changed_pages
 
 
 def main() -> int:

@@ -31,7 +31,8 @@ from typing import Any
 import pandas as pd
 
 BLOCK = re.compile(
-    r"(?P<head><!-- (?P<what>[a-z](?:[^-]|-(?!->))*?)\s*-->)(?P<made>.*?)(?P<tail><!-- end -->)", re.S
+    r"(?P<head><!-- (?P<what>[a-z](?:[^-]|-(?!->))*?)\s*-->)(?P<made>.*?)(?P<tail><!-- end -->)",
+    re.S,
 )
 
 
@@ -159,7 +160,9 @@ def content(block: Block, records: Records) -> str:
             return _row(block.what, records)
         return f"\n{_table(block.what, records)}\n"
     except Exception as error:
-        raise BlockError(f"{block.page}: {block.what!r}: {type(error).__name__}: {error}") from error
+        raise BlockError(
+            f"{block.page}: {block.what!r}: {type(error).__name__}: {error}"
+        ) from error
 
 
 def _row(what: str, records: Records) -> str:

@@ -43,7 +43,10 @@ def _commands(parser: argparse.ArgumentParser) -> Iterator[str]:
     usage = " ".join(parser.format_usage().split()).removeprefix("usage: ")
     yield f"### `{program}`\n\n{_sentence(parser.description or '')}\n\n```text\n{usage}\n```"
     rows = [
-        [f"`{_names(action)}`", (action.help or "").replace("%(default)s", str(action.default)).replace("|", "\\|")]
+        [
+            f"`{_names(action)}`",
+            (action.help or "").replace("%(default)s", str(action.default)).replace("|", "\\|"),
+        ]
         for action in parser._actions
         if "--help" not in action.option_strings
     ]
@@ -158,7 +161,9 @@ def messages() -> str:
             if rows:
                 name = str(file.relative_to(ROOT / Path(package).parent))
                 heads = ["message", "limit", "remedy"]
-                parts.append(f"## `{name}`\n\n{_table(heads, list(dict.fromkeys(map(tuple, rows))))}")
+                parts.append(
+                    f"## `{name}`\n\n{_table(heads, list(dict.fromkeys(map(tuple, rows))))}"
+                )
     return "\n\n".join(parts)
 
 
@@ -168,7 +173,9 @@ ERRORS = re.compile(r"^(_?[a-z_]*error|[A-Z]\w*Error|Refusal|EngineEnded)$")
 def raised(source: str) -> Iterator[tuple[str, str, str]]:
     """Message, limit and remedy of every error that a module makes; a dot stands for a value."""
     for node in ast.walk(ast.parse(source)):
-        name = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+        name = (
+            node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+        )
         if not ERRORS.match(name) or name in ("ValueError", "TypeError", "AttributeError"):
             continue
         assert isinstance(node, ast.Call)
@@ -206,9 +213,7 @@ def bibliography() -> str:
     style = find_plugin("pybtex.style.formatting", "plain")()
     backend = find_plugin("pybtex.backends", "markdown")()
     formatted = sorted(style.format_entries(entries.entries.values()), key=lambda one: one.key)
-    return "\n\n".join(
-        f"## {one.key}\n\n{one.text.render(backend)}" for one in formatted
-    )
+    return "\n\n".join(f"## {one.key}\n\n{one.text.render(backend)}" for one in formatted)
 
 
 TEXTS: dict[str, Callable[[], str]] = {

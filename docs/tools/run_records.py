@@ -1,4 +1,4 @@
-"""Keep what the figures and the README need of a run of uhlmann2015: python docs/tools/run_records.py.
+"""Keep what pages and figures need of a run of uhlmann2015: python docs/tools/run_records.py.
 
 Needs the results of ``./run all --config study=uhlmann2015``.
 """
@@ -23,7 +23,14 @@ def main() -> None:
     means = force.groupby(block)[["time_s", "drag_n", "lateral_n"]].mean()
     means["time_s"] -= force["time_s"].iloc[0]
     means.to_csv(out / "run_force.csv", index=False, float_format="%.5g")
-    names = ["centre_x_m", "centre_y_m", "centre_z_m", "area_m2", "force_slide_n_m", "force_slide_pa"]
+    names = [
+        "centre_x_m",
+        "centre_y_m",
+        "centre_z_m",
+        "area_m2",
+        "force_slide_n_m",
+        "force_slide_pa",
+    ]
     facets = pd.read_parquet(run.folder / "tables/facets.parquet", columns=names)
     facets.to_csv(out / "run_facets.csv", index=False, float_format="%.5g")
 

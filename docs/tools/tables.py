@@ -1,9 +1,9 @@
 """Tables that pages show: the committed records, by name.
 
 A name is the path of a file in ``docs/data`` without its ending (``motion/spin``), or one of
-`RECORDS`, and for JSON the keys that lead to a part of it (``tradeoff/settings``). A list of objects
-has one row per object, a mapping of objects one row per key (column ``name``), an object one row.
-Columns of nested objects are joined by ``_``. `DERIVED` has the tables that need more than that, and
+`RECORDS`, and for JSON the keys that lead to a part of it (``tradeoff/settings``). A list of
+objects has one row per object, a mapping of objects one row per key (column ``name``), an object
+one row. Columns of nested objects are joined by ``_``. `DERIVED` has the tables that need more, and
 ``study/<name>`` has the fields of a study, with ``_`` for a dot.
 """
 
@@ -131,8 +131,8 @@ def table(name: str) -> pd.DataFrame:
     return STORE.table(name)
 
 
-import derived_explanation  # noqa: E402, F401
 import derived_cost  # noqa: E402, F401
+import derived_explanation  # noqa: E402, F401
 import derived_settings  # noqa: E402, F401
-import derived_validation  # noqa: E402, F401
 import derived_tradeoff  # noqa: E402, F401
+import derived_validation  # noqa: E402, F401

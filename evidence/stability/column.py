@@ -21,7 +21,7 @@ _STACK = 12
 """Particles of a stack."""
 
 _TUBE_CLEARANCE = 0.02
-"""Gap between a stack's particles and its tube, as a share of the radius: the stack
+"""Gap between a stack's particles and its tube, as a fraction of the radius: the stack
 leans and has about two contacts with particles and one with the tube a particle."""
 
 _LOAD_FRACTION = 0.1

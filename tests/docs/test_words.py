@@ -11,8 +11,10 @@ from doc_pages import FENCE, name_of
 from doc_pages import PAGES as ALL_PAGES
 from paths import ROOT
 
-PAGES = [page for page in ALL_PAGES if page.name not in ("glossary.md", "renamed.md")]
-"""Those two name the words that others replace."""
+PAGES = [
+    page for page in ALL_PAGES if page.name not in ("bibliography.md", "glossary.md", "renamed.md")
+]
+"""Others quote titles, or name the words that others replace."""
 
 TERMS = ROOT / "docs/words.txt"
 """Words that the glossary replaces, in the form of codespell's dictionaries."""
@@ -26,7 +28,7 @@ PHRASES = (
     r"\bby the clock\b",
     r"\bto the last bit\b",
     r"\bgoes on from\b",
-    r"\bshare of the Rayleigh\b",
+    r"(?i)\b(the|a|this|same|what|time)? ?shares? of (the|a|all|its)\b",
     r"\bprocessor time\b",
     r"\brun-in\b",
     r"\b(soft|full) balls?\b",
@@ -34,11 +36,13 @@ PHRASES = (
 )
 """Patterns of words that read like a translation."""
 
+QUOTED = {"explanation_process": {"balls", "submersion"}}
+"""Words of the paper, in a table of its symbols."""
+
 TEMPLATES = sorted(
     file
     for folder in ("templates", "analysis", "evidence", "workflow")
-    for ending in ("*.j2", "*.txt.j2")
-    for file in (ROOT / folder).rglob(ending)
+    for file in (ROOT / folder).rglob("*.j2")
 )
 
 
@@ -53,9 +57,10 @@ def words_of(page: Path) -> str:
 
 def words_of_template(file: Path) -> str:
     """The text of a template, without tags and expressions."""
-    text = re.sub(
-        r"{[{%#].*?[}%#]}|<style.*?</style>|<script.*?</script>", " ", file.read_text(), flags=re.S
-    )
+    code = r"{[{%#].*?[}%#]}|<style.*?</style>|<script.*?</script>"
+    text = re.sub(code, " ", file.read_text(), flags=re.S)
+    if file.name.endswith(".in.j2"):  # a script of LIGGGHTS: its comments
+        return "\n".join(re.findall("^ *#(.*)", text, re.M))
     return re.sub(r"<[^>]*>", " ", text)
 
 
@@ -98,7 +103,12 @@ def test_the_spelling_is_british(texts: Path, british: Path) -> None:
 
 
 def test_the_terms_are_those_of_the_glossary(texts: Path) -> None:
-    assert misspelt(texts, str(TERMS)) == []
+    strange = [
+        line
+        for line in misspelt(texts, str(TERMS))
+        if not any(page in line and line.split()[1] in words for page, words in QUOTED.items())
+    ]
+    assert strange == []
 
 
 @pytest.mark.parametrize("file", [*PAGES, *TEMPLATES], ids=name_of)
@@ -109,8 +119,8 @@ def test_no_phrase_reads_like_a_translation(file: Path) -> None:
 
 def test_the_check_finds_what_it_is_for(tmp_path: Path, british: Path) -> None:
     (tmp_path / "page.md").write_text(
-        "The knob of recieve and color. One row a case, a row a case."
+        "The knob of recieve and center. One row a case, a row a case."
     )
     found = "\n".join(misspelt(tmp_path, "-", str(british), str(TERMS)))
-    assert all(word in found for word in ("knob", "recieve", "color"))
+    assert all(word in found for word in ("knob", "recieve", "center"))
     assert re.search(PHRASES[0], (tmp_path / "page.md").read_text())

@@ -18,7 +18,7 @@ FORCE_COLUMNS = {"force_n": 1.0, "force_mn": 1e-3, "force_kn": 1e3}
 
 _LEAST_SAMPLES = 100
 _JITTER = 0.25
-"""A time may be off an even grid by this share of the interval (rounded stamps)."""
+"""A time may be off an even grid by this fraction of the interval (rounded stamps)."""
 
 Note = Literal["sign_turned", "two_impacts"]
 """What was done to a record, and what its reader should know; the page has the words."""

@@ -28,7 +28,7 @@ _SIGNAL_TO_NOISE = 10.0
 """The first peak is at least so many standard deviations high."""
 
 _DEAD_FRACTION = 0.05
-"""What follows an impact within this share of the fall time belongs to it: a
+"""What follows an impact within this fraction of the fall time belongs to it: a
 sensor rings, and a particle with restitution 0.05 flies for twice as long."""
 
 _MAD_TO_STD = 1.4826
@@ -36,10 +36,10 @@ _MAD_TO_STD = 1.4826
 
 _CENTROID_FRACTION = 0.2
 """Force over peak that counts nothing for the time of an impact: a slow sensor's
-tail would be cut by the noise at another share of each impact."""
+tail would be cut by the noise at another fraction of each impact."""
 
 _FLAT_TOP = 0.4
-"""Share of a pulse's samples above half its height that may lie within 1 % of its
+"""Fraction of a pulse's samples above half its height that may lie within 1 % of its
 top; 0.13 for an elastic Hertz impact, whose force is nearly (sin)^1.5."""
 
 
@@ -56,7 +56,7 @@ class Impact(Part):
         Time of the largest sample, s.
     centroid_s : float
         Mean time of the pulse, weighted with what its force has above a fifth
-        of its peak, s: the same share of a large and of a small impact.
+        of its peak, s: the same fraction of a large and of a small impact.
     peak_n : float
         Largest sample above the baseline, N.
     width_s : float

@@ -20,12 +20,12 @@ def read_dump(source: Path | str, columns: Sequence[str] | None = None) -> Itera
     Parameters
     ----------
     source : Path or str
-        The file; or, of a dump with one file per frame, its pattern with ``*`` for the step.
-        A name that ends in ``.bin`` is that of a binary dump. Compressed files end in ``.gz``,
-        ``.zst``, ``.bz2`` or ``.lz4``.
+        The file; or, for a dump with one file per frame, its pattern with ``*`` for the step.
+        The ending ``.bin`` marks a binary dump; an additional ``.gz``, ``.zst``, ``.bz2`` or
+        ``.lz4`` marks a compressed one.
     columns : sequence of str, optional
-        Names of the columns. A binary dump does not contain them: name all, in their order.
-        Of a text dump, name those of its header, in any order, or none.
+        Names of the columns: required for a binary dump, in the order of its dump command; a text
+        dump must contain all of them, in any order. By default those in its header.
 
     Yields
     ------
@@ -39,8 +39,8 @@ def read_dump(source: Path | str, columns: Sequence[str] | None = None) -> Itera
     TruncatedDumpError
         If a file ends inside a frame.
     DumpError
-        If there is no such file, it is not such a dump, or a number is not finite.
-        Either error names file, frame and byte. The frames before it have been yielded.
+        If there is no such file, it is not such a dump, or a number is not finite. Both errors
+        name file, frame and byte; the frames before it have been yielded by then.
     """
     files = dump_files(source)
     yield from read_frames(files, layout_of(files[0], columns))

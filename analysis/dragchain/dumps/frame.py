@@ -39,11 +39,11 @@ class Frame:
     step : int
         The step.
     columns : dict of str to (N,) ndarray
-        The columns, N rows in no particular order; ids are int64, all others float64.
-        N may be zero and may change between frames.
+        Columns by name, N rows in no particular order; ids are int64, all others float64. N may be
+        zero and may differ between frames.
     opening : bool
-        Whether it is the first frame of its file. LIGGGHTS may write it before the first
-        step, with re-evaluated forces instead of the applied ones.
+        Whether it is the first frame of its file. If a run starts at a step with output, LIGGGHTS
+        writes this frame before its first step; its forces are re-evaluated, not those applied.
     """
 
     step: int

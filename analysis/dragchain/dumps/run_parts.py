@@ -71,8 +71,7 @@ def iter_frames(run_dir: Path | str, output: Output) -> Iterator[Frame]:
     TruncatedDumpError
         If a file ends inside a frame that no later part covers.
     DumpError
-        If a file is not such a dump, or its frames are not those that ``columns.json``
-        announces.
+        If a file is not such a dump, or its frames are not those that ``columns.json`` announces.
     """
 
     def read(file: Path) -> Iterator[_Piece]:

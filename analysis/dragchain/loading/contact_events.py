@@ -38,14 +38,14 @@ class Thresholds:
     ----------
     mobilised : float
         A contact slides in a sample if its tangential force is at least this
-        share of friction coefficient times normal force.
+        fraction of friction coefficient times normal force.
     impact_times : float
         An impact lasts no longer than this many Hertz contact times of a mean
         particle that meets the workpiece at the workpiece's speed, or than one sample if that
         is longer.
     rest : float
         A particle rests if its mean speeds of sliding and rolling add up to less
-        than this share of the workpiece's speed.
+        than this fraction of the workpiece's speed.
     slide_to_roll : float
         A particle slides if its mean speed of sliding is at least this multiple of
         that of rolling. It is 2 for a particle that slides without turning, and 0

@@ -86,7 +86,7 @@ def workpiece_figure(
 
 
 def _height_in(case: Case, fraction: float) -> float:
-    """The figure's height, that a view of this share of the width has a workpiece fill it."""
+    """The figure's height, that a view of this fraction of the width has a workpiece fill it."""
     high, low = _depths(case)
     view_in = fraction * (WIDTH_IN - _BESIDE_IN)
     fits = view_in * (low - high) / (2e3 * _half_width(case))

@@ -42,7 +42,7 @@ def percent(value: float | None) -> str:
 
 
 def fraction(value: float | None) -> str:
-    """A share of 1 as a signed percentage, a dash for none."""
+    """A fraction of 1 as a signed percentage, a dash for none."""
     return percent(None if value is None else 100 * value)
 
 

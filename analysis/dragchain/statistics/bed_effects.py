@@ -22,7 +22,7 @@ Combination = tuple[tuple[str, Hashable], ...]
 """Factors and their levels, those of the reference left out."""
 
 _LARGEST_FRACTION = 0.98
-"""Largest share of the variance that a bed is allowed to explain."""
+"""Largest fraction of the variance that a bed is allowed to explain."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def fit_effects(
 
 
 def _best_fraction(design: Floats, values: Floats, same_bed: Floats) -> float:
-    """The share of the beds that maximises the restricted likelihood at the best variance."""
+    """The fraction of the beds that maximises the restricted likelihood at the best variance."""
 
     def loss(fraction: float) -> float:
         model = Whitened.of(design, values, alike(same_bed, fraction))

@@ -32,7 +32,7 @@ class MeanEstimate:
     autocorrelation_samples : float
         Integrated autocorrelation time, in samples; 1/2 for independent ones.
     effective_samples : float
-        Number of independent samples whose mean has the same standard error.
+        Number of independent samples with the same standard error of the mean.
     se : float
         Standard error of the mean, in the unit of the series.
     ci95_low, ci95_high : float
@@ -41,7 +41,7 @@ class MeanEstimate:
         Confidence level of the interval.
     reliable : bool
         Whether the series is at least 50 autocorrelation times long and not
-        constant. If not, the interval contains the mean less often than its level states.
+        constant. If not, the interval is probably too narrow.
     """
 
     mean: float
@@ -57,7 +57,7 @@ class MeanEstimate:
 
 
 def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanEstimate:
-    """Mean of a correlated series, with a confidence interval that accounts for the correlation.
+    """Estimate the mean of a correlated series and its confidence interval.
 
     The standard error is ``std / sqrt(n)`` with ``n = N / (2 tau)`` (Sokal 1997,
     section 2). The interval uses Student's t with n - 1 degrees of freedom, at least 1.
@@ -72,7 +72,7 @@ def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanE
     Returns
     -------
     MeanEstimate
-        The mean with its standard error and interval.
+        Mean, standard error, confidence interval and autocorrelation time.
 
     Raises
     ------

@@ -24,7 +24,7 @@ _LEAST_LEVELS = 3
 """A line through two levels always fits."""
 
 _LARGEST_FRACTION = 0.9
-"""Largest share of the variance that a bed is allowed to explain."""
+"""Largest fraction of the variance that a bed is allowed to explain."""
 
 _SPREADS = (1e-4, 2.0)
 """Limits of the standard deviation between runs, in logarithms."""

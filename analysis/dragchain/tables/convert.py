@@ -19,9 +19,7 @@ def dump_to_parquet(
     source : Path or str
         As in `read_dump`.
     target : Path or str
-        The table: ``step``, then the dump's columns.
-    columns : sequence of str, optional
-        As in `read_dump`.
+        Parquet file to write, with the column ``step`` and those of the dump.
 
     Returns
     -------
@@ -31,8 +29,7 @@ def dump_to_parquet(
     Raises
     ------
     TruncatedDumpError, DumpError
-        As in `read_dump`. The table then contains the frames before it, and the error states
-        how many.
+        As in `read_dump`. The table then contains the frames before the error.
     """
     files = dump_files(source)
     output = layout_of(files[0], columns)

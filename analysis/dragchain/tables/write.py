@@ -67,8 +67,8 @@ class Table:
 def write_tables(run_dir: Path | str) -> list[Path]:
     """Make the tables of a run.
 
-    A table appears under its name only once it is complete. Tables that need an output
-    that ``columns.json`` does not list are not made.
+    A table gets its final name only when it is complete. Tables whose outputs are not listed in
+    ``columns.json`` are not made.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from dragchain.tradeoff.six_digits import Number, SixDigits
 
 
 class LoadMapEntry(Part):
-    """How far load maps differ: sums over bins of the absolute difference of shares of the load.
+    """How far load maps differ: sums over bins of the absolute difference of fractions of the load.
 
     Attributes
     ----------

@@ -125,7 +125,7 @@ def coverage(tradeoff: Tradeoff, name: str, trials: int = TRIALS) -> float | Non
     """How often an interval of this plan holds the truth, from simulated runs.
 
     Runs at the same settings and beds get values without any effect, with the
-    scatter and the bed's share of a quantity, and are compared just as the
+    scatter and the bed's fraction of a quantity, and are compared just as the
     measured ones: the share is estimated and additivity tested anew each time.
 
     Parameters

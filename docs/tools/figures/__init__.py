@@ -35,7 +35,9 @@ def svg(name: str) -> str:
     with drawing(), matplotlib.rc_context({"svg.hashsalt": "dragdeck", "svg.fonttype": "path"}):
         figure = import_module(f"figures.{name}").draw()
         text = StringIO()
-        figure.savefig(text, format="svg", bbox_inches="tight", metadata={"Date": None, "Creator": None})
+        figure.savefig(
+            text, format="svg", bbox_inches="tight", metadata={"Date": None, "Creator": None}
+        )
     return "\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n"
 
 

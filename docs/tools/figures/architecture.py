@@ -34,11 +34,21 @@ def draw() -> Figure:
         for row, packages in enumerate(rows):
             _layer(axes, x, -0.55 * row, packages, colour)
     deepest = -0.55 * max(map(len, columns.values()))
-    for start, end, text in ((WIDTH, 3.9, "files:\nrun folders,\ncase.json"), (6.9, 7.8, "imports\nboth")):
+    for start, end, text in (
+        (WIDTH, 3.9, "files:\nrun folders,\ncase.json"),
+        (6.9, 7.8, "imports\nboth"),
+    ):
         y = -0.55 * 4
-        axes.annotate("", (end, y), (start, y), arrowprops={"arrowstyle": "<|-|>" if end < 5 else "<|-", "color": GREY})
+        axes.annotate(
+            "",
+            (end, y),
+            (start, y),
+            arrowprops={"arrowstyle": "<|-|>" if end < 5 else "<|-", "color": GREY},
+        )
         axes.text((start + end) / 2, y - 0.1, text, ha="center", va="top", fontsize=8, color=GREY)
-    axes.annotate("", (-0.3, deepest + 0.3), (-0.3, 0.0), arrowprops={"arrowstyle": "-|>", "color": INK})
+    axes.annotate(
+        "", (-0.3, deepest + 0.3), (-0.3, 0.0), arrowprops={"arrowstyle": "-|>", "color": INK}
+    )
     axes.text(-0.45, deepest / 2, "imports", rotation=90, va="center", ha="right", fontsize=9)
     axes.set(xlim=(-0.9, 10.9), ylim=(deepest, 0.7))
     axes.axis("off")
@@ -51,9 +61,18 @@ def _layer(axes: Axes, x: float, y: float, packages: list[str], colour: str) -> 
         corner = (x + place * width + 0.03, y - HEIGHT / 2)
         axes.add_patch(
             FancyBboxPatch(
-                corner, width - 0.06, HEIGHT - 0.06, boxstyle="round,pad=0,rounding_size=0.06",
-                fc=colour, alpha=0.14, ec="none",
-            )  # fmt: skip
+                corner,
+                width - 0.06,
+                HEIGHT - 0.06,
+                boxstyle="round,pad=0,rounding_size=0.06",
+                fc=colour,
+                alpha=0.14,
+                ec="none",
+            )
         )
+        if len(packages) > 3:
+            name = name.replace("_", "_\n")
         small = 6.0 if len(packages) > 3 else 8.0
-        axes.text(corner[0] + width / 2 - 0.03, y - 0.03, name.replace("_", "_\n") if len(packages) > 3 else name, ha="center", va="center", fontsize=small)  # fmt: skip
+        axes.text(
+            corner[0] + width / 2 - 0.03, y - 0.03, name, ha="center", va="center", fontsize=small
+        )

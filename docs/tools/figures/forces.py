@@ -7,18 +7,34 @@ from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE
 
 
 def draw() -> Figure:
-    """Draw it: means over short blocks, the mean of the run, and what the paper measured and simulated."""
+    """Draw means over short blocks, the mean of the run, and those of the paper."""
     force, run = table("validation/run_force"), table("validation/run").iloc[0]
     study = table("study/uhlmann2015").iloc[0]
     mean, std = study["reference_experiment_drag_mean_n"], study["reference_experiment_drag_std_n"]
     figure = Figure(figsize=(7.6, 3.2), layout="constrained")
     axes = figure.subplots()
-    axes.axhspan(mean - std, mean + std, color=GREEN, alpha=0.15, lw=0, label="experiment, mean ± standard deviation")
+    axes.axhspan(
+        mean - std,
+        mean + std,
+        color=GREEN,
+        alpha=0.15,
+        lw=0,
+        label="experiment, mean ± standard deviation",
+    )
     axes.axhline(mean, color=GREEN, ls="--", lw=1)
-    axes.axhline(study["reference_simulation_drag_mean_n"], color=ORANGE, ls=":", label="simulation of Uhlmann et al. (2015), mean")
+    axes.axhline(
+        study["reference_simulation_drag_mean_n"],
+        color=ORANGE,
+        ls=":",
+        label="simulation of Uhlmann et al. (2015), mean",
+    )
     axes.plot(force["time_s"], force["lateral_n"], color=GREY, lw=0.7, label="lateral force")
     axes.plot(force["time_s"], force["drag_n"], color=BLUE, lw=0.8, label="drag force, 20 ms means")
     axes.axhline(run["drag_mean_n"], color=BLUE, lw=1.2)
-    axes.set(xlabel="time since the start of the drag (s)", ylabel="force on the workpiece (N)", xlim=(0, force["time_s"].max()))
+    axes.set(
+        xlabel="time since the start of the drag (s)",
+        ylabel="force on the workpiece (N)",
+        xlim=(0, force["time_s"].max()),
+    )
     figure.legend(loc="outside lower left", ncols=2)
     return figure

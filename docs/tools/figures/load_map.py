@@ -32,8 +32,9 @@ def draw() -> Figure:
     axes.text(-176, -1, "bed surface", fontsize=8, va="bottom")
     axes.set(
         xlabel="azimuth from the direction of motion, counter-clockwise (degrees)",
-        ylabel="depth (mm)", xticks=range(-180, 181, 45),
-    )  # fmt: skip
+        ylabel="depth (mm)",
+        xticks=range(-180, 181, 45),
+    )
     axes.invert_yaxis()
     axes.grid(visible=False)
     figure.colorbar(shown, label="load-distance integral per area\nand path length (N/m²)")

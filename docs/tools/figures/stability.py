@@ -29,7 +29,10 @@ def draw() -> Figure:
     for axes, (regime, title) in zip(panels, TITLES.items(), strict=True):
         _panel(axes, points[points["regime"] == regime])
         axes.set_title(title)
-    handles = [Patch(color=colour, label=name.replace("engine", "LIGGGHTS")) for name, colour in COLOURS.items()]
+    handles = [
+        Patch(color=colour, label=name.replace("engine", "LIGGGHTS"))
+        for name, colour in COLOURS.items()
+    ]
     handles.append(Patch(fill=False, ec=INK, label="critical time step of the contacts (line)"))
     figure.legend(handles=handles, loc="outside lower left", ncols=4)
     return figure

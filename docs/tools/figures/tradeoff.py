@@ -27,31 +27,53 @@ def draw() -> Figure:
         value = 100 * own["value"]
         sides = [value - 100 * own["ci95_low"], 100 * own["ci95_high"] - value]
         axes.errorbar(
-            1 / own["relative_cost"], value, sides, fmt=mark, color=shade, capsize=2, lw=1,
+            1 / own["relative_cost"],
+            value,
+            sides,
+            fmt=mark,
+            color=shade,
+            capsize=2,
+            lw=1,
             label=f"Young's modulus x {level:g}",
-        )  # fmt: skip
+        )
     best, words = np.inf, []
     for row in rows.itertuples():
         if row.bound >= best:
             continue
         best = row.bound
         speed = f", speed x {row.speed_factor:g}" if row.speed_factor != 1 else ""
-        words.append(f"{len(words) + 1}  E x {row.youngs_modulus_scale:g}, {row.timestep_fraction:.0%}{speed}")
+        words.append(
+            f"{len(words) + 1}  E x {row.youngs_modulus_scale:g}, "
+            f"{row.timestep_fraction:.0%}{speed}"
+        )
         place = (1 / row.relative_cost, 100 * row.ci95_high)
         axes.annotate(
-            str(len(words)), place, (0, 3), textcoords="offset points", fontsize=8.5,
-            weight="bold", color=INK, ha="center",
-        )  # fmt: skip
+            str(len(words)),
+            place,
+            (0, 3),
+            textcoords="offset points",
+            fontsize=8.5,
+            weight="bold",
+            color=INK,
+            ha="center",
+        )
     words.insert(0, "Pareto-optimal by cost and\n95 % bound of the error:")
     figure.text(1.0, 0.93, "\n".join(words), fontsize=8, va="top", color=INK)
     axes.text(
-        0.01, 100 * TOLERANCE - 0.4, "within 10 %", fontsize=8, color=GREY, va="top",
+        0.01,
+        100 * TOLERANCE - 0.4,
+        "within 10 %",
+        fontsize=8,
+        color=GREY,
+        va="top",
         transform=axes.get_yaxis_transform(),
-    )  # fmt: skip
+    )
     axes.set(
-        xscale="log", xlabel="CPU time of the reference / CPU time of the setting",
-        ylabel="error of the mean drag (%), 95 % CI", ylim=(-17, 22),
-    )  # fmt: skip
+        xscale="log",
+        xlabel="CPU time of the reference / CPU time of the setting",
+        ylabel="error of the mean drag (%), 95 % CI",
+        ylim=(-17, 22),
+    )
     log_ticks(axes.xaxis, steps=(1.0, 3.0))
     axes.legend(loc="lower left", ncols=3)
     return figure

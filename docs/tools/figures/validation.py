@@ -29,7 +29,9 @@ def draw() -> Figure:
     axes.axvline(measured, color=GREEN, ls="--", label="Uhlmann et al. (2015), experiment")
     axes.axvline(published, color=ORANGE, ls=":", label="Uhlmann et al. (2015), simulation")
     for place, (_, value, low, high, colour) in enumerate(rows):
-        axes.errorbar(value, -place, xerr=[[value - low], [high - value]], fmt="o", color=colour, capsize=2)
+        axes.errorbar(
+            value, -place, xerr=[[value - low], [high - value]], fmt="o", color=colour, capsize=2
+        )
     axes.set_yticks([-place for place in range(len(rows))], [row[0] for row in rows])
     axes.set_xlabel("mean drag force (N), 95 % CI")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
@@ -38,5 +40,9 @@ def draw() -> Figure:
 
 
 def _short(field: str) -> str:
-    names = {"workpiece.shape.radius_m": "workpiece radius", "motion.path.radius_m": "path radius", "bowl.radius_m": "bowl radius"}
+    names = {
+        "workpiece.shape.radius_m": "workpiece radius",
+        "motion.path.radius_m": "path radius",
+        "bowl.radius_m": "bowl radius",
+    }
     return names.get(field, field)

@@ -13,7 +13,9 @@ SMALLEST = 1e-12
 def draw() -> Figure:
     """Draw one bar per quantity; tests whose tolerance is no number are left out."""
     rows = table("verification/shown")
-    rows = rows.assign(tolerance=pd.to_numeric(rows["tolerance"], errors="coerce")).dropna(subset=["tolerance"])
+    rows = rows.assign(tolerance=pd.to_numeric(rows["tolerance"], errors="coerce")).dropna(
+        subset=["tolerance"]
+    )
     ratio = (rows["largest_error"] / rows["tolerance"]).clip(lower=SMALLEST)
     names = [f"{row.tests} {row.subject}: {row.about}" for row in rows.itertuples()]
     figure = Figure(figsize=(8.6, 0.21 * len(rows) + 0.9), layout="constrained")

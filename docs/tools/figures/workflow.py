@@ -30,7 +30,7 @@ def rule_graph() -> tuple[dict[str, str], set[tuple[str, str]]]:
 def shortest(edges: set[tuple[str, str]]) -> set[tuple[str, str]]:
     """The edges that no longer way replaces."""
     after = defaultdict(set)
-    for start, end in edges:
+    for start, end in sorted(edges):
         after[start].add(end)
 
     def reached(start: str) -> set[str]:
@@ -57,10 +57,19 @@ def draw() -> Figure:
         places[one] = place
     figure = Figure(figsize=(11.0, 4.2), layout="constrained")
     axes = figure.subplots()
-    for start, end in edges:
-        axes.annotate("", places[end], places[start], arrowprops={
-            "arrowstyle": "-|>", "color": GREY, "lw": 0.9, "shrinkA": 26, "shrinkB": 28,
-        })  # fmt: skip
+    for start, end in sorted(edges):
+        axes.annotate(
+            "",
+            places[end],
+            places[start],
+            arrowprops={
+                "arrowstyle": "-|>",
+                "color": GREY,
+                "lw": 0.9,
+                "shrinkA": 26,
+                "shrinkB": 28,
+            },
+        )
     for one, (x, y) in places.items():
         colour = COLOURS.get(labels[one].partition("_")[0], GREY)
         text = labels[one].removesuffix("_of_process").replace("_", "\n", 1)

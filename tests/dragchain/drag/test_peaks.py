@@ -41,7 +41,7 @@ def test_a_constant_series_has_no_peaks() -> None:
 
 
 def test_peaks_need_equal_intervals_and_some_samples() -> None:
-    with pytest.raises(SeriesError, match="equal intervals"):
+    with pytest.raises(SeriesError, match="constant sampling interval"):
         find_drag_peaks(np.array([0, 1, 2, 4.0]), np.zeros(4), min_separation_s=1.0)
     with pytest.raises(SeriesError, match="at least 3"):
         find_drag_peaks(np.array([0, 1.0]), np.zeros(2), min_separation_s=1.0)

@@ -1,7 +1,6 @@
 """What other programs' readers find in an export is what the tables hold."""
 
 import json
-import re
 import shlex
 import shutil
 import subprocess
@@ -15,7 +14,6 @@ import pyarrow.parquet as pq
 import pytest
 import pyvista as pv
 from analysed_run import analysed_tiny_run
-from paths import ROOT
 from tiny_run_files import (
     CHAIN_Z_M,
     LAST,
@@ -552,15 +550,6 @@ def test_the_command_tells_size_and_file(run: Path, tmp_path: Path, capsys) -> N
     assert main(["export", str(run), *arguments]) == 1
     assert "already contains an export" in capsys.readouterr().err
     assert main(["export", str(run), *arguments, "--replace"]) == 0
-
-
-def test_the_pages_lines_run(run: Path, monkeypatch) -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/export.md").read_text(), re.DOTALL)
-    monkeypatch.chdir(write_export(run, "paraview").file.parent)
-    names: dict[str, Any] = {}
-    exec(code, names)
-    assert names["spheres"].n_cells > 4 * 100
-    assert names["pushed"].n_cells == 3
 
 
 PEAK = """

@@ -3,7 +3,7 @@
 Steps per second depend on the number of particles and of contacts, hardly on the
 modulus. So a soft bed is settled, which takes few steps, and the workpiece is
 dragged through it for some thousand of them. What happens in one step, the way
-of the workpiece and the share of steps with output, is that of the settings asked.
+of the workpiece and the fraction of steps with output, is that of the settings asked.
 """
 
 import math

@@ -37,7 +37,7 @@ _OTHER_RESTITUTIONS = _RESTITUTIONS[::2]
 """With the contact option that the study does not use."""
 
 _PHASES = 4
-"""Production drops per deck value. Their heights differ by a share of a step's
+"""Production drops per deck value. Their heights differ by a fraction of a step's
 path, so that the first contact begins at another place within a time step."""
 
 _REFERENCE_FRACTION = 0.01
@@ -47,7 +47,7 @@ _TRIAL_FRACTION = 0.005
 """Time step of a trial's record over the Rayleigh time: half the sweep's finest."""
 
 _GOLDEN = 0.618
-"""Share of a step between the phases of reference drops, one a deck value."""
+"""Fraction of a step between the phases of reference drops, one a deck value."""
 
 _TRIAL_RANGE = (0.5, 0.9)
 """Deck values of the trials' records."""
@@ -226,7 +226,7 @@ def trials(study: Study, count: int, seed: int) -> Iterator[Drop]:
 
 
 def full(study: Study, fraction: float) -> DropFidelity:
-    """Full modulus, and a step that is a share of the mean particle's Rayleigh time."""
+    """Full modulus, and a step that is a fraction of the mean particle's Rayleigh time."""
     rayleigh = mechanics.rayleigh_time(particle_material(study), study.media.radius_mean_m)
     return DropFidelity(1.0, timestep(rayleigh, fraction))
 

@@ -1,4 +1,4 @@
-"""What to expect of a time step: shares of the Rayleigh time, steps per contact, errors.
+"""What to expect of a time step: fractions of the Rayleigh time, steps per contact, errors.
 
 The errors and the safe steps were measured on the engine by the stability map;
 ``data/stability.json`` holds them with engine version and date.

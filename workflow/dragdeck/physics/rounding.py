@@ -17,7 +17,7 @@ def rounded(value: float, *, up: bool) -> float:
 
 
 def timestep(rayleigh_s: float, fraction: float) -> float:
-    """A share of the Rayleigh time, rounded down to four significant digits, s."""
+    """A fraction of the Rayleigh time, rounded down to four significant digits, s."""
     exact = rayleigh_s * fraction
     unit = 10.0 ** (math.floor(math.log10(exact)) - 3)
     return round_to(math.floor(exact / unit * (1 + 1e-12)) * unit, 4)

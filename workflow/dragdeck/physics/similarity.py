@@ -10,7 +10,7 @@ from dragdeck.physics.rounding import rounded
 from dragdeck.study.model import Study
 
 SAME_NUMBER = 0.02
-"""Scenes whose numbers differ by no more than this share count as the same: the
+"""Scenes whose numbers differ by no more than this fraction count as the same: the
 solid fraction behind the numbers is not known better."""
 
 _FASTEST_FACTOR = 100.0

@@ -17,7 +17,7 @@ from dragdeck.study.base import Json
 from dragdeck.study.model import Study
 
 _MARGIN = 0.5
-"""Steps written before and after a contact, as a share of its Hertz time."""
+"""Steps written before and after a contact, as a fraction of its Hertz time."""
 
 
 @dataclass(frozen=True, kw_only=True)
