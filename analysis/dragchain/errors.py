@@ -1,4 +1,4 @@
-"""The errors that reading and analysing a run can end in."""
+"""The errors of reading and analysing a run."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -83,7 +83,7 @@ class DumpError(DragchainError):
         super().__init__()
 
     def __str__(self) -> str:
-        """What was found where, what should have stood there, what is kept."""
+        """Problem with its place, what was expected, and what is intact."""
         place = [f"{self.file}"]
         if self.frame is not None:
             place.append(f"frame {self.frame}")
@@ -134,7 +134,7 @@ class UnknownNameError(DragchainError):
 
 
 class ExportError(DragchainError):
-    """A run that cannot be written for another program, or not there."""
+    """An export that cannot be made, or not in this place."""
 
 
 class SeriesError(DragchainError):

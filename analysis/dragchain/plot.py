@@ -30,7 +30,11 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
     ax : Axes, optional
         Axes to draw on.
     peaks : bool
-        Mark the peaks of the drag.
+        Whether to mark the peaks of the drag.
+
+    Returns
+    -------
+    Axes
     """
     found, ax = run.findings, _axes(ax)
     run_panels.forces(ax, run, found)
@@ -42,7 +46,9 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
 
 
 def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axes:
-    """Bottleneck force (N) of the dominant path from workpiece to bowl over process time (s).
+    """Plot the bottleneck force (N) of the dominant path against process time (s).
+
+    The dominant path of a frame is the path from workpiece to bowl with the largest bottleneck.
 
     Parameters
     ----------
@@ -51,7 +57,11 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
     ax : Axes, optional
         Axes to draw on.
     peaks : bool
-        Draw a line at the time of each peak of the drag.
+        Whether to draw a line at the time of each peak of the drag.
+
+    Returns
+    -------
+    Axes
     """
     found, ax = run.findings, _axes(ax)
     run_panels.bottlenecks(ax, run, found)
@@ -98,7 +108,11 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
     ax : Axes, optional
         Axes to draw on.
     total : bool
-        Draw the sum of the normal forces per depth (N/mm) instead.
+        Whether to plot the sum of the normal forces per depth (N/mm) instead.
+
+    Returns
+    -------
+    Axes
     """
     found, ax = run.findings, _axes(ax)
     draw = run_panels.load_over_depth if total else run_panels.force_over_depth
@@ -107,7 +121,7 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
 
 
 def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
-    """Fraction of the force chains by number of particles, for both definitions.
+    """Plot the fraction of force chains by number of particles, for both definitions.
 
     Widest paths are included if they reach the bowl.
 
@@ -136,12 +150,12 @@ def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
 
 
 def contact_forces(run: FinishedRun, ax: Axes | None = None, *, kind: str | None = None) -> Axes:
-    """Probability density of the normal contact forces, divided by their mean.
+    """Plot the probability density of the normal contact forces relative to their mean.
 
     Parameters
     ----------
     run : FinishedRun
-        A process run; its network frames in the statistics are used.
+        A process run; the network frames in its statistics are used.
     ax : Axes, optional
         Axes to draw on.
     kind : str, optional

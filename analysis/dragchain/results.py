@@ -62,7 +62,7 @@ def _table(name: str, rows: str) -> "cached_property[pd.DataFrame]":
 
 
 class FinishedRun(RunData):
-    """A run with its tables, each read when it is first used and kept.
+    """A run with its tables, each of which is read on first use and kept in memory.
 
     Reading a table that was not made raises `TableError`, which names the command that makes it.
 
@@ -71,13 +71,13 @@ class FinishedRun(RunData):
     folder : Path
         The run folder.
     case : Case
-        What the run models: ``case.json``.
+        Content of ``case.json``: the simulated case and its settings.
     force, workpiece_contacts, facets, events : DataFrame
-        Of a process: force on the workpiece, contacts on it, its facets, contact events.
+        Process only: force on the workpiece, contacts on it, its facets, and contact events.
     particles, contacts, network, clusters, chains : DataFrame
-        Of a process: the network frames. A filling has ``particles``, too.
+        Process only: the frames of the contact network. A filling also has ``particles``.
     impacts : DataFrame
-        Of a drop test.
+        Drop test only: one row per impact.
     thermo : DataFrame
         Kinetic energies over time.
 
@@ -101,17 +101,17 @@ class FinishedRun(RunData):
 
     @classmethod
     def open(cls, folder: Path) -> "FinishedRun":
-        """Read the case of a run folder; `DocumentError` if it has none."""
+        """Open the folder of a run; `DocumentError` if it contains no ``case.json``."""
         return cls(folder, load_case(folder))
 
     @property
     def name(self) -> str:
-        """Name of the case; of a filling or a drop test the run id."""
+        """Name of the case; for a filling or a drop test the run id."""
         return self.case.case or self.case.run
 
     @cached_property
     def units(self) -> Mapping[str, str]:
-        """Units of the columns of all tables: ``1`` for plain numbers, empty for text and flags."""
+        """Unit of each column of all tables: ``1`` if dimensionless, empty for text and flags."""
         return _units(self._file(name) for name in _TABLES[self.case.scene])
 
     def describe(self, column: str) -> str:
@@ -147,9 +147,9 @@ class FinishedRun(RunData):
         Raises
         ------
         UnknownNameError
-            If runs of this scene have no such table, or the table no such column.
+            If the scene has no such table, or the table no such column.
         TableError
-            If the table was not made; the message names the command that makes it.
+            If the table does not exist; the message names the command that makes it.
         """
         tables = _TABLES[self.case.scene]
         if name not in tables:
@@ -176,7 +176,7 @@ class FinishedRun(RunData):
         return ProcessFindings.read(file) if file.is_file() else process_findings(self)
 
     def upstream(self, scene: Literal["filling", "drop_test"]) -> "FinishedRun":
-        """The filling that a process run starts from, or its drop test.
+        """Filling or drop test that belongs to a process run.
 
         Parameters
         ----------
@@ -217,7 +217,7 @@ class Study:
     folder : Path
         ``results/<study>``.
     runs : tuple of FinishedRun
-        Sorted by the names of their cases. Each workpiece of several is a run of its own.
+        Sorted by name of the case. With several workpieces, each is a separate run.
     """
 
     folder: Path

@@ -1,4 +1,4 @@
-"""A frame of a dump, and how an output is laid out."""
+"""A frame of a dump, and the layout of an output."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,11 +23,11 @@ class Layout(Protocol):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Our name of each column."""
+        """Name of each column in dragchain."""
 
     @property
     def header(self) -> tuple[str, ...]:
-        """What LIGGGHTS writes for each of them in the header of a text file."""
+        """Name of each column in the header of a text file."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Frame:
     Attributes
     ----------
     step : int
-        The step.
+        Number of the time step.
     columns : dict of str to (N,) ndarray
         Columns by name, N rows in no particular order; ids are int64, all others float64. N may be
         zero and may differ between frames.
@@ -75,5 +75,5 @@ class Frame:
 
 
 def is_integer_column(name: str) -> bool:
-    """Whether a column counts or names things, which makes it int64 in tables."""
+    """Whether a column contains counts or identifiers, which are int64 in tables."""
     return name in ("step", "n_particles", "id", "type") or name.endswith("_id")
