@@ -19,6 +19,9 @@ STUDY = "quickstart"
 SHORT_S = 300
 """No command takes as long."""
 
+WAYPOINTS = "time_s,x_m,y_m\n0,0.02,0\n2,0,0.02\n5,-0.02,0\n"
+"""A recorded path that examples name."""
+
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
 
@@ -77,26 +80,26 @@ def calls(text: str) -> Iterator[list[str]]:
 
 
 NOT_SNAKEMAKE = ("dragdeck", "dragchain", "setup", "test", "docs", "web", "status", "open")
+CALLS = sorted({" ".join(words) for _, text in LONG for words in calls(text)})
 
 
-@pytest.mark.parametrize(("page", "text"), LONG, ids=numbered(LONG))
-def test_a_long_command_would_run(clone: Path, page: Path, text: str) -> None:
-    """Targets of Snakemake run dry; of other programs the help must know the option."""
-    for words in calls(text):
-        match words:
-            case ["./run", target, *_] if target not in NOT_SNAKEMAKE:
-                ran = shell(" ".join([*words, "--dry-run"]), clone)
-            case ["snakemake", *_]:
-                ran = shell(" ".join([*words, "--dry-run", "--cores", "1"]), clone)
-            case ["./run", "dragdeck" | "dragchain" as program, command, *_]:
-                ran = shell(f"{program} {command} --help", clone)
-            case ["./run", own, *_]:
-                ran = shell(f"./run --help | grep -F 'run {own}'", clone)
-            case ["python", script, *_]:
-                ran = shell(f"python {script} --help", clone)
-            case _:
-                pytest.fail(f"{name_of(page)}: {' '.join(words)}: mark it `sh elsewhere`")
-        assert ran.returncode == 0, f"{' '.join(words)}\n{ran.stdout[-2000:]}\n{ran.stderr[-2000:]}"
+@pytest.mark.parametrize("call", CALLS)
+def test_a_long_command_would_run(clone: Path, call: str) -> None:
+    """Targets of Snakemake run dry; of other programs the help must know the command."""
+    match call.split():
+        case ["./run", target, *_] if target not in NOT_SNAKEMAKE:
+            ran = shell(f"{call} --dry-run", clone)
+        case ["snakemake", *_]:
+            ran = shell(f"{call} --dry-run --cores 1", clone)
+        case ["./run", "dragdeck" | "dragchain" as program, command, *_]:
+            ran = shell(f"{program} {command} --help", clone)
+        case ["./run", own, *_]:
+            ran = shell(f"./run --help | grep -F 'run {own}'", clone)
+        case ["python", script, *_]:
+            ran = shell(f"python {script} --help", clone)
+        case _:
+            pytest.fail(f"{call}: mark its block `sh elsewhere`")
+    assert ran.returncode == 0, f"{ran.stdout[-2000:]}\n{ran.stderr[-2000:]}"
 
 
 @pytest.mark.parametrize("page", sorted({page for page, _ in PYTHON}), ids=name_of)
@@ -113,6 +116,7 @@ def test_an_example_of_a_study_is_valid(clone: Path, page: Path, text: str) -> N
     base = {} if "materials" in example and "motion" in example else {"extends": "uhlmann2015"}
     folder = clone / "studies/example"
     folder.mkdir(exist_ok=True)
+    (folder / "path.csv").write_text(WAYPOINTS)
     (folder / "study.yaml").write_text(yaml.safe_dump({**base, "title": "Example", **example}))
     assert Project(clone).cases("example")
 
