@@ -24,6 +24,8 @@ copybutton_prompt_text = r"\$ "
 
 html_theme = "pydata_sphinx_theme"
 html_title = "dragdeck"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_theme_options = {
     "navigation_with_keys": False,

@@ -101,12 +101,20 @@ FENCE = re.compile(r"^( *)(```+).*?^\1\2 *$", re.M | re.S)
 """A block of code, in which nothing is made."""
 
 
+BLOCK_OR_CODE = re.compile(
+    rf"{BLOCK.pattern}|(?P<code>^(?P<indent> *)(?P<ticks>```+).*?^(?P=indent)(?P=ticks) *$)",
+    re.M | re.S,
+)
+"""The first of both: what is made may contain code, and code may show blocks."""
+
+
 def _typed(text: str, work: Callable[[str], str]) -> str:
     """A text whose parts outside of code blocks are replaced by what a function makes of them."""
     parts, end = [], 0
-    for code in FENCE.finditer(text):
-        parts += [work(text[end : code.start()]), code[0]]
-        end = code.end()
+    for found in BLOCK_OR_CODE.finditer(text):
+        if found["code"]:
+            parts += [work(text[end : found.start()]), found["code"]]
+            end = found.end()
     return "".join([*parts, work(text[end:])])
 
 

@@ -4,7 +4,8 @@ import argparse
 import ast
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -101,7 +102,8 @@ def _document(file: Path) -> str:
     name = file.name.removesuffix(".schema.json")
     parts = [f"## `{name}`", _first(schema), _keys(schema)]
     for part, inner in schema.get("$defs", {}).items():
-        parts += [f"**{part}**: {_first(inner)}", _keys(inner)]
+        if said := _first(inner):
+            parts += [f"**{part}**: {said}", _keys(inner)]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -169,34 +171,60 @@ def messages() -> str:
 
 ERRORS = re.compile(r"^(_?[a-z_]*error|[A-Z]\w*Error|Refusal|EngineEnded)$")
 
+IN_ORDER = {
+    "Refusal": ("message", "value", "limit", "remedy"),
+    "EngineEnded": ("message", "remedy"),
+}
+"""The arguments of errors that take no keywords."""
+
+LINE = re.compile(r"\s*\b(value|limit|remedy): +")
+"""Where another line starts in a message that is a single text."""
+
 
 def raised(source: str) -> Iterator[tuple[str, str, str]]:
-    """Message, limit and remedy of every error that a module makes; a dot stands for a value."""
-    for node in ast.walk(ast.parse(source)):
+    """Message, limit and remedy of every error that a module makes; an ellipsis is a value."""
+    tree = ast.parse(source)
+    texts = [
+        (node.lineno, node.targets[0].id, node.value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+    ]
+    for node in ast.walk(tree):
         name = (
             node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
         )
         if not ERRORS.match(name) or name in ("ValueError", "TypeError", "AttributeError"):
             continue
         assert isinstance(node, ast.Call)
-        texts = [text for argument in node.args if (text := _text(argument))]
-        given = {item.arg: _text(item.value) for item in node.keywords if item.arg}
-        texts += [given[key] for key in ("problem", "message") if given.get(key)]
-        if texts:
-            message = max(texts, key=len)
+        line = node.lineno
+        before = {
+            given: value for at, given, value in sorted(texts, key=itemgetter(0)) if at < line
+        }
+        found = [_text(argument, before) for argument in node.args]
+        given = {item.arg: _text(item.value, before) for item in node.keywords if item.arg}
+        if name in IN_ORDER:
+            given |= dict(zip(IN_ORDER[name], found, strict=False))
+            found = []
+        found += [given.get(key, "") for key in ("problem", "message")]
+        message, *more = LINE.split(max(found, key=len))
+        given |= dict(zip(more[::2], more[1::2], strict=True))
+        if message:
             yield message, given.get("limit") or "", given.get("remedy") or ""
 
 
-def _text(node: ast.expr) -> str:
+def _text(node: ast.expr, known: Mapping[str, ast.expr]) -> str:
     """A text as it stands in the code, with an ellipsis for each value."""
     if isinstance(node, ast.Constant):
         return node.value if isinstance(node.value, str) else ""
+    if isinstance(node, ast.Name) and node.id in known:
+        others = {name: value for name, value in known.items() if name != node.id}
+        return _text(known[node.id], others)
     if isinstance(node, ast.JoinedStr):
-        return "".join(_text(part) or "…" for part in node.values)
+        return "".join(_text(part, {}) or "…" for part in node.values)
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
-        return _text(node.left) + _text(node.right)
+        return (_text(node.left, known) or "…") + (_text(node.right, known) or "…")
     if isinstance(node, ast.IfExp):
-        return " / ".join(filter(None, (_text(node.body), _text(node.orelse))))
+        return " / ".join(filter(None, (_text(node.body, known), _text(node.orelse, known))))
     return ""
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from blocks import Block, Records, blocks, selected
+from blocks import Block, Records, blocks, renewed, selected
 from doc_pages import PAGES, name_of, prose
 from page_files import changed_pages
 from paths import ROOT
@@ -38,6 +38,15 @@ TEXTS = {
 def test_every_page_is_up_to_date() -> None:
     """`./run docs` renews them."""
     assert [name_of(page) for page, _ in changed_pages()] == []
+
+
+def test_a_made_part_may_contain_code_and_code_may_show_a_block() -> None:
+    code = "```text\n{}\n```"
+    shown = "```markdown\n<!-- text help -->old<!-- end -->\n```\n"
+    page = "<!-- text help -->\n{}\n<!-- end -->\n\n" + shown
+    records = Records(STORE.table, STORE.table, {"help": lambda: code.format("new")})
+    found = renewed(Path("page.md"), page.format(code.format("old")), records)
+    assert found == page.format(code.format("new"))
 
 
 def changed(value: Any, chance: Random, key: str = "") -> Any:

@@ -36,7 +36,7 @@ rate, shows the sensor and not the contact: its peaks are not compared."""
 
 
 class Fit(Part):
-    """The restitution to put into the deck.
+    """The fitted coefficient of restitution for the input script.
 
     Attributes
     ----------
@@ -47,14 +47,14 @@ class Fit(Part):
     chi2 : float
         Weighted sum of squares at the best value.
     degrees : int
-        Degrees of freedom; 0: nothing tests the fit.
+        Degrees of freedom; 0: the fit cannot be tested.
     p_value : float or None
         Probability of a larger `chi2` if the model is right.
     inflation : float
-        Factor on the interval because the residuals are larger than their
-        uncertainties, the root of chi2 over degrees; 1 if they are not.
+        Factor by which the interval is widened if the residuals exceed their uncertainties:
+        sqrt(chi2 / degrees), at least 1.
     residuals : tuple of float
-        Measured less simulated, over its standard uncertainty.
+        (Measured - simulated) / standard uncertainty.
     """
 
     restitution: float

@@ -55,12 +55,12 @@ class Impact(Part):
     peak_time_s : float
         Time of the largest sample, s.
     centroid_s : float
-        Mean time of the pulse, weighted with what its force has above a fifth
-        of its peak, s: the same fraction of a large and of a small impact.
+        Mean time of the pulse, s, weighted with the force above a fifth of the peak, so that
+        large and small impacts are treated alike.
     peak_n : float
         Largest sample above the baseline, N.
     width_s : float
-        Width at half of the largest sample, between samples interpolated, s.
+        Width at half of the largest sample, interpolated between samples, s.
     impulse_n_s : float
         Sum of force over time, N s.
     samples : int
@@ -78,7 +78,7 @@ class Impact(Part):
 
 
 class Measured(Document):
-    """What a record says, ``record.json``.
+    """The impacts of a measured record: ``record.json``.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Measured(Document):
     threshold_n : float
         Least force of an impact above the baseline, N.
     notes : tuple of str
-        What was done to the samples, and what the user should know.
+        Corrections of the samples, and remarks for the user.
     impacts : tuple of Impact
         The first two or three.
     first_pulse : (M, 2) ndarray

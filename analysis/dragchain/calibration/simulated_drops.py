@@ -24,7 +24,7 @@ _SAMPLES = ("step", "time_s", "z_m", "vz_m_s", "force_n")
 
 
 class DropTest(Document):
-    """What ``drops.json`` says of the study.
+    """The drop test of the study, as in ``drops.json``.
 
     Attributes
     ----------
@@ -33,15 +33,15 @@ class DropTest(Document):
     record : str
         The CSV of the measured drop test.
     height_m, height_std_m : float
-        Free height below the particle and its standard uncertainty.
+        Drop height (gap below the particle) and its standard uncertainty, m.
     peaks : str
         Whether to compare peak forces.
     limit_force : bool
-        The study's contact option.
+        Whether tensile normal forces are suppressed, as in the study.
     restitution_now : float
-        What the study puts into the deck.
+        Coefficient of restitution of the study.
     fall_time_s, contact_time_s : float
-        Of the particle before its first impact, and in an elastic one.
+        Time of the fall before the first impact, and contact time of an elastic impact, s.
     """
 
     made_by: ClassVar[str] = "snakemake calibrate"

@@ -8,13 +8,13 @@ FILE = Path("tables") / "extrapolated.json"
 
 
 class ExtrapolatedQuantity(Part):
-    """A quantity of a run with a reduced modulus, and what it would be with the physical one.
+    """A quantity of a run with a reduced modulus, and its value at the physical modulus.
 
     Attributes
     ----------
     name, label, unit : str
     measured : float
-        In the run, as it is.
+        Uncorrected value of the run.
     value, ci95_low, ci95_high : float
         At the physical Young's modulus. The interval includes the scatter of one run, the
         uncertainty of rate and amplitude, and the model's own error.
@@ -35,12 +35,12 @@ class Extrapolated(Document):
     Attributes
     ----------
     youngs_modulus_scale : float
-        Of the run.
+        Multiplier of every Young's modulus in the run.
     source : str
-        Where the laws come from.
+        Source of the laws.
     outside : tuple of str
-        Numbers of the scene that no scene of the record comes near: the intervals are then too
-        narrow by an unknown amount.
+        Dimensionless numbers of the scene outside the range of the record; the intervals are then
+        too narrow by an unknown amount.
     """
 
     made_by = "dragchain step extrapolate"

@@ -20,17 +20,17 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
 
 
 class Comparison(Part):
-    """A mean drag of the study's source, and how ours differs from it.
+    """A published mean drag, and the difference of the simulated one from it.
 
     Attributes
     ----------
     label : str
         ``experiment`` or ``simulation``.
     mean_n, std_n : float
-        Of the source, N; no standard deviation if it gives none.
+        Published mean and standard deviation, N; the latter is None if it is not reported.
     difference_percent, ci95_low, ci95_high : float
-        Relative difference of our mean from the source's, with its interval from that of our mean
-        alone.
+        Relative difference of the simulated mean, %, with its 95 % CI; the latter includes the
+        uncertainty of the simulated mean only.
     """
 
     label: str
@@ -198,7 +198,7 @@ class ProcessFindings(Findings):
     network : mapping of str to float
         Means of the columns of ``network.parquet``, and the number of ``frames``.
     wake : Wake or None
-        None if the workpiece comes to no wake, or has too few samples before or in it.
+        None if the workpiece enters no wake, or if there are too few samples before or in it.
     comparison : tuple of Comparison
         One entry per published mean drag.
     peaks : Peaks

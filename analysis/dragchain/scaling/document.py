@@ -36,9 +36,9 @@ class Expectation(Part):
     ----------
     exponent : float or None
     source : str or None
-        Where the exponent comes from.
+        Source of the exponent.
     within : (float, float) or None
-        Levels for which it is meant; all if None.
+        Range of levels in which it is expected; None: all.
     """
 
     exponent: float | None = None
@@ -173,7 +173,7 @@ class ScaledRun(Part):
     level : float
         Value of the field.
     drag_n, standard_error_n : float
-        Magnitude of the mean drag and its standard error with autocorrelation, N.
+        Magnitude of the mean drag, and its standard error including autocorrelation, N.
     reliable : bool
         Whether the series was long enough to rely on that error.
     eta : float

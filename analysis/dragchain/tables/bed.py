@@ -18,16 +18,16 @@ class Packing(Document):
     Attributes
     ----------
     bed_height_m : float
-        See `bed_height`.
+        Height of the settled surface, m; see `bed_height`.
     top_m : float
-        The highest point of any particle.
+        Highest point of any particle, m.
     solid_fraction : float
-        Volume of the particles over that of the bowl up to the bed's height.
+        Volume of the particles / volume of the bowl up to the bed height.
     radius_std_m : float
-        Divisor N, as the study states it.
+        Standard deviation of the radii (divisor N), m.
     kinetic_energy_ratio : float
-        Mean translational kinetic energy of a particle over what the mean particle gains in a
-        fall through its own diameter, ``mean(m v^2 / 2) / (mean(m) g d)``.
+        Mean translational kinetic energy per particle / (m g d):
+        ``mean(m v^2 / 2) / (mean(m) g d)``.
     n_particles : int
         Number of particles.
     radius_mean_m : float

@@ -37,9 +37,9 @@ class Error:
     ci95_low, ci95_high : float
         Interval of `CONFIDENCE`.
     bound : float
-        The true error is smaller than this, in either direction, with that confidence.
+        One-sided 95 % upper bound of the absolute error.
     significant : bool
-        Zero lies outside of the interval.
+        Whether the interval excludes zero.
     """
 
     value: float

@@ -125,11 +125,11 @@ class Measures(PathQuantities, Document):
     Attributes
     ----------
     failure : sequence of AcceptanceCheck
-        Why the run is not `complete`; it has none of what follows then.
+        Checks that did not pass; a failed run has no quantities.
     single : mapping
         The quantities of the bed.
     stability_number : float or None
-        Of the time step, as the acceptance check found it.
+        Stability number of the time step from the acceptance check.
     """
 
     made_by = "dragchain step measure"

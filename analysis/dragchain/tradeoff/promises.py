@@ -29,26 +29,26 @@ Verdict = Literal["kept", "broken", "open"]
 
 
 class Promise(Part):
-    """One promise in one scene.
+    """A prediction of the advisor in one scene.
 
     Attributes
     ----------
     scene : mapping
-        The inputs in which the scene differs from others of the plan.
+        Inputs that distinguish the scene from the others of the plan.
     numbers : mapping
         Its dimensionless numbers.
     quantity : str
     tolerance : float
     held_to : float
-        The error that the settings were chosen for: less than the tolerance
-        where the scene is unlike those that were measured.
+        Error for which the settings were chosen: less than the tolerance outside the measured
+        range.
     youngs_modulus_scale, timestep_fraction, speed_factor : float
-        What the advisor chose.
+        Settings that the advisor selected.
     runs, failed, reference_runs : int
     error : Error
     verdict : str
     met : bool
-        Whether no run failed and the error is within what the settings were chosen for.
+        Whether no run failed and the 95 % CI of the error is within `held_to`.
     """
 
     scene: Mapping[str, str]
@@ -68,7 +68,7 @@ class Promise(Part):
 
     @property
     def setting(self) -> Setting:
-        """What the advisor chose."""
+        """Settings that the advisor selected."""
         return Setting.of(self)
 
     @property

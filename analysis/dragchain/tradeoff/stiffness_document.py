@@ -18,13 +18,13 @@ class LawEntry(Part):
     Attributes
     ----------
     scenes : int
-        How many it was fitted to.
+        Number of scenes in the fit.
     friction : str
-        The number of a scene that is the law's coefficient of friction.
+        Dimensionless number that the law uses as its coefficient of friction.
     quantile : float
-        Half-width of a 95 % interval over its standard error.
+        Half-width of a 95 % CI / standard error.
     path_to_particle : float
-        Mean path over particle diameter that `run_std` belongs to.
+        Mean path / particle diameter to which `run_std` refers.
     """
 
     label: str
@@ -76,7 +76,7 @@ class ExtrapolationErrors(Part):
     inside : int
         Scenes whose measured value lies within the predicted 95 % interval.
     raw_root_mean_square : float
-        Of the value as it is, at the largest modulus of the plan.
+        Root mean square error of the uncorrected value, at the largest modulus of the plan.
     """
 
     quantity: str
@@ -102,7 +102,7 @@ class SceneEntry(Part):
 
 
 class CheckEntry(Part):
-    """What a modulus scale changes a quantity by, relatively: by the law, and as measured.
+    """Relative change of a quantity by a modulus scale: predicted by the law, and measured.
 
     Attributes
     ----------

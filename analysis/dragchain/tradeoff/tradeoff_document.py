@@ -23,7 +23,7 @@ class FidelityParameters(Part):
 
 
 class ErrorEntry(Part):
-    """An error relative to the reference; `significant`: zero is outside of its interval."""
+    """An error relative to the reference; `significant`: its 95 % CI excludes zero."""
 
     value: SixDigits
     se: SixDigits
@@ -47,7 +47,7 @@ class QuantityEntry(Part):
 
 
 class SettingEntry(FidelityParameters):
-    """What was run at a setting; `arc_m`: the compared path of all its complete runs together."""
+    """The runs at a setting; `arc_m`: compared path of all its complete runs together, m."""
 
     seeds: int
     runs: int
@@ -67,16 +67,16 @@ class DropEntry(Part):
 
 
 class PromiseEntry(Part):
-    """A scene in which the advisor was tested: its numbers, and whether the error was met."""
+    """A scene in which a prediction was tested: its numbers, and whether it was confirmed."""
 
     numbers: Mapping[str, SixDigits]
     met: bool
 
 
 class CostEntry(Part):
-    """Processor time with one thing changed over that without, as timed side by side.
+    """CPU time with one change relative to that without it, timed side by side.
 
-    ``ratio`` counts what ``unit`` says. ``parameter`` and ``level`` are those of a variant
+    ``ratio`` refers to ``unit``. ``parameter`` and ``level`` are those of a variant
     that changes one setting of the fidelity alone.
     """
 
@@ -99,7 +99,7 @@ class CostEntry(Part):
 
 
 class TradeoffRecord(Document):
-    """The content of ``tradeoff.json``; a null is a number there is none of.
+    """The content of ``tradeoff.json``; null: not known.
 
     ``scene`` are the dimensionless numbers of the measured scene.
     """

@@ -7,7 +7,7 @@ SCALE = 1e-3
 
 
 class Speed(Part):
-    """A measured speed of the engine on this machine.
+    """Speed of LIGGGHTS measured on this machine.
 
     Attributes
     ----------

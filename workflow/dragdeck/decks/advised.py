@@ -11,14 +11,15 @@ class AdvisedSettings(Part):
     Attributes
     ----------
     held_to : float
-        The tolerance that the settings meet: the asked one, or less outside of the measured
+        Tolerance that the settings meet: the requested one, or a smaller one outside the measured
         range.
     extrapolated : bool
-        They are meant for the value that is extrapolated to the physical Young's modulus.
+        Whether the tolerance applies to the value extrapolated to the physical Young's modulus.
     error, ci95_low, ci95_high, bound : float or None
-        Expected error, its interval and the bound of its size; None for the reference.
+        Expected relative error, its 95 % CI, and the bound of its absolute value; None for the
+        reference.
     half_width : float or None
-        Of the 95 % interval of one run's value, relative.
+        Relative half-width of the 95 % CI of the value of one run.
     tolerance : float
         Requested relative error.
     quantity, label : str

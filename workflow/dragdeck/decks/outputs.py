@@ -21,15 +21,15 @@ class OutputOfRun(Part):
     Attributes
     ----------
     kind : str
-        ``print``, ``custom`` or ``local``: the engine command that writes it.
+        ``print``, ``custom`` or ``local``: the LIGGGHTS command that writes it.
     pattern : str
         File name, with ``{part}`` for the part number.
     columns, engine_columns : sequence of str
-        Our name of each column, and the engine's where the file has it in its header.
+        Name of each column in dragdeck, and in LIGGGHTS where the header of the file contains it.
     period_steps, first_step, last_step : int
-        When frames are written. `last_step` is None where the engine decides.
+        Interval, first and last step of the frames; `last_step` is None if LIGGGHTS decides.
     rows_per_particle : float
-        Rows to expect in a frame, for each particle of the run; a frame has at least one.
+        Expected rows per frame and particle of the run; a frame has at least one row.
     binary : bool
         Whether it is a binary dump.
     """
@@ -82,13 +82,13 @@ class Output:
     name : str
         Also the first part of the file's name.
     kind : str
-        ``print``, ``custom`` or ``local``: the engine command that writes it.
+        ``print``, ``custom`` or ``local``: the LIGGGHTS command that writes it.
     columns : tuple of Column
     period_steps, first_step, last_step : int
-        When frames are written. `last_step` is None where the engine decides.
+        Interval, first and last step of the frames; `last_step` is None if LIGGGHTS decides.
     binary : bool
     rows_per_particle : float
-        Rows to expect in a frame, for each particle of the run; a frame has at least one.
+        Expected rows per frame and particle of the run; a frame has at least one row.
     purpose : str
         For the comment in the input script: content, and the result made from it.
     """

@@ -18,10 +18,10 @@ class WorkpieceOfRun(Part):
     Attributes
     ----------
     number, count : int
-        Which workpiece it is, from 1, and of how many; the keys are absent if there is one.
+        Number of this workpiece, from 1, and number of all; absent if there is only one.
     wake_from_m : float or None
-        Path length from which on its axis goes where a workpiece went before; the key is absent
-        if it never does, or if the path is no circle.
+        Path length after which its axis is where a workpiece has passed before; absent if that
+        never happens, or if the path is not a circle.
     kind : str
         ``cylinder`` or ``mesh``.
     radius_m : float
@@ -62,19 +62,19 @@ class ProcessCase(CaseOfStudy):
     Attributes
     ----------
     case : str
-        The case's readable name.
+        Readable name of the case.
     upstream : mapping
-        Run ids of the filling and the drop test that it belongs to.
+        Run ids of its filling and drop test.
     numbers : mapping
-        The scene's dimensionless numbers at full modulus and the study's own speed.
+        Dimensionless numbers of the scene at the physical modulus and the speed of the study.
     surface_m : float
-        The settled surface above the floor.
+        Height of the settled surface above the floor, m.
     output_of : str or None
-        Of a further workpiece: the run whose output it is read from; else the key is absent.
+        Run whose raw output is read, for a second or further workpiece; otherwise absent.
     superposed : sequence
-        What is superposed on the path; the key is absent if nothing is.
+        Motions superposed on the path; absent if there are none.
     steady : SteadyCriterion
-        When the bed moves steadily; the key is absent if the bowl stands still.
+        Criterion for a steadily moving bed; absent if the bowl is at rest.
     workpiece : WorkpieceOfRun
         Geometry and immersion.
     motion : mapping

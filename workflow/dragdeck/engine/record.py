@@ -75,15 +75,15 @@ class AcceptanceCheck(Part):
     Attributes
     ----------
     code : str
-        What is checked.
+        Identifier of the check.
     reason : str, optional
-        Why the check did not pass, where a code has several reasons.
+        Reason why the check did not pass, if a code has several.
     name, seen, limit : str
-        For readers: the condition, what was seen, and what it asks for.
+        In words: the condition, the observed value, and the limit.
     number : float or None
-        What was seen, where it is one number.
+        Observed value, if it is a single number.
     remedy : str, optional
-        What to do where the check did not pass.
+        Remedy if the check did not pass.
     passed : bool
         Whether the condition is met.
     """
@@ -104,7 +104,7 @@ class RunPart(Part):
     Attributes
     ----------
     gap : int or None
-        The first step that some output lacks after a part that came to its end.
+        First step that is missing in an output of a finished part.
     part : int
         Number, from 1.
     from : str or None

@@ -20,7 +20,7 @@ _STIFFNESS_FILE = _DATA / "stiffness.json"
 
 
 class FidelityParameters(Part):
-    """The three settings that trade accuracy for speed."""
+    """Young's modulus, time step and speed: the settings that trade accuracy for speed."""
 
     youngs_modulus_scale: float
     timestep_fraction: float
@@ -36,9 +36,9 @@ class MeasuredError(Part):
     ci95_low, ci95_high : float
         95 % confidence interval.
     bound : float
-        The absolute error is below it with 95 % confidence.
+        One-sided 95 % upper bound of the absolute error.
     single_parameter_error : float
-        The largest absolute error of one of the parameters, turned alone.
+        Largest absolute error by a single parameter, the others as in the reference.
     """
 
     value: float
@@ -64,9 +64,9 @@ class MeasuredSetting(FidelityParameters):
     ----------
     runs, failed : int
     breaks : bool
-        Its step is too long: a run failed, or the drag is wrong because of it.
+        Whether the time step is too large: a run failed, or the mean drag is wrong.
     relative_cost : float or None
-        Processor time for a metre of path over the reference's; None if it failed at once.
+        CPU time per metre of path / that of the reference; None if the runs failed at once.
     errors : mapping of str to MeasuredError
         By quantity.
     """
@@ -108,14 +108,14 @@ class MeasuredDrop(Part):
 
 
 class MeasuredCost(Part):
-    """Processor time with one thing changed over that without.
+    """CPU time with one change, relative to that without it.
 
     Attributes
     ----------
     name, what : str
         Of the variant, and for readers.
     unit : str
-        What `ratio` counts; `per_step` is that of a step.
+        Unit to which `ratio` refers; `per_step` is the ratio of the CPU times per step.
     ci95_low, ci95_high : float or None
         None after a single round.
     parameter, level
@@ -251,7 +251,7 @@ class Tradeoff(Document):
     scene : mapping
         Dimensionless numbers of the measured scene.
     stiffness : StiffnessRecord or None
-        What other scenes say of reduced moduli; a record of its own.
+        Effect of reduced moduli in other scenes; a separate record.
     """
 
     remedy = (

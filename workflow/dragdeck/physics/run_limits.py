@@ -21,11 +21,11 @@ class RunLimits:
     Attributes
     ----------
     n_particles : int
-        Fewer mean that one was lost.
+        Number of particles; fewer mean that one was lost.
     mean_kinetic_energy_j : float
-        Of a particle, spin included.
+        Largest mean kinetic energy per particle, rotation included, J.
     speed_m_s : float
-        Of the fastest particle.
+        Largest speed of the fastest particle, m/s.
     why : str
         How the limits were derived.
     """

@@ -6,7 +6,7 @@ from dragdeck.study.base import Model, NonNegative, Number
 
 
 class Drag(Model):
-    """A published drag force along the motion; negative: against it."""
+    """A published drag force; negative: opposes the motion."""
 
     drag_mean_n: Number = Field(
         description="published mean drag force, N; negative: opposes the motion"
@@ -17,7 +17,7 @@ class Drag(Model):
 
 
 class Reference(Model):
-    """Published figures to stand beside the results."""
+    """Published values with which the results are compared."""
 
     source: str = Field(description="publication from which the values are taken")
     experiment: Drag | None = Field(default=None, description="values measured in an experiment")

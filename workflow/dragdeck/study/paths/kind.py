@@ -14,7 +14,7 @@ Vector = tuple[float, float, float]
 
 
 class StageOfRun(BaseModel):
-    """A stretch of constant velocity as it is driven: its steps, and the velocity."""
+    """A stage of constant velocity: its number of steps, and the velocity."""
 
     steps: int
     velocity_m_s: Vector
@@ -24,7 +24,7 @@ Stages = Sequence[StageOfRun]
 
 
 class PathOfRun(BaseModel):
-    """The drag as it is driven: the speed of the workpiece's axis, and its first direction."""
+    """The simulated drag: speed of the workpiece's axis, and its initial direction."""
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 

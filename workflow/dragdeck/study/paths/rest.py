@@ -10,7 +10,7 @@ from dragdeck.study.paths.kind import AroundBowl, Leg, Orientation, PathOfRun, S
 
 
 class RestOfRun(PathOfRun):
-    """A workpiece at rest, the radius at which it stands, and the rotation of the bowl."""
+    """A workpiece at rest in a rotating bowl: its distance from the axis, and the rotation."""
 
     kind: Literal["rest"] = "rest"
     radius_m: float

@@ -33,7 +33,7 @@ class Waypoint(NamedTuple):
 
 
 class WaypointsOfRun(PathOfRun):
-    """Waypoints as they are driven, one stage after another from the beginning of the drag."""
+    """Waypoints as simulated: consecutive stages from the start of the drag."""
 
     kind: Literal["waypoints"] = "waypoints"
     stages: Stages

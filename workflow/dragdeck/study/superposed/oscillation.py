@@ -15,7 +15,7 @@ from dragdeck.study.superposed.kind import (
 
 
 class OscillationOfRun(SuperposedOfRun):
-    """An oscillation as it is driven: ``z = amplitude sin(rate t)``, t from the start of the drag.
+    """An oscillation as simulated: ``z = amplitude sin(rate t)``, t from the start of the drag.
 
     Attributes
     ----------

@@ -20,14 +20,14 @@ from dragdeck.study.superposed.kind import (
 
 
 class SpinStageOfRun(Model):
-    """A stretch of constant spin: `steps` of them, and the rate about +z."""
+    """A stage of constant spin: its number of steps, and the rate about +z."""
 
     steps: int
     rate_rad_s: float
 
 
 class SpinOfRun(SuperposedOfRun):
-    """A spin as it is driven, one stage after another from the beginning of the drag."""
+    """A spin as simulated: consecutive stages from the start of the drag."""
 
     kind: Literal["spin"] = "spin"
     stages: Sequence[SpinStageOfRun]
