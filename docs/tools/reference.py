@@ -184,11 +184,12 @@ LINE = re.compile(r"\s*\b(value|limit|remedy): +")
 def raised(source: str) -> Iterator[tuple[str, str, str]]:
     """Message, limit and remedy of every error that a module makes; an ellipsis is a value."""
     tree = ast.parse(source)
-    texts = [
+    assigned = (
         (node.lineno, node.targets[0].id, node.value)
         for node in ast.walk(tree)
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
-    ]
+    )
+    texts = sorted(assigned, key=itemgetter(0))
     for node in ast.walk(tree):
         name = (
             node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
@@ -196,10 +197,7 @@ def raised(source: str) -> Iterator[tuple[str, str, str]]:
         if not ERRORS.match(name) or name in ("ValueError", "TypeError", "AttributeError"):
             continue
         assert isinstance(node, ast.Call)
-        line = node.lineno
-        before = {
-            given: value for at, given, value in sorted(texts, key=itemgetter(0)) if at < line
-        }
+        before = {given: value for at, given, value in texts if at < node.lineno}
         found = [_text(argument, before) for argument in node.args]
         given = {item.arg: _text(item.value, before) for item in node.keywords if item.arg}
         if name in IN_ORDER:
@@ -208,8 +206,9 @@ def raised(source: str) -> Iterator[tuple[str, str, str]]:
         found += [given.get(key, "") for key in ("problem", "message")]
         message, *more = LINE.split(max(found, key=len))
         given |= dict(zip(more[::2], more[1::2], strict=True))
-        if message:
-            yield message, given.get("limit") or "", given.get("remedy") or ""
+        if re.search("[a-z]", message):
+            limit, remedy = (given.get(key, "") for key in ("limit", "remedy"))
+            yield message, limit, remedy if re.search("[a-z]", remedy) else ""
 
 
 def _text(node: ast.expr, known: Mapping[str, ast.expr]) -> str:

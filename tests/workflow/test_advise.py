@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 from made_tradeoff import made_tradeoff
-from paths import ROOT, SMALL_STUDY
+from paths import PROJECT, ROOT, SMALL_STUDY
 
 from dragdeck.sweep.cases import load_cases
 
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A copy of the project whose package holds a trade."""
-    for name in ("analysis", "evidence", "meshes", "profiles", "templates", "Snakefile"):
+    for name in set(PROJECT) - {"workflow"}:
         (tmp_path / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "workflow", tmp_path / "workflow")
     (tmp_path / "studies/small").mkdir(parents=True)

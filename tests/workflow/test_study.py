@@ -15,7 +15,7 @@ import pyvista as pv
 import yaml
 from fat_files import fatten
 from pages import stands_alone
-from paths import ROOT, SMALL_STUDY
+from paths import PROJECT, ROOT, SMALL_STUDY
 from snakemake_calls import jobs, snakemake
 
 from dragchain import read_dump, write_tables
@@ -38,7 +38,7 @@ dump total_forces all custom {{ deck.thermo_steps }} total_forces.${part}.dump i
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the project in which the small study was run."""
     folder = tmp_path_factory.mktemp("project")
-    for name in ("workflow", "analysis", "evidence", "meshes", "profiles", "Snakefile"):
+    for name in set(PROJECT) - {"templates"}:
         (folder / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "templates", folder / "templates")
     data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
