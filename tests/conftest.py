@@ -26,6 +26,7 @@ settings.load_profile("repeat")
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update", action="store_true", help="write golden decks and schemas anew")
     parser.addoption("--slurm", action="store_true", help="run the tests that start a Slurm too")
+    parser.addoption("--long-commands", action="store_true", help="run the pages' long commands")
     add_options(parser)
 
 
