@@ -39,10 +39,11 @@ def effective_shear(first: Material, second: Material, scale: float = 1.0) -> fl
 
 
 def rayleigh_time(material: Material, radius_m: float, scale: float = 1.0) -> float:
-    """Time of a Rayleigh wave over half a particle's circumference, s.
+    """Travel time of a Rayleigh wave over half the circumference of a particle, s.
 
-    Thornton and Randall 1988; Sheng et al. 2004, Powder Technology 139, eq. 12:
-    pi R sqrt(rho / G) / (0.1631 nu + 0.8766).
+    ``pi R sqrt(rho / G) / (0.1631 nu + 0.8766)``, as in LIGGGHTS' ``fix check/timestep/gran``
+    (Thornton and Randall 1988, Micromechanics of Granular Materials, 133-142; Sheng et al. 2004,
+    Engineering Computations 21, 304-317).
     """
     wave = math.sqrt(material.density_kg_m3 / shear_modulus(material, scale))
     return math.pi * radius_m * wave / (0.1631 * material.poissons_ratio + 0.8766)
