@@ -161,6 +161,14 @@ def _unstable(store: Store) -> pd.DataFrame:
     return pd.DataFrame([{"smallest": min(losses), "largest": max(losses)}])
 
 
+@derived("tradeoff/selections")
+def _selections(store: Store) -> pd.DataFrame:
+    """Simulated selections, and those whose true error exceeds the tolerance."""
+    table = store.table("tradeoff/selection")
+    exceeded = (table["draws"] * table["exceeded_fraction"]).sum()
+    return pd.DataFrame([{"selections": table["draws"].sum(), "exceeded": exceeded}])
+
+
 @derived("tradeoff/plain")
 def _plain(store: Store) -> pd.DataFrame:
     """One row: cost of the plain input script at the physical modulus over the reference's."""

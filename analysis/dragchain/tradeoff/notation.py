@@ -48,7 +48,7 @@ def cheaper(ratio: float) -> str:
     """A ratio of costs in words."""
     if ratio >= 1.0:
         return f"{times(ratio)} times cheaper"
-    return f"{times(1.0 / ratio)} times dearer"
+    return f"{times(1.0 / ratio)} times more expensive"
 
 
 def span(gain: Estimate) -> str:
