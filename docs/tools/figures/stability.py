@@ -1,4 +1,4 @@
-"""Stable and unstable time steps of packings at rest and of slow drags, by condition."""
+"""Stable and unstable time steps of single impacts and of packings at rest, by condition."""
 
 import numpy as np
 import pandas as pd
@@ -17,24 +17,25 @@ COLOURS = {
     "particles lost": RED,
     "engine refused": GREY,
 }
-TITLES = {"column": "Packing at rest under a load", "drag": "Slow drag"}
+TITLES = {"impact": "Single impacts", "column": "Packing at rest under a load"}
 
 
 def draw() -> Figure:
     """Draw one panel per regime, one row per condition, one column per time step."""
     points = table("stability/points")
     points = points[~points["reference"].astype(bool)].rename(columns={"class": "kind"})
-    figure = Figure(figsize=(9.2, 4.4), layout="constrained")
+    figure = Figure(figsize=(9.2, 6.2), layout="constrained")
     panels = figure.subplots(1, len(TITLES))
+    rows = points.groupby("regime")["condition"].nunique()[list(TITLES)].max()
     for axes, (regime, title) in zip(panels, TITLES.items(), strict=True):
         _panel(axes, points[points["regime"] == regime])
-        axes.set_title(title)
+        axes.set(title=title, ylim=(rows - 0.5, -0.5))
     handles = [
         Patch(color=colour, label=name.replace("engine", "LIGGGHTS"))
         for name, colour in COLOURS.items()
     ]
-    handles.append(Patch(fill=False, ec=INK, label="critical time step of the contacts (line)"))
-    figure.legend(handles=handles, loc="outside lower left", ncols=4)
+    handles.append(Patch(fill=False, ec=INK, label="line: critical time step of the contacts"))
+    panels[-1].legend(handles=handles, loc="lower left")
     return figure
 
 
@@ -52,7 +53,6 @@ def _panel(axes: Axes, points: pd.DataFrame) -> None:
             axes.plot([x, x], [row - 0.45, row + 0.45], color=INK, lw=1.8)
     names = points.drop_duplicates("condition").set_index("condition")["label"]
     axes.set_yticks(range(len(rows)), [names[condition] for condition in rows], fontsize=7.5)
-    axes.set_xticks(range(len(steps)), [f"{100 * step:g}" for step in steps])
+    axes.set_xticks(range(len(steps)), [f"{100 * step:g}" for step in steps], fontsize=7)
     axes.set_xlabel("time step (% of the Rayleigh time)")
-    axes.invert_yaxis()
     axes.grid(visible=False)
