@@ -2,9 +2,11 @@
 
 import argparse
 import ast
+import csv
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -70,12 +72,22 @@ def _sentence(text: str) -> str:
 
 
 def columns(table: str) -> str:
-    """The columns of a table: name, unit, meaning."""
+    """The columns of a table: name, unit, type, meaning."""
     rows = []
     for name in columns_of(table):
         text = descriptions(name).get(table, "")
-        rows.append([f"`{name}`", _unit(name), text])
-    return _table(["column", "unit", "meaning"], rows)
+        rows.append([f"`{name}`", _unit(name), column_type(name, table), text])
+    return _table(["column", "unit", "type", "meaning"], rows)
+
+
+def column_type(column: str, table: str) -> str:
+    """The type of a column: number, integer, flag, text, list of integers, or any."""
+    with (ROOT / "analysis/dragchain/tables/columns.csv").open(encoding="utf-8") as file:
+        return next(
+            row["type"]
+            for row in csv.DictReader(file)
+            if fnmatchcase(column, row["column"]) and table in row["tables"].split()
+        )
 
 
 def _unit(name: str) -> str:

@@ -16,6 +16,7 @@ import yaml
 from fat_files import fatten
 from pages import stands_alone
 from paths import PROJECT, ROOT, SMALL_STUDY
+from reference import column_type
 from snakemake_calls import jobs, snakemake
 
 from dragchain import read_dump, write_tables
@@ -51,6 +52,16 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 
+
+TYPES = {
+    "number": "double",
+    "integer": "int64",
+    "flag": "bool",
+    "text": ("large_string", "dictionary<values=string"),
+    "list of integers": "list<element: int64",
+    "any": "",
+}
+"""Types of the reference, and how those of Parquet begin."""
 
 STUDY = ("all", "--config", "study=small")
 
@@ -187,6 +198,16 @@ def test_every_column_of_the_tables_has_a_unit_and_a_description(finished: Path)
         if not {b"unit", b"description"} <= set(field.metadata or {})
     }
     assert not bare
+
+
+def test_every_column_has_the_type_that_the_reference_states(finished: Path) -> None:
+    wrong = {
+        f"{file.stem}.{field.name}: {field.type}"
+        for file in (finished / "results/small").rglob("*.parquet")
+        for field in pq.read_schema(file)
+        if not str(field.type).startswith(TYPES[column_type(field.name, file.stem)])
+    }
+    assert not wrong
 
 
 def test_nothing_is_left_to_do(finished: Path) -> None:
