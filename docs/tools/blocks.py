@@ -23,17 +23,20 @@ to the right.
 
 import re
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+CODE = r"(?P<code>^(?P<indent> *)(?P<ticks>```+).*?^(?P=indent)(?P=ticks) *$)"
 BLOCK = re.compile(
+    rf"{CODE}|"
     r"(?P<head><!-- (?P<what>[a-z](?:[^-]|-(?!->))*?)\s*-->)(?P<made>.*?)(?P<tail><!-- end -->)",
-    re.S,
+    re.M | re.S,
 )
+"""A block, or code in which nothing is made; what is made may contain code."""
 
 
 class BlockError(Exception):
@@ -97,41 +100,23 @@ class Records:
     text: Mapping[str, Callable[[], str]]
 
 
-FENCE = re.compile(r"^( *)(```+).*?^\1\2 *$", re.M | re.S)
-"""A block of code, in which nothing is made."""
-
-
-BLOCK_OR_CODE = re.compile(
-    rf"{BLOCK.pattern}|(?P<code>^(?P<indent> *)(?P<ticks>```+).*?^(?P=indent)(?P=ticks) *$)",
-    re.M | re.S,
-)
-"""The first of both: what is made may contain code, and code may show blocks."""
-
-
-def _typed(text: str, work: Callable[[str], str]) -> str:
-    """A text whose parts outside of code blocks are replaced by what a function makes of them."""
-    parts, end = [], 0
-    for found in BLOCK_OR_CODE.finditer(text):
-        if found["code"]:
-            parts += [work(text[end : found.start()]), found["code"]]
-            end = found.end()
-    return "".join([*parts, work(text[end:])])
-
-
 def blocks(page: Path, text: str) -> Iterator[Block]:
     """Every block of a page."""
-    for found in BLOCK.finditer(FENCE.sub("", text)):
-        yield Block(page, found["what"], found["made"])
+    for found in BLOCK.finditer(text):
+        if not found["code"]:
+            yield Block(page, found["what"], found["made"])
 
 
 def without_blocks(text: str) -> str:
     """A page without what is made, for checks of what is typed."""
-    return BLOCK.sub(" ", text)
+    return BLOCK.sub(lambda found: found["code"] or " ", text)
 
 
 ROW = r"(?=<!-- (?!table |text |end)[a-z][^>]*? : )"
-LINE_START = re.compile(rf"(?<=[^\n])\n(?:> )?[ \t]*{ROW}")
-PARAGRAPH_START = re.compile(rf"(?:^|\n)[ \t]*(?:[-*] +|\d+\. +|> +)?{ROW}(.*)")
+LINE_START = re.compile(rf"{CODE}|(?<=[^\n])\n(?:> )?[ \t]*{ROW}", re.M | re.S)
+PARAGRAPH_START = re.compile(
+    rf"{CODE}|^[ \t]*(?:[-*] +|\d+\. +|> +)?{ROW}(?P<row>[^\n]*)", re.M | re.S
+)
 """Where Markdown takes a comment for the start of HTML code."""
 
 
@@ -143,16 +128,14 @@ def renewed(page: Path, text: str, records: Records) -> str:
     BlockError
         If a block cannot be made, or if a row starts a paragraph.
     """
-    return _typed(text, lambda part: _renewed(page, part, records))
-
-
-def _renewed(page: Path, text: str, records: Records) -> str:
-    """A part of a page outside of code with every block made anew."""
-    text = LINE_START.sub(" ", text)
-    if found := PARAGRAPH_START.search(text):
-        raise BlockError(f"{page}: a paragraph must not start with a row: {found[1][:80]}")
+    text = LINE_START.sub(lambda found: found["code"] or " ", text)
+    for found in PARAGRAPH_START.finditer(text):
+        if row := found["row"]:
+            raise BlockError(f"{page}: a paragraph must not start with a row: {row[:80]}")
 
     def made(found: re.Match[str]) -> str:
+        if found["code"]:
+            return found["code"]
         block = Block(page, found["what"], found["made"])
         return f"{found['head']}{content(block, records)}{found['tail']}"
 
@@ -189,11 +172,15 @@ def _table(what: str, records: Records) -> str:
         heads.append(head)
         rules.append("---:" if right else "---")
         templates.append(template)
-    lines = [heads, rules]
-    lines += [
-        [template.format(**row) for template in templates]
-        for row in selected(first.removeprefix("table "), records)
-    ]
+    rows = selected(first.removeprefix("table "), records)
+    return markdown_table(heads, ([one.format(**row) for one in templates] for row in rows), rules)
+
+
+def markdown_table(
+    heads: Sequence[str], rows: Iterable[Sequence[str]], rules: Sequence[str] = ()
+) -> str:
+    """A table in Markdown; `rules` are the marks of alignment, one per column."""
+    lines = [heads, rules or ["---"] * len(heads), *rows]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from tables import ROOT, Store, derived
+from tables import LABELS, ROOT, Store, derived
 
 from dragchain.report.notation import MINUS
 from dragchain.scaling.document import ScalingFile
@@ -14,14 +14,12 @@ from dragchain.scaling.fit import said
 from dragchain.statistics.estimate import student_quantile
 from dragchain.statistics.power_law import Runs, fit_power_law
 from dragchain.tradeoff.notation import in_percent
-from dragchain.tradeoff.quantities import QUANTITIES
 from dragdeck.advice.advise import advise
 from dragdeck.advice.options import Option
 from dragdeck.outlook.measured import StiffnessRecord, Tradeoff
 from dragdeck.project import Project
 from dragdeck.study.model import Tolerance
 
-LABELS = {quantity.name: quantity.label for quantity in QUANTITIES}
 SCATTER = 1.96
 """Half-width of a 95 % interval in standard deviations, as the advisor takes it."""
 

@@ -5,12 +5,14 @@ import ast
 import csv
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from fnmatch import fnmatchcase
+from functools import cache
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+from blocks import markdown_table
 from pybtex.database import parse_file
 from pybtex.plugin import find_plugin
 from study_fields import fidelities, fields, plausible_ranges
@@ -21,11 +23,6 @@ from dragchain.tables.meanings import _rows, columns_of, descriptions, unit_end
 from dragdeck import cli as dragdeck_cli
 
 ROOT = Path(__file__).resolve().parents[2]
-
-
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 
 # --- command line --------------------------------------------------------------------
@@ -54,7 +51,7 @@ def _commands(parser: argparse.ArgumentParser) -> Iterator[str]:
         if "--help" not in action.option_strings
     ]
     if rows:
-        yield _table(["argument", "meaning"], rows)
+        yield markdown_table(["argument", "meaning"], rows)
 
 
 def _names(action: argparse.Action) -> str:
@@ -77,17 +74,22 @@ def columns(table: str) -> str:
     for name in columns_of(table):
         text = descriptions(name).get(table, "")
         rows.append([f"`{name}`", _unit(name), column_type(name, table), text])
-    return _table(["column", "unit", "type", "meaning"], rows)
+    return markdown_table(["column", "unit", "type", "meaning"], rows)
 
 
 def column_type(column: str, table: str) -> str:
     """The type of a column: number, integer, flag, text, list of integers, or any."""
+    return next(
+        row["type"]
+        for row in _column_rows()
+        if fnmatchcase(column, row["column"]) and table in row["tables"].split()
+    )
+
+
+@cache
+def _column_rows() -> list[dict[str, str]]:
     with (ROOT / "analysis/dragchain/tables/columns.csv").open(encoding="utf-8") as file:
-        return next(
-            row["type"]
-            for row in csv.DictReader(file)
-            if fnmatchcase(column, row["column"]) and table in row["tables"].split()
-        )
+        return list(csv.DictReader(file))
 
 
 def _unit(name: str) -> str:
@@ -131,7 +133,7 @@ def _keys(schema: dict[str, Any]) -> str:
         [f"`{key}`", _type(inner), "yes" if key in required else "no", said.get(key, "")]
         for key, inner in schema.get("properties", {}).items()
     ]
-    return _table(["key", "type", "required", "meaning"], rows) if rows else ""
+    return markdown_table(["key", "type", "required", "meaning"], rows) if rows else ""
 
 
 def _type(schema: dict[str, Any]) -> str:
@@ -176,7 +178,7 @@ def messages() -> str:
                 name = str(file.relative_to(ROOT / Path(package).parent))
                 heads = ["message", "limit", "remedy"]
                 parts.append(
-                    f"## `{name}`\n\n{_table(heads, list(dict.fromkeys(map(tuple, rows))))}"
+                    f"## `{name}`\n\n{markdown_table(heads, list(dict.fromkeys(map(tuple, rows))))}"
                 )
     return "\n\n".join(parts)
 

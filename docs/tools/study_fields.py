@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
+from blocks import markdown_table
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
@@ -27,12 +28,9 @@ def fields() -> str:
 
 
 def _table(rows: list[tuple[str, str, str, str]]) -> str:
-    lines = ["| field | limits | default | meaning |", "| --- | --- | --- | --- |"]
-    lines += [
-        f"| `{name}` | {limits} | {default} | {meaning} |"
-        for name, limits, default, meaning in rows
-    ]
-    return "\n".join(lines)
+    return markdown_table(
+        ["field", "limits", "default", "meaning"], [[f"`{row[0]}`", *row[1:]] for row in rows]
+    )
 
 
 def _rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, str]]:
@@ -117,19 +115,18 @@ def _default(field: FieldInfo) -> str:
 def fidelities() -> str:
     """The built-in fidelities and their settings."""
     names = list(Fidelity.model_fields)
-    lines = ["| name | " + " | ".join(names) + " |", "| --- " * (len(names) + 1) + "|"]
+    rows = []
     for name, fidelity in BUILT_IN_FIDELITIES.items():
         values = [getattr(fidelity, field) for field in names]
-        shown = ["none" if value is None else f"{value:g}" for value in values]
-        lines.append(f"| `{name}` | " + " | ".join(shown) + " |")
-    return "\n".join(lines)
+        rows.append([f"`{name}`", *("none" if one is None else f"{one:g}" for one in values)])
+    return markdown_table(["name", *names], rows)
 
 
 def plausible_ranges() -> str:
     """The values that give a warning, those that are refused, and the units that are tried."""
-    heads = "| field | warning outside | refused outside | other units tried |"
-    lines = [heads, "| --- | --- | --- | --- |"]
+    heads = ["field", "warning outside", "refused outside", "other units tried"]
+    rows = []
     for name, one in RANGES.items():
         usual, known = f"{one.low:g} to {one.high:g}", f"{one.least:g} to {one.most:g}"
-        lines.append(f"| `{name}` | {usual} | {known} | {', '.join(one.slips)} |")
-    return "\n".join(lines)
+        rows.append([f"`{name}`", usual, known, ", ".join(one.slips)])
+    return markdown_table(heads, rows)

@@ -15,10 +15,14 @@ from typing import Any
 
 import pandas as pd
 
+from dragchain.tradeoff.quantities import QUANTITIES
 from dragdeck.project import Project
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "docs/data"
+
+LABELS = {quantity.name: quantity.label for quantity in QUANTITIES}
+"""Quantities of the trade-off in words; those of an older record may differ."""
 
 RECORDS = {
     "tradeoff": ROOT / "workflow/dragdeck/data/tradeoff.json",
@@ -114,7 +118,7 @@ def _tradeoff_errors(store: Store) -> pd.DataFrame:
         {
             **{key: value for key, value in setting.items() if key != "errors"},
             "quantity": quantity,
-            "label": found["quantities"][quantity]["label"],
+            "label": LABELS[quantity],
             "signed": found["quantities"][quantity]["signed"],
             **error,
         }

@@ -10,7 +10,7 @@ CORES_VARIABLE = "DRAGDECK_CORES"
 
 FEWEST_PARTICLES_A_RANK = 5000
 """``ranks: auto`` gives no rank fewer particles. Two ranks of 5,000 particles were measured to take
-1.08 times the processor time of one with all (docs/howto/scale_up.md); smaller runs are soon done
+1.08 times the CPU time of one with all (docs/howto/scale_up.md); smaller runs are soon done
 anyway, and on a machine that others use too their ranks wait for each other."""
 
 

@@ -168,7 +168,7 @@ def time_left(runs: Sequence[StudyRun], cores: int) -> float:
 
 
 def done_fraction(runs: Sequence[StudyRun]) -> float:
-    """How much of the expected processor time of runs is behind them."""
+    """How much of the expected CPU time of runs is behind them."""
     work = [run.cost.wall_time_s * run.ranks for run in runs]
     done = sum(run.fraction * one for run, one in zip(runs, work, strict=True))
     return done / sum(work) if sum(work) else 1.0
