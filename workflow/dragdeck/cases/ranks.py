@@ -9,9 +9,9 @@ CORES_VARIABLE = "DRAGDECK_CORES"
 """Environment variable: cores that ``ranks: auto`` may count on, if not those seen here."""
 
 FEWEST_PARTICLES_A_RANK = 5000
-"""``ranks: auto`` gives no rank fewer particles. Two ranks of 5,000 particles were measured to take
-1.08 times the CPU time of one with all (docs/howto/scale_up.md); smaller runs are soon done
-anyway, and on a machine that others use too their ranks wait for each other."""
+"""``ranks: auto`` assigns no rank fewer particles. Two ranks of this size cost little more CPU time
+than one rank with all particles (docs/evidence/scale.md). Smaller runs are short in any case, and
+on a shared machine their ranks wait for each other."""
 
 
 def auto_ranks(particles: int, cases: int, cores: int) -> int:

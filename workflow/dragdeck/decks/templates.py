@@ -32,7 +32,7 @@ _TRUSTING = ("e", "escape", "forceescape", "random", "safe", "tojson", "urlize",
 """Filters of Jinja that would pass text by `quoted`, or give another script each time."""
 
 _MOST_SECONDS, _MOST_BYTES = 3.0, 2**30
-"""What rendering a script may take: processor time and memory; it takes 0.05 s."""
+"""Limits of rendering a script, far above its need: CPU time (s) and memory (bytes)."""
 
 
 _FAILURES: Mapping[type[BaseException], tuple[str, str]] = {

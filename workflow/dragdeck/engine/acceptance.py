@@ -19,8 +19,8 @@ from dragdeck.engine.record import AcceptanceCheck, CheckCode, CheckReason, RunP
 from dragdeck.physics.contact_network import Floats, stability_number
 
 _FRAMES = 20
-"""Frames whose contacts are looked at. An assumption: their stability number scatters by 3 % from
-frame to frame, and the median of so many by 1 %."""
+"""Frames whose contacts are evaluated. An assumption: the median of so many frames scatters little
+(docs/evidence/stability.md)."""
 
 
 def check_run(

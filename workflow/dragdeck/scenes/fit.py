@@ -40,8 +40,8 @@ _PLACES_PER_LEG = 500
 """At which the distance of two workpieces is compared."""
 
 _JAMMING_GAP = 2.0
-"""Particle diameters between workpiece and bowl below which a warning is given: an arch of two
-particles at 1.7 diameters held a workpiece until the force was 190 N, and then left the bowl."""
+"""Particle diameters between workpiece and bowl below which a warning is given: in a narrower gap,
+an arch of two particles can block the workpiece (docs/development/liggghts.md)."""
 
 
 @dataclass(frozen=True)
