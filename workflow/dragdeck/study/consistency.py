@@ -82,18 +82,29 @@ def _shape(study: Study) -> _Found:
 
 
 def _motion(study: Study) -> _Found:
-    length = study.motion.path_length_m
-    problem = "no path is left for the statistics"
-    if study.motion.transient_m >= length * (1 - 1e-9):
-        limit = f"below the length of the path, {length:.4g} m"
+    """Statistics need a frame of the contact network after all that they leave out."""
+    motion, problem = study.motion, "no path is left for the statistics"
+    length, speed = motion.path_length_m, motion.axis_speed_m_s
+    frame = speed / study.outputs.network_hz
+    if length < frame * (1 - 1e-9):
+        problem = "not one frame of the contact network is written during the drag"
+        limit = f"at least {speed / length:.3g} Hz; or use a longer path"
+        yield "outputs.network_hz", problem, limit
+        return
+    most = (length - frame) * (1 + 1e-9)
+    if motion.transient_m > most:
+        limit = (
+            f"at most {most:.4g} m: the length of the path, {length:.4g} m, minus that between "
+            "two frames of the contact network (outputs.network_hz)"
+        )
         yield "motion.transient_m", problem, limit
-    elif study.motion.uncounted_m >= length * (1 - 1e-9):
+    for name, one in motion.superposed().items():
+        if one.ramp_s * speed > most:
+            limit = f"at most {most / speed:.3g} s; or use a longer path"
+            yield f"motion.{name}.ramp_s", problem, limit
+    if motion.uncounted_m > most and motion.counted_from_revolution is not None:
         limit = "a revolution that begins before the drag ends (motion.path.revolutions)"
         yield "motion.counted_from_revolution", problem, limit
-    rate = study.motion.axis_speed_m_s / length
-    if study.outputs.network_hz < rate:
-        problem = "not one frame of the contact network is written during the drag"
-        yield "outputs.network_hz", problem, f"at least {rate:.3g} Hz; or use a longer path"
 
 
 def _sweep(study: Study) -> _Found:
