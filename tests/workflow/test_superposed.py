@@ -37,7 +37,8 @@ from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import read_bed
-from dragdeck.study.superposed.kind import DragSteps
+from dragdeck.study.superposed.kind import DragSteps, SuperposedOfRun
+from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin
 from dragdeck.sweep.cases import load_cases
 
@@ -266,9 +267,9 @@ def test_a_resumed_run_continues_the_motion(runs: Runs, path: dict[str, Any]) ->
 
 def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
     """Facets gather in the body frame, whose sums are those of the workpiece; work is power."""
-    schedule = [{"until_s": 0.1, "rpm": 300}, {"until_s": 1, "rpm": -300}]
+    schedule = [{"until_s": 0.12, "rpm": 300}, {"until_s": 1, "rpm": -300}]
     path = {"kind": "circle", "radius_m": 0.01, "revolutions": 0.07}
-    spin = {"schedule": schedule}
+    spin = {"schedule": schedule, "ramp_s": 0.02}
     deep = {"immersion_depth_m": 0.025, "plunge_speed_m_s": 0.15}
     folder = runs.rendered(300, path=path, spin=spin, transient_m=1e-4, **deep)
     engine(folder)
@@ -334,10 +335,10 @@ variable reference_x equal f_workpiece[7]
 variable reference_y equal f_workpiece[8]
 variable reference_z equal f_workpiece[9]
 fix drag all move/mesh mesh workpiece linear {{ speed }} 0. 0.
-{% for name, formula in spin.variables | items %}
+{% for name, formula in superposed.variables | items %}
 variable {{ name }} equal {{ formula }}
 {% endfor %}
-fix spin all move/mesh mesh workpiece {{ spin.mover }}
+fix superposed all move/mesh mesh workpiece {{ superposed.mover }}
 {% from "outputs.j2" import write %}
 {% for output in outputs %}
 {{ write(output) }}
@@ -350,6 +351,43 @@ def static_overlap(mass: float) -> float:
     """The overlap at which Hertz' force on a plate of the same material carries a particle."""
     stiffness = 4 / 3 * MODULUS / (2 * (1 - 0.3**2)) * np.sqrt(RADIUS)
     return float((mass * GRAVITY / stiffness) ** (2 / 3))
+
+
+def write_plate(
+    folder: Path, motion: SuperposedOfRun, drag: DragSteps, speed_m_s: float, written: Any
+) -> None:
+    """Input script, plate and a particle that rests on it."""
+    deck = environment(ROOT / "templates").from_string(DECK)
+    text = deck.render(
+        superposed=motion.on_engine(drag.start), outputs=written, steps=drag.end,
+        timestep=drag.timestep_s, modulus=MODULUS, friction=FRICTION, gravity=GRAVITY,
+        speed=speed_m_s, law="hertz tangential history",
+    )  # fmt: skip
+    (folder / "in.liggghts").write_text(text)
+    (folder / "workpiece.stl").write_text(PLATE)
+    mass = DENSITY * 4 / 3 * np.pi * RADIUS**3
+    place = f"{PLACE[0]} {PLACE[1]} {RADIUS - static_overlap(mass)}"
+    (folder / "particle.data").write_text(
+        "one particle\n\n1 atoms\n\n1 atom types\n\n-0.05 0.05 xlo xhi\n-0.05 0.05 ylo yhi\n"
+        f"-0.01 0.05 zlo zhi\n\nAtoms\n\n1 1 {2 * RADIUS} {DENSITY} {place}\n"
+    )
+
+
+@pytest.mark.parametrize(("ramp_s", "thrown"), [(0.0, True), (0.1, False)])
+def test_an_oscillation_below_gravity_throws_no_particle_off(
+    tmp_path: Path, ramp_s: float, thrown: bool
+) -> None:
+    """0.1 mm at 30 Hz accelerates with 0.36 g at most: only a start at full speed throws it off."""
+    oscillation = Oscillation(amplitude_m=1e-4, frequency_hz=30, ramp_s=ramp_s)
+    drag = DragSteps(0, 17_000, 1e-5)
+    force = outputs.workpiece_force(20, drag.end, "workpiece")
+    motion = oscillation.of_run(drag)
+    write_plate(tmp_path, motion, drag, 0.0, [force])
+    engine(tmp_path)
+    rows = np.loadtxt(tmp_path / "workpiece_force.1.txt", skiprows=1)
+    lifts = [motion.lift_m(step, drag.timestep_s) for step in rows[:, 0]]
+    np.testing.assert_allclose(rows[:, 10], lifts, atol=1e-9)
+    assert (rows[:, 4] == 0.0).any() == thrown
 
 
 def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: Path) -> None:
@@ -366,19 +404,7 @@ def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: 
         ]
     )
     spin = Spin(rpm=RPM, ramp_s=0.0)
-    deck = environment(ROOT / "templates").from_string(DECK)
-    text = deck.render(
-        spin=spin.of_run(drag).on_engine(drag.start), outputs=written, steps=STEPS,
-        timestep=drag.timestep_s, modulus=MODULUS, friction=FRICTION, gravity=GRAVITY, speed=SPEED,
-        law="hertz tangential history",
-    )  # fmt: skip
-    (tmp_path / "in.liggghts").write_text(text)
-    (tmp_path / "workpiece.stl").write_text(PLATE)
-    place = f"{PLACE[0]} {PLACE[1]} {RADIUS - static_overlap(mass)}"
-    (tmp_path / "particle.data").write_text(
-        "one particle\n\n1 atoms\n\n1 atom types\n\n-0.05 0.05 xlo xhi\n-0.05 0.05 ylo yhi\n"
-        f"-0.01 0.05 zlo zhi\n\nAtoms\n\n1 1 {2 * RADIUS} {DENSITY} {place}\n"
-    )
+    write_plate(tmp_path, spin.of_run(drag), drag, SPEED, written)
     ColumnsFile(outputs={each.name: each.as_part() for each in written}).write(
         tmp_path / "columns.json"
     )
