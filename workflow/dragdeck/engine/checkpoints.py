@@ -146,15 +146,21 @@ def _last_chunks(stream: BinaryIO, end: int) -> Iterator[tuple[int, int]]:
     """Where a last chunk may begin, and how many particles it would hold, shortest first."""
     doubles = (end - 4) // 8
     for least in range(1, doubles + 1, _PIECE_DOUBLES):
-        lengths = np.arange(min(least + _PIECE_DOUBLES - 1, doubles), least - 1, -1)
-        words = np.frombuffer(_read(stream, end - 4 - 8 * int(lengths[0]), 8 * len(lengths)), "<i4")
-        if len(words) == 0:  # cut meanwhile
-            return
-        for length in reversed(lengths[words[::2] == lengths].tolist()):
+        for length in _lengths(stream, end, least, min(least + _PIECE_DOUBLES - 1, doubles)):
             start = end - 4 - 8 * length
             count = _particles(stream, start + 4, length)
             if count:
                 yield start, count
+
+
+def _lengths(stream: BinaryIO, end: int, least: int, most: int) -> list[int]:
+    """Lengths in doubles, in a range, that stand before as many doubles, shortest first."""
+    lengths = np.arange(most, least - 1, -1)
+    content = _read(stream, end - 4 - 8 * most, 8 * len(lengths))
+    if not content:  # cut meanwhile
+        return []
+    found: list[int] = lengths[np.frombuffer(content, "<i4")[::2] == lengths].tolist()
+    return found[::-1]
 
 
 def _particles(stream: BinaryIO, begin: int, doubles: int) -> int:
