@@ -173,8 +173,8 @@ def _merged(base: Mapping[str, Any], own: Mapping[str, Any], top: bool = True) -
         if value is None:
             found.pop(key, None)
         elif isinstance(value, dict) and not (top and key in _WHOLE):
-            inherits = isinstance(there, dict) and value.get("kind") in (None, there.get("kind"))
-            found[key] = _merged(there if inherits else {}, value, top=False)
+            same = isinstance(there, dict) and value.get("kind") in (None, there.get("kind"))
+            found[key] = _merged(there if same and there else {}, value, top=False)
         else:
             found[key] = value
     return found
