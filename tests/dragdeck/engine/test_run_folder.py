@@ -78,8 +78,13 @@ def test_a_changed_deck_moves_the_old_run_aside(
     old = (filling / "particles.1.bin").read_bytes()
     deck = filling / "in.liggghts"
     rewrite(deck, deck.read_text().replace("9.81", "9.80"))
+    for name in ("logs/run.log", "benchmarks/run.tsv"):
+        (filling / name).parent.mkdir()
+        (filling / name).write_text("of Snakemake")
     lines: list[str] = []
     run(filling, lines.append)
+    assert (filling / "logs/run.log").is_file()
+    assert (filling / "benchmarks/run.tsv").is_file()
     (kept,) = (filling / "archive").iterdir()
     assert (kept / "particles.1.bin").read_bytes() == old
     assert "9.81" in (kept / "as_run/in.liggghts").read_text()

@@ -130,6 +130,9 @@ class CaseFile(Document):
         Time step and Rayleigh time of the smallest particle, s.
     phases : sequence of Phase
         Empty if LIGGGHTS determines the number of steps.
+    added_forces : sequence of str
+        Models of the script's contact law that add a normal force; Coulomb's limit of friction
+        does not follow from the contact force then.
     """
 
     study: str
@@ -141,6 +144,7 @@ class CaseFile(Document):
     versions: Mapping[str, str]
     phases: Sequence[Phase] = ()
     files: Mapping[str, str] = {}
+    added_forces: Sequence[str] = ()
 
 
 class CaseOfStudy(CaseFile):

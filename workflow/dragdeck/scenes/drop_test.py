@@ -76,7 +76,7 @@ def drop_scene(case: Case, fidelity: DropFidelity | None = None) -> Scene[DropTe
         scene="drop_test",
         run=DROP_TEST.run_id(case),
         source="particle.data",
-        materials=material_table(study, names, scale, case),
+        materials=material_table(study, names, scale, case, one_particle=True),
         limit_force=study.contact.limit_force,
         gravity_m_s2=study.gravity_m_s2,
         skin_m=radius,

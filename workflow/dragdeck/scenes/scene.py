@@ -218,7 +218,9 @@ def _assumptions(study: Study) -> list[AssumptionOfRun]:
     return found
 
 
-def material_table(study: Study, names: Sequence[str], scale: float, case: Case) -> Materials:
+def material_table(
+    study: Study, names: Sequence[str], scale: float, case: Case, *, one_particle: bool = False
+) -> Materials:
     """The constants of the given materials, and their contact law.
 
     Parameters
@@ -230,6 +232,8 @@ def material_table(study: Study, names: Sequence[str], scale: float, case: Case)
         Factor on every Young's modulus.
     case : Case
         For the error message.
+    one_particle : bool
+        Whether no particle meets another one.
 
     Raises
     ------
@@ -242,7 +246,9 @@ def material_table(study: Study, names: Sequence[str], scale: float, case: Case)
         _check_modulus(name, modulus, scale, case)
     size = range(len(names))
     with_particle = [study.pair(names[0], name) for name in names]
-    # pairs without a particle never touch: they repeat one with a particle
+    if one_particle:
+        with_particle[0] = with_particle[-1]
+    # pairs that never touch repeat one that does
     law = contact_law([[with_particle[max(i, j)] for j in size] for i in size])
     return Materials(
         names=names,
