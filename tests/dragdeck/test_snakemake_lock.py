@@ -7,12 +7,12 @@ from pathlib import Path
 from dragdeck.snakemake_lock import clear_stale_locks
 
 HOLD = """
-import sys, time
+import sys
 from pathlib import Path
 from dragdeck.snakemake_lock import clear_stale_locks
 clear_stale_locks(Path(sys.argv[1]), print)
 print("held", flush=True)
-time.sleep(60)
+sys.stdin.read()
 """
 
 
@@ -21,7 +21,10 @@ def test_only_locks_that_nobody_holds_are_deleted(tmp_path: Path) -> None:
     lock.parent.mkdir()
     lines: list[str] = []
     with subprocess.Popen(
-        [sys.executable, "-c", HOLD, str(tmp_path)], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", HOLD, str(tmp_path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
     ) as other:
         assert other.stdout is not None and other.stdout.readline() == "held\n"
         lock.write_text("a\n")

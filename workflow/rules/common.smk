@@ -116,6 +116,11 @@ def every(place, *files):
     return [f"{folder}/{file}" for folder in every_folder(place) for file in files]
 
 
+def every_table(place):
+    """The tables of every run of the study's cases."""
+    return every(place, *(f"tables/{name}" for name in PLACES[place].tables))
+
+
 STIFFNESS = "workflow/dragdeck/data/stiffness.json"
 
 

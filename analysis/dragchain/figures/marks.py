@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
 from dragchain.arrays import Floats
-from dragchain.figures.style import BLUE, GREY, ORANGE
+from dragchain.figures.style import BLUE, COLOURS, GREY
 from dragchain.statistics.estimate import EstimateColumns
 
 
@@ -69,7 +69,7 @@ def compass_bars(
     """Draw values by azimuth with their intervals, ahead in another colour than behind."""
     edges, (value, reach) = np.array(edges_rad), _with_reach(columns, unit)
     middle = (edges[:-1] + edges[1:]) / 2
-    colours = np.where(np.abs(middle) < np.pi / 2, BLUE, ORANGE)
+    colours = np.where(np.abs(middle) < np.pi / 2, COLOURS["ahead"], COLOURS["behind"])
     axes.bar(middle, value, np.diff(edges), color=colours, edgecolor="white", linewidth=0.6)
     reach[0] = np.minimum(reach[0], value)
     axes.errorbar(middle, value, reach, fmt="none", ecolor="black", elinewidth=0.8)

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.typing import RcKeyType
 
-from dragchain.figures.style import PAPER_COLOURS, drawing
+from dragchain.figures.style import PAPER_COLOURS, drawing, true_minus
 from dragchain.files import write_bytes
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.write import compute_loading, figure_of
@@ -102,6 +102,7 @@ def _is_panel(axes: Axes) -> bool:
 
 
 def _encoded(figure: Figure, ending: str) -> bytes:
+    true_minus(figure)
     content = BytesIO()
     figure.savefig(content, format=ending, dpi=_DPI)
     return content.getvalue()

@@ -1,7 +1,6 @@
 """The figures of a run, as PNG files, and that of all cases."""
 
 from collections.abc import Callable, Mapping
-from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from dragchain.figures import network_picture
 from dragchain.figures.marks import compass, compass_bars, row, row_names
 from dragchain.figures.network_overlay import force_bar, show_network
 from dragchain.figures.panels import head, legend_below, new_figure, new_panels
-from dragchain.figures.style import BLUE, RED, drawing, save
+from dragchain.figures.style import BLUE, COLOURS, RED, drawing, save
 from dragchain.report import run_panels
 from dragchain.report.collect import write_findings
 from dragchain.report.findings import (
@@ -266,13 +265,13 @@ def drag_of_cases(
     names, forces : list
         Name and mean drag of each case.
     references : list of (str, float)
-        Label and mean in N of each figure to compare with.
+        ``experiment`` or ``simulation``, and mean in N of each figure to compare with.
     """
     figure, (axes,) = new_panels(1.2 + 0.32 * len(names))
     for place, force in enumerate(forces):
         row(axes, place, force.mean, force, BLUE)
-    for (label, value), colour in zip(references, cycle(run_panels.REFERENCES), strict=False):
-        axes.axvline(value, color=colour, linestyle="--", label=f"{label} {value:.2f} N")
+    for label, value in references:
+        axes.axvline(value, color=COLOURS[label], linestyle="--", label=f"{label} {value:.2f} N")
     row_names(axes, names)
     axes.set(xlabel="mean drag (N); bars: 95 % confidence interval")
     return legend_below(figure)

@@ -148,7 +148,7 @@ def test_the_page_on_the_contact_network_is_beside_the_report(
     write_report(out, [process])
     assert (out / "network.html").read_text() == "the scene"
     page = stands_alone((out / "report.html").read_text(encoding="utf-8"), ["network.html"])
-    assert page.references.count("network.html") == 3
+    assert page.references.count("network.html") == 2
     assert "There is no interactive page" not in page.words
 
 

@@ -72,7 +72,7 @@ def test_the_last_frame_counts_only_if_whole(
     file = tmp_path / "output"
     file.write_bytes(content)
     frames = whole_frames(file, output)
-    assert (frames.steps[-1] if frames.steps and not frames.damaged else None) == step
+    assert (frames.steps[-1] if frames.steps and not frames.problem else None) == step
 
 
 INPUTS = RunInputs(

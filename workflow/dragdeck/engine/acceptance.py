@@ -167,8 +167,10 @@ def _complete(
     promised = output.last_step is not None and found.gap is None
     if not file.is_file() and not promised:  # a part from a checkpoint at the end writes nothing
         seen = f"no {file.name}"
-    elif not found.steps or found.damaged:
-        seen = f"{file.name} is truncated or empty"
+    elif found.problem:
+        seen = f"{file.name}, {found.problem}"
+    elif not found.steps:
+        seen = f"{file.name} is empty"
     elif found.gap is not None:
         seen = f"step {found.gap} is missing"
     else:

@@ -101,8 +101,8 @@ class PartOfRun:
         gap = first_gap(self.folder, outputs, parts) if parts else -1
         newest = newest_checkpoint(self.folder, count, ranks, gap, self.report)
         first = checkpoint_step(newest) if newest else 0
-        for name in cut_outputs(self.folder, outputs, parts, first if newest else -1):
-            self.report(f"{name} is truncated or has a gap: it is rewritten from there")
+        for damage in cut_outputs(self.folder, outputs, parts, first if newest else -1):
+            self.report(f"{damage}; the run writes it again from step {first:,}")
         checkpoint = newest.name if newest else None
         part = RunPart(part=len(parts) + 1, checkpoint=checkpoint, from_step=first)
         self.record = RunRecord(

@@ -22,6 +22,9 @@ from dragdeck.errors import InputError, RejectedRunError
 from dragdeck.files import file_checksum
 
 _ARCHIVE = "archive"
+_OF_THE_WORKFLOW = ("logs", "benchmarks")
+"""Folders in which Snakemake has files open while it runs a job here."""
+
 _AS_RUN = "as_run"
 _PATIENCE_S = 1800.0
 _ANEW = (
@@ -172,7 +175,7 @@ def _archive(folder: Path, name: str, report: Report) -> None:
         number += 1
         place = folder / _ARCHIVE / f"{name}-{number}"
     place.mkdir(parents=True)
-    new = {DECK_FILE, CASE_FILE, COLUMNS_FILE, LOCK_FILE, _ARCHIVE}
+    new = {DECK_FILE, CASE_FILE, COLUMNS_FILE, LOCK_FILE, _ARCHIVE, *_OF_THE_WORKFLOW}
     sources = {file.name for file in (*folder.glob("*.data"), *folder.glob("*.stl"))}
     for file in folder.iterdir():
         if file.name not in new | sources:

@@ -182,6 +182,7 @@ def _process_case(
         {name: value for name, value in study.plain().items() if name in _INPUTS},
         drag.timestep_s,
         bed_rayleigh_time(study),
+        settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
         asked=case.advised,
         unsafe_timestep=study.accepted.unsafe_timestep,
         case=case.name,

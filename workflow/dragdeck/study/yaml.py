@@ -163,14 +163,20 @@ _WHOLE = ("fidelity", "sweep")
 
 
 def _merged(base: Mapping[str, Any], own: Mapping[str, Any], top: bool = True) -> dict[str, Any]:
-    """A study's content with another's changes; a part of another `kind` is replaced."""
+    """A study's content with another's changes.
+
+    A part of another `kind` is replaced, and ``null`` leaves a part out.
+    """
     found = dict(base)
     for key, value in own.items():
         there = base.get(key)
-        found[key] = value
-        if isinstance(value, dict) and isinstance(there, dict) and not (top and key in _WHOLE):
-            same = value.get("kind", there.get("kind")) == there.get("kind")
-            found[key] = _merged(there, value, top=False) if same else value
+        if value is None:
+            found.pop(key, None)
+        elif isinstance(value, dict) and not (top and key in _WHOLE):
+            same = isinstance(there, dict) and value.get("kind") in (None, there.get("kind"))
+            found[key] = _merged(there if same and there else {}, value, top=False)
+        else:
+            found[key] = value
     return found
 
 
