@@ -112,7 +112,7 @@ def test_a_coefficient_that_adds_a_force_is_found_in_a_script(
 ) -> None:
     row = Coefficient("liquid", "liquid", "surface wet", adds_force=True)
     monkeypatch.setattr(contact_law, "coefficients", lambda: {"liquid": row})
-    assert added_forces("gran model hertz surface wet".split()) == ["surface wet"]
+    assert added_forces(["gran", "model", "hertz", "surface", "wet"]) == ["surface wet"]
 
 
 def test_a_pair_needs_only_what_it_has() -> None:
