@@ -253,8 +253,8 @@ def friction_with(case: Case, body: str) -> float:
         raise TableError(
             f"{case.run}: the contact law adds a force ({', '.join(case.added_forces)}), and "
             "LIGGGHTS limits friction by the force without it: tangential forces of contacts, "
-            "friction work and chains cannot be told from the output; thermo.parquet, "
-            "workpiece_force.parquet and the raw output are not affected"
+            "friction work and chains cannot be told from the output; tables of the force "
+            "on the workpiece, of energies and particles, and the raw output are not affected"
         )
     particle, other = (input_of(case, f"{name}.material") for name in ("media", body))
     names = [f"pairs.{pair}.friction" for pair in (f"{particle}-{other}", f"{other}-{particle}")]

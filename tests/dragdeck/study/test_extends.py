@@ -109,6 +109,13 @@ def test_what_cannot_be_extended(extend: Callable[..., Path], text: str, words: 
     assert "extends" in str(caught.value) and "small" in str(caught.value)
 
 
+def test_a_study_that_extends_itself_is_offered_others_only(extend: Callable[..., Path]) -> None:
+    extend("extends: small\n", "childe")
+    with pytest.raises(InputError) as caught:
+        load_cases(extend("extends: child\n"))
+    assert caught.value.limit == "did you mean 'childe'? one of: childe, small"
+
+
 def test_an_error_names_the_file_and_line_that_has_the_value(extend: Callable[..., Path]) -> None:
     extend("extends: small\nmotion:\n  speed_m_s: -1\n", "middle")
     file = extend("extends: middle\nseed: -2\n")

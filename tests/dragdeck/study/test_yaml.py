@@ -195,7 +195,7 @@ def test_a_pair_may_be_given_twice_with_the_same_values(small: dict[str, Any]) -
         (b"? [a, b]\n: 1\n", "not YAML"),
         (b"a: " + 5000 * b"[", "nested too deeply"),
         (5000 * b"{a: ", "nested too deeply"),
-        (b"", "a study must be a mapping"),
+        (b"", "the file must be a mapping"),
     ],
 )
 def test_each_is_named_with_its_file(tmp_path: Path, content: bytes, words: str) -> None:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator
 from itertools import product
 
-from dragdeck.errors import InputError, choices
+from dragdeck.errors import InputError, choices, near
 from dragdeck.study.base import flat
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Scaling, Study
 from dragdeck.study.workpiece import CylinderShape
@@ -22,7 +22,7 @@ _Found = Iterator[tuple[str, str, str]]
 def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
     """Every contradiction within a whole study, or one of its cases; the errors name no file."""
     values = flat(study.plain())
-    for check in (_names, _pairs, _shape, _motion, *([_sweep] if whole else [])):
+    for check in (_names, _pairs, _shape, _motion, _assumptions, *([_sweep] if whole else [])):
         for field, problem, limit in check(study):
             yield InputError(problem, field=field, value=values.get(field), limit=limit)
 
@@ -105,6 +105,16 @@ def _motion(study: Study) -> _Found:
     if motion.uncounted_m > most and motion.counted_from_revolution is not None:
         limit = "a revolution that begins before the drag ends (motion.path.revolutions)"
         yield "motion.counted_from_revolution", problem, limit
+
+
+def _assumptions(study: Study) -> _Found:
+    values = flat(study.model_dump(mode="json"))
+    parts = (name.split(".") for name in values)
+    known = {".".join(words[:count]) for words in parts for count in range(1, len(words) + 1)}
+    for number, entry in enumerate(study.assumptions):
+        if entry.field not in known:
+            limit = f"{near(entry.field, known)}the dotted name of a field, such as media.count"
+            yield f"assumptions.{number}.field", f"no such field {entry.field!r}", limit
 
 
 def _sweep(study: Study) -> _Found:

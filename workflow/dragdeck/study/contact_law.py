@@ -136,7 +136,8 @@ def added_forces(law: Sequence[str]) -> list[str]:
         The models that add a force, and those that are not known not to.
     """
     words = list(law)
-    if "model" not in words[:-1]:
+    gran = words[:1] == ["gran"] or words[0].startswith("wall/gran")
+    if not gran or "model" not in words[:-1]:
         return [" ".join(words)]
     normal, *models = words[words.index("model") + 1 :]
     found = [] if normal in _PUSHING else [normal]
