@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -59,6 +60,18 @@ def test_a_complete_run_is_not_repeated(filling: Path) -> None:
     (filling / "run.json").unlink()  # as Snakemake does before it runs a rule again
     run(filling, silent)
     assert (filling / "run.json").read_text() == first
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_disk_that_is_full_is_named_with_what_is_free_and_needed(filling: Path) -> None:
+    (filling / f".state.json.{os.getpid()}").symlink_to("/dev/full")
+    with pytest.raises(EngineError) as caught:
+        run(filling, silent)
+    said = str(caught.value)
+    assert said.startswith(f"{filling / 'state.json'}: the disk is full (No space left on device)")
+    assert re.search(r"value:  [\d.,]+ .?B free\n  limit:  [\d.,]+ .?B, estimated", said)
+    assert "remedy: free disk space" in said
+    assert run(filling, silent).state == "complete"
 
 
 def test_a_comment_in_the_deck_changes_nothing(filling: Path) -> None:

@@ -155,7 +155,11 @@ def test_an_unusual_value_is_a_warning(small: dict[str, Any]) -> None:
     [
         ({"motion": {"transient_m": 0.0063}}, "motion.transient_m", "no path is left"),
         ({"outputs": {"network_hz": 1}}, "outputs.network_hz", "not one frame"),
-        ({"filling": {"energy_ratio": 1.1}}, "filling.energy_ratio", "less than or equal to 1"),
+        (
+            {"filling": {"energy_ratio": 2e-3}},
+            "filling.energy_ratio",
+            "less than or equal to 0.001",
+        ),
         (
             {"pairs": {"steel-ceramic": {"restitution": 0.5, "friction": 0.1}}},
             "pairs.steel-ceramic",

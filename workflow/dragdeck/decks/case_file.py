@@ -202,9 +202,12 @@ class SettlingCriterion(Part):
     ----------
     energy_ratio : float
         Largest mean kinetic energy per particle / (m g d).
+    highest_m : float
+        Largest height of any point of a particle above the floor, m: the rim of the bowl.
     """
 
     energy_ratio: float
+    highest_m: float
 
 
 class SteadyCriterion(Part):

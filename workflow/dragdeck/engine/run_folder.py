@@ -18,6 +18,7 @@ from dragdeck.engine.part import STATE_FILE, PartOfRun, why_rejected
 from dragdeck.engine.process import find_engine
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import Report, say
+from dragdeck.engine.space import full_disk_named
 from dragdeck.errors import InputError, RejectedRunError
 from dragdeck.files import file_checksum
 
@@ -69,7 +70,8 @@ def run(
     """
     inputs = RunInputs.read(folder / CASE_FILE)
     columns = ColumnsFile.read(folder / COLUMNS_FILE)
-    with only_runner(folder, report):
+    full_disk = full_disk_named(folder, columns.outputs, inputs.media.count)
+    with full_disk, only_runner(folder, report):
         _check_files(folder, inputs)
         take_forced_restarts(folder)
         digest = fingerprint(folder, inputs)

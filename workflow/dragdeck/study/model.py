@@ -263,9 +263,10 @@ class Calibration(Model):
 class Filling(Model):
     """When a packing counts as settled."""
 
-    energy_ratio: Annotated[Number, Field(gt=0, le=1)] = Field(
+    energy_ratio: Annotated[Number, Field(gt=0, le=1e-3)] = Field(
         default=1e-5,
-        description="settling criterion: largest mean kinetic energy per particle / (m g d)",
+        description="settling criterion: largest mean kinetic energy per particle / (m g d); "
+        "0.001 lifts a particle by a thousandth of its diameter",
     )
     max_time_s: Positive = Field(
         default=10.0,
