@@ -84,8 +84,13 @@ def made_stiffness(case: Case, *, amplitude_std: float = 0.05, **numbers: float)
         "quantile": 2.0, "path_to_particle": 15.0,
         "law": {
             "rate": 0.25,
-            "covariance": [[2e-4, -1e-4, 0.0], [-1e-4, 1e-4, 0.0], [0.0, 0.0, 1e-4]],
-            "amplitude_std": amplitude_std, "run_std": 0.06, "model_std": 0.01,
+            "amplitude": [0.3, 0.1, 0.05],
+            "covariance": [
+                [2e-4, -1e-4, 0.0, 1e-4], [-1e-4, 1e-4, 0.0, 0.0], [0.0, 0.0, 1e-4, 0.0],
+                [1e-4, 0.0, 0.0, 1e-3],
+            ],
+            "amplitude_std": amplitude_std, "run_std": 0.06,
+            "misfit": [[1e-3, 0.02], [1e-2, 0.005]],
         },
     }  # fmt: skip
     scenes = [
