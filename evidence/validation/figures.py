@@ -130,8 +130,7 @@ def around(found: Statements) -> Figure:
     figure = new_figure(3.9)
     left, right = compass(figure, 1, 2, 1), figure.add_subplot(1, 2, 2)
     edges = found.azimuth.edges
-    compass_bars(left, edges, found.azimuth.columns, 100.0)
-    left.set_title(f"normal force\n(% per {np.degrees(edges[1] - edges[0]):.0f}°)")
+    compass_bars(left, edges, found.azimuth.columns, 100.0, "%")
     depth_bars(right, found.depth.edges, found.depth.columns)
     right.set(xlabel="mean normal force per contact (N)", ylabel="depth (mm)")
     right.set_title("bars: 95 % CI over packings")

@@ -1,4 +1,4 @@
-"""A trade of speed against accuracy with made-up numbers, for tests of what reads one."""
+"""A trade-off of speed against accuracy with made-up numbers, for tests of what reads one."""
 
 from typing import Any
 
@@ -40,7 +40,7 @@ def cost(name: str, ratio: float = 1.0, **more: Any) -> MeasuredCost:
 
 
 def made_tradeoff(case: Case, **more: Any) -> Tradeoff:
-    """A trade whose measured scene is that of a case."""
+    """A trade-off whose measured scene is that of a case."""
     content = {
         "measured": "2026-01-02", "plan": "made", "study": case.study_name,
         "versions": {"engine": "3.8.0"},

@@ -185,7 +185,7 @@ def network_page_files():
 
 @cache
 def points(plan=PLAN):
-    """The points of a plan, the trade's if no other."""
+    """The points of a plan, the trade-off's if no other."""
     return explained(PROJECT.points, STUDY, plan)
 
 
@@ -361,7 +361,7 @@ def promises_option(wildcards):
 
 
 def every_drop_point(file):
-    """One file of every drop test of the trade."""
+    """One file of every drop test of the trade-off."""
     return [f"{run_path(STUDY, 'drop_test', run)}/{file}" for run in points_by_run("drop_test")]
 
 

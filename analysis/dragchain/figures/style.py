@@ -38,7 +38,7 @@ COLOURS = {
     "bed": "#d8b365",
     "workpiece": "#59636e",
     "swept": "#5ba3d0",
-    "plunge": "#6c3483",
+    "plunge": "#CC79A7",
     "approach": "#117a65",
     "ink": INK,
     "refused": "#b3261e",
@@ -70,21 +70,28 @@ STYLE: dict[RcKeyType, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 8,
 }
-FORCE_COLOURS = "magma_r"
-"""From light to dark, told apart with any kind of colour vision."""
+FORCE_COLOURS = LinearSegmentedColormap.from_list(
+    "forces", matplotlib.colormaps["magma_r"](np.linspace(0.0, 0.8, 256))
+)
+"""From light to dark, told apart with any kind of colour vision.
+
+It ends before black, in which a cylinder shows neither its shape nor what is drawn on it.
+"""
 
 PAPER_COLOURS = LinearSegmentedColormap.from_list("paper", ["#1a9850", "#d9c514", "#c8102e"])
 """Green over yellow to red, as in Uhlmann et al. (2015)."""
 
 WIDTH_IN = 7.6
-WIDE_IN = 9.5
+HALF_IN, WIDE_IN = 5.6, 9.5
+"""Widths of figures: `HALF_IN` where two stand side by side on a page."""
+
 _DPI = 150
 
 
 def force_map() -> Colormap:
     """The colour map of forces and loads: the paper's where matplotlib's default is set to it."""
     paper = matplotlib.rcParams["image.cmap"] == PAPER_COLOURS.name
-    return PAPER_COLOURS if paper else matplotlib.colormaps[FORCE_COLOURS]
+    return PAPER_COLOURS if paper else FORCE_COLOURS
 
 
 def drawing() -> AbstractContextManager[None]:
