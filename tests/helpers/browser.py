@@ -103,6 +103,27 @@ class Browser:
         chain = ActionChains(self.driver).move_to_element_with_offset(element, x, y)
         chain.click_and_hold().move_to_element_with_offset(element, u, v).release().perform()
 
+    def phone(self) -> None:
+        """Show pages as a phone of 390 x 844 pixels does, until `desktop`."""
+        size = {"width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": True}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+    def desktop(self) -> None:
+        """Show pages in the window again."""
+        self.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+    def saved(self, folder: Path, selector: str) -> Path:
+        """Click what saves a file, and wait for the file."""
+        where = {"behavior": "allow", "downloadPath": str(folder)}
+        self.driver.execute_cdp_cmd("Browser.setDownloadBehavior", where)
+        self.click(selector)
+
+        def files() -> list[Path]:
+            return [file for file in folder.iterdir() if not file.name.endswith(".crdownload")]
+
+        self.wait(files, "the file")
+        return files()[0]
+
     def errors(self) -> list[str]:
         """What the page wrote to the console, but for notes of the graphics driver."""
         messages = [entry["message"] for entry in self.driver.get_log("browser")]

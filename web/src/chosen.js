@@ -1,17 +1,20 @@
-// What was chosen, drawn over everything else: a particle, a contact or a facet of the workpiece.
+// What was chosen, drawn over everything else: a particle, a contact or a facet of the workpiece,
+// and the line between the places whose distance is measured.
 import { BufferAttribute, BufferGeometry, Group, Mesh } from "three";
 import { Bodies } from "./bodies.js";
-import { CHOSEN, rgb } from "./colours.js";
+import { CHOSEN, INK, rgb } from "./colours.js";
 import { bodyMaterial, facetMaterial } from "./shading.js";
 
 const PARTICLE = 0.6,
-  CONTACT = 0.12; // radii, in the particle's own and in the mean particle radius
+  CONTACT = 0.12,
+  END = 0.2,
+  LINE = 0.05; // radii, that of a particle in its own and others in the mean particle radius
 
 export class Chosen {
   constructor(frames, workpiece) {
     this.frames = frames;
     this.workpiece = workpiece;
-    this.body = new Bodies(1, onTop(bodyMaterial()));
+    this.body = new Bodies(4, onTop(bodyMaterial()));
     this.corners = new BufferAttribute(new Float32Array(9), 3);
     const geometry = new BufferGeometry().setAttribute("position", this.corners);
     for (const [name, value] of [
@@ -25,11 +28,14 @@ export class Chosen {
     for (const mesh of this.group.children) Object.assign(mesh, { renderOrder: 1, frustumCulled: false });
   }
 
-  /** Mark what was chosen where it is in a frame; nothing if it is not there. */
-  update(frame, chosen) {
+  /** Mark what was chosen where it is in a frame, and the measured places; nothing if they are not there. */
+  update(frame, chosen, places) {
     this.body.clear();
     if (chosen?.pair) this.markContact(frame, chosen.pair);
     else if (chosen?.particle !== undefined) this.markParticle(frame, chosen.particle);
+    const { radius } = this.frames.head.media;
+    for (const place of places) this.body.add(place, place, END * radius, 0, rgb(INK));
+    if (places.length === 2) this.body.add(...places, LINE * radius, 0, rgb(INK));
     this.body.show();
     this.facet.visible = chosen?.facet !== undefined;
     if (this.facet.visible) this.markFacet(chosen.facet);

@@ -19,7 +19,7 @@ export class Contacts {
     this.counts = [0, 0, 0]; // shown, by class
   }
 
-  /** Show the contacts of a frame that pass threshold and classes; see `media.js`. */
+  /** Show the contacts of a frame that pass threshold, classes and section; see `media.js`. */
   update(frame, look, colourOf) {
     const { from, to } = this.frames.ends(frame),
       { force } = this.frames.head.scales,
@@ -40,11 +40,12 @@ export class Contacts {
       const onPath = look.path && (flags & DOMINANT) > 0,
         inChain = look.chains && (flags & QUASI_LINEAR) > 0;
       const passes = look.classes[kind] && value > look.threshold;
-      if (passes) this.counts[kind]++;
       const marked = onPath || (inChain && passes);
-      if (!passes && !marked) continue;
+      if (!marked && !(passes && look.others !== "hidden")) continue;
+      if (!look.kept[frame.a[k]] || look.kept[frame.b[k]] === 0) continue;
+      this.counts[kind]++;
       let tint = look.colour === "force" ? colourOf(value / force) : look.colour === "class" ? tints[kind] : steel;
-      if (look.fade && !marked) tint = blend(tint, pale, 0.8);
+      if (look.others === "faded" && !marked) tint = blend(tint, pale, 0.8);
       const radius = mean * Math.min(Math.max((LARGEST * value) / force, marked ? LEAST_MARKED : LEAST), LARGEST);
       const start = from.subarray(3 * k, 3 * k + 3),
         end = to.subarray(3 * k, 3 * k + 3);

@@ -85,6 +85,24 @@ export class Frames {
     return (frame.ends = { from, to });
   }
 
+  /** Which particles are on the shown side of a section: { axis, at, side }, or null for all. */
+  kept(frame, section) {
+    const { axis, at, side } = section ?? { axis: 0, at: Infinity, side: 1 };
+    return Uint8Array.from(frame.id, (_, k) => side * (frame.centre[3 * k + axis] - at) <= 0);
+  }
+
+  /** Where the centre of a particle or the point of a contact is, mm; null if it is not in the frame.
+   *  That of two particles divides the line between their centres as their radii do. */
+  place(frame, { particle, pair }) {
+    const row = pair ? this.find(frame, ...pair) : frame.id.indexOf(particle);
+    if (row < 0) return null;
+    if (!pair) return frame.centre.slice(3 * row, 3 * row + 3);
+    const { from, to } = this.ends(frame),
+      [own, other] = [frame.a, frame.b].map((bodies) => frame.radius[bodies[row]]);
+    const part = other ? own / (own + other) : 1;
+    return [0, 1, 2].map((axis) => from[3 * row + axis] + part * (to[3 * row + axis] - from[3 * row + axis]));
+  }
+
   /** The class of each contact: 0 between particles, 1 with the workpiece, 2 with the bowl. */
   classes(frame) {
     const ofBody = (b) => (this.head.bodies[b].startsWith("workpiece") ? 1 : 2);

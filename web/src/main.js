@@ -10,10 +10,11 @@ import { ForceCurve } from "./force_curve.js";
 import { Frames } from "./frames.js";
 import { showLegend, showScale } from "./legend.js";
 import { Media } from "./media.js";
-import { digits, seconds, whole } from "./numbers.js";
+import { digits, fixed, seconds, whole } from "./numbers.js";
 import { Player } from "./player.js";
 import { ProfilePlots } from "./profile_plots.js";
 import { numbers } from "./readout.js";
+import { Film, filmKind, savePicture } from "./save.js";
 import { PRESETS, View } from "./view.js";
 import { Workpiece } from "./workpiece.js";
 
@@ -26,7 +27,8 @@ class Page {
     this.frames = new Frames(head, columns);
     this.colourOf = colourMap(head.colours);
     this.number = head.peaks[0]?.frame ?? 0;
-    this.look = { classes: [true, true, true], threshold: 0, chosen: null };
+    this.look = { classes: [true, true, true], threshold: 0, chosen: null, section: null };
+    this.measured = null; // the particles or contacts whose distance is measured
     this.startCurve(columns);
     this.startProfiles();
     this.startScene(columns);
@@ -125,6 +127,8 @@ class Page {
     this.preset("overview");
     this.startControls();
     this.startTransport();
+    this.startSaving();
+    this.startSection();
     this.startChoosing();
   }
 
@@ -151,7 +155,7 @@ class Page {
     const redraw = () => this.redraw(),
       { scales } = this.head;
     for (const button of byId("presets").children) button.onclick = () => this.preset(button.dataset.preset);
-    for (const name of ["colour", "load", "path", "chains", "fade", "class-0", "class-1", "class-2"])
+    for (const name of ["colour", "load", "path", "chains", "others", "class-0", "class-1", "class-2"])
       byId(name).onchange = redraw;
     for (const name of ["size", "threshold"]) byId(name).oninput = redraw;
     byId("threshold-range").oninput = () =>
@@ -159,6 +163,23 @@ class Page {
     byId("mean").onclick = () => this.setThreshold(scales.mean);
     for (const swatch of document.querySelectorAll("[data-class]"))
       swatch.style.background = CLASS_COLOURS[swatch.dataset.class];
+  }
+
+  startSection() {
+    const axis = byId("section-axis"),
+      at = byId("section-at"),
+      { radius, height } = this.head.bowl;
+    const place = () => {
+      const [low, high] = axis.value === "2" ? [0, height] : [-radius, radius];
+      Object.assign(at, { min: low, max: high, value: (low + high) / 2, disabled: !axis.value });
+      byId("section-side").disabled = !axis.value;
+    };
+    place();
+    axis.onchange = () => {
+      place();
+      this.redraw();
+    };
+    at.oninput = byId("section-side").onchange = () => this.redraw();
   }
 
   preset(name) {
@@ -180,6 +201,7 @@ class Page {
     const told = (on) => {
       play.textContent = on ? "Pause" : "Play";
       play.setAttribute("aria-pressed", on);
+      if (!on) this.endFilm();
     };
     this.player = new Player(this.frames.times, { show: (number) => this.show(number), told });
     slider.max = this.frames.count - 1;
@@ -189,6 +211,30 @@ class Page {
     play.onclick = () => this.playOrPause();
     speed.onchange = () => (this.player.speed = Number(speed.value));
     this.player.speed = Number(speed.value);
+  }
+
+  // --- saving --------------------------------------------------------------------------------
+
+  startSaving() {
+    const video = byId("save-video");
+    byId("save-picture").onclick = () => savePicture(this.view, `${this.head.run}_${this.frames.times[this.number].toFixed(3)}s`);
+    video.disabled = !filmKind();
+    if (video.disabled) video.title = "This browser cannot record a canvas.";
+    video.onclick = () => (this.film ? this.player.stop() : this.startFilm());
+  }
+
+  /** Play all frames and record them. */
+  startFilm() {
+    this.go(0);
+    this.view.draw(devicePixelRatio);
+    this.film = new Film(this.view, this.head.run, () => this.film && this.player.start(0));
+    byId("save-video").textContent = "End video";
+  }
+
+  endFilm() {
+    this.film?.end();
+    this.film = null;
+    byId("save-video").textContent = "Save video";
   }
 
   playOrPause() {
@@ -211,6 +257,7 @@ class Page {
     if (!this.view) return;
     byId("time").value = this.number;
     byId("time").setAttribute("aria-valuetext", seconds(this.frames.times[this.number]));
+    byId("caption-time").textContent = seconds(this.frames.times[this.number]);
     byId("now").textContent = `${seconds(this.frames.times[this.number])} (${this.number + 1} of ${this.frames.count})`;
     this.workpiece.place(this.number);
     this.view.follow();
@@ -227,7 +274,8 @@ class Page {
       load: byId("load").value,
       path: checked("path"),
       chains: checked("chains"),
-      fade: checked("fade"),
+      others: byId("others").value,
+      section: this.section,
     });
     look.classes = [0, 1, 2].map((kind) => checked(`class-${kind}`));
     look.threshold = Math.max(Number(byId("threshold").value) || 0, 0);
@@ -237,13 +285,22 @@ class Page {
     byId("size-shown").textContent = `${byId("size").value} %`;
   }
 
+  /** The section that is chosen: its axis, place in mm, and 1 or −1 for the side that is shown. */
+  get section() {
+    const axis = byId("section-axis").value,
+      at = Number(byId("section-at").value);
+    byId("section-shown").textContent = axis && `${fixed(at, 1)} mm`;
+    return axis ? { axis: Number(axis), at, side: byId("section-side").checked ? -1 : 1 } : null;
+  }
+
   redraw() {
     const frame = this.frames.at(this.number);
     this.readControls();
+    this.look.kept = this.frames.kept(frame, this.look.section);
     this.media.update(frame, this.look, this.colourOf);
     this.contacts.update(frame, this.look, this.colourOf);
     this.workpiece.update(this.look, this.colourOf);
-    this.chosen.update(frame, this.look.chosen);
+    this.chosen.update(frame, this.look.chosen, this.tellDistance(frame));
     showLegend(
       byId("legend"),
       this.head,
@@ -263,7 +320,7 @@ class Page {
       ["b", whole(counts.reduce((sum, count) => sum + count))],
       [
         0,
-        ` of ${whole(frame.a.length)} contacts shown, normal force above ${digits(look.threshold, 3)} N. Drag force `,
+        ` of ${whole(frame.a.length)} contacts shown${look.others === "hidden" ? ", those of chains only" : ""}, normal force above ${digits(look.threshold, 3)} N. Drag force `,
       ],
       ["b", `${digits(this.curve.at(this.time))} N`],
       [0, ` at ${seconds(this.time)}. `],
@@ -295,6 +352,17 @@ class Page {
     byId("chosen").replaceChildren(Object.assign(document.createElement("h3"), { textContent: title }), table);
   }
 
+  /** Tell the distance between the measured places; returns those of them that are in the frame. */
+  tellDistance(frame) {
+    const { measured } = this,
+      places = (measured ?? []).map((one) => this.frames.place(frame, one)).filter(Boolean),
+      [from, to] = places;
+    const known = to ? `${fixed(Math.hypot(...[0, 1, 2].map((axis) => to[axis] - from[axis])), 2)} mm` : "not in this frame";
+    byId("distance").hidden = !measured;
+    byId("distance").textContent = `Distance: ${measured?.length === 2 ? known : "choose two particles or contacts"}`;
+    return places;
+  }
+
   // --- choosing ------------------------------------------------------------------------------
 
   startChoosing() {
@@ -308,6 +376,11 @@ class Page {
     canvas.addEventListener("keydown", (event) => this.key(event));
     byId("find-button").onclick = () => this.find(byId("find").value);
     byId("find").addEventListener("keydown", ({ key }) => key === "Enter" && this.find(byId("find").value));
+    byId("measure").onclick = () => {
+      this.measured = this.measured ? null : [];
+      byId("measure").setAttribute("aria-pressed", Boolean(this.measured));
+      this.redraw();
+    };
     byId("highest-facet").onclick = () => this.showHighestFacet();
     byId("highest-facet").hidden = !this.workpiece.own.loads.length;
   }
@@ -320,6 +393,7 @@ class Page {
 
   choose(chosen) {
     this.look.chosen = chosen;
+    if (this.measured && chosen.facet === undefined) this.measured = [...this.measured, chosen].slice(-2);
     this.redraw();
   }
 

@@ -26,7 +26,7 @@ export class Media {
     this.spheres.clear();
     for (let k = 0; k < frame.id.length; k++) {
       const size = onPath.has(k) ? Math.max(look.size, MARKED) : look.size;
-      if (size <= 0) continue;
+      if (size <= 0 || !look.kept[k]) continue;
       const centre = frame.centre.subarray(3 * k, 3 * k + 3);
       const tint = measure ? colourOf(measure[k] / look.top) : onPath.has(k) ? path : plain;
       this.rows.push(k);

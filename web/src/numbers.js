@@ -1,14 +1,24 @@
 // Numbers as text.
 
+const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+
+export const minus = (text) => text.replaceAll("-", "−");
+
+export const tenTo = (power) =>
+  `10${power < 0 ? "⁻" : ""}${[...String(Math.abs(power))].map((digit) => RAISED[digit]).join("")}`;
+
 /** A number with four significant digits; the data have a little more. */
 export function digits(value, count = 4) {
   if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
-  const text = value.toPrecision(count);
-  const plain = text.includes("e") && Math.abs(value) >= 1 ? Number(text).toFixed(0) : text;
-  return plain.replace("-", "−").replace("e−", "e-");
+  const text = value.toPrecision(count),
+    [front, power] = text.split("e");
+  if (power === undefined) return minus(text);
+  return Math.abs(value) >= 1 ? minus(Number(text).toFixed(0)) : `${minus(front)} × ${tenTo(Number(power))}`;
 }
 
-export const seconds = (value) => `${value.toFixed(3).replace("-", "−")} s`;
+export const fixed = (value, decimals) => minus(value.toFixed(decimals));
+
+export const seconds = (value) => `${fixed(value, 3)} s`;
 
 export const whole = (value) => value.toLocaleString("en-GB").replaceAll(",", "\u202f");

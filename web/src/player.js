@@ -26,7 +26,7 @@ export class Player {
       if (number === last) this.stop();
       else this.request = requestAnimationFrame(advance);
     };
-    this.stop();
+    cancelAnimationFrame(this.request);
     this.request = requestAnimationFrame(advance);
     this.told(true);
   }

@@ -1,6 +1,6 @@
 // The plots of the profiles: a frame over the mean of all frames, and the map of the workpiece.
 import { plain, set, ticks } from "./axes.js";
-import { digits, seconds, whole } from "./numbers.js";
+import { digits, seconds, tenTo, whole } from "./numbers.js";
 import { profilesOf } from "./profiles.js";
 
 const EDGE = { left: 46, right: 20, top: 8, bottom: 46 };
@@ -19,7 +19,7 @@ const forceAxis = {
   marks: (first, last) =>
     Array.from({ length: Math.floor(last) - Math.ceil(first) + 1 }, (_, k) => {
       const power = Math.ceil(first) + k;
-      return { at: power, text: power < -3 ? `1e−${-power}` : plain(10 ** power) };
+      return { at: power, text: power < -3 ? tenTo(power) : plain(10 ** power) };
     }),
 };
 

@@ -1,6 +1,6 @@
 // The numbers of what was chosen: a particle, a contact or a facet of the workpiece.
 import { CLASSES, DOMINANT, PATH, QUASI_LINEAR } from "./frames.js";
-import { digits, whole } from "./numbers.js";
+import { digits, fixed, whole } from "./numbers.js";
 
 const degrees = (angle) => `${digits((180 / Math.PI) * angle, 3)}°`;
 
@@ -19,7 +19,7 @@ function particle(id, frame, frames) {
     `Particle ${id}`,
     [
       ["diameter", `${digits(2 * frame.radius[row])} mm`],
-      ["x, y, z", `${[x, y, z].map((value) => value.toFixed(2).replace("-", "−")).join(", ")} mm`],
+      ["x, y, z", `${[x, y, z].map((value) => fixed(value, 2)).join(", ")} mm`],
       ["speed", `${digits(frame.speed[row])} mm/s`],
       ["displacement", `${digits(frames.moved(frame)[row], 3)} mm`],
       ["contacts", whole(touching.length)],
@@ -58,7 +58,7 @@ function facet(number, workpiece) {
   return [
     `Facet ${number} of the workpiece`,
     [
-      ...loads.map(({ name, short, unit }) => [short, `${digits(workpiece.columns[name][number])} ${unit}`]),
+      ...loads.map(({ name, label, unit }) => [label, `${digits(workpiece.columns[name][number])} ${unit}`]),
       ["depth below surface", `${digits(depth, 3)} mm`],
       ["azimuth from motion", degrees(azimuth)],
     ],

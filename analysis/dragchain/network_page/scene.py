@@ -24,6 +24,7 @@ from dragchain.network_page.frames import (
     read_shown,
     shown_frames,
 )
+from dragchain.run.case import Case
 from dragchain.run.kinematics import drag_phase, drag_start_s, needed
 from dragchain.run.workpiece import read_surface
 from dragchain.tables.by_step import read_table
@@ -31,15 +32,11 @@ from dragchain.tables.columns import CENTRE, POINT, VELOCITY
 from dragchain.tables.run_folder import Run
 
 _LOADS = {
-    "force_slide_pa": (
-        "sliding load",
-        "normal force times sliding distance, per area and path length",
-        "N/m²",
-    ),
-    "mean_pressure_pa": ("mean pressure", "mean normal pressure", "Pa"),
-    "friction_work_pa": ("friction work", "friction work per area and path length", "J/m³"),
+    "force_slide_pa": ("sliding load", "N/m²"),
+    "mean_pressure_pa": ("mean pressure", "Pa"),
+    "friction_work_pa": ("friction work", "J/m³"),
 }
-"""Columns of ``facets.parquet`` that the workpiece can be coloured by: short name, name, unit."""
+"""Columns of ``facets.parquet`` that the workpiece can be coloured by: name, unit."""
 
 _MOST_SAMPLES = 50_000
 """Of the force curve; of a longer one only every n-th sample is shown."""
@@ -72,14 +69,14 @@ def load_scene(run: Run) -> Scene:
     case, columns, peaks = run.case, Columns(), highest_peaks(run)
     series = shown_frames(run, peaks.time_s)
     frames = list(read_shown(series))
-    start_s = drag_start_s(case)
-    times_s = series.times_s - start_s
+    times_s = process_time(case, series.times_s)
     bowl, surface = needed(case.bowl, "bowl"), 1e3 * needed(case.surface_m, "surface_m")
     head = {
+        "run": case.run,
         "steps": series.steps.tolist(),
         "times": times_s.tolist(),
-        "frames": _frames(columns, frames),
-        "scales": _scales(frames),
+        "frames": _frames(columns, frames, case.fidelity.speed_factor),
+        "scales": _scales(frames, case.fidelity.speed_factor),
         "paths": _dominant_paths(run, frames),
         "bodies": {BODIES + body: name for body, name in KINDS.items() if body != PARTICLE},
         "bowl": {"radius": 1e3 * bowl.radius_m, "height": 1.2 * surface},
@@ -90,11 +87,19 @@ def load_scene(run: Run) -> Scene:
             "most": MOST_PARTICLES,
         },
         "workpieces": [_workpiece(columns, run, frames)],
-        "curve": _curve(columns, run, start_s),
-        "peaks": _peaks(peaks, times_s, start_s),
+        "curve": _curve(columns, run),
+        "peaks": _peaks(peaks, process_time(case, peaks.time_s), times_s),
         "colours": _colours(),
     }
     return Scene(head | {"columns": columns.entries}, columns)
+
+
+def process_time(case: Case, simulated_s: Floats) -> Floats:
+    """Times of the process since the start of the drag, s, of times of its run, (N,).
+
+    A run in which the workpiece moves faster than in the process takes a shorter time.
+    """
+    return case.fidelity.speed_factor * (simulated_s - drag_start_s(case))
 
 
 def _colours() -> list[str]:
@@ -106,7 +111,7 @@ def _colours() -> list[str]:
 # --- frames ----------------------------------------------------------------------------------
 
 
-def _frames(columns: Columns, frames: list[ShownFrame]) -> dict[str, Any]:
+def _frames(columns: Columns, frames: list[ShownFrame], faster: float) -> dict[str, Any]:
     """Add particles and contacts of all frames; where each frame starts, and the box of places."""
     centres = [_vectors(one.data.particles, CENTRE)[one.particles] for one in frames]
     points = [_outer_points(one) for one in frames]
@@ -119,7 +124,7 @@ def _frames(columns: Columns, frames: list[ShownFrame]) -> dict[str, Any]:
         columns.add(name, "u16", ((np.concatenate(parts) - low) / step).round().T)
     columns.add("id", "u32", _joined(particles, "particle_id"))
     columns.add("radius", "f24", 1e3 * _joined(particles, "radius_m"))
-    columns.add("speed", "f24", 1e3 * _speeds(pd.concat(particles)))
+    columns.add("speed", "f24", 1e3 / faster * _speeds(pd.concat(particles)))
     columns.add("a", "u16", np.concatenate([one.a for one in frames]))
     columns.add("b", "u16", np.concatenate([one.b for one in frames]))
     columns.add("flags", "u8", np.concatenate([one.flags for one in frames]))
@@ -157,7 +162,7 @@ def _speeds(particles: pd.DataFrame) -> Floats:
     return np.asarray(np.linalg.norm(_vectors(particles, VELOCITY), axis=1))
 
 
-def _scales(frames: list[ShownFrame]) -> dict[str, float]:
+def _scales(frames: list[ShownFrame], faster: float) -> dict[str, float]:
     """The tops of the colour scales, and the mean normal force, over all shown frames."""
     forces = [_table(one)["normal_force_n"].to_numpy()[one.contacts] for one in frames]
     largest = [part.max(initial=0.0) for part in forces]
@@ -166,7 +171,7 @@ def _scales(frames: list[ShownFrame]) -> dict[str, float]:
         "force": float(np.median(largest)) or 1.0,
         "largest": float(max(largest)),
         "mean": float(np.concatenate([*forces, np.zeros(0)]).mean()),
-        "speed": float(1e3 * np.quantile(speeds, _TOP)) or 1.0,
+        "speed": float(1e3 / faster * np.quantile(speeds, _TOP)) or 1.0,
         "displacement": 1e3 * _displacement(frames) or 1.0,
     }
 
@@ -229,12 +234,12 @@ def _loads(columns: Columns, run: Run) -> list[dict[str, Any]]:
     if not file.is_file():
         return []
     table, loads = read_table(file, list(_LOADS)), []
-    for name, (short, label, unit) in _LOADS.items():
+    for name, (label, unit) in _LOADS.items():
         values = table[name].to_numpy(np.float64)
         columns.add(name, "f24", values)
         loaded = values[values > 0.0]
         top = float(np.quantile(loaded, 0.99)) if loaded.size else 1.0
-        loads.append({"name": name, "short": short, "label": label, "unit": unit, "top": top})
+        loads.append({"name": name, "label": label, "unit": unit, "top": top})
     return loads
 
 
@@ -250,26 +255,29 @@ def _force(run: Run, names: list[str]) -> pd.DataFrame:
     return read_table(run.table("workpiece_force.parquet"), names)
 
 
-def _curve(columns: Columns, run: Run, start_s: float) -> dict[str, Any]:
+def _curve(columns: Columns, run: Run) -> dict[str, Any]:
     """Add the force against the motion over the drag; its times, and how it is filtered."""
     table = _force(run, ["step", "time_s", "drag_n", "in_statistics"])
     table = table[table["step"] > drag_phase(run.case).start_step]
+    faster = run.case.fidelity.speed_factor
     every = -(-len(table) // _MOST_SAMPLES)
     shown = table.iloc[::every]
-    times = shown["time_s"].to_numpy(np.float64) - start_s
+    times, all_times = (
+        process_time(run.case, one["time_s"].to_numpy(np.float64)) for one in (shown, table)
+    )
     columns.add("resistance", "f24", -shown["drag_n"].to_numpy(np.float64))
     return {
         "first": float(times[0]),
         "interval": float(np.diff(times).mean()),
         "every": every,
-        "counted": float(table["time_s"][table["in_statistics"]].iloc[0]) - start_s,
-        "window": 2 * _SMOOTHED_DIAMETERS * peak_separation_s(run.case),
+        "counted": float(all_times[table["in_statistics"].argmax()]),
+        "window": 2 * _SMOOTHED_DIAMETERS * peak_separation_s(run.case) * faster,
     }
 
 
-def _peaks(peaks: Peaks, times_s: Floats, start_s: float) -> list[dict[str, Any]]:
-    """The highest peaks, each with its nearest frame."""
+def _peaks(peaks: Peaks, at_s: Floats, frames_s: Floats) -> list[dict[str, Any]]:
+    """The highest peaks, each at its process time and with its nearest frame."""
     return [
-        {"time": time, "force": -drag, "frame": int(np.abs(times_s - time).argmin())}
-        for time, drag in zip((peaks.time_s - start_s).tolist(), peaks.drag_n.tolist(), strict=True)
+        {"time": time, "force": -drag, "frame": int(np.abs(frames_s - time).argmin())}
+        for time, drag in zip(at_s.tolist(), peaks.drag_n.tolist(), strict=True)
     ]

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 
-DASH, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
+DASH, MINUS, TIMES = "\N{EN DASH}", "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
 
 
 def number(value: object, digits: int = 3) -> str:

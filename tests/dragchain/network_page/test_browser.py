@@ -1,5 +1,6 @@
 """network.html in a real browser: what it shows is what the tables say."""
 
+import base64
 import json
 import re
 from collections.abc import Iterator
@@ -11,9 +12,10 @@ import pytest
 from browser import MISSING, NO_WEBGL, Browser
 from figure_files import case_json
 from network_run_files import PEAK_N, PEAKS_S, accept, draw, write_network_run
+from PIL import Image
 
 from dragchain.network_page.page import write_page
-from dragchain.report.notation import MINUS
+from dragchain.report.notation import MINUS, TIMES
 
 pytestmark = [
     pytest.mark.slow,
@@ -83,9 +85,15 @@ def shown(page: Browser) -> dict[str, str]:
 
 def number(text: str) -> float:
     """The first number of a text."""
-    found = re.search(r"-?[\d.]+(e-?\d+)?", text.replace(MINUS, "-"))
+    found = re.search(r"-?[\d.]+(e-?\d+)?", plain(text))
     assert found, text
     return float(found[0])
+
+
+def plain(text: str) -> str:
+    """A text whose numbers are written as Python does."""
+    raised = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+    return text.replace(MINUS, "-").replace(f" {TIMES} 10", "e").translate(raised)
 
 
 def four_digits(value: float) -> object:
@@ -287,6 +295,121 @@ def test_classes_and_chains_are_switched(page: Browser, run: Path) -> None:
     assert page.run("return networkPage.contacts.halos.count") == links
 
 
+def test_other_contacts_are_faded_or_hidden(page: Browser, run: Path) -> None:
+    def drawn() -> tuple[int, int, int]:
+        """Cylinders, halos, counted contacts."""
+        counted = sum(int(page.text(f"#count-{kind}")) for kind in range(3))
+        cylinders, halos = page.run("const {rows, halos} = networkPage.contacts;"
+                                    "return [rows.length, halos.count]")  # fmt: skip
+        return cylinders, halos, counted
+
+    def brightness() -> float:
+        return float(
+            page.run("""return networkPage.contacts.cylinders.values
+            .filter((_, k) => k % 12 > 7).reduce((sum, one) => sum + one)""")
+        )
+
+    contacts, chains = (rows(run, name, step_at(page)) for name in ("contacts", "chains"))
+    path = chains[chains["dominant"]]["n_particles"].iloc[0] + 1
+    assert drawn() == (len(contacts), path, len(contacts))
+    shown_brightness = brightness()
+    choose(page, "others", "faded")
+    assert brightness() > shown_brightness + 100
+    assert drawn() == (len(contacts), path, len(contacts))
+    choose(page, "others", "hidden")
+    assert drawn() == (path, path, path)
+    assert page.text("#status").startswith(
+        f"{path} of {len(contacts)} contacts shown, those of chains only"
+    )
+    page.click("#path")
+    page.click("#chains")
+    links = (chains[chains["definition"] == "peters"]["n_particles"] - 1).sum()
+    assert drawn() == (links, links, links)
+
+
+@pytest.mark.parametrize(("axis", "other_side"), [("x", False), ("y", True), ("z", False)])
+def test_a_section_plane_hides_what_is_beyond_it(
+    page: Browser, run: Path, axis: str, other_side: bool
+) -> None:
+    choose(page, "section-axis", axis)
+    at = move(page, "section-at", 0.6)
+    if other_side:
+        page.click("#section-side")
+    particles, contacts = (rows(run, name, step_at(page)) for name in ("particles", "contacts"))
+    beyond = 1e3 * particles[f"{axis}_m"] > at
+    kept = set(particles["particle_id"][beyond == other_side])
+    assert 0 < len(kept) < len(particles)
+    ids = page.run("const {media, frames, number} = networkPage;"
+                   "return media.rows.map(row => frames.at(number).id[row])")  # fmt: skip
+    assert set(ids) == kept
+    own, other = contacts["a_id"].isin(kept), contacts["b_id"].isin(kept) | (contacts["b_id"] <= 0)
+    inside = (own & other).sum()
+    assert page.run("return networkPage.contacts.rows.length") == inside
+    assert page.text("#status").startswith(f"{inside} of {len(contacts)} contacts shown")
+    assert page.text("#section-shown") == f"{at:.1f} mm".replace("-", MINUS)
+    choose(page, "section-axis", "none")
+    assert page.run("return networkPage.media.rows.length") == len(particles)
+
+
+def choose(page: Browser, name: str, text: str) -> None:
+    """Choose an option by what it says."""
+    from selenium.webdriver.support.ui import Select
+
+    Select(page.find(f"#{name}")).select_by_visible_text(text)
+
+
+def move(page: Browser, name: str, part: float) -> float:
+    """Move a slider to a part of its way; its value then."""
+    return float(page.run("""const slider = document.getElementById(arguments[0]);
+        const [low, high] = [Number(slider.min), Number(slider.max)];
+        slider.value = low + arguments[1] * (high - low);
+        slider.dispatchEvent(new Event("input"));
+        return Number(slider.value)""", name, part))  # fmt: skip
+
+
+def test_the_distance_of_two_particles_is_measured_over_time(page: Browser, run: Path) -> None:
+    page.run("document.getElementById('size').value = 100; networkPage.redraw()")
+    page.click("#presets [data-preset=above]")
+    particles = rows(run, "particles", step_at(page))
+    one, other = particles.sort_values("z_m").iloc[[-1, -2]].to_dict("records")
+    page.click("#measure")
+    assert page.text("#distance") == "Distance: choose two particles or contacts"
+    for particle in (one, other):
+        place = page.run("return networkPage.view.onCanvas(arguments[0])",
+                         [1e3 * particle[f"{axis}_m"] for axis in "xyz"])  # fmt: skip
+        page.click_at("#canvas", *place)
+    for frame in (page.run("return networkPage.number"), 0, 7):
+        page.run("networkPage.go(arguments[0])", frame)
+        places = rows(run, "particles", step_at(page)).set_index("particle_id")
+        ends = places.loc[[one["particle_id"], other["particle_id"]], ["x_m", "y_m", "z_m"]]
+        apart_mm = 1e3 * float(np.linalg.norm(np.diff(ends.to_numpy(float), axis=0)))
+        said = re.fullmatch(r"Distance: ([\d.]+) mm", page.text("#distance"))
+        assert said is not None
+        assert float(said[1]) == pytest.approx(apart_mm, abs=0.01)
+    page.click("#measure")
+    assert not page.find("#distance").is_displayed()
+
+
+def test_the_distance_of_contacts_is_measured_with_the_keyboard(page: Browser, run: Path) -> None:
+    from selenium.webdriver import Keys
+
+    contacts, particles = (rows(run, name, step_at(page)) for name in ("contacts", "particles"))
+    outer = contacts[contacts["b_id"] == 0].iloc[0]
+    inner = contacts[contacts["b_id"] > 0].iloc[5]
+    centre = particles.set_index("particle_id")[["x_m", "y_m", "z_m"]]
+    between = centre.loc[[inner["a_id"], inner["b_id"]]].mean().to_numpy(float)  # of equal radii
+    point = outer[["point_x_m", "point_y_m", "point_z_m"]].to_numpy(float)
+    page.find("#measure").send_keys(Keys.SPACE)
+    for text in (f"{outer['a_id']} workpiece", f"{inner['a_id']} {inner['b_id']}"):
+        page.find("#find").clear()
+        page.find("#find").send_keys(text + Keys.ENTER)
+    apart_mm = 1e3 * float(np.linalg.norm(between - point))
+    assert number(page.text("#distance")) == pytest.approx(apart_mm, abs=0.01)
+    page.find("#find").clear()
+    page.find("#find").send_keys("99999" + Keys.ENTER)
+    assert page.text("#distance") == "Distance: not in this frame"
+
+
 @pytest.mark.parametrize("colour", ["force", "class", "speed", "displacement"])
 def test_every_colour_has_a_legend_and_changes_the_picture(page: Browser, colour: str) -> None:
     def picture() -> str:
@@ -351,6 +474,28 @@ def test_a_window_of_another_size_is_filled_again(page: Browser) -> None:
     page.wait(lambda: abs(part() - before) < 0.02, "the bowl to fit again")
 
 
+def test_a_phone_shows_all_of_the_page(window: Browser, run: Path) -> None:
+    try:
+        window.phone()
+        window.open(run / "network.html")
+        assert window.run("return document.documentElement.scrollWidth") == 390
+        beyond = window.run("""return [...document.querySelectorAll("main *")]
+            .filter(one => one.getBoundingClientRect().right > 390.5).map(one => one.outerHTML)""")
+        assert beyond == []
+        assert window.find("#time").size["width"] > 300
+        heights = window.run("return [...document.querySelectorAll('.transport button')]"
+                             ".map(one => one.offsetHeight)")  # fmt: skip
+        assert min(heights) > 30
+        top, bottom, below = window.run("""
+            const at = name => document.getElementById(name).getBoundingClientRect();
+            document.getElementById("section-axis").scrollIntoView({block: "center"});
+            return [at("canvas").top, at("canvas").bottom, at("section-axis").top]""")
+        assert 0 <= top < bottom < below < 844
+    finally:
+        window.desktop()
+    assert window.errors() == []
+
+
 def test_all_controls_have_names(page: Browser) -> None:
     nameless = page.run("""
         const controls = document.querySelectorAll("input, select, button, canvas, svg");
@@ -359,6 +504,77 @@ def test_all_controls_have_names(page: Browser) -> None:
         return nameless.map(one => one.outerHTML)
     """)
     assert nameless == []
+
+
+# --- saving --------------------------------------------------------------------------------------
+
+
+def test_a_saved_picture_is_the_view_at_twice_its_size(page: Browser, tmp_path: Path) -> None:
+    size = page.run("const {clientWidth, clientHeight} = document.getElementById('canvas');"
+                    "return [clientWidth, clientHeight]")  # fmt: skip
+    box = page.run("""
+        const at = selector => document.querySelector(selector).getBoundingClientRect();
+        const from = at("#canvas"), box = ({left, top, right, bottom}) =>
+            [left - from.left, top - from.top, right - from.left, bottom - from.top];
+        return {bar: box(at("#legend .bar")), title: box(at("#legend div")),
+            scale: box(at("#scale-bar")), time: box(at("#caption-time"))}""")  # fmt: skip
+    time_s = page.run("return networkPage.frames.times[networkPage.number]")
+    file = page.saved(tmp_path, "#save-picture")
+    assert file.name == f"made-process_{time_s:.3f}s.png"
+    with Image.open(file) as image:
+        assert image.size == (2 * size[0], 2 * size[1])
+        seen = np.asarray(image.convert("RGB")).astype(int)
+
+    def part(name: str) -> np.ndarray:
+        left, top, right, bottom = (round(2 * edge) for edge in box[name])
+        return seen[top:bottom, left:right]
+
+    height, width = seen.shape[:2]
+    middle = seen[height // 3 : 2 * height // 3, width // 3 : 2 * width // 3]
+    assert len(np.unique(middle.reshape(-1, 3), axis=0)) > 100
+    assert part("bar")[6, 6].sum() > part("bar")[6, -6].sum() + 300  # from light to dark
+    assert part("title").min() < 100 and part("time").min() < 100  # letters
+    dark = (part("scale").max(axis=2) < 100).mean(axis=1)
+    assert dark[-2] == 1.0 and dark[2] < 0.2  # a line with two ticks
+
+
+def test_a_film_shows_all_frames(page: Browser, tmp_path: Path) -> None:
+    size = page.run("const {clientWidth, clientHeight} = document.getElementById('canvas');"
+                    "return [clientWidth, clientHeight].map(one => one - one % 2)")  # fmt: skip
+    file = page.saved(tmp_path, "#save-video")
+    assert page.run("return networkPage.number + 1 === networkPage.frames.count")
+    assert page.text("#save-video") == "Save video"
+    seen = page.run("""return new Promise((done, failed) => {
+        const film = document.createElement("video"), pictures = [];
+        const look = () => {
+          const canvas = Object.assign(document.createElement("canvas"),
+            {width: film.videoWidth, height: film.videoHeight}), context = canvas.getContext("2d");
+          context.drawImage(film, 0, 0);
+          const data = context.getImageData(0, 0, canvas.width, canvas.height).data;
+          pictures.push(data.filter((_, k) => k % 4 === 0));
+        };
+        film.onerror = () => failed(film.error.message);
+        film.onloadeddata = () => { look(); film.currentTime = 1e6; };  // to the end
+        film.onseeked = () => {
+          look();
+          const [first, last] = pictures, dark = one => one.filter(value => value < 60).length;
+          const changed = first.filter((value, k) => Math.abs(value - last[k]) > 60).length;
+          done([[film.videoWidth, film.videoHeight], dark(first), dark(last), changed]);
+        };
+        film.src = "data:video/webm;base64," + arguments[0];
+    })""", base64.b64encode(file.read_bytes()).decode())  # fmt: skip
+    assert seen[0] == size
+    assert min(seen[1:]) > 100
+
+
+def test_a_browser_that_cannot_record_says_so(window: Browser, run: Path) -> None:
+    script = {"source": "delete window.MediaRecorder"}
+    added = window.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)
+    window.open(run / "network.html")
+    window.driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
+    assert not window.find("#save-video").is_enabled()
+    assert "cannot record" in window.find("#save-video").get_attribute("title")
+    assert window.errors() == []
 
 
 # --- without a scene -----------------------------------------------------------------------------
@@ -442,11 +658,11 @@ def told(page: Browser, plot: str) -> dict[tuple[float, float], list[float]]:
     page.find(f"#profile-{plot}").send_keys(Keys.HOME)
     found = {}
     for _ in range(int(page.find(f"#profile-{plot}").get_attribute("aria-valuemax")) + 1):
-        text = page.text("#profile-told").replace(MINUS, "-")
+        text = page.text("#profile-told")
         assert text == page.run(
             "return document.getElementById(arguments[0]).ariaValueText", f"profile-{plot}"
-        ).replace(MINUS, "-").replace("\u202f", "")
-        low, high, *values = (float(one) for one in re.findall(r"-?[\d.]+(?:e-\d+)?", text))
+        ).replace("\u202f", "")
+        low, high, *values = (float(one) for one in re.findall(r"-?[\d.]+(?:e-\d+)?", plain(text)))
         found[low, high] = values
         page.find(f"#profile-{plot}").send_keys(Keys.ARROW_RIGHT)
     return found

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from figure_files import case_json
 from hypothesis import given
 from hypothesis import strategies as st
 from network_run_files import PEAK_N, PEAKS_S, accept, draw, write_network_run
@@ -21,6 +22,7 @@ from dragchain.network_page import frames as frames_module
 from dragchain.network_page.columns import ROUNDING, Columns
 from dragchain.network_page.frames import BODIES, DOMINANT, PATH, QUASI_LINEAR
 from dragchain.network_page.page import write_page
+from dragchain.report.notation import TIMES
 
 _BYTES = {"u8": 1, "u16": 2, "u32": 4, "f24": 3}
 
@@ -262,6 +264,45 @@ def test_a_rejected_run_is_marked(tmp_path: Path) -> None:
     accept(run)
     write_page(run)
     assert "This run is not a result" not in (run / "network.html").read_text(encoding="utf-8")
+
+
+def with_fidelity(folder: Path, **changes: Any) -> Written:
+    """The page of a run with other settings."""
+    run = write_network_run(folder, fidelity=case_json("process")["fidelity"] | changes)
+    write_page(run)
+    return Written(run / "network.html")
+
+
+@pytest.mark.parametrize(
+    ("scale", "factor", "short"),
+    [(1.0, 1.0, None), (0.01, 1.0, "E x 0.01"), (1.0, 4.0, "speed x 4"),
+     (0.001, 2.5, "E x 0.001, speed x 2.5")],
+)  # fmt: skip
+def test_the_settings_of_the_run_are_named(
+    tmp_path: Path, scale: float, factor: float, short: str | None
+) -> None:
+    page = with_fidelity(tmp_path / "run", youngs_modulus_scale=scale, speed_factor=factor)
+    shell = page.text[: page.text.index("<script")].replace(TIMES, "x")
+    assert f"E x {scale:g}, time step 0.5 of the Rayleigh time, speed x {factor:g}" in shell
+    assert ('id="settings"' in shell) == (short is not None)
+    assert (f"<p>{short} <span" in shell) == (short is not None)
+    assert (f"modulus is {scale:g} of the physical one" in shell) == (scale != 1)
+    assert (f"moves {factor:g} times as fast as in the process" in shell) == (factor != 1)
+
+
+def test_times_and_speeds_of_a_faster_run_are_those_of_the_process(
+    page: Written, tmp_path: Path
+) -> None:
+    fast = with_fidelity(tmp_path / "run", speed_factor=4.0)
+    for name in ("first", "interval", "counted", "window"):
+        assert fast.head["curve"][name] == pytest.approx(4 * page.head["curve"][name])
+    assert fast.head["times"] == pytest.approx([4 * time for time in page.head["times"]])
+    for one, other in zip(fast.head["peaks"], page.head["peaks"], strict=True):
+        assert one == other | {"time": pytest.approx(4 * other["time"])}
+    assert 4 * fast.head["scales"]["speed"] == pytest.approx(page.head["scales"]["speed"])
+    speeds = 4 * fast.columns["speed"], page.columns["speed"]
+    np.testing.assert_allclose(*speeds, rtol=3 * ROUNDING)
+    np.testing.assert_array_equal(fast.columns["normal"], page.columns["normal"])
 
 
 def test_a_page_without_loads_and_pictures(tmp_path: Path) -> None:
