@@ -42,6 +42,22 @@ def carousel(small: dict[str, Any], write_study: Callable[..., Path]) -> Carouse
     return make
 
 
+def test_a_warning_says_which_workpiece_is_meant(carousel: Carousel) -> None:
+    """Unless it holds for all of them."""
+    thick = THIN | {"radius_m": 0.0035}
+    each = [{"angle_deg": angle, "shape": shape} for angle, shape in ((0, thick), (180, THIN))]
+    circle = {"kind": "circle", "radius_m": 0.0095, "revolutions": 0.1}
+
+    def gaps(*workpieces: dict[str, Any]) -> list[str]:
+        case = carousel({"each": list(workpieces)}, path=circle)
+        return [str(one) for one in process_scene(case, BED).warnings if one.code == "gap"]
+
+    (one,) = gaps(*each)
+    assert one.startswith("workpiece 1: the gap between workpiece and bowl is 1.8")
+    both = gaps(*({**station, "shape": dict(thick)} for station in each))
+    assert len(both) == 1 and both[0].startswith("the gap between workpiece and bowl is 1.8")
+
+
 def script(case: Case, project: Project) -> str:
     return deck_text(process_scene(case, BED), environment(project.templates))
 

@@ -27,6 +27,7 @@ from dragdeck.preview.layout import layout
 from dragdeck.scenes.fit import clearances
 from dragdeck.scenes.motion import course, driven_speed, farthest_reach, path_heights
 from dragdeck.scenes.process import process_scene
+from dragdeck.study.check import warnings
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)
@@ -180,6 +181,39 @@ def test_a_line_that_nearly_reaches_the_wall_is_where_the_check_has_it(made: Mak
     farther = made(10, path=path | {"length_m": 0.025})
     with pytest.raises(InputError, match="no particle fits"):
         process_scene(farther, BED)
+
+
+@pytest.mark.parametrize(
+    ("motion", "field"),
+    [
+        ({"transient_m": math.tau * 1e-3 - 25e-6}, "motion.transient_m"),
+        ({"transient_m": 0.0054}, "motion.transient_m"),
+        ({"path": REST | {"bowl_rpm": 1e-9}}, "motion.path.speed_m_s"),
+        ({"path": LINE | {"direction_deg": 1e300}}, "motion.path.direction_deg"),
+        ({"path": CIRCLE | {"start_deg": -1e300}}, "motion.path.start_deg"),
+    ],
+)
+def test_motions_that_cannot_be_meant(made: Make, motion: dict[str, Any], field: str) -> None:
+    with pytest.raises(InputError) as caught:
+        made(**motion)
+    assert caught.value.field == field
+    assert caught.value.limit is not None
+
+
+def test_statistics_have_a_frame_after_the_longest_transient(made: Make, tmp_path: Path) -> None:
+    """The longest that is accepted leaves one frame of the network."""
+    length, frame = math.tau * 1e-3, 0.02 / 20
+    scene = process_scene(made(transient_m=length - frame), BED)
+    case, network = read_back(scene, tmp_path), load_outputs(tmp_path)["contacts"]
+    assert network.last_step is not None
+    steps = np.arange(network.first_step, network.last_step + 1, network.period_steps)
+    assert counted_mask(steps, case).any()
+
+
+def test_a_high_speed_factor_is_remarked(made: Make) -> None:
+    assert not [one for one in warnings(made(10).study) if "speed_factor" in str(one)]
+    (remark,) = (one for one in warnings(made(100).study) if "speed_factor" in str(one))
+    assert "fidelities.quick.speed_factor 100 is not plausible" in str(remark)
 
 
 def test_the_fraction_of_a_path_that_is_driven_has_to_fit(made: Make) -> None:

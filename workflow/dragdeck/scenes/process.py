@@ -1,7 +1,8 @@
 """The process: the workpiece plunges into the settled bed and is dragged along its path."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, skin
@@ -15,6 +16,7 @@ from dragdeck.decks.process_case import (
     StatisticsOfRun,
     WorkpieceOfRun,
 )
+from dragdeck.errors import Caution
 from dragdeck.files import file_checksum
 from dragdeck.mesh import bowl, stl_text
 from dragdeck.physics.domain_split import warnings as rank_warnings
@@ -117,7 +119,6 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     own = {WORKPIECE_MESH: partial(_stl, each[number])}
     limits = bed_limits(study, top, max(map(_fastest, each, courses)))
     models = {body.mesh: partial(_stl, one) for one, body in zip(each, moved, strict=True)}
-    cautions = {str(caution): caution for one in each for caution in process_cautions(one)}
     return Scene(
         deck=deck,
         case=_process_case(each, number, bed.surface_m, courses[number], limits),
@@ -125,8 +126,19 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         files=own if number else {**models, **_bowl_files(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
-        warnings=[*cautions.values(), *rank_warnings(parts)],
+        warnings=[*_cautions(each), *rank_warnings(parts)],
     )
+
+
+def _cautions(each: Sequence[Case]) -> Iterator[Caution]:
+    """What a user should know of each workpiece; it is named where not all of them are meant."""
+    found: dict[str, tuple[Caution, list[str]]] = {}
+    for number, one in enumerate(each, 1):
+        for caution in process_cautions(one):
+            found.setdefault(str(caution), (caution, []))[1].append(str(number))
+    for caution, numbers in found.values():
+        owners = f"workpiece {', '.join(numbers)}: " if len(numbers) < len(each) else ""
+        yield replace(caution, text=f"{owners}{caution}")
 
 
 def _mesh_files(each: Sequence[Case]) -> Mapping[Shape, str]:

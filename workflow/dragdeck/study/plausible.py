@@ -77,6 +77,7 @@ _RANGES = {
     "gravity_m_s2": _Range(0.01, 1, 30, 500, {"cm/s2": 0.01, "mm/s2": 1e-3}),
     "outputs.*_hz": _Range(1e-3, 0.1, 2e5, 1e8, _RATE),
     "filling.max_time_s": _Range(1e-3, 0.1, 200, 1e5, {"ms": 1e-3}),
+    "fidel*.speed_factor": _Range(1, 1, 10, 100, {}),
     "fidel*.skin_m": _Range(1e-7, 5e-6, 0.02, 1, _LENGTH),
 }
 """By dotted field. Assumptions: they span laboratory and industrial processes, and more."""

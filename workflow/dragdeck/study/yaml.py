@@ -52,6 +52,7 @@ for _kind in ("binary", "set", "omap", "pairs"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _refused)
 
 
+_NULL = "tag:yaml.org,2002:null"
 _LONGEST_NUMBER, _LONGEST_SHOWN = 40, 200
 _PLAIN = re.compile(rf"{DECIMAL.pattern}|[-+]?\.(inf|nan)|true|false", re.ASCII | re.IGNORECASE)
 
@@ -76,7 +77,7 @@ def read_yaml(file: Path) -> dict[str, Any]:
         The file is missing, is not YAML, or is not a mapping.
     """
     try:
-        data = yaml.load(file.read_text(encoding="utf-8"), Loader=_Loader)
+        data = _Loader("").construct_document(_composed(file.read_bytes()))
     except FileNotFoundError:
         raise InputError("no such study file", file=file, remedy=_studies_nearby(file)) from None
     except UnicodeDecodeError as error:
@@ -98,6 +99,12 @@ def read_yaml(file: Path) -> dict[str, Any]:
             "the file must be a mapping of fields", file=file, value=type(data).__name__
         )
     return data
+
+
+@lru_cache(maxsize=8)
+def _composed(content: bytes) -> yaml.Node:
+    """The nodes of a YAML file, whose parsing takes most of the time of a long one."""
+    return yaml.compose(content.decode(), Loader=_Loader) or yaml.ScalarNode(_NULL, "")
 
 
 def _studies_nearby(file: Path) -> str:
@@ -211,7 +218,7 @@ def _line_tables(file: Path) -> Iterator[tuple[Path, Mapping[str, int]]]:
 def _line_table(content: bytes) -> Mapping[str, int]:
     """The lines of a study's fields; none of a file that is no study."""
     try:
-        return dict(_lines(yaml.compose(content.decode(), Loader=_Loader), ""))
+        return dict(_lines(_composed(content), ""))
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError):
         return {}
 

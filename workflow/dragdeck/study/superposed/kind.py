@@ -76,14 +76,15 @@ class SuperposedOfRun(BaseModel, ABC):
         """
         if steps > self.ramp_steps:
             return steps - self.ramp_steps / 2
-        return steps**3 / self.ramp_steps**2 * (1 - steps / (2 * self.ramp_steps)) if steps else 0.0
+        x = steps / max(self.ramp_steps, 1)
+        return steps * x**2 * (1 - x / 2)
 
     def advance_formula(self, start_step: int) -> str:
         """`advance` at the engine's ``step``."""
         since, ramp = f"(step-{start_step})", self.ramp_steps
         if not ramp:
             return since
-        starting = f"{since}^3/{float(ramp**2)!r}*(1.0-{since}/{2.0 * ramp!r})"
+        starting = f"{since}*({since}/{ramp}.0)^2*(1.0-{since}/{2 * ramp}.0)"
         return f"({starting}*({since}<={ramp})+({since}-{ramp / 2!r})*({since}>{ramp}))"
 
     def lift_m(self, steps: float, timestep_s: float) -> float:
