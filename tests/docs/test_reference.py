@@ -8,7 +8,7 @@ import pytest
 import reference
 import study_fields
 import yaml
-from doc_pages import PAGES
+from doc_pages import PAGES, template_examples
 from paths import ROOT
 from pybtex.database import parse_file
 
@@ -16,6 +16,8 @@ import dragchain
 from dragchain.report.notation import MINUS
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import read_scalings, said
+from dragdeck.cases.case import Case
+from dragdeck.cli import main
 from dragdeck.engine.record import CheckCode
 from dragdeck.errors import CautionCode
 from dragdeck.project import Project
@@ -107,6 +109,24 @@ def test_every_block_of_the_templates_is_on_the_page() -> None:
     for template in (ROOT / "templates").glob("*.in.j2"):
         for block in re.findall(r"{% block (\w+) %}", template.read_text()):
             assert f"`{block}`" in text, f"{template.name}: block {block}"
+
+
+@pytest.mark.engine
+@pytest.mark.parametrize("name", template_examples())
+def test_a_template_of_the_how_to_passes_the_check(
+    name: str, case: Case, project: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = case.file.parent / "templates" / name
+    file.parent.mkdir()
+    file.write_text(template_examples()[name])
+    monkeypatch.chdir(project.root)
+    assert main(["check", "small"]) == 0
+
+
+def test_the_how_to_changes_law_damping_and_output() -> None:
+    assert set(template_examples()) == {"base.in.j2", "filling.in.j2", "process.in.j2"}
+    shallow = ROOT / "studies/shallow/templates/process.in.j2"
+    assert template_examples()["process.in.j2"] == shallow.read_text()
 
 
 def test_every_public_name_of_dragchain_is_on_the_page() -> None:

@@ -33,3 +33,15 @@ def prose(page: Path) -> str:
     text = re.sub(r"\$\$.*?\$\$|\$[^$\n]+\$", " ", text, flags=re.S)
     text = re.sub(r"``[^`]*``|`[^`\n]*`", " ", text)
     return re.sub(r"\]\([^)]*\)", "]", text)
+
+
+def template_examples() -> dict[str, str]:
+    """The templates that the how-to on input scripts shows, by the name of their file."""
+    shown = (
+        text
+        for language, text in fences(ROOT / "docs/howto/input_scripts.md")
+        if language == "jinja"
+    )
+    return {
+        found[1]: text for text in shown if (found := re.match(r'{% extends "base/(.+?)"', text))
+    }
