@@ -44,38 +44,65 @@ class _Range:
         return "check the value and its unit"
 
 
+_ANGLE = _Range(-1e5, -36e3, 36e3, 1e5, {})
 _RANGES = {
     "media.count": _Range(1, 1, 1e6, 4e6, {}),
     "media.radius_mean_m": _Range(1e-5, 1e-4, 0.02, 0.1, _LENGTH),
+    "media.radius_std_m": _Range(0, 0, 0.006, 0.03, _LENGTH),
     "bowl.radius_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
     "bowl.height_m": _Range(1e-3, 5e-3, 2, 10, _LENGTH),
-    "workpiece.shape.radius_m": _Range(1e-5, 2e-4, 0.3, 2, _LENGTH),
+    "workpiece*.shape.radius_m": _Range(1e-5, 2e-4, 0.3, 2, _LENGTH),
     "*facet_*_m": _Range(1e-6, 5e-5, 0.1, 1, _LENGTH),
-    "workpiece.shape.offset_m.*": _Range(-10, -2, 2, 10, _LENGTH),
+    "workpiece*.shape.offset_m.*": _Range(-10, -2, 2, 10, _LENGTH),
+    "workpieces.count": _Range(1, 1, 12, 12, {}),
     "motion.path.radius_m": _Range(1e-5, 1e-3, 2, 10, _LENGTH),
     "motion.path.length_m": _Range(1e-5, 1e-3, 50, 1e4, _LENGTH),
     "motion.path.start_m.*": _Range(-10, -2, 2, 10, _LENGTH),
+    "motion.path.points.*.0": _Range(-1e7, -1e6, 1e6, 1e7, {"ms": 1e-3}),
     "motion.path.points.*.[123]": _Range(-10, -2, 2, 10, _LENGTH),
     "motion.path.points.*.speed_m_s": _Range(0, 0, 3, 30, {}),
     "motion.path.bowl_rpm": _Range(-1e4, -500, 500, 1e4, {"rad/s": 30 / math.pi}),
+    "motion.path.fraction": _Range(1e-6, 1e-4, 1, 1, {}),
     "motion.path.revolutions": _Range(1e-5, 1e-3, 1e3, 1e5, {}),
     "motion.plunge_at_m.*": _Range(-10, -2, 2, 10, _LENGTH),
     "motion.immersion_depth_m": _Range(1e-5, 1e-3, 1, 5, _LENGTH),
     "motion.transient_m": _Range(0, 0, 2, 1e3, _LENGTH),
+    "motion.counted_from_revolution": _Range(1, 1, 1e3, 1e5, {}),
     "motion.spin.*rpm": _Range(-1e5, -3e3, 3e3, 1e5, {"rad/s": 30 / math.pi}),
     "motion.spin.*until_s": _Range(1e-4, 0.01, 1e4, 1e6, {"ms": 1e-3}),
     "motion.oscillation.amplitude_m": _Range(1e-7, 1e-5, 0.2, 1, _LENGTH),
     "motion.oscillation.frequency_hz": _Range(1e-4, 0.01, 100, 1e4, {"1/min": 1 / 60}),
     "motion.*speed_m_s": _Range(1e-6, 1e-4, 3, 30, _SPEED),
+    "*_deg": _ANGLE,
+    "motion.path.points.*.4": _ANGLE,
     "drop_test.height_m": _Range(1e-5, 5e-4, 1, 20, _LENGTH),
     "materials.*.youngs_modulus_pa": _Range(1e6, 5e6, 1.3e12, 1e13, _MODULUS),
+    "materials.*.poissons_ratio": _Range(-0.9, 0, 0.49, 0.499, {}),
     "materials.*.density_kg_m3": _Range(50, 300, 2.3e4, 3e4, {"g/cm3": 1e3}),
+    "pairs.*.restitution": _Range(0.05, 0.05, 1, 1, {}),
+    "pairs.*friction": _Range(0, 0, 2, 10, {}),
     "gravity_m_s2": _Range(0.01, 1, 30, 500, {"cm/s2": 0.01, "mm/s2": 1e-3}),
     "outputs.*_hz": _Range(1e-3, 0.1, 2e5, 1e8, _RATE),
+    "outputs.n_checkpoints": _Range(0, 0, 1000, 1000, {}),
+    "filling.energy_ratio": _Range(1e-12, 1e-8, 1e-4, 1e-3, {}),
     "filling.max_time_s": _Range(1e-3, 0.1, 200, 1e5, {"ms": 1e-3}),
     "fidel*.skin_m": _Range(1e-7, 5e-6, 0.02, 1, _LENGTH),
+    "fidel*.youngs_modulus_scale": _Range(1e-6, 1e-5, 1, 1, {}),
+    "*.timestep_fraction": _Range(1e-4, 1e-3, 2, 2, {}),
+    "fidel*.filling_timestep_fraction": _Range(1e-4, 1e-3, 1, 1, {}),
+    "fidel*.speed_factor": _Range(1, 1, 100, 100, {}),
+    "fidel*.ranks": _Range(1, 1, 1024, 1024, {}),
+    "fidelity.tolerance": _Range(1e-4, 1e-3, 0.5, 1, {}),
+    "drop_test.impacts": _Range(1, 1, 20, 20, {}),
+    "calibration.height_std_m": _Range(1e-7, 1e-6, 0.01, 0.1, _LENGTH),
+    "seed": _Range(0, 0, 2**32, 2**32, {}),
+    "accepted.cases": _Range(1, 1, 1e5, 1e6, {}),
+    "scaling.expected_exponent": _Range(-20, -5, 5, 20, {}),
+    "scaling.fit_range.*": _Range(1e-30, 1e-20, 1e20, 1e30, {}),
+    "reference.*_n": _Range(-1e5, -1e3, 1e3, 1e5, {"mN": 1e-3}),
 }
-"""By dotted field. Assumptions: they span laboratory and industrial processes, and more."""
+"""By dotted field, every number of a study; the first that fits counts. Assumptions: they span
+laboratory and industrial processes, and more."""
 
 
 def implausible(data: Mapping[str, Any]) -> Iterator[tuple[InputError, bool]]:
