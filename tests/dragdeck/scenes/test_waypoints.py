@@ -125,15 +125,15 @@ HEADER = "time_s,x_m,y_m\n"
         ("time_s,x_m,y_m,speed\n0,0,0,0\n", ": line 1", "the columns are not those"),
         ("time_s,x_m,y_m,y_m\n0,0,0,0\n", ": line 1", "the columns are not those"),
         ("0,0,0\n1,0.01,0\n", ": line 1", "the columns are not those"),
-        (HEADER + "0,0,0\n\n1,0.01\n", ":4: y_m", "should be a valid number"),
-        (HEADER + "0,0,0\n1,0.01,0,0\n", ":3", "should have at most 5 items"),
+        (HEADER + "0,0,0\n\n1,0.01\n", ":4: y_m", "a number is required"),
+        (HEADER + "0,0,0\n1,0.01,0,0\n", ":3", "at most 5"),
         (HEADER + "0,0,0\n\n1,abc,0\n", ":4: x_m", "'abc' is text, not a number"),
         (HEADER + '0,0,0\n1,0,"0,01"\n', ":3: y_m", "is text, not a number"),
         (HEADER + "0,0,0\n1,nan,0\n", ":3: x_m", "is text, not a number"),
         (HEADER + "0,0,0\n1,1e999,0\n", ":3: x_m", "a finite number"),
         (HEADER + "0,0,0\n1,,0\n", ":3: x_m", "'' is text, not a number"),
-        (HEADER + "0,0,0\n", None, "at least 2 items"),
-        (HEADER + "".join(f"{n},{n / 1e4},0\n" for n in range(150)), None, "at most 100 items"),
+        (HEADER + "0,0,0\n", None, "at least 2"),
+        (HEADER + "".join(f"{n},{n / 1e4},0\n" for n in range(150)), None, "at most 100"),
         (HEADER + "0,0,0\n1,0.01,0\n1,0.02,0\n", ":4: time_s", "the time does not increase"),
         (HEADER + "0,0,0\n1,0.01,0\n0.5,0.02,0\n", ":4: time_s", "the time does not increase"),
         (HEADER + "0,0,0\n1,0.01,0\n1.0001,0.02,0\n", ":4: speed_m_s", "is not plausible"),
@@ -167,7 +167,7 @@ def test_a_file_in_another_encoding_is_no_csv(made: Made, project: Project) -> N
         load_cases(case.file)
 
 
-@pytest.mark.parametrize("name", ["missing.csv", "", "x" * 290, ".", "../small"])
+@pytest.mark.parametrize("name", ["missing.csv", "", "x" * 290, "."])
 def test_a_missing_file_is_named(made: Made, name: str) -> None:
     with pytest.raises(InputError, match="no such file") as caught:
         made(CSV, file=name)
@@ -181,10 +181,10 @@ def test_a_missing_file_is_named(made: Made, name: str) -> None:
 @pytest.mark.parametrize(
     ("path", "words"),
     [
-        ({"points": None}, "motion.path.points: Input should be a valid list"),
-        ({"points": []}, "motion.path.points: List should have at least 2"),
+        ({"points": None}, "motion.path.points: a list is required"),
+        ({"points": []}, "motion.path.points: the list has 0 entries"),
         ({"points": [[0, 0, 0], [1, 0]]}, "motion.path.points.1.2: a required"),
-        ({"points": [[0, 0, 0], [1, 0, 0, 0, 0, 0]]}, "motion.path.points.1: NamedTuple "),
+        ({"points": [[0, 0, 0], [1, 0, 0, 0, 0, 0]]}, "points.1: the list has 6 entries"),
         ({"points": [[0, 0, 0], [1, True, 0]]}, "motion.path.points.1.1: a number is required"),
         ({"points": [[0, 0, 0], [0, 0.01, 0]]}, "motion.path.points.1.0: the time does not"),
         ({"points": [[0, 0, 0], [1, 0, 0, 0.01]]}, "does not move horizontally"),
@@ -194,8 +194,8 @@ def test_a_missing_file_is_named(made: Made, name: str) -> None:
         ({"points": [[0, 0, 0], [1e308, 0.1, 0], [1.7e308, 1e308, 0]]}, "is not plausible"),
         ({"points": [[-1e308, 0, 0], [1e308, 0.1, 0]]}, "is not plausible"),
         ({"points": [[0, 0, 0], [5e-324, 0.1, 0]]}, "is not plausible"),
-        ({"fraction": 1.1}, "motion.path.fraction: Input should be less than or equal to 1"),
-        ({"fraction": 0}, "motion.path.fraction: Input should be greater than 0"),
+        ({"fraction": 1.1}, "motion.path.fraction: the value is out of range"),
+        ({"fraction": 0}, "motion.path.fraction: the value is out of range"),
         ({"file": "path.csv"}, "motion.path: give either file or points, and not both"),
         ({"speed_m_s": 1}, "motion.path.speed_m_s: unknown key"),
     ],
@@ -204,6 +204,28 @@ def test_fields_that_cannot_be(made: Made, path: dict[str, Any], words: str) -> 
     with pytest.raises(InputError) as caught:
         made(**path)
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name", ["/etc/passwd", "../../../secret.csv", "more/../../secret.csv", "../small"]
+)
+def test_a_file_outside_the_study_is_refused_and_not_shown(
+    made: Made, project: Project, name: str
+) -> None:
+    (project.studies / "secret.csv").write_text("root:x:0:0\n")
+    (project.root.parent / "secret.csv").write_text("root:x:0:0\n")
+    with pytest.raises(InputError, match="the path leaves the folder of the study") as caught:
+        made(CSV, file=name)
+    assert caught.value.field == "motion.path.file"
+    assert "root:x" not in str(caught.value)
+
+
+def test_a_file_that_is_no_table_of_waypoints_is_not_quoted(made: Made) -> None:
+    with pytest.raises(InputError, match="the columns are not those of waypoints") as caught:
+        made("root:x:0:0:root:/root:/bin/sh\n")
+    assert "root:x" not in str(caught.value)
+    with pytest.raises(InputError, match="value:  time_s,x_m,y_mm"):
+        made("time_s,x_m,y_mm\n0,0,0\n1,1,0\n")
 
 
 def test_neither_file_nor_points(small: dict[str, Any], write_study: Any) -> None:

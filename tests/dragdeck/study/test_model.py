@@ -53,7 +53,7 @@ def test_a_value_beyond_its_limit_is_named(
     [
         ("media.count", "many", "'many' is text, not a number"),
         ("media.count", True, "a number is required"),
-        ("media.count", 10.5, "integer"),
+        ("media.count", 10.5, "whole number"),
         ("media.colour", "red", "unknown key"),
         ("bowl.material", "tin", "no such material 'tin'"),
         ("fidelity", "perfect", "unknown fidelity 'perfect'"),

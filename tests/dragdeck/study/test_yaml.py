@@ -158,7 +158,7 @@ def test_an_unusual_value_is_a_warning(small: dict[str, Any]) -> None:
         (
             {"filling": {"energy_ratio": 2e-3}},
             "filling.energy_ratio",
-            "less than or equal to 0.001",
+            "at most 0.001",
         ),
         (
             {"pairs": {"steel-ceramic": {"restitution": 0.5, "friction": 0.1}}},

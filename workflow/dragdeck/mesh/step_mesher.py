@@ -30,6 +30,14 @@ _GROWTH = 2.0
 EXPORT = "export the part again as STEP, as one solid; or its surface as STL"
 """What helps against a damaged file."""
 
+_NO_SOLID = (
+    "the STEP file contains no solid",
+    "close the surfaces to a solid body in the CAD program, and export it as STEP",
+)
+_SEVERAL = (
+    "the STEP file contains several parts",
+    "join them into one solid, or remove all others, then export it as STEP",
+)
 _OPTIONS = {
     "General.Terminal": 0,
     "General.NumThreads": 1,  # the same mesh every time
@@ -103,12 +111,9 @@ def _solid(gmsh: Any, file: str) -> int:
     solids = [tag for _, tag in gmsh.model.getEntities(3)]
     if len(solids) == 1:
         return int(solids[0])
-    faces = len(gmsh.model.getEntities(2))
-    problem = (
-        "the STEP file contains several parts" if solids else "the STEP file contains no solid"
-    )
-    value = f"{len(solids)} solids, {faces} faces"
-    raise Refusal(problem, value, "one solid: the workpiece is one body", EXPORT)
+    value = f"{len(solids)} solids, {len(gmsh.model.getEntities(2))} faces"
+    problem, remedy = _NO_SOLID if not solids else _SEVERAL
+    raise Refusal(problem, value, "one solid: the workpiece is one body", remedy)
 
 
 def _refuse_too_many(gmsh: Any, size: float) -> None:

@@ -73,13 +73,36 @@ _FORMS = (
 )
 """Names of alternatives, which are no part of a field's dotted name."""
 
-_LIMITS = {
-    "greater_than": "greater than {gt}",
-    "greater_than_equal": "at least {ge}",
-    "less_than": "less than {lt}",
-    "less_than_equal": "at most {le}",
-    "finite_number": "a finite number",
+_OUT_OF_RANGE = "the value is out of range"
+_ENTRIES = "the list has {actual_length} entries"
+_BLOCK, _LIST = "a block of fields is required", "a list is required"
+_WHOLE, _SWITCH = "a whole number is required", "true or false is required"
+_WORDS = {
+    "string_type": ("text is required", None),
+    "bool_type": (_SWITCH, None),
+    "bool_parsing": (_SWITCH, None),
+    "float_type": ("a number is required", None),
+    "int_type": (_WHOLE, None),
+    "int_from_float": (_WHOLE, None),
+    "dict_type": (_BLOCK, None),
+    "model_type": (_BLOCK, None),
+    "model_attributes_type": (_BLOCK, None),
+    "list_type": (_LIST, None),
+    "tuple_type": (_LIST, None),
+    "named_tuple_type": (_LIST, None),
+    "too_long": (_ENTRIES, "at most {max_length}"),
+    "too_short": (_ENTRIES, "at least {min_length}"),
+    "union_tag_not_found": ("the block does not state its kind", None),
+    "union_tag_invalid": ("unknown kind", "one of {expected_tags}"),
+    "literal_error": ("the value is unknown", "{expected}"),
+    "string_pattern_mismatch": ("a character is not accepted", "none of {{ and }}"),
+    "greater_than": (_OUT_OF_RANGE, "greater than {gt}"),
+    "greater_than_equal": (_OUT_OF_RANGE, "at least {ge}"),
+    "less_than": (_OUT_OF_RANGE, "less than {lt}"),
+    "less_than_equal": (_OUT_OF_RANGE, "at most {le}"),
+    "finite_number": (_OUT_OF_RANGE, "a finite number"),
 }
+"""Problem and limit by the type of an error of pydantic, whose own words are about Python."""
 
 
 def explained(error: ValidationError, file: Path | str) -> InputError:
@@ -102,9 +125,14 @@ def _problem(issue: ErrorDetails) -> InputError:
     """One problem that a model found."""
     kind = issue["type"]
     field = ".".join(str(part) for part in issue["loc"] if part not in _FORMS)
-    limit = _LIMITS[kind].format(**issue.get("ctx", {})) if kind in _LIMITS else None
-    problem, remedy = issue["msg"].removeprefix("Value error, "), None
+    words = _WORDS.get(kind, (issue["msg"].removeprefix("Value error, "), None))
+    problem, limit, remedy = *words, None
+    if kind in _WORDS:
+        context = issue.get("ctx", {})
+        problem, limit = problem.format(**context), limit and limit.format(**context)
     value: object = issue["input"]
+    if kind == "union_tag_invalid" and isinstance(value, Mapping):
+        field, value = f"{field}.kind", value.get("kind")
     if kind == "extra_forbidden":
         hint = near(str(issue["loc"][-1]), _every_key())
         problem, remedy = (

@@ -351,7 +351,7 @@ Quantity = Literal[
 class Tolerance(Model):
     """A tolerance instead of settings; the advisor selects settings that meet it."""
 
-    tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+    tolerance: Annotated[Number, Field(ge=1e-4, lt=1)] = Field(
         description="largest relative error caused by the settings"
     )
     quantity: Quantity = Field(

@@ -42,11 +42,13 @@ def with_recording(data: Mapping[str, Any], study: Path) -> tuple[Mapping[str, A
 def _found(name: str, study: Path) -> Path:
     """The file beside the study, or beside one that it extends."""
     folders = study_folders(study)
-    for folder in folders:
+    inside = not Path(name).is_absolute() and ".." not in Path(name).parts
+    for folder in folders if inside else ():
         if os.path.isfile(folder / name):  # a name that can be none is no error here
             return folder / name
     limit, remedy = f"a file in {', '.join(map(str, folders))}", "put it there, or correct the name"
-    field, problem = "motion.path.file", "no such file"
+    field = "motion.path.file"
+    problem = "no such file" if inside else "the path leaves the folder of the study"
     raise located(
         InputError(problem, file=study, field=field, value=name, limit=limit, remedy=remedy)
     )
@@ -67,7 +69,8 @@ def _read(file: Path) -> tuple[list[list[Any]], Places]:
     needed, optional = set(_COLUMNS[:-2]), _COLUMNS[-2:]
     if not needed <= set(header) <= set(_COLUMNS) or len(set(header)) < len(header):
         limit = f"{','.join(_COLUMNS[:-2])}, optionally {', '.join(optional)}, separated by commas"
-        problem, value = "the columns are not those of waypoints", ",".join(header)[:200]
+        problem = "the columns are not those of waypoints"
+        value = ",".join(header)[:200] if needed & set(header) else None  # quote only a table
         raise InputError(problem, file=file, field="line 1", value=value, limit=limit)
     surplus: Any = None  # the key of values beyond the header
     points = [[*(row.get(key, "0") for key in _COLUMNS), *row.get(surplus, ())] for _, row in rows]
