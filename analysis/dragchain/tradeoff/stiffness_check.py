@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from dragchain.statistics.estimate import NORMAL_QUANTILE
 from dragchain.tradeoff.stiffness_document import CheckEntry
 from dragchain.tradeoff.stiffness_law import ScaledRuns, StiffnessLaw
 from dragchain.tradeoff.tradeoff_document import TradeoffRecord
@@ -54,5 +55,5 @@ def check_laws(
                 measured=error.value,
                 ci95_low=error.ci95_low,
                 ci95_high=error.ci95_high,
-                inside=abs(apart) <= 1.96 * math.hypot(se, measured_se),
+                inside=abs(apart) <= NORMAL_QUANTILE * math.hypot(se, measured_se),
             )
