@@ -94,6 +94,31 @@ def _stiffness(store: Store) -> pd.DataFrame:
     return rows.reset_index()
 
 
+@derived("loading/sampling_rates")
+def _sampling(store: Store) -> pd.DataFrame:
+    """Contact events per mm of path by sampling rate: the runs are not equally long."""
+    rows = store.table("loading/sampling").copy()
+    for name in ("reduced", "physical"):
+        rows[f"{name}_per_mm"] = rows[f"events_{name}"] / rows[f"path_{name}_mm"]
+    return rows
+
+
+@derived("benchmarks/coverage_shown")
+def _coverage(store: Store) -> pd.DataFrame:
+    """One row per kind of interval and length, numbers with their intervals as text."""
+    rows = store.table("benchmarks/coverage")
+    shown = {
+        "shown_length": "{length:d} {unit}",
+        "shown_coverage": "{coverage:.1%} ({ci95_low:.1%} to {ci95_high:.1%})",
+        "shown_reliable": "{reliable_coverage:.1%}",
+    }
+    texts = {
+        name: [form.format(**row).replace("nan%", "–") for row in rows.to_dict("records")]
+        for name, form in shown.items()
+    }
+    return rows.assign(**{name: [one.replace("%", " %") for one in t] for name, t in texts.items()})
+
+
 @derived("timestep/law")
 def _law(store: Store) -> pd.DataFrame:
     """The law of the stability number, its largest deviation upwards as a fraction."""

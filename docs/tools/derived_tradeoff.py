@@ -11,7 +11,7 @@ from tables import LABELS, ROOT, Store, derived
 from dragchain.report.notation import MINUS
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import said
-from dragchain.statistics.estimate import student_quantile
+from dragchain.statistics.estimate import NORMAL_QUANTILE, student_quantile
 from dragchain.statistics.power_law import Runs, fit_power_law
 from dragchain.tradeoff.notation import in_percent
 from dragdeck.advice.advise import advise
@@ -19,9 +19,6 @@ from dragdeck.advice.options import Option
 from dragdeck.outlook.measured import StiffnessRecord, Tradeoff
 from dragdeck.project import Project
 from dragdeck.study.model import Tolerance
-
-SCATTER = 1.96
-"""Half-width of a 95 % interval in standard deviations, as the advisor takes it."""
 
 FOLD = 2
 """Relative errors from this on are shown as multiples."""
@@ -143,7 +140,12 @@ def _speed(store: Store) -> pd.DataFrame:
 def _scatter(store: Store) -> pd.DataFrame:
     """One row per quantity: half-width of the 95 % CI of one run over the compared path."""
     return pd.DataFrame(
-        {**one, "quantity": name, "label": LABELS[name], "half_width": SCATTER * one["run_std"]}
+        {
+            **one,
+            "quantity": name,
+            "label": LABELS[name],
+            "half_width": NORMAL_QUANTILE * one["run_std"],
+        }
         for name, one in store.record("tradeoff")["quantities"].items()
     )
 

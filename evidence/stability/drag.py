@@ -12,14 +12,14 @@ from dragchain.dumps.frame import Frame
 from dragchain.run.case import Case, friction_with
 from dragchain.run.kinematics import drag_phase, needed
 from dragchain.statistics.correlated import estimate_mean
-from dragchain.statistics.estimate import Estimate
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 from dragchain.tables.network_contacts import KINDS, contact_rows
 from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WorkpieceFrames
 from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks.case_file import CaseOfStudy
 from evidence.stability import contacts as network
-from evidence.stability.measured import NORMAL_95, Measured
+from evidence.stability.measured import Measured
 from evidence.stability.points import PointRun
 
 _NETWORK_FRAMES = 8
@@ -58,7 +58,7 @@ class Dragged(Measured):
         """The relative error of the mean drag, positive where it is stronger."""
         fine = abs(reference.drag_mean_n)
         error = (self.drag_mean_n - reference.drag_mean_n) / -fine
-        half_width = NORMAL_95 * math.hypot(self.drag_se_n, reference.drag_se_n) / fine
+        half_width = NORMAL_QUANTILE * math.hypot(self.drag_se_n, reference.drag_se_n) / fine
         return {"mean drag": Estimate.around(error, half_width)}
 
 

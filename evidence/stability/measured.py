@@ -15,14 +15,11 @@ from dragchain.arrays import Floats
 from dragchain.contact_law.hertz import sphere_mass
 from dragchain.dumps.frame import Frame
 from dragchain.run.kinematics import needed
-from dragchain.statistics.estimate import Estimate
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 from dragdeck.decks.case_file import CaseOfStudy
 from evidence.stability import contacts as network
 from evidence.stability.contacts import centres, in_id_order, network_frequency, radii
 from evidence.stability.points import PointRun
-
-NORMAL_95 = 1.96
-"""Half a 95 % interval in standard errors, as the published map was classified with."""
 
 COLUMNS = (
     "restitution_mean",
@@ -95,7 +92,7 @@ class Bed(Measured):
 
     def errors(self, reference: Self) -> Mapping[str, Estimate]:
         """The relative error of the height."""
-        half_width = NORMAL_95 * math.sqrt(2.0) * reference.height_scatter
+        half_width = NORMAL_QUANTILE * math.sqrt(2.0) * reference.height_scatter
         return {"height": Estimate.around(self.height_m / reference.height_m - 1.0, half_width)}
 
 

@@ -17,10 +17,7 @@ from dragchain.calibration.sweep import Emulator, emulator_of
 from dragchain.documents import Document, Part
 from dragchain.errors import TableError
 from dragchain.files import write_text
-from dragchain.statistics.estimate import Estimate
-
-_NORMAL_95 = 1.96
-"""Half width of a 95 % interval of a normal distribution, in standard deviations."""
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 
 SweepPurpose = Literal["production", "reference"]
 PURPOSES: tuple[SweepPurpose, ...] = ("production", "reference")
@@ -227,7 +224,7 @@ def read_off(
 
     The interval includes that of the measured rebound and the scatter of the drops.
     """
-    value, own = measured.value, _NORMAL_95 * model.rebound_error
+    value, own = measured.value, NORMAL_QUANTILE * model.rebound_error
     low = value - math.hypot(value - measured.ci95_low, own)
     high = value + math.hypot(measured.ci95_high - value, own)
     return model.inverse(value), model.inverse(low), model.inverse(high)

@@ -4,8 +4,8 @@ import numpy as np
 
 from dragchain.arrays import Floats, Ints
 from dragchain.drag.azimuth import circumference, parts, within
-from dragchain.statistics.frame_means import estimates, frame_sums
 from dragchain.statistics.estimate import Estimate
+from dragchain.statistics.frame_means import estimates, frame_sums
 
 AZIMUTH_BINS = 24
 DEPTH_BINS = 10

@@ -60,7 +60,7 @@ def facet_table(sampled: Sampled, surface: Surface, events: pd.DataFrame) -> pd.
     samples = np.bincount(facet, minlength=count)
     names = [name for name in (*AMOUNTS, *WORKPIECE, *BODY) if name in rows]
     sums = {name: np.bincount(facet, rows[name], count) for name in names}
-    errors = {f"{name}_se": _standard_error(sampled, name, count) for name in _UNCERTAIN}
+    errors = {f"{name}_se": standard_errors(sampled, name, count) for name in _UNCERTAIN}
     area = surface.areas
     return pd.DataFrame(
         {
@@ -82,8 +82,8 @@ def facet_table(sampled: Sampled, surface: Surface, events: pd.DataFrame) -> pd.
     )
 
 
-def _standard_error(sampled: Sampled, name: str, count: int) -> Floats:
-    """The standard error of a sum of each facet, (count,), with `SLOW_WAVES` degrees of freedom.
+def standard_errors(sampled: Sampled, name: str, count: int) -> Floats:
+    """The standard errors of a sum of each facet, (count,), with `SLOW_WAVES` degrees of freedom.
 
     As `slow_error` of the series of each facet, which need not be held for that.
     """

@@ -35,8 +35,8 @@ from dragchain.loading.document import (
 )
 from dragchain.loading.samples import WORKPIECE, Sampled
 from dragchain.run.case import Case
-from dragchain.statistics.frame_means import estimates
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
+from dragchain.statistics.frame_means import estimates
 
 _THINNING = (2, 5, 10)
 """Every n-th sample is taken to see what a lower rate of samples would give."""

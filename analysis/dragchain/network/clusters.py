@@ -114,7 +114,9 @@ def find_clusters(frame: NetworkFrame, force_n: Floats) -> Clusters:
     )
     in_order = np.empty_like(counts)
     in_order[by_stop] = counts
-    reached = iter(np.where(joined >= 0, force[joined], 0.0) if force.size else 0.0 * joined)
+    reached = iter(
+        np.where(joined >= 0, force[joined], 0.0) if force.size else np.zeros(joined.shape)
+    )
     percolation = {name: float(max(next(reached) for _ in ways)) for name, ways in SPANS.items()}
     clusters, members, largest, squares = in_order.T
     size = frame.particle_id.size

@@ -1,6 +1,5 @@
 """Compute the findings of one run from its tables."""
 
-import math
 from dataclasses import asdict
 
 import numpy as np
@@ -32,7 +31,7 @@ from dragchain.run.case import Case, load_outputs
 from dragchain.run.kinematics import drag_start_s, motion_of, needed
 from dragchain.run.reference import ReferenceDrag, reference_drags
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean
-from dragchain.statistics.estimate import CONFIDENCE, Estimate, EstimateColumns
+from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
 from dragchain.tables.bed import Packing
 from dragchain.tables.impacts import effective_restitution
 
@@ -104,14 +103,7 @@ def _wake(samples: pd.DataFrame, case: Case) -> Wake | None:
         )
     except SeriesError:
         return None
-    return Wake(fresh_n=before, wake_n=after, ratio=_ratio(after, before))
-
-
-def _ratio(above: MeanEstimate, below: MeanEstimate) -> Estimate:
-    """Ratio of two independent means; its relative error is the root of the sum of squares."""
-    value = above.mean / below.mean
-    relative = (0.5 * (one.ci95_high - one.ci95_low) / one.mean for one in (above, below))
-    return Estimate.around(value, abs(value) * math.hypot(*relative))
+    return Wake(fresh_n=before, wake_n=after, ratio=after.over(before))
 
 
 def compare(ours: MeanEstimate, reference: ReferenceDrag) -> Comparison:

@@ -40,8 +40,11 @@ def forces(run: RunData, found: ProcessFindings) -> Figure:
 
 def _reliability(ours: MeanEstimate) -> str:
     text = f"drag {ours.mean:.2f} ± {ours.std:.2f} N (± standard deviation)"
-    doubt = "" if ours.reliable else " (too few for a reliable CI)"
-    return f"{text}, {ours.effective_samples:.0f} effective samples{doubt}"
+    return f"{text}, {ours.effective_samples:.0f} effective samples{_doubt(ours)}"
+
+
+def _doubt(ours: MeanEstimate | Estimate) -> str:
+    return "" if ours.reliable else " (too few for a reliable CI)"
 
 
 def force_around_workpiece(run: RunData, found: ProcessFindings) -> Figure:
@@ -63,7 +66,7 @@ def _ratio(ratio: Estimate) -> str:
     if not np.isfinite(ratio.value):
         return "no contact behind"
     high = f"{ratio.ci95_high:.1f}" if np.isfinite(ratio.ci95_high) else "unbounded"
-    return f"ratio {ratio.value:.1f} (95 % CI {ratio.ci95_low:.1f} to {high})"
+    return f"ratio {ratio.value:.1f} (95 % CI {ratio.ci95_low:.1f} to {high}){_doubt(ratio)}"
 
 
 def force_depth(run: RunData, found: ProcessFindings) -> Figure:
@@ -72,7 +75,7 @@ def force_depth(run: RunData, found: ProcessFindings) -> Figure:
     figure, (left, right) = new_panels(3.3, 2, HALF_IN, sharey=True)
     run_panels.force_over_depth(left, found)
     interval = f"95 % CI {slope.ci95_low:.4f} to {slope.ci95_high:.4f}"
-    left.set_title(f"slope {slope.value:.4f} N/mm\n({interval})")
+    left.set_title(f"slope {slope.value:.4f} N/mm\n({interval}){_doubt(slope)}")
     run_panels.load_over_depth(right, found)
     right.set(ylabel="", title="deepest bin includes the contacts\non edge and end face")
     return figure

@@ -11,12 +11,18 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import stats
 from scipy.optimize import minimize_scalar
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
-from dragchain.statistics.shared_bed import Effects, Whitened, alike, same
+from dragchain.statistics.shared_bed import (
+    Effects,
+    Whitened,
+    alike,
+    free_degrees,
+    same,
+    shares_beds,
+)
 
 Combination = tuple[tuple[str, Hashable], ...]
 """Factors and their levels, those of the reference left out."""
@@ -35,13 +41,10 @@ class Fit(Effects):
         Standard deviation of one run about its settings' effects, bed included.
     bed_fraction : float
         The part of that variance which runs from the same bed have in common.
-    residuals : (N,) ndarray
-        Whitened: independent and of equal variance if the model is right.
     """
 
     residual_std: float
     bed_fraction: float
-    residuals: Floats
 
 
 def fit_effects(
@@ -51,7 +54,8 @@ def fit_effects(
 
     The covariance of two runs is ``s^2`` for a run with itself, ``r s^2`` for
     runs from the same bed and zero otherwise; ``r`` maximises the restricted
-    likelihood (Patterson and Thompson 1971, Biometrika 58, 545-554).
+    likelihood (Patterson and Thompson 1971, Biometrika 58, 545-554). It is zero if too few
+    runs are left to estimate it, which makes differences on the same beds less certain.
 
     Parameters
     ----------
@@ -72,15 +76,15 @@ def fit_effects(
         raise SeriesError(f"{runs} runs are too few to estimate {number} effects: run more seeds")
     if np.linalg.matrix_rank(design) < number:
         raise SeriesError("the effects are confounded: vary one setting at a time as well")
-    same_bed = same(beds)
+    same_bed, degrees = same(beds), runs - number
     if bed_fraction is None:
-        shared = len(set(beds)) < runs
-        bed_fraction = _best_fraction(design, values, same_bed) if shared else 0.0
+        bed_fraction, left = 0.0, free_degrees(beds, number)
+        if shares_beds(beds) and left >= 1:
+            bed_fraction, degrees = _best_fraction(design, values, same_bed), left
     model = Whitened.of(design, values, alike(same_bed, bed_fraction))
-    variance = float(model.residuals @ model.residuals) / model.degrees
+    variance = model.square / model.degrees
     covariance = np.asarray(variance * model.covariance)
-    std = float(np.sqrt(variance))
-    return Fit(model.effects, covariance, model.degrees, std, bed_fraction, model.residuals)
+    return Fit(model.effects, covariance, degrees, math.sqrt(variance), bed_fraction)
 
 
 def _best_fraction(design: Floats, values: Floats, same_bed: Floats) -> float:
@@ -106,14 +110,11 @@ class Factors:
         The levels that have no column of their own.
     additive : bool
         A column for every level of every factor; else one for every combination.
-    apart : frozenset of combinations
-        Those that have a column of their own all the same, and take no part in others.
     """
 
     settings: Sequence[Mapping[str, Hashable]]
     reference: Mapping[str, Hashable]
     additive: bool
-    apart: frozenset[Combination] = frozenset()
 
     @cached_property
     def columns(self) -> list[Combination]:
@@ -123,14 +124,8 @@ class Factors:
 
     def _terms(self, setting: Mapping[str, Hashable]) -> list[Combination]:
         """The columns that are 1 for a setting, besides the first."""
-        own = self.combination(setting)
-        if self.additive and own not in self.apart:
-            return [(pair,) for pair in own]
-        return [own] * bool(own)
-
-    def combination(self, setting: Mapping[str, Hashable]) -> Combination:
-        """The levels of a setting that are not those of the reference."""
-        return tuple((f, setting[f]) for f in self.reference if setting[f] != self.reference[f])
+        own = tuple((f, setting[f]) for f in self.reference if setting[f] != self.reference[f])
+        return [(pair,) for pair in own] if self.additive else [own] * bool(own)
 
     def row(self, setting: Mapping[str, Hashable]) -> Floats:
         """Row of the design matrix for some settings, (1 + columns,)."""
@@ -144,18 +139,3 @@ class Factors:
     def design(self) -> Floats:
         """The design matrix, (N, 1 + columns)."""
         return np.array([self.row(setting) for setting in self.settings])
-
-
-def lack_of_fit(additive: Fit, full: Fit) -> float:
-    """Probability of so much disagreement with additivity by chance alone.
-
-    F test of the sum of squares that the interactions explain against what is
-    left with them. Both fits must have used the same `bed_fraction`. 1 if the two
-    models are the same, or if nothing is left to test against.
-    """
-    more = additive.degrees - full.degrees
-    left = full.residuals @ full.residuals / full.degrees
-    if more == 0 or left == 0.0:
-        return 1.0
-    explained = (additive.residuals @ additive.residuals - full.residuals @ full.residuals) / more
-    return float(stats.f.sf(explained / left, more, full.degrees))

@@ -66,13 +66,21 @@ class MeanEstimate:
         """The mean with its interval."""
         return Estimate(self.mean, self.ci95_low, self.ci95_high, self.reliable)
 
+    def over(self, below: "MeanEstimate") -> Estimate:
+        """The ratio to an independent mean: relative half-widths add up as squares do."""
+        both = self, below
+        relative = np.hypot(*(0.5 * (one.ci95_high - one.ci95_low) / one.mean for one in both))
+        value, reliable = self.mean / below.mean, self.reliable and below.reliable
+        half = abs(value) * float(relative)
+        return Estimate(value, value - half, value + half, reliable)
+
 
 def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanEstimate:
     """Estimate the mean of a correlated series and its confidence interval.
 
     The standard error is ``std / sqrt(n)`` with ``n = N / (2 tau)`` (Sokal 1997,
     section 2). The autocorrelation time is itself estimated: its relative variance is
-    ``2 (2 W + 1) / N`` (Wolff 2004, equation 42), which is that of a variance with
+    ``2 (2 W + 1) / N`` (Sokal 1997, section 3), which is that of a variance with
     ``N / (2 W + 1)`` degrees of freedom. The interval uses Student's t with these, at least 1.
     A fluctuation that is slow and weak beside a fast one is not within W: if the variance by
     `slow_error` is larger by more than `_SLOWER`, the wider of both intervals holds.

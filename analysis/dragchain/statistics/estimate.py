@@ -12,6 +12,9 @@ from pydantic import AllowInfNan, BeforeValidator
 CONFIDENCE = 0.95
 """Level of every interval."""
 
+NORMAL_QUANTILE = 1.959964
+"""Half-width of a normal interval of `CONFIDENCE`, in standard errors."""
+
 
 def finite(number: float) -> float | None:
     """The number, or None where JSON has no way to write it."""

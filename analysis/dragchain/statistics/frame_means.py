@@ -18,6 +18,12 @@ from dragchain.statistics.estimate import Estimate
 _STEP = 1e-6
 """Step of the numerical slopes, over the root mean square of a column."""
 
+LARGEST_REACH = 0.6
+"""An interval that reaches further, over a sum that is never negative, is not reliable.
+
+The sum then comes from a few dozen events, and its distribution is too skew for Student's t.
+"""
+
 
 def estimates(sums: Floats, statistic: Callable[[Floats], Floats]) -> list[Estimate]:
     """Return statistics of mean frame sums with their intervals.
@@ -51,12 +57,13 @@ def estimates(sums: Floats, statistic: Callable[[Floats], Floats]) -> list[Estim
         found = [estimate_mean(one) if np.isfinite(one).all() else None for one in series.T]
         reach = [one.ci95_high - one.mean if one else np.nan for one in found]
         shares = np.nan_to_num(centred.T @ series / np.sum(series**2, axis=0))
+        moves = (shares * reach).T
         low, high = (
-            np.diagonal(statistic(np.maximum(means + sign * (shares * reach).T, least)))
-            for sign in (-1.0, 1.0)
+            np.diagonal(statistic(np.maximum(means + sign * moves, least))) for sign in (-1.0, 1.0)
         )
-    reliable = [one is not None and one.reliable for one in found]
-    ends = zip(values.tolist(), low.tolist(), high.tolist(), reliable, strict=True)
+    few = ((least == 0.0) & (np.abs(moves) > LARGEST_REACH * means)).any(axis=1)
+    reliable = [one is not None and one.reliable for one in found] & ~few
+    ends = zip(values.tolist(), low.tolist(), high.tolist(), reliable.tolist(), strict=True)
     return [Estimate(*end) for end in ends]
 
 

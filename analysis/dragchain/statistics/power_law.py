@@ -18,7 +18,14 @@ from scipy.optimize import minimize
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
 from dragchain.statistics.estimate import Estimate
-from dragchain.statistics.shared_bed import Effects, Whitened, alike, same
+from dragchain.statistics.shared_bed import (
+    Effects,
+    Whitened,
+    alike,
+    free_degrees,
+    same,
+    shares_beds,
+)
 
 _LEAST_LEVELS = 3
 """A line through two levels always fits."""
@@ -114,15 +121,9 @@ class Runs:
         """1 where two runs start from the same bed, else 0, (N, N)."""
         return same(self.beds)
 
-    @property
-    def fractions_beds(self) -> bool:
-        """Whether there are several beds, and some have several runs."""
-        return 1 < len(set(self.beds)) < len(self.beds)
-
     def degrees(self, effects: int) -> int:
-        """Degrees of freedom that some effects leave; beds that are shared take theirs."""
-        beds = len(set(self.beds)) - 1 if self.fractions_beds else 0
-        return len(self.x) - effects - beds
+        """Degrees of freedom that some effects leave."""
+        return free_degrees(self.beds, effects)
 
     def line(self) -> Floats:
         """Design of a power law: constant and ln(x / geometric mean of the levels), (N, 2)."""
@@ -161,7 +162,7 @@ def estimate_scatter(runs: Runs, design: Floats) -> Scatter:
         return _minus_likelihood(design, runs.logarithms, runs.covariance(scatter))
 
     least, most = (float(limit) for limit in np.log(_SPREADS))
-    fraction = _LARGEST_FRACTION if runs.fractions_beds else 0.0
+    fraction = _LARGEST_FRACTION if shares_beds(runs.beds) else 0.0
     trials = itertools.product(np.linspace(least, most, 12)[1:-2], {0.0, 0.5 * fraction})
     start = min((np.array(trial) for trial in trials), key=loss)
     found = minimize(loss, start, bounds=[(least, most), (0.0, fraction)], method="L-BFGS-B")

@@ -23,6 +23,21 @@ def same(labels: Sequence[Hashable]) -> Floats:
     return np.asarray(codes[:, None] == codes[None, :], dtype=np.float64)
 
 
+def shares_beds(beds: Sequence[Hashable]) -> bool:
+    """Whether there are several beds, and some have several runs."""
+    return 1 < len(set(beds)) < len(beds)
+
+
+def free_degrees(beds: Sequence[Hashable], effects: int) -> int:
+    """Degrees of freedom that some effects leave of N runs; beds that are shared take theirs.
+
+    What the runs from one bed have in common is estimated from the same runs. Where it is much,
+    an effect is as good as one of the differences within the beds, of which there are as many
+    fewer as there are beds less one.
+    """
+    return len(beds) - effects - (len(set(beds)) - 1 if shares_beds(beds) else 0)
+
+
 def alike(same_bed: Floats, fraction: float) -> Floats:
     """Covariance of runs of which those from the same bed share a part, over the variance."""
     return np.asarray((1.0 - fraction) * np.eye(len(same_bed)) + fraction * same_bed)

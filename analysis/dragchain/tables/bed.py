@@ -103,13 +103,15 @@ def bed_height(centre_m: Floats, radius_m: Floats, bowl_radius_m: float) -> floa
     Returns
     -------
     float
-        The height above the floor, m.
+        The height above the floor, m; 0 without particles.
 
     Raises
     ------
     TableError
         If the bowl is narrower than a particle.
     """
+    if not radius_m.size:
+        return 0.0
     pitch = 2.0 * float(radius_m.mean())
     reach = bowl_radius_m - 0.5 * pitch
     if reach < 0.0:

@@ -3,28 +3,25 @@
 The runs of a plan, each measured by `dragchain.tradeoff.measure_run`, are compared over the
 stretch of path that all of them have. For each quantity the effects of modulus,
 time step, speed and everything else are estimated together
-(`dragchain.statistics.bed_effects`): added up where the runs do not contradict that, and for
-every combination by itself where they do.
+(`dragchain.statistics.bed_effects`), for every combination by itself: no test decides from the
+same runs which of them may be added up.
 """
 
 import math
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import stats
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
-from dragchain.statistics.bed_effects import Combination, Factors, Fit, fit_effects, lack_of_fit
+from dragchain.statistics.bed_effects import Factors, Fit, fit_effects
 from dragchain.statistics.estimate import CONFIDENCE, student_quantile
 from dragchain.tradeoff.quantities import Quantity
 from dragchain.tradeoff.runs import Run, Setting
 
 Levels = Mapping[str, Hashable]
-
-ADDITIVE_LEVEL = 0.05
-"""Effects are added up unless chance would disagree as much less often than this."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +53,19 @@ class Error:
 
 
 @dataclass(frozen=True)
+class Model:
+    """Effects of settings: how they become columns of a design, and the fit of these."""
+
+    factors: Factors
+    fit: Fit
+
+    def error(self, setting: Levels, reference: Levels, signed: bool) -> Error:
+        """The difference of one setting to another."""
+        weights = self.factors.row(setting) - self.factors.row(reference)
+        return relative_error(*self.fit.contrast(weights), self.fit.degrees, signed)
+
+
+@dataclass(frozen=True)
 class Comparison:
     """All settings against the reference in one quantity.
 
@@ -70,16 +80,11 @@ class Comparison:
         Relative standard deviation of one run's value over the common path.
     bed_fraction : float
         The part of its square that runs from one bed have in common.
-    additivity : float
-        Probability of so much disagreement with additive effects by chance.
-    additive : bool
-        Whether effects were added up.
-    apart : list of Setting
-        Those that have effects of their own all the same.
     errors : dict of Setting to Error
-    fit : Fit
-    factors : Factors
-        What `between` draws on.
+    model : Model
+        What `errors` and `between` draw on.
+    added : Model
+        Of single parameters, whose effects add up: what `alone` draws on.
     """
 
     quantity: Quantity
@@ -87,17 +92,14 @@ class Comparison:
     se: float
     run_std: float
     bed_fraction: float
-    additivity: float
-    additive: bool
-    apart: list[Setting]
     errors: Mapping[Setting, Error]
-    fit: Fit = field(repr=False)
-    factors: Factors = field(repr=False)
+    model: Model = field(repr=False)
+    added: Model = field(repr=False)
 
     @property
     def reference_halfwidth(self) -> float:
         """Relative half-width of the reference's interval."""
-        return student_quantile(self.fit.degrees) * self.se
+        return self.model.fit.quantile * self.se
 
     def alone(self, setting: Setting, reference: Setting) -> float:
         """The largest error that one of a setting's parameters makes when it is turned alone.
@@ -107,18 +109,17 @@ class Comparison:
         """
         own, levels = setting.factors(), reference.factors()
         errors = [
-            _error(self.fit, self.factors, one, levels, self.quantity.signed)
+            self.added.error(one, levels, self.quantity.signed)
             for one in ({**levels, name: own[name]} for name in levels)
-            if self.factors.tells(one)
+            if self.added.factors.tells(one)
         ]
         return max(abs(error.value) for error in errors)
 
     def between(self, setting: Setting, base: Setting) -> Error | None:
         """Difference of one setting to another; None if the runs cannot tell it."""
-        if not all(self.factors.tells(one.factors()) for one in (setting, base)):
+        if not all(self.model.factors.tells(one.factors()) for one in (setting, base)):
             return None
-        signed = self.quantity.signed
-        return _error(self.fit, self.factors, setting.factors(), base.factors(), signed)
+        return self.model.error(setting.factors(), base.factors(), self.quantity.signed)
 
 
 def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting) -> Comparison:
@@ -146,77 +147,42 @@ def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting
     else:
         scale = float(np.sign(values[0]))
         values = np.log(np.abs(values))
-    factors, fit, additivity = _choose(settings, values, [run.bed for run, _ in rows], reference)
-    level, uncertainty = fit.contrast(factors.row(reference.factors()))
+    levels = reference.factors()
+    model, added = _models(settings, values, [run.bed for run, _ in rows], levels)
+    level, uncertainty = model.fit.contrast(model.factors.row(levels))
     return Comparison(
         quantity=quantity,
         reference=scale * (level if quantity.signed else math.exp(level)),
         se=uncertainty,
-        run_std=fit.residual_std,
-        bed_fraction=fit.bed_fraction,
-        additivity=additivity,
-        additive=factors.additive,
-        apart=[
-            setting
-            for setting in dict.fromkeys(settings)
-            if factors.combination(setting.factors()) in factors.apart
-        ],
+        run_std=model.fit.residual_std,
+        bed_fraction=model.fit.bed_fraction,
         errors={
-            setting: _error(fit, factors, setting.factors(), reference.factors(), quantity.signed)
+            setting: model.error(setting.factors(), levels, quantity.signed)
             for setting in dict.fromkeys(settings)
         },
-        fit=fit,
-        factors=factors,
+        model=model,
+        added=added,
     )
 
 
-def _choose(
-    settings: Sequence[Setting], values: Floats, beds: list[str | None], reference: Setting
-) -> tuple[Factors, Fit, float]:
-    """Additive effects, as far as the runs do not contradict additivity.
+def _models(
+    settings: Sequence[Setting], values: Floats, beds: Sequence[str | None], reference: Levels
+) -> tuple[Model, Model]:
+    """A model with an effect of every combination, and one whose effects add up.
 
-    While they do, the combination that contradicts it most gets an effect of
-    its own: a step that breaks with soft particles alone does not spoil what is
-    known of the others. If most of the combinations would need one, or the
-    runs cannot tell the parameters apart, every combination has its own.
+    One stands for both if the runs do not allow the other: without repetitions effects are
+    added up on trust, and what does not fit is scatter.
     """
     levels = [setting.factors() for setting in settings]
-    full_factors = Factors(levels, reference.factors(), additive=False)
-    factors = Factors(levels, reference.factors(), additive=True)
-    try:
-        full = fit_effects(full_factors.design(), values, beds)
-    except SeriesError:  # no replicates: additivity is taken on trust
-        return factors, fit_effects(factors.design(), values, beds), math.nan
-    try:
-        additive = fit_effects(factors.design(), values, beds, full.bed_fraction)
-    except SeriesError:
-        return full_factors, full, math.nan
-    first = probability = lack_of_fit(additive, full)
-    while probability < ADDITIVE_LEVEL:
-        factors = replace(factors, apart=factors.apart | {_misfit(factors, additive, levels)})
-        if 2 * len(factors.apart) > len(full_factors.columns):
-            return full_factors, full, first
+    found: list[Model] = []
+    for additive in (False, True):
+        factors = Factors(levels, reference, additive)
         try:
-            additive = fit_effects(factors.design(), values, beds, full.bed_fraction)
+            found.append(Model(factors, fit_effects(factors.design(), values, beds)))
         except SeriesError:
-            return full_factors, full, first
-        probability = lack_of_fit(additive, full)
-    return factors, fit_effects(factors.design(), values, beds), first
-
-
-def _misfit(factors: Factors, fit: Fit, levels: Sequence[Mapping[str, Hashable]]) -> Combination:
-    """The combination of levels that fits worst: the largest sum of residuals over its root."""
-    sums: dict[Combination, list[float]] = {}
-    for level, residual in zip(levels, fit.residuals, strict=True):
-        combination = factors.combination(level)
-        if len(combination) > 1 and combination not in factors.apart:
-            sums.setdefault(combination, []).append(float(residual))
-    return max(sums, key=lambda one: abs(sum(sums[one])) / math.sqrt(len(sums[one])))
-
-
-def _error(fit: Fit, factors: Factors, setting: Levels, reference: Levels, signed: bool) -> Error:
-    weights = factors.row(setting) - factors.row(reference)
-    return relative_error(*fit.contrast(weights), fit.degrees, signed)
+            if additive and not found:
+                raise
+    return found[0], found[-1]
 
 
 def relative_error(

@@ -8,7 +8,7 @@ from scipy import stats
 
 from dragchain.arrays import Floats
 from dragchain.statistics.correlated import autocovariance
-from dragchain.statistics.estimate import CONFIDENCE, student_quantile
+from dragchain.statistics.estimate import CONFIDENCE, NORMAL_QUANTILE, student_quantile
 from dragchain.tradeoff.compare import compare_quantity
 from dragchain.tradeoff.outcome import Tradeoff
 from dragchain.tradeoff.quantities import MAIN, QUANTITIES, Quantity
@@ -49,12 +49,14 @@ class Reach:
 
 def reaches(tradeoff: Tradeoff) -> list[Reach]:
     """How well runs know the quantities that have blocks along the path."""
-    score = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE))
     along_path = {name for run in tradeoff.runs for name in run.measures.blocks}
     block_m = float(np.median([run.measures.block_m for run in tradeoff.runs if run.complete]))
     return [
         Reach(
-            quantity, score * tradeoff.comparisons[quantity.name].run_std, tradeoff.arc_m, block_m
+            quantity,
+            NORMAL_QUANTILE * tradeoff.comparisons[quantity.name].run_std,
+            tradeoff.arc_m,
+            block_m,
         )
         for quantity in QUANTITIES
         if quantity.name in tradeoff.comparisons and quantity.name in along_path
@@ -126,11 +128,11 @@ def coverage(tradeoff: Tradeoff, name: str, trials: int = TRIALS) -> float | Non
 
     Runs at the same settings and beds get values without any effect, with the
     scatter and the bed's fraction of a quantity, and are compared just as the
-    measured ones: the share is estimated and additivity tested anew each time.
+    measured ones: the share is estimated anew each time.
 
     Parameters
     ----------
-    trade : Trade
+    tradeoff : Tradeoff
     name : str
         The quantity.
     trials : int

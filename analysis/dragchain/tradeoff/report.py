@@ -9,7 +9,6 @@ from dragchain.report.bundle import write_bundle
 from dragchain.report.page import data_uri, render_page
 from dragchain.statistics.estimate import CONFIDENCE
 from dragchain.tradeoff.changes import RUINED, gains, modulus_levels, softness, verdicts
-from dragchain.tradeoff.compare import ADDITIVE_LEVEL
 from dragchain.tradeoff.costs import read_costs, step_costs
 from dragchain.tradeoff.drops import Drop, choose_drop, read_drops
 from dragchain.tradeoff.figures import draw
@@ -125,7 +124,6 @@ def render(
         figures={name: data_uri(picture) for name, picture in figures.items()},
         tolerances=TOLERANCES,
         confidence=CONFIDENCE,
-        additive_level=ADDITIVE_LEVEL,
         ruined=RUINED,
         waves=(SHORT_WAVE, LONG_WAVE),
     )

@@ -5,8 +5,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from dragchain.statistics.estimate import NORMAL_QUANTILE
 from dragchain.tradeoff.stiffness_document import CheckEntry, LawEntry
-from dragchain.tradeoff.stiffness_law import NORMAL_95, ScaledRuns
+from dragchain.tradeoff.stiffness_law import ScaledRuns
 from dragchain.tradeoff.tradeoff_document import TradeoffRecord
 
 _STEP = 0.5
@@ -52,5 +53,5 @@ def check_laws(laws: Mapping[str, LawEntry], tradeoff: TradeoffRecord) -> Iterat
                 measured=error.value,
                 ci95_low=error.ci95_low,
                 ci95_high=error.ci95_high,
-                inside=abs(apart) <= NORMAL_95 * math.hypot(se, measured_se),
+                inside=abs(apart) <= NORMAL_QUANTILE * math.hypot(se, measured_se),
             )

@@ -1,13 +1,12 @@
 """The fit of the restitution, on drops whose answer is known on paper."""
 
 import math
-from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from paper_drops import BIAS, FALL_S, HEIGHT, G, paper_drop, paper_drops, rebound
 from scipy.stats import binom
 
 from dragchain.calibration.fit import WIDTH_LIMIT, calibrate
@@ -15,103 +14,13 @@ from dragchain.calibration.measured_impacts import Measured, measure
 from dragchain.calibration.results import bias_table, read_off, result
 from dragchain.calibration.sampling import observe, sample_impact
 from dragchain.calibration.simulated_drops import (
-    Drop,
-    DropRun,
-    Drops,
-    DropTest,
     Purpose,
-    Waveform,
     waveform,
 )
 from dragchain.calibration.sweep import Sweep, emulate, emulator_of, prepare
 from dragchain.calibration.trials import Sensor, coverage, record_of, run_trials
 from dragchain.errors import RecordError, TableError
 from dragchain.statistics.estimate import Estimate
-
-G, HEIGHT = 9.81, 0.010
-FALL_S = math.sqrt(2 * HEIGHT / G)
-Peaks = Literal["auto", "yes", "no"]
-BIAS = 0.02
-"""Made-up engine: it rebounds with the deck's value plus this times (1 - value)."""
-
-
-def rebound(deck: float, bias: float) -> float:
-    return deck + bias * (1 - deck)
-
-
-def paper_drop(
-    deck: float,
-    *,
-    bias: float = 0.0,
-    height: float = HEIGHT,
-    purpose: Purpose = "reference",
-    contact_s: float = 25e-6,
-    jitter: float = 0.0,
-    limit_force: bool = True,
-) -> DropRun:
-    """A drop by the laws of free flight; contacts are sin^1.5, peaks go with v^1.2."""
-    e = rebound(deck, bias) + jitter
-    speeds = math.sqrt(2 * G * height) * e ** np.arange(4)
-    down, impacts = math.sqrt(2 * height / G), []
-    for before, after in pairwise(speeds):
-        time = down + np.linspace(-0.1, 1.1, 601) * contact_s
-        phase = np.clip((time - down) / contact_s, 0, 1)
-        peak = 23.0 * float(before / speeds[0]) ** 1.2
-        force = peak * np.sin(np.pi * phase) ** 1.5
-        middle = down + contact_s / 2
-        impacts.append(Waveform(time, force, down, down + contact_s, middle, peak))
-        down += contact_s + 2 * float(after) / G
-    modulus = 1.0 if purpose != "production" else 0.01
-    drop = Drop(
-        folder="",
-        purpose=purpose,
-        restitution=deck,
-        limit_force=limit_force,
-        height_m=height,
-        youngs_modulus_scale=modulus,
-        timestep_s=1e-7,
-        timestep_fraction=0.01,
-    )
-    return DropRun(drop, speeds, tuple(impacts))
-
-
-def paper_drops(
-    bias: float = BIAS, jitter: float = 0.0, peaks: Peaks = "auto", height_std: float = 1e-4
-) -> Drops:
-    """A sweep; production is biased and its contacts are six times as long."""
-    random = np.random.default_rng(0)
-    runs = []
-    for option in (True, False):
-        for deck in np.round(np.arange(0.4, 1.001, 0.05), 2):
-            runs.append(paper_drop(float(deck), limit_force=option))
-            for _ in range(2):
-                noise = float(random.normal(0, jitter))
-                runs.append(
-                    paper_drop(
-                        float(deck),
-                        bias=bias if option else 0.0,
-                        purpose="production",
-                        contact_s=150e-6,
-                        jitter=noise,
-                        limit_force=option,
-                    )
-                )
-    known = DropTest(
-        study="paper",
-        title="on paper",
-        pair="a-b",
-        fidelity="quick",
-        record="record.csv",
-        height_m=HEIGHT,
-        height_std_m=height_std,
-        peaks=peaks,
-        gravity_m_s2=G,
-        limit_force=True,
-        restitution_now=0.7,
-        fall_time_s=FALL_S,
-        contact_time_s=25e-6,
-    )
-    return Drops(known, tuple(runs))
 
 
 @pytest.fixture(scope="module")

@@ -286,6 +286,7 @@ def test_write_chains_writes_counted_frames_only(run_dir: Path) -> None:
     assert at_mean["largest_cluster"] == 2
     assert not at_mean["workpiece_to_bowl"]
     assert network["workpiece_to_bowl_n"].tolist() == [2.0, 0.0]
+    assert not np.signbit(network["workpiece_to_bowl_n"]).any()
     assert not list((run_dir / "tables").glob("*.part"))
 
 

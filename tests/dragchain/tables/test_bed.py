@@ -17,6 +17,10 @@ def frame(rows):
     return Frame(0, {name: table[:, i] for i, name in enumerate(NAMES)})
 
 
+def test_a_bed_of_nothing_has_no_height() -> None:
+    assert bed_height(np.empty((0, 3)), np.empty(0), 0.04) == 0.0
+
+
 def test_one_particle_under_the_only_probe() -> None:
     """The bowl is 1.4 wide, the particle 1: one probe, on the axis."""
     assert bed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), 0.7) == 1.0
