@@ -51,6 +51,7 @@ from dragdeck.outlook import timestep as timestep_outlook
 from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, show
 from dragdeck.outlook.explain import page as page_of_scene
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_measured
+from dragdeck.outlook.measured_range import outside_of_laws, range_note
 from dragdeck.outlook.runs import expected_runs, plan_in_words
 from dragdeck.outlook.stable_step import stable_step_cautions, stable_step_note
 from dragdeck.physics.packing import Bed
@@ -112,6 +113,7 @@ class _Findings:
     templates: jinja2.Environment
     errors: list[InputError] = field(default_factory=list)
     warnings: dict[str, list[str]] = field(default_factory=dict)
+    outside: dict[str, list[str]] = field(default_factory=dict)
     notes: dict[str, list[str]] = field(default_factory=dict)
     overriding: set[str] = field(default_factory=set)
     effective: set[str] = field(default_factory=set)
@@ -130,6 +132,8 @@ class _Findings:
         for text in dict.fromkeys([*map(str, scene.warnings), *_friction_unknown(script)]):
             names = self.warnings.setdefault(text, [])
             names += [case.name] if case.name not in names else []
+        if kind.needs_bed and (text := outside_of_laws(case)):
+            self.outside.setdefault(text, []).append(case.name)
         lines = [f"time step: {scene.deck.timestep_s:.3g} s"]
         lines += [f"{what}: {text}" for what, text in _expectations(case, kind, scene)]
         names = [f"{kind.name} {folder.name}" for folder in runs]
@@ -140,6 +144,8 @@ class _Findings:
         """Print the warnings; and what is expected of every run, if that is asked for."""
         for text, names in self.warnings.items():
             print(f"warning: {_first(names)}: {text}")
+        for text, names in self.outside.items():
+            print(f"note: {_first(names)}: {text}")
         for text, names in self.notes.items() if verbose else ():
             print(f"{_first(names)}\n  {text}")
 
@@ -191,7 +197,8 @@ def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) 
             cost = expected_cost(kind, one, speeds)
             if not verbose:
                 width = min(100, shutil.get_terminal_size().columns)
-                print(*page_of_scene(one, cost, len(cases), width), sep="\n")
+                range_text = outside_of_laws(case) if kind.needs_bed else ""
+                print(*page_of_scene(one, cost, len(cases), width, range_text), sep="\n")
                 continue
             notes = _expectations(case, kind, one)
             show([explanation(one, cost, notes, tradeoff_if_measured())])
@@ -203,7 +210,7 @@ def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[
     """What is known of a scene's time step and bed before it is run."""
     notes = timestep_outlook.notes(case, kind, scene)
     if kind.needs_bed:
-        notes += [stable_step_note(case), *fit_outlook.notes(case)]
+        notes += [stable_step_note(case), *fit_outlook.notes(case), range_note(case)]
     return [*notes, *([] if kind.single_particle else bed_outlook.notes(case))]
 
 

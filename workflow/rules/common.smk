@@ -1,4 +1,5 @@
 # What the rules share: the study, its cases, the paths of its runs.
+import os
 import re
 import sys
 from functools import cache
@@ -10,6 +11,7 @@ from jsonschema import Draft202012Validator
 from snakemake.exceptions import WorkflowError
 
 from dragdeck.campaigns.restitution_drops import record_file
+from dragdeck.cases.ranks import CORES_VARIABLE, cores_here
 from dragdeck.decks.templates import environment, template_files
 from dragdeck.errors import DragdeckError, choices
 from dragdeck.outlook.runs import expected_runs, plan_in_words
@@ -57,6 +59,11 @@ explained(read_yaml, Path("config/config.yaml"))
 
 configfile: "config/config.yaml"
 
+
+# Runs have no more ranks than the cores that this call was given; with a queue, than a node has.
+if workflow.is_main_process and workflow.local_exec and workflow.resource_settings.cores:
+    given = min(workflow.resource_settings.cores, explained(cores_here))
+    os.environ[CORES_VARIABLE] = str(given)
 
 SCHEMA = yaml.safe_load(Path(workflow.source_path("../schemas/config.schema.yaml")).read_text())
 

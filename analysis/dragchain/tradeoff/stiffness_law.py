@@ -348,20 +348,22 @@ class ErrorIn:
 def with_misfit(law: StiffnessLaw, errors: Mapping[float, Sequence[ErrorIn]]) -> StiffnessLaw:
     """A law with what its errors in scenes left out of the fit are beyond their standard errors.
 
+    Only what exceeds the standard error of such a mean square counts: chance alone would otherwise
+    add a misfit to every other law.
+
     Parameters
     ----------
     law : StiffnessLaw
     errors : mapping of float to sequence of ErrorIn
         Of extrapolations from one run, by its modulus scale.
     """
-    beyond = {
-        scale: np.mean([one.found.logarithm**2 - one.found.se**2 for one in found])
-        for scale, found in errors.items()
-        if found
-    }
-    return replace(
-        law, misfit=tuple((scale, math.sqrt(max(0.0, float(m)))) for scale, m in beyond.items())
-    )
+    misfit = []
+    for scale, found in errors.items():
+        expected = float(np.mean([one.found.se**2 for one in found]))
+        beyond = float(np.mean([one.found.logarithm**2 for one in found])) - expected
+        by_chance = expected * math.sqrt(2.0 / len(found))
+        misfit.append((scale, math.sqrt(beyond) if beyond > by_chance else 0.0))
+    return replace(law, misfit=tuple(misfit))
 
 
 def left_out(

@@ -78,7 +78,7 @@ def stiffness_record(
         single = {
             min(plan): found
             for plan, found in zip(plans, by_plan, strict=True)
-            if sum(plan.values()) == 1
+            if sum(plan.values()) == 1 and found
         }
         laws[quantity.name] = LawEntry(
             label=quantity.label,

@@ -16,6 +16,7 @@ from made_tradeoff import error, made_tradeoff, setting, with_settings
 from dragdeck import commands
 from dragdeck.advice.advise import advise, resolve
 from dragdeck.advice.forecast import question, remarks
+from dragdeck.advice.options import with_option
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.outlook import timestep as stability
@@ -144,7 +145,7 @@ def test_neighbours_of_the_choice(case: Case, tradeoff: Tradeoff) -> None:
     found = advise(case, asked(0.05), tradeoff)
     assert found.cheaper and level(found.cheaper.fidelity) == (1e-2, 0.5, 4.0)
     assert found.dearer and level(found.dearer.fidelity) == (0.1, 0.5, 1.0)
-    assert found.speedup == pytest.approx(25)
+    assert 15 < found.speedup < 25  # the filling takes a part of what the process saves
     said = dict(remarks(found, case.study))
     assert "error up to 8 %, 3 % above the limit" in said["cheaper"]
 
@@ -173,12 +174,12 @@ def test_strong_damping_shortens_the_steps(
     for pair in small["pairs"].values():
         pair["restitution"] = 0.3
     (damped,) = load_cases(write_study(small))
-    found = advise(damped, asked(0.3), tradeoff)
+    elsewhere = advise(damped, asked(0.3), tradeoff)
+    assert [number.field for number in elsewhere.outside] == ["lowest restitution"]
+    for found in (elsewhere, advise(damped, asked(0.3), made_tradeoff(damped))):
+        assert found.chosen.fidelity.timestep_fraction <= 0.8 * 0.4 * (1 + 1e-9)
+        assert found.chosen.fidelity.filling_timestep_fraction == pytest.approx(0.8 * 0.2)
     assert found.chosen.fidelity.timestep_fraction == pytest.approx(0.8 * 0.4)
-    assert found.chosen.fidelity.filling_timestep_fraction == pytest.approx(0.8 * 0.2)
-    assert [number.field for number in found.outside] == ["lowest restitution"]
-    # a shorter step takes more of them
-    assert found.chosen.relative_cost == pytest.approx(0.012 * 0.5 / 0.32)
 
 
 def test_the_advised_step_is_what_check_calls_safe(case: Case, tradeoff: Tradeoff) -> None:
@@ -201,7 +202,7 @@ def test_the_advised_step_is_what_check_calls_safe(case: Case, tradeoff: Tradeof
         ("pairs.ceramic-steel.friction", 0.2, "friction of particle on workpiece"),
     ],
 )
-def test_outside_of_the_measured_range_the_error_is_held_lower(
+def test_outside_of_the_measured_range_a_raw_value_is_never_promised(
     small: dict[str, Any],
     write_study: Write,
     tradeoff: Tradeoff,
@@ -210,10 +211,12 @@ def test_outside_of_the_measured_range_the_error_is_held_lower(
     words: str,
 ) -> None:
     other = changed(small, write_study, field, value)
-    found = advise(other, asked(0.05), tradeoff)
-    assert [number.field for number in found.outside] == [words]
-    assert found.held_to == 0.025
-    assert found.chosen.error is not None and found.chosen.error.bound <= 0.025
+    full = setting(1.0, 0.64, 1.0, 0.3, 0.03)
+    for tolerance, fraction in ((0.05, 0.2), (0.06, 0.64), (0.9, 0.64)):
+        found = advise(other, asked(tolerance), with_settings(tradeoff, full))
+        assert level(found.chosen.fidelity) == (1.0, fraction, 1.0)
+        assert [number.field for number in found.outside] == [words]
+        assert found.held_to == 0.5 * tolerance
     said = dict(remarks(found, other.study))
     assert "is outside the range" in said["outside"] and "assumption" in said["safe side"]
 
@@ -252,6 +255,43 @@ def test_numbers_beyond_all_measured_ones_are_said(
     (other,) = load_cases(write_study(small | {"fidelity": "full"}))
     fields = [number.field for number in advise(other, asked(0.05), tradeoff).outside]
     assert fields == ["stiffness number at full modulus", "inertial number at the study's speed"]
+
+
+@pytest.mark.parametrize("quantity", ["drag_mean", "workpiece_contacts"])
+@pytest.mark.parametrize("tolerance", [0.1, 0.2])
+def test_a_small_change_of_depth_does_not_change_the_cost_tenfold(
+    small: dict[str, Any], write_study: Write, quantity: str, tolerance: float
+) -> None:
+    """From inside the range of the trade-off to far outside, in steps of 1 %."""
+    tradeoff = measured_tradeoff()
+    assert tradeoff.stiffness is not None
+    deep = changed(small, write_study, "motion.immersion_depth_m", 0.008)
+    made = tradeoff.model_copy(update={"scene": describe(deep), "promises": []})
+    found = [
+        advise(
+            changed(small, write_study, "motion.immersion_depth_m", 0.008 * 1.01**step),
+            asked(tolerance, quantity=quantity),
+            made,
+        )
+        for step in range(13)
+    ]
+    assert not found[0].outside and found[-1].outside
+    costs = [one.chosen.relative_cost for one in found]
+    assert all(0.1 < one / other < 10 for one, other in zip(costs, costs[1:], strict=False))
+    last = found[-1].chosen
+    assert last.extrapolated or last.fidelity.youngs_modulus_scale == 1
+
+
+def test_cheaper_settings_never_take_more_work(case: Case, tradeoff: Tradeoff) -> None:
+    """The filling counts: a soft process with a stiff, slow filling is not cheap."""
+    found = advise(case, asked(0.05), with_settings(tradeoff, setting(0.1, 0.5, 20.0, 2.0, 0.01)))
+    rows = [one for one in (found.cheaper, found.chosen, found.dearer, found.reference) if one]
+    steps = []
+    for one in rows:
+        other = replace(case, study=with_option(case.study, one))
+        filling, process = filling_scene(other), process_scene(other)
+        steps.append(7 * filling.steps / 10 + process.steps)
+    assert steps == sorted(steps)
 
 
 # --- chance --------------------------------------------------------------------------------------
@@ -312,7 +352,7 @@ def test_a_study_that_asks_gets_settings_and_remembers(asking: Case) -> None:
     assert said.fidelity.name == "tolerance-0.05"
     assert said.asked is not None
     assert said.asked.tolerance == 0.05 and said.asked.bound == 0.045
-    assert said.asked.relative_cost == 0.04 and said.asked.fallback is None
+    assert 0.04 < said.asked.relative_cost < 0.07 and said.asked.fallback is None
     others = filling_scene(asking).case, drop_scene(asking).case
     assert not any("asked" in json.loads(other.as_text()) for other in others)
 
@@ -359,9 +399,8 @@ def test_the_packages_own_tradeoff_can_be_read_and_resolves_tolerances(
     tradeoff = measured_tradeoff()
     assert tradeoff.study == "uhlmann2015" and len(tradeoff.promises) == 5
     (found,) = load_cases(write_study(small | {"fidelity": {"tolerance": 0.4}}), resolve=resolve)
-    assert found.advised is not None and found.advised.source.startswith(
-        f"measured {tradeoff.measured}"
-    )
+    assert tradeoff.stiffness is not None and found.advised is not None
+    assert found.advised.source.startswith(f"measured {tradeoff.stiffness.measured}")
 
 
 def test_entries_of_any_quantity_are_read(case: Case, tradeoff: Tradeoff) -> None:
@@ -449,8 +488,8 @@ def test_a_wrong_question_is_explained(
 
 
 def test_a_broken_step_is_no_candidate(case: Case, tradeoff: Tradeoff) -> None:
-    cheap = setting(1e-3, 0.6, 1.0, 0.001, 0.001)
+    cheap = setting(1e-3, 0.6, 1.0, 1.0, 0.001)
     with_it = with_settings(tradeoff, cheap)
     without = with_settings(tradeoff, cheap.model_copy(update={"breaks": True}))
-    assert advise(case, asked(0.05), with_it).chosen.relative_cost == pytest.approx(0.001)
-    assert advise(case, asked(0.05), without).chosen.relative_cost > 0.001
+    assert level(advise(case, asked(0.05), with_it).chosen.fidelity) == (1e-3, 0.6, 1.0)
+    assert level(advise(case, asked(0.05), without).chosen.fidelity) != (1e-3, 0.6, 1.0)

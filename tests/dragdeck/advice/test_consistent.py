@@ -1,6 +1,5 @@
 """Advised settings pass every check that a setting can fail."""
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,8 @@ from made_tradeoff import made_tradeoff, setting, with_settings
 from random_scenes import random_scenes
 
 from dragdeck.advice.advise import advise, resolve
-from dragdeck.advice.options import consistent
+from dragdeck.advice.cost import Work
+from dragdeck.advice.options import consistent, process_reference
 from dragdeck.cases.bed import bed_timestep, skin
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution
@@ -101,8 +101,11 @@ def test_a_stiffer_modulus_and_a_shorter_step_are_paid_for(
 ) -> None:
     small["media"]["count"], small["bowl"]["height_m"] = 3000, 1.0
     (deep,) = load_cases(write_study(small))
-    soft, cost = setting(1e-4, 0.6, 1.0, 1e-3, 0.01), 1e-3
+    soft = setting(1e-4, 0.6, 1.0, 1e-3, 0.01)
+    soft_settings = {"youngs_modulus_scale": 1e-4, "timestep_fraction": 0.6}
     tradeoff = with_settings(made_tradeoff(deep), soft)
+    work = Work.of(deep, tradeoff)
+    whole = work.cpu_time(process_reference(deep, tradeoff).fidelity)
     chosen = advise(deep, Tolerance(tolerance=0.05), tradeoff).chosen
     scale = chosen.fidelity.youngs_modulus_scale
     (raw,) = (
@@ -111,12 +114,13 @@ def test_a_stiffer_modulus_and_a_shorter_step_are_paid_for(
         if one.code == "overlap"
     )
     assert scale == raw.settings["youngs_modulus_scale"] > 1e-4
-    assert chosen.relative_cost == pytest.approx(cost * math.sqrt(scale / 1e-4))
+    assert chosen.relative_cost == pytest.approx(work.cpu_time(chosen.fidelity) / whole)
+    assert chosen.relative_cost > work.cpu_time(Fidelity(**soft_settings)) / whole
     long = setting(1e-4, 0.64, 1.0, 5e-4, 0.01)
     shorter = advise(deep, Tolerance(tolerance=0.05), with_settings(tradeoff, long)).chosen
     fraction = shorter.fidelity.timestep_fraction
     assert fraction < min(0.64, stable_fraction(with_fidelity(deep, shorter.fidelity)))
-    assert shorter.relative_cost == pytest.approx(5e-4 * math.sqrt(scale / 1e-4) * 0.64 / fraction)
+    assert shorter.relative_cost == pytest.approx(work.cpu_time(shorter.fidelity) / whole)
 
 
 def test_a_skin_that_would_be_too_wide_gives_way_to_a_shorter_step(case: Case) -> None:

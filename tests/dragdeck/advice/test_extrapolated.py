@@ -1,5 +1,6 @@
 """Settings whose results are extrapolated to the physical Young's modulus."""
 
+import math
 from typing import Any
 
 import pytest
@@ -7,6 +8,7 @@ from made_tradeoff import made_stiffness, made_tradeoff, setting, with_settings
 
 from dragdeck.advice.advise import OUTSIDE_FACTOR, Advice, advise
 from dragdeck.advice.forecast import remarks
+from dragdeck.advice.options import extrapolated_options, process_options
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.outlook.measured import Tradeoff
@@ -81,4 +83,38 @@ def test_outside_of_the_designed_scenes_the_assumption_stays(case: Case) -> None
     far = with_laws(case, elsewhere(case), inertial_number=1e3)
     found = advise(case, Tolerance(tolerance=0.1), far)
     assert found.held_to == 0.1 * OUTSIDE_FACTOR
-    assert not found.chosen.extrapolated
+    assert found.chosen.extrapolated and [one.field for one in found.outside] == ["inertial number"]
+    assert found.chosen.error is not None and found.chosen.error.bound <= found.held_to
+
+
+def test_the_promise_is_about_the_value_that_the_report_shows(case: Case) -> None:
+    """In the measured scene: the measured error, times the correction by the law."""
+    tradeoff = with_laws(case)
+    option = next(iter(process_options(case, tradeoff, Tolerance(tolerance=0.2))))
+    raw = next(iter(process_options(case, made_tradeoff(case), Tolerance(tolerance=0.2))))
+    assert option.fidelity == raw.fidelity and option.extrapolated and not raw.extrapolated
+    assert tradeoff.stiffness is not None and option.error is not None and raw.error is not None
+    scale = option.fidelity.youngs_modulus_scale
+    effect, _ = tradeoff.stiffness.laws["drag_mean"].effect(describe(case), scale)
+    assert 1 + option.error.value == pytest.approx((1 + raw.error.value) * math.exp(-effect))
+    assert option.error.bound > abs(option.error.value)
+
+
+def test_the_bound_vanishes_as_the_modulus_approaches_the_physical_one(case: Case) -> None:
+    """So any tolerance has a reduced modulus; and the misfit of a soft one is not charged here."""
+    made = with_laws(case)
+    assert made.stiffness is not None
+    known = made.stiffness.laws["drag_mean"]
+    wild = known.law.model_copy(update={"misfit": [(1e-3, 0.5), (1e-2, 0.005)]})
+    laws = {**made.stiffness.laws, "drag_mean": known.model_copy(update={"law": wild})}
+    stiffness = made.stiffness.model_copy(update={"laws": laws})
+    tradeoff = made.model_copy(update={"stiffness": stiffness})
+    asked = Tolerance(tolerance=0.1)
+    bounds = {
+        one.fidelity.youngs_modulus_scale: one.error.bound
+        for one in extrapolated_options(case, tradeoff, asked)
+        if one.error is not None
+    }
+    stiff = sorted((scale for scale in bounds if scale >= 0.01), reverse=True)
+    assert [bounds[scale] for scale in stiff] == sorted(bounds[scale] for scale in stiff)
+    assert bounds[0.5] < 0.05 and bounds[0.01] < 0.3 < 1.0 < bounds[1e-3]

@@ -5,7 +5,7 @@ runs LIGGGHTS.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from dragdeck.advice.options import (
@@ -21,50 +21,20 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.errors import InputError
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
+from dragdeck.outlook.measured_range import LAW_NAMES, RANGE_LABELS, Outside, beyond, closeness
 from dragdeck.physics.similarity import SAME_NUMBER
 from dragdeck.scenes.dimensionless import describe
-from dragdeck.study.contact_law import compared_labels
 from dragdeck.study.model import Study, Tolerance
 
-WIDENING = 0.1
-"""How far beyond the measured scenes a number of a scene still counts as measured."""
-
 OUTSIDE_FACTOR = 0.5
-"""On the tolerance when a scene lies outside of the measured range. An
-assumption: nothing measured says how much an error grows there."""
+"""On the tolerance when a scene lies outside of the measured range, which keeps a value at the
+physical Young's modulus alone. An assumption: nothing measured says how much an error grows."""
 
 _NORMAL_95 = 1.96
 """Half-width of a 95 % interval in standard deviations of a normal distribution."""
 
 RESTITUTION = "restitution"
 """The quantity of the drop test; all others are of the process."""
-
-_RANGE_LABELS = {
-    "workpiece_to_particle": "ratio of workpiece to particle diameter",
-    "depth_to_particle": "ratio of depth to particle diameter",
-    "bowl_to_particle": "ratio of bowl to particle diameter",
-    **compared_labels(),
-    "superposed_speed": "ratio of additional surface speed to mean speed along the path",
-    "bowl_froude_number": "Froude number of the bowl's rotation",
-    "tilt_deg": "tilt of the workpiece (degrees)",
-    "further_workpieces": "number of further workpieces",
-}
-"""The numbers of a scene that must lie within the measured range."""
-
-
-@dataclass(frozen=True)
-class Outside:
-    """A number of a scene that no measured scene comes near."""
-
-    field: str
-    value: float
-    low: float
-    high: float
-
-    def __str__(self) -> str:
-        return (
-            f"{self.field} {self.value:.3g} is outside the range {self.low:.3g} to {self.high:.3g}"
-        )
 
 
 @dataclass(frozen=True)
@@ -171,12 +141,14 @@ def resolve(case: Case, asked: Tolerance, tradeoff: Tradeoff | None = None) -> C
 
 
 def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
-    """The cheapest measured settings whose error is within a tolerance.
+    """The cheapest settings whose error is within a tolerance.
 
-    Where the case's scene lies outside of the range of the trade-off, results that are
-    extrapolated to the physical Young's modulus are offered, with an error that was measured in
-    designed scenes. Outside of their range, too, the error must be within `OUTSIDE_FACTOR` of
-    the tolerance. Where no measured setting meets it, the reference settings are taken.
+    What is promised is the value that the report shows: the one at the physical Young's modulus
+    wherever a law extrapolates the quantity. A measured error holds in the range of the trade-off,
+    and less and less beyond it; what a law promises holds in the range of the designed scenes, and
+    outside of it must be within `OUTSIDE_FACTOR` of the tolerance. A value as it is with a reduced
+    modulus is never promised outside. Where nothing meets the tolerance, the reference settings
+    are taken.
 
     Parameters
     ----------
@@ -192,19 +164,29 @@ def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
     """
     drop = asked.quantity == RESTITUTION
     _check_quantity(case, asked, tradeoff)
-    options = list(drop_options(case, tradeoff) if drop else process_options(case, tradeoff, asked))
-    reference = finest_drop(case, tradeoff) if drop else process_reference(case, tradeoff)
-    names = ("lowest_restitution",) if drop else None
     here = describe(case)
-    outside = list(_outside_of(here, tradeoff, names))
-    extrapolated = [] if drop else list(_extrapolated(case, here, tradeoff, asked))
-    if outside and extrapolated:
-        options, outside = [one for one in options if _at_full_modulus(one)], []
-    options += extrapolated
-    held_to = asked.tolerance * (OUTSIDE_FACTOR if outside else 1.0)
-    holding = [option for option in options if option.error and option.error.limit <= held_to]
-    chosen = min(holding, key=_cost_then_bound, default=reference)
+    names = ("lowest_restitution",) if drop else tuple(RANGE_LABELS)
+    scenes = [tradeoff.scene, *(one.numbers for one in tradeoff.promises if one.met)]
+    outside = [*beyond(here, scenes, names), *([] if drop else _outside_numbers(here, tradeoff))]
+    close = 0.0 if outside else closeness(here, scenes, names)
+    if drop:
+        reference = finest_drop(case, tradeoff)
+        held = [(one, _held(close), outside) for one in drop_options(case, tradeoff)]
+    else:
+        reference = process_reference(case, tradeoff)
+        held = [
+            (one, _held(close) if _at_full_modulus(one) else close, outside)
+            for one in process_options(case, tradeoff, asked)
+        ]
+        held += _extrapolated(case, here, tradeoff, asked)
+    options = [option for option, _, _ in held]
+    holding = [
+        one for one in held if one[0].error and one[0].error.limit <= asked.tolerance * one[1]
+    ]
+    found = reference, _held(close), outside
+    chosen, share, beside = min(holding, key=lambda one: _cost_then_bound(one[0]), default=found)
     cheaper, dearer = _neighbours(options, chosen, reference)
+    held_to = asked.tolerance * share
     return Advice(
         asked=asked,
         held_to=held_to,
@@ -213,16 +195,21 @@ def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
         cheaper=cheaper,
         dearer=dearer,
         reference=reference,
-        outside=outside,
+        outside=beside,
         fallback=None if holding else _fallback(asked, held_to, options, reference, tradeoff),
         spread=None if drop else _spread(case.study, asked, tradeoff),
         source=_source(chosen, tradeoff),
     )
 
 
+def _held(close: float) -> float:
+    """Share of a tolerance that an error must be within where a range is left."""
+    return OUTSIDE_FACTOR + (1.0 - OUTSIDE_FACTOR) * close
+
+
 def _source(chosen: Option, tradeoff: Tradeoff) -> str:
-    if chosen.extrapolated and tradeoff.stiffness is not None:
-        scenes = sum(bool(one.runs) for one in tradeoff.stiffness.scenes)
+    if chosen.by_law and tradeoff.stiffness is not None:
+        scenes = len(tradeoff.stiffness.scenes)
         return f"measured {tradeoff.stiffness.measured} in {scenes} designed scenes"
     return f"measured {tradeoff.measured} on {tradeoff.study}, plan {tradeoff.plan}"
 
@@ -244,43 +231,17 @@ def _check_quantity(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> None:
         )
 
 
-def _outside_of(
-    here: Mapping[str, float], tradeoff: Tradeoff, names: Sequence[str] | None = None
-) -> Iterator[Outside]:
-    """The numbers of a scene that are outside of the measured range.
-
-    The range spans the measured scene and those in which a prediction was
-    checked and met, and `WIDENING` beyond. The stiffness number must not be
-    below, nor the inertial number above, what any setting was measured at.
-    """
-    scenes = [tradeoff.scene, *(one.numbers for one in tradeoff.promises if one.met)]
-    yield from _beyond(here, scenes, _RANGE_LABELS if names is None else names)
-    if names is None:
-        yield from _outside_numbers(here, tradeoff)
-
-
-def _beyond(
-    here: Mapping[str, float], scenes: Sequence[Mapping[str, float]], names: Iterable[str]
-) -> Iterator[Outside]:
-    """The numbers of a scene that no other scene comes near."""
-    for name in names:
-        values = [scene.get(name, 0.0) for scene in scenes]
-        low, high = (1 - WIDENING) * min(values), (1 + WIDENING) * max(values)
-        value = here.get(name, 0.0)  # an absent coefficient
-        if not low <= value <= high:
-            yield Outside(_RANGE_LABELS.get(name, name.replace("_", " ")), value, low, high)
-
-
 def _extrapolated(
     case: Case, here: Mapping[str, float], tradeoff: Tradeoff, asked: Tolerance
-) -> Iterator[Option]:
-    """What may be extrapolated to the physical modulus: nothing in a scene unlike all designed."""
+) -> Iterator[tuple[Option, float, list[Outside]]]:
+    """What may be extrapolated to the physical modulus, and which share of a tolerance holds it."""
     if tradeoff.stiffness is None:
         return
     scenes = [scene.numbers for scene in tradeoff.stiffness.scenes]
-    names = [*_RANGE_LABELS, "stiffness_number", "inertial_number"]
-    if not any(_beyond(here, scenes, names)):
-        yield from extrapolated_options(case, tradeoff, asked)
+    share = _held(closeness(here, scenes, LAW_NAMES))
+    outside = list(beyond(here, scenes, LAW_NAMES))
+    for option in extrapolated_options(case, tradeoff, asked):
+        yield option, share, outside
 
 
 def _at_full_modulus(option: Option) -> bool:
@@ -335,7 +296,7 @@ def _fallback(
     best = min((option.error.limit for option in options if option.error), default=None)
     smallest = "" if best is None else f" (smallest upper bound: {percent(best)})"
     text = (
-        f"no measured setting has an error below {percent(held_to)}{smallest}: "
+        f"no setting that may be used here has an error below {percent(held_to)}{smallest}: "
         f"the reference settings are used ({reference})"
     )
     quantity = tradeoff.quantities.get(asked.quantity)

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
 from rich.table import Table
 
 from dragdeck import __version__
 from dragdeck.advice.advise import RESTITUTION, Advice, Spread, percent, signed
+from dragdeck.advice.cost import step_cost
 from dragdeck.advice.options import Option, process_options, with_option
 from dragdeck.advice.speed import SCALE, Speed
 from dragdeck.cases.case import Case
@@ -264,29 +264,6 @@ def _cost(
     return Cost(scene.steps, scene.steps / rate, f"a short run of this study, {ranks}")
 
 
-def step_cost(scale: float, tradeoff: Tradeoff) -> float:
-    """Time of a step of the drag at a modulus scale, over that at the others that were timed.
-
-    Soft particles have more contacts, and their steps cost more. Interpolated over
-    logarithms; 1 where nothing was timed.
-
-    Parameters
-    ----------
-    scale : float
-        Factor on every Young's modulus.
-    tradeoff : Tradeoff
-    """
-    timed = sorted(
-        (cost.level, cost.per_step)
-        for cost in tradeoff.costs
-        if cost.parameter == "youngs_modulus_scale" and cost.level and cost.per_step
-    )
-    if not timed:
-        return 1.0
-    levels, logs = zip(*((level, math.log(time)) for level, time in timed), strict=True)
-    return math.exp(np.interp(math.log(scale), np.log(levels), logs))
-
-
 def advice_file(
     case: Case, advices: Sequence[tuple[Advice, Sequence[Forecast]]], speed: Speed | None
 ) -> AdviceFile:
@@ -337,11 +314,12 @@ def tables(
 def _about(
     case: Case, advice: Advice, advised: Forecast, own: Option | None
 ) -> Iterator[tuple[str, str]]:
-    yield "cost", f"ratio of CPU time to that of the reference; advised: 1/{advice.speedup:.3g}"
+    runs = " and ".join(advised.steps)
+    yield "cost", f"CPU time of {runs} / that of the reference; advised: 1/{advice.speedup:.3g}"
     if skin := advice.chosen.fidelity.skin_m:
         yield "neighbour skin", f"{1e3 * skin:.3g} mm"
     yield "errors", f"relative to the reference settings, {advice.source}"
-    yield "wall time", f"{' and '.join(advised.steps)}; speed: {advised.source}"
+    yield "wall time", f"{runs}; speed: {advised.source}"
     if case.asked is None:
         yield "tolerance", "the study sets no tolerance and keeps its own fidelity"
     if case.asked is None and advice.chosen.drop_timestep_fraction is None:

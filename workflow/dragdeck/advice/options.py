@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 
+from dragdeck.advice.cost import Work
 from dragdeck.cases.bed import widest_skin
 from dragdeck.cases.case import Case
 from dragdeck.outlook.measured import (
@@ -45,12 +46,13 @@ class Option:
     error : MeasuredError or None
         None for the reference, which errors are measured against.
     relative_cost : float
-        Processor time of the process against that of the measured reference: more if a case's
-        checks take a stiffer modulus or a shorter step.
+        Forecast CPU time of all runs that depend on the settings, over that with the reference.
     drop_timestep_fraction : float or None
         Step of the drop test over the Rayleigh time, if the option is about it.
     extrapolated : bool
         The error is that of the value extrapolated to the physical Young's modulus.
+    by_law : bool
+        It was not measured in the scene of the trade-off, but follows from the law.
     """
 
     fidelity: Fidelity
@@ -58,6 +60,7 @@ class Option:
     relative_cost: float
     drop_timestep_fraction: float | None = None
     extrapolated: bool = False
+    by_law: bool = False
 
     def __str__(self) -> str:
         if self.drop_timestep_fraction is not None:
@@ -125,51 +128,108 @@ def process_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterato
     limit of the measured scene, or that cost as much as the reference.
     """
     reference = process_reference(case, tradeoff)
-    for setting, cost in _sound_settings(tradeoff):
+    known = _law(tradeoff, asked)
+    work = Work.of(case, tradeoff)
+    whole = work.cpu_time(reference.fidelity)
+    for setting in _sound_settings(tradeoff):
         error = setting.errors.get(asked.quantity)
         if error is None:
             continue
         fidelity = consistent(case, _carried(case, setting, tradeoff.scene))
-        option = Option(fidelity, error, cost * _steps(fidelity, setting))
+        corrected = fidelity.youngs_modulus_scale < 1 and fidelity.speed_factor == 1
+        shown = _corrected(error, setting, known, tradeoff.scene) if corrected else None
+        cost = work.cpu_time(fidelity) / whole
+        option = Option(fidelity, shown or error, cost, extrapolated=shown is not None)
         dearest = option.relative_cost >= reference.relative_cost
         if not dearest and not option.same_settings(reference.fidelity):
             yield option
 
 
+def _law(tradeoff: Tradeoff, asked: Tolerance) -> MeasuredLaw | None:
+    """The law by which the report extrapolates a quantity."""
+    return tradeoff.stiffness.laws.get(asked.quantity) if tradeoff.stiffness else None
+
+
+def _corrected(
+    error: MeasuredError,
+    setting: MeasuredSetting,
+    known: MeasuredLaw | None,
+    scene: Mapping[str, float],
+) -> MeasuredError | None:
+    """A measured error of the extrapolated value; None where nothing is extrapolated.
+
+    The law multiplies every value of a setting by the same number, and so does it the error.
+    """
+    if known is None or not scene.get(known.friction):
+        return None
+    factor = math.exp(-known.effect(scene, setting.youngs_modulus_scale)[0])
+
+    def shifted(value: float) -> float:
+        return (1 + value) * factor - 1
+
+    reach = error.bound - abs(error.value)
+    ends = (abs(shifted(error.value + sign * reach)) for sign in (-1, 1))
+    return MeasuredError(
+        value=shifted(error.value),
+        se=error.se * factor,
+        ci95_low=shifted(error.ci95_low),
+        ci95_high=shifted(error.ci95_high),
+        bound=max(ends),
+        single_parameter_error=error.single_parameter_error,
+    )
+
+
+SCALES = tuple(step * 10.0**power for power in (-5, -4, -3, -2, -1) for step in (1, 2, 5))
+"""Modulus scales from which a law is asked to extrapolate: so dense that the advice has no jump."""
+
+
 def extrapolated_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterator[Option]:
     """Settings with a reduced modulus whose results are extrapolated to the physical one.
 
-    None where no law of the quantity was measured. The error is that of the law in one scene: how
-    far the effect of a reduced modulus scatters from scene to scene, how well its mean is known,
-    and what extrapolations erred in scenes that were left out.
+    None where no law of the quantity was measured, and none softer than the runs that it was
+    measured with. The error is that of the law in one scene: how far the effect of a reduced
+    modulus scatters from scene to scene, how well its mean is known, and what extrapolations erred
+    in scenes that were left out.
     """
-    known = tradeoff.stiffness.laws.get(asked.quantity) if tradeoff.stiffness else None
-    if tradeoff.stiffness is None or known is None:
+    known, numbers = _law(tradeoff, asked), describe(case)
+    fractions = [
+        setting.timestep_fraction
+        for setting in _sound_settings(tradeoff)
+        if setting.speed_factor == 1 and setting.youngs_modulus_scale < 1
+    ]
+    if (
+        tradeoff.stiffness is None
+        or known is None
+        or not numbers.get(known.friction)
+        or not fractions
+    ):
         return
-    numbers = describe(case)
-    for setting, cost in _sound_settings(tradeoff):
-        if setting.youngs_modulus_scale == 1 or setting.speed_factor != 1:
-            continue
-        plain = Fidelity(
-            youngs_modulus_scale=setting.youngs_modulus_scale,
-            timestep_fraction=setting.timestep_fraction,
-            skin_m=widest_skin(case.study),
+    softest = tradeoff.stiffness.lowest_stiffness_number / numbers["stiffness_number"]
+    work = Work.of(case, tradeoff)
+    whole = work.cpu_time(process_reference(case, tradeoff).fidelity)
+    lowest = max(softest_scale(case.study), (softest * (1 - SAME_NUMBER)) ** 1.5)
+    for scale in (one for one in SCALES if one >= lowest):
+        fidelity = consistent(
+            case,
+            Fidelity(
+                youngs_modulus_scale=scale,
+                timestep_fraction=max(fractions),
+                skin_m=widest_skin(case.study),
+                ranks="auto",
+            ),
         )
-        fidelity = consistent(case, plain)
-        softness = fidelity.youngs_modulus_scale ** (2 / 3) * numbers["stiffness_number"]
-        if softness >= tradeoff.stiffness.lowest_stiffness_number * (1 - SAME_NUMBER):
-            error = _law_error(known, numbers, fidelity.youngs_modulus_scale)
-            cost_here = cost * _steps(fidelity, setting)
-            yield Option(fidelity, error, cost_here, extrapolated=True)
+        error = _law_error(known, numbers, fidelity.youngs_modulus_scale)
+        cost = work.cpu_time(fidelity) / whole
+        yield Option(fidelity, error, cost, extrapolated=True, by_law=True)
 
 
-def _sound_settings(tradeoff: Tradeoff) -> Iterator[tuple[MeasuredSetting, float]]:
-    """The measured settings that may be used anywhere, with their relative cost."""
+def _sound_settings(tradeoff: Tradeoff) -> Iterator[MeasuredSetting]:
+    """The measured settings that may be used anywhere."""
     limit = largest_fraction("drag", tradeoff.scene["lowest_restitution"]) * (1 + 1e-9)
     for setting in tradeoff.settings:
         sound = setting.failed == 0 and not setting.breaks and setting.runs >= _FEWEST_RUNS
         if sound and setting.timestep_fraction <= limit and setting.relative_cost is not None:
-            yield setting, setting.relative_cost
+            yield setting
 
 
 def _law_error(known: MeasuredLaw, numbers: Mapping[str, float], scale: float) -> MeasuredError:
@@ -195,21 +255,16 @@ def _carried(case: Case, setting: MeasuredSetting, there: Mapping[str, float]) -
         timestep_fraction=setting.timestep_fraction,
         speed_factor=carried_speed(setting.speed_factor, slower),
         skin_m=widest_skin(case.study),
+        ranks="auto",
     )
-
-
-def _steps(fidelity: Fidelity, measured: FidelityParameters) -> float:
-    """How many times as many steps as the measured settings a metre of path takes."""
-    steps = math.sqrt(fidelity.youngs_modulus_scale / measured.youngs_modulus_scale)
-    steps *= measured.timestep_fraction / fidelity.timestep_fraction
-    return steps * measured.speed_factor / fidelity.speed_factor
 
 
 def process_reference(case: Case, tradeoff: Tradeoff) -> Option:
     """The settings that errors are measured against, or the nearest that pass every check."""
-    plain = Fidelity(**tradeoff.reference.model_dump(), skin_m=widest_skin(case.study))
-    fidelity = consistent(case, plain)
-    return Option(fidelity, None, _steps(fidelity, tradeoff.reference))
+    plain = Fidelity(
+        **tradeoff.reference.model_dump(), skin_m=widest_skin(case.study), ranks="auto"
+    )
+    return Option(consistent(case, plain), None, 1.0)
 
 
 def drop_options(case: Case, tradeoff: Tradeoff) -> Iterator[Option]:

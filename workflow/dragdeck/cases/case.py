@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import JsonValue
 
-from dragdeck.cases.ranks import auto_ranks, cores_here
+from dragdeck.cases.ranks import auto_ranks, cores_here, ranks_within
 from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.errors import InputError
 from dragdeck.study.base import Json
@@ -69,7 +69,7 @@ class Case:
         asked = self.study.chosen_fidelity().ranks
         if asked == "auto":
             return auto_ranks(self.study.media.count, self.beside, cores_here())
-        return asked
+        return ranks_within(asked)
 
     @property
     def axis_speed_m_s(self) -> float:

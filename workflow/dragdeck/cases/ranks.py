@@ -13,6 +13,9 @@ FEWEST_PARTICLES_A_RANK = 5000
 than one rank with all particles (docs/evidence/scale.md). Smaller runs are short in any case, and
 on a shared machine their ranks wait for each other."""
 
+_ALWAYS_ACCEPTED = 2
+"""Ranks that a study may have on any machine: the default."""
+
 
 def auto_ranks(particles: int, cases: int, cores: int) -> int:
     """Ranks of a run of a study with that many cases.
@@ -32,6 +35,14 @@ def auto_ranks(particles: int, cases: int, cores: int) -> int:
     return max(1, min(cores // cases, particles // FEWEST_PARTICLES_A_RANK))
 
 
+def ranks_within(ranks: int) -> int:
+    """MPI ranks of a run that is to have this many: two, the default, are one on a single core.
+
+    `check_ranks` refuses more than two where there are not as many cores.
+    """
+    return min(ranks, cores_here()) if ranks <= _ALWAYS_ACCEPTED else ranks
+
+
 def check_ranks(ranks: int, file: Path) -> None:
     """Refuse more ranks than this machine has cores; the default of two runs everywhere.
 
@@ -40,7 +51,7 @@ def check_ranks(ranks: int, file: Path) -> None:
     InputError
         Names `CORES_VARIABLE`, for runs that are on another machine.
     """
-    cores = max(cores_here(), 2)
+    cores = max(cores_here(), _ALWAYS_ACCEPTED)
     if ranks > cores:
         raise InputError(
             "more MPI ranks than cores: the ranks would wait for each other",

@@ -98,7 +98,7 @@ def _ratio(cost: MeasuredCost, tradeoff: Tradeoff) -> str:
     return f"{cost.ratio:.3g}x{interval}, LIGGGHTS {engine}, {date}"
 
 
-def page(scene: StudyScene, cost: Cost, runs: int, width: int) -> Iterator[str]:
+def page(scene: StudyScene, cost: Cost, runs: int, width: int, outside: str = "") -> Iterator[str]:
     """The lines of one scene on a page that fits a terminal: names without reasons and prices.
 
     Parameters
@@ -110,6 +110,8 @@ def page(scene: StudyScene, cost: Cost, runs: int, width: int) -> Iterator[str]:
         How many there are.
     width : int
         Of the page, characters.
+    outside : str
+        What it means that the scene is outside the measured range.
     """
     step = scene.deck.timestep_s
     rayleigh = f"{100 * step / scene.case.rayleigh_time_s:.3g} % of Rayleigh"
@@ -120,6 +122,7 @@ def page(scene: StudyScene, cost: Cost, runs: int, width: int) -> Iterator[str]:
         ("models", scene.models),
     ]
     rows += [("leaves out", scene.leaves_out), ("warning", [str(one) for one in scene.warnings])]
+    rows.append(("range", [outside] if outside else []))
     for name, texts in rows:
         if joined := "; ".join(texts):
             yield from textwrap.wrap(

@@ -123,7 +123,7 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             ),
             limits=bed_limits(study, top, particles.fastest_m_s),
         ),
-        steps=round(_expected_time(study, particles) / dt),
+        steps=round(expected_time(study) / dt),
         files={"particles.data": lambda: _particles_data(particles, study, top, len(types))},
         models={
             "every particle individually": "exact number, mean and standard deviation of radii",
@@ -278,8 +278,9 @@ def _energy_unit(study: Study) -> float:
     return fall_energy(media.count, density, media.radius_mean_m, study.gravity_m_s2)
 
 
-def _expected_time(study: Study, particles: Particles) -> float:
-    return _arrival_speed(study, particles) / study.gravity_m_s2 + _SETTLING_ESTIMATE_S
+def expected_time(study: Study) -> float:
+    """Time in which the particles of a study come to rest, s. An estimate."""
+    return _arrival_speed(study, first_particles(study)) / study.gravity_m_s2 + _SETTLING_ESTIMATE_S
 
 
 def _arrival_speed(study: Study, particles: Particles) -> float:
