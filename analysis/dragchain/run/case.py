@@ -153,8 +153,9 @@ class Case(Document):
     and ``statistics`` are None outside a process, ``restitution`` outside a drop test, ``settled``
     outside a filling. ``contact_moduli`` are those of a particle with a ``particle``, the ``bowl``
     and the ``workpiece``, ``numbers`` the dimensionless numbers of a process. ``superposed`` lists
-    the superposed motions, ``asked`` is the tolerance for which the settings were chosen, and
-    ``output_of`` the run from whose raw output a further workpiece is read.
+    the superposed motions, ``asked`` is the tolerance for which the settings were chosen,
+    ``unsafe_timestep`` why a step beyond the stable one was accepted, and ``output_of`` the run
+    from whose raw output a further workpiece is read.
     """
 
     made_by: ClassVar[str] = "dragdeck step render"
@@ -187,6 +188,7 @@ class Case(Document):
     reference: Reference | None = None
     versions: Mapping[str, str]
     asked: AdvisedSettings | None = None
+    unsafe_timestep: str | None = None
 
     @model_validator(mode="after")
     def _of_its_scene(self) -> Self:
