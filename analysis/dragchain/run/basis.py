@@ -199,9 +199,10 @@ def _of_speed(fidelity: Fidelity) -> Iterator[str]:
     factor = fidelity.speed_factor
     if factor != 1.0:
         yield (
-            f"Speed {_TIMES} {factor:g} gives fewer and larger contact forces than at the speed of the "
-            "process. Nothing is corrected for it: no law is known. Times, impulses and rates are "
-            f"in process time: simulated time {_TIMES} {factor:g}."
+            f"Speed {_TIMES} {factor:g} gives fewer and larger contact forces than at the speed of "
+            "the process. Nothing is corrected for it: no law is known. Process time is simulated "
+            f"time {_TIMES} {factor:g}: times, impulses and rates of the report are in process "
+            "time, those of the tables in simulated time."
         )
 
 

@@ -76,7 +76,7 @@ def test_an_interval_that_is_not_known_stays_unknown() -> None:
     [
         (1.0, 1.0, ["is the physical one"], ["fewer", "more and", "process time"]),
         (0.01, 1.0, ["more and smaller", "corrected to the physical"], ["fewer", "process time"]),
-        (1.0, 5.0, ["fewer and larger", "simulated time \N{MULTIPLICATION SIGN} 5"], ["more and"]),
+        (1.0, 5.0, ["fewer and larger", "simulated time \N{MULTIPLICATION SIGN} 5:"], ["more and"]),
         (1e-4, 5.0, ["more and smaller", "fewer and larger", "Nothing is corrected"], ["where a"]),
     ],
 )
