@@ -129,7 +129,9 @@ COMMANDS = (
         OUT_DIR, RUN_DIRS,
         _argument("--advice", type=Path, metavar="FILE",
                   help="advice.json, made by dragdeck advise, to compare its predicted costs "
-                  "with the actual ones"))),
+                  "with the actual ones"),
+        _argument("--preview", type=Path, metavar="FILE",
+                  help="picture of the set-up, set_up.png of dragdeck preview, for the report"))),
 )  # fmt: skip
 """What a user calls."""
 
@@ -180,9 +182,10 @@ STEPS = (
                 _argument("--tradeoff", type=Path, required=True, metavar="FILE",
                           help="tradeoff.json of another scene, on which the fit is tested; "
                           "required"))),
-    Command("extrapolate", "extrapolate a run to the physical Young's modulus",
-            "Extrapolate the quantities of a run with reduced stiffness to the physical Young's "
-            "modulus. It reads the tables of the run and writes extrapolated.json to RUN_DIR.",
+    Command("extrapolate", "quantities of a run, extrapolated to the physical Young's modulus",
+            "Measure the quantities of a run and, if its stiffness is reduced, extrapolate them to "
+            "the physical Young's modulus. It reads the tables of the run and writes "
+            "extrapolated.json to RUN_DIR.",
             "tradeoff.extrapolate:extrapolate_run", (RUN_DIR, STIFFNESS)),
     Command("scaling", "fit a power law to the mean drag",
             "Fit a power law of the mean drag as a function of one field of the study. It reads "

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, SupportsIndex
 
 import pandas as pd
 import pyarrow.parquet as pq
@@ -14,7 +14,9 @@ from dragchain.errors import RejectedRunError, TableError, UnknownNameError
 from dragchain.report.collect import process_findings
 from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData
-from dragchain.report.runs import upstream_folders
+from dragchain.report.runs import read_optional, upstream_folders
+from dragchain.report.values import Values, values_of
+from dragchain.run.basis import Basis, notes
 from dragchain.run.case import Scene, load_case
 from dragchain.run.completeness import read_accepted
 from dragchain.tables.by_step import intact, read_table
@@ -135,7 +137,7 @@ class FinishedRun(RunData):
         return _describe(column, self.units, _TABLES[self.case.scene])
 
     def table(self, name: str, columns: list[str] | None = None) -> pd.DataFrame:
-        """Read a table, or some of its columns.
+        """Read a table, or some of its columns; `attrs` has study, run, units and basis.
 
         Parameters
         ----------
@@ -161,7 +163,27 @@ class FinishedRun(RunData):
             known = pq.read_schema(file).names
         for column in set(columns or ()) - set(known):
             raise UnknownNameError(f"{file}: no column {column!r}", column, known)
-        return read_table(file, columns)
+        table = read_table(file, columns)
+        table.attrs.update(self._about(table.columns))
+        return table
+
+    def _about(self, columns: Iterable[str]) -> dict[str, Any]:
+        """What the attributes of a table state."""
+        process = self.case.scene == "process"
+        return {
+            "study": self.case.study,
+            "run": self.case.run,
+            "units": {name: self.units[name] for name in columns},
+            "basis": " ".join(notes(self.case)) if process else str(Basis.MEASURED),
+        }
+
+    @cached_property
+    def values(self) -> Values:
+        """Quantities of a process run, each with what it says of the process, as in the report.
+
+        Without ``loading.json`` or ``extrapolated.json`` it has fewer; errors as in `findings`.
+        """
+        return values_of(self.case, self.findings, *read_optional(self.folder))
 
     @cached_property
     def findings(self) -> ProcessFindings:
@@ -208,6 +230,26 @@ class FinishedRun(RunData):
         return f"<{self.case.scene} run {self.name}: {', '.join(made) or 'no tables'}>"
 
 
+class Runs(tuple[FinishedRun, ...]):
+    """The runs of a study by their number; names are the business of `Study.run`."""
+
+    def __getitem__(self, key: SupportsIndex | slice) -> Any:
+        """The run of that number from 0, or several of them.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such number, or it is a name.
+        """
+        try:
+            return super().__getitem__(key)
+        except (IndexError, TypeError):
+            problem = f"there is no run {key!r}: {len(self)} run(s), numbered from 0"
+            remedy = "name the case: study.run(NAME)"
+            known = [run.name for run in self]
+            raise UnknownNameError(problem, str(key), known, remedy=remedy) from None
+
+
 @dataclass(frozen=True, repr=False)
 class Study:
     """The finished process runs of a study.
@@ -216,22 +258,29 @@ class Study:
     ----------
     folder : Path
         ``results/<study>``.
-    runs : tuple of FinishedRun
+    runs : Runs
         Sorted by name of the case. With several workpieces, each is a separate run.
     """
 
     folder: Path
-    runs: tuple[FinishedRun, ...]
+    runs: Runs
 
     @property
     def name(self) -> str:
         """Name of the study."""
-        return self.runs[0].case.study
+        return next(iter(self.runs)).case.study
 
     @cached_property
     def summary(self) -> pd.DataFrame:
-        """``summary.parquet`` of the report, one row per case; `TableError` without a report."""
-        return read_table(self._summary)
+        """``summary.parquet`` of the report, one row per run; `TableError` without a report."""
+        table = read_table(self._summary)
+        table.attrs.update(
+            study=self.name,
+            run=[run.case.run for run in self.runs],
+            units=dict(self.units),
+            basis={run.case.run: " ".join(notes(run.case)) for run in self.runs},
+        )
+        return table
 
     @cached_property
     def units(self) -> Mapping[str, str]:
@@ -297,7 +346,7 @@ def load(study: Path | str) -> Study:
     homes = [home / "results" for home in (Path.cwd(), *Path.cwd().parents)]
     for folder in (*(home / study for home in homes), Path(study)):
         if (folder / "case.json").is_file():
-            return Study(folder.resolve().parents[1], (FinishedRun.open(folder),))
+            return Study(folder.resolve().parents[1], Runs([FinishedRun.open(folder)]))
         if (folder / "process").is_dir():
             return _finished(folder)
     known = sorted({file.parent.name for home in homes for file in home.glob("*/process")})
@@ -314,7 +363,7 @@ def _finished(folder: Path) -> Study:
     runs = sorted(_runs(folder, "run.json"), key=lambda run: (run.name, run.case.run))
     if not runs:
         raise RejectedRunError(f"{folder}: no process run is finished")
-    return Study(folder, tuple(runs))
+    return Study(folder, Runs(runs))
 
 
 def _runs(folder: Path, having: str) -> Iterator[FinishedRun]:

@@ -252,3 +252,30 @@ def test_every_public_name_is_there() -> None:
     for name in dragchain.__all__:
         found = getattr(dragchain, name)
         assert callable(found) != (name == "plot")
+
+
+def test_tables_carry_study_run_units_and_basis(project: Path) -> None:
+    write_summary(project)
+    study = load("small")
+    run = study.run("deep")
+    about = run.force.attrs
+    assert (about["study"], about["run"]) == (run.case.study, run.case.run)
+    assert (about["units"]["drag_n"], about["units"]["time_s"]) == ("N", "s")
+    assert "more and smaller contact forces" in about["basis"]
+    assert run.table("network", ["step"]).attrs["units"] == {"step": "1"}
+    assert study.summary.attrs["units"]["drag_mean_n"] == "N"
+    assert study.summary.attrs["basis"][run.case.run] == about["basis"]
+
+
+def test_values_say_what_they_rest_on(project: Path) -> None:
+    run = load("small").run("deep")
+    drag = run.values.drag
+    assert drag.run.value == run.findings.forces["drag_n"].mean
+    assert "Young's modulus" in drag.reason and drag.basis == "as measured"
+
+
+@pytest.mark.parametrize("number", [5, -9, "deep"])
+def test_a_run_that_is_not_there_is_named(project: Path, number: Any) -> None:
+    with pytest.raises(UnknownNameError, match=r"(?s)no run .*3 run\(s\).*study\.run"):
+        load("small").runs[number]
+    assert len(load("small").runs[:2]) == 2

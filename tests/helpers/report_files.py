@@ -8,6 +8,8 @@ from typing import Any
 
 from pages import Page
 
+from dragchain.report.extrapolated import FILE as EXTRAPOLATED
+from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity
 from dragchain.report.findings import (
     FILE,
     AheadBehind,
@@ -23,6 +25,7 @@ from dragchain.report.findings import (
     Peaks,
     ProcessFindings,
 )
+from dragchain.run.basis import QUANTITIES
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, EstimateColumns
 
@@ -37,6 +40,13 @@ PICTURES = [
     "network_xy",
     "network_xz",
 ]
+
+ASKED = {
+    "tolerance": 0.05, "quantity": "drag_mean", "label": "mean drag", "held_to": 0.025,
+    "error": 0.012, "ci95_low": -0.018, "ci95_high": 0.042, "bound": 0.037, "relative_cost": 0.04,
+    "half_width": 0.03, "outside": ["depth over particle diameter 3 is outside of 6 to 8"],
+    "fallback": None, "source": "measured 2026-01-02 on small, plan made",
+}  # fmt: skip
 
 
 def case_json(scene: str, run: str, **more: Any) -> dict[str, Any]:
@@ -57,9 +67,12 @@ def case_json(scene: str, run: str, **more: Any) -> dict[str, Any]:
         "surface_m": 0.07,
         "motion": {"kind": "circle", "axis_speed_m_s": 0.01, "radius_m": 0.02, "direction": "ccw",
                    "orientation": "follow_path", "start_direction_rad": 1.57},
-        "phases": [], "statistics": {"transient_s": 0.5}, "restitution": 0.68,
+        "phases": [{"name": "drag", "start_step": 4000, "end_step": 64000}],
+        "statistics": {"transient_s": 0.5}, "restitution": 0.68,
         "assumptions": [{"field": "bowl.radius_m", "value": 0.04, "why": "a plausible fraction"}],
-        "reference": None, "versions": {"dragdeck": "0.1.0"},
+        "reference": {"source": "a paper",
+                      "experiment": {"drag_mean_n": -2.59, "drag_std_n": 0.66}},
+        "versions": {"dragdeck": "0.1.0"},
     } | more  # fmt: skip
 
 
@@ -133,6 +146,21 @@ def make_run(results: Path, case: dict[str, Any], findings: Findings, names: lis
     for name in names:
         (folder / "figures" / f"{name}.png").write_bytes(PNG)
     return folder
+
+
+def write_quantities(run: Path, scale: float, corrected: float | None = None) -> None:
+    """Write ``extrapolated.json``: all quantities 2, at the physical modulus that many times it."""
+    ends = {} if corrected is None else {
+        "value": 2.0 * corrected, "ci95_low": 1.8 * corrected, "ci95_high": 2.2 * corrected,
+    }  # fmt: skip
+    found = tuple(
+        ExtrapolatedQuantity(name=one.name, label=one.label, unit=one.unit, measured=2.0, **ends)
+        for one in QUANTITIES
+    )
+    document = Extrapolated(
+        youngs_modulus_scale=scale, source="14 scenes", outside=(), quantities=found
+    )
+    document.write(run / EXTRAPOLATED)
 
 
 def page_of(out: Path) -> Page:

@@ -57,7 +57,7 @@ from dragdeck.outlook.stable_step import stable_step_cautions, stable_step_note
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import Layout, layout
 from dragdeck.preview.page import Words, page
-from dragdeck.preview.picture import picture
+from dragdeck.preview.picture import picture, small_picture
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
 from dragdeck.scenes.registry import SCENES
@@ -247,13 +247,14 @@ def _numbers(case: Case) -> dict[str, list[tuple[str, str]]]:
 
 
 def _drawn(found: Layout, words: Words, folder: Path) -> list[Path]:
-    """Write picture and page of a layout into a folder and return their files."""
+    """Write pictures and page of a layout into a folder and return their files."""
     swept = [swept_volume(body.mesh, body.drag.poses) for body in found.workpieces]
     png = picture(found, swept, words.heading, refused=bool(words.refusal))
     folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / "preview.png", folder / "preview.html"]
+    files = [folder / name for name in ("preview.png", "preview.html", "set_up.png")]
     replace_bytes(files[0], png)
     replace_text(files[1], page(found, swept, words, png))
+    replace_bytes(files[2], small_picture(found, swept))
     return files
 
 

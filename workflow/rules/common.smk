@@ -146,22 +146,6 @@ def every_table(place):
 STIFFNESS = "workflow/dragdeck/data/stiffness.json"
 
 
-def every_extrapolated():
-    """What is extrapolated to the physical Young's modulus: process runs with a reduced one.
-
-    Not with a faster workpiece, at which no law was measured.
-    """
-    chosen = {
-        run: case.study.chosen_fidelity()
-        for run, case in by_folder(CASES, PLACES["process"]).items()
-    }
-    return [
-        f"{run_path(STUDY, 'process', run)}/tables/extrapolated.json"
-        for run, one in chosen.items()
-        if one.youngs_modulus_scale < 1 and one.speed_factor == 1
-    ]
-
-
 def relative(file):
     """Path from the project, where the workflow runs; other paths stay as they are."""
     return file.relative_to(PROJECT.root) if file.is_relative_to(PROJECT.root) else file

@@ -2,14 +2,35 @@
 # the others is written all the same and lists it, and the call ends with an error.
 
 
+# What is simulated, drawn from the first case of the study.
+rule draw_set_up:
+    output:
+        f"results/{STUDY}/set_up.png",
+    log:
+        f"results/{STUDY}/logs/preview.log",
+    benchmark:
+        f"results/{STUDY}/benchmarks/preview.tsv"
+    localrule: True
+    conda:
+        "../envs/python.yaml"
+    params:
+        case=SCENES["process"].digest(CASES[0]),
+        fidelity=fidelity_option,
+        study=STUDY,
+        source=source_hash("dragdeck.preview.picture", "dragdeck.preview.layout"),
+    shell:
+        "dragdeck preview {params.study} {params.fidelity} > {log} 2>&1"
+
+
 rule write_report:
     input:
         [every(name, "run.json", "tables/figures.json") for name in SCENES],
         [every_table(name) for name in SCENES],
         every("process", "tables/loading.json"),
         every("process", "network.html"),
-        every_extrapolated(),
+        every("process", "tables/extrapolated.json"),
         advice=asked_advice("process"),
+        set_up=rules.draw_set_up.output,
         templates=page_templates("report/report.html.j2"),
     output:
         csv=of_study("report", "summary.csv"),
@@ -33,7 +54,8 @@ rule write_report:
         advice=advice_option,
         source=source_hash("dragchain.report.study_report"),
     shell:
-        "dragchain report --out $(dirname {output.csv}) {params.runs} {params.advice} > {log} 2>&1"
+        "dragchain report --out $(dirname {output.csv}) {params.runs} {params.advice}"
+        " --preview {input.set_up} > {log} 2>&1"
 
 
 # What will be run: as text, and as data for `--logger dragdeck`.
@@ -62,8 +84,10 @@ onerror:
     if wanted and not stopped:
         runs = " ".join(folder for name in SCENES for folder in every_folder(name))
         advice = f"--advice {ADVICE}" if Path(ADVICE).is_file() else ""
+        picture = f"results/{STUDY}/set_up.png"
+        preview = f"--preview {picture}" if Path(picture).is_file() else ""
         shell(
             "rm -f results/{STUDY}/report/complete;"
-            " dragchain report --out results/{STUDY}/report {runs} {advice} || true"
+            " dragchain report --out results/{STUDY}/report {runs} {advice} {preview} || true"
         )
         tell_numbers()

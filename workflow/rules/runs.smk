@@ -192,7 +192,7 @@ rule draw_for_journal:
         "dragchain journal $(dirname {input.run}) {params.colours} > {log} 2>&1"
 
 
-# What the quantities of a run would be at the physical Young's modulus.
+# The quantities of a run, and what they would be at the physical Young's modulus.
 rule extrapolate_process:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),

@@ -21,7 +21,7 @@ from dragchain.figures.style import COLOURS, force_map
 from dragchain.network.chains import WidestPath, dominant_path, widest_paths
 from dragchain.network.frame import NetworkFrame, read_frames
 from dragchain.run.case import Case
-from dragchain.run.kinematics import drag_start_s, needed
+from dragchain.run.kinematics import needed, process_time
 from dragchain.run.workpiece import placed, workpiece_mesh
 from dragchain.tables.by_step import read_table
 from dragchain.tables.workpiece_pose import workpiece_places
@@ -63,7 +63,7 @@ class Scene:
     dominant : WidestPath or None
         The frame's dominant workpiece path.
     process_time_s : float
-        Time since the drag began.
+        Process time since the drag began.
     """
 
     frame: NetworkFrame
@@ -119,21 +119,21 @@ def load_scene(run_dir: Path, case: Case, wanted_s: float = _PICTURE_TIME_S) -> 
         If a table is missing or holds no counted network frame.
     """
     network = read_table(run_dir / "tables" / "network.parquet", ["step", "time_s"])
-    start_s = drag_start_s(case)
-    times = network["time_s"].to_numpy(np.float64) - start_s
+    times = process_time(network["time_s"].to_numpy(np.float64), case)
     step = picture_step(network["step"].to_numpy(np.float64), times, wanted_s)
     frame = next(read_frames(run_dir, (step, step)), None)
     if frame is None:
         raise TableError(f"particles.parquet lacks step {step}, which network.parquet has")
-    return scene_of(frame, workpiece_places(run_dir, case), start_s)
+    return scene_of(frame, workpiece_places(run_dir, case), case)
 
 
 def scene_of(
-    frame: NetworkFrame, place: Callable[[int], tuple[Floats, float]], start_s: float
+    frame: NetworkFrame, place: Callable[[int], tuple[Floats, float]], case: Case
 ) -> Scene:
     """What the picture of a frame shows, from the workpiece's place and turn at each step."""
     path = dominant_path(frame, widest_paths(frame))
-    return Scene(frame, *place(frame.step), path, frame.time_s - start_s)
+    moment = float(process_time(np.array(frame.time_s), case))
+    return Scene(frame, *place(frame.step), path, moment)
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,9 @@ from dragchain.network_page.frames import (
     read_shown,
     shown_frames,
 )
+from dragchain.run.basis import notes
 from dragchain.run.case import Case
-from dragchain.run.kinematics import drag_phase, drag_start_s, needed
+from dragchain.run.kinematics import drag_phase, needed, process_time
 from dragchain.run.workpiece import read_surface
 from dragchain.tables.by_step import read_table
 from dragchain.tables.columns import CENTRE, POINT, VELOCITY
@@ -69,14 +70,14 @@ def load_scene(run: Run) -> Scene:
     case, columns, peaks = run.case, Columns(), highest_peaks(run)
     series = shown_frames(run, peaks.time_s)
     frames = list(read_shown(series))
-    times_s = process_time(case, series.times_s)
+    times_s = process_time(series.times_s, case)
     bowl, surface = needed(case.bowl, "bowl"), 1e3 * needed(case.surface_m, "surface_m")
     head = {
         "run": case.run,
         "steps": series.steps.tolist(),
         "times": times_s.tolist(),
-        "frames": _frames(columns, frames, case.fidelity.speed_factor),
-        "scales": _scales(frames, case.fidelity.speed_factor),
+        "frames": _frames(columns, frames, case),
+        "scales": _scales(frames, case),
         "paths": _dominant_paths(run, frames),
         "bodies": {BODIES + body: name for body, name in KINDS.items() if body != PARTICLE},
         "bowl": {"radius": 1e3 * bowl.radius_m, "height": 1.2 * surface},
@@ -88,18 +89,11 @@ def load_scene(run: Run) -> Scene:
         },
         "workpieces": [_workpiece(columns, run, frames)],
         "curve": _curve(columns, run),
-        "peaks": _peaks(peaks, process_time(case, peaks.time_s), times_s),
+        "peaks": _peaks(peaks, times_s, case),
         "colours": _colours(),
+        "settings": " ".join(notes(case)),
     }
     return Scene(head | {"columns": columns.entries}, columns)
-
-
-def process_time(case: Case, simulated_s: Floats) -> Floats:
-    """Times of the process since the start of the drag, s, of times of its run, (N,).
-
-    A run in which the workpiece moves faster than in the process takes a shorter time.
-    """
-    return case.fidelity.speed_factor * (simulated_s - drag_start_s(case))
 
 
 def _colours() -> list[str]:
@@ -111,7 +105,7 @@ def _colours() -> list[str]:
 # --- frames ----------------------------------------------------------------------------------
 
 
-def _frames(columns: Columns, frames: list[ShownFrame], faster: float) -> dict[str, Any]:
+def _frames(columns: Columns, frames: list[ShownFrame], case: Case) -> dict[str, Any]:
     """Add particles and contacts of all frames; where each frame starts, and the box of places."""
     centres = [_vectors(one.data.particles, CENTRE)[one.particles] for one in frames]
     points = [_outer_points(one) for one in frames]
@@ -124,7 +118,7 @@ def _frames(columns: Columns, frames: list[ShownFrame], faster: float) -> dict[s
         columns.add(name, "u16", ((np.concatenate(parts) - low) / step).round().T)
     columns.add("id", "u32", _joined(particles, "particle_id"))
     columns.add("radius", "f24", 1e3 * _joined(particles, "radius_m"))
-    columns.add("speed", "f24", 1e3 / faster * _speeds(pd.concat(particles)))
+    columns.add("speed", "f24", 1e3 * _speeds(pd.concat(particles), case))
     columns.add("a", "u16", np.concatenate([one.a for one in frames]))
     columns.add("b", "u16", np.concatenate([one.b for one in frames]))
     columns.add("flags", "u8", np.concatenate([one.flags for one in frames]))
@@ -158,20 +152,22 @@ def _joined(tables: list[pd.DataFrame], name: str) -> Any:
     return np.concatenate([table[name].to_numpy() for table in tables])
 
 
-def _speeds(particles: pd.DataFrame) -> Floats:
-    return np.asarray(np.linalg.norm(_vectors(particles, VELOCITY), axis=1))
+def _speeds(particles: pd.DataFrame, case: Case) -> Floats:
+    """Speeds of particles in process time, m/s."""
+    simulated = np.linalg.norm(_vectors(particles, VELOCITY), axis=1)
+    return np.asarray(simulated / case.fidelity.speed_factor)
 
 
-def _scales(frames: list[ShownFrame], faster: float) -> dict[str, float]:
+def _scales(frames: list[ShownFrame], case: Case) -> dict[str, float]:
     """The tops of the colour scales, and the mean normal force, over all shown frames."""
     forces = [_table(one)["normal_force_n"].to_numpy()[one.contacts] for one in frames]
     largest = [part.max(initial=0.0) for part in forces]
-    speeds = np.concatenate([_speeds(one.data.particles)[one.particles] for one in frames])
+    speeds = np.concatenate([_speeds(one.data.particles, case)[one.particles] for one in frames])
     return {
         "force": float(np.median(largest)) or 1.0,
         "largest": float(max(largest)),
         "mean": float(np.concatenate([*forces, np.zeros(0)]).mean()),
-        "speed": float(1e3 / faster * np.quantile(speeds, _TOP)) or 1.0,
+        "speed": float(1e3 * np.quantile(speeds, _TOP)) or 1.0,
         "displacement": 1e3 * _displacement(frames) or 1.0,
     }
 
@@ -259,25 +255,28 @@ def _curve(columns: Columns, run: Run) -> dict[str, Any]:
     """Add the force against the motion over the drag; its times, and how it is filtered."""
     table = _force(run, ["step", "time_s", "drag_n", "in_statistics"])
     table = table[table["step"] > drag_phase(run.case).start_step]
-    faster = run.case.fidelity.speed_factor
     every = -(-len(table) // _MOST_SAMPLES)
     shown = table.iloc[::every]
-    times, all_times = (
-        process_time(run.case, one["time_s"].to_numpy(np.float64)) for one in (shown, table)
-    )
+    times = process_time(shown["time_s"].to_numpy(np.float64), run.case)
+    counted = table["time_s"][table["in_statistics"]].to_numpy(np.float64)[:1]
     columns.add("resistance", "f24", -shown["drag_n"].to_numpy(np.float64))
     return {
         "first": float(times[0]),
         "interval": float(np.diff(times).mean()),
         "every": every,
-        "counted": float(all_times[table["in_statistics"].argmax()]),
-        "window": 2 * _SMOOTHED_DIAMETERS * peak_separation_s(run.case) * faster,
+        "counted": float(process_time(counted, run.case)[0]),
+        "window": 2
+        * _SMOOTHED_DIAMETERS
+        * run.case.fidelity.speed_factor
+        * peak_separation_s(run.case),
     }
 
 
-def _peaks(peaks: Peaks, at_s: Floats, frames_s: Floats) -> list[dict[str, Any]]:
-    """The highest peaks, each at its process time and with its nearest frame."""
+def _peaks(peaks: Peaks, times_s: Floats, case: Case) -> list[dict[str, Any]]:
+    """The highest peaks, each with its nearest frame."""
     return [
-        {"time": time, "force": -drag, "frame": int(np.abs(frames_s - time).argmin())}
-        for time, drag in zip(at_s.tolist(), peaks.drag_n.tolist(), strict=True)
+        {"time": time, "force": -drag, "frame": int(np.abs(times_s - time).argmin())}
+        for time, drag in zip(
+            process_time(peaks.time_s, case).tolist(), peaks.drag_n.tolist(), strict=True
+        )
     ]

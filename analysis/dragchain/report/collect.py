@@ -28,7 +28,7 @@ from dragchain.report.findings import (
 )
 from dragchain.report.run_data import RunData
 from dragchain.run.case import Case, load_outputs
-from dragchain.run.kinematics import drag_start_s, motion_of, needed
+from dragchain.run.kinematics import drag_start_s, motion_of, needed, process_time
 from dragchain.run.reference import ReferenceDrag, reference_drags
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
@@ -122,13 +122,13 @@ def compare(ours: MeanEstimate, reference: ReferenceDrag) -> Comparison:
 
 def _peaks(samples: pd.DataFrame, run: RunData) -> Peaks:
     peaks = drag_peaks(samples, run.case)
-    process_s = peaks.time_s - drag_start_s(run.case)
+    process_s = process_time(peaks.time_s, run.case)
     return Peaks(
         count=len(peaks.index),
         process_time_s=tuple(process_s.tolist()),
         drag_n=tuple(peaks.drag_n.tolist()),
         largest_n=peaks.drag_n.min(initial=np.inf),
-        separation_s=peak_separation_s(run.case),
+        separation_s=run.case.fidelity.speed_factor * peak_separation_s(run.case),
     )
 
 

@@ -149,7 +149,8 @@ def actual_interval(
     if asked is None:
         return None
     if asked.extrapolated:
-        found = extrapolated.of(asked.quantity) if extrapolated else None
+        one = extrapolated.of(asked.quantity) if extrapolated else None
+        found = one.estimate if one else None
         return RunInterval.of(found.value, found.ci95_low, found.ci95_high) if found else None
     name = _INTERVALS.get(asked.quantity)
     if name is None or not forces[name].mean:

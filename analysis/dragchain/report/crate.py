@@ -1,9 +1,11 @@
 """A study's results as an RO-Crate (https://w3id.org/ro/crate/1.1), to archive and to cite."""
 
 import hashlib
+import math
 import mimetypes
 import os
 import platform
+import re
 import shutil
 from collections.abc import Mapping, Sequence
 from importlib.metadata import distributions
@@ -12,6 +14,7 @@ from typing import Any
 
 from dragchain.errors import ExportError
 from dragchain.files import write_text
+from dragchain.report.runs import read_study
 from dragchain.run.case import Case, load_case
 from dragchain.run.completeness import read_accepted
 
@@ -23,7 +26,7 @@ LARGEST_BYTES = 20_000_000
 """Larger files are left out."""
 
 _SPECIFICATION = "1.1"
-_NO_LICENCE = "unknown: the study states none; ask its authors before you use it"
+_LICENCES, _SPDX_NAME = "https://spdx.org/licenses/", re.compile(r"[A-Za-z0-9][A-Za-z0-9.+-]*")
 _INPUTS = (".liggghts", ".data", ".stl", "case.json", "columns.json")
 _RESULTS = (".json", ".png", ".svg", ".pdf", ".vtp", ".parquet")
 _NO_RESULT = {"logs", "benchmarks", "as_run", "archive", "damaged", "export", "state.json"}
@@ -54,7 +57,7 @@ def write_crate(
     inputs : sequence of Path
         What the runs were made from: study files, templates, meshes.
     licence : str, optional
-        Licence of the results; unknown if None.
+        Licence of the results, SPDX name or address; the crate states none if None.
 
     Raises
     ------
@@ -112,7 +115,11 @@ class _Crate:
             " simulated with the discrete element method (LIGGGHTS) through dragdeck. Paths are"
             f" those of the project; {LEFT_OUT} lists the files that were left out."
         )
-        root["license"] = licence or _NO_LICENCE
+        if licence:
+            address = f"{_LICENCES}{licence}" if _SPDX_NAME.fullmatch(licence) else licence
+            linked = re.match("https?://", address)
+            about = {"@type": "CreativeWork", "name": licence}
+            root["license"] = self._named(address, about) if linked else licence
         root["keywords"] = "discrete element method, drag finishing, LIGGGHTS"
 
     def add(self, files: Sequence[Path]) -> list[Any]:
@@ -152,9 +159,30 @@ class _Crate:
             "startTime": record.started,
             "instrument": [self._software(*version) for version in versions.items()],
             "object": self.add(inputs),
-            "result": self.add(results),
+            "result": [*self.add(results), *self._measured(folder, case)],
         }
         self._mention(f"#{case.scene}-{case.run}", about)
+
+    def _measured(self, folder: Path, case: Case) -> list[Any]:
+        """The quantities of a process run, as its report states them."""
+        if case.scene != "process":
+            return []
+        found = []
+        for one in read_study(folder).values.standings:
+            about: dict[str, object] = {
+                "@type": "PropertyValue",
+                "name": one.quantity.label,
+                "propertyID": one.quantity.name,
+                "unitText": one.quantity.unit or "1",
+                "value": one.shown.value,
+                "description": f"{one.basis}; {one.reason}" if one.reason else str(one.basis),
+            }
+            if one.shown.known:
+                about |= {"minValue": one.shown.ci95_low, "maxValue": one.shown.ci95_high}
+                about["measurementTechnique"] = "simulation; ends of the 95 % confidence interval"
+            if math.isfinite(one.shown.value):
+                found.append(self._named(f"#{case.run}-{one.quantity.name}", about))
+        return found
 
     def close(self) -> None:
         """Add the versions and the list of what was left out, and write the metadata."""
@@ -172,13 +200,17 @@ class _Crate:
 
     def _mention(self, identity: str, about: Mapping[str, object]) -> Any:
         """Something that is no file, listed under ``mentions`` of the whole crate."""
-        from rocrate.model import ContextEntity
-
         if (known := self._crate.get(identity)) is not None:
             return known
-        found = self._crate.add(ContextEntity(self._crate, identity, dict(about)))
+        found = self._named(identity, about)
         self._crate.root_dataset.append_to("mentions", found)
         return found
+
+    def _named(self, identity: str, about: Mapping[str, object]) -> Any:
+        """Something that is no file and that another entry names."""
+        from rocrate.model import ContextEntity
+
+        return self._crate.add(ContextEntity(self._crate, identity, dict(about)))
 
 
 def sha256(file: Path) -> str:

@@ -1,32 +1,40 @@
-"""Quantities of a run extrapolated to the physical Young's modulus: ``extrapolated.json``."""
+"""Quantities of a run, and at the physical Young's modulus: ``extrapolated.json``."""
 
 from pathlib import Path
 
 from dragchain.documents import Document, Part
+from dragchain.statistics.estimate import Estimate
 
 FILE = Path("tables") / "extrapolated.json"
 
 
 class ExtrapolatedQuantity(Part):
-    """A quantity of a run with a reduced modulus, and its value at the physical modulus.
+    """A quantity of a run, and its value at the physical modulus where a law gives it.
 
     Attributes
     ----------
     name, label, unit : str
     measured : float
         Uncorrected value of the run.
-    value, ci95_low, ci95_high : float
-        At the physical Young's modulus. The interval includes the scatter of one run, the
-        uncertainty of rate and amplitude, and the model's own error.
+    value, ci95_low, ci95_high : float or None
+        At the physical Young's modulus, None if no law applies to the run. The interval includes
+        the scatter of one run, the uncertainty of rate and amplitude, and the model's own error.
     """
 
     name: str
     label: str
     unit: str
     measured: float
-    value: float
-    ci95_low: float
-    ci95_high: float
+    value: float | None = None
+    ci95_low: float | None = None
+    ci95_high: float | None = None
+
+    @property
+    def estimate(self) -> Estimate | None:
+        """The value at the physical modulus with its interval."""
+        if self.value is None or self.ci95_low is None or self.ci95_high is None:
+            return None
+        return Estimate(self.value, self.ci95_low, self.ci95_high)
 
 
 class Extrapolated(Document):
@@ -51,5 +59,5 @@ class Extrapolated(Document):
     quantities: tuple[ExtrapolatedQuantity, ...]
 
     def of(self, name: str) -> ExtrapolatedQuantity | None:
-        """A quantity by its name, None if it was not extrapolated."""
+        """A quantity by its name, None if it was not measured."""
         return next((one for one in self.quantities if one.name == name), None)

@@ -60,7 +60,10 @@ def page_environment(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    shared = ("number", "measured", "fixed", "percent", "fraction", "interval")
+    shared = (
+        *("number", "measured", "fixed", "percent", "fraction", "interval"),
+        *("with_interval", "mean_interval", "ends"),
+    )
     environment.filters |= {name: getattr(notation, name) for name in shared}
     environment.filters |= {"slug": slug, "sections": sections, **(filters or {})}
     return environment

@@ -13,7 +13,7 @@ from dragchain.arrays import Floats
 from dragchain.figures.network_picture import Scene, load_scene
 from dragchain.figures.rendering import check_rendering
 from dragchain.run.case import Case
-from dragchain.run.kinematics import drag_start_s
+from dragchain.run.kinematics import process_time
 from dragchain.tables.by_step import read_table
 
 
@@ -23,7 +23,7 @@ class DragTrace(NamedTuple):
     Attributes
     ----------
     process_time_s : array
-        From the start of the drag.
+        From the start of the drag, at the speed of the process.
     drag_n, lateral_n : array
     counted : array of bool
         Whether a sample is in the statistics.
@@ -75,7 +75,7 @@ class RunData:
             table[name].to_numpy(np.float64) for name in ("time_s", "drag_n", "lateral_n")
         )
         counted = table["in_statistics"].to_numpy(bool)
-        return DragTrace(time_s - drag_start_s(self.case), drag, lateral, counted)
+        return DragTrace(process_time(time_s, self.case), drag, lateral, counted)
 
     @cached_property
     def bottlenecks_n(self) -> Floats:

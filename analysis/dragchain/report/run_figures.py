@@ -259,7 +259,7 @@ def write_figures(run_dir: Path) -> list[Path]:
 
 
 def drag_of_cases(
-    names: list[str], forces: list[MeanEstimate], references: list[tuple[str, float]]
+    names: list[str], forces: list[Estimate], references: list[tuple[str, float]]
 ) -> Figure:
     """The mean drag of each case with its interval, beside reference means.
 
@@ -272,7 +272,7 @@ def drag_of_cases(
     """
     figure, (axes,) = new_panels(1.2 + 0.32 * len(names))
     for place, force in enumerate(forces):
-        row(axes, place, force.mean, force, BLUE)
+        row(axes, place, force.value, force, BLUE)
     for label, value in references:
         axes.axvline(value, color=COLOURS[label], linestyle="--", label=f"{label} {value:.2f} N")
     row_names(axes, names)

@@ -7,7 +7,7 @@ from dragchain.figures.marks import depth_bars
 from dragchain.figures.style import COLOURS
 from dragchain.report.findings import Comparison, ProcessFindings
 from dragchain.report.run_data import RunData
-from dragchain.run.kinematics import drag_start_s
+from dragchain.run.kinematics import process_time
 
 _DEPTH = "depth below the surface (mm)"
 
@@ -55,7 +55,7 @@ def peaks(axes: Axes, run: RunData, found: ProcessFindings) -> None:
 
 def bottlenecks(axes: Axes, run: RunData, found: ProcessFindings) -> None:
     """Bottleneck of the dominant workpiece path over process time."""
-    frame_s = run.network["time_s"].to_numpy(np.float64) - drag_start_s(run.case)
+    frame_s = process_time(run.network["time_s"].to_numpy(np.float64), run.case)
     axes.plot(frame_s, run.bottlenecks_n, ".-", color=COLOURS["dominant_path"])
     axes.set(xlabel="process time (s)", ylabel="bottleneck force of the\ndominant path (N)")
     axes.set_ylim(bottom=0)

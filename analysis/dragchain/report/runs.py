@@ -2,10 +2,13 @@
 
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Generic, TypeVar
 
 from dragchain.errors import DocumentError, RejectedRunError
+from dragchain.loading.document import FILE as LOADING
+from dragchain.loading.document import Loading
 from dragchain.report.extrapolated import FILE as EXTRAPOLATED
 from dragchain.report.extrapolated import Extrapolated
 from dragchain.report.findings import (
@@ -15,6 +18,7 @@ from dragchain.report.findings import (
     Findings,
     ProcessFindings,
 )
+from dragchain.report.values import Values, values_of
 from dragchain.run.case import Case, load_case
 from dragchain.run.completeness import RunRecord, read_accepted
 
@@ -35,14 +39,26 @@ class ReportedRun(Generic[F]):
 class StudyRuns:
     """A process run with the filling and the drop test it belongs to, None where it names none.
 
-    `extrapolated`: its quantities at the physical Young's modulus, None where that was not
-    computed.
+    `loading`: load, sliding and friction work on the workpiece; `extrapolated`: its quantities at
+    the physical Young's modulus. Both are None where they were not computed.
     """
 
     process: ReportedRun[ProcessFindings]
     filling: ReportedRun[FillingFindings] | None
     drop_test: ReportedRun[DropFindings] | None
+    loading: Loading | None = None
     extrapolated: Extrapolated | None = None
+
+    @cached_property
+    def values(self) -> Values:
+        """The quantities of the process run, each with what it says of the process."""
+        process = self.process
+        return values_of(process.case, process.findings, self.loading, self.extrapolated)
+
+    @property
+    def outside(self) -> tuple[str, ...]:
+        """Numbers of the scene outside the range of the laws that correct its values."""
+        return self.extrapolated.outside if self.extrapolated else ()
 
     @property
     def runs(self) -> list[ReportedRun[Findings]]:
@@ -71,9 +87,22 @@ def read_study(run_dir: Path) -> StudyRuns:
     with suppress(RejectedRunError, DocumentError):
         if "drop_test" in upstream:
             drop_test = _read(upstream["drop_test"], DropFindings)
-    extrapolated = run_dir / EXTRAPOLATED
-    known = Extrapolated.read(extrapolated) if extrapolated.is_file() else None
-    return StudyRuns(process, filling, drop_test, known)
+    return StudyRuns(process, filling, drop_test, *read_optional(run_dir))
+
+
+def read_optional(run_dir: Path) -> tuple[Loading | None, Extrapolated | None]:
+    """Read ``loading.json`` and ``extrapolated.json`` of a process run, None where there is none.
+
+    Raises
+    ------
+    DocumentError
+        If one of them cannot be used.
+    """
+    loading, extrapolated = run_dir / LOADING, run_dir / EXTRAPOLATED
+    return (
+        Loading.read(loading) if loading.is_file() else None,
+        Extrapolated.read(extrapolated) if extrapolated.is_file() else None,
+    )
 
 
 def read_upstream(run_dir: Path) -> ReportedRun[Findings]:

@@ -4,15 +4,19 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from io import BytesIO
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import pandas as pd
 import pyarrow as pa
 
+from dragchain.report.cases import ReportedCase
+from dragchain.run.basis import Standing
 from dragchain.run.case import Assumption
 from dragchain.tables.meanings import descriptions, unit_end, unit_of
 
 if TYPE_CHECKING:
+    from xlsxwriter.format import Format
     from xlsxwriter.worksheet import Worksheet
 
 _WORDS = {
@@ -55,18 +59,56 @@ def _heading(column: str, unit: str) -> str:
     return f"{text[:1].upper()}{text[1:]}" + (f" ({unit})" if end else "")
 
 
+def overview(cases: Sequence[ReportedCase]) -> pd.DataFrame:
+    """The main quantities of all cases, one row per line of the set-up and per quantity.
+
+    Parameters
+    ----------
+    cases : sequence of ReportedCase
+        C cases.
+
+    Returns
+    -------
+    DataFrame
+        ``quantity``, ``unit`` and five columns per case: value of the process, the ends of its
+        95 % confidence interval, value of the run, and what the first one rests on.
+    """
+    standings = [{one.quantity: one for one in case.values.standings} for case in cases]
+    known = dict.fromkeys(quantity for every in standings for quantity in every)
+    rows: list[list[object]] = []
+    for line, (name, _) in enumerate(cases[0].set_up):
+        texts = [[case.set_up[line][1], *[None] * 4] for case in cases]
+        rows.append([name, None, *chain.from_iterable(texts)])
+    for quantity in known:
+        cells = [_cells(every.get(quantity)) for every in standings]
+        rows.append([quantity.label, quantity.unit or "1", *chain.from_iterable(cells)])
+    heads = ("process", "95 % CI low", "95 % CI high", "run", "basis")
+    columns = [f"{case.name}: {head}" for case in cases for head in heads]
+    return pd.DataFrame(rows, columns=["quantity", "unit", *columns], dtype=object)
+
+
+def _cells(one: Standing | None) -> list[object]:
+    if one is None:
+        return [None] * 5
+    value = [one.value.value, one.value.ci95_low, one.value.ci95_high] if one.value else [None] * 3
+    return [*value, one.run.value, f"{one.basis}; {one.reason}" if one.reason else str(one.basis)]
+
+
 def summary_workbook(
     table: pd.DataFrame,
     assumptions: Mapping[str, Sequence[Assumption]],
+    cases: Sequence[ReportedCase],
 ) -> bytes:
-    """The summary as an XLSX file with the sheets Summary, Definitions and Assumptions.
+    """The summary as an XLSX file: sheets Overview, Summary, Definitions and Assumptions.
 
     Parameters
     ----------
     table : DataFrame
-        The summary, one row per case.
+        The summary, one row per run.
     assumptions : mapping of str to sequence of Assumption
         The assumptions of each run, by its name.
+    cases : sequence of ReportedCase
+        The cases for the overview.
     """
     about = definitions(table)
     assumed = [
@@ -76,7 +118,14 @@ def summary_workbook(
     ]
     summary = table.set_axis(about["heading"], axis=1)
     assumption_sheet = pd.DataFrame(assumed, columns=["run", "field", "value", "reason"])
-    return workbook({"Summary": summary, "Definitions": about, "Assumptions": assumption_sheet})
+    return workbook(
+        {
+            "Overview": overview(cases),
+            "Summary": summary,
+            "Definitions": about,
+            "Assumptions": assumption_sheet,
+        }
+    )
 
 
 def workbook(sheets: Mapping[str, pd.DataFrame]) -> bytes:
@@ -86,23 +135,32 @@ def workbook(sheets: Mapping[str, pd.DataFrame]) -> bytes:
     content = BytesIO()
     with Workbook(content, {"in_memory": True}) as book:
         bold = book.add_format({"bold": True, "text_wrap": True, "valign": "top"})
+        formats = {code: book.add_format({"num_format": code}) for code in _NUMBERS.values()}
         for name, table in sheets.items():
             sheet = book.add_worksheet(name)
             for column, (heading, values) in enumerate(table.items()):
                 sheet.write_string(0, column, str(heading), bold)
                 for row, value in enumerate(values.tolist(), start=1):
-                    _write(sheet, row, column, value)
+                    _write(sheet, row, column, value, formats)
             sheet.freeze_panes(1, 0)
             sheet.autofit(300)
     return content.getvalue()
 
 
-def _write(sheet: "Worksheet", row: int, column: int, value: object) -> None:
+_NUMBERS = {1000.0: "#,##0", 10.0: "0.0", 0.01: "0.000", 0.0: "0.00E+00"}
+"""Formats of numbers from these sizes on."""
+
+
+def _write(
+    sheet: "Worksheet", row: int, column: int, value: object, formats: Mapping[str, "Format"]
+) -> None:
     """Write a cell by the type of its value; a number that there is none of stays blank."""
     if isinstance(value, bool):
         sheet.write_boolean(row, column, value)
     elif isinstance(value, int | float):
         if math.isfinite(value):
-            sheet.write_number(row, column, value)
+            size = next(least for least in _NUMBERS if abs(value) >= least)
+            plain = isinstance(value, int) or value == 0.0
+            sheet.write_number(row, column, value, None if plain else formats[_NUMBERS[size]])
     elif value is not None:
         sheet.write_string(row, column, str(value))

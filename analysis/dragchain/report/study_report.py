@@ -9,9 +9,8 @@ import pandas as pd
 
 from dragchain.errors import DragchainError, MissingRunsError, TableError
 from dragchain.files import write_bytes
-from dragchain.loading.document import FILE as LOADING
-from dragchain.loading.document import Loading
 from dragchain.report.bundle import write_bundle
+from dragchain.report.cases import ReportedCase, cases_of
 from dragchain.report.cost_check import (
     CostRow,
     Option,
@@ -21,8 +20,9 @@ from dragchain.report.cost_check import (
     prediction_for,
     read_advice,
 )
-from dragchain.report.findings import FIGURES, Findings
+from dragchain.report.findings import FIGURES, FillingFindings, Findings, ProcessFindings
 from dragchain.report.missing import MissingRun, missing_run, scene_of
+from dragchain.report.notation import number
 from dragchain.report.page import NETWORK_PAGE, data_uri, file_uri, render_page
 from dragchain.report.runs import (
     ReportedRun,
@@ -50,6 +50,12 @@ class Picture:
 
     name: str
     uri: str
+    alt: str
+
+    @property
+    def foremost(self) -> bool:
+        """Whether it comes first."""
+        return self.name == _FROM_LOADING
 
 
 @dataclass(frozen=True)
@@ -60,14 +66,18 @@ class Section:
     assumptions: list[Assumption]
     pictures: list[Picture]
     network: Path | None
-    loading: Loading | None
     corrections: Corrections | None
     interval: RunInterval | None
     costs: list[CostRow]
     cost_source: str | None
 
 
-def write_report(out_dir: Path, run_dirs: Sequence[Path], advice: Path | None = None) -> None:
+def write_report(
+    out_dir: Path,
+    run_dirs: Sequence[Path],
+    advice: Path | None = None,
+    preview: Path | None = None,
+) -> None:
     """Write ``summary.csv``, ``.parquet`` and ``.xlsx``, and ``report.html``, on process runs.
 
     ``network.html`` of a run is copied beside the report, which links to it.
@@ -82,6 +92,8 @@ def write_report(out_dir: Path, run_dirs: Sequence[Path], advice: Path | None = 
         a run that starts from one of them is not there.
     advice : Path, optional
         ``advice.json`` of the study.
+    preview : Path, optional
+        Picture of the set-up of its first case, PNG.
 
     Raises
     ------
@@ -99,7 +111,8 @@ def write_report(out_dir: Path, run_dirs: Sequence[Path], advice: Path | None = 
     if sections:
         studies = [section.study for section in sections]
         table = summary(studies)
-        page = _render(sections, table, missing)
+        cases = cases_of(studies)
+        page = _render(sections, cases, table, missing, file_uri(preview) if preview else None)
         for section, name in zip(sections, _network_pages(sections), strict=True):
             if section.network is not None:
                 write_bytes(out_dir / name, section.network.read_bytes())
@@ -107,7 +120,7 @@ def write_report(out_dir: Path, run_dirs: Sequence[Path], advice: Path | None = 
         write_bundle(
             out_dir,
             tables={"summary": table},
-            workbooks={"summary": summary_workbook(table, assumed)},
+            workbooks={"summary": summary_workbook(table, assumed, cases)},
             pages={"report": page},
         )
     elif not any(run.scene == "process" for run in missing):
@@ -147,7 +160,6 @@ def _section(study: StudyRuns, options: Sequence[Option]) -> Section:
     process = study.process
     expected = prediction_for(process.case, options)
     records = {str(run.case.scene): run.record for run in study.runs}
-    measured = (process.folder / LOADING).is_file()
     corrections = process.folder / "tables" / "corrections.json"
     network = process.folder / NETWORK_PAGE
     return Section(
@@ -155,7 +167,6 @@ def _section(study: StudyRuns, options: Sequence[Option]) -> Section:
         assumptions=_assumptions(study),
         pictures=[picture for run in study.runs for picture in _pictures(run)],
         network=network if network.is_file() else None,
-        loading=Loading.read(process.folder / LOADING) if measured else None,
         corrections=Corrections.read(corrections) if corrections.is_file() else None,
         interval=actual_interval(process.case.asked, process.findings.forces, study.extrapolated),
         costs=list(cost_rows(expected, records)) if expected else [],
@@ -178,27 +189,72 @@ def _pictures(run: ReportedRun[Findings]) -> list[Picture]:
     for name in (*FIGURES[scene], *([_FROM_LOADING] if scene == "process" else [])):
         file = run.folder / "figures" / f"{name}.png"
         if (uri := file_uri(file)) is not None:
-            found.append(Picture(name, uri))
+            found.append(Picture(name, uri, _alt(name, run)))
         elif scene != "filling" and name != _FROM_LOADING:
             raise TableError(f"{file}: there is no such file; run `dragchain figures` first")
     return found
 
 
-def _render(sections: Sequence[Section], table: pd.DataFrame, missing: Sequence[MissingRun]) -> str:
+def _alt(name: str, run: ReportedRun[Findings]) -> str:
+    """What is seen in a figure, for those who do not see it."""
+    found = run.findings
+    if isinstance(found, ProcessFindings):
+        drag, sums, chains = found.forces["drag_n"], found.ahead_behind, found.chains
+        return {
+            "forces": f"Curves of drag and lateral force over process time. The drag varies "
+            f"about {number(drag.mean)} N with a standard deviation of {number(drag.std)} N.",
+            "network_xy": "Contact network from above: cylinders between particles in contact, "
+            "thicker and darker where the normal force is larger, around the workpiece.",
+            "network_xz": "Contact network from the side: cylinders between particles in contact, "
+            "thicker and darker where the normal force is larger, from workpiece to bowl.",
+            "force_around_workpiece": f"Polar bars of the normal force around the workpiece: "
+            f"{number(sums.ahead_n.value)} N ahead, {number(sums.behind_n.value)} N behind.",
+            "force_depth": "Bars of the normal force per contact and of the total normal force "
+            "against depth below the settled surface; slope per contact "
+            f"{number(found.depth.slope_n_per_m.value)} N/m.",
+            "chains_peaks": f"Above, the drag magnitude over process time with {found.peaks.count} "
+            "marked peaks; below, the bottleneck force of the dominant path, on average "
+            f"{number(chains.dominant_bottleneck_mean_n)} N.",
+            _FROM_LOADING: "Map of normal force times sliding distance on the unrolled or "
+            "three-dimensional surface of the workpiece, with its profiles.",
+        }[name]
+    if isinstance(found, FillingFindings):
+        return "Falling curve of the mean kinetic energy per particle while the packing settles."
+    return "Force and upward velocity of the particle over time in each impact of the drop test."
+
+
+def _render(
+    sections: Sequence[Section],
+    cases: Sequence[ReportedCase],
+    table: pd.DataFrame,
+    missing: Sequence[MissingRun],
+    preview: str | None,
+) -> str:
     """The page: HTML that needs no other file and no network."""
     studies = [section.study for section in sections]
+    first = studies[0].process.case
     return render_page(
         "report/report.html.j2",
         title=", ".join(dict.fromkeys(study.process.case.study for study in studies)),
+        heading=first.title or first.study,
+        preview=preview,
         sections=sections,
+        cases=cases,
         network_pages=_network_pages(sections),
         missing=missing,
         runs=_engine_runs(studies),
-        overview=_overview(studies) if len(studies) > 1 else None,
+        overview=_overview(cases) if len(cases) > 1 else None,
         columns={str(name): table[name].tolist() for name in table},
         shown=_SHOWN,
         reliable_times=RELIABLE_TIMES,
+        laws=_laws(studies),
     )
+
+
+def _laws(studies: Sequence[StudyRuns]) -> list[str]:
+    """Sources of the laws that corrected any value, each once."""
+    corrected = [one for one in studies if one.values.corrected and one.extrapolated]
+    return list(dict.fromkeys(one.extrapolated.source for one in corrected if one.extrapolated))
 
 
 def _network_pages(sections: Sequence[Section]) -> list[str]:
@@ -214,17 +270,16 @@ def _engine_runs(studies: Sequence[StudyRuns]) -> list[ReportedRun[Findings]]:
     return [run for run in every.values() if run.case.output_of is None]
 
 
-def _overview(studies: Sequence[StudyRuns]) -> str:
+def _overview(cases: Sequence[ReportedCase]) -> str:
     """The mean drag of all cases as a figure; no other part of the page needs matplotlib."""
     from dragchain.figures.style import drawing, png
     from dragchain.report.run_figures import drag_of_cases
 
-    runs = [study.process for study in studies]
-    rows = [row for run in runs for row in run.findings.comparison]
+    rows = [row for one in cases for row in one.values.against]
     with drawing():
         figure = drag_of_cases(
-            [run.case.case or run.case.run for run in runs],
-            [run.findings.forces["drag_n"] for run in runs],
+            [one.name for one in cases],
+            [one.values.drag.shown for one in cases],
             list(dict.fromkeys((row.label, row.mean_n) for row in rows)),
         )
         return data_uri(png(figure))

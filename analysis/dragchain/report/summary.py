@@ -2,13 +2,18 @@
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import pandas as pd
 
-from dragchain.report.findings import Comparison, ProcessFindings
+from dragchain.report.cases import cases_of
+from dragchain.report.findings import ProcessFindings
 from dragchain.report.runs import StudyRuns
+from dragchain.report.values import Against
+from dragchain.run.basis import Standing
+from dragchain.run.case import AdvisedSettings
 from dragchain.statistics.correlated import MeanEstimate
+from dragchain.statistics.estimate import Estimate
 
 Cell = str | int | float | bool | None
 Row = dict[str, Cell]
@@ -17,16 +22,24 @@ Row = dict[str, Cell]
 
 def summary(studies: Sequence[StudyRuns]) -> pd.DataFrame:
     """The summary table; a number that there is none of is NaN."""
-    return pd.DataFrame([_summary_row(study) for study in studies])
+    said = {
+        study.process.case.run: f"{case.name}: {case.values.headline()}"
+        for case in cases_of(studies)
+        for study in case.studies
+    }
+    return pd.DataFrame([_summary_row(study, said[study.process.case.run]) for study in studies])
 
 
-def _summary_row(study: StudyRuns) -> Row:
+def _summary_row(study: StudyRuns, headline: str) -> Row:
     """The row of a process run."""
+    values = study.values
     case, found, record = study.process.case, study.process.findings, study.process.record
     return {
         "study": case.study,
         "case": case.case,
         "run": case.run,
+        "headline": headline,
+        "settings": " ".join(values.notes),
         **{input_column(name): _cell(value) for name, value in case.inputs.items()},
         **{f"fidelity_{name}": value for name, value in vars(case.fidelity).items()},
         "timestep_s": case.timestep_s,
@@ -35,14 +48,15 @@ def _summary_row(study: StudyRuns) -> Row:
         "wall_time_s": record.wall_time_s,
         "engine_version": record.engine_version,
         **_forces(found.forces),
-        **_comparisons(found.comparison),
-        "peak_count": found.peaks.count,
+        **_comparisons(values.against),
+        **{key: cell for one in values.standings for key, cell in _of_run(one)},
+        **_asked(case.asked),
         "peak_max_n": found.peaks.largest_n,
         **_wake(found),
         **_network(found),
         **_chains(found),
         **_upstream(study),
-        **_extrapolated(study),
+        **{key: cell for one in values.standings if one.corrected for key, cell in _corrected(one)},
     }
 
 
@@ -70,24 +84,56 @@ def _forces(forces: Mapping[str, MeanEstimate]) -> Row:
     return row
 
 
-def _comparisons(comparisons: Sequence[Comparison]) -> Row:
+def _comparisons(comparisons: Sequence[Against]) -> Row:
     row: Row = {}
     for against in comparisons:
-        name = f"drag_against_{against.label}"
-        row[f"{name}_percent"] = against.difference_percent
-        row[f"{name}_ci95_low_percent"] = against.ci95_low
-        row[f"{name}_ci95_high_percent"] = against.ci95_high
+        name, percent = f"drag_against_{against.label}", against.difference.over(0.01)
+        row[f"{name}_percent"] = percent.value
+        row[f"{name}_ci95_low_percent"] = percent.ci95_low
+        row[f"{name}_ci95_high_percent"] = percent.ci95_high
     return row
 
 
-def _extrapolated(study: StudyRuns) -> Row:
-    row: Row = {}
-    for found in study.extrapolated.quantities if study.extrapolated else ():
-        unit = f"_{found.unit.lower().replace('/', '_per_')}" if found.unit else ""
-        row[f"extrapolated_{found.name}{unit}"] = found.value
-        row[f"extrapolated_{found.name}_ci95_low{unit}"] = found.ci95_low
-        row[f"extrapolated_{found.name}_ci95_high{unit}"] = found.ci95_high
-    return row
+_NAMED_OTHERWISE = {
+    *("drag_mean", "drag_std", "lateral_mean", "vertical_mean", "ahead_behind"),
+    *("coordination_number", "mechanical_coordination_number", "chain_count", "chain_length"),
+    "path_bottleneck",
+}
+"""Quantities whose values of the run have columns from the findings."""
+
+
+def _of_run(one: Standing) -> Iterator[tuple[str, Cell]]:
+    """The value of the run, in process time, with its interval if it has one."""
+    if one.quantity.name not in _NAMED_OTHERWISE:
+        yield from _estimate(one.quantity.name, one.quantity.unit, one.run)
+
+
+def _corrected(one: Standing) -> Iterator[tuple[str, Cell]]:
+    """The value at the physical Young's modulus."""
+    yield from _estimate(f"extrapolated_{one.quantity.name}", one.quantity.unit, one.shown)
+
+
+def _estimate(name: str, unit: str, found: Estimate) -> Iterator[tuple[str, Cell]]:
+    end = "_" + unit.lower().replace("/", "_per_").replace(" ", "_") if unit else ""
+    end = end.replace("_1_per", "_per")
+    yield f"{name}{end}", found.value
+    if found.known:
+        yield f"{name}_ci95_low{end}", found.ci95_low
+        yield f"{name}_ci95_high{end}", found.ci95_high
+
+
+def _asked(asked: AdvisedSettings | None) -> Row:
+    """What the settings were chosen for, and the error that is expected of them."""
+    if asked is None:
+        return {}
+    return {
+        "asked_quantity": asked.quantity,
+        "asked_tolerance": asked.tolerance,
+        "expected_error": math.nan if asked.error is None else asked.error,
+        "expected_error_ci95_low": math.nan if asked.ci95_low is None else asked.ci95_low,
+        "expected_error_ci95_high": math.nan if asked.ci95_high is None else asked.ci95_high,
+        "expected_error_bound": math.nan if asked.bound is None else asked.bound,
+    }
 
 
 def _wake(found: ProcessFindings) -> Row:

@@ -153,9 +153,10 @@ class Case(Document):
     and ``statistics`` are None outside a process, ``restitution`` outside a drop test, ``settled``
     outside a filling. ``contact_moduli`` are those of a particle with a ``particle``, the ``bowl``
     and the ``workpiece``, ``numbers`` the dimensionless numbers of a process. ``superposed`` lists
-    the superposed motions, ``asked`` is the tolerance for which the settings were chosen, and
-    ``output_of`` the run from whose raw output a further workpiece is read. ``added_forces`` are
-    models of the contact law that add a normal force, such as cohesion.
+    the superposed motions, ``asked`` is the tolerance for which the settings were chosen,
+    ``unsafe_timestep`` why a step beyond the stable one was accepted, and ``output_of`` the run
+    from whose raw output a further workpiece is read. ``added_forces`` are models of the contact
+    law that add a normal force, such as cohesion.
     """
 
     made_by: ClassVar[str] = "dragdeck step render"
@@ -189,6 +190,7 @@ class Case(Document):
     versions: Mapping[str, str]
     asked: AdvisedSettings | None = None
     added_forces: tuple[str, ...] = ()
+    unsafe_timestep: str | None = None
 
     @model_validator(mode="after")
     def _of_its_scene(self) -> Self:

@@ -17,6 +17,26 @@ def drag_start_s(case: Case) -> float:
     return drag_phase(case).start_step * case.timestep_s
 
 
+def process_time(simulated_s: Floats, case: Case) -> Floats:
+    """Process time of simulated times: from the start of the drag, at the speed of the process.
+
+    A workpiece that is f times as fast takes 1/f of the time for the same path.
+
+    Parameters
+    ----------
+    simulated_s : (N,) ndarray
+        Simulated times, s.
+    case : Case
+        The case, of a process.
+
+    Returns
+    -------
+    (N,) ndarray
+        Process times, s.
+    """
+    return np.asarray((simulated_s - drag_start_s(case)) * case.fidelity.speed_factor)
+
+
 T = TypeVar("T")
 
 

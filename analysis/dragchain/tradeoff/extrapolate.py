@@ -1,10 +1,9 @@
-"""Extrapolate the quantities of one run to the physical Young's modulus."""
+"""The quantities of one run, extrapolated to the physical Young's modulus where a law applies."""
 
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from dragchain.errors import TableError
 from dragchain.report.extrapolated import FILE, Extrapolated, ExtrapolatedQuantity
 from dragchain.run.case import load_case
 from dragchain.tradeoff.path_blocks import quantities_along
@@ -19,7 +18,10 @@ _SCENE_SIZE = "particles"
 
 
 def extrapolate_run(run_dir: Path, record: Path) -> None:
-    """Write ``extrapolated.json`` of a run: every quantity that the record supports.
+    """Write ``extrapolated.json`` of a run: its quantities, and what the laws make of them.
+
+    No law applies to a run at the physical modulus, and none to a workpiece that is faster than
+    the study says: the laws were measured at a study's own speed.
 
     Parameters
     ----------
@@ -33,27 +35,27 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
     DocumentError
         If the record or the run's case cannot be used.
     TableError
-        If a table is missing, or the workpiece is faster than the study says: the laws were
-        measured at a study's own speed.
+        If a table is missing.
     """
     case, known = load_case(run_dir), StiffnessRecord.read(record)
-    scale, factor = case.fidelity.youngs_modulus_scale, case.fidelity.speed_factor
-    if factor != 1.0:
-        raise TableError(
-            f"{case.run}: the laws do not apply to a workpiece {factor:g} times as fast"
-        )
+    scale = case.fidelity.youngs_modulus_scale
+    applies = scale < 1.0 and case.fidelity.speed_factor == 1.0
     along = quantities_along(run_dir, case)
     diameters = along.arc_m / (2.0 * case.media.radius_mean_m)
     values = along.values()
     found = []
     for quantity in QUANTITIES:
-        entry, measured = known.laws.get(quantity.name), values.get(quantity.name, 0.0)
-        if entry is None or measured == 0.0 or not case.numbers.get(entry.friction):
-            continue  # the laws are written in the logarithm of a coefficient of friction
-        guess = entry.at_physical_modulus(measured, case.numbers, scale, diameters)
-        half = guess.half_width(entry.quantile)
-        ends = [math.copysign(math.exp(guess.logarithm + s * half), measured) for s in (-1, 0, 1)]
-        low, value, high = sorted(ends)
+        entry, measured = known.laws.get(quantity.name), values.get(quantity.name, math.nan)
+        if not math.isfinite(measured):
+            continue
+        low = value = high = None
+        # the laws are written in the logarithm of a coefficient of friction
+        if applies and entry and measured and case.numbers.get(entry.friction):
+            guess = entry.at_physical_modulus(measured, case.numbers, scale, diameters)
+            half = guess.half_width(entry.quantile)
+            low, value, high = sorted(
+                math.copysign(math.exp(guess.logarithm + s * half), measured) for s in (-1, 0, 1)
+            )
         found.append(
             ExtrapolatedQuantity(
                 name=quantity.name,
@@ -68,7 +70,7 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
     Extrapolated(
         youngs_modulus_scale=scale,
         source=f"{len(known.scenes)} scenes, measured {known.measured}",
-        outside=tuple(_outside(case.numbers, known)),
+        outside=tuple(_outside(case.numbers, known)) if applies else (),
         quantities=tuple(found),
     ).write(run_dir / FILE)
 

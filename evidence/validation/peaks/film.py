@@ -23,7 +23,7 @@ from dragchain.figures.rendering import check_rendering
 from dragchain.figures.style import COLOURS, drawing, force_map, png
 from dragchain.network.frame import read_frames
 from dragchain.run.case import Case, load_case
-from dragchain.run.kinematics import drag_start_s
+from dragchain.run.kinematics import process_time
 from dragchain.tables.by_step import read_table
 from dragchain.tables.workpiece_pose import workpiece_places
 
@@ -81,9 +81,10 @@ def _peak_and_quiet(run_dir: Path) -> PeakAndQuiet:
     """
     case = load_case(run_dir)
     samples = read_counted(run_dir, ("time_s", "drag_n"))
-    time_s = samples["time_s"].to_numpy(np.float64) - drag_start_s(case)
+    time_s = process_time(samples["time_s"].to_numpy(np.float64), case)
     drag = samples["drag_n"].to_numpy(np.float64)
-    peaks = find_drag_peaks(time_s, drag, min_separation_s=peak_separation_s(case))
+    separation_s = case.fidelity.speed_factor * peak_separation_s(case)
+    peaks = find_drag_peaks(time_s, drag, min_separation_s=separation_s)
     if not len(peaks.index):
         raise TableError(f"{run_dir}: the drag has no peak to show; drag for longer")
     wide = max(1, round(_QUIET_S / float(np.median(np.diff(time_s)))))
@@ -204,9 +205,9 @@ def film_steps(steps: Ints, process_s: Floats, peak_s: float, pictures: int = PI
 
 
 def _scenes(moments: PeakAndQuiet, pictures: int) -> list[Scene]:
-    run_dir, start_s = moments.run_dir, drag_start_s(moments.case)
+    run_dir = moments.run_dir
     network = read_table(run_dir / "tables" / "network.parquet", ["step", "time_s"])
-    process_s = network["time_s"].to_numpy(np.float64) - start_s
+    process_s = process_time(network["time_s"].to_numpy(np.float64), moments.case)
     steps = film_steps(network["step"].to_numpy(np.int64), process_s, moments.peak_s, pictures)
     if not steps.size:
         raise TableError(
@@ -216,7 +217,7 @@ def _scenes(moments: PeakAndQuiet, pictures: int) -> list[Scene]:
     wanted, place = set(steps.tolist()), workpiece_places(run_dir, moments.case)
     frames = read_frames(run_dir, (int(steps[0]), int(steps[-1])))
     chosen = (frame for frame in frames if frame.step in wanted)
-    return [scene.scene_of(frame, place, start_s) for frame in chosen]
+    return [scene.scene_of(frame, place, moments.case) for frame in chosen]
 
 
 def _picture(moments: PeakAndQuiet, shown: Scene, largest_n: float) -> Image.Image:

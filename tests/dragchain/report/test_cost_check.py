@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from report_files import PICTURES, case_json, make_run, page_of, process_findings, run_json
+from report_files import ASKED, PICTURES, case_json, make_run, page_of, process_findings, run_json
 
 from dragchain.errors import DocumentError
 from dragchain.report.cost_check import (
@@ -22,14 +22,6 @@ from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity
 from dragchain.report.study_report import write_report
 from dragchain.run.case import AdvisedSettings, Case
 from dragchain.run.completeness import RunRecord
-
-ASKED = {
-    "tolerance": 0.05, "quantity": "drag_mean", "label": "mean drag", "held_to": 0.025,
-    "error": 0.012, "ci95_low": -0.018, "ci95_high": 0.042, "bound": 0.037, "relative_cost": 0.04,
-    "half_width": 0.03, "outside": ["depth over particle diameter 3 is outside of 6 to 8"],
-    "fallback": None, "source": "measured 2026-01-02 on small, plan made",
-}  # fmt: skip
-
 
 RECORD = RunRecord.model_validate(run_json())
 
@@ -140,8 +132,11 @@ def test_an_extrapolated_answer_stands_beside_the_value_of_the_run(tmp_path: Pat
     write_report(tmp_path, [folder])
     words = " ".join(page_of(tmp_path).words.split())
     assert "Values at the physical Young's modulus" in words
-    assert "contacts on the workpiece 32.1 25.6 24.2 to 27.4" in words
+    assert "contacts on the workpiece at a time 25.6 (24.2 to 27.4) 32.1 corrected" in words
+    assert "through 25.6 contacts at a time" in words
+    assert "this run: 32.1" in words
     assert "25.6 (24.2 to 27.4) 6.2 %" in words  # in the table of tolerances
     row = pd.read_csv(tmp_path / "summary.csv").iloc[0]
-    assert row["extrapolated_workpiece_contacts"] == 25.6
-    assert row["extrapolated_workpiece_contacts_ci95_high"] == 27.4
+    assert row["extrapolated_workpiece_contacts"] == pytest.approx(25.6)
+    assert row["extrapolated_workpiece_contacts_ci95_high"] == pytest.approx(27.4)
+    assert row["workpiece_contacts"] == 32.1

@@ -2,14 +2,27 @@
 
 import pytest
 
-from dragchain.report.notation import fixed, fraction, interval, measured, number, percent
+from dragchain.report.notation import (
+    MINUS,
+    fixed,
+    fraction,
+    interval,
+    measured,
+    number,
+    percent,
+    with_interval,
+)
+from dragchain.statistics.estimate import Estimate
 
 
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (-2.626, "\N{MINUS SIGN}2.63"), (0.0, "0"), (1234.5, "1234"), (160000, "160 000"),
-        (2.5e-5, "2.5e-05"), (None, "\N{EN DASH}"), (float("nan"), "\N{EN DASH}"),
+        (-2.626, "\N{MINUS SIGN}2.63"), (0.0, "0"), (1234.5, "1234"),
+        (160000, "160\N{NARROW NO-BREAK SPACE}000"),
+        (2727567.0, "2\N{NARROW NO-BREAK SPACE}727\N{NARROW NO-BREAK SPACE}567"),
+        (1.66e-5, "1.66 \N{MULTIPLICATION SIGN} 10⁻⁵"), (None, "\N{EN DASH}"),
+        (float("nan"), "\N{EN DASH}"),
         (float("inf"), "\N{EN DASH}"), ("draft", "draft"), (True, "True"),
     ],
 )  # fmt: skip
@@ -26,6 +39,22 @@ def test_numbers_read_well(value: object, text: str) -> None:
 )  # fmt: skip
 def test_measured_numbers_keep_their_zeros(value: object, text: str) -> None:
     assert measured(value) == text
+
+
+@pytest.mark.parametrize(
+    ("ends", "text"),
+    [
+        ((-2.641, -2.784, -2.502), f"{MINUS}2.64 N ({MINUS}2.78 to {MINUS}2.50)"),
+        ((23.31, 18.5, 29.36), "23.3 N (18.5 to 29.4)"),
+        ((1.713e-5, 1.288e-5, 2.279e-5), "1.71 (1.29 to 2.28) \N{MULTIPLICATION SIGN} 10⁻⁵ N"),
+        ((38094.5, 33627.0, 42455.0), "38\u202f094 N (33\u202f627 to 42\u202f455)"),
+        ((0.7, float("nan"), float("nan")), "0.700 N"), ((4.0, 4.0, 4.0), "4.00 N"),
+    ],
+)  # fmt: skip
+def test_a_value_has_the_decimals_of_its_interval(
+    ends: tuple[float, float, float], text: str
+) -> None:
+    assert with_interval(Estimate(*ends), "N") == text
 
 
 def test_percent_carries_its_sign() -> None:

@@ -40,6 +40,7 @@ from dragchain.report.run_figures import drag_of_cases, energy_ratio, write_figu
 from dragchain.run.case import Case, PublishedDrag, Reference, load_case
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean
+from dragchain.statistics.estimate import Estimate
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
 
@@ -340,7 +341,7 @@ def test_a_drop_is_drawn_with_its_restitution(tmp_path: Path) -> None:
 
 
 def test_overview_has_a_row_a_case() -> None:
-    force = estimate_mean(np.array([-1.8, -2.2] * 4))
+    force = Estimate(-2.0, -2.2, -1.8)
     figure = drag_of_cases(["a", "b"], [force, force], [("measured", -2.59)])
     axes = figure.axes[0]
     assert [label.get_text() for label in axes.get_yticklabels()] == ["a", "b"]

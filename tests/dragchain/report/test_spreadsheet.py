@@ -7,7 +7,10 @@ import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
+from report_files import PICTURES, case_json, make_run, process_findings, write_quantities
 
+from dragchain.report.cases import cases_of
+from dragchain.report.runs import read_study
 from dragchain.report.spreadsheet import definitions, summary_workbook, workbook
 from dragchain.run.case import Assumption
 
@@ -49,7 +52,9 @@ def test_cells_keep_their_values_and_types() -> None:
         ("input_gravity_m_s2", "m/s2", "Input gravity (m/s2)"),
         ("input_materials_x_youngs_modulus_pa", "Pa", "Input materials x Young's modulus (Pa)"),
         ("steps_per_s", "1/s", "Steps (1/s)"),
-        ("peak_count", "1", "Peak count"),
+        ("peaks_per_m", "1/m", "Peaks (1/m)"),
+        ("force_slide_n_m_per_m", "N m/m", "Force slide (N m/m)"),
+        ("coordination_number", "1", "Coordination number"),
     ],
 )  # fmt: skip
 def test_headings_are_words_with_units(column: str, unit: str, heading: str) -> None:
@@ -63,12 +68,15 @@ def test_a_column_that_nobody_describes_has_no_meaning() -> None:
     assert found.iloc[:, 2:].to_numpy().tolist() == [["m", ""], ["", ""]]
 
 
-def test_the_three_sheets_say_what_there_is(tmp_path: Path) -> None:
+def test_the_sheets_say_what_there_is(tmp_path: Path) -> None:
     table = pd.DataFrame({"case": ["=a", "b"], "drag_mean_n": [-2.5, math.nan]})
     assumed = {"run-1": [Assumption(field="bowl.radius_m", value=0.04, why="+plausible")]}
-    book = read(summary_workbook(table, assumed))
-    assert book.sheetnames == ["Summary", "Definitions", "Assumptions"]
-    rows = [list(sheet.iter_rows(values_only=True)) for sheet in book]
+    folder = make_run(
+        tmp_path, case_json("process", "workpiece-1"), process_findings(-2.5), PICTURES
+    )
+    book = read(summary_workbook(table, assumed, cases_of([read_study(folder)])))
+    assert book.sheetnames == ["Overview", "Summary", "Definitions", "Assumptions"]
+    rows = [list(sheet.iter_rows(values_only=True)) for sheet in book][1:]
     assert rows[0] == [("Case", "Drag mean (N)"), ("=a", -2.5), ("b", None)]
     assert [row[:3] for row in rows[1][1:]] == [
         ("Case", "case", ""), ("Drag mean (N)", "drag_mean_n", "N")
@@ -76,3 +84,20 @@ def test_the_three_sheets_say_what_there_is(tmp_path: Path) -> None:
     assert rows[2] == [
         ("run", "field", "value", "reason"), ("run-1", "bowl.radius_m", "0.04", "+plausible")
     ]  # fmt: skip
+
+
+def test_the_overview_has_a_row_per_quantity_with_formats(tmp_path: Path) -> None:
+    case = case_json("process", "workpiece-1")
+    folder = make_run(tmp_path, case, process_findings(-2.5), PICTURES)
+    write_quantities(folder, 0.01, corrected=0.8)
+    book = read(summary_workbook(pd.DataFrame({"a": [1]}), {}, cases_of([read_study(folder)])))
+    rows = {row[0].value: row for row in book["Overview"].iter_rows()}
+    assert [cell.value for cell in rows["quantity"]][2:] == [
+        f"10 mm <workpiece>: {head}"
+        for head in ("process", "95 % CI low", "95 % CI high", "run", "basis")
+    ]
+    assert "diameter 10 mm" in str(rows["Workpiece"][2].value)
+    drag = rows["mean drag"]
+    assert [round(cell.value, 6) for cell in drag[2:6]] == [-2.0, -2.2, -1.8, -2.5]
+    assert drag[6].value == "corrected to the physical Young's modulus"
+    assert drag[2].number_format == "0.000"

@@ -1,6 +1,9 @@
 import base64
+import html
 import json
 import re
+import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +23,13 @@ from report_files import (
     particles_kept,
     process_findings,
     run_json,
+    write_quantities,
 )
 
 from dragchain.errors import MissingRunsError, TableError
 from dragchain.loading.write import write_loading
-from dragchain.report.findings import FIGURES
+from dragchain.report.findings import FIGURES, FILE
+from dragchain.report.numbers import main_numbers
 from dragchain.report.study_report import write_report
 from dragchain.report.summary import input_column
 from dragchain.run.completeness import RunRecord, refusal
@@ -54,7 +59,7 @@ def test_summary_has_the_numbers_of_run_filling_and_drop(process: Path, tmp_path
     assert row["fidelity_youngs_modulus_scale"] == 0.01
     assert row["drag_mean_n"] == -2.5
     assert row["drag_ci95_low_n"] == -2.6
-    assert row["drag_against_measured_percent"] == -3.47
+    assert row["drag_against_experiment_percent"] == pytest.approx(100 * (2.5 / 2.59 - 1))
     assert row["peak_max_n"] == -3.9
     assert row["bed_height_m"] == 0.0703
     assert row["restitution_effective"] == 0.71
@@ -95,12 +100,11 @@ def test_page_shows_the_contacts_on_the_workpiece_if_they_are_known(
     page = page_of(tmp_path / "with")
     assert page.open == []
     assert len(page.images) == len(PICTURES) + 2
-    html = (tmp_path / "with" / "report.html").read_text(encoding="utf-8")
-    words = " ".join(re.sub("<[^>]+>", " ", html).split())
-    assert "impact 2 0.33 % (" in words
-    assert "resting 1 17 % (" in words
-    assert "normal impulse (N s) 0.856" in words
-    assert "friction work (J) 0.00200" in words
+    words = words_of((tmp_path / "with" / "report.html").read_text(encoding="utf-8"))
+    assert "impact 66.7 0.33 % (" in words  # two events over a path of 30 mm
+    assert "resting 33.3 17 % (" in words
+    assert "normal impulse per metre of path (N s/m) 28.5" in words
+    assert "friction work per metre of path (J/m)" in words
 
 
 def test_page_says_how_many_contacts_were_corrected(process: Path, tmp_path: Path) -> None:
@@ -118,7 +122,7 @@ def test_page_says_what_counts(process: Path, tmp_path: Path) -> None:
     write_report(tmp_path, [process])
     words = page_of(tmp_path).words
     for expected in (
-        "10 mm <workpiece>", "\N{MINUS SIGN}3.5 %", "\N{MINUS SIGN}7.3 % to +0.4 %", "assumed",
+        "10 mm <workpiece>", "3.5 % less", "\N{MINUS SIGN}7.3 % to +0.4 %", "assumed",
         "a plausible fraction", "bowl.radius_m", "Engine 3.8", "no particle lost", "passed",
         "a paper",
         "70.3 mm", "Peters et al. (2005)", "Thornton 2000",
@@ -287,6 +291,175 @@ def test_input_columns_are_names() -> None:
 
 def test_every_figure_of_a_run_has_a_caption(process: Path, tmp_path: Path) -> None:
     write_report(tmp_path, [process])
-    html = (tmp_path / "report.html").read_text(encoding="utf-8")
-    shown = re.findall(r'<img src="[^"]*" alt="(\w+)"><figcaption>[A-Z]', html)
-    assert set(FIGURES["process"]) | set(FIGURES["drop_test"]) <= set(shown)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    shown = re.findall(r'<img src="[^"]*" alt="([^"]+)"><figcaption>[A-Z]', page)
+    assert len(shown) == len(FIGURES["process"]) + len(FIGURES["drop_test"])
+    assert len(set(shown)) == len(shown)
+    assert all(len(text.split()) > 8 for text in shown)  # what is seen, not a file's name
+
+
+# --- what the page says follows from the settings ---------------------------------------------
+
+
+def with_settings(process: Path, **settings: float) -> Path:
+    """The process run with other settings and with its loading."""
+    case = json.loads((process / "case.json").read_text())
+    case["fidelity"] |= settings
+    (process / "case.json").write_text(json.dumps(case))
+    made = write_run(process.parent / "made", made_contacts())
+    write_loading(made)
+    (process / "tables/loading.json").write_bytes((made / "tables/loading.json").read_bytes())
+    shutil.rmtree(made)
+    return process
+
+
+def summary_box(out: Path) -> str:
+    """The words of the first screen."""
+    page = (out / "report.html").read_text(encoding="utf-8")
+    return words_of(page[page.index('<div class="box says">') : page.index("<h2 id=")])
+
+
+def words_of(page: str) -> str:
+    return " ".join(html.unescape(re.sub("<[^>]+>", " ", page)).split())
+
+
+def test_a_faster_run_says_so_first_and_gives_no_number_of_contacts(
+    process: Path, tmp_path: Path
+) -> None:
+    """Fewer and larger contact forces, not more and smaller; times are those of the process."""
+    run = with_settings(process, youngs_modulus_scale=1.0, speed_factor=5.0)
+    write_quantities(run, 1.0)
+    write_report(tmp_path, [run])
+    words = summary_box(tmp_path)
+    assert "10 mm/s; simulated at 50 mm/s" not in words  # 10 mm/s are the simulated ones here
+    assert "2 mm/s; simulated at 10 mm/s" in words
+    assert "fewer and larger contact forces" in words
+    assert "more and smaller" not in words
+    assert "contacts</b> at a time" not in (tmp_path / "report.html").read_text()
+    assert "not available contacts on the workpiece at a time this run:" in words
+    row = pd.read_csv(tmp_path / "summary.csv").iloc[0]
+    assert "contacts on the workpiece at a time: not available" in row["headline"]
+    assert row["normal_impulse_n_s_per_m"] == pytest.approx(5 * 0.856 / 0.03, rel=1e-3)
+
+
+def test_a_reduced_modulus_gives_the_corrected_number_of_contacts_first(
+    process: Path, tmp_path: Path
+) -> None:
+    run = with_settings(process, youngs_modulus_scale=0.01)
+    write_quantities(run, 0.01, corrected=0.8)
+    write_report(tmp_path, [run])
+    words = summary_box(tmp_path)
+    assert "more and smaller contact forces" in words
+    assert "fewer and larger" not in words
+    own = float(pd.read_csv(tmp_path / "summary.csv").iloc[0]["workpiece_contacts"])
+    assert f"through {0.8 * own:.2f} contacts at a time" in words
+    assert "mean force of 2.00 N" in words and "this run: \N{MINUS SIGN}2.50 N" in words
+    assert (
+        main_numbers(tmp_path)
+        .splitlines()[1]
+        .startswith(
+            "  10 mm <workpiece>: mean drag -2.00 N (95 % CI -2.20 to -1.80 N) at the physical"
+        )
+    )
+
+
+def test_a_reduced_modulus_without_a_law_is_not_corrected_and_says_so(
+    process: Path, tmp_path: Path
+) -> None:
+    run = with_settings(process, youngs_modulus_scale=1e-4)
+    write_report(tmp_path, [run])
+    words = summary_box(tmp_path)
+    assert "not available contacts on the workpiece at a time" in words
+    assert "not corrected for Young's modulus \N{MULTIPLICATION SIGN} 0.0001" in words
+    assert "mean force of 2.50 N in this run" in words
+
+
+def test_at_the_settings_of_the_process_all_is_as_measured(process: Path, tmp_path: Path) -> None:
+    run = with_settings(process, youngs_modulus_scale=1.0)
+    write_quantities(run, 1.0)
+    write_report(tmp_path, [run])
+    words = page_of(tmp_path).words
+    assert "not available" not in summary_box(tmp_path)
+    assert "this run" not in words[words.index("Values") : words.index("Force on the workpiece")]
+
+
+def test_the_first_screen_says_what_was_simulated(process: Path, tmp_path: Path) -> None:
+    case = json.loads((process / "case.json").read_text())
+    case |= {"title": "A rod in <ceramic>"}
+    case["inputs"] |= {"workpiece.material": "steel", "motion.path.kind": "circle"}
+    (process / "case.json").write_text(json.dumps(case))
+    (tmp_path / "set_up.png").write_bytes(PNG)
+    write_report(tmp_path, [process], preview=tmp_path / "set_up.png")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<h1>A rod in &lt;ceramic&gt;</h1>" in page
+    assert page.index("seen obliquely") < page.index("<h2 id=")
+    words = summary_box(tmp_path)
+    for expected in (
+        "Workpiece steel cylinder, diameter 10 mm", "circle of radius 20 mm; 15 mm long",
+        "immersed 50 mm", "1422 spheres; diameter 6.54 mm", "filled to 70.3 mm",
+        "one packing (seed)",
+    ):  # fmt: skip
+        assert expected in words
+
+
+def test_each_run_shows_its_own_settings(process: Path, tmp_path: Path) -> None:
+    drop = process.parents[1] / "drop_test/drop-1/case.json"
+    case = json.loads(drop.read_text())
+    case["fidelity"] |= {"youngs_modulus_scale": 1.0, "timestep_fraction": 0.02}
+    drop.write_text(json.dumps(case))
+    write_report(tmp_path, [process])
+    words = words_of((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert "drop-1 E \N{MULTIPLICATION SIGN} 1, time step 0.02 of the Rayleigh time 2.5" in words
+    assert (
+        "workpiece-1 E \N{MULTIPLICATION SIGN} 0.01, time step 0.77 of the Rayleigh time," in words
+    )
+
+
+def test_forces_of_a_short_series_are_marked_everywhere(process: Path, tmp_path: Path) -> None:
+    findings = process_findings()
+    short = replace(findings.forces["vertical_n"], reliable=False, effective_samples=2.7)
+    forces = {**findings.forces, "vertical_n": short}
+    findings.model_copy(update={"forces": forces}).write(process / FILE)
+    write_report(tmp_path, [process])
+    words = page_of(tmp_path).words
+    assert "2.7 (too few)" in words
+    row = words[words.index("mean vertical force (N)") :]
+    assert "too few effective samples" in row[:200]
+
+
+# --- several packings -------------------------------------------------------------------------
+
+
+@pytest.fixture
+def packings(process: Path) -> list[Path]:
+    """Three runs that differ in their seeds alone, and one of another case."""
+    found = []
+    for seed, drag in enumerate((-2.4, -2.5, -2.9), 1):
+        inputs = {"media.count": 1422, "seed": seed}
+        case = case_json("process", f"run-{seed}", case=f"draft_seed-{seed}", inputs=inputs)
+        found.append(make_run(process.parents[2], case, process_findings(drag), PICTURES))
+    other = case_json("process", "run-9", case="other", inputs={"media.count": 900, "seed": 1})
+    return [*found, make_run(process.parents[2], other, process_findings(-1.0), PICTURES)]
+
+
+def test_packings_of_one_case_have_one_row_and_one_headline(
+    packings: list[Path], tmp_path: Path
+) -> None:
+    """Mean -2.6 with a standard error of 0.153: Student's t with 2 degrees of freedom, 4.303."""
+    write_report(tmp_path, packings[:3])
+    words = summary_box(tmp_path)
+    low, high = (f"\N{MINUS SIGN}{value:.2f}" for value in (2.6 + 0.6572, 2.6 - 0.6572))
+    assert "mean force of 2.60 N" in words
+    assert f"mean drag , 95 % CI {low} to {high}" in words
+    assert "Means over 3 packings (seeds)" in words
+    table = pd.read_csv(tmp_path / "summary.csv")
+    assert len(table) == 3 and table["headline"].nunique() == 1
+    assert main_numbers(tmp_path).count("mean drag") == 1
+
+
+def test_packings_of_another_case_are_apart(packings: list[Path], tmp_path: Path) -> None:
+    write_report(tmp_path, packings)
+    words = words_of((tmp_path / "report.html").read_text(encoding="utf-8"))
+    table = words[words.rindex("Drag by case") : words.rindex("Packings")]
+    assert re.findall(r"\b(draft|other) (\d)", table) == [("draft", "3"), ("other", "1")]
+    assert main_numbers(tmp_path).count("mean drag") == 2

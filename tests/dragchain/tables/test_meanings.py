@@ -1,4 +1,5 @@
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -7,12 +8,23 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from finished_runs import write_finished_run
-from report_files import DROP, FILLING, PICTURES, case_json, make_run, process_findings
+from loading_files import made_contacts, write_run
+from report_files import (
+    ASKED,
+    DROP,
+    FILLING,
+    PICTURES,
+    case_json,
+    make_run,
+    process_findings,
+    write_quantities,
+)
 from tiny_run_files import RADIUS_M, Raw
 from tiny_run_files import case_json as tiny_case
 
 from dragchain import write_tables
 from dragchain.loading.samples import BODY as BODY_IMPULSE
+from dragchain.loading.write import write_loading
 from dragchain.report.study_report import write_report
 from dragchain.tables import parquet
 from dragchain.tables.columns import BODY
@@ -47,8 +59,14 @@ def write_summary(results: Path) -> None:
     make_run(results, case_json("filling", "filling-1"), FILLING, [])
     make_run(results, case_json("drop_test", "drop-1"), DROP, ["drop_test"])
     upstream = {"filling": "filling-1", "drop_test": "drop-1"}
-    case = case_json("process", "workpiece-1", upstream=upstream)
-    write_report(results / "report", [make_run(results, case, process_findings(), PICTURES)])
+    case = case_json("process", "workpiece-1", upstream=upstream, asked=ASKED)
+    run = make_run(results, case, process_findings(), PICTURES)
+    write_quantities(run, 0.01, corrected=0.8)
+    made = write_run(results / "made", made_contacts())
+    write_loading(made)
+    (run / "tables/loading.json").write_bytes((made / "tables/loading.json").read_bytes())
+    shutil.rmtree(made)
+    write_report(results / "report", [run])
 
 
 def write_all(folder: Path) -> dict[str, Path]:

@@ -5,6 +5,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -277,7 +278,7 @@ def test_a_small_change_of_depth_does_not_change_the_cost_tenfold(
     ]
     assert not found[0].outside and found[-1].outside
     costs = [one.chosen.relative_cost for one in found]
-    assert all(0.1 < one / other < 10 for one, other in zip(costs, costs[1:], strict=False))
+    assert all(0.1 < one / other < 10 for one, other in pairwise(costs))
     last = found[-1].chosen
     assert last.extrapolated or last.fidelity.youngs_modulus_scale == 1
 

@@ -17,6 +17,7 @@ from dragdeck.preview.views import COLOURS, View, views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from trimesh import Trimesh
 
 _DASHES = {"plunge": (0, (1, 1.2)), "approach": (0, (4, 1.5)), "drag": "solid"}
@@ -42,13 +43,33 @@ def picture(layout: Layout, swept: Sequence["Trimesh"], title: str, refused: boo
     colour = COLOURS["refused" if refused else "ink"]
     figure.suptitle(title, fontsize=12, color=colour, parse_math=False)
     layers = list(_layers(layout, swept))
-    for axes, view in zip(
-        figure.subplots(2, 2).flat, views(layout.workpieces[0].direction_rad), strict=True
-    ):
+    for axes, view in zip(figure.subplots(2, 2).flat, _views(layout), strict=True):
         _draw(axes, view, layout, layers)
     handles, names = figure.axes[0].get_legend_handles_labels()
     known = dict(zip(names, handles, strict=True))
     figure.legend(known.values(), known, loc="outside lower center", ncols=7, frameon=False)
+    return _png(figure)
+
+
+def small_picture(layout: Layout, swept: Sequence["Trimesh"]) -> bytes:
+    """Draw a layout obliquely from above, without words, as PNG: for the report on its runs."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(3.2, 2.9), dpi=150)
+    _draw(
+        figure.add_axes((0.0, 0.0, 1.0, 1.0)),
+        _views(layout)[-1],
+        layout,
+        list(_layers(layout, swept)),
+    )
+    return _png(figure)
+
+
+def _views(layout: Layout) -> list[View]:
+    return views(layout.workpieces[0].direction_rad)
+
+
+def _png(figure: "Figure") -> bytes:
     content = io.BytesIO()
     figure.savefig(content, format="png")
     return content.getvalue()

@@ -1,0 +1,210 @@
+"""The quantities of a process run, each with what it says of the process."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from dragchain.loading.document import Loading
+from dragchain.report.extrapolated import Extrapolated
+from dragchain.report.findings import ProcessFindings
+from dragchain.run.basis import QUANTITIES, Basis, Standing, judge, notes
+from dragchain.run.case import Case
+from dragchain.run.reference import reference_drags
+from dragchain.statistics.correlated import MeanEstimate
+from dragchain.statistics.estimate import Estimate, mean_of
+
+_FORCES = {"drag_mean": "drag_n", "lateral_mean": "lateral_n", "vertical_mean": "vertical_n"}
+_PER_METRE = {
+    "force_slide": "force_slide_n_m",
+    "sliding_distance": "sliding_m",
+    "friction_work": "friction_work_j",
+    "workpiece_work": "workpiece_work_j",
+    "normal_impulse": "normal_impulse_n_s",
+    "events": "events",
+}
+
+
+@dataclass(frozen=True)
+class Against:
+    """A published mean drag, and the relative difference of the simulated one from it."""
+
+    label: str
+    source: str
+    mean_n: float
+    std_n: float | None
+    difference: Estimate
+
+
+@dataclass(frozen=True)
+class Values:
+    """The quantities of a case in the order of the registry.
+
+    Attributes
+    ----------
+    case : Case
+    standings : tuple of Standing
+    packings : int
+        Number of packings (seeds) that the values are means of.
+    """
+
+    case: Case
+    standings: tuple[Standing, ...]
+    packings: int = 1
+
+    def of(self, name: str) -> Standing | None:
+        """A quantity by its name, None if the run does not give it."""
+        return next((one for one in self.standings if one.quantity.name == name), None)
+
+    @property
+    def drag(self) -> Standing:
+        """The mean drag."""
+        found = self.of("drag_mean")
+        assert found is not None
+        return found
+
+    @property
+    def adjusted(self) -> bool:
+        """Whether any value differs from the run's, or is missing."""
+        return any(one.value != one.run for one in self.standings)
+
+    @property
+    def corrected(self) -> bool:
+        """Whether any value is corrected to the physical Young's modulus."""
+        return any(one.corrected for one in self.standings)
+
+    @cached_property
+    def notes(self) -> list[str]:
+        """What each setting does to the numbers, one sentence each."""
+        return [*notes(self.case), *_of_packings(self)]
+
+    @cached_property
+    def against(self) -> list[Against]:
+        """The mean drag beside the published ones."""
+        return [
+            Against(one.label, one.source, one.mean_n, one.std_n, one.difference(self.drag.shown))
+            for one in reference_drags(self.case.reference)
+        ]
+
+    def headline(self) -> str:
+        """The main numbers in one line of plain text."""
+        shown = (self.drag, self.of("workpiece_contacts"))
+        return "; ".join(_plain(one) for one in shown if one)
+
+
+def values_of(
+    case: Case, found: ProcessFindings, loading: Loading | None, extrapolated: Extrapolated | None
+) -> Values:
+    """The quantities of a process run.
+
+    Parameters
+    ----------
+    case : Case
+    found : ProcessFindings
+    loading : Loading or None
+        Content of ``loading.json``, if it was made.
+    extrapolated : Extrapolated or None
+        Content of ``extrapolated.json``, if it was made.
+    """
+    own = dict(_own(case, found, loading, extrapolated))
+    standings = []
+    for quantity in QUANTITIES:
+        if quantity.name in own:
+            force = found.forces.get(_FORCES.get(quantity.name, ""))
+            law = _factor(quantity.correction, extrapolated)
+            reliable = force is None or force.reliable
+            standings.append(judge(quantity, own[quantity.name], case, law, reliable))
+    return Values(case, tuple(standings))
+
+
+def _own(
+    case: Case, found: ProcessFindings, loading: Loading | None, extrapolated: Extrapolated | None
+) -> Iterator[tuple[str, Estimate]]:
+    """The values of the run in simulated time, later ones instead of earlier ones."""
+    for one in extrapolated.quantities if extrapolated else ():
+        yield one.name, Estimate(one.measured, math.nan, math.nan)
+    for name, force in _FORCES.items():
+        yield name, of_mean(found.forces[force])
+    yield "drag_std", Estimate(found.forces["drag_n"].std, math.nan, math.nan)
+    yield "ahead_behind", found.ahead_behind.ratio
+    yield "chain_count", Estimate(found.chains.peters_per_frame, math.nan, math.nan)
+    yield "chain_length", Estimate(found.chains.peters_particles_mean, math.nan, math.nan)
+    for name in ("coordination_number", "mechanical_coordination_number"):
+        if name in found.network:
+            yield name, Estimate(found.network[name], math.nan, math.nan)
+    if loading is not None:
+        yield "workpiece_contacts", loading.mean_contacts
+        for name, key in _PER_METRE.items():
+            yield name, loading.per_metre[key]
+        yield "peaks", Estimate(found.peaks.count / loading.path_m, math.nan, math.nan)
+
+
+def _factor(law: str, extrapolated: Extrapolated | None) -> Estimate | None:
+    """The factor from a run's value to that at the physical modulus."""
+    one = extrapolated.of(law) if extrapolated else None
+    known = one.estimate if one else None
+    return known.over(one.measured) if one and known else None
+
+
+def of_mean(mean: MeanEstimate) -> Estimate:
+    """The mean of a series with its interval."""
+    return Estimate(mean.mean, mean.ci95_low, mean.ci95_high)
+
+
+def over_packings(several: Sequence[Values]) -> Values:
+    """The means over the packings of one case, each with Student's t interval between them.
+
+    The interval of a corrected value is the wider one of that between packings and the mean one
+    of a single run, which includes the uncertainty of the law that all packings share.
+    """
+    first = several[0]
+    if len(several) == 1:
+        return first
+    found = []
+    for standing in first.standings:
+        same = [one for each in several if (one := each.of(standing.quantity.name))]
+        run = mean_of([one.run.value for one in same])
+        value = _common([one.value for one in same if one.value], standing.basis)
+        reliable = all(one.reliable for one in same) or run.known
+        found.append(replace(standing, run=run, value=value, reliable=reliable))
+    return Values(first.case, tuple(found), len(several))
+
+
+def _common(values: Sequence[Estimate], basis: Basis) -> Estimate | None:
+    if not values:
+        return None
+    between = mean_of([one.value for one in values])
+    if basis is not Basis.CORRECTED:
+        return between
+    half = max(
+        0.5 * (between.ci95_high - between.ci95_low),
+        sum(0.5 * (one.ci95_high - one.ci95_low) for one in values) / len(values),
+    )
+    return Estimate.around(between.value, half)
+
+
+def _of_packings(values: Values) -> Iterator[str]:
+    if values.packings > 1:
+        yield (
+            f"Means over {values.packings} packings (seeds); 95 % confidence intervals are "
+            "Student's t between packings."
+        )
+    else:
+        yield (
+            "One packing (seed): 95 % confidence intervals cover the scatter along its path, not "
+            "that between packings."
+        )
+
+
+def _plain(one: Standing) -> str:
+    """Name and value with interval and, where it differs, that of the run."""
+    name, unit, found = one.quantity.label, f" {one.quantity.unit}".rstrip(), one.value
+    what = one.reason.partition(":")[0]
+    if found is None:
+        return f"{name}: not available, {what}"
+    doubt = "" if one.reliable or one.corrected else ", too short for a reliable interval"
+    ends = f"95 % CI {found.ci95_low:#.3g} to {found.ci95_high:#.3g}{unit}{doubt}"
+    text = f"{name} {found.value:#.3g}{unit}" + (f" ({ends})" if found.known else "")
+    if one.corrected:
+        return f"{text} at the physical Young's modulus, {one.run.value:#.3g}{unit} in the run"
+    return f"{text}, {what}" if what else text

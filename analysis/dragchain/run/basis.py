@@ -1,0 +1,217 @@
+"""What a number of a run says of the physical process: the one place that decides it.
+
+A run has settings of its own: a reduced Young's modulus, a faster workpiece, a time step, rates of
+output, a packing. Report, summary, terminal, network page, `dragchain.load` and crate ask `judge`
+what each number stands for and `notes` what the settings do; they decide nothing themselves.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+from dragchain.run.case import Case, Fidelity
+from dragchain.statistics.estimate import Estimate
+
+_TIMES = "\N{MULTIPLICATION SIGN}"
+
+
+class Basis(StrEnum):
+    """What a value of the physical process rests on."""
+
+    MEASURED = "as measured"
+    CORRECTED = "corrected to the physical Young's modulus"
+    SCALED = "scaled to process time"
+    NONE = "not available"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of a process run, and how it depends on the settings.
+
+    Attributes
+    ----------
+    name, label, unit : str
+        The unit is empty for a plain number.
+    law : str
+        Stiffness law that corrects it; the quantity's own if empty.
+    time : int
+        Power of time in it. A workpiece that is f times as fast takes 1/f of the time.
+    robust : bool
+        Whether a reduced modulus and a faster workpiece change it so little that the run's value
+        stands for the process where there is no correction: forces on the whole workpiece.
+    """
+
+    name: str
+    label: str
+    unit: str = ""
+    law: str = ""
+    time: int = 0
+    robust: bool = False
+
+    @property
+    def correction(self) -> str:
+        """Name of the law that corrects it."""
+        return self.law or self.name
+
+
+QUANTITIES = (
+    Quantity("drag_mean", "mean drag", "N", robust=True),
+    Quantity("workpiece_contacts", "contacts on the workpiece at a time"),
+    Quantity(
+        "force_slide",
+        "normal force \N{MULTIPLICATION SIGN} sliding distance per metre of path",
+        "N m/m",
+    ),
+    Quantity("drag_std", "standard deviation of the drag", "N"),
+    Quantity("lateral_mean", "mean lateral force", "N", robust=True),
+    Quantity("vertical_mean", "mean vertical force", "N", robust=True),
+    Quantity("contact_force_mean", "mean contact force on the workpiece", "N"),
+    Quantity("contact_force_p50", "median contact force on the workpiece", "N"),
+    Quantity("contact_force_p90", "90th percentile of the contact forces", "N"),
+    Quantity("contact_force_p99", "99th percentile of the contact forces", "N"),
+    Quantity("sliding_distance", "sliding distance of all contacts per metre of path", "m/m"),
+    Quantity("friction_work", "friction work per metre of path", "J/m"),
+    Quantity("workpiece_work", "work of the workpiece per metre of path", "J/m", robust=True),
+    Quantity("normal_load", "sum of the normal forces on the workpiece", "N", robust=True),
+    Quantity("normal_impulse", "normal impulse per metre of path", "N s/m", time=1, robust=True),
+    Quantity("events", "contact events per metre of path", "1/m"),
+    Quantity("peaks", "drag peaks per metre of path", "1/m"),
+    Quantity("ahead_behind", "ratio of the normal force ahead to that behind"),
+    Quantity("coordination_number", "coordination number"),
+    Quantity("mechanical_coordination_number", "coordination number without rattlers"),
+    Quantity("network_force_mean", "mean normal force in the network", "N"),
+    Quantity("chain_count", "quasi-linear force chains per frame"),
+    Quantity("chain_length", "particles per quasi-linear chain"),
+    Quantity("path_bottleneck", "bottleneck force of the dominant path", "N"),
+    Quantity("workpiece_overlap", "mean relative overlap on the workpiece"),
+    Quantity("drag_std_short", "drag fluctuations at wavelengths below 1/4 particle diameter", "N"),
+    Quantity("overlap_p99", "99th percentile of the relative overlap between particles"),
+)
+"""The registry: what a report tells of a process run, in its order."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A quantity of a run, and what it says of the process.
+
+    Attributes
+    ----------
+    quantity : Quantity
+    run : Estimate
+        The value of the run, in process time; its interval is NaN where one run gives none.
+    value : Estimate or None
+        The value of the physical process, None if there is none.
+    basis : Basis
+        What that rests on.
+    reason : str
+        Why it is not available, or what it is not corrected for; empty if nothing is to be said.
+    reliable : bool
+        Whether the series is long enough for the interval of the run.
+    """
+
+    quantity: Quantity
+    run: Estimate
+    value: Estimate | None
+    basis: Basis
+    reason: str = ""
+    reliable: bool = True
+
+    @property
+    def corrected(self) -> bool:
+        """Whether the value is another than the run's."""
+        return self.basis is Basis.CORRECTED
+
+    @property
+    def shown(self) -> Estimate:
+        """The value of the process, or else that of the run."""
+        return self.value or self.run
+
+
+def judge(
+    quantity: Quantity, own: Estimate, case: Case, law: Estimate | None, reliable: bool = True
+) -> Standing:
+    """Decide what the value of a run says of the process.
+
+    Parameters
+    ----------
+    quantity : Quantity
+    own : Estimate
+        Value of the run, in simulated time.
+    case : Case
+        A process run.
+    law : Estimate or None
+        Factor from the run's value to that at the physical modulus, with its interval; None if no
+        law applies.
+    reliable : bool
+        Whether the interval of `own` is reliable.
+    """
+    factor = case.fidelity.speed_factor**quantity.time
+    run = own.over(1.0 / factor)
+    scaled = Basis.SCALED if factor != 1.0 else Basis.MEASURED
+    doubts = list(_doubts(case.fidelity))
+    if not doubts:
+        return Standing(quantity, run, run, scaled, "", reliable)
+    if law is not None and case.fidelity.speed_factor == 1.0:
+        low, high = sorted((run.value * law.ci95_low, run.value * law.ci95_high))
+        value = Estimate(run.value * law.value, low, high)
+        return Standing(quantity, run, value, Basis.CORRECTED, "", reliable)
+    why = _why_not(case.fidelity)
+    reason = f"not corrected for {' and '.join(doubts)}: {why}"
+    if quantity.robust:
+        return Standing(quantity, run, run, scaled, reason, reliable)
+    return Standing(quantity, run, None, Basis.NONE, reason, reliable)
+
+
+def _doubts(fidelity: Fidelity) -> Iterator[str]:
+    """The settings that are not those of the process."""
+    if fidelity.youngs_modulus_scale != 1.0:
+        yield f"Young's modulus {_TIMES} {fidelity.youngs_modulus_scale:g}"
+    if fidelity.speed_factor != 1.0:
+        yield f"speed {_TIMES} {fidelity.speed_factor:g}"
+
+
+def _why_not(fidelity: Fidelity) -> str:
+    if fidelity.speed_factor == 1.0:
+        return "no law of this quantity is known"
+    if fidelity.youngs_modulus_scale == 1.0:
+        return "no law for a faster workpiece is known"
+    return "the laws hold at the speed of the process only"
+
+
+def notes(case: Case) -> list[str]:
+    """What each setting of a process run does to its numbers, one sentence each."""
+    return [*_of_modulus(case.fidelity), *_of_speed(case.fidelity), _of_step(case)]
+
+
+def _of_modulus(fidelity: Fidelity) -> Iterator[str]:
+    scale = fidelity.youngs_modulus_scale
+    if scale == 1.0:
+        yield "Young's modulus is the physical one."
+        return
+    effect = "more and smaller contact forces than at the physical one"
+    done = "Values are corrected to the physical modulus where a law is known."
+    if fidelity.speed_factor != 1.0:
+        done = "Nothing is corrected for it: the laws hold at the speed of the process only."
+    yield f"Young's modulus {_TIMES} {scale:g} gives {effect}. {done}"
+
+
+def _of_speed(fidelity: Fidelity) -> Iterator[str]:
+    factor = fidelity.speed_factor
+    if factor != 1.0:
+        yield (
+            f"Speed {_TIMES} {factor:g} gives fewer and larger contact forces than at the speed of "
+            "the process. Nothing is corrected for it: no law is known. Process time is simulated "
+            f"time {_TIMES} {factor:g}: times, impulses and rates of the report are in process "
+            "time, those of the tables in simulated time."
+        )
+
+
+def _of_step(case: Case) -> str:
+    percent = f"{100 * case.fidelity.timestep_fraction:.3g} %"
+    text = f"The time step is {percent} of the Rayleigh time"
+    if case.unsafe_timestep:
+        return (
+            f"{text}, which may be unstable and is accepted on purpose ({case.unsafe_timestep}): "
+            "forces may be too small by a quarter without any other sign."
+        )
+    return f"{text}; below the largest stable step no effect of it was measured."

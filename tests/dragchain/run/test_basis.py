@@ -1,0 +1,99 @@
+"""What a number of a run says of the process, for all combinations of settings."""
+
+import math
+from typing import Any
+
+import pytest
+from report_files import case_json
+
+from dragchain.run.basis import QUANTITIES, Basis, Quantity, judge, notes
+from dragchain.run.case import Case
+from dragchain.statistics.estimate import Estimate
+
+OWN = Estimate(10.0, 8.0, 12.0)
+LAW = Estimate(0.8, 0.6, 1.0)
+PLAIN = Quantity("contacts", "contacts")
+ROBUST = Quantity("drag", "drag", "N", robust=True)
+IMPULSE = Quantity("impulse", "impulse", "N s", time=1, robust=True)
+RATE = Quantity("rate", "rate", "1/s", time=-1, robust=True)
+
+
+def case(scale: float = 1.0, factor: float = 1.0, **more: Any) -> Case:
+    data = case_json("process", "run-1", **more)
+    data["fidelity"] |= {"youngs_modulus_scale": scale, "speed_factor": factor}
+    return Case.model_validate(data)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "settings", "law", "basis", "value"),
+    [
+        (PLAIN, (1.0, 1.0), None, Basis.MEASURED, 10.0),
+        (PLAIN, (0.01, 1.0), LAW, Basis.CORRECTED, 8.0),
+        (PLAIN, (0.01, 1.0), None, Basis.NONE, None),
+        (PLAIN, (1.0, 5.0), None, Basis.NONE, None),
+        (PLAIN, (0.01, 5.0), LAW, Basis.NONE, None),  # the law holds at the process speed only
+        (ROBUST, (0.01, 1.0), LAW, Basis.CORRECTED, 8.0),
+        (ROBUST, (0.01, 5.0), LAW, Basis.MEASURED, 10.0),
+        (IMPULSE, (1.0, 5.0), None, Basis.SCALED, 50.0),
+        (IMPULSE, (0.01, 1.0), None, Basis.MEASURED, 10.0),
+        (RATE, (1.0, 5.0), None, Basis.SCALED, 2.0),
+    ],
+)
+def test_the_basis_follows_from_all_settings(
+    quantity: Quantity,
+    settings: tuple[float, float],
+    law: Estimate | None,
+    basis: Basis,
+    value: float | None,
+) -> None:
+    found = judge(quantity, OWN, case(*settings), law)
+    assert found.basis is basis
+    assert (found.value.value if found.value else None) == (
+        None if value is None else pytest.approx(value)
+    )
+    scale, factor = settings
+    changed = [(scale != 1.0, "Young's modulus"), (factor != 1.0, "speed")]
+    corrected = basis is Basis.CORRECTED
+    assert [name in found.reason for _, name in changed] == [
+        there and not corrected for there, _ in changed
+    ]
+
+
+def test_the_interval_of_a_corrected_value_is_that_of_the_law() -> None:
+    found = judge(PLAIN, Estimate(-10.0, -12.0, -8.0), case(0.01), LAW)
+    assert found.value is not None
+    assert (found.value.ci95_low, found.value.ci95_high) == (-10.0, -6.0)
+    assert found.run == Estimate(-10.0, -12.0, -8.0)
+
+
+def test_an_interval_that_is_not_known_stays_unknown() -> None:
+    found = judge(IMPULSE, Estimate(10.0, math.nan, math.nan), case(1.0, 2.0), None)
+    assert found.run.value == 20.0 and not found.run.known
+
+
+@pytest.mark.parametrize(
+    ("scale", "factor", "said", "not_said"),
+    [
+        (1.0, 1.0, ["is the physical one"], ["fewer", "more and", "process time"]),
+        (0.01, 1.0, ["more and smaller", "corrected to the physical"], ["fewer", "process time"]),
+        (1.0, 5.0, ["fewer and larger", "simulated time \N{MULTIPLICATION SIGN} 5:"], ["more and"]),
+        (1e-4, 5.0, ["more and smaller", "fewer and larger", "Nothing is corrected"], ["where a"]),
+    ],
+)
+def test_each_setting_has_its_own_sentence(
+    scale: float, factor: float, said: list[str], not_said: list[str]
+) -> None:
+    text = " ".join(notes(case(scale, factor)))
+    assert all(words in text for words in said)
+    assert not any(words in text for words in not_said)
+    assert "77 % of the Rayleigh time" in text
+
+
+def test_a_step_that_was_accepted_though_unstable_is_said_to_be() -> None:
+    text = " ".join(notes(case(unsafe_timestep="to see it break")))
+    assert "may be unstable" in text and "to see it break" in text
+    assert "no effect" not in text
+
+
+def test_names_of_the_registry_are_unique() -> None:
+    assert len({one.name for one in QUANTITIES}) == len(QUANTITIES)
