@@ -8,6 +8,7 @@ import argparse
 import sys
 
 from figures import draw_all
+from notebooks import store_outputs
 from page_files import changed_pages
 
 
@@ -16,6 +17,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--check", action="store_true", help="change nothing, list stale pages")
     parser.add_argument("--figures", action="store_true", help="draw the figures, too")
+    parser.add_argument("--notebooks", action="store_true", help="run examples/, keep their output")
     parser.add_argument("page", nargs="*", help="only pages whose path contains this")
     options = parser.parse_args()
     stale = False
@@ -26,6 +28,8 @@ def main() -> int:
             page.write_text(text, encoding="utf-8")
     if options.figures:
         draw_all()
+    if options.notebooks:
+        store_outputs()
     return int(options.check and stale)
 
 

@@ -26,14 +26,16 @@ from evidence.stability.document import RestitutionErrors
 from evidence.stability.map import REGIMES
 from evidence.stability.safe_steps import RULE, head_on_impacts
 
-_COLOURS = {
+COLOURS = {
     STABLE: GREEN,
     INACCURATE: "#F0E442",
     OVERLAP: "#56B4E9",
     ENERGY: ORANGE,
     LOST: RED,
-    REFUSED: "#8a929b",
+    REFUSED: GREY,
 }
+"""Of the classes."""
+
 _LETTERS = {STABLE: "", INACCURATE: "i", OVERLAP: "o", ENERGY: "e", LOST: "L", REFUSED: "x"}
 _TITLES = {
     "impact": "Single impacts ({} per run, at different phases within a time step)",
@@ -102,11 +104,11 @@ def _class_keys(axes: Axes, points: pd.DataFrame, letters: Mapping[str, str]) ->
     """Name the colours of the classes that occur."""
     for kind in (one for one in CLASSES if (points["class"] == one).any()):
         name = f"{letters.get(kind, '')} {kind}".strip()
-        key(axes, name, color=_COLOURS[kind], marker="s", ms=8)
+        key(axes, name, color=COLOURS[kind], marker="s", ms=8)
 
 
 def _cell(axes: Axes, column: int, line: int, kind: str) -> None:
-    axes.barh(line, 0.96, 0.88, column - 0.48, color=_COLOURS[kind])
+    axes.barh(line, 0.96, 0.88, column - 0.48, color=COLOURS[kind])
     axes.text(column, line, _LETTERS[kind], ha="center", va="center", fontsize=7, color=INK)
 
 
@@ -149,7 +151,7 @@ def _fractions(points: pd.DataFrame) -> Figure:
         known = points[np.isfinite(points[column])]
         for line, regime in enumerate(REGIMES):
             own = known[known["regime"] == regime]
-            axes.scatter(own[column], line + _offsets(own), 9, own["class"].map(_COLOURS), lw=0)
+            axes.scatter(own[column], line + _offsets(own), 9, own["class"].map(COLOURS), lw=0)
         axes.axvline(limit, color=INK, ls="--", lw=1)
         axes.set(xscale="log", xlabel=label)
         log_ticks(axes.xaxis, steps=(1.0, 2.0, 5.0))

@@ -3,12 +3,20 @@
 import re
 import subprocess
 import sys
+from io import BytesIO
 from pathlib import Path
 
 import pytest
 from doc_pages import PAGES, name_of
+from figure_files import write_process_run
 from figures import FIGURES, IMAGES, svg
+from figures.pictures import PICTURES, picture
+from mathml import mathml
+from network_run_files import write_network_run
 from paths import ROOT
+from PIL import Image
+
+from dragchain.report.run_figures import write_figures
 
 README_LINES = 90
 LINK = re.compile(r"(?<!\\)\]\(([^)\s]+)\)")
@@ -24,7 +32,9 @@ def test_sphinx_builds_the_site_without_a_warning(tmp_path: Path) -> None:
         text=True,
     )
     assert ran.returncode == 0, ran.stderr[-3000:]
-    assert (tmp_path / "index.html").is_file()
+    pages = {page.name: page.read_text() for page in tmp_path.rglob("*.html")}
+    assert "index.html" in pages
+    assert [name for name, text in pages.items() if re.search(r"[\s>(]\u2013[a-z]", text)] == []
 
 
 def anchors(page: Path) -> set[str]:
@@ -75,7 +85,7 @@ def test_every_image_is_shown_and_every_figure_is_drawn() -> None:
     text = "".join(page.read_text() for page in PAGES)
     files = {file.name for file in IMAGES.iterdir()}
     assert {name for name in files if f"images/{name}" not in text} == set()
-    assert {f"{name}.svg" for name in FIGURES} == {name for name in files if name.endswith(".svg")}
+    assert files == {f"{name}.svg" for name in FIGURES} | {f"{name}.png" for name in PICTURES}
 
 
 @pytest.mark.slow
@@ -83,3 +93,30 @@ def test_every_image_is_shown_and_every_figure_is_drawn() -> None:
 def test_a_figure_can_be_drawn_from_the_records(name: str) -> None:
     drawn = svg(name)
     assert drawn.startswith("<?xml") and len(drawn) > 5000
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["carousel", "network_xz", "peak"])
+def test_a_picture_can_be_drawn_from_a_run(name: str, drawn_run: Path) -> None:
+    with Image.open(BytesIO(picture(name, drawn_run))) as drawn:
+        assert drawn.mode == "P" and min(drawn.size) > 300
+
+
+@pytest.mark.slow
+def test_an_export_can_be_drawn(tmp_path: Path) -> None:
+    write_network_run(tmp_path / "run")
+    assert len(picture("export", tmp_path / "run")) > 5000
+
+
+@pytest.fixture(scope="module")
+def drawn_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    run = write_process_run(tmp_path_factory.mktemp("run"))
+    write_figures(run)
+    return run
+
+
+@pytest.mark.parametrize(
+    ("latex", "bold"), [(r"s = |\mathbf s|", "\U0001d42c"), (r"\boldsymbol\xi", "\U0001d743")]
+)
+def test_vectors_are_bold_letters(latex: str, bold: str) -> None:
+    assert f"<mi>{bold}</mi>" in mathml(latex) and 'mathvariant="bold' not in mathml(latex)

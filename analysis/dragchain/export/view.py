@@ -27,7 +27,7 @@ COLOURS = {
 }
 """Array, title and colour map; the first two are choices for the particles.
 
-Loads have the map of all figures, `dragchain.figures.style`: from light to dark.
+Loads have the map of all figures, `dragchain.figures.style`, but down to black.
 """
 
 CHAINS = {"peters_chain": [0.34, 0.71, 0.91], "dominant": [0.00, 0.45, 0.70]}

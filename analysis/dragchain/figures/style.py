@@ -108,6 +108,11 @@ def true_minus(drawn: Artist) -> None:
         text.set_text(_HYPHEN.sub("\N{MINUS SIGN}", text.get_text()))
 
 
+def few_colours(picture: Image.Image) -> Image.Image:
+    """A picture of as many colours as a palette holds: a third of the bytes."""
+    return picture.quantize(256, dither=Image.Dither.NONE)
+
+
 def png(figure: Figure) -> bytes:
     """A figure as PNG without transparency."""
     true_minus(figure)

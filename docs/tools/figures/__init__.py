@@ -1,6 +1,7 @@
-"""The figures of the documentation, drawn from records: python docs/tools --figures.
+"""The figures of the documentation: python docs/tools --figures.
 
-A figure is a module with a function ``draw`` that returns it; `FIGURES` names it.
+A figure is a module with a function ``draw`` that returns it from records; `FIGURES` names it.
+`pictures` has those that show a run.
 """
 
 from importlib import import_module
@@ -9,7 +10,9 @@ from pathlib import Path
 
 import matplotlib
 
+from dragchain.errors import DragchainError
 from dragchain.figures.style import drawing, true_minus
+from figures.pictures import PICTURES, picture, run_of_study
 
 IMAGES = Path(__file__).resolve().parents[2] / "images"
 
@@ -42,7 +45,12 @@ def svg(name: str) -> str:
     return "\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n"
 
 
-def draw_all(names: tuple[str, ...] = FIGURES) -> None:
-    """Draw figures into docs/images."""
-    for name in names:
+def draw_all() -> None:
+    """Draw all figures into docs/images; say which pictures cannot be drawn here, and why."""
+    for name in FIGURES:
         (IMAGES / f"{name}.svg").write_text(svg(name), encoding="utf-8")
+    for name in PICTURES:
+        try:
+            (IMAGES / f"{name}.png").write_bytes(picture(name, run_of_study()))
+        except DragchainError as error:
+            print(f"{name}.png was not drawn: {error}")

@@ -6,10 +6,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Rectangle
 from tables import table
 
-from dragchain.figures.style import BLUE, GREEN, GREY, INK, LIGHT, ORANGE, RED
+from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, INK, LIGHT, RED
 
 ARROW = {"arrowstyle": "-|>", "shrinkA": 0, "shrinkB": 0}
-BED, STEEL = "#efe6d6", "#9aa7b5"
+BED, STEEL, DRAG, LATERAL = (COLOURS[name] for name in ("bed", "workpiece", "drag", "lateral"))
 BED_HEIGHT = 70.0
 """mm, drawn; the paper fills to this height."""
 
@@ -68,12 +68,12 @@ def _size(
 
 def _side(axes: Axes, bowl: float, height: float, rod: float, path: float, depth: float) -> None:
     tip = BED_HEIGHT - depth
-    axes.add_patch(Rectangle((-bowl, 0), 2 * bowl, BED_HEIGHT, color=BED))
+    axes.add_patch(Rectangle((-bowl, 0), 2 * bowl, BED_HEIGHT, color=BED, alpha=0.3))
     axes.plot([-bowl, -bowl, bowl, bowl], [height, 0, 0, height], color=INK, lw=2)
-    axes.add_patch(Rectangle((path - rod, tip), 2 * rod, height + 8 - tip, color=STEEL))
+    axes.add_patch(Rectangle((path - rod, tip), 2 * rod, height + 8 - tip, color=STEEL, alpha=0.5))
     axes.add_patch(Rectangle((-rod, tip), 2 * rod, height + 8 - tip, fill=False, ls=":", ec=GREY))
-    axes.plot([-bowl, bowl], [BED_HEIGHT, BED_HEIGHT], color=ORANGE, lw=1)
-    axes.text(-bowl + 2, BED_HEIGHT + 2.5, "bed surface", fontsize=8, color=ORANGE)
+    axes.plot([-bowl, bowl], [BED_HEIGHT, BED_HEIGHT], color=BED, lw=1)
+    axes.text(-bowl + 2, BED_HEIGHT + 2.5, "bed surface", fontsize=8, color=GREY)
     axes.text(0, height + 12, "1 plunge", fontsize=8, color=GREY, ha="center")
     axes.text(path, height + 12, "3 drag", fontsize=8, color=INK, ha="center")
     axes.annotate("", (path - rod, 92), (rod, 92), arrowprops={**ARROW, "color": GREY, "lw": 1})
@@ -97,11 +97,11 @@ def _side(axes: Axes, bowl: float, height: float, rod: float, path: float, depth
 
 
 def _top(axes: Axes, bowl: float, height: float, rod: float, path: float, depth: float) -> None:
-    axes.add_patch(Circle((0, 0), bowl, fc=BED, ec=INK, lw=2))
+    axes.add_patch(Circle((0, 0), bowl, fc=(BED, 0.3), ec=INK, lw=2))
     axes.add_patch(Circle((0, 0), path, fill=False, ls="--", ec=GREY, lw=1))
     turn = np.radians(35.0)
     x, y = path * np.cos(turn), path * np.sin(turn)
-    axes.add_patch(Circle((x, y), rod, color=STEEL))
+    axes.add_patch(Circle((x, y), rod, color=STEEL, alpha=0.5))
     ahead = np.array([-np.sin(turn), np.cos(turn)])
     left = np.array([-ahead[1], ahead[0]])
     here = np.array([x, y])
@@ -114,9 +114,23 @@ def _top(axes: Axes, bowl: float, height: float, rod: float, path: float, depth:
         (-1, 2.5),
         ha="right",
     )
-    _arrow(axes, tuple(here), tuple(here + 13 * left), BLUE, "lateral", (-1, -1), ha="right")
     _arrow(
-        axes, tuple(here), tuple(here - 16 * ahead), ORANGE, "drag < 0", (0.5, -2.5), ha="center"
+        axes,
+        tuple(here),
+        tuple(here + 13 * left),
+        COLOURS["lateral"],
+        "lateral",
+        (-1, -1),
+        ha="right",
+    )
+    _arrow(
+        axes,
+        tuple(here),
+        tuple(here - 16 * ahead),
+        COLOURS["drag"],
+        "drag < 0",
+        (0.5, -2.5),
+        ha="center",
     )
     spot = here + rod * (np.cos(0.9) * ahead - np.sin(0.9) * left)
     axes.plot(*spot, "o", color=RED, ms=4)
@@ -143,6 +157,6 @@ def _top(axes: Axes, bowl: float, height: float, rod: float, path: float, depth:
         y=-5,
         turn=54,
     )
-    axes.text(0, -bowl + 5, "bed", fontsize=8, color=ORANGE, ha="center")
+    axes.text(0, -bowl + 5, "bed", fontsize=8, color=GREY, ha="center")
     axes.set(xlim=(-bowl - 3, bowl + 3), ylim=(-bowl - 3, bowl + 3), title="Top view")
     axes.plot([], [], color=LIGHT)

@@ -5,7 +5,7 @@ from matplotlib.ticker import NullFormatter
 from tables import STORE
 
 from dragchain.figures.marks import log_ticks
-from dragchain.figures.style import BLUE, GREY, LIGHT
+from dragchain.figures.style import COLOURS, GREY, LIGHT
 
 LABELS = {
     "drag-depth": ("immersion depth (mm)", 1e3),
@@ -34,7 +34,7 @@ def draw() -> Figure:
             [factor * run["level"] for run in runs],
             [abs(run["drag_n"]) for run in runs],
             "o",
-            color=BLUE,
+            color=COLOURS["drag"],
         )
         exponent = found["fit"]["exponent"]
         value, low, high = (exponent[key] for key in ("value", "ci95_low", "ci95_high"))

@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 from tables import table
 
-from dragchain.figures.style import BLUE, ORANGE
+from dragchain.figures.style import COLOURS, GREEN
 from dragchain.statistics.estimate import student_quantile
 
 PACKINGS = 3
@@ -16,8 +16,8 @@ def draw() -> Figure:
     times = student_quantile(PACKINGS - 1)
     figure = Figure(figsize=(7.6, 2.8), layout="constrained")
     panels = (
-        ("drag_n", "drag_se_n", "mean drag (N)", BLUE),
-        ("torque_mn_m", "torque_se_mn_m", "mean torque (mN m)", ORANGE),
+        ("drag_n", "drag_se_n", "mean drag (N)", COLOURS["drag"]),
+        ("torque_mn_m", "torque_se_mn_m", "mean torque (mN m)", GREEN),
     )
     for axes, (name, error, label, colour) in zip(figure.subplots(1, 2), panels, strict=True):
         axes.errorbar(

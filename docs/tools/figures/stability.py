@@ -7,16 +7,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from tables import table
 
-from dragchain.figures.style import GREEN, GREY, INK, ORANGE, RED
+from dragchain.figures.style import INK
+from evidence.stability.figures import COLOURS
 
-COLOURS = {
-    "stable": GREEN,
-    "inaccurate": "#F0E442",
-    "overlap too large": "#56B4E9",
-    "energy gained": ORANGE,
-    "particles lost": RED,
-    "engine refused": GREY,
-}
 TITLES = {"impact": "Single impacts", "column": "Packing at rest under a load"}
 
 

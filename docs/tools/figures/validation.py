@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 from tables import table
 
-from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE
+from dragchain.figures.style import COLOURS, GREY, ORANGE
 from dragchain.statistics.estimate import student_quantile
 
 
@@ -14,10 +14,10 @@ def draw() -> Figure:
     rows: list[tuple[str, float, float, float, str]] = []
     mean, error = packings["drag_n_mean"].mean(), packings["drag_n_mean"].sem()
     half = student_quantile(len(packings) - 1) * error
-    rows.append(("all packings, physical E", mean, mean - half, mean + half, BLUE))
+    rows.append(("all packings, physical E", mean, mean - half, mean + half, COLOURS["drag"]))
     for row in packings.itertuples():
         low, high = row.drag_n_ci95_low, row.drag_n_ci95_high
-        rows.append((f"packing {row.seed}", row.drag_n_mean, low, high, BLUE))
+        rows.append((f"packing {row.seed}", row.drag_n_mean, low, high, COLOURS["drag"]))
     for row in effects[effects["quantity"] == "drag_mean"].itertuples():
         settings = f"E x {row.youngs_modulus_scale:g}, {row.timestep_fraction:.0%}"
         name = settings if row.field != row.field else f"{_short(row.field)} {1e3 * row.value:g} mm"
@@ -26,8 +26,9 @@ def draw() -> Figure:
     figure = Figure(figsize=(7.6, 0.26 * len(rows) + 1.1), layout="constrained")
     axes = figure.subplots()
     measured, published = compared["mean_n"].iloc[0], compared["mean_n"].iloc[1]
-    axes.axvline(measured, color=GREEN, ls="--", label="Uhlmann et al. (2015), experiment")
-    axes.axvline(published, color=ORANGE, ls=":", label="Uhlmann et al. (2015), simulation")
+    source = "Uhlmann et al. (2015)"
+    axes.axvline(measured, color=COLOURS["experiment"], ls="--", label=f"{source}, experiment")
+    axes.axvline(published, color=COLOURS["simulation"], ls=":", label=f"{source}, simulation")
     for place, (_, value, low, high, colour) in enumerate(rows):
         axes.errorbar(
             value, -place, xerr=[[value - low], [high - value]], fmt="o", color=colour, capsize=2

@@ -120,15 +120,19 @@ def peak_pictures(run_dir: Path, pictures: int = PICTURES) -> tuple[dict[str, by
         If pictures cannot be rendered here.
     """
     check_rendering()
+    drawn = peak_and_quiet(run_dir)
+    with drawing():
+        return drawn, _film(_peak_and_quiet(run_dir), pictures)
+
+
+def peak_and_quiet(run_dir: Path) -> dict[str, bytes]:
+    """Draw the network at the highest peak and at the quietest moment; see `peak_pictures`."""
     moments = _peak_and_quiet(run_dir)
     wanted = (moments.peak_s, moments.quiet_s)
     pair = [scene.load_scene(run_dir, moments.case, time_s) for time_s in wanted]
     views: tuple[View, ...] = ("xy", "xz")
     with drawing():
-        drawn = {
-            f"peak_and_quiet_{view}": png(_side_by_side(moments, pair, view)) for view in views
-        }
-        return drawn, _film(moments, pictures)
+        return {f"peak_and_quiet_{view}": png(_side_by_side(moments, pair, view)) for view in views}
 
 
 # --- side by side ----------------------------------------------------------------------------

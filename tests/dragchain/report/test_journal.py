@@ -1,10 +1,16 @@
 """Figures for a publication: their sizes and texts."""
 
+import base64
+import re
+from io import BytesIO
+
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from PIL import Image
 
 from dragchain.figures.panels import head, new_panels
-from dragchain.report.journal import COLUMN_MM, PAGE_MM, as_printed
+from dragchain.report.journal import COLUMN_MM, PAGE_MM, _encoded, as_printed
 
 MM_PER_IN = 25.4
 
@@ -35,3 +41,16 @@ def test_a_single_panel_has_no_letter() -> None:
     figure, (axes,) = new_panels(3.0)
     as_printed(figure, COLUMN_MM)
     assert not axes.texts
+
+
+def test_pictures_in_a_figure_have_few_colours_and_their_own_pixels() -> None:
+    pixels = np.random.default_rng(1).integers(0, 256, (120, 100, 3), dtype=np.uint8)
+    figure, (axes,) = new_panels(3.0)
+    axes.imshow(pixels)
+    as_printed(figure, PAGE_MM)
+    (embedded,) = re.findall(rb'image/png;base64,([^"]+)', _encoded(figure, "svg"))
+    with Image.open(BytesIO(base64.b64decode(embedded))) as picture:
+        assert picture.size == (100, 120)
+        assert len(picture.getcolors(100_000) or ()) <= 256
+    with Image.open(BytesIO(_encoded(figure, "png"))) as picture:
+        assert picture.mode == "P"

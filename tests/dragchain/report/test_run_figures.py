@@ -21,11 +21,13 @@ from figure_files import (
     workpiece_force_table,
     write_process_run,
 )
+from matplotlib.figure import Figure
 from PIL import Image
 
 from dragchain.errors import SeriesError, TableError
 from dragchain.figures import network_picture as scene
 from dragchain.figures.rendering import RenderError, check_rendering
+from dragchain.figures.style import COLOURS, drawing
 from dragchain.network.frame import NetworkFrame
 from dragchain.report.collect import compare
 from dragchain.report.findings import (
@@ -35,8 +37,14 @@ from dragchain.report.findings import (
     FillingFindings,
     ProcessFindings,
 )
-from dragchain.report.run_data import dominant_bottlenecks
-from dragchain.report.run_figures import drag_of_cases, energy_ratio, write_figures
+from dragchain.report.run_data import RunData, dominant_bottlenecks
+from dragchain.report.run_figures import (
+    DRAW_PROCESS,
+    drag_of_cases,
+    energy_ratio,
+    forces,
+    write_figures,
+)
 from dragchain.run.case import Case, PublishedDrag, Reference, load_case
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean
@@ -193,7 +201,7 @@ def pixel(image: Any, extent: Any, across_mm: float, up_mm: float) -> Any:
 
 def is_strongest(colour: Any) -> bool:
     """Whether it is the dark end of the colour map."""
-    return bool(max(colour) < 90)
+    return bool(colour[0] < 90 and colour[1] < 40 and colour[2] < 130)
 
 
 @pytest.mark.parametrize(("view", "level_mm"), [("xy", 0.0), ("xz", 15.0)])
@@ -340,8 +348,43 @@ def test_a_drop_is_drawn_with_its_restitution(tmp_path: Path) -> None:
     assert ratio.input == 0.7
 
 
+HALF_PANEL_PX, LEAST_PX = 498, 9.0
+"""Of a figure that shares its row in a report at 1366 pixels: its width, and its axis texts."""
+
+
+@pytest.fixture(scope="module")
+def figures(process: Path, drawn: list[Path]) -> dict[str, Figure]:
+    run, found = RunData(process, load_case(process)), ProcessFindings.read(process / FILE)
+    with drawing():
+        return {draw.__name__: draw(run, found) for draw in DRAW_PROCESS}
+
+
+def test_axis_texts_of_figures_in_half_a_row_can_be_read(figures: dict[str, Figure]) -> None:
+    for name in figures.keys() - {"forces"}:
+        shown = HALF_PANEL_PX / figures[name].get_figwidth()
+        axes = figures[name].axes[0]
+        labels = [axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels()]
+        assert min(label.get_fontsize() for label in labels) / 72.0 * shown >= LEAST_PX, name
+
+
+def test_the_polar_plot_names_its_axis(figures: dict[str, Figure]) -> None:
+    (axes,) = figures["force_around_workpiece"].axes
+    assert axes.get_xlabel() == "mean normal force (N per 15°)"
+
+
+def test_the_experiment_lies_over_the_mean_in_its_own_colour(process: Path) -> None:
+    run, found = RunData(process, load_case(process)), ProcessFindings.read(process / FILE)
+    ours = found.forces["drag_n"].mean
+    (published,) = reference_drags(reference(drag_mean_n=ours, drag_std_n=0.66))
+    row = compare(found.forces["drag_n"], published)
+    (axes,) = forces(run, changed(found, comparison=[row])).axes
+    at_mean = [line for line in axes.get_lines() if set(line.get_ydata()) == {ours}]
+    assert [line.get_color() for line in at_mean] == ["black", COLOURS["experiment"]]
+    assert at_mean[1].get_zorder() >= at_mean[0].get_zorder() and at_mean[1].is_dashed()
+
+
 def test_overview_has_a_row_a_case() -> None:
     force = Estimate(-2.0, -2.2, -1.8)
-    figure = drag_of_cases(["a", "b"], [force, force], [("measured", -2.59)])
+    figure = drag_of_cases(["a", "b"], [force, force], [("experiment", -2.59)])
     axes = figure.axes[0]
     assert [label.get_text() for label in axes.get_yticklabels()] == ["a", "b"]

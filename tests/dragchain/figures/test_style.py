@@ -1,0 +1,48 @@
+"""What all figures have in common: minus signs and pictures of few colours."""
+
+from io import BytesIO
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from dragchain.figures.panels import head, new_panels
+from dragchain.figures.style import few_colours, png, true_minus
+
+
+@pytest.mark.parametrize(
+    ("written", "shown"),
+    [
+        ("mean -2.55 N (-2.75 to -.5)", "mean \u22122.55 N (\u22122.75 to \u2212.5)"),
+        ("tolerance-0.1, 2026-11-23, 1e-05, -- 3", "tolerance-0.1, 2026-11-23, 1e-05, -- 3"),
+    ],
+)
+def test_a_hyphen_before_a_number_becomes_a_minus_sign(written: str, shown: str) -> None:
+    figure, (axes,) = new_panels(3.0)
+    head(figure, written)
+    axes.plot([0, 1], label=written)
+    axes.set_title(written)
+    legend = axes.legend()
+    png(figure)
+    texts = [figure.get_suptitle(), axes.get_title("left"), axes.get_title()]
+    assert shown in texts and (written == shown or written not in texts)
+    assert legend.get_texts()[0].get_text() == shown
+
+
+def test_minus_signs_of_single_axes() -> None:
+    _, (axes,) = new_panels(3.0)
+    axes.set_xlabel("-1")
+    true_minus(axes)
+    assert axes.get_xlabel() == "\u22121"
+
+
+def test_a_picture_of_few_colours_is_smaller() -> None:
+    pixels = np.random.default_rng(1).integers(0, 256, (200, 200, 3), dtype=np.uint8)
+    whole, few = Image.fromarray(pixels), few_colours(Image.fromarray(pixels))
+    sizes = []
+    for picture in (whole, few):
+        content = BytesIO()
+        picture.save(content, format="png")
+        sizes.append(len(content.getvalue()))
+    assert len(whole.getcolors(100_000) or ()) > 256 >= len(few.getcolors(100_000) or ())
+    assert sizes[1] < sizes[0]
