@@ -5,9 +5,6 @@ from snakemake.utils import min_version
 min_version("9.0")
 
 
-configfile: "config/config.yaml"
-
-
 include: "workflow/rules/common.smk"
 include: "workflow/rules/runs.smk"
 include: "workflow/rules/advise.smk"
@@ -60,19 +57,19 @@ rule all:
 # The drop tests.
 rule drop_test:
     input:
-        every("drop_test", "tables/impacts.parquet"),
+        every_table("drop_test"),
 
 
 # The settled packings.
 rule filling:
     input:
-        every("filling", "tables/packing.json"),
+        every_table("filling"),
 
 
 # The process runs with their tables.
 rule process:
     input:
-        every("process", "tables/workpiece_force.parquet"),
+        every_table("process"),
 
 
 # summary.csv, summary.parquet, summary.xlsx and report.html.

@@ -41,13 +41,12 @@ class Call:
 
 def call(checkout: Path, tolerance: float) -> Call:
     """Run the study of a checkout from nothing and read what its jobs took."""
-    study = (checkout / "studies/uhlmann2015/study.yaml").read_text()
-    asked = study.replace("fidelity: standard", f"fidelity: {{tolerance: {tolerance:g}}}")
-    assert asked != study, "the study has another fidelity by now"
     file = checkout / "studies" / NAME / "study.yaml"
     results = checkout / "results" / NAME
     file.parent.mkdir(exist_ok=True)
-    file.write_text(asked)
+    file.write_text(
+        f"title: Half a minute\nextends: uhlmann2015\nfidelity: {{tolerance: {tolerance:g}}}\n"
+    )
     shutil.rmtree(results, ignore_errors=True)
     paths = os.pathsep.join([str(checkout / "workflow"), str(checkout / "analysis"), str(checkout)])
     words = [sys.executable, "-m", "snakemake", "all", "--config", f"study={NAME}"]

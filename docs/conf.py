@@ -13,6 +13,7 @@ release = version = version_of("dragdeck")
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_copybutton", "mathml"]
 html_math_renderer = "mathml"
+smartquotes_action = "qe"  # no dashes: options begin with two hyphens
 exclude_patterns = ["tools", "data"]
 nitpicky = False
 

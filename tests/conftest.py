@@ -22,10 +22,14 @@ settings.register_profile("explore", deadline=None)
 settings.register_profile("repeat", derandomize=True, deadline=None)
 settings.load_profile("repeat")
 
+ON_DEMAND = {"slurm": "start a Slurm", "audit": "compute tables again from raw outputs"}
+"""Markers of tests that run only when their option is given."""
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update", action="store_true", help="write golden decks and schemas anew")
-    parser.addoption("--slurm", action="store_true", help="run the tests that start a Slurm too")
+    for name, what in ON_DEMAND.items():
+        parser.addoption(f"--{name}", action="store_true", help=f"run the tests that {what} too")
     parser.addoption("--long-commands", action="store_true", help="run the pages' long commands")
     add_options(parser)
 
@@ -37,11 +41,11 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if config.getoption("numprocesses", None):
         _longest_files_first(items)
-    if config.getoption("--slurm"):
-        return
-    for item in items:
-        if item.get_closest_marker("slurm"):
-            item.add_marker(pytest.mark.skip(reason="starts a Slurm: give --slurm"))
+    for name in ON_DEMAND:
+        skipped = pytest.mark.skip(reason=f"give --{name}")
+        for item in items:
+            if item.get_closest_marker(name) and not config.getoption(f"--{name}"):
+                item.add_marker(skipped)
 
 
 def _longest_files_first(items: list[pytest.Item]) -> None:

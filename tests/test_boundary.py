@@ -1,6 +1,7 @@
 """What is said of errors that a user can cause, and of those that nobody expected."""
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from dragchain import cli as dragchain
 from dragchain.errors import DragchainError
 from dragdeck import cli as dragdeck
 from dragdeck.errors import DragdeckError
+from dragdeck.files import replace_bytes
 
 PACKAGES = [
     pytest.param("dragdeck", dragdeck.guarded, DragdeckError, id="dragdeck"),
@@ -66,6 +68,17 @@ def test_what_is_expected_leaves_no_log(
         assert capsys.readouterr().err.startswith(f"{name}: {words[:20]}")
     assert guarded(raising(KeyboardInterrupt())) == 130
     assert guarded(lambda: None) == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_is_named_with_the_file_and_what_is_free(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "preview.png"
+    (tmp_path / f".preview.png.{os.getpid()}").symlink_to("/dev/full")
+    assert dragdeck.guarded(lambda: replace_bytes(file, b"1")) == 1
+    said = capsys.readouterr().err
+    assert re.match(rf"dragdeck: {file}: [\d,]+ bytes free: No space left on device\n", said)
     assert list(tmp_path.iterdir()) == []
 
 

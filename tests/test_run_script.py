@@ -133,7 +133,6 @@ class Machine:
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=60,
             check=False,
         )
 
@@ -446,6 +445,23 @@ def test_all_attacks_are_made_when_asked_for(machine: Machine):
     (line,) = machine.done()
     assert line.startswith("pytest [-n]")
     assert "[--attacks] [-m] [attack] [-k] [kill]" in line
+
+
+def test_everything_leaves_no_test_out(machine: Machine):
+    machine.run("setup")
+    for name in ("slurmctld", "munged"):
+        machine.add(name, FAKE_TOOL)
+    machine.done()
+    assert machine.run("test", "--everything").returncode == 0
+    tested = machine.done()[-1]
+    assert "[--attacks] [--slurm] [--audit] [--long-commands]" in tested and "[-m]" not in tested
+
+
+def test_the_audit_runs_alone_when_asked_for(machine: Machine):
+    machine.run("setup")
+    machine.done()
+    assert machine.run("test", "--audit", "-x").returncode == 0
+    assert machine.done()[-1].startswith("pytest [--audit] [-m] [audit] [-x] ")
 
 
 def test_arguments_go_to_pytest_alone(machine: Machine):

@@ -169,7 +169,7 @@ def test_a_run_that_its_time_limit_ends_goes_on(
     minutes = math.ceil((start_s + 30) / 60)
     (short,) = (local / "results/small/process").glob("*/run.json")
     longer = 600 * minutes / json.loads(short.read_text())["wall_time_s"]
-    edit(queued, motion__path__revolutions=0.1 * longer, outputs__checkpoints=400)
+    edit(queued, motion__path__revolutions=0.1 * longer, outputs__n_checkpoints=400)
     limit = ("--set-resources", f"run_process:runtime={minutes}", "--retries", "9")
     told = succeed(queued, "process", "--until", "run_process", *STUDY, *QUEUE, *limit)
     assert "TIMEOUT" in set(cluster.jobs().JobState)

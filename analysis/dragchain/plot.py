@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 
 from dragchain.errors import UnknownNameError
 from dragchain.figures.marks import as_compass, compass_bars
-from dragchain.figures.style import BLUE, GREEN, RED
+from dragchain.figures.style import COLOURS, true_minus
 from dragchain.report import run_panels
 from dragchain.results import FinishedRun
 
@@ -40,8 +40,9 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
     run_panels.forces(ax, run, found)
     if peaks:
         times_s, label = found.peaks.process_time_s, f"{found.peaks.count} peaks"
-        ax.plot(times_s, found.peaks.drag_n, "v", color=RED, label=label)
+        ax.plot(times_s, found.peaks.drag_n, "v", color=COLOURS["peak"], label=label)
     ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.15), frameon=False, fontsize="small")
+    true_minus(ax)
     return ax
 
 
@@ -137,7 +138,7 @@ def chain_lengths(run: FinishedRun, ax: Axes | None = None) -> Axes:
     """
     chains = run.table("chains", ["definition", "n_particles", "reaches_bowl"])
     ax = _axes(ax)
-    for name, colour in (("peters", BLUE), ("widest_path", GREEN)):
+    for name, colour in (("peters", COLOURS["chain"]), ("widest_path", COLOURS["dominant_path"])):
         of_name = chains[chains["definition"] == name]
         whole = of_name[of_name["reaches_bowl"]] if name == "widest_path" else of_name
         found = whole["n_particles"].value_counts(normalize=True).sort_index()

@@ -74,12 +74,17 @@ def _pilot_whole(store: Store) -> pd.DataFrame:
 @derived("benchmarks/pilot_growth")
 def _pilot_growth(store: Store) -> pd.DataFrame:
     """Cost of a particle and step in larger bowls relative to smaller ones."""
-    ranks = store.table("benchmarks/pilot_ranks")
+    ranks, runs = store.table("benchmarks/pilot_ranks"), store.table("benchmarks/pilot_runs")
     small, medium, large = ranks.one_rank_ns
     values = store.table("benchmarks/scale_values").set_index("name")["value"]
     return pd.DataFrame(
         {
             "large_to_small": [large / small],
+            **{
+                phase: runs[f"{phase}_cpu_ns_per_particle_step"].iloc[[-1]].to_numpy()
+                / runs[f"{phase}_cpu_ns_per_particle_step"].iloc[0]
+                for phase in ("filling", "drag")
+            },
             "large_to_medium": [large / medium],
             "side_by_side": [1 / ranks.cpu_ratio.iloc[0]],
             "fall_to_rest": [values["fall"] / values["rest"]],

@@ -581,11 +581,11 @@ def _scaling(store: Store) -> pd.DataFrame:
             diameter = 2e3 * _base().media.radius_mean_m
             row |= {
                 "offset": _with_interval(
-                    {key: 1e3 * value for key, value in offset.items()},
+                    {key: 1e3 * times * value for key, value in offset.items()},
                     lambda value: f"{value:.1f}",
                 ),
                 "offset_particles": _with_interval(
-                    {key: 1e3 * value / diameter for key, value in offset.items()},
+                    {key: 1e3 * times * value / diameter for key, value in offset.items()},
                     lambda value: f"{value:.1f}",
                 ),
                 "offset_p": found["shifted"]["lack_of_fit"],

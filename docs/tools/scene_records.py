@@ -72,7 +72,7 @@ def merged() -> Iterator[Row]:
                 "runs": len(own),
                 "change": own.mean() / full - 1,
                 "corrected": np.mean([math.exp(one.logarithm) for one in at_full]) / full - 1,
-                "half_width": known.quantile * at_full[0].se,
+                "half_width": at_full[0].half_width(known.quantile),
             }
 
 
@@ -201,7 +201,7 @@ def friction_of_sliding() -> Iterator[Row]:
         ]
         plans = ({0.001: 1}, {0.01: 1})
         for plan, errors in zip(plans, left_out(found, plans), strict=True):
-            entry, _ = errors_entry(sliding, plan, np.array(errors), 2.0)
+            entry = errors_entry(sliding, plan, errors, 2.0)
             yield {
                 "friction": friction,
                 "youngs_modulus_scale": min(plan),

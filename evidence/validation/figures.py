@@ -10,7 +10,7 @@ from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import drag_peaks
 from dragchain.figures.marks import band, compass, compass_bars, depth_bars, row, row_names
 from dragchain.figures.panels import legend_below, new_figure, new_panels
-from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
+from dragchain.figures.style import BLUE, COLOURS, GREY, RED
 from dragchain.run.kinematics import drag_start_s
 from dragchain.statistics.estimate import Estimate
 from evidence.validation.around_workpiece import Statements
@@ -18,8 +18,6 @@ from evidence.validation.corridor import Network
 from evidence.validation.effects import Effect
 from evidence.validation.force import Compared, Force, Spectrum
 from evidence.validation.runs_by_bed import Point
-
-_COLOURS = {"experiment": GREEN, "simulation": ORANGE}
 
 
 def traces(packings: Sequence[Point], compared: Sequence[Compared]) -> Figure:
@@ -39,8 +37,8 @@ def _trace(axes: Axes, point: Point) -> None:
     time_s, drag = samples["time_s"].to_numpy(np.float64), samples["drag_n"].to_numpy(np.float64)
     peaks = drag_peaks(samples, point.case)
     zero = drag_start_s(point.case)
-    axes.plot(time_s - zero, drag, color=BLUE, linewidth=0.5)
-    axes.plot(peaks.time_s - zero, peaks.drag_n, "v", color=RED, label="peak")
+    axes.plot(time_s - zero, drag, color=COLOURS["drag"], linewidth=0.5)
+    axes.plot(peaks.time_s - zero, peaks.drag_n, "v", color=COLOURS["peak"], label="peak")
     axes.axhline(float(drag.mean()), color="black", linewidth=1.0, label="mean of the packing")
     force = f"{drag.mean():.2f} ± {drag.std(ddof=1):.2f} N"
     axes.set_title(f"packing {point.seed}: {force}, {len(peaks.index)} peaks")
@@ -48,7 +46,7 @@ def _trace(axes: Axes, point: Point) -> None:
 
 def _bands(axes: Axes, compared: Sequence[Compared]) -> None:
     for one in compared:
-        colour = _COLOURS[one.label]
+        colour = COLOURS[one.label]
         axes.axhline(one.mean_n, color=colour, linestyle="--", label=f"{one.label} mean")
         if one.std_n and one.label == "experiment":
             low, high = one.mean_n - one.std_n, one.mean_n + one.std_n
@@ -64,7 +62,7 @@ def comparison(force: Force, compared: Sequence[Compared], effects: Sequence[Eff
     """Mean drags: the source's, each packing's with its own interval, and all together."""
     together = force.together["drag_n"].mean
     rows: list[_Row] = [
-        (one.label, Estimate.around(one.mean_n, 0.0), _COLOURS[one.label]) for one in compared
+        (one.label, Estimate.around(one.mean_n, 0.0), COLOURS[one.label]) for one in compared
     ]
     for packing in force.packings:
         own = packing.drag_n
@@ -132,8 +130,7 @@ def around(found: Statements) -> Figure:
     figure = new_figure(3.9)
     left, right = compass(figure, 1, 2, 1), figure.add_subplot(1, 2, 2)
     edges = found.azimuth.edges
-    compass_bars(left, edges, found.azimuth.columns, 100.0)
-    left.set_title(f"normal force\n(% per {np.degrees(edges[1] - edges[0]):.0f}°)")
+    compass_bars(left, edges, found.azimuth.columns, 100.0, "%")
     depth_bars(right, found.depth.edges, found.depth.columns)
     right.set(xlabel="mean normal force per contact (N)", ylabel="depth (mm)")
     right.set_title("bars: 95 % CI over packings")
@@ -145,8 +142,9 @@ def corridor(network: Network) -> Figure:
     figure, (axes,) = new_panels(3.2)
     edges = np.array(network.edges_diameters)
     middle = (edges[1:] + edges[:-1]) / 2
-    sides = (("ahead", network.ahead_n, BLUE), ("behind", network.behind_n, ORANGE))
-    for name, side, colour in sides:
+    sides = (("ahead", network.ahead_n), ("behind", network.behind_n))
+    for name, side in sides:
+        colour = COLOURS[name]
         band(axes, middle, side, colour)
         axes.plot(middle, side.value, "o-", color=colour, label=name)
     wall = network.wall_diameters

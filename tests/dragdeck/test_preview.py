@@ -25,6 +25,7 @@ from dragdeck.preview.views import COLOURS
 from dragdeck.project import Project
 from dragdeck.scenes.filling import expected_surface
 from dragdeck.scenes.fit import check_fit, clearances
+from dragdeck.study.superposed.kind import DragSteps
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin
 from dragdeck.sweep.cases import load_cases
@@ -249,11 +250,13 @@ def test_spin_and_oscillation_enlarge_the_swept_volume(made: Made) -> None:
 def test_what_is_superposed_moves_as_it_is_driven() -> None:
     stages = [(1, 60), (2, -30), (3, 0)]
     schedule = [{"until_s": until, "rpm": rpm} for until, rpm in stages]
-    spin = Spin.model_validate({"schedule": schedule})
-    turns = [spin.turn_rad(time) / (2 * np.pi) for time in (0, 0.5, 1, 1.5, 2, 9)]
+    drag = DragSteps(7, 9007, 1e-3)
+    spin = Spin.model_validate({"schedule": schedule, "ramp_s": 0}).of_run(drag)
+    turns = [spin.turn_rad(step, 1e-3) / (2 * np.pi) for step in (0, 500, 1000, 1500, 2000, 9000)]
     assert turns == pytest.approx([0, 0.5, 1, 0.75, 0.5, 0.5])
-    up = Oscillation(amplitude_m=0.002, frequency_hz=2)
-    assert [up.lift_m(time) for time in (0, 0.125, 0.375)] == pytest.approx([0, 0.002, -0.002])
+    up = Oscillation(amplitude_m=0.002, frequency_hz=2, ramp_s=0).of_run(drag)
+    lifts = [up.lift_m(step, 1e-3) for step in (0, 125, 375)]
+    assert lifts == pytest.approx([0, 0.002, -0.002])
 
 
 def test_other_commands_load_no_graphics(case: Case) -> None:

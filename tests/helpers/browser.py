@@ -15,7 +15,8 @@ _SWITCHES = (
 )
 WEBGL = ("--enable-unsafe-swiftshader",)
 NO_WEBGL = ("--disable-3d-apis",)
-LONGEST_S = 60.0
+HUNG_S = 3600.0
+"""A browser that has not answered after this time never will, s: nothing else is timed."""
 
 
 class Browser:
@@ -43,7 +44,9 @@ class Browser:
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         service = Service(shutil.which("chromedriver"))
         self.driver: Any = webdriver.Chrome(options=options, service=service)
-        self.driver.set_script_timeout(LONGEST_S)
+        self.driver.command_executor.client_config.timeout = HUNG_S
+        self.driver.set_script_timeout(HUNG_S)
+        self.driver.set_page_load_timeout(HUNG_S)
 
     def open(self, file: Path) -> "Browser":
         """Open a page and wait until it is ready, or says what its problem is."""
@@ -55,8 +58,8 @@ class Browser:
         return self
 
     def wait(self, condition: Callable[[], object], what: str) -> None:
-        """Wait until a condition is true, for `LONGEST_S` at most."""
-        end = time.monotonic() + LONGEST_S
+        """Wait until a condition is true."""
+        end = time.monotonic() + HUNG_S
         while not condition():
             assert time.monotonic() < end, f"waited too long for {what}"
             time.sleep(0.05)

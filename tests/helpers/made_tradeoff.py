@@ -1,4 +1,4 @@
-"""A trade of speed against accuracy with made-up numbers, for tests of what reads one."""
+"""A trade-off of speed against accuracy with made-up numbers, for tests of what reads one."""
 
 from typing import Any
 
@@ -40,7 +40,7 @@ def cost(name: str, ratio: float = 1.0, **more: Any) -> MeasuredCost:
 
 
 def made_tradeoff(case: Case, **more: Any) -> Tradeoff:
-    """A trade whose measured scene is that of a case."""
+    """A trade-off whose measured scene is that of a case."""
     content = {
         "measured": "2026-01-02", "plan": "made", "study": case.study_name,
         "versions": {"engine": "3.8.0"},
@@ -84,8 +84,13 @@ def made_stiffness(case: Case, *, amplitude_std: float = 0.05, **numbers: float)
         "quantile": 2.0, "path_to_particle": 15.0,
         "law": {
             "rate": 0.25,
-            "covariance": [[2e-4, -1e-4, 0.0], [-1e-4, 1e-4, 0.0], [0.0, 0.0, 1e-4]],
-            "amplitude_std": amplitude_std, "run_std": 0.06, "model_std": 0.01,
+            "amplitude": [0.3, 0.1, 0.05],
+            "covariance": [
+                [2e-4, -1e-4, 0.0, 1e-4], [-1e-4, 1e-4, 0.0, 0.0], [0.0, 0.0, 1e-4, 0.0],
+                [1e-4, 0.0, 0.0, 1e-3],
+            ],
+            "amplitude_std": amplitude_std, "run_std": 0.06,
+            "misfit": [[1e-3, 0.02], [1e-2, 0.005]],
         },
     }  # fmt: skip
     scenes = [

@@ -1,4 +1,4 @@
-"""Measures of a trade that were never run: known effects, chance from a seed."""
+"""Measures of a trade-off that were never run: known effects, chance from a seed."""
 
 import json
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The workflow of a study that asks for a tolerance, on a trade with made-up numbers."""
+"""The workflow of a study that asks for a tolerance, on a trade-off with made-up numbers."""
 
 import os
 import shutil
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A copy of the project whose package holds a trade."""
+    """A copy of the project whose package holds a trade-off."""
     for name in set(PROJECT) - {"workflow"}:
         (tmp_path / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "workflow", tmp_path / "workflow")

@@ -23,6 +23,7 @@ from dragchain import read_dump, write_tables
 from dragchain.network.write import write_chains
 from dragchain.tables.network_contacts import contact_rows
 from dragchain.tables.run_folder import Run
+from dragdeck.scenes.registry import SCENES
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -178,7 +179,7 @@ def test_a_notebook_runs(finished: Path, file: Path) -> None:
     first = next(cell for cell in notebook.cells if cell.cell_type == "code")
     first.source = 'study_name = "small"'
     folder = {"metadata": {"path": str(finished / "studies")}}
-    NotebookClient(notebook, timeout=300, resources=folder).execute()
+    NotebookClient(notebook, timeout=None, resources=folder).execute()
     outputs = [one for cell in notebook.cells for one in cell.get("outputs", [])]
     pictures = [one for one in outputs if "image/png" in one.get("data", {})]
     assert len(pictures) == sum("plt." in cell.source for cell in notebook.cells)
@@ -212,6 +213,17 @@ def test_every_column_has_the_type_that_the_reference_states(finished: Path) -> 
 
 def test_nothing_is_left_to_do(finished: Path) -> None:
     assert jobs(finished, *STUDY) == set()
+
+
+def test_a_deleted_table_is_made_again(finished: Path) -> None:
+    results = finished / "results/small"
+    for place, scene in SCENES.items():
+        run, *_ = (results / place).iterdir()
+        deleted = run / "tables" / scene.tables[-1]
+        kept = deleted.rename(run / "kept")
+        wanted = jobs(finished, place, "--config", "study=small")
+        kept.rename(deleted)
+        assert wanted == {place, f"tabulate_{place}"}
 
 
 def test_frames_are_exported_when_asked_for(finished: Path) -> None:

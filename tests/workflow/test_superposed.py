@@ -37,7 +37,8 @@ from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import read_bed
-from dragdeck.study.superposed.kind import DragSteps
+from dragdeck.study.superposed.kind import DragSteps, SuperposedOfRun
+from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin
 from dragdeck.sweep.cases import load_cases
 
@@ -45,10 +46,10 @@ pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
 CORNERS = """{% extends "base/process.in.j2" %}
 {% block extra %}
-dump corners all mesh/stl {{ deck.thermo_steps }} corners.*.stl workpiece
+dump corners all mesh/stl {{ deck.thermo_steps // 5 }} corners.*.stl workpiece
 {% endblock %}
 """
-"""Writes the corners of the workpiece's facets with every network frame."""
+"""Writes the corners of the workpiece's facets, more often than network frames."""
 
 LINE = {"kind": "line", "start_m": [-0.005, 0.001], "direction_deg": 30, "length_m": 0.004}
 CIRCLE = {"kind": "circle", "radius_m": 0.01, "revolutions": 0.06}
@@ -76,6 +77,10 @@ TURNING = {
 }
 REVERSING = {"schedule": [{"until_s": 0.06, "rpm": 300}, {"until_s": 0.12, "rpm": -600}]}
 UP_AND_DOWN = {"amplitude_m": 0.001, "frequency_hz": 6}
+
+
+RAMP_S = 0.1
+"""Time in which a superposed motion starts: its speed grows as 3 x^2 - 2 x^3."""
 
 
 class Runs:
@@ -131,10 +136,20 @@ def reference(folder: Path, part: int = 1) -> tuple[np.ndarray, np.ndarray]:
     return steps[dragged], rows[dragged, 8:11]
 
 
+def asked_speed(motion: dict[str, Any]) -> float:
+    """Speed along the path, of waypoints the mean: whole steps change it a little."""
+    if motion["path"]["kind"] != "waypoints":
+        return float(motion.get("speed_m_s", 0.02))
+    points = np.array([[*point, 0.0][:4] for point in motion["path"]["points"]])
+    ways = np.linalg.norm(np.diff(points[:, 1:], axis=0), axis=1)
+    return float(ways.sum() / np.ptp(points[:, 0]))
+
+
 def analytic(case: Case, motion: dict[str, Any], steps: np.ndarray) -> np.ndarray:
     """Where the reference point has to be, its height from that of the immersion."""
     time = (steps - drag_phase(case).start_step) * case.timestep_s
     path, way = motion["path"], motion_of(case).axis_speed_m_s * time
+    faster = motion_of(case).axis_speed_m_s / asked_speed(motion)
     found = np.zeros((len(steps), 3))
     if path["kind"] == "circle":
         angle = (-1 if path.get("direction") == "cw" else 1) * way / path["radius_m"]
@@ -142,18 +157,19 @@ def analytic(case: Case, motion: dict[str, Any], steps: np.ndarray) -> np.ndarra
         found[:, 1] = path["radius_m"] * np.sin(angle)
     elif path["kind"] == "waypoints":
         points = np.array([[*point, 0.0][:4] for point in path["points"]])
-        ends = np.round((points[:, 0] - points[0, 0]) / case.timestep_s) * case.timestep_s
-        last = (time - ends[-2]) / (ends[-1] - ends[-2])
+        ends = np.round((points[:, 0] - points[0, 0]) / faster / case.timestep_s) * case.timestep_s
         for axis, places in enumerate(points.T[1:]):
-            beyond = places[-2] + last * (places[-1] - places[-2])
-            found[:, axis] = np.where(last > 0, beyond, np.interp(time, ends, places))
+            found[:, axis] = np.interp(time, ends, places)
     else:
         direction = np.radians(path["direction_deg"])
         found[:, 0] = path["start_m"][0] + way * np.cos(direction)
         found[:, 1] = path["start_m"][1] + way * np.sin(direction)
     if "oscillation" in motion:
         amplitude, hertz = (motion["oscillation"][key] for key in ("amplitude_m", "frequency_hz"))
-        found[:, 2] += amplitude * np.sin(2 * np.pi * hertz * time)
+        ramp = round(RAMP_S / faster / case.timestep_s) * case.timestep_s
+        x = np.minimum(time / ramp, 1.0)
+        started = np.where(time < ramp, ramp * (x**3 - x**4 / 2), time - ramp / 2)
+        found[:, 2] += amplitude * np.sin(2 * np.pi * hertz * faster * started)
     return found
 
 
@@ -251,9 +267,9 @@ def test_a_resumed_run_continues_the_motion(runs: Runs, path: dict[str, Any]) ->
 
 def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
     """Facets gather in the body frame, whose sums are those of the workpiece; work is power."""
-    schedule = [{"until_s": 0.1, "rpm": 300}, {"until_s": 1, "rpm": -300}]
+    schedule = [{"until_s": 0.12, "rpm": 300}, {"until_s": 1, "rpm": -300}]
     path = {"kind": "circle", "radius_m": 0.01, "revolutions": 0.07}
-    spin = {"schedule": schedule}
+    spin = {"schedule": schedule, "ramp_s": 0.02}
     deep = {"immersion_depth_m": 0.025, "plunge_speed_m_s": 0.15}
     folder = runs.rendered(300, path=path, spin=spin, transient_m=1e-4, **deep)
     engine(folder)
@@ -319,10 +335,10 @@ variable reference_x equal f_workpiece[7]
 variable reference_y equal f_workpiece[8]
 variable reference_z equal f_workpiece[9]
 fix drag all move/mesh mesh workpiece linear {{ speed }} 0. 0.
-{% for name, formula in spin.variables | items %}
+{% for name, formula in superposed.variables | items %}
 variable {{ name }} equal {{ formula }}
 {% endfor %}
-fix spin all move/mesh mesh workpiece {{ spin.mover }}
+fix superposed all move/mesh mesh workpiece {{ superposed.mover }}
 {% from "outputs.j2" import write %}
 {% for output in outputs %}
 {{ write(output) }}
@@ -335,6 +351,43 @@ def static_overlap(mass: float) -> float:
     """The overlap at which Hertz' force on a plate of the same material carries a particle."""
     stiffness = 4 / 3 * MODULUS / (2 * (1 - 0.3**2)) * np.sqrt(RADIUS)
     return float((mass * GRAVITY / stiffness) ** (2 / 3))
+
+
+def write_plate(
+    folder: Path, motion: SuperposedOfRun, drag: DragSteps, speed_m_s: float, written: Any
+) -> None:
+    """Input script, plate and a particle that rests on it."""
+    deck = environment(ROOT / "templates").from_string(DECK)
+    text = deck.render(
+        superposed=motion.on_engine(drag.start), outputs=written, steps=drag.end,
+        timestep=drag.timestep_s, modulus=MODULUS, friction=FRICTION, gravity=GRAVITY,
+        speed=speed_m_s, law="hertz tangential history",
+    )  # fmt: skip
+    (folder / "in.liggghts").write_text(text)
+    (folder / "workpiece.stl").write_text(PLATE)
+    mass = DENSITY * 4 / 3 * np.pi * RADIUS**3
+    place = f"{PLACE[0]} {PLACE[1]} {RADIUS - static_overlap(mass)}"
+    (folder / "particle.data").write_text(
+        "one particle\n\n1 atoms\n\n1 atom types\n\n-0.05 0.05 xlo xhi\n-0.05 0.05 ylo yhi\n"
+        f"-0.01 0.05 zlo zhi\n\nAtoms\n\n1 1 {2 * RADIUS} {DENSITY} {place}\n"
+    )
+
+
+@pytest.mark.parametrize(("ramp_s", "thrown"), [(0.0, True), (0.1, False)])
+def test_an_oscillation_below_gravity_throws_no_particle_off(
+    tmp_path: Path, ramp_s: float, thrown: bool
+) -> None:
+    """0.1 mm at 30 Hz accelerates with 0.36 g at most: only a start at full speed throws it off."""
+    oscillation = Oscillation(amplitude_m=1e-4, frequency_hz=30, ramp_s=ramp_s)
+    drag = DragSteps(0, 17_000, 1e-5)
+    force = outputs.workpiece_force(20, drag.end, "workpiece")
+    motion = oscillation.of_run(drag)
+    write_plate(tmp_path, motion, drag, 0.0, [force])
+    engine(tmp_path)
+    rows = np.loadtxt(tmp_path / "workpiece_force.1.txt", skiprows=1)
+    lifts = [motion.lift_m(step, drag.timestep_s) for step in rows[:, 0]]
+    np.testing.assert_allclose(rows[:, 10], lifts, atol=1e-9)
+    assert (rows[:, 4] == 0.0).any() == thrown
 
 
 def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: Path) -> None:
@@ -350,20 +403,8 @@ def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: 
             outputs.workpiece_contacts(20, 0, STEPS, several=False),
         ]
     )
-    spin = Spin(rpm=RPM)
-    deck = environment(ROOT / "templates").from_string(DECK)
-    text = deck.render(
-        spin=spin.on_engine(drag), outputs=written, steps=STEPS, timestep=drag.timestep_s,
-        modulus=MODULUS, friction=FRICTION, gravity=GRAVITY, speed=SPEED,
-        law="hertz tangential history",
-    )  # fmt: skip
-    (tmp_path / "in.liggghts").write_text(text)
-    (tmp_path / "workpiece.stl").write_text(PLATE)
-    place = f"{PLACE[0]} {PLACE[1]} {RADIUS - static_overlap(mass)}"
-    (tmp_path / "particle.data").write_text(
-        "one particle\n\n1 atoms\n\n1 atom types\n\n-0.05 0.05 xlo xhi\n-0.05 0.05 ylo yhi\n"
-        f"-0.01 0.05 zlo zhi\n\nAtoms\n\n1 1 {2 * RADIUS} {DENSITY} {place}\n"
-    )
+    spin = Spin(rpm=RPM, ramp_s=0.0)
+    write_plate(tmp_path, spin.of_run(drag), drag, SPEED, written)
     ColumnsFile(outputs={each.name: each.as_part() for each in written}).write(
         tmp_path / "columns.json"
     )

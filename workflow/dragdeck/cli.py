@@ -5,6 +5,7 @@ import contextlib
 import os
 import platform
 import shlex
+import shutil
 import sys
 import tempfile
 import traceback
@@ -16,6 +17,7 @@ from typing import Any
 
 from dragdeck import __version__
 from dragdeck.errors import DragdeckError
+from dragdeck.files import FULL_DISK
 
 
 def _argument(*names: str, **options: Any) -> tuple[tuple[str, ...], dict[str, Any]]:
@@ -213,6 +215,10 @@ def _message(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:
         where = f"{error.filename}: " if error.filename else ""
         remedy = "check that the path exists, its permissions, and the free space on the disk"
+        if error.errno in FULL_DISK:
+            place = Path(error.filename or ".").resolve().parent
+            free = shutil.disk_usage(place if place.is_dir() else ".").free
+            where, remedy = f"{where}{free:,} bytes free: ", "free disk space, then try again"
         return f"{where}{error.strerror}\n  remedy: {remedy}"
     if isinstance(error, MemoryError):
         return f"not enough memory: {error}\n  remedy: use a machine with more memory"

@@ -4,8 +4,10 @@ import os
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import jinja2
@@ -29,7 +31,15 @@ from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
 from dragdeck.decks.deck import StudyScene
-from dragdeck.decks.render import deck_text, write_run, write_workpiece
+from dragdeck.decks.render import (
+    added_forces,
+    deck_text,
+    effective,
+    idle,
+    overriding,
+    write_run,
+    write_workpiece,
+)
 from dragdeck.decks.templates import environment
 from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
@@ -79,6 +89,8 @@ def check(study: str, fidelity: str | None, verbose: bool) -> None:
         for kind in SCENES.values()
         for run in expected_runs(kind, project.run_folders(every, kind), partial(found.look, kind))
     ]
+    if not found.errors:
+        found.errors += idle(found.overriding - found.effective, found.templates)
     warned = f"{len(found.warnings) or 'no'} warning{'' if len(found.warnings) == 1 else 's'}"
     if found.errors:
         wrong = together(found.errors)
@@ -101,17 +113,21 @@ class _Findings:
     errors: list[InputError] = field(default_factory=list)
     warnings: dict[str, list[str]] = field(default_factory=dict)
     notes: dict[str, list[str]] = field(default_factory=dict)
+    overriding: set[str] = field(default_factory=set)
+    effective: set[str] = field(default_factory=set)
 
     def look(self, kind: SceneType, runs: Mapping[Path, Case]) -> StudyScene:
         """Build the scene of runs that differ in the seed alone."""
         case = next(iter(runs.values()))
         try:
             scene = _built(kind, case, None)
-            deck_text(scene, self.templates)
+            script = deck_text(scene, self.templates)
         except InputError as error:
             self.errors.append(error)
             raise
-        for text in dict.fromkeys(map(str, scene.warnings)):
+        self.overriding |= overriding(scene, self.templates)
+        self.effective |= effective(scene, self.templates)
+        for text in dict.fromkeys([*map(str, scene.warnings), *_friction_unknown(script)]):
             names = self.warnings.setdefault(text, [])
             names += [case.name] if case.name not in names else []
         lines = [f"time step: {scene.deck.timestep_s:.3g} s"]
@@ -126,6 +142,18 @@ class _Findings:
             print(f"warning: {_first(names)}: {text}")
         for text, names in self.notes.items() if verbose else ():
             print(f"{_first(names)}\n  {text}")
+
+
+def _friction_unknown(script: str) -> list[str]:
+    """A warning that contacts of a run cannot be analysed, if its contact law adds a force."""
+    added = added_forces(script)
+    if not added:
+        return []
+    return [
+        f"the contact law adds a force ({', '.join(added)}), so that the limit of friction does "
+        "not follow from the contact force; tables of contacts, chains, loading and the report "
+        "will be refused, force on the workpiece and raw output remain"
+    ]
 
 
 def _first(names: Sequence[str]) -> str:
@@ -339,15 +367,33 @@ def render(
             remedy="list them with: dragdeck cases",
         )
     case = runs[run]
+    templates = environment(project.templates, study_templates(case))
     built = _built(kind, case, _bed(kind, packing))
-    for warning in built.warnings:
+    _check_overrides(built, every, templates)
+    for warning in (*built.warnings, *_friction_unknown(deck_text(built, templates))):
         say(f"warning: {warning}")
     folder = project.run_folder(case, kind, of_plan=plan is not None)
     if case.number > 1:
         whole = project.run_folder(case.all_workpieces, kind, of_plan=plan is not None)
-        write_workpiece(built, folder, case.number, whole)
+        write_workpiece(built, folder, case.number, whole, templates)
         return
-    write_run(built, folder, environment(project.templates, study_templates(case)))
+    write_run(built, folder, templates)
+
+
+def _check_overrides(
+    built: StudyScene, every: Sequence[Case], templates: jinja2.Environment
+) -> None:
+    """Refuse a template that changes neither this script nor any other of the cases."""
+    left = overriding(built, templates)
+    if left:
+        left -= effective(built, templates)
+    for case, kind in product(every, SCENES.values()):
+        if not left:
+            return
+        with suppress(InputError):  # that of another run
+            left -= effective(kind.build(case, None), templates)
+    if left:
+        raise together(idle(left, templates))
 
 
 def _bed(kind: SceneType, packing: Path | None) -> Bed | None:

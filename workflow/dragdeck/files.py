@@ -1,8 +1,12 @@
 """Files that are replaced in one step."""
 
+import errno
 import hashlib
 import os
 from pathlib import Path
+
+FULL_DISK = {errno.ENOSPC, errno.EDQUOT}
+"""Numbers of the errors of a full disk, and of a user who may not write more."""
 
 
 def file_checksum(file: Path) -> str:
@@ -17,10 +21,19 @@ def replace_text(file: Path, text: str) -> None:
 
 
 def replace_bytes(file: Path, content: bytes) -> None:
-    """Write a file in one step: readers see the old version or the new one."""
+    """Write a file in one step: readers see the old version or the new one.
+
+    Raises
+    ------
+    OSError
+        It cannot be written; the error names the file.
+    """
     waiting = file.with_name(f".{file.name}.{os.getpid()}")
     try:
         waiting.write_bytes(content)
         waiting.replace(file)
+    except OSError as error:
+        error.filename = str(file)  # a full disk says so of a stream, which has no name
+        raise
     finally:
         waiting.unlink(missing_ok=True)

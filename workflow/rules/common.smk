@@ -1,8 +1,9 @@
 # What the rules share: the study, its cases, the paths of its runs.
 import re
+import sys
 from functools import cache
 from pathlib import Path
-from shlex import quote
+from shlex import join, quote
 
 import yaml
 from jsonschema import Draft202012Validator
@@ -26,13 +27,21 @@ from dragdeck.project import (
 from dragdeck.scenes.registry import SCENES
 from dragdeck.engine.reports import say, shown_bytes
 from dragdeck.engine.space import free_bytes
-from dragdeck.snakemake_lock import clear_stale_locks
+from dragdeck.snakemake_lock import hold_lock
 from dragdeck.source_hash import source_hash
 from dragdeck.study.check import warnings
+from dragdeck.study.yaml import read_yaml
 from evidence.stability.map import bed_names
 from evidence.verification.suite import suite_of
 
-clear_stale_locks(Path(".snakemake"), say)
+
+def locking_call():
+    """The arguments of this call; none of a job within one, or of one that makes no files."""
+    idle = {"-n", "--dry-run", "--dryrun", "--lint", "--nolock"} & set(sys.argv)
+    return "" if idle or not workflow.is_main_process else join(sys.argv[1:])
+
+
+hold_lock(Path(".snakemake"), say, locking_call())
 
 
 def explained(function, *arguments):
@@ -41,6 +50,12 @@ def explained(function, *arguments):
         return function(*arguments)
     except DragdeckError as error:
         raise WorkflowError(str(error))
+
+
+explained(read_yaml, Path("config/config.yaml"))
+
+
+configfile: "config/config.yaml"
 
 
 SCHEMA = yaml.safe_load(Path(workflow.source_path("../schemas/config.schema.yaml")).read_text())
@@ -116,6 +131,11 @@ def every(place, *files):
     return [f"{folder}/{file}" for folder in every_folder(place) for file in files]
 
 
+def every_table(place):
+    """The tables of every run of the study's cases."""
+    return every(place, *(f"tables/{name}" for name in PLACES[place].tables))
+
+
 STIFFNESS = "workflow/dragdeck/data/stiffness.json"
 
 
@@ -165,7 +185,7 @@ def network_page_files():
 
 @cache
 def points(plan=PLAN):
-    """The points of a plan, the trade's if no other."""
+    """The points of a plan, the trade-off's if no other."""
     return explained(PROJECT.points, STUDY, plan)
 
 
@@ -341,7 +361,7 @@ def promises_option(wildcards):
 
 
 def every_drop_point(file):
-    """One file of every drop test of the trade."""
+    """One file of every drop test of the trade-off."""
     return [f"{run_path(STUDY, 'drop_test', run)}/{file}" for run in points_by_run("drop_test")]
 
 

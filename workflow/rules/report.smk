@@ -4,11 +4,8 @@
 
 rule write_report:
     input:
-        [
-            every(name, "run.json", *(f"tables/{table}" for table in scene.tables))
-            for name, scene in SCENES.items()
-        ],
-        [every(name, "tables/figures.json") for name in SCENES],
+        [every(name, "run.json", "tables/figures.json") for name in SCENES],
+        [every_table(name) for name in SCENES],
         every("process", "tables/loading.json"),
         every("process", "network.html"),
         every_extrapolated(),

@@ -1,4 +1,4 @@
-# The trade of speed against accuracy: costs, report and checks.
+# The trade-off of speed against accuracy: costs, report and checks.
 
 
 # Processor times side by side: no other job may run meanwhile.

@@ -22,6 +22,7 @@ from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 from dragdeck.engine.reports import printable, shown_time
 from dragdeck.outlook.explain import Cost
 from dragdeck.outlook.runs import StudyRun, by_their_speeds, done_fraction, time_left
+from dragdeck.snakemake_lock import why_locked
 
 _RECORDS = ("run.json", "outcome.json")
 """Outputs of jobs that run LIGGGHTS in a folder."""
@@ -127,7 +128,9 @@ class LogHandler(LogHandlerBase):
         shown = self._everything or record.levelno > logging.INFO or hasattr(record, "shown")
         if event == LogEvent.RUN_INFO:
             self._held = None
-        if text := printable(self.format(record)).strip("\n"):
+        locked = getattr(record, "exception", None) == "LockException"
+        said = (why_locked(Path(".snakemake")) if locked else None) or self.format(record)
+        if text := printable(said).strip("\n"):
             if shown or text.startswith("Complete log"):
                 style = "red" if record.levelno >= logging.ERROR else ""
                 self._console.print(Text(text, style))

@@ -14,7 +14,7 @@ from dragchain.calibration.results import PURPOSES, CalibrationFile
 from dragchain.calibration.simulated_drops import DropRun, Drops
 from dragchain.figures.marks import row_names
 from dragchain.figures.panels import legend_below, new_figure, new_panels
-from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
+from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, ORANGE, RED
 
 
 def draw_impacts(record: Record, found: Calibration, confirm: Drops) -> Figure:
@@ -37,11 +37,13 @@ def draw_impacts(record: Record, found: Calibration, confirm: Drops) -> Figure:
 
 def _whole(axes: Axes, time: Floats, force: Floats, found: Calibration) -> None:
     measured = found.measured
-    axes.plot((time - time[0]) * 1e3, force, color=BLUE, linewidth=0.7)
+    axes.plot((time - time[0]) * 1e3, force, color=COLOURS["experiment"], linewidth=0.7)
     for impact in measured.impacts:
         place = (impact.peak_time_s - time[0]) * 1e3, impact.peak_n
-        axes.annotate(str(impact.impact), place, (5, -3), textcoords="offset points", color=RED)
-        axes.plot(*place, "v", color=RED)
+        axes.annotate(
+            str(impact.impact), place, (5, -3), textcoords="offset points", color=COLOURS["peak"]
+        )
+        axes.plot(*place, "v", color=COLOURS["peak"])
     axes.set(xlabel="time (ms)", ylabel="force (N)")
     axes.set_title(
         f"{1e-3 / measured.interval_s:.0f} kHz, noise {measured.noise_n:.3g} N, offset "
@@ -54,13 +56,21 @@ def _one_impact(
 ) -> None:
     widest = 0.0
     names = ("simulated, physical modulus", "simulated, production settings")
-    for drop, style, colour, name in zip(drops, "-:", (RED, GREY), names, strict=True):
+    for drop, style, colour, name in zip(drops, "-:", (BLUE, GREY), names, strict=True):
         shape = drop.impacts[impact]
         time = shape.time_s - shape.centroid_s
         axes.plot(time * 1e6, shape.force_n, style, color=colour, label=name, zorder=1)
         widest = max(widest, float(np.abs(time).max()))
     near = np.abs(since) < widest
-    axes.plot(since[near] * 1e6, force[near], "o", color=BLUE, ms=3, label="measured", zorder=2)
+    axes.plot(
+        since[near] * 1e6,
+        force[near],
+        "o",
+        color=COLOURS["experiment"],
+        ms=3,
+        label="measured",
+        zorder=2,
+    )
     axes.set(xlabel="time (µs)")
 
 
@@ -122,10 +132,10 @@ def draw_bias(bias: pd.DataFrame, result: CalibrationFile) -> Figure:
 def _measured_lines(axes: Axes, rebound: float, deck: float) -> None:
     ends = axes.get_xlim()
     axes.plot(ends, ends, color="black", linewidth=0.6, zorder=0)
-    axes.plot([ends[0], deck, deck], [rebound, rebound, ends[0]], ":", color=RED)
+    axes.plot([ends[0], deck, deck], [rebound, rebound, ends[0]], ":", color=COLOURS["experiment"])
     labels = {f"measured {rebound:.3f}": (ends[0], rebound), f"set {deck:.3f}": (deck, ends[0])}
     for label, place in labels.items():
-        axes.annotate(label, place, (3, 3), textcoords="offset points", color=RED)
+        axes.annotate(label, place, (3, 3), textcoords="offset points", color=COLOURS["experiment"])
     axes.set(xlim=ends, ylim=ends)
 
 

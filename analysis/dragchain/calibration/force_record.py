@@ -17,6 +17,9 @@ FORCE_COLUMNS = {"force_n": 1.0, "force_mn": 1e-3, "force_kn": 1e3}
 """Accepted column names and their units in SI; ``force_mn`` is millinewton."""
 
 _LEAST_SAMPLES = 100
+_BLOCKS = 50
+"""Blocks of a record whose medians a line is put through: impacts touch few of them."""
+
 _JITTER = 0.25
 """A time may be off an even grid by this fraction of the interval (rounded stamps)."""
 
@@ -147,7 +150,30 @@ def check_samples(time_s: Floats, force_n: Floats) -> Record:
             limit=f"{_JITTER:g} intervals of {interval:.3g} s",
             remedy="export every sample at the sampling rate of the sensor",
         )
-    centre = float(np.median(force_n))
-    if centre - float(force_n.min()) > float(force_n.max()) - centre:
+    rest = force_n - np.polyval(quiet_line(even, force_n), even)
+    if -float(rest.min()) > float(rest.max()):
         return Record(even, -force_n, interval, ("sign_turned",))
     return Record(even, force_n, interval)
+
+
+def quiet_line(time_s: Floats, force_n: Floats) -> Floats:
+    """A first line through what lies between the impacts, however steep the drift.
+
+    Its slope is the median of the slopes between the medians of all pairs of blocks (Theil-Sen
+    estimator), its offset the median of what is left.
+
+    Parameters
+    ----------
+    time_s, force_n : (N,) ndarray
+        Times, s, and forces, N; at least two samples per block.
+
+    Returns
+    -------
+    (2,) ndarray
+        Slope, N/s, and force at time 0, N.
+    """
+    time = np.array([np.mean(block) for block in np.array_split(time_s, _BLOCKS)])
+    force = np.array([np.median(block) for block in np.array_split(force_n, _BLOCKS)])
+    one, other = np.triu_indices(_BLOCKS, 1)
+    slope = float(np.median((force[other] - force[one]) / (time[other] - time[one])))
+    return np.array([slope, float(np.median(force_n - slope * time_s))])

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 from pydantic.json_schema import SkipJsonSchema
 
 from dragchain.arrays import Floats
-from dragchain.calibration.force_record import Note, Record
+from dragchain.calibration.force_record import Note, Record, quiet_line
 from dragchain.documents import Document, Part
 from dragchain.errors import RecordError
 
@@ -164,15 +164,15 @@ def measure(record: Record, *, fall_time_s: float) -> Measured:
 def _baseline(time: Floats, force: Floats, dead: int) -> tuple[float, float, float]:
     """Offset, drift and noise of the quiet samples.
 
-    A line through them, begun with the median and fitted again without what
+    A line through them, begun with `quiet_line` and fitted again without what
     stands out, until that changes nothing. What stands out is told by the
     median absolute deviation, which the impacts do not touch, or by the
     sensor's resolution where that is coarser. The noise is the standard
     deviation of what is left.
     """
     coarse = _quantum(force) / 2.0
-    line = np.array([0.0, float(np.median(force))])
-    spread = _MAD_TO_STD * float(np.median(np.abs(force - line[1])))
+    line = quiet_line(time, force)
+    spread = _MAD_TO_STD * float(np.median(np.abs(force - np.polyval(line, time))))
     out = np.zeros(len(force), dtype=bool)
     for _ in range(20):
         before = out

@@ -4,7 +4,7 @@ import numpy as np
 
 from dragchain.arrays import Floats, Ints
 from dragchain.drag.azimuth import circumference, parts, within
-from dragchain.statistics.bootstrap import estimates, frame_sums
+from dragchain.statistics.frame_means import estimates, frame_sums
 from dragchain.statistics.estimate import Estimate
 
 AZIMUTH_BINS = 24

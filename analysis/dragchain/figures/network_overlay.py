@@ -13,7 +13,7 @@ from matplotlib.patheffects import withStroke
 from dragchain.arrays import Floats
 from dragchain.figures.network_picture import Scene, View
 from dragchain.figures.rendering import Image
-from dragchain.figures.style import CHAIN, force_map
+from dragchain.figures.style import COLOURS, force_map
 
 
 def show_network(
@@ -56,7 +56,7 @@ def _mark_chain(axes: Axes, shown: Scene, pick: Sequence[int], width: float, hal
     ends = frame.point[[path.contacts[0], path.contacts[-1]]]
     centres, radii = frame.centre[list(path.particles)], frame.radius[list(path.particles)] * 1e3
     line = np.vstack([ends[:1], centres, ends[1:]])[:, pick] * 1e3
-    for colour, thick in (("white", halo), (CHAIN, width)):
+    for colour, thick in (("white", halo), (COLOURS["dominant_path"], width)):
         axes.plot(*line.T, color=colour, linewidth=thick)
         for centre, radius in zip(line[1:-1], radii, strict=True):
             axes.add_patch(Circle(centre, radius, fill=False, edgecolor=colour, linewidth=thick))

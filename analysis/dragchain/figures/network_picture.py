@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.figures.rendering import Camera, Image, new_plotter, photograph
-from dragchain.figures.style import force_map
+from dragchain.figures.style import COLOURS, force_map
 from dragchain.network.chains import WidestPath, dominant_path, widest_paths
 from dragchain.network.frame import NetworkFrame, read_frames
 from dragchain.run.case import Case
@@ -229,7 +229,7 @@ def render(
     plotter.enable_depth_peeling(number_of_peels=8)
     _add_bowl(plotter, case, view)
     workpiece = placed(workpiece_mesh(run_dir, case), scene.workpiece_m, scene.workpiece_turn_rad)
-    plotter.add_mesh(workpiece, color="#59636e", opacity=0.45)
+    plotter.add_mesh(workpiece, color=COLOURS["workpiece"], opacity=0.45)
     _add_contacts(plotter, scene.frame, case.media.radius_mean_m, look, part.contacts)
     image = photograph(plotter, _camera((low + high) / 2, view, case), float(high[1] - low[1]))
     return image, np.array([low[0], high[0], low[1], high[1]]) * 1e3

@@ -1,5 +1,6 @@
 """Colours and style of all figures, and how they become PNG files."""
 
+import re
 from contextlib import AbstractContextManager
 from io import BytesIO
 from pathlib import Path
@@ -7,9 +8,11 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.typing import RcKeyType
 from PIL import Image
 
@@ -18,7 +21,33 @@ from dragchain.files import write_bytes
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#6b7480"
 """After Okabe and Ito (2008): told apart with any kind of colour vision."""
 
-INK, LIGHT, CHAIN = "#1d2733", "#c8ced6", "#1f4fa3"
+INK, LIGHT = "#1d2733", "#c8ced6"
+
+COLOURS = {
+    "drag": BLUE,
+    "lateral": ORANGE,
+    "experiment": "#7a4fa3",
+    "simulation": GREY,
+    "peak": RED,
+    "transient": "#d9dde2",
+    "ahead": BLUE,
+    "behind": "#9cc3dd",
+    "dominant_path": "#1fa2e8",
+    "chain": GREEN,
+    "bowl": "#b9c6d2",
+    "bed": "#d8b365",
+    "workpiece": "#59636e",
+    "swept": "#5ba3d0",
+    "plunge": "#CC79A7",
+    "approach": "#117a65",
+    "ink": INK,
+    "refused": "#b3261e",
+}
+"""One colour for each thing, in every figure and page; `simulation` is that of a source.
+
+`pytest tests/contract --update` copies it to where no import leads: the preview and ``web/``.
+"""
+
 SERIES = (BLUE, ORANGE, GREEN, RED, "#7a4fa3", "#5b8a99")
 """Colours of series that stand side by side."""
 
@@ -41,21 +70,28 @@ STYLE: dict[RcKeyType, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 8,
 }
-FORCE_COLOURS = "magma_r"
-"""From light to dark, told apart with any kind of colour vision."""
+FORCE_COLOURS = LinearSegmentedColormap.from_list(
+    "forces", matplotlib.colormaps["magma_r"](np.linspace(0.0, 0.8, 256))
+)
+"""From light to dark, told apart with any kind of colour vision.
+
+It ends before black, in which a cylinder shows neither its shape nor what is drawn on it.
+"""
 
 PAPER_COLOURS = LinearSegmentedColormap.from_list("paper", ["#1a9850", "#d9c514", "#c8102e"])
 """Green over yellow to red, as in Uhlmann et al. (2015)."""
 
 WIDTH_IN = 7.6
-WIDE_IN = 9.5
+HALF_IN, WIDE_IN = 5.6, 9.5
+"""Widths of figures: `HALF_IN` where two stand side by side on a page."""
+
 _DPI = 150
 
 
 def force_map() -> Colormap:
     """The colour map of forces and loads: the paper's where matplotlib's default is set to it."""
     paper = matplotlib.rcParams["image.cmap"] == PAPER_COLOURS.name
-    return PAPER_COLOURS if paper else matplotlib.colormaps[FORCE_COLOURS]
+    return PAPER_COLOURS if paper else FORCE_COLOURS
 
 
 def drawing() -> AbstractContextManager[None]:
@@ -63,8 +99,18 @@ def drawing() -> AbstractContextManager[None]:
     return matplotlib.rc_context(STYLE)
 
 
+_HYPHEN = re.compile(r"(?<![\w.\-])-(?=[\d.])")
+
+
+def true_minus(drawn: Artist) -> None:
+    """Write the hyphens before numbers in all texts of a figure or of axes as minus signs."""
+    for text in drawn.findobj(Text):
+        text.set_text(_HYPHEN.sub("\N{MINUS SIGN}", text.get_text()))
+
+
 def png(figure: Figure) -> bytes:
     """A figure as PNG without transparency."""
+    true_minus(figure)
     figure.set_dpi(_DPI)
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()

@@ -14,7 +14,7 @@ from dragchain.loading.samples import BODY, WORKPIECE, Sampled
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
 from dragchain.run.workpiece import Surface, off_facet
-from dragchain.statistics.bootstrap import block_length
+from dragchain.statistics.correlated import slow_waves
 
 _OFF_FACET = 1e-5
 """Largest distance of a contact point from its facet over the workpiece's length: rounding."""
@@ -83,18 +83,14 @@ def facet_table(sampled: Sampled, surface: Surface, events: pd.DataFrame) -> pd.
 
 
 def _standard_error(sampled: Sampled, name: str, count: int) -> Floats:
-    """The standard error of a sum of each facet, (count,), by batch means.
+    """The standard error of a sum of each facet, (count,), with `SLOW_WAVES` degrees of freedom.
 
-    The samples are cut into batches that outlast the memory of the whole workpiece's
-    series (`block_length`); the batches' spread gives the error.
+    As `slow_error` of the series of each facet, which need not be held for that.
     """
-    rows = sampled.rows
-    series = sampled.per_frame(rows[name])
-    batches = max(2, sampled.frames // block_length(series[:, None]))
-    batch = rows["frame"].to_numpy() * batches // sampled.frames
-    at = batch * count + rows["facet_id"].to_numpy()
-    sums = np.bincount(at, rows[name], batches * count).reshape(batches, count)
-    return np.asarray(np.sqrt(batches) * sums.std(axis=0, ddof=1))
+    frame, facet, amount = (sampled.rows[one].to_numpy() for one in ("frame", "facet_id", name))
+    waves = slow_waves(sampled.frames)
+    squares = [np.bincount(facet, amount * wave[frame], count) ** 2 for wave in waves]
+    return np.asarray(np.sqrt(sampled.frames * np.mean(squares, axis=0)))
 
 
 def _axes(name: str, unit: str, vectors: Floats) -> dict[str, Floats]:

@@ -35,7 +35,7 @@ from dragchain.loading.document import (
 )
 from dragchain.loading.samples import WORKPIECE, Sampled
 from dragchain.run.case import Case
-from dragchain.statistics.bootstrap import estimates
+from dragchain.statistics.frame_means import estimates
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
 
 _THINNING = (2, 5, 10)

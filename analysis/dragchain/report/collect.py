@@ -116,7 +116,7 @@ def _ratio(above: MeanEstimate, below: MeanEstimate) -> Estimate:
 
 def compare(ours: MeanEstimate, reference: ReferenceDrag) -> Comparison:
     """Set the mean drag beside one of the source."""
-    difference = reference.difference(Estimate(ours.mean, ours.ci95_low, ours.ci95_high))
+    difference = reference.difference(ours.estimate)
     return Comparison(
         label=reference.label,
         mean_n=reference.mean_n,

@@ -1,15 +1,20 @@
 """The figures of a process run for a publication: SVG, PDF and PNG at the widths of columns."""
 
+import base64
+import re
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.typing import RcKeyType
+from PIL import Image
 
-from dragchain.figures.style import PAPER_COLOURS, drawing
+from dragchain.figures.style import PAPER_COLOURS, drawing, true_minus
 from dragchain.files import write_bytes
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.write import compute_loading, figure_of
@@ -23,6 +28,7 @@ _ONE_COLUMN = ("force_around_workpiece",)
 _MM_PER_IN = 25.4
 _DPI = 300
 _POINTS = 8
+_PALETTE = 256
 _PRINT: dict[RcKeyType, Any] = {
     "font.size": _POINTS,
     "axes.labelsize": _POINTS,
@@ -102,6 +108,33 @@ def _is_panel(axes: Axes) -> bool:
 
 
 def _encoded(figure: Figure, ending: str) -> bytes:
+    true_minus(figure)
+    for shown in figure.findobj(AxesImage):
+        shown.set_data(
+            np.asarray(_few_colours(Image.fromarray(np.asarray(shown.get_array()))).convert("RGB"))
+        )
+        shown.set_interpolation("antialiased" if ending == "png" else "none")
     content = BytesIO()
     figure.savefig(content, format=ending, dpi=_DPI)
+    if ending == "png":
+        return _png(_few_colours(Image.open(content).convert("RGB")))
+    if ending == "svg":
+        return re.sub(rb"(?<=image/png;base64,)[^\"]+", _embedded, content.getvalue())
+    return content.getvalue()
+
+
+def _embedded(picture: re.Match[bytes]) -> bytes:
+    """A picture in an SVG file, of few colours."""
+    pixels = Image.open(BytesIO(base64.b64decode(picture.group()))).convert("RGB")
+    return base64.b64encode(_png(_few_colours(pixels)))
+
+
+def _few_colours(picture: Image.Image) -> Image.Image:
+    """A picture of as many colours as a palette holds: a fifth of the bytes."""
+    return picture.quantize(_PALETTE, dither=Image.Dither.NONE)
+
+
+def _png(picture: Image.Image) -> bytes:
+    content = BytesIO()
+    picture.save(content, format="png", dpi=(_DPI, _DPI), optimize=True)
     return content.getvalue()

@@ -1,7 +1,6 @@
 """The figures of a run, as PNG files, and that of all cases."""
 
 from collections.abc import Callable, Mapping
-from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from dragchain.figures import network_picture
 from dragchain.figures.marks import compass, compass_bars, row, row_names
 from dragchain.figures.network_overlay import force_bar, show_network
 from dragchain.figures.panels import head, legend_below, new_figure, new_panels
-from dragchain.figures.style import BLUE, RED, drawing, save
+from dragchain.figures.style import BLUE, COLOURS, HALF_IN, RED, drawing, save
 from dragchain.report import run_panels
 from dragchain.report.collect import write_findings
 from dragchain.report.findings import (
@@ -48,12 +47,12 @@ def _reliability(ours: MeanEstimate) -> str:
 def force_around_workpiece(run: RunData, found: ProcessFindings) -> Figure:
     """Mean normal force by azimuth, ahead up."""
     edges, sums = found.azimuth.edges_rad, found.ahead_behind
-    figure = new_figure(4.6, 5.7)
+    figure = new_figure(4.6, HALF_IN)
     compass_bars(compass(figure), edges, found.azimuth.force_n)
     head(
         figure,
-        "normal force on the workpiece by azimuth from the direction of motion,\n"
-        f"mean over frames (N per {np.degrees(edges[1] - edges[0]):.0f}°); bars: 95 % CI\n"
+        "normal force on the workpiece by azimuth from the direction of\n"
+        "motion, mean over frames; bars: 95 % CI\n"
         f"ahead {sums.ahead_n.value:.2f} N, behind {sums.behind_n.value:.2f} N, "
         + _ratio(sums.ratio),
     )
@@ -70,7 +69,7 @@ def _ratio(ratio: Estimate) -> str:
 def force_depth(run: RunData, found: ProcessFindings) -> Figure:
     """The normal force of a contact, and of all contacts together, against depth."""
     slope = found.depth.slope_n_per_m.over(1e3)
-    figure, (left, right) = new_panels(3.9, 2, sharey=True)
+    figure, (left, right) = new_panels(3.3, 2, HALF_IN, sharey=True)
     run_panels.force_over_depth(left, found)
     interval = f"95 % CI {slope.ci95_low:.4f} to {slope.ci95_high:.4f}"
     left.set_title(f"slope {slope.value:.4f} N/mm\n({interval})")
@@ -82,7 +81,7 @@ def force_depth(run: RunData, found: ProcessFindings) -> Figure:
 def chains_peaks(run: RunData, found: ProcessFindings) -> Figure:
     """Resistance with its peaks over the bottleneck of the dominant workpiece path."""
     peaks = found.peaks
-    figure, (upper, lower) = new_panels(4.4, 2, columns=1, sharex=True)
+    figure, (upper, lower) = new_panels(3.8, 2, HALF_IN, 1, sharex=True)
     run_panels.peaks(upper, run, found)
     upper.set_title(f"{peaks.count} peaks (marked), at least {peaks.separation_s:.2f} s apart")
     run_panels.bottlenecks(lower, run, found)
@@ -105,13 +104,13 @@ def _network(run: RunData, view: network_picture.View, side: str) -> Figure:
     """A rendered view on axes in mm, with what it shows named."""
     shown = run.scene
     image, extent = network_picture.render(run.folder, run.case, shown, view)
-    height = 5.6 * (extent[3] - extent[2]) / (extent[1] - extent[0]) + 0.9
-    figure, (axes,) = new_panels(height, width_in=6.9)
+    height = 4.3 * (extent[3] - extent[2]) / (extent[1] - extent[0]) + 0.9
+    figure, (axes,) = new_panels(height, width_in=HALF_IN)
     show_network(axes, shown, view, image, extent)
     largest = float(shown.frame.normal_force.max(initial=0.0))
     force_bar(figure, [axes], largest)
     title = (
-        f"contact network {side}, process time {shown.process_time_s:.2f} s; "
+        f"contact network {side}, process time {shown.process_time_s:.2f} s\n"
         f"largest normal force {largest:.2f} N"
     )
     cut = network_picture.cut_words(run.case, view)
@@ -124,7 +123,7 @@ def _path_words(shown: network_picture.Scene) -> str:
         return "no path of strong contacts from workpiece to bowl"
     forces = shown.frame.normal_force[list(shown.dominant.contacts)]
     return (
-        "outlined: dominant path from workpiece to bowl, "
+        "blue: dominant path from workpiece to bowl, "
         f"{len(shown.dominant.particles)} particles, bottleneck {forces.min():.2f} N"
     )
 
@@ -157,7 +156,7 @@ def filling(run: RunData, found: FillingFindings) -> Figure | None:
     table = table[table["n_particles"] > 0]
     energy = (table["kinetic_energy_j"] + table["rotational_energy_j"]).to_numpy(np.float64)
     ratio = energy_ratio(energy, table["n_particles"].to_numpy(np.float64), run.case)
-    figure, (axes,) = new_panels(3.2)
+    figure, (axes,) = new_panels(3.2, width_in=HALF_IN)
     axes.semilogy(table["time_s"], ratio, color=BLUE)
     rest, bed = found.rest_energy_ratio, found.bed
     if rest is not None:
@@ -179,7 +178,7 @@ def drop_test(run: RunData, found: DropFindings) -> Figure:
         for name in ("time_s", "vz_m_s", "force_n")
     )
     impacts, ratio = found.impacts, found.restitution
-    figure, panels = new_panels(3.2, len(impacts.start_time_s), sharey=True)
+    figure, panels = new_panels(3.2, len(impacts.start_time_s), HALF_IN, sharey=True)
     limit = 1.1 * float(np.abs(speed_m_s).max())
     for number, axes in enumerate(panels):
         start, duration = impacts.start_time_s[number], impacts.duration_s[number]
@@ -195,16 +194,16 @@ def drop_test(run: RunData, found: DropFindings) -> Figure:
     head(
         figure,
         f"effective coefficient of restitution {ratio.mean:.3f} "
-        f"(range {ratio.lowest:.3f} to {ratio.highest:.3f}); input value {ratio.input:.3f}",
+        f"(range {ratio.lowest:.3f} to {ratio.highest:.3f});\ninput value {ratio.input:.3f}",
     )
     return figure
 
 
 def _impact_words(number: int, impacts: DropImpacts) -> str:
     return (
-        f"impact {number + 1}: peak {impacts.peak_force_n[number]:.2f} N\n"
-        f"{impacts.time_since_first_s[number] * 1e3:.1f} ms after the first, "
-        f"e = {impacts.restitution[number]:.3f}"
+        f"impact {number + 1}, e = {impacts.restitution[number]:.3f}\n"
+        f"peak {impacts.peak_force_n[number]:.2f} N\n"
+        f"after {impacts.time_since_first_s[number] * 1e3:.1f} ms"
     )
 
 
@@ -266,13 +265,13 @@ def drag_of_cases(
     names, forces : list
         Name and mean drag of each case.
     references : list of (str, float)
-        Label and mean in N of each figure to compare with.
+        ``experiment`` or ``simulation``, and mean in N of each figure to compare with.
     """
     figure, (axes,) = new_panels(1.2 + 0.32 * len(names))
     for place, force in enumerate(forces):
         row(axes, place, force.mean, force, BLUE)
-    for (label, value), colour in zip(references, cycle(run_panels.REFERENCES), strict=False):
-        axes.axvline(value, color=colour, linestyle="--", label=f"{label} {value:.2f} N")
+    for label, value in references:
+        axes.axvline(value, color=COLOURS[label], linestyle="--", label=f"{label} {value:.2f} N")
     row_names(axes, names)
     axes.set(xlabel="mean drag (N); bars: 95 % confidence interval")
     return legend_below(figure)

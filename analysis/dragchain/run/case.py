@@ -154,7 +154,8 @@ class Case(Document):
     outside a filling. ``contact_moduli`` are those of a particle with a ``particle``, the ``bowl``
     and the ``workpiece``, ``numbers`` the dimensionless numbers of a process. ``superposed`` lists
     the superposed motions, ``asked`` is the tolerance for which the settings were chosen, and
-    ``output_of`` the run from whose raw output a further workpiece is read.
+    ``output_of`` the run from whose raw output a further workpiece is read. ``added_forces`` are
+    models of the contact law that add a normal force, such as cohesion.
     """
 
     made_by: ClassVar[str] = "dragdeck step render"
@@ -187,6 +188,7 @@ class Case(Document):
     reference: Reference | None = None
     versions: Mapping[str, str]
     asked: AdvisedSettings | None = None
+    added_forces: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _of_its_scene(self) -> Self:
@@ -239,11 +241,21 @@ def number_of(case: Case, name: str) -> float:
 def friction_with(case: Case, body: str) -> float:
     """Coefficient of friction of a particle with ``media``, ``bowl`` or ``workpiece``.
 
+    Times the normal force of a contact it limits the tangential force.
+
     Raises
     ------
     TableError
-        If the inputs of ``case.json`` do not give it.
+        If the inputs of ``case.json`` do not give it, or the contact law adds a force to the
+        one that limits friction.
     """
+    if case.added_forces:
+        raise TableError(
+            f"{case.run}: the contact law adds a force ({', '.join(case.added_forces)}), and "
+            "LIGGGHTS limits friction by the force without it: tangential forces of contacts, "
+            "friction work and chains cannot be told from the output; tables of the force "
+            "on the workpiece, of energies and particles, and the raw output are not affected"
+        )
     particle, other = (input_of(case, f"{name}.material") for name in ("media", body))
     names = [f"pairs.{pair}.friction" for pair in (f"{particle}-{other}", f"{other}-{particle}")]
     return number_of(case, next((name for name in names if name in case.inputs), names[0]))

@@ -21,6 +21,7 @@ CheckCode = Literal[
     "within_limits",
     "output_complete",
     "packing_whole",
+    "packing_in_bowl",
     "ranks",
 ]
 CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", "energy", "speed"]

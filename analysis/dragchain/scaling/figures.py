@@ -11,7 +11,6 @@ from dragchain.arrays import Floats
 from dragchain.figures.marks import log_ticks
 from dragchain.figures.panels import legend_below, new_panels
 from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN
-from dragchain.report.notation import MINUS
 from dragchain.scaling.document import CurvePoint, ScaledRun, ScalingFile
 
 _LEAST_SPAN = 2.5
@@ -47,7 +46,7 @@ def draw_scalings(scalings: Sequence[ScalingFile]) -> Figure:
 def _title(found: ScalingFile) -> str:
     exponent, expected = found.judged.exponent, found.expected.exponent
     value, low, high = (
-        f"{round(number, 2) + 0.0:.2f}".replace("-", MINUS)
+        f"{round(number, 2) + 0.0:.2f}"
         for number in (exponent.value, exponent.ci95_low, exponent.ci95_high)
     )
     words = f"exponent {value} ({low} to {high})"

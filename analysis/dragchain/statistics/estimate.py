@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated
 
 import numpy as np
@@ -30,12 +30,14 @@ Real = Annotated[float, AllowInfNan(True), BeforeValidator(_nan_for_none)]
 class Estimate:
     """A number with its 95 % confidence interval, NaN where it is not known.
 
-    It may be a field of a document, whose JSON then has null for NaN.
+    It may be a field of a document, whose JSON then has null for NaN. It is not reliable if
+    the series behind it is too short, so that the interval is probably too narrow.
     """
 
     value: Real
     ci95_low: Real
     ci95_high: Real
+    reliable: bool = True
 
     @classmethod
     def around(cls, value: float, half_width: float) -> "Estimate":
@@ -45,7 +47,11 @@ class Estimate:
     @property
     def known(self) -> bool:
         """Whether the value and its interval are finite."""
-        return all(math.isfinite(number) for number in vars(self).values())
+        return all(math.isfinite(number) for number in self._numbers)
+
+    @property
+    def _numbers(self) -> tuple[float, float, float]:
+        return self.value, self.ci95_low, self.ci95_high
 
     def contains(self, value: float) -> bool:
         """Whether a value is within the interval."""
@@ -54,18 +60,16 @@ class Estimate:
     def over(self, size: float) -> "Estimate":
         """The estimate divided by a number, which may be negative."""
         low, high = sorted((self.ci95_low / size, self.ci95_high / size))
-        return Estimate(self.value / size, low, high)
+        return Estimate(self.value / size, low, high, self.reliable)
 
     def exp(self, factor: float = 1.0, minus: float = 0.0) -> "Estimate":
         """The estimate of ``exp(factor * x) - minus``, for a positive factor."""
-        low, value, high = (
-            np.exp(factor * np.array([self.ci95_low, self.value, self.ci95_high])) - minus
-        )
-        return Estimate(float(value), float(low), float(high))
+        return self.mapped(lambda number: np.exp(factor * number) - minus)
 
     def mapped(self, function: Callable[[float], float]) -> "Estimate":
         """The estimate of a rising function of the number."""
-        return Estimate(*(float(function(number)) for number in vars(self).values()))
+        value, low, high = (float(function(number)) for number in self._numbers)
+        return Estimate(value, low, high, self.reliable)
 
 
 @dataclass(frozen=True)
@@ -75,12 +79,12 @@ class EstimateColumns:
     value: tuple[Real, ...]
     ci95_low: tuple[Real, ...]
     ci95_high: tuple[Real, ...]
+    reliable: tuple[bool, ...] = ()
 
     @classmethod
     def of(cls, estimates: Sequence[Estimate]) -> "EstimateColumns":
         """The columns of estimates."""
-        names = ("value", "ci95_low", "ci95_high")
-        return cls(*(tuple(getattr(one, name) for one in estimates) for name in names))
+        return cls(*(tuple(getattr(one, own.name) for one in estimates) for own in fields(cls)))
 
 
 def flattened(row: Mapping[str, object]) -> dict[str, object]:

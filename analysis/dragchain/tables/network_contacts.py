@@ -80,8 +80,8 @@ def contact_rows(
 ) -> ContactRows:
     """Bring the contacts of one step into one form.
 
-    A contact with floor, side or workpiece is one that carries force; overlaps
-    without force (`WallContacts.silent`) are left out.
+    A contact is one that carries force, whatever the other body is: overlaps without force, where
+    damping exceeds the elastic force and tension is suppressed, are left out.
 
     Parameters
     ----------
@@ -136,6 +136,7 @@ def contact_rows(
 
 def _particle_particle(particles: _Particles, contacts: Frame, friction: float) -> ContactRows:
     """Contact point: centre 1 + (R1 - overlap / 2) n, with n from particle 1 to particle 2."""
+    contacts = contacts.take(np.flatnonzero(contacts.vectors(*FORCES).any(axis=1)))
     first, second = contacts.ids("particle1_id"), contacts.ids("particle2_id")
     at_first, at_second = particles.rows_of(first), particles.rows_of(second)
     centre = particles.centres[at_first]

@@ -359,12 +359,12 @@ _TABLES: Mapping[Scene, tuple[Table, ...]] = {
     "process": (
         _THERMO,
         Table("workpiece_force.parquet", ("workpiece_force",), _write_workpiece_force),
+        _PARTICLES,
         Table(
             "workpiece_contacts.parquet",
             ("workpiece_force", *_ON_WORKPIECE),
             _write_workpiece_contacts,
         ),
-        _PARTICLES,
         Table("contacts.parquet", ("contacts", "particles", *_ON_WORKPIECE), _write_contacts),
     ),
 }

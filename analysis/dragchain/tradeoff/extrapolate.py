@@ -51,7 +51,7 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
         if entry is None or measured == 0.0 or not case.numbers.get(entry.friction):
             continue  # the laws are written in the logarithm of a coefficient of friction
         guess = entry.at_physical_modulus(measured, case.numbers, scale, diameters)
-        half = entry.quantile * guess.se
+        half = guess.half_width(entry.quantile)
         ends = [math.copysign(math.exp(guess.logarithm + s * half), measured) for s in (-1, 0, 1)]
         low, value, high = sorted(ends)
         found.append(
@@ -67,7 +67,7 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
         )
     Extrapolated(
         youngs_modulus_scale=scale,
-        source=f"{sum(bool(one.runs) for one in known.scenes)} scenes, measured {known.measured}",
+        source=f"{len(known.scenes)} scenes, measured {known.measured}",
         outside=tuple(_outside(case.numbers, known)),
         quantities=tuple(found),
     ).write(run_dir / FILE)

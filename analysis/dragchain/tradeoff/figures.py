@@ -1,4 +1,4 @@
-"""The figures of the report on a trade."""
+"""The figures of the report on a trade-off."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace

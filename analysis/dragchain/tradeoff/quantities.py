@@ -23,6 +23,9 @@ class Quantity:
         It may be zero or change its sign: errors are counted in mean drags.
     friction : str
         The number of a scene that the effect of a reduced modulus depends on.
+    stiffness_power : float
+        A law of reduced moduli is fitted to the quantity times kappa to this power: an overlap
+        is proportional to 1 / kappa.
     """
 
     name: str
@@ -32,6 +35,7 @@ class Quantity:
     squared: bool = False
     signed: bool = False
     friction: str = "particle_friction"
+    stiffness_power: float = 0.0
 
     def of_blocks(self, blocks: Floats) -> float:
         """A run's value from the values of its blocks, (B,)."""
@@ -84,7 +88,7 @@ QUANTITIES = (
         "J/m",
         friction="workpiece_friction",
     ),
-    Quantity("workpiece_overlap", "mean relative overlap on the workpiece"),
+    Quantity("workpiece_overlap", "mean relative overlap on the workpiece", stiffness_power=1.0),
     Quantity(
         "coordination_number",
         "coordination number",
@@ -92,7 +96,11 @@ QUANTITIES = (
     ),
     Quantity("mechanical_coordination_number", "coordination number without rattlers"),
     Quantity("network_force_mean", "mean normal force in the network", "N"),
-    Quantity("overlap_p99", "99th percentile of the relative overlap between particles"),
+    Quantity(
+        "overlap_p99",
+        "99th percentile of the relative overlap between particles",
+        stiffness_power=1.0,
+    ),
     Quantity("chain_count", "Peters chains per frame", short="Peters chains"),
     Quantity("chain_length", "particles per Peters chain", short="particles per chain"),
     Quantity("chain_alignment", "mean squared cosine of the angle between chains and motion"),

@@ -22,7 +22,7 @@ from scipy.optimize import least_squares
 
 from dragchain.arrays import Floats
 from dragchain.documents import Part
-from dragchain.errors import SeriesError
+from dragchain.errors import SeriesError, TableError
 from dragchain.tradeoff.measures import Measures
 from dragchain.tradeoff.six_digits import SixDigits
 
@@ -64,6 +64,8 @@ def fit_stable_step(runs: Sequence[Measures]) -> StableStepLaw:
     ------
     SeriesError
         If fewer than ten of them have a number.
+    TableError
+        If a run with a number does not say its restitution or its radii.
     """
     rows = np.array([_row(run) for run in runs if run.stability_number and run.numbers])
     if len(rows) < _FEWEST_RUNS:
@@ -103,7 +105,7 @@ def _row(run: Measures) -> tuple[float, float, float, float, float]:
     kappa = run.numbers["stiffness_number"] * softer
     media = run.inputs["media.material"]
     restitution, mean, std = (
-        float(run.inputs.get(name) or 0.0)  # type: ignore[arg-type]
+        _number(run, name)
         for name in (
             f"pairs.{media}-{media}.restitution",
             "media.radius_mean_m",
@@ -112,3 +114,13 @@ def _row(run: Measures) -> tuple[float, float, float, float, float]:
     )
     step = run.fidelity.timestep_fraction
     return run.stability_number or math.nan, kappa, restitution, step, std / mean
+
+
+def _number(run: Measures, name: str) -> float:
+    value = run.inputs.get(name)
+    if not isinstance(value, int | float):
+        raise TableError(
+            f"{run.study} {run.run}: measures.json has no number for {name}, but {value!r}: "
+            "measure the run again"
+        )
+    return float(value)

@@ -21,8 +21,10 @@ class LawEntry(Part):
         Number of scenes in the fit.
     friction : str
         Dimensionless number that the law uses as its coefficient of friction.
+    stiffness_power : float
+        The law is that of the quantity times kappa to this power.
     quantile : float
-        Half-width of a 95 % CI / standard error.
+        Half-width of a 95 % CI / standard error, of the errors by the law.
     path_to_particle : float
         Mean path / particle diameter to which `run_std` refers.
     """
@@ -30,6 +32,7 @@ class LawEntry(Part):
     label: str
     scenes: int
     friction: str
+    stiffness_power: SixDigits
     quantile: SixDigits
     path_to_particle: SixDigits
     law: StiffnessLaw
@@ -57,6 +60,7 @@ class LawEntry(Part):
             scales=np.array([scale]),
             logarithms=np.log(np.abs([value])),
             path_to_particle=diameters,
+            stiffness_power=self.stiffness_power,
         )
         run_std = self.law.run_std * math.sqrt(self.path_to_particle / diameters)
         return extrapolate(self.law, run, np.array([run_std]))
@@ -90,11 +94,7 @@ class ExtrapolationErrors(Part):
 
 
 class SceneEntry(Part):
-    """A scene of the record: its dimensionless numbers, and its runs at each modulus scale.
-
-    The last scene is that of the trade-off that the laws were checked with: none of its runs was
-    part of the fit.
-    """
+    """A scene of the fit: its dimensionless numbers, and its runs at each modulus scale."""
 
     numbers: Mapping[str, SixDigits]
     runs: Mapping[str, int]

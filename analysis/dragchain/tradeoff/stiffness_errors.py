@@ -5,12 +5,11 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from dragchain.arrays import Floats
 from dragchain.tradeoff.measures import Measures
 from dragchain.tradeoff.quantities import QUANTITIES, Quantity
 from dragchain.tradeoff.runs import by_scene, values_within
 from dragchain.tradeoff.stiffness_document import ExtrapolationErrors, LawEntry
-from dragchain.tradeoff.stiffness_law import ScaledRuns, error_in
+from dragchain.tradeoff.stiffness_law import ErrorIn, ScaledRuns, error_in
 
 PLANS: Sequence[Mapping[float, int]] = ({1e-3: 1}, {1e-2: 1}, {1e-3: 1, 1e-2: 1})
 """Ways to extrapolate that are tried."""
@@ -31,42 +30,36 @@ def scaled_runs(runs: Sequence[Measures], quantity: Quantity) -> ScaledRuns | No
         scales=np.array([run.fidelity.youngs_modulus_scale for run, _ in rows]),
         logarithms=np.log(np.abs([value for _, value in rows])),
         path_to_particle=arc / complete[0].particle_diameter_m,
+        stiffness_power=quantity.stiffness_power,
     )
 
 
 def errors_entry(
-    quantity: Quantity, plan: Mapping[float, int], found: Floats, quantile: float
-) -> tuple[ExtrapolationErrors, float]:
-    """What the errors of a plan say, and what of them is beyond their standard errors.
+    quantity: Quantity, plan: Mapping[float, int], found: Sequence[ErrorIn], quantile: float
+) -> ExtrapolationErrors:
+    """What the errors of a plan say.
 
     Parameters
     ----------
     quantity : Quantity
     plan : mapping of float to int
         Runs at each modulus scale.
-    found : (N, 3) ndarray
-        Errors as of `error_in`, a row for each scene.
+    found : sequence of ErrorIn
+        One for each scene.
     quantile : float
-        Half-width of a 95 % interval over its standard error.
-
-    Returns
-    -------
-    ExtrapolationErrors
-    float
-        Standard deviation, of the logarithm.
+        Of the errors by the law.
     """
-    errors, expected, plain = found.T
-    entry = ExtrapolationErrors(
+    errors, plain = np.array([(one.found.logarithm, one.raw) for one in found]).T
+    return ExtrapolationErrors(
         quantity=quantity.name,
         runs={f"{level:g}": count for level, count in plan.items()},
         scenes=len(found),
         mean=math.expm1(errors.mean()),
         root_mean_square=math.sqrt(float(np.mean(np.expm1(errors) ** 2))),
         largest=float(np.abs(np.expm1(errors)).max()),
-        inside=int((np.abs(errors) <= quantile * expected).sum()),
+        inside=sum(abs(one.found.logarithm) <= one.found.half_width(quantile) for one in found),
         raw_root_mean_square=math.sqrt(float(np.mean(np.expm1(plain) ** 2))),
     )
-    return entry, math.sqrt(max(0.0, float(np.mean(errors**2 - expected**2))))
 
 
 def errors_in_new_scenes(
@@ -93,4 +86,4 @@ def errors_in_new_scenes(
             found = [error_in(one, known.law, plan) for one in scaled]
             rows = [row for row in found if row is not None]
             if rows:
-                yield errors_entry(quantity, plan, np.array(rows), known.quantile)[0]
+                yield errors_entry(quantity, plan, rows, known.quantile)

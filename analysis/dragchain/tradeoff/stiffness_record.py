@@ -1,7 +1,6 @@
 """The record of reduced stiffness: a law for each quantity, and how well it extrapolates."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +24,7 @@ from dragchain.tradeoff.stiffness_law import (
     COEFFICIENTS,
     fit_stiffness_law,
     left_out,
+    with_misfit,
 )
 from dragchain.tradeoff.tradeoff_document import TradeoffRecord
 
@@ -53,10 +53,12 @@ def stiffness_record(
     without: dict[str, str] = {}
     errors: list[ExtrapolationErrors] = []
     for quantity in QUANTITIES:
-        found = [scaled_runs(everyone, quantity) for everyone in scenes]
-        known = [one for one in found if one is not None]
+        scaled = [scaled_runs(everyone, quantity) for everyone in scenes]
+        known = [one for one in scaled if one is not None]
         try:
-            if quantity.signed or len(known) < _FEWEST_SCENES:
+            if quantity.signed:
+                raise SeriesError("it can change its sign")
+            if len(known) < _FEWEST_SCENES:
                 raise SeriesError(
                     f"only {len(known)} of {len(scenes)} scenes have this quantity with one sign"
                 )
@@ -64,38 +66,39 @@ def stiffness_record(
         except SeriesError as error:
             without[quantity.name] = str(error)
             continue
+        by_plan = left_out(known, plans)
         rows = [
-            errors_entry(quantity, plan, np.reshape(of_plan, (-1, 3)), _quantile(len(of_plan) - 1))
-            for plan, of_plan in zip(plans, left_out(known, plans), strict=True)
+            errors_entry(quantity, plan, found, _quantile(len(found) - 1))
+            for plan, found in zip(plans, by_plan, strict=True)
         ]
-        errors += [row for row, _ in rows]
-        if sum(row.root_mean_square**2 - row.raw_root_mean_square**2 for row, _ in rows) >= 0.0:
+        errors += rows
+        if sum(row.root_mean_square**2 - row.raw_root_mean_square**2 for row in rows) >= 0.0:
             without[quantity.name] = "the correction errs no less than the value as it is"
             continue
-        law_std = max(std for _, std in rows)
+        single = {
+            min(plan): found
+            for plan, found in zip(plans, by_plan, strict=True)
+            if sum(plan.values()) == 1
+        }
         laws[quantity.name] = LawEntry(
             label=quantity.label,
             scenes=len(known),
             friction=quantity.friction,
+            stiffness_power=quantity.stiffness_power,
             quantile=_quantile(len(known)),
             path_to_particle=float(np.mean([one.path_to_particle for one in known])),
-            law=replace(law, model_std=law_std),
+            law=with_misfit(law, single),
         )
     return StiffnessRecord(
         measured=max(run.started for run in runs)[:10],
         engine_versions=tuple(sorted({run.versions["engine"] for run in runs})),
-        scenes=(
-            *map(_scene_entry, scenes),
-            SceneEntry(numbers=tradeoff.scene, runs={}, failed=0),
-        ),
+        scenes=tuple(map(_scene_entry, scenes)),
         laws=laws,
         left_out=tuple(errors),
         without_law=without,
         load_maps=tuple(compare_load_maps(scenes)),
         stable_step=fit_stable_step(runs),
-        checks=tuple(
-            check_laws({name: (one.law, one.friction) for name, one in laws.items()}, tradeoff)
-        ),
+        checks=tuple(check_laws(laws, tradeoff)),
     )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import matplotlib
 
-from dragchain.figures.style import drawing
+from dragchain.figures.style import drawing, true_minus
 
 IMAGES = Path(__file__).resolve().parents[2] / "images"
 
@@ -34,6 +34,7 @@ def svg(name: str) -> str:
     """A figure as SVG; the same figure gives the same text."""
     with drawing(), matplotlib.rc_context({"svg.hashsalt": "dragdeck", "svg.fonttype": "path"}):
         figure = import_module(f"figures.{name}").draw()
+        true_minus(figure)
         text = StringIO()
         figure.savefig(
             text, format="svg", bbox_inches="tight", metadata={"Date": None, "Creator": None}

@@ -10,7 +10,7 @@ from dragchain.figures.style import BLUE, GREY, LIGHT
 LABELS = {
     "drag-depth": ("immersion depth (mm)", 1e3),
     "drag-diameter": ("diameter of the workpiece (mm)", 1e3),
-    "drag-friction": ("friction between particles", 1.0),
+    "drag-friction": ("friction of particle on workpiece", 1.0),
     "drag-speed": ("speed of the workpiece (mm/s)", 1e3),
 }
 

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from dragchain.arrays import Floats
 from dragchain.figures.marks import compass, key, row, row_names
 from dragchain.figures.panels import head, legend_below, new_figure, new_panels
-from dragchain.figures.style import BLUE, GREEN, GREY, ORANGE, RED
+from dragchain.figures.style import BLUE, COLOURS, GREY, INK, RED, SERIES
 from evidence.validation.peaks.averages import Lifetimes
 from evidence.validation.peaks.findings import Study
 from evidence.validation.peaks.lags import LagCurves
@@ -22,7 +22,8 @@ from evidence.validation.peaks.tests import DESCRIPTORS, PeakTest
 from evidence.validation.peaks.verdicts import LEVEL
 
 _COLOURS: dict[Definition, str] = {
-    "widest_path": BLUE, "free_path": GREEN, "peters": RED, "peters_workpiece": ORANGE
+    "widest_path": COLOURS["dominant_path"], "free_path": INK,
+    "peters": COLOURS["chain"], "peters_workpiece": SERIES[-1],
 }  # fmt: skip
 _FAMILIES: dict[str, tuple[Definition, ...]] = {
     "paths": ("free_path", "widest_path"),
@@ -61,14 +62,16 @@ def _around_peaks(lags: LagCurves) -> Figure:
 
 def _lag_panel(axes: Axes, lags: LagCurves, name: str, definitions: tuple[Definition, ...]) -> None:
     axes.axvline(0.0, color=GREY, linewidth=0.7, linestyle=":")
-    axes.plot(lags.lag_s, lags.drag, color=GREY, linewidth=0.9, label="drag force magnitude")
+    axes.plot(
+        lags.lag_s, lags.drag, color=COLOURS["drag"], linewidth=0.9, label="drag force magnitude"
+    )
     for definition in definitions:
         mean, colour = lags.curves[definition][name].mean, _COLOURS[definition]
         axes.plot(lags.lag_s, mean, color=colour, label=DEFINITIONS[definition])
     band = lags.curves[definitions[0]][name].band
     if np.isfinite(band):
         words = "simultaneous 95 % null band"
-        axes.axhspan(-band, band, color="#d9dde2", alpha=0.5, linewidth=0, label=words)
+        axes.axhspan(-band, band, color=COLOURS["transient"], alpha=0.5, linewidth=0, label=words)
 
 
 # --- effects over thresholds -----------------------------------------------------------------

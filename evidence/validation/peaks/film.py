@@ -20,7 +20,7 @@ from dragchain.figures.network_overlay import force_bar, show_network
 from dragchain.figures.network_picture import Look, Scene, View
 from dragchain.figures.panels import new_figure
 from dragchain.figures.rendering import check_rendering
-from dragchain.figures.style import BLUE, CHAIN, RED, drawing, force_map, png
+from dragchain.figures.style import COLOURS, drawing, force_map, png
 from dragchain.network.frame import read_frames
 from dragchain.run.case import Case, load_case
 from dragchain.run.kinematics import drag_start_s
@@ -166,13 +166,18 @@ def _chain_words(shown: Scene) -> str:
 
 
 def _trace(axes: Axes, moments: PeakAndQuiet, marked_s: Sequence[float]) -> None:
-    axes.plot(moments.time_s, moments.resistance_n, color=BLUE, linewidth=0.7)
+    axes.plot(moments.time_s, moments.resistance_n, color=COLOURS["drag"], linewidth=0.7)
     for name, at, lift in zip(("peak", "lowest"), marked_s, (4, -9), strict=True):
         level = moments.resistance_at(at)
-        axes.axvline(at, color=RED, linewidth=0.8, linestyle=":")
-        axes.plot([at], [level], "o", color=RED, markersize=5)
+        axes.axvline(at, color=COLOURS["peak"], linewidth=0.8, linestyle=":")
+        axes.plot([at], [level], "o", color=COLOURS["peak"], markersize=5)
         axes.annotate(
-            name, (at, level), (5, lift), textcoords="offset points", color=RED, weight="bold"
+            name,
+            (at, level),
+            (5, lift),
+            textcoords="offset points",
+            color=COLOURS["peak"],
+            weight="bold",
         )
     axes.set(xlabel="process time (s)", ylabel="drag force\nmagnitude (N)")
     axes.margins(x=0.01, y=0.15)
@@ -222,10 +227,12 @@ def _picture(moments: PeakAndQuiet, shown: Scene, largest_n: float) -> Image.Ima
     _network(axes, moments, shown, "xy", Look(_FILM_PIXELS_PER_MM, largest_n, kept))
     below = figure.add_axes((0.13, 0.075, 0.845, 0.155))
     near = np.abs(moments.time_s - moments.peak_s) <= 1.05 * max(BEFORE_S, AFTER_S)
-    below.plot(moments.time_s[near], moments.resistance_n[near], color=BLUE, linewidth=0.8)
+    below.plot(
+        moments.time_s[near], moments.resistance_n[near], color=COLOURS["drag"], linewidth=0.8
+    )
     at = shown.process_time_s
-    below.axvline(at, color=RED, linewidth=0.8)
-    below.plot([at], [moments.resistance_at(at)], "o", color=RED, markersize=6)
+    below.axvline(at, color=COLOURS["peak"], linewidth=0.8)
+    below.plot([at], [moments.resistance_at(at)], "o", color=COLOURS["peak"], markersize=6)
     below.set(xlabel="process time (s)")
     below.set_ylabel("drag force\nmagnitude (N)", fontsize=8)
     drawn = BytesIO()
@@ -237,7 +244,8 @@ def _picture(moments: PeakAndQuiet, shown: Scene, largest_n: float) -> Image.Ima
 def _swatches() -> Image.Image:
     """The colours of forces, bright and dark, and of marks, so that none is lost."""
     bright = force_map()(np.linspace(0.0, 1.0, 16))[:, :3]
-    marks = np.array([to_rgb(colour) for colour in (BLUE, RED, CHAIN, "white")])
+    own = [COLOURS[name] for name in ("drag", "peak", "dominant_path")]
+    marks = np.array([to_rgb(colour) for colour in (*own, "white")])
     greys = np.linspace(0.0, 1.0, 16)[:, None].repeat(3, axis=1)
     rows = [bright, 0.7 * bright, np.repeat(marks, 4, axis=0), greys]
     return Image.fromarray(np.rint(255.0 * np.stack(rows)).astype(np.uint8))

@@ -81,6 +81,21 @@ def test_baseline_and_noise_are_found() -> None:
     assert got.noise_n == pytest.approx(0.08, rel=0.03)  # a median deviation of 7e4: 0.4 %
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("share", [0.3, 0.45, 0.6, 1.0, 5.0, 40.0])
+def test_drift_changes_nothing_but_the_baseline(share: float, sign: int) -> None:
+    """Drift over the record, up to many peaks, upwards or downwards: the same impacts."""
+    slope = sign * share * PEAKS_N[0] / 0.15
+    still, drifting = found(*samples(offset_n=2.0)), found(*samples(drift_n_per_s=slope))
+    assert drifting.notes == ()
+    assert drifting.drift_n_per_s - still.drift_n_per_s == pytest.approx(slope, rel=1e-4)
+    assert drifting.noise_n == pytest.approx(still.noise_n, rel=1e-3)
+    for one, other in zip(drifting.impacts, still.impacts, strict=True):
+        assert one.centroid_s == pytest.approx(other.centroid_s, abs=1e-9)
+        assert one.peak_n == pytest.approx(other.peak_n, rel=1e-4)
+        assert one.width_s == pytest.approx(other.width_s, rel=1e-3)
+
+
 def test_a_ringing_sensor_makes_no_more_impacts() -> None:
     time, force = samples()
     for start in STARTS_S:

@@ -157,7 +157,7 @@ def pvpython(script: Path, *arguments: object) -> subprocess.CompletedProcess[st
         screen = ["xvfb-run", f"--server-num={number}", "--auto-servernum"]
         words = [*screen, "pvpython", "--force-offscreen-rendering", script, *arguments]
         done = subprocess.run(
-            list(map(str, words)), cwd="/", env=kept, capture_output=True, text=True, timeout=300
+            list(map(str, words)), cwd="/", env=kept, capture_output=True, text=True
         )
         if not re.search("X server|Xvfb", done.stderr):
             break

@@ -141,6 +141,15 @@ def test_contacts_with_the_workpiece_that_carry_nothing_are_left_out() -> None:
     assert (rows.normal_force_n[0], rows.tangential_force_n[0]) == (2, 1)
 
 
+def test_contacts_between_particles_that_carry_nothing_are_left_out() -> None:
+    """One definition of a contact for all bodies: four particles in a row, the middle pair idle."""
+    particles = [[number, 1.9 * number, 0, 5, 1, *CALM] for number in (1, 2, 3, 4)]
+    pairs = [[1, 2, -1, 0, 0, 0.1], [2, 3, 0, 0, 0, 0.1], [3, 4, -1, 0, 0.2, 0.1]]
+    rows = rows_of(particles, pairs)
+    assert list(zip(rows.a_id.tolist(), rows.b_id.tolist(), strict=True)) == [(1, 2), (3, 4)]
+    assert len(rows.normal_force_n) == 2
+
+
 def test_a_meshed_bowl_is_split_into_floor_and_side() -> None:
     bowl = wall([[1, 0, 0], [10, 0, 1]], [[0, 0, 3], [-2, 0, 0]], [[0, 0, 1], [-1, 0, 0]], [0, 0])
     rows = rows_of([[1, 1, 0, 1, 1, *CALM], [2, 9, 0, 1, 1, *CALM]], bowl=bowl)

@@ -334,3 +334,13 @@ def test_a_filling_gives_a_bed(tiny_run: Path, edit_json, raw) -> None:
     bed = json.loads(made[1].read_text())
     assert bed["bed_height_m"] == pytest.approx(0.06)
     assert bed["n_particles"] == 1
+
+
+def test_contacts_with_an_added_force_are_refused(tiny_run: Path) -> None:
+    """Friction is limited by the force without it, which no output contains."""
+    file = tiny_run / "case.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"added_forces": ["cohesion sjkr2"]}))
+    with pytest.raises(TableError, match="adds a force \\(cohesion sjkr2\\)"):
+        write_tables(tiny_run)
+    made = {table.name for table in (tiny_run / "tables").glob("*.parquet")}
+    assert made == {"thermo.parquet", "workpiece_force.parquet", "particles.parquet"}

@@ -1,4 +1,4 @@
-"""The comparison of a trade on measures whose effects are known."""
+"""The comparison of a trade-off on measures whose effects are known."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a run says of the quantities of a trade: bands of the drag, blocks, a run by hand."""
+"""What a run says of the quantities of a trade-off: bands of the drag, blocks, a run by hand."""
 
 import json
 import math

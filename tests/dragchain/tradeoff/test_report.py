@@ -1,4 +1,4 @@
-"""The page of a trade on measures whose effects are known."""
+"""The page of a trade-off on measures whose effects are known."""
 
 import json
 import re

@@ -9,15 +9,16 @@ import pytest
 from paths import ROOT
 from tradeoff_files import measures, write
 
+from dragchain.errors import TableError
 from dragchain.tradeoff import stiffness_record
 from dragchain.tradeoff.load_maps import compare_load_maps
 from dragchain.tradeoff.measures import Measures
 from dragchain.tradeoff.promises import PromisesFile, check_promises, write_promises
 from dragchain.tradeoff.quantities import QUANTITIES
-from dragchain.tradeoff.stable_step import damping_ratio
+from dragchain.tradeoff.stable_step import damping_ratio, fit_stable_step
 from dragchain.tradeoff.stiffness_check import check_laws
 from dragchain.tradeoff.stiffness_document import StiffnessRecord
-from dragchain.tradeoff.stiffness_law import UNIT
+from dragchain.tradeoff.stiffness_law import reduction
 from dragchain.tradeoff.tradeoff_document import TradeoffRecord
 
 TRADEOFF = ROOT / "workflow/dragdeck/data/tradeoff.json"
@@ -27,8 +28,7 @@ SCALES = (1.0, 1e-2, 1e-3)
 
 def factor(stiffness: float, scale: float) -> float:
     """What a modulus scale multiplies the contacts with."""
-    full = (stiffness / UNIT) ** -RATE
-    return float(np.exp(AMPLITUDE * full * (scale ** (-2 / 3 * RATE) - 1.0)))
+    return float(np.exp(AMPLITUDE * reduction(stiffness, np.log(scale ** (-2 / 3)), RATE)))
 
 
 def run(number: int, scale: float, seed: int, rng: np.random.Generator, **more: Any) -> Any:
@@ -135,19 +135,31 @@ def test_load_maps_are_compared_as_shares(tmp_path: Path) -> None:
 def test_laws_are_checked_with_a_trade_off(record: Path) -> None:
     """With the law as the trade-off's truth every check passes; with another rate some do not."""
     known = StiffnessRecord.read(record)
-    law = known.laws["workpiece_contacts"].law
+    entry = known.laws["workpiece_contacts"]
     tradeoff = TradeoffRecord.read(TRADEOFF)
-    rows = {
-        row.scale: row
-        for row in check_laws({"workpiece_contacts": (law, "particle_friction")}, tradeoff)
-    }
+    rows = {row.scale: row for row in check_laws({"workpiece_contacts": entry}, tradeoff)}
     assert set(rows) == {0.1, 0.01, 0.001, 0.0001}
     assert rows[1e-4].predicted > rows[1e-3].predicted > rows[0.1].predicted > 0
     assert all(row.ci95_low < row.measured < row.ci95_high for row in rows.values())
-    alpha, *others = law.amplitude
-    wrong = replace(law, amplitude=(-alpha, *others))
-    assert not any(
-        row.inside
-        for row in check_laws({"workpiece_contacts": (wrong, "particle_friction")}, tradeoff)
+    alpha, *others = entry.law.amplitude
+    law = replace(entry.law, amplitude=(-alpha, *others))
+    wrong = entry.model_copy(update={"law": law})
+    assert not any(row.inside for row in check_laws({"workpiece_contacts": wrong}, tradeoff))
+
+
+def test_the_range_of_the_laws_is_that_of_the_runs_in_their_fit(record: Path) -> None:
+    scenes = StiffnessRecord.read(record).scenes
+    assert len(scenes) == 8 and all(len(one.runs) == 3 for one in scenes)
+    assert max(one.numbers["stiffness_number"] for one in scenes) == pytest.approx(
+        3e4 * 1.2**7, rel=1e-5
     )
-    assert known.scenes[-1].numbers == tradeoff.scene and not known.scenes[-1].runs
+
+
+@pytest.mark.parametrize("value", [None, "0.7"])
+def test_a_run_without_a_restitution_is_refused(tmp_path: Path, value: object) -> None:
+    rng = np.random.default_rng(6)
+    content = run(0, 1.0, 1, rng)
+    content["inputs"] = {**content["inputs"], "pairs.ceramic-ceramic.restitution": value}
+    runs = [Measures.read(file) for file in write(tmp_path, [content])]
+    with pytest.raises(TableError, match=r"pairs\.ceramic-ceramic\.restitution"):
+        fit_stable_step(runs)

@@ -1,4 +1,4 @@
-"""From a tolerance to settings, on a trade with made-up numbers."""
+"""From a tolerance to settings, on a trade-off with made-up numbers."""
 
 import copy
 import json

@@ -24,7 +24,7 @@ def contacts(case: Case, tradeoff: Tradeoff, tolerance: float) -> Advice:
 
 
 def elsewhere(case: Case) -> Tradeoff:
-    """A trade whose measured scene is much deeper than the case."""
+    """A trade-off whose measured scene is much deeper than the case."""
     scene = {**describe(case), "depth_to_particle": 50.0}
     return made_tradeoff(case, scene=scene)
 

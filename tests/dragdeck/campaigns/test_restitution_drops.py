@@ -56,7 +56,7 @@ def measured_case(small: dict[str, Any], write_study: WriteStudy) -> Case:
 def test_the_default_drop_is_at_full_modulus_and_the_studys_step(case: Case) -> None:
     scene = drop_scene(case)
     assert scene.deck == drop_scene(case, DropFidelity()).deck
-    assert scene.case.youngs_modulus_scale == 1.0
+    assert scene.case.fidelity.youngs_modulus_scale == 1.0
     ratio = scene.deck.timestep_s / scene.case.rayleigh_time_s
     assert ratio == pytest.approx(case.study.drop_test.timestep_fraction, rel=1e-3)
 

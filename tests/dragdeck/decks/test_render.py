@@ -17,6 +17,7 @@ from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.registry import SCENES
+from dragdeck.study.contact_law import Pair
 from dragdeck.sweep.cases import load_cases
 
 GOLDEN = ROOT / "tests/golden"
@@ -74,6 +75,40 @@ def test_contacts_are_written_after_all_that_reads_stored_forces(
     deck = deck_text(turned, environment(project.templates))
     dumps = [line.split()[3] for line in deck.splitlines() if line.startswith("dump ")]
     assert dumps == ["custom", "custom", "local", "local"]
+
+
+def commands(text: str) -> list[str]:
+    return [line for line in text.splitlines() if line and not line.startswith("#")]
+
+
+def with_three_materials(small: dict[str, Any]) -> dict[str, Any]:
+    small["materials"]["rubber"] = {**small["materials"]["steel"], "youngs_modulus_pa": 7e9}
+    small["bowl"]["material"] = "rubber"
+    small["pairs"]["ceramic-rubber"] = {"restitution": 0.6, "friction": 0.4}
+    return small
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("pair", ["ceramic-ceramic", "ceramic-steel", "ceramic-rubber"])
+@pytest.mark.parametrize("field", Pair.model_fields)
+def test_a_script_changes_with_a_coefficient_if_its_name_does(
+    small: dict[str, Any],
+    write_study: Callable[..., Path],
+    project: Project,
+    scene: str,
+    pair: str,
+    field: str,
+) -> None:
+    (before,) = load_cases(write_study(with_three_materials(small)))
+    old = render(before, project, scene)
+    small["pairs"][pair][field] = 0.123
+    (after,) = load_cases(write_study(small))
+    ids = {SCENES[scene].run_id(case) for case in (before, after)}
+    body, changed = (
+        [line for line in commands(text) if not line.startswith("variable from")]
+        for text in (old, render(after, project, scene))
+    )
+    assert (body != changed) == (len(ids) > 1)
 
 
 def own_template(case: Case, text: str) -> None:
@@ -151,7 +186,7 @@ def test_every_rate_is_at_least_the_asked(case: Case) -> None:
         assert 1 / (periods[name] * dt) >= rate
     assert periods["workpiece_particles"] % periods["workpiece_force"] == 0
     assert periods["contacts"] % periods["workpiece_contacts"] == 0
-    assert scene.steps % periods["contacts"] == 0
+    assert scene.case.phases[-1].start_step % periods["contacts"] == 0
 
 
 def test_the_tip_ends_at_the_asked_depth(case: Case) -> None:

@@ -1,5 +1,6 @@
 """What a template may do, and what a value may bring into an input script."""
 
+import re
 import signal
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,8 +11,15 @@ import pytest
 from markupsafe import Markup
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.render import deck_text
-from dragdeck.decks.templates import comment, environment, number, quoted, template_files
+from dragdeck.decks.render import deck_text, effective, idle, overriding
+from dragdeck.decks.templates import (
+    comment,
+    environment,
+    explained,
+    number,
+    quoted,
+    template_files,
+)
 from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
@@ -167,3 +175,144 @@ def test_a_command_that_leaves_the_run_is_refused(case: Case, project: Project) 
     with pytest.raises(InputError, match="start another program") as caught:
         render(case, project)
     assert caught.value.value == "'shell date'"
+
+
+LAW = """{% extends "base/base.in.j2" %}
+{% block contact_model %}
+hooke tangential history
+{% endblock %}
+"""
+
+
+@pytest.mark.parametrize("name", ["base", "process"])
+def test_a_contact_law_of_a_template_holds_for_particles_and_walls(
+    case: Case, project: Project, name: str
+) -> None:
+    own(case, LAW.replace("base.in", f"{name}.in"), f"{name}.in.j2")
+    text = render(case, project)
+    laws = re.findall(r"^(?:pair_style|fix .* wall/gran) .*$", text, re.MULTILINE)
+    assert len(laws) == 4
+    assert all(" model hooke tangential history " in law for law in laws)
+    assert "Hertz-Mindlin" not in text
+
+
+def test_a_whole_file_may_be_replaced(case: Case, project: Project) -> None:
+    walls = (project.templates / "walls.j2").read_text()
+    own(case, walls.replace("zplane 0.0", "zplane 0.001"), "walls.j2")
+    assert "zplane 0.001 store_force" in render(case, project)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words", "remedy"),
+    [
+        (
+            "walls.j2",
+            '{% extends "base/walls.j2" %}\n{% macro bowl(script) %}# mine{% endmacro %}',
+            "the macro 'bowl' does not replace",
+            "copy the whole file",
+        ),
+        (
+            "process.in.j2",
+            '{% extends "base/process.in.j2" %}\nfix damping all viscous 1e-4\n',
+            "text outside of the blocks",
+            "put it into a block",
+        ),
+        (
+            "process.in.j2",
+            '{% extends "base/process.in.j2" %}\n{% if deck.hard %}run 1{% endif %}\n',
+            "text outside of the blocks",
+            "put it into a block",
+        ),
+    ],
+)
+def test_what_an_extending_template_cannot_change_is_refused(
+    case: Case, project: Project, name: str, text: str, words: str, remedy: str
+) -> None:
+    file = own(case, text, name)
+    with pytest.raises(InputError, match=words) as caught:
+        environment(project.templates, file.parent)
+    assert (caught.value.file, caught.value.field) == (file, "line 2")
+    assert remedy in str(caught.value.remedy)
+
+
+def test_what_a_template_defines_for_its_blocks_is_no_text(case: Case, project: Project) -> None:
+    text = "{% set rate %}5{% endset %}\n{% macro mine() %}# {{ rate }}{% endmacro %}\n"
+    own(case, in_block("{{ mine() }}").replace("\n{% block", f"\n{text}{{% block", 1))
+    assert "# 5" in render(case, project)
+
+
+def test_a_template_that_changes_nothing_has_no_effect(case: Case, project: Project) -> None:
+    file = own(
+        case, "{% extends 'base/base.in.j2' %}{% block run %}# never{% endblock %}", "base.in.j2"
+    )
+    own(case, in_block("# mine"))
+    templates, scene = environment(project.templates, file.parent), process_scene(case, BED)
+    assert overriding(scene, templates) == {"base.in.j2", "process.in.j2"}
+    assert effective(scene, templates) == {"process.in.j2"}
+    (error,) = idle({"base.in.j2"}, templates)
+    assert error.file == file and "changes no input script" in str(error)
+
+
+@pytest.mark.parametrize("block", ["outputs", "contacts", "run", "integration"])
+def test_output_that_is_analysed_cannot_be_left_out(
+    case: Case, project: Project, block: str
+) -> None:
+    own(case, in_block("").replace("extra", block))
+    with pytest.raises(InputError, match="would not write the output files") as caught:
+        render(case, project)
+    assert str(caught.value.value).startswith("missing: ")
+    assert "super()" in str(caught.value.remedy)
+
+
+def test_columns_of_a_contact_cannot_be_exchanged(case: Case, project: Project) -> None:
+    contacts = "compute workpiece_contacts all wall/gran/local id pos force delta torque\n"
+    own(case, in_block(contacts + "compute particle_contacts all pair/gran/local id force delta")
+        .replace("extra", "contacts"))  # fmt: skip
+    with pytest.raises(InputError, match="would not write the output files") as caught:
+        render(case, project)
+    assert "compute workpiece_contacts" in str(caught.value.value)
+
+
+def test_output_of_a_template_is_its_own(case: Case, project: Project) -> None:
+    own(case, in_block("{{ super() }}\nvariable mine equal step").replace("extra", "outputs"))
+    assert "variable mine equal step" in render(case, project)
+
+
+@pytest.mark.parametrize(
+    "loop", ["label again\nrun 1\njump SELF again", "jump SELF", "label a\nlabel b\njump SELF a"]
+)
+def test_a_loop_without_end_is_refused(case: Case, project: Project, loop: str) -> None:
+    own(case, in_block(loop))
+    with pytest.raises(InputError, match="run for ever") as caught:
+        render(case, project)
+    assert "jump SELF" in str(caught.value.value)
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        "variable i loop 3\nlabel again\nnext i\njump SELF again",
+        'label again\nif "1 > 0" then "jump SELF out"\njump SELF again\nlabel out',
+        'label again\nif "0 > 1" then "jump SELF again"',
+        "jump SELF out\nlabel out",
+    ],
+)
+def test_a_loop_that_can_end_stays(case: Case, project: Project, loop: str) -> None:
+    own(case, in_block(loop))
+    assert "jump SELF" in render(case, project)
+
+
+@pytest.mark.parametrize("verb", ["extends", "include"])
+def test_a_missing_template_is_named_where_it_is_used(
+    case: Case, project: Project, verb: str
+) -> None:
+    file = own(case, f'\n{{% {verb} "base/proces.in.j2" %}}\n')
+    with pytest.raises(InputError, match=r"no such template: 'base/proces\.in\.j2'") as caught:
+        environment(project.templates, file.parent)
+    assert (caught.value.file, caught.value.field) == (file, "line 2")
+
+
+def test_an_error_without_a_place_names_the_template() -> None:
+    with pytest.raises(InputError) as caught, explained("process.in.j2"):
+        raise MemoryError
+    assert (caught.value.file, caught.value.field) == ("process.in.j2", None)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from tiny_run_files import Raw
 
 from dragdeck.decks.case_file import CountOfRun, RanksOfRun, SettlingCriterion, SteadyCriterion
 from dragdeck.decks.outputs import Kind, OutputOfRun
@@ -72,7 +73,7 @@ def test_the_last_frame_counts_only_if_whole(
     file = tmp_path / "output"
     file.write_bytes(content)
     frames = whole_frames(file, output)
-    assert (frames.steps[-1] if frames.steps and not frames.damaged else None) == step
+    assert (frames.steps[-1] if frames.steps and not frames.problem else None) == step
 
 
 INPUTS = RunInputs(
@@ -136,10 +137,28 @@ def test_a_bed_whose_motion_changes_fails(tmp_path: Path, last: float, fails: se
     assert {check.code for check in checks if not check.passed} == fails
 
 
+SETTLED = SettlingCriterion(energy_ratio=1e-6, highest_m=0.05)
+
+
+@pytest.mark.parametrize(("z_m", "fails"), [(0.0479, set()), (0.0481, {"packing_in_bowl"})])
+def test_a_packing_above_the_rim_fails(tmp_path: Path, z_m: float, fails: set[str]) -> None:
+    particles = written("custom", "particles", ["a_id", "z_m", "radius_m"], None)
+    frames = [[[1, 0.2, 0.002], [2, 0.01, 0.002]], [[1, z_m, 0.002], [2, 0.01, 0.002]]]
+    content = [Raw.binary(step, rows, 3) for step, rows in enumerate(frames)]
+    (tmp_path / "particles.1.txt").write_bytes(b"".join(content))
+    (tmp_path / "screen.1.txt").write_text(GRID + "DRAGDECK SETTLED: after\nDRAGDECK END\n")
+    filling = INPUTS.model_copy(update={"settled": SETTLED, "scene": "other"})
+    parts = [RunPart(part=1, checkpoint=None, from_step=0)]
+    checks = check_run(tmp_path, filling, {"particles": particles}, 0, parts, ranks=1)
+    rejected = {check.code: check.seen for check in checks if not check.passed}
+    assert rejected.keys() - {"packing_whole"} == fails
+    assert all("0.0501 m" in rejected[code] for code in fails)
+
+
 def test_a_bed_that_did_not_settle_fails(tmp_path: Path) -> None:
     (tmp_path / "screen.1.txt").write_text(GRID + "DRAGDECK NOT SETTLED: energy ratio 0.1\n")
     (tmp_path / "thermo.1.txt").write_text(GOOD)
-    filling = INPUTS.model_copy(update={"settled": SettlingCriterion(energy_ratio=1e-6)})
+    filling = INPUTS.model_copy(update={"settled": SETTLED})
     assert failed(tmp_path, filling) == {"ended", "at_rest", "packing_whole"}
 
 

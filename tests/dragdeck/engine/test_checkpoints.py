@@ -2,12 +2,15 @@
 
 import os
 import struct
+import tracemalloc
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dragdeck.engine import checkpoints
 from dragdeck.engine.checkpoints import (
     checkpoint_files,
     checkpoint_step,
@@ -48,6 +51,46 @@ def test_a_file_is_whole_only_to_its_last_byte(
         assert not is_whole(file, count, len(ranks))
         file.write_bytes(b"")
         assert not is_whole(file, count, len(ranks))
+
+
+@pytest.mark.parametrize("ranks", [1, 4])
+@pytest.mark.parametrize("cut", [0, 4096])
+def test_the_size_of_a_checkpoint_needs_no_memory(tmp_path: Path, ranks: int, cut: int) -> None:
+    particles, doubles = 40_000, 50
+    values = np.zeros((particles, doubles), "<f8")
+    values[:, 0] = doubles
+    chunk = struct.pack("<i", values.size) + values.tobytes()
+    file = tmp_path / "checkpoint.5.restart"
+    file.write_bytes(b"header" + chunk * ranks)
+    os.truncate(file, file.stat().st_size - cut)
+    assert file.stat().st_size > 15e6 * ranks
+    tracemalloc.start()
+    try:
+        assert is_whole(file, particles * ranks, ranks) == (cut == 0)
+        assert tracemalloc.get_traced_memory()[1] < 5e6
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_file_that_has_not_grown_is_not_read_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content, file = restart([[20, 20, 20]]), tmp_path / "checkpoint.7.restart"
+    looks: list[int] = []
+
+    def look(file: Path, particles: int, ranks: int) -> bool:
+        looks.append(file.stat().st_size)
+        return is_whole(file, particles, ranks)
+
+    monkeypatch.setattr(checkpoints, "is_whole", look)
+    sizes: dict[str, int] = {}
+    for size in (100, 200, len(content)):
+        file.write_bytes(content[:size])
+        for _ in range(3):
+            name_whole_checkpoints(tmp_path, 3, 1, sizes)
+    assert looks == [100, 200, len(content)]
+    assert not file.exists()
+    assert [checkpoint_step(file) for file in checkpoint_files(tmp_path)] == [7]
 
 
 @pytest.fixture

@@ -1,12 +1,27 @@
 """Which steps the parts of a run hold."""
 
 import math
+import re
+import struct
+from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
+from spoilt_dumps import NAMES, ROWS, SPOILT, binary, spoilt, text
+from tiny_run_files import Raw
 
+from dragchain.dumps.careful_reader import read_carefully
+from dragchain.errors import DumpError
+from dragchain.run.case import Output
 from dragdeck.decks.outputs import OutputOfRun
-from dragdeck.engine.completeness import coverage, cut_outputs, first_gap
+from dragdeck.engine.completeness import (
+    coverage,
+    cut_outputs,
+    first_gap,
+    some_frames,
+    whole_frames,
+)
 from dragdeck.engine.record import RunPart
 
 FORCE = OutputOfRun(
@@ -52,8 +67,8 @@ def parts(*from_steps: int) -> list[RunPart]:
 def test_the_first_missing_step_is_found(
     tmp_path: Path, texts: list[str], starts: list[int], gap: int | None
 ) -> None:
-    for number, text in enumerate(texts, 1):
-        (tmp_path / f"force.{number}.txt").write_text(text)
+    for number, content in enumerate(texts, 1):
+        (tmp_path / f"force.{number}.txt").write_text(content)
     assert coverage(tmp_path, FORCE, parts(*starts)).gap == gap
     wanted = math.inf if gap is None else gap
     assert first_gap(tmp_path, {"force": FORCE}, parts(*starts)) == wanted
@@ -62,7 +77,8 @@ def test_the_first_missing_step_is_found(
 def test_what_follows_a_hole_is_cut(tmp_path: Path) -> None:
     file = tmp_path / "force.1.txt"
     file.write_text(rows(10, 20) + "30 1.\x00\x00\n40 1.5\n")
-    assert cut_outputs(tmp_path, {"force": FORCE}, parts(0), 60) == [file.name]
+    (damage,) = cut_outputs(tmp_path, {"force": FORCE}, parts(0), 60)
+    assert damage == r"force.1.txt, row 2, byte 27: found b'30 1.\x00\x00\n', expected 2 numbers"
     assert file.read_text() == rows(10, 20)
     assert cut_outputs(tmp_path, {"force": FORCE}, parts(0), 60) == []
 
@@ -80,3 +96,106 @@ def test_an_output_that_the_engine_decides_on_has_no_gap(tmp_path: Path) -> None
     decided = FORCE.model_copy(update={"last_step": None, "period_steps": 1})
     (tmp_path / "force.1.txt").write_text(rows(17, 18, 40))
     assert coverage(tmp_path, decided, parts(0)).gap is None
+
+
+def dump(name: str) -> OutputOfRun:
+    """The entry in ``columns.json`` of a spoilt dump."""
+    return OutputOfRun(
+        kind="custom",
+        binary=name.endswith(".bin"),
+        pattern=name,
+        columns=NAMES,
+        engine_columns=NAMES,
+        period_steps=7,
+        first_step=0,
+        last_step=21,
+        rows_per_particle=1.0,
+    )
+
+
+NUMBERS = re.compile(r"row \d+: |(id|x|c_f\[1\]) is |as numbers|are not text|names the columns")
+"""What only a reader of every number and name can say."""
+
+
+def careful(file: Path) -> tuple[list[int], DumpError | None]:
+    """The steps that the careful reader reads, and the error that ends them."""
+    layout = dump(file.name).model_dump(exclude={"rows_per_particle"}) | {"pattern": "{part}"}
+    steps: list[int] = []
+    try:
+        steps.extend(frame.step for frame in read_carefully(file, Output(**layout)))
+    except DumpError as error:
+        return steps, error
+    return steps, None
+
+
+def agrees_with_the_careful_reader(file: Path) -> None:
+    """The same frames are whole, and what follows them begins at the same byte."""
+    found = whole_frames(file, dump(file.name))
+    steps, error = careful(file)
+    if error is None:
+        assert (found.steps, found.problem) == (steps, "")
+    elif NUMBERS.search(str(error)):
+        assert found.steps[: len(steps)] == steps
+    else:
+        assert found.steps == steps
+        assert found.problem.startswith(f"frame {len(steps)}, byte {error.offset}: ")
+
+
+@pytest.mark.parametrize("goes_on", [False, True])
+@pytest.mark.parametrize("what", SPOILT)
+def test_the_whole_frames_of_a_damaged_dump_are_those_of_the_careful_reader(
+    tmp_path: Path, what: str, goes_on: bool
+) -> None:
+    name, content, _ = spoilt(Raw)[what]
+    write = binary if name == "a.bin" else text
+    (tmp_path / name).write_bytes(
+        write(Raw, [0, 7]) + content + (write(Raw, [21]) if goes_on else b"")
+    )
+    agrees_with_the_careful_reader(tmp_path / name)
+
+
+def damages(content: bytes) -> Iterator[tuple[int, bytes]]:
+    """A file cut at every byte, and with another value in every byte; and where."""
+    for place in range(len(content)):
+        yield place, content[:place]
+        for byte in (0, 0x39, 0xFF):
+            yield place, content[:place] + bytes([byte]) + content[place + 1 :]
+
+
+@pytest.mark.filterwarnings("ignore:invalid value encountered in cast:RuntimeWarning")
+@pytest.mark.parametrize("name", ["a.bin", "a.dump"])
+def test_a_damaged_byte_leaves_the_frames_before_it(tmp_path: Path, name: str) -> None:
+    file, write = tmp_path / name, binary if name == "a.bin" else text
+    ends = [len(write(Raw, [0, 7, 14][:number])) for number in (1, 2, 3)]
+    for place, damaged in damages(write(Raw, [0, 7, 14])):
+        file.write_bytes(damaged)
+        found = whole_frames(file, dump(name))
+        steps, error = careful(file)
+        assert len(found.steps) >= min(len(steps), sum(end <= place for end in ends))
+        if error is None or not NUMBERS.search(str(error)):
+            assert found.steps == steps[: len(found.steps)]
+            assert found.problem or (len(found.steps) == len(steps) and error is None)
+
+
+def test_a_header_without_columns_ends_the_whole_frames(tmp_path: Path) -> None:
+    whole = Raw.binary(7, ROWS[0], 3, 1)
+    (tmp_path / "a.bin").write_bytes(whole + whole[:92] + bytes(4) + whole[96:])
+    output = dump("a.bin").model_copy(update={"first_step": 7, "last_step": 14})
+    (damage,) = cut_outputs(tmp_path, {"a": output}, parts(0), 7)
+    assert damage == (
+        f"a.bin, frame 1, byte {len(whole)}: 0 columns from 1 ranks, expected 3 columns"
+    )
+    assert (tmp_path / "a.bin").read_bytes() == whole
+
+
+def test_frames_in_a_tilted_box_are_whole(tmp_path: Path) -> None:
+    frames = [Raw.binary(step, ROWS[step], 3, 2) for step in (0, 14)]
+    tilted = [
+        frame[:16] + struct.pack("<i", 1) + frame[20:92] + bytes(24) + frame[92:]
+        for frame in frames
+    ]
+    (tmp_path / "a.bin").write_bytes(b"".join(tilted))
+    agrees_with_the_careful_reader(tmp_path / "a.bin")
+    first, last = some_frames(tmp_path, dump("a.bin"), parts(0), 20)
+    assert sorted(first.tolist()) == sorted(ROWS[0])
+    np.testing.assert_array_equal(last, ROWS[14])

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import psutil
@@ -11,31 +10,36 @@ import psutil
 from dragdeck.engine.lock import only_runner
 
 HOLD = """
-import sys, time
+import sys
 from pathlib import Path
 from dragdeck.engine.lock import only_runner
 with only_runner(Path(sys.argv[1]), print):
     print("held", flush=True)
-    time.sleep(60)
+    sys.stdin.read()
 """
 
 
 def test_the_lock_names_its_holder_and_dies_with_it(tmp_path: Path) -> None:
     words = [sys.executable, "-c", HOLD, str(tmp_path)]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as holder:
+    pipe = subprocess.PIPE
+    with subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True) as holder:
         assert holder.stdout is not None and holder.stdout.readline() == "held\n"
         lines: list[str] = []
-        threading.Timer(0.5, holder.kill).start()
-        with only_runner(tmp_path, lines.append):
+
+        def waiting(line: str) -> None:
+            lines.append(line)
+            holder.kill()
+
+        with only_runner(tmp_path, waiting):
             assert holder.wait() == -9
             assert f"process {os.getpid()}" in (tmp_path / ".lock").read_text()
         assert f"process {holder.pid} on " in lines[0]
 
 
 def test_an_engine_without_a_runner_is_ended(tmp_path: Path) -> None:
-    words = [sys.executable, "-c", "import time; time.sleep(60)", "-in", "in.liggghts"]
+    words = [sys.executable, "-c", "import sys; sys.stdin.read()", "-in", "in.liggghts"]
     lines: list[str] = []
-    with subprocess.Popen(words, cwd=tmp_path) as left:
+    with subprocess.Popen(words, cwd=tmp_path, stdin=subprocess.PIPE) as left:
         elsewhere = tmp_path / "elsewhere"
         elsewhere.mkdir()
         with only_runner(elsewhere, lines.append):

@@ -630,7 +630,6 @@ def engine_reads(mesh: Trimesh, folder: Path) -> tuple[bool, str]:
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        timeout=60,
         check=False,
     )
     return done.returncode == 0, done.stdout + done.stderr

@@ -1,60 +1,227 @@
-"""Where the workpiece goes."""
+"""Where the workpiece goes: the motion in whole steps, which deck, checks and preview share."""
 
 import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from dragdeck.scenes.motion import farthest_reach, legs
-from dragdeck.study.model import Motion
+from dragchain.run.case import Case as ReadCase
+from dragchain.run.case import load_case, load_outputs
+from dragchain.run.kinematics import (
+    counted_mask,
+    directions,
+    drag_phase,
+    motion_of,
+    workpiece_turn,
+    workpiece_velocity,
+)
+from dragdeck.cases.case import Case
+from dragdeck.decks.deck import AnyScene
+from dragdeck.decks.outputs import ColumnsFile
+from dragdeck.errors import InputError
+from dragdeck.physics.packing import Bed
+from dragdeck.preview.layout import layout
+from dragdeck.scenes.fit import clearances
+from dragdeck.scenes.motion import course, driven_speed, farthest_reach, path_heights
+from dragdeck.scenes.process import process_scene
+from dragdeck.sweep.cases import load_cases
 
-CIRCLE = {"kind": "circle", "radius_m": 0.02}
-LINE = {"kind": "line", "start_m": [-0.01, 0.005], "direction_deg": 30, "length_m": 0.02}
+BED = Bed(surface_m=0.038, top_m=0.0446)
+CIRCLE = {"kind": "circle", "radius_m": 0.010, "revolutions": 0.1}
+LINE = {"kind": "line", "start_m": [-0.008, 0.005], "direction_deg": 30, "length_m": 0.0123}
+REST = {"kind": "rest", "radius_m": 0.010, "bowl_rpm": -30, "revolutions": 0.3}
+POINTS = [[2, 0.001, 0], [2.2, 0.006, 0.002], [2.3, 0.006, 0.002], [2.7, 0.001, 0.003, -0.002]]
+WAYPOINTS = {"kind": "waypoints", "points": POINTS}
+SPIN = {"schedule": [{"until_s": 0.123, "rpm": 200}, {"until_s": 9, "rpm": -300}]}
+OSCILLATION = {"amplitude_m": 1e-3, "frequency_hz": 7}
+
+Make = Callable[..., Case]
 
 
-def motion(path: dict, **more) -> Motion:
-    given = {"speed_m_s": 0.01, "immersion_depth_m": 0.05, "transient_m": 0.0, **more}
-    return Motion.model_validate({"path": path, **given})
+@pytest.fixture
+def made(small: dict[str, Any], write_study: Callable[..., Path]) -> Make:
+    """The small study with these fields of its motion."""
+
+    def make(factor: float = 1, **motion: Any) -> Case:
+        small["motion"] |= motion
+        if motion.get("path", {}).get("kind") in ("rest", "waypoints"):
+            small["motion"].pop("speed_m_s", None)
+        small["fidelities"]["quick"]["speed_factor"] = factor
+        (only,) = load_cases(write_study(small))
+        return only
+
+    return make
 
 
-def test_a_revolution_takes_its_length_over_the_speed() -> None:
-    plunge, approach, drag = legs(motion(CIRCLE), dive_m=0.06, speed_factor=1)
-    assert [leg.name for leg in (plunge, approach, drag)] == ["plunge", "approach", "drag"]
-    assert drag.duration_s == pytest.approx(2 * math.pi * 0.02 / 0.01)
-    assert drag.angular_speed_rad_s == pytest.approx(0.5)
-    assert plunge.duration_s * plunge.velocity_m_s[2] == pytest.approx(-0.06)
-    assert approach.duration_s * approach.velocity_m_s[0] == pytest.approx(0.02)
+def last_place(case: Case) -> tuple[float, ...]:
+    """Where the course has the workpiece after its last step; nothing is superposed."""
+    way = course(case.study, BED)
+    *_, (leg, begun) = way.begun()
+    assert way.drag.end == leg.end_step
+    return leg.pose(begun, leg.steps)
 
 
-def test_clockwise_turns_the_heading_and_the_spin() -> None:
-    clockwise = motion(
-        {
-            **CIRCLE,
-            "direction": "cw",
-        }
+def path_end(path: dict[str, Any], tip_m: float) -> tuple[float, float, float]:
+    """Where a path ends, from its fields alone."""
+    if path["kind"] == "rest":
+        return path["radius_m"], 0.0, tip_m
+    if path["kind"] == "circle":
+        sign = -1 if path.get("direction") == "cw" else 1
+        angle = math.radians(path.get("start_deg", 0)) + sign * math.tau * path["revolutions"]
+        return path["radius_m"] * math.cos(angle), path["radius_m"] * math.sin(angle), tip_m
+    if path["kind"] == "line":
+        (x, y), heading = path["start_m"], math.radians(path["direction_deg"])
+        way = path["length_m"]
+        return x + way * math.cos(heading), y + way * math.sin(heading), tip_m
+    points = [[*point, 0.0][:4] for point in path["points"]]
+    time = path.get("fraction", 1.0) * (points[-1][0] - points[0][0]) + points[0][0]
+    x, y, z = (np.interp(time, *np.array(points)[:, [0, axis]].T) for axis in (1, 2, 3))
+    return float(x), float(y), tip_m + float(z)
+
+
+PATHS = [
+    CIRCLE,
+    CIRCLE | {"direction": "cw", "start_deg": 40, "revolutions": 0.513},
+    LINE,
+    REST,
+    WAYPOINTS,
+    WAYPOINTS | {"fraction": 0.83},
+]
+
+
+@pytest.mark.parametrize("factor", [1, 3.7])
+@pytest.mark.parametrize("orientation", ["follow_path", "fixed"])
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path["kind"])
+def test_the_last_pose_is_the_end_of_the_path(
+    made: Make, path: dict[str, Any], orientation: str, factor: float
+) -> None:
+    """Of every path: after the last step, and in the preview."""
+    case = made(factor, path=path, orientation=orientation)
+    end = path_end(path, BED.surface_m - 0.015)
+    assert last_place(case)[:3] == pytest.approx(end, abs=1e-12)
+    shown = layout(case).workpieces[0].drag.poses[[0, -1], :3, 3]
+    assert shown[-1, :2] == pytest.approx(end[:2], abs=1e-12)
+    drag = course(case.study, BED).drag
+    assert driven_speed(case.study) == pytest.approx(
+        factor * case.study.motion.axis_speed_m_s, rel=0.6 / (drag.end - drag.start)
     )
-    assert clockwise.path.direction_rad == pytest.approx(-math.pi / 2)
-    assert legs(clockwise, 0.06, 1)[-1].angular_speed_rad_s == pytest.approx(-0.5)
 
 
-def test_a_workpiece_that_keeps_its_orientation() -> None:
-    assert legs(motion(CIRCLE, orientation="fixed"), 0.06, 1)[-1].kind == "circle"
-    assert legs(motion(CIRCLE), 0.06, 1)[-1].kind == "rotate"
+@pytest.mark.parametrize("superposed", [{}, {"spin": SPIN, "oscillation": OSCILLATION}])
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path["kind"])
+def test_no_row_lies_behind_the_end_of_the_path(
+    made: Make, tmp_path: Path, path: dict[str, Any], superposed: dict[str, Any]
+) -> None:
+    """No output has a step after the drag, and its last period is in it."""
+    scene = process_scene(made(path=path, **superposed), BED)
+    case = read_back(scene, tmp_path)
+    drag = drag_phase(case)
+    for output in load_outputs(tmp_path).values():
+        assert output.last_step is not None
+        assert drag.end_step - output.period_steps < output.last_step <= drag.end_step
+        assert (output.last_step - output.first_step) % output.period_steps == 0
+    steps = np.array([drag.end_step, drag.end_step + 1])
+    assert counted_mask(steps, case).tolist() == [True, False]
+    length = motion_of(case).axis_speed_m_s * (drag.end_step - drag.start_step) * case.timestep_s
+    assert length == pytest.approx(path_length(path), rel=1e-12)
 
 
-def test_a_line_that_starts_where_it_plunges_has_no_approach() -> None:
-    plan = legs(motion(LINE), 0.06, 1)
-    assert [leg.name for leg in plan] == ["plunge", "drag"]
-    x, y, z = (v * plan[-1].duration_s for v in plan[-1].velocity_m_s)
-    assert (x, y, z) == pytest.approx((0.02 * math.cos(math.pi / 6), 0.01, 0.0))
+@pytest.mark.parametrize("superposed", [{}, {"spin": SPIN, "oscillation": OSCILLATION}])
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path["kind"])
+def test_both_packages_describe_the_same_motion(
+    made: Make, tmp_path: Path, path: dict[str, Any], superposed: dict[str, Any]
+) -> None:
+    """What dragchain says of velocity and turn at each step is what the course does until then."""
+    study = made(path=path, **superposed)
+    way, case = course(study.study, BED), read_back(process_scene(study, BED), tmp_path)
+    *_, (leg, begun) = way.begun()
+    steps = np.arange(way.drag.start, way.drag.end + 1)
+    places = np.array([way.pose(leg, begun, float(step - steps[0])) for step in steps])
+    velocity = workpiece_velocity(steps, places[:, :3], places[:, :3], case)
+    if path["kind"] != "rest":
+        speed = np.linalg.norm(velocity[1:], axis=1).max()
+        went = places[:1, :3] + np.cumsum(velocity[1:], axis=0) * case.timestep_s
+        np.testing.assert_allclose(went, places[1:, :3], atol=2 * speed * case.timestep_s)
+    heading = directions(steps, places[:, :2], case)
+    turn = workpiece_turn(steps, heading, case) - motion_of(case).start_direction_rad
+    np.testing.assert_allclose(np.exp(1j * turn), np.exp(1j * places[:, 3]), atol=1e-9)
 
 
-def test_the_speed_factor_shortens_every_leg() -> None:
-    slow, fast = legs(motion(CIRCLE), 0.06, 1), legs(motion(CIRCLE), 0.06, 4)
-    for one, other in zip(slow, fast, strict=True):
-        assert one.duration_s == pytest.approx(4 * other.duration_s)
+def read_back(scene: AnyScene, folder: Path) -> ReadCase:
+    """The case of a scene as dragchain reads it."""
+    scene.case.write(folder / "case.json")
+    outputs = {one.name: one.as_part() for one in scene.deck.outputs}
+    ColumnsFile(outputs=outputs).write(folder / "columns.json")
+    return load_case(folder)
 
 
-def test_farthest_reach_counts_the_end_of_a_line_and_the_plunge() -> None:
-    end = math.hypot(-0.01 + 0.02 * math.cos(math.pi / 6), 0.005 + 0.01)
-    assert farthest_reach(motion(LINE)) == pytest.approx(end)
-    assert farthest_reach(motion(CIRCLE, plunge_at_m=[0, 0.03])) == pytest.approx(0.03)
+def path_length(path: dict[str, Any]) -> float:
+    """Length of a path, from its fields alone, m."""
+    if path["kind"] == "line":
+        return float(path["length_m"])
+    if path["kind"] == "waypoints":
+        points = np.array([[*point, 0.0][1:4] for point in path["points"]])
+        whole = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+        return float(path.get("fraction", 1.0) * whole)
+    return float(math.tau * path["radius_m"] * path["revolutions"])
+
+
+def test_a_line_that_nearly_reaches_the_wall_is_where_the_check_has_it(made: Make) -> None:
+    """A fast drag and few frames: a whole period of the network would be far beyond the wall."""
+    path = {"kind": "line", "start_m": [-0.008, 0], "direction_deg": 0, "length_m": 0.02}
+    case = made(10, path=path)
+    assert last_place(case)[0] == pytest.approx(0.012, abs=1e-12)
+    gap = case.study.bowl.radius_m - 0.012 - clearances(case, BED.surface_m).wall_m
+    assert gap == pytest.approx(0.004, rel=0.01)
+    process_scene(case, BED)
+    farther = made(10, path=path | {"length_m": 0.025})
+    with pytest.raises(InputError, match="no particle fits"):
+        process_scene(farther, BED)
+
+
+def test_the_fraction_of_a_path_that_is_driven_has_to_fit(made: Make) -> None:
+    """Waypoints beyond it are never reached."""
+    points = [[0, 0, 0], [0.5, 0.01, 0], [1, 0.03, 0, 0.03]]
+    case = made(path={"kind": "waypoints", "points": points, "fraction": 0.5})
+    assert farthest_reach(case.study) == pytest.approx(0.01)
+    assert path_heights(case.study) == (0, 0)
+    process_scene(case, BED)
+
+
+def test_a_revolution_takes_its_length_over_the_speed(made: Make) -> None:
+    way = course(made(path=CIRCLE).study, BED)
+    plunge, approach, drag = way.legs
+    assert [leg.name for leg in way.legs] == ["plunge", "approach", "drag"]
+    assert drag.duration_s == pytest.approx(0.1 * math.tau * 0.01 / 0.02, abs=way.drag.timestep_s)
+    assert drag.angular_speed_rad_s * drag.duration_s == pytest.approx(0.1 * math.tau)
+    dive = way.start_m[2] - BED.surface_m + 0.015
+    assert plunge.duration_s * plunge.velocity_m_s[2] == pytest.approx(-dive)
+    assert approach.duration_s * approach.velocity_m_s[0] == pytest.approx(0.01)
+
+
+def test_clockwise_turns_the_heading_and_the_spin(made: Make) -> None:
+    way = course(made(path=CIRCLE | {"direction": "cw"}).study, BED)
+    assert way.legs[-1].direction_rad == pytest.approx(-math.pi / 2)
+    assert way.legs[-1].angular_speed_rad_s == pytest.approx(-2, rel=1e-3)
+
+
+def test_a_workpiece_that_keeps_its_orientation(made: Make) -> None:
+    assert course(made(path=CIRCLE).study, BED).legs[-1].kind == "rotate"
+    assert course(made(orientation="fixed").study, BED).legs[-1].kind == "circle"
+
+
+def test_a_line_that_starts_where_it_plunges_has_no_approach(made: Make) -> None:
+    assert [leg.name for leg in course(made(path=LINE).study, BED).legs] == ["plunge", "drag"]
+
+
+def test_the_speed_factor_shortens_the_drag(made: Make) -> None:
+    slow, fast = (course(made(factor).study, BED).legs[-1].duration_s for factor in (1, 4))
+    assert slow == pytest.approx(4 * fast, rel=1e-3)
+
+
+def test_farthest_reach_counts_the_end_of_a_line_and_the_plunge(made: Make) -> None:
+    assert farthest_reach(made(path=LINE).study) == pytest.approx(math.hypot(*path_end(LINE, 0)))
+    assert farthest_reach(made(path=CIRCLE, plunge_at_m=[0, 0.03]).study) == pytest.approx(0.03)

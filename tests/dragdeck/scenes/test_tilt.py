@@ -77,7 +77,7 @@ def test_the_gap_is_that_of_what_is_in_the_bed(moved: Callable[..., Case]) -> No
 def test_a_workpiece_that_follows_a_circle_leans_along_it(moved: Callable[..., Case]) -> None:
     """Its farthest point lies ahead of the axis, not outwards; with a fixed orientation it may."""
     case = moved(tilt_deg=20)
-    depth, path = case.study.motion.immersion_depth_m, case.study.motion.path.reach_m
+    depth, path = case.study.motion.immersion_depth_m, case.study.motion.path.radius_m
     radius, lean = case.study.workpiece.shape.radius_m, depth * math.tan(math.radians(20))
     farthest = farthest_surface(case)
     assert math.hypot(path, lean) < farthest < math.hypot(path + radius, lean + 1.1 * radius)

@@ -22,12 +22,11 @@ from dragdeck.preview.layout import layout
 from dragdeck.project import Project
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.fit import clearances, fastest_motion
-from dragdeck.scenes.motion import in_steps, surface_speed
+from dragdeck.scenes.motion import drag_leg, path_heights, surface_speed
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.check import warnings
-from dragdeck.study.paths.kind import Leg
-from dragdeck.study.superposed.kind import DragSteps
+from dragdeck.study.stages import in_steps
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)
@@ -85,7 +84,7 @@ def test_a_file_is_what_stands_in_it(made: Made) -> None:
 
 def test_heights_may_be_left_out(made: Made) -> None:
     case = made("time_s,x_m,y_m\n0,0,0\n1,0.01,0\n")
-    assert case.study.motion.path.heights_m == [0, 0]
+    assert path_heights(case.study) == (0, 0)
 
 
 def test_a_study_finds_the_file_of_the_one_it_extends(made: Made, project: Project) -> None:
@@ -269,7 +268,7 @@ def test_the_fastest_stretch_widens_the_speed_limit(made: Made) -> None:
 
 def test_every_speed_grows_by_the_speed_factor(made: Made) -> None:
     slow, fast = (motion_of_run(made(factor=factor)) for factor in (1, 2))
-    assert fast["axis_speed_m_s"] == pytest.approx(2 * slow["axis_speed_m_s"])
+    assert fast["axis_speed_m_s"] == pytest.approx(2 * slow["axis_speed_m_s"], rel=2e-4)
     for before, after in zip(slow["stages"], fast["stages"], strict=True):
         assert after["steps"] / before["steps"] == pytest.approx(0.5, rel=0.05)
         np.testing.assert_allclose(
@@ -277,28 +276,30 @@ def test_every_speed_grows_by_the_speed_factor(made: Made) -> None:
         )
 
 
-def test_rounded_stages_reach_the_waypoints(made: Made) -> None:
-    """Whatever the step: places after whole steps are the waypoints, and the last stage goes on."""
-    leg = made().study.motion.path.drag(LENGTH / 0.7, "follow_path")
+@pytest.mark.parametrize("modulus", [1.0, 1e-3, 1e-6])
+def test_rounded_stages_reach_the_waypoints(made: Made, modulus: float) -> None:
+    """Whatever the step: places after whole steps are the waypoints, also the last one."""
+    study = made().study
+    quick = study.chosen_fidelity().model_copy(update={"youngs_modulus_scale": modulus})
+    leg = drag_leg(study.model_copy(update={"fidelity": quick}))
+    dt = leg.duration_s / leg.steps
     at = np.diff([[0, 0, *point[1:], *[0] * (4 - len(point))][-3:] for point in POINTS], axis=0)
-    for dt in (1e-5, 3.3e-4, 7e-3):
-        stages = in_steps(leg, DragSteps(50, 50 + math.ceil(0.7 / dt) + 17, dt))
-        moved = np.array([stage.steps * dt * np.array(stage.velocity_m_s) for stage in stages])
-        np.testing.assert_allclose(moved[:-1], at[:-1], atol=1e-16)
-        ends = np.cumsum([stage.steps for stage in stages])
-        np.testing.assert_allclose(ends[:-1] * dt, [0.2, 0.3, 0.5], atol=dt / 2)
-        assert ends[-1] == math.ceil(0.7 / dt) + 17
+    moved = np.array([one.steps * dt * np.array(one.velocity_m_s) for one in leg.stages])
+    np.testing.assert_allclose(moved, at, atol=1e-15)
+    ends = np.cumsum([stage.steps for stage in leg.stages])
+    assert ends[-1] == leg.steps
+    np.testing.assert_allclose(ends * dt, [0.2, 0.3, 0.5, 0.7], atol=dt)
 
 
 def test_no_stage_is_without_a_step() -> None:
     """A stage shorter than a step takes one, and those beyond the end of the drag are left out."""
-    leg = Leg("drag", "stages", 1.0, (1, 0, 0), stages=[
-        (1e-6, (1, 0, 0)), (2e-6, (2, 0, 0)), (0.5, (0.0, 1.0, 0.0)), (1.0, (0, 0, 1))
-    ])  # fmt: skip
-    stages = in_steps(leg, DragSteps(0, 40, 0.01))
-    assert [stage.steps for stage in stages] == [1, 1, 38]
-    assert stages[0].velocity_m_s[0] * 0.01 == pytest.approx(1e-6)
-    assert in_steps(Leg("drag", "linear", 1.0, (1, 0, 0)), DragSteps(0, 40, 0.01)) == []
+    stages = list(in_steps([1e-6, 2e-6, 0.5, 1.0], 40, 0.01))
+    assert stages == [(1, 0.0, 1e-6), (1, 1e-6, 2e-6), (38, 2e-6, 0.4)]
+    assert list(in_steps([0.399, 0.3999, math.inf], 40, 0.01)) == [
+        (38, 0.0, 0.399), (1, 0.399, 0.3999), (1, 0.3999, 0.4)
+    ]  # fmt: skip
+    assert [steps for steps, _, _ in in_steps([0.01, 0.02, 0.03, 9], 2, 0.02)] == [1, 1]
+    assert list(in_steps([], 40, 0.01)) == [(40, 0.0, 0.4)]
 
 
 @pytest.mark.parametrize(
@@ -425,8 +426,8 @@ def test_a_fraction_of_the_path(made: Made) -> None:
     assert part.study.motion.path_length_m == pytest.approx(0.4 * LENGTH)
     assert PROCESS.run_id(part) != PROCESS.run_id(whole)
     every, some = motion_of_run(whole)["stages"], motion_of_run(part)["stages"]
-    assert some[0] == every[0]
-    assert [each["velocity_m_s"] for each in some] == [each["velocity_m_s"] for each in every[:2]]
+    for one, other in zip(some, every[:2], strict=True):
+        np.testing.assert_allclose(one["velocity_m_s"], other["velocity_m_s"], rtol=2e-4)
 
 
 def test_the_short_run_for_its_speed_is_as_short_as_others(made: Made) -> None:

@@ -18,7 +18,15 @@ from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.registry import SCENES
-from dragdeck.study.contact_law import Pair, coefficients, contact_model, contact_settings
+from dragdeck.study import contact_law
+from dragdeck.study.contact_law import (
+    Coefficient,
+    Pair,
+    added_forces,
+    coefficients,
+    contact_model,
+    contact_settings,
+)
 from dragdeck.study.material import Material
 from dragdeck.sweep.cases import load_cases
 from evidence.verification.collide import Body, Experiment, Wall, collide_case, collide_scene
@@ -71,6 +79,40 @@ def test_explain_says_whether_a_coefficient_is_modelled(
     assert words in process_scene(case).leaves_out
     modelled = process_scene(with_coefficient(small, write_study, name, USED))
     assert words in modelled.models and words not in modelled.leaves_out
+
+
+@pytest.mark.parametrize(
+    ("law", "added"),
+    [
+        ("gran model hertz tangential history", []),
+        ("gran model hooke tangential no_history rolling_friction cdt limitForce on", []),
+        ("gran model hertz/stiffness cohesion off", []),
+        ("wall/gran model hertz cohesion sjkr2 mesh n_meshes 1 meshes a", ["cohesion sjkr2"]),
+        ("gran model hooke/hysteresis tangential history", ["hooke/hysteresis"]),
+        ("gran model ${law} tangential history", ["${law}"]),
+        ("gran/hertz/history 1 0", ["gran/hertz/history 1 0"]),
+        ("hybrid gran model hertz dpd 1", ["hybrid gran model hertz dpd 1"]),
+    ],
+)
+def test_what_a_contact_law_adds_to_the_force_that_limits_friction(
+    law: str, added: list[str]
+) -> None:
+    assert added_forces(law.split()) == added
+
+
+@pytest.mark.parametrize("name", coefficients())
+def test_a_coefficient_says_whether_it_adds_a_force(name: str) -> None:
+    law = f"gran model {contact_model([Pair(restitution=0.9, friction=0.3)])}"
+    row = coefficients()[name]
+    assert bool(added_forces(f"{law} {row.model}".split())) == row.adds_force
+
+
+def test_a_coefficient_that_adds_a_force_is_found_in_a_script(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    row = Coefficient("liquid", "liquid", "surface wet", adds_force=True)
+    monkeypatch.setattr(contact_law, "coefficients", lambda: {"liquid": row})
+    assert added_forces(["gran", "model", "hertz", "surface", "wet"]) == ["surface wet"]
 
 
 def test_a_pair_needs_only_what_it_has() -> None:

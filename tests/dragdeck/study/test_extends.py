@@ -9,6 +9,7 @@ import yaml
 
 from dragdeck.errors import InputError
 from dragdeck.project import study_templates
+from dragdeck.study.model import Filling, Study
 from dragdeck.study.yaml import located, read_study
 from dragdeck.sweep.cases import load_cases
 
@@ -51,6 +52,40 @@ def test_lists_fidelity_and_another_kind_are_replaced_as_a_whole(
     assert "speed_m_s" in data["motion"]
 
 
+@pytest.mark.parametrize(
+    ("block", "inherited"),
+    [
+        ("sweep", {"seed": [1, 2]}),
+        ("fidelity", "draft"),
+        ("filling", {"energy_ratio": 0.01}),
+        ("outputs", {"network_hz": 50}),
+        ("contact", {"limit_force": False}),
+        ("drop_test", {"impacts": 2}),
+        ("scaling", {"field": "seed"}),
+        ("accepted", {"cases": 200}),
+        ("assumptions", [{"field": "seed", "why": "any"}]),
+    ],
+)
+def test_null_removes_what_the_extended_study_has(
+    extend: Callable[..., Path], block: str, inherited: Any
+) -> None:
+    extend(yaml.safe_dump({"extends": "small", block: inherited}), "middle")
+    file = extend(f"extends: middle\n{block}: null\n")
+    assert block not in read_study(file)
+    (case,) = load_cases(file)
+    assert getattr(case.study, block) == Study.model_fields[block].get_default(
+        call_default_factory=True
+    )
+
+
+def test_null_removes_one_value(extend: Callable[..., Path]) -> None:
+    extend("extends: small\nfilling: {energy_ratio: 0.01, max_time_s: 7}\n", "middle")
+    file = extend("extends: middle\nfilling: {energy_ratio: null}\n")
+    assert read_study(file)["filling"] == {"max_time_s": 7}
+    (case,) = load_cases(file)
+    assert case.study.filling == Filling(max_time_s=7)
+
+
 def test_a_study_may_extend_one_that_extends(extend: Callable[..., Path]) -> None:
     extend("extends: small\nseed: 7\ntitle: middle\n", "middle")
     data = read_study(extend("extends: middle\ntitle: last\n"))
@@ -72,6 +107,13 @@ def test_what_cannot_be_extended(extend: Callable[..., Path], text: str, words: 
     with pytest.raises(InputError, match=words) as caught:
         load_cases(extend(text))
     assert "extends" in str(caught.value) and "small" in str(caught.value)
+
+
+def test_a_study_that_extends_itself_is_offered_others_only(extend: Callable[..., Path]) -> None:
+    extend("extends: small\n", "childe")
+    with pytest.raises(InputError) as caught:
+        load_cases(extend("extends: child\n"))
+    assert caught.value.limit == "did you mean 'childe'? one of: childe, small"
 
 
 def test_an_error_names_the_file_and_line_that_has_the_value(extend: Callable[..., Path]) -> None:

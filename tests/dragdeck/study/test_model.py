@@ -107,8 +107,8 @@ def test_yaml_numbers_with_an_exponent_are_numbers(tmp_path: Path) -> None:
     [
         ("a: 1\na: 2\n", "key 'a' is given twice"),
         ("a: [1\n", "not YAML"),
-        ("- 1\n", "a study must be a mapping"),
-        ("", "a study must be a mapping"),
+        ("- 1\n", "the file must be a mapping"),
+        ("", "the file must be a mapping"),
     ],
 )
 def test_a_file_that_is_no_study_is_refused(tmp_path: Path, text: str, words: str) -> None:

@@ -155,7 +155,11 @@ def test_an_unusual_value_is_a_warning(small: dict[str, Any]) -> None:
     [
         ({"motion": {"transient_m": 0.0063}}, "motion.transient_m", "no path is left"),
         ({"outputs": {"network_hz": 1}}, "outputs.network_hz", "not one frame"),
-        ({"filling": {"energy_ratio": 1.1}}, "filling.energy_ratio", "less than or equal to 1"),
+        (
+            {"filling": {"energy_ratio": 2e-3}},
+            "filling.energy_ratio",
+            "less than or equal to 0.001",
+        ),
         (
             {"pairs": {"steel-ceramic": {"restitution": 0.5, "friction": 0.1}}},
             "pairs.steel-ceramic",
@@ -195,7 +199,7 @@ def test_a_pair_may_be_given_twice_with_the_same_values(small: dict[str, Any]) -
         (b"? [a, b]\n: 1\n", "not YAML"),
         (b"a: " + 5000 * b"[", "nested too deeply"),
         (5000 * b"{a: ", "nested too deeply"),
-        (b"", "a study must be a mapping"),
+        (b"", "the file must be a mapping"),
     ],
 )
 def test_each_is_named_with_its_file(tmp_path: Path, content: bytes, words: str) -> None:

@@ -14,7 +14,7 @@ from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.registry import SCENES
-from dragdeck.sweep.cases import load_cases, study_file
+from dragdeck.sweep.cases import load_cases, new_study, study_file
 
 
 @pytest.fixture
@@ -222,3 +222,32 @@ def test_a_scaling_that_the_matrix_cannot_tell_is_refused(
     with pytest.raises(InputError, match=words) as caught:
         load_cases(write_study(data))
     assert caught.value.field == field
+
+
+@pytest.mark.parametrize("field", ["media.cuont", "path", "motion.path.length_m", "media."])
+def test_an_assumption_about_no_field_is_refused(
+    small: dict[str, Any], write_study: Callable[..., Path], field: str
+) -> None:
+    small["assumptions"] = [{"field": "media", "why": "any"}, {"field": field, "why": "any"}]
+    with pytest.raises(InputError, match="no such field") as caught:
+        load_cases(write_study(small))
+    assert (caught.value.field, repr(field) in caught.value.problem) == (
+        "assumptions.1.field",
+        True,
+    )
+
+
+@pytest.mark.parametrize("field", ["media.count", "pairs", "motion.tilt_deg", "reference"])
+def test_an_assumption_may_be_about_a_field_or_a_block(
+    small: dict[str, Any], write_study: Callable[..., Path], field: str
+) -> None:
+    small["assumptions"] = [{"field": field, "why": "any"}]
+    assert load_cases(write_study(small))
+
+
+@pytest.mark.parametrize("name", [".", "..", "", "a/b"])
+def test_a_name_that_can_be_none_is_not_called_taken(
+    write_study: Any, small: Any, name: str
+) -> None:
+    with pytest.raises(InputError, match="this name cannot be used for a study"):
+        new_study(write_study(small).parent.parent, name, "small")

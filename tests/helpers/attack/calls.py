@@ -27,9 +27,11 @@ LARGEST_FILE = 64 * 2**20
 MOST_MEMORY = 6 * 2**30
 """Address space of a command that is attacked, bytes."""
 
-PATIENCE_S = 120.0
-_SHARED = 12.0
-"""By how much a clock may run ahead of the processor time on a machine that others use too."""
+PATIENCE_S = 240.0
+"""Processor time after which a command has no answer, s; how long it takes depends on the load."""
+
+HUNG_S = 3600.0
+"""After this time a command that uses no processor time has no answer either, s."""
 
 _POLL_S = 0.02
 
@@ -113,19 +115,23 @@ class Call:
         while self.running:
             if condition():
                 return True
-            if time.monotonic() - self._begun > PATIENCE_S:
+            if self._is_beyond(PATIENCE_S):
                 return False
             time.sleep(poll_s)
         return False
 
+    def _is_beyond(self, patience_s: float) -> bool:
+        return self.spent_s() > patience_s or time.monotonic() - self._begun > HUNG_S
+
     def wait(self, patience_s: float = PATIENCE_S) -> Said:
-        """Wait for the end; after the patience everything is killed."""
+        """Wait for the end; beyond this processor time everything is killed."""
         status: int | None = None
-        try:
-            status = self.process.wait(timeout=patience_s)
-        except subprocess.TimeoutExpired:
-            kill(self.tree())
-            self.process.wait()
+        while (status := self.process.poll()) is None:
+            if self._is_beyond(patience_s):
+                kill(self.tree())
+                self.process.wait()
+                break
+            time.sleep(_POLL_S)
         text = self.log.read_text(encoding="utf-8", errors="replace")
         return Said(status, text, time.monotonic() - self._begun)
 
@@ -189,9 +195,13 @@ def _is_engine(number: int) -> bool:
 
 
 def gone_within(folder: Path, seconds: float) -> bool:
-    """Whether no engine of a folder is left after some seconds."""
-    deadline = time.monotonic() + seconds
-    while engines(folder):
+    """Whether no engine of a folder goes on for more than some seconds of processor time."""
+    begun: dict[int, float] = {}
+    deadline = time.monotonic() + HUNG_S
+    while left := engines(folder):
+        spent = ((each.pid, _spent_s(each)) for each in left)
+        if any(now - begun.setdefault(number, now) > seconds for number, now in spent):
+            return False
         if time.monotonic() > deadline:
             return False
         time.sleep(_POLL_S)
@@ -234,13 +244,13 @@ def run_function(
 ) -> Said:
     """Call a function in a process that is forked for it, its output kept.
 
-    The patience is processor time, and many times that on a clock: the machine may be shared.
+    The patience is processor time: the machine may be shared.
     """
     log = folder / f"said.{time.monotonic_ns()}.log"
     begun = time.monotonic()
     process = _server().Process(target=_inside, args=(log, folder, patience_s, function, arguments))
     process.start()
-    process.join(_SHARED * patience_s)
+    process.join(HUNG_S)
     status = None if process.exitcode == -signal.SIGXCPU else process.exitcode
     if process.is_alive():
         process.kill()

@@ -199,7 +199,7 @@ _REFUSED_FIELDS: tuple[tuple[str, Change, tuple[str, ...]], ...] = (
      ("steel-ceramic", "ceramic-steel")),
     ("the transient is the path", put(motion__transient_m=0.005026548245743669), ("transient_m",)),
     ("the transient is beyond the path", put(motion__transient_m=1.0), ("transient_m",)),
-    ("an energy ratio above 1", put(filling__energy_ratio=1.5), ("energy_ratio",)),
+    ("an energy ratio of a bed that moves", put(filling__energy_ratio=1), ("energy_ratio",)),
     ("a sweep of a sweep", put(sweep={"sweep": [{"seed": [1, 2]}]}), ("sweep",)),
     ("a sweep into a sweep", put(sweep={"sweep.seed": [[1, 2]]}), ("sweep",)),
     ("a sweep of nothing", put(sweep={"": [1]}), ("sweep",)),

@@ -85,6 +85,27 @@ _FILES: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
         _BASE + "{% block extra %}{% endblock %}{% block extra %}{% endblock %}",
         ("extra",),
     ),
+    "a macro in place of another": (
+        "walls.j2",
+        '{% extends "base/walls.j2" %}{% macro bowl(script) %}{% endmacro %}',
+        ("walls.j2.*bowl",),
+    ),
+    "text outside of the blocks": ("process.in.j2", _BASE + "run 1\n", ("outside of the blocks",)),
+    "a block that no script contains": (
+        "base.in.j2",
+        '{% extends "base/base.in.j2" %}{% block run %}{% endblock %}',
+        ("changes no input script",),
+    ),
+    "no outputs": (
+        "process.in.j2",
+        _BASE + "{% block outputs %}{% endblock %}",
+        ("would not write the output files",),
+    ),
+    "an endless loop": (
+        "process.in.j2",
+        _in_extra("label again\njump SELF again"),
+        ("run for ever",),
+    ),
     "a file of no scene": ("proces.in.j2", _BASE, (r"proces\.in\.j2",)),
     "a file in capitals": ("Process.in.j2", _BASE, (r"Process\.in\.j2",)),
     "an empty one": ("process.in.j2", "", (r"process\.in\.j2|DRAGDECK END",)),

@@ -5,8 +5,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 
-import numpy as np
-
 from dragdeck.cases.bed import widest_skin
 from dragdeck.cases.case import Case
 from dragdeck.outlook.measured import (
@@ -32,10 +30,6 @@ from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance
 
 _FEWEST_RUNS = 2
 """Runs of a setting below which its error is not believed."""
-
-UNIT_STIFFNESS, UNIT_INERTIA, UNIT_FRICTION = 1e4, 0.1, 0.3
-"""Stiffness number, inertial number and friction about which the laws of reduced moduli are
-written."""
 
 _PROCESS_OF_DROP = "standard"
 """Fidelity of the process in a study whose tolerance is about the drop test."""
@@ -184,12 +178,7 @@ def _law_error(known: MeasuredLaw, numbers: Mapping[str, float], scale: float) -
     The standard error of `dragchain.tradeoff.stiffness_law.extrapolate`, without the scatter of
     the run.
     """
-    law, inertia = known.law, numbers["inertial_number"] / UNIT_INERTIA
-    along = np.array([1.0, inertia, math.log(numbers[known.friction] / UNIT_FRICTION)])
-    reduction = (numbers["stiffness_number"] / UNIT_STIFFNESS) ** -law.rate
-    reduction *= scale ** (-2 / 3 * law.rate) - 1
-    variance = law.amplitude_std**2 + float(along @ np.array(law.covariance) @ along)
-    se = math.hypot(reduction * math.sqrt(variance), law.model_std)
+    _, se = known.effect(numbers, scale)
     low, high = (math.expm1(sign * known.quantile * se) for sign in (-1, 1))
     return MeasuredError(
         value=0.0, se=se, ci95_low=low, ci95_high=high, bound=high, single_parameter_error=0.0

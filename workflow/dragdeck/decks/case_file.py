@@ -24,16 +24,18 @@ class CountOfRun(Part):
 
 
 class FidelityOfRun(RanksOfRun):
-    """The settings for speed and accuracy of a run.
+    """The settings for speed and accuracy with which this run is simulated.
+
+    A drop test and a filling have their own time step, and no workpiece that could be faster.
 
     Attributes
     ----------
     name : str
-        Name of the fidelity.
+        Name of the fidelity of the case.
     youngs_modulus_scale, speed_factor : float
         Multipliers of every Young's modulus and of the speed of the workpiece.
-    timestep_fraction, filling_timestep_fraction : float
-        Time steps of process and filling as fractions of the Rayleigh time.
+    timestep_fraction : float
+        Time step as a fraction of the Rayleigh time.
     skin_m : float
         Neighbour skin, m.
     ranks : int
@@ -43,7 +45,6 @@ class FidelityOfRun(RanksOfRun):
     name: str
     youngs_modulus_scale: float
     timestep_fraction: float
-    filling_timestep_fraction: float
     speed_factor: float
     skin_m: float
 
@@ -130,6 +131,9 @@ class CaseFile(Document):
         Time step and Rayleigh time of the smallest particle, s.
     phases : sequence of Phase
         Empty if LIGGGHTS determines the number of steps.
+    added_forces : sequence of str
+        Models of the script's contact law that add a normal force; Coulomb's limit of friction
+        does not follow from the contact force then.
     """
 
     study: str
@@ -141,6 +145,7 @@ class CaseFile(Document):
     versions: Mapping[str, str]
     phases: Sequence[Phase] = ()
     files: Mapping[str, str] = {}
+    added_forces: Sequence[str] = ()
 
 
 class CaseOfStudy(CaseFile):
@@ -178,8 +183,6 @@ class DropTestCase(CaseOfStudy):
     ----------
     restitution : float
         Coefficient of restitution in the input script.
-    youngs_modulus_scale : float
-        Multiplier of every Young's modulus.
     files : mapping
         SHA-256 of every file from which the run starts.
     inputs : mapping
@@ -190,7 +193,6 @@ class DropTestCase(CaseOfStudy):
 
     scene: Literal["drop_test"] = "drop_test"
     restitution: float
-    youngs_modulus_scale: float
 
 
 class SettlingCriterion(Part):
@@ -200,9 +202,12 @@ class SettlingCriterion(Part):
     ----------
     energy_ratio : float
         Largest mean kinetic energy per particle / (m g d).
+    highest_m : float
+        Largest height of any point of a particle above the floor, m: the rim of the bowl.
     """
 
     energy_ratio: float
+    highest_m: float
 
 
 class SteadyCriterion(Part):

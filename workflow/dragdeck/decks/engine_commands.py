@@ -1,7 +1,8 @@
-"""Commands of LIGGGHTS that would leave the run's folder: start a program, read other scripts."""
+"""The commands of an input script: what they reach, whether they end, the contact law they set."""
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 _PROGRAMS = ("include", "partition", "python", "shell")
 """Commands that start programs or scripts, or carry other commands."""
@@ -10,6 +11,39 @@ _WORD = re.compile(r'"""(.*?)"""|"([^"]*)"|\'([^\']*)\'|(\S+)', re.DOTALL)
 
 _OUTSIDE = re.compile(r"[/~].|.*(\.\.|\})/|.*\.gz$", re.DOTALL)
 """An absolute path, one upwards or through a variable, or a file that gzip is started for."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command of an input script.
+
+    Attributes
+    ----------
+    text : str
+    words : list of str
+        Without quotation marks; at least one.
+    within : str
+        The command that carries it: ``if`` or ``run``; empty for one that stands alone.
+    """
+
+    text: str
+    words: list[str]
+    within: str = ""
+
+
+def commands(deck: str) -> Iterator[Command]:
+    """The commands of an input script, those that another one carries after it."""
+    for line in re.sub(r"&[ \t]*\r?\n", "", deck).splitlines():
+        if not line.lstrip().startswith("#"):
+            yield from _commands(line, "")
+
+
+def _commands(text: str, within: str) -> Iterator[Command]:
+    words = [next(filter(None, found), "") for found in _WORD.findall(text)]
+    if words:
+        yield Command(text, words, within)
+        for inner in _inner(words):
+            yield from _commands(inner, within or words[0])
 
 
 def leaving_folder(deck: str, source: str) -> Iterator[tuple[str, str]]:
@@ -22,27 +56,49 @@ def leaving_folder(deck: str, source: str) -> Iterator[tuple[str, str]]:
     source : str
         The one file outside of the folder that it may name.
     """
-    for line in re.sub(r"&[ \t]*\r?\n", "", deck).splitlines():
-        if not line.lstrip().startswith("#"):
-            yield from _command(line, source)
+    for command in commands(deck):
+        words, first = command.words, command.words[0]
+        if first in _PROGRAMS or (first == "jump" and words[1:2] != ["SELF"]):
+            yield command.text, "start another program or script"
+        elif "$" in first:
+            yield command.text, "take a command from a variable"
+        elif first == "variable" and words[2:3] == ["getenv"]:
+            yield command.text, "read the environment"
+        elif not (first == "variable" and words[2:3] in (["equal"], ["atom"])):
+            for word in words[1:]:
+                if word != source and _OUTSIDE.match(word):
+                    yield command.text, f"access a file outside the run's folder: {word}"
 
 
-def _command(command: str, source: str) -> Iterator[tuple[str, str]]:
-    words = [next(filter(None, found), "") for found in _WORD.findall(command)]
-    if not words:
-        return
-    first = words[0]
-    if first in _PROGRAMS or (first == "jump" and words[1:2] != ["SELF"]):
-        yield command, "start another program or script"
-    elif "$" in first:
-        yield command, "take a command from a variable"
-    elif first == "variable" and words[2:3] == ["getenv"]:
-        yield command, "read the environment"
-    elif not (first == "variable" and words[2:3] in (["equal"], ["atom"])):
-        paths = (word for word in words[1:] if word != source and _OUTSIDE.match(word))
-        yield from ((command, f"access a file outside the run's folder: {word}") for word in paths)
-    for inner in _inner(words):
-        yield from _command(inner, source)
+def endless(deck: str) -> Iterator[tuple[str, str]]:
+    """Jumps back of a deck between whose label and itself nothing can end the loop."""
+    every = list(commands(deck))
+    labels = {each.words[1]: at for at, each in reversed([*enumerate(every)]) if _is_label(each)}
+    for at, command in enumerate(every):
+        if command.words[:2] != ["jump", "SELF"] or command.within == "if":
+            continue
+        start = labels.get(command.words[2], at) if command.words[2:] else 0
+        if start < at and not any(_ends_loop(each) for each in every[start:at]):
+            yield command.text, "run for ever: no `next` and no `if` ends this loop"
+
+
+def _is_label(command: Command) -> bool:
+    return command.words[0] == "label" and len(command.words) > 1
+
+
+def _ends_loop(command: Command) -> bool:
+    way_out = command.words[0] in ("jump", "quit") and command.within == "if"
+    return way_out or command.words[0] in ("next", "quit")
+
+
+def contact_laws(deck: str) -> Iterator[list[str]]:
+    """The words of a deck that give particles or a wall their contact law."""
+    for command in commands(deck):
+        words = command.words
+        if words[0] == "pair_style":
+            yield words[1:]
+        elif words[0] == "fix" and any(word.startswith("wall/gran") for word in words[3:4]):
+            yield words[3:]
 
 
 def _inner(words: list[str]) -> Iterator[str]:

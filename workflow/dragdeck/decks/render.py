@@ -1,6 +1,8 @@
 """From a scene to the files of its run folder."""
 
 import hashlib
+import re
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,11 +10,12 @@ import jinja2
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, END, RUN_FILE
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.engine_commands import leaving_folder
+from dragdeck.decks.engine_commands import commands, contact_laws, endless, leaving_folder
 from dragdeck.decks.outputs import WORKPIECE_FORCE, ColumnsFile, in_writing_order
-from dragdeck.decks.templates import explained, file_of, used
+from dragdeck.decks.templates import explained, file_of, replaced, used, without
 from dragdeck.errors import InputError
 from dragdeck.files import file_checksum, replace_text
+from dragdeck.study import contact_law
 
 
 def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
@@ -22,31 +25,108 @@ def deck_text(scene: AnyScene, templates: jinja2.Environment) -> str:
     ------
     InputError
         A template cannot be used: names template, line and what is missing. Or the deck would
-        start a program, or reach files outside of the run's folder.
+        start a program, reach files outside of the run's folder, run for ever, or not write
+        what ``columns.json`` says.
     """
-    with explained():
-        template = templates.get_template(scene.template)
-        names = ", ".join(used(templates, scene.template))
-        outputs = in_writing_order(scene.deck.outputs)
-        text = template.render(deck=replace(scene.deck, templates=names, outputs=outputs))
+    names = ", ".join(_used(scene, templates))
+    text = _rendered(scene, templates, names)
+    file = file_of(templates, scene.template)
     if f'\nprint "{END}"\n' not in text or not all(c.isprintable() or c in "\n\t" for c in text):
         raise InputError(
             "the input script is not printable text, or lacks its last command",
-            file=file_of(templates, scene.template),
+            file=file,
             limit=f"printable characters, and the last command of base.in.j2: print {END}",
             remedy="extend the project's template, and override blocks of it",
         )
-    for command, why in leaving_folder(text, scene.deck.source):
+    for command, why in (*leaving_folder(text, scene.deck.source), *endless(text)):
         raise InputError(
             f"the input script would {why}",
-            file=file_of(templates, scene.template),
+            file=file,
             value=ascii(command),
             remedy="remove the command from the template; see docs/reference/templates.md",
         )
+    if overriding(scene, templates) and scene.override is None:
+        _check_outputs(scene, text, _rendered(scene, without(templates)), file)
     return text
 
 
-def write_workpiece(scene: AnyScene, folder: Path, number: int, run: Path) -> None:
+def _used(scene: AnyScene, templates: jinja2.Environment) -> list[str]:
+    with explained(scene.template):
+        return used(templates, scene.template)
+
+
+def _rendered(scene: AnyScene, templates: jinja2.Environment, names: str = "") -> str:
+    """A deck, whose header names these templates."""
+    deck = replace(scene.deck, templates=names, outputs=in_writing_order(scene.deck.outputs))
+    with explained(scene.template):
+        return templates.get_template(scene.template).render(deck=deck)
+
+
+def _check_outputs(scene: AnyScene, text: str, original: str, file: Path) -> None:
+    """Refuse a deck that does not write what ``columns.json`` says as the original writes it."""
+    columns = [column.engine for output in scene.deck.outputs for column in output.columns]
+    names = {
+        f"{name}{number}"
+        for output in scene.deck.outputs
+        for name, number in [
+            (f"write_{output.name}", ""),
+            *((f"{output.name}_", at) for at in range(1, len(output.columns) + 1)),
+        ]
+    } | set(re.findall(r"\bc_(\w+)", " ".join(columns)))
+    there = [command.words for command in commands(text)]
+    for command in commands(original):
+        defines = command.words[0] in ("compute", "dump", "fix", "variable")
+        if defines and command.words[1] in names and command.words not in there:
+            raise InputError(
+                "the input script would not write the output files that are analysed",
+                file=file,
+                value=f"missing: {command.text}",
+                limit="all commands that write them, unchanged",
+                remedy="insert the original content of the block with {{ super() }}, and write "
+                "additional output to files of other names",
+            )
+
+
+def overriding(scene: AnyScene, templates: jinja2.Environment) -> set[str]:
+    """Names of the project's templates in whose place a scene uses a study's own."""
+    return {name for name in _used(scene, templates) if replaced(templates, name)}
+
+
+def effective(scene: AnyScene, templates: jinja2.Environment) -> set[str]:
+    """Those of `overriding` without which the deck of the scene would be another one."""
+    whole, found = _rendered(scene, templates), set()
+    for name in overriding(scene, templates):
+        try:
+            changed = _rendered(scene, without(templates, name)) != whole
+        except InputError:  # the others need it
+            changed = True
+        found |= {name} if changed else set()
+    return found
+
+
+def idle(names: Iterable[str], templates: jinja2.Environment) -> Iterator[InputError]:
+    """Why templates of a study that change no deck of it are refused."""
+    for name in sorted(names):
+        yield InputError(
+            "this template changes no input script of the study",
+            file=file_of(templates, name),
+            remedy=f"override a block that the input scripts contain (docs/reference/templates.md "
+            f"lists the blocks of {name}), or remove the file",
+        )
+
+
+def added_forces(text: str) -> list[str]:
+    """What the contact laws of a deck add to the force that limits friction."""
+    return list(
+        dict.fromkeys(
+            force for law in contact_laws(text) for force in contact_law.added_forces(law)
+        )
+    )
+
+
+def write_workpiece(
+    scene: AnyScene, folder: Path, number: int, run: Path, templates: jinja2.Environment
+) -> None:
     """Write the folder of a further workpiece of a complete run, from which tables are made.
 
     It has what a run's folder has but for the input script and the output, which are the run's.
@@ -60,12 +140,15 @@ def write_workpiece(scene: AnyScene, folder: Path, number: int, run: Path) -> No
         Of the workpiece, from 1.
     run : Path
         Folder of the run.
+    templates : Environment
+        Those of the run.
     """
     outputs = {each.name: each.as_part() for each in scene.deck.outputs}
     forces = [outputs.pop(name) for name in list(outputs) if name.startswith(WORKPIECE_FORCE)]
     columns = ColumnsFile(outputs={**outputs, WORKPIECE_FORCE: forces[number - 1]})
+    own = {"added_forces": added_forces(deck_text(scene, templates))}
     texts = {
-        CASE_FILE: scene.case.as_text(),
+        CASE_FILE: scene.case.model_copy(update=own).as_text(),
         COLUMNS_FILE: columns.as_text(),
         **scene.texts(),
         RUN_FILE: (run / RUN_FILE).read_text(encoding="utf-8"),
@@ -96,7 +179,8 @@ def write_run(scene: AnyScene, folder: Path, templates: jinja2.Environment) -> l
     source = folder / scene.deck.source
     if scene.deck.source not in texts and source.is_file():
         checksums[scene.deck.source] = file_checksum(source)
-    texts[CASE_FILE] = scene.case.model_copy(update={"files": checksums}).as_text()
+    own = {"files": checksums, "added_forces": added_forces(texts[DECK_FILE])}
+    texts[CASE_FILE] = scene.case.model_copy(update=own).as_text()
     for name, text in texts.items():
         replace_text(folder / name, text)
     return [folder / name for name in texts]

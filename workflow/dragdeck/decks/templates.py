@@ -9,7 +9,7 @@ import math
 import resource
 import signal
 import traceback
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,6 @@ import jinja2
 import psutil
 from jinja2 import nodes
 from jinja2.exceptions import SecurityError
-from jinja2.meta import find_referenced_templates
 from jinja2.runtime import BlockReference, Context, Macro
 from jinja2.sandbox import ImmutableSandboxedEnvironment, safe_range
 from markupsafe import Markup
@@ -30,6 +29,9 @@ _NOT_IN_A_VALUE = set("$&#\"'\\")
 
 _TRUSTING = ("e", "escape", "forceescape", "random", "safe", "tojson", "urlize", "xmlattr")
 """Filters of Jinja that would pass text by `quoted`, or give another script each time."""
+
+_BASE = "base"
+"""Prefix of the project's own templates, which a study's may replace."""
 
 _MOST_SECONDS, _MOST_BYTES = 3.0, 2**30
 """Limits of rendering a script, far above its need: CPU time (s) and memory (bytes)."""
@@ -88,7 +90,7 @@ def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
     loader = jinja2.ChoiceLoader(
         [
             jinja2.FileSystemLoader([*folders, str(project)]),
-            jinja2.PrefixLoader({"base": jinja2.FileSystemLoader(str(project))}),
+            jinja2.PrefixLoader({_BASE: jinja2.FileSystemLoader(str(project))}),
         ]
     )
     found = _Sandbox(
@@ -104,7 +106,7 @@ def environment(project: Path, study: Path | None = None) -> jinja2.Environment:
         del found.filters[name]
     found.filters.update(num=number, nums=numbers, comment=comment)
     if folders and study is not None:
-        with explained():
+        with explained(study):
             _check_own(found, study, project)
     return found
 
@@ -154,8 +156,13 @@ def _inserted(context: Context, value: object) -> Markup:
 
 
 @contextlib.contextmanager
-def explained() -> Iterator[None]:
+def explained(template: Path | str) -> Iterator[None]:
     """Limit what templates take, and turn what they raise into an error with file and line.
+
+    Parameters
+    ----------
+    template : Path or str
+        The template, or folder of templates, that is named where the error does not say.
 
     Raises
     ------
@@ -171,19 +178,19 @@ def explained() -> Iterator[None]:
         problem, remedy = next(
             texts for kind, texts in _FAILURES.items() if isinstance(error, kind)
         )
-        file, line = _place(error)
+        file, line = _place(error, template)
         text = f"{problem}{error}" if problem.endswith(" ") else problem
-        raise InputError(text, file=file, field=f"line {line}", remedy=remedy) from None
+        raise InputError(text, file=file, field=line, remedy=remedy) from None
 
 
-def _place(error: Exception) -> tuple[str, int | str]:
-    """Template file and line where an error arose."""
+def _place(error: Exception, template: Path | str) -> tuple[Path | str, str | None]:
+    """File and line where an error arose, as far as it says."""
     if isinstance(error, jinja2.TemplateSyntaxError):
-        return error.filename or "template", error.lineno
-    place: tuple[str, int | str] = ("template", "?")
+        return error.filename or template, f"line {error.lineno}"
+    place: tuple[Path | str, str | None] = (template, None)
     for frame, line in traceback.walk_tb(error.__traceback__):
         if frame.f_code.co_filename.endswith(".j2"):
-            place = (frame.f_code.co_filename, line)
+            place = (frame.f_code.co_filename, f"line {line}")
     return place
 
 
@@ -207,17 +214,73 @@ def _limited() -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
 
+_REFERENCES = (nodes.Extends, nodes.FromImport, nodes.Import, nodes.Include)
+
+
 def used(templates: jinja2.Environment, *names: str) -> list[str]:
-    """Names of the templates that some templates are made of, themselves first."""
-    found: list[str] = []
-    waiting = list(names)
-    while waiting:
-        current = waiting.pop(0)
-        if current not in found:
-            found.append(current)
-            referenced = find_referenced_templates(_parsed(templates, current))
-            waiting.extend(name for name in referenced if name is not None)
+    """Names of the templates that some templates are made of, themselves first.
+
+    Raises
+    ------
+    InputError
+        One of them names a template that there is not.
+    """
+    found = list(names)
+    for current in found:
+        for node in _parsed(templates, current).find_all(_REFERENCES):
+            for name in _named(node):
+                if not _is_there(templates, name):
+                    problem, remedy = _FAILURES[jinja2.TemplateNotFound]
+                    raise InputError(
+                        f"{problem}{name!a}",
+                        file=file_of(templates, current),
+                        field=f"line {node.lineno}",
+                        remedy=remedy,
+                    )
+                if name not in found:
+                    found.append(name)
     return found
+
+
+def _named(reference: nodes.Node) -> list[str]:
+    """The templates that a node refers to, as far as they do not depend on values."""
+    target = reference.template  # type: ignore[attr-defined]
+    items = target.items if isinstance(target, nodes.Tuple | nodes.List) else [target]
+    return [item.value for item in items if isinstance(item, nodes.Const)]
+
+
+def _is_there(templates: jinja2.Environment, name: str) -> bool:
+    try:
+        file_of(templates, name)
+    except jinja2.TemplateNotFound:
+        return False
+    return True
+
+
+def replaced(templates: jinja2.Environment, name: str) -> bool:
+    """Whether a study has its own file in place of a template of the project."""
+    base = f"{_BASE}/{name}"
+    return _is_there(templates, base) and file_of(templates, base) != file_of(templates, name)
+
+
+def without(templates: jinja2.Environment, name: str | None = None) -> jinja2.Environment:
+    """The same templates, but the project's in place of a study's own.
+
+    Parameters
+    ----------
+    templates : Environment
+    name : str, optional
+        The only one to take from the project.
+    """
+    assert templates.loader is not None
+    every = templates.loader
+
+    def original(asked: str) -> tuple[str, str | None, Callable[[], bool] | None] | None:
+        if name not in (None, asked) or not _is_there(templates, f"{_BASE}/{asked}"):
+            return None
+        return every.get_source(templates, f"{_BASE}/{asked}")
+
+    return templates.overlay(loader=jinja2.ChoiceLoader([jinja2.FunctionLoader(original), every]))
 
 
 def file_of(templates: jinja2.Environment, name: str) -> Path:
@@ -252,7 +315,7 @@ def template_files(templates: jinja2.Environment, scene: str) -> list[Path]:
     InputError
         One of them is missing or cannot be parsed.
     """
-    with explained():
+    with explained(f"{scene}.in.j2"):
         return sorted({file_of(templates, name) for name in used(templates, f"{scene}.in.j2")})
 
 
@@ -269,17 +332,41 @@ def _check_own(templates: jinja2.Environment, study: Path, project: Path) -> Non
         if (study / name).is_dir() or ((study / name).is_symlink() and not (study / name).exists()):
             found.append(InputError("this is not a file", file=study / name))
     for name in sorted(files & reached):
-        found += _idle_blocks(templates, name)
+        found += _idle_parts(templates, name)
     if found:
         raise together(found)
 
 
-def _idle_blocks(templates: jinja2.Environment, name: str) -> Iterator[InputError]:
-    """What an extending template has outside of the blocks of the templates it extends."""
+def _idle_parts(templates: jinja2.Environment, name: str) -> Iterator[InputError]:
+    """What an extending template has that no script contains, whatever the values."""
     tree, *others = (_parsed(templates, each) for each in used(templates, name))
-    known = {block.name for other in others for block in other.find_all(nodes.Block)}
+    blocks = {block.name for other in others for block in other.find_all(nodes.Block)}
+    macros = {macro.name for other in others for macro in other.find_all(nodes.Macro)}
+    file, see = file_of(templates, name), "docs/reference/templates.md lists the blocks"
     for node in tree.body if tree.find(nodes.Extends) else ():
-        if isinstance(node, nodes.Block) and node.name not in known:
-            file, line = file_of(templates, name), f"line {node.lineno}"
+        line = f"line {node.lineno}"
+        if isinstance(node, nodes.Block) and node.name not in blocks:
             problem = f"no template that it extends has a block {node.name!r}"
-            yield InputError(problem, file=file, field=line, limit=choices(node.name, known))
+            yield InputError(problem, file=file, field=line, limit=choices(node.name, blocks))
+        elif isinstance(node, nodes.Macro) and node.name in macros:
+            problem = f"the macro {node.name!r} does not replace that of the extended template"
+            remedy = f"override a block, or copy the whole file and change it; {see}"
+            yield InputError(problem, file=file, field=line, remedy=remedy)
+        elif not isinstance(node, nodes.Block | nodes.Macro) and _writes(node):
+            problem = "text outside of the blocks of an extending template is not used"
+            remedy = f"put it into a block; {see}"
+            yield InputError(problem, file=file, field=line, remedy=remedy)
+
+
+def _writes(node: nodes.Node) -> bool:
+    """Whether a part of a template would be text of the script."""
+    if isinstance(node, nodes.Output):
+        return any(
+            not isinstance(part, nodes.TemplateData) or part.data.strip() for part in node.nodes
+        )
+    inside = node.find_all((nodes.Output, nodes.Include))
+    return isinstance(node, nodes.Include) or any(
+        isinstance(part, nodes.Include) or _writes(part)
+        for part in inside
+        if not isinstance(node, nodes.AssignBlock)
+    )

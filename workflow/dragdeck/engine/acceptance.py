@@ -57,6 +57,8 @@ def check_run(
     if inputs.settled is not None:
         checks.append(_at_rest(screens[-1]))
         checks.append(_packing(folder / PACKING_FILE, inputs.media.count, ranks))
+        if "particles" in outputs:
+            checks += _in_bowl(folder, outputs["particles"], parts, inputs.settled.highest_m)
     if "thermo" in outputs:
         samples = _samples(folder, outputs["thermo"], parts)
         checks += _thermo(samples, inputs.media.count)
@@ -139,6 +141,20 @@ def _packing(file: Path, particles: int, ranks: int) -> AcceptanceCheck:
     return _check("packing_whole", "packing complete", whole, seen, f"{particles} particles")
 
 
+def _in_bowl(
+    folder: Path, particles: OutputOfRun, parts: Sequence[RunPart], highest_m: float
+) -> list[AcceptanceCheck]:
+    """Whether every particle of the settled packing lies below the rim; none without a frame."""
+    *_, rows = [np.empty((0, 0)), *some_frames(folder, particles, parts, 2)]
+    if not rows.size:
+        return []
+    z, radius = (particles.columns.index(name) for name in ("z_m", "radius_m"))
+    top = float((rows[:, z] + rows[:, radius]).max())
+    seen, limit = f"highest point {top:.4g} m", f"rim of the bowl, {highest_m:.4g} m"
+    name = "packing within the bowl"
+    return [_check("packing_in_bowl", name, top <= highest_m, seen, limit, number=top)]
+
+
 def _samples(folder: Path, output: OutputOfRun, parts: Sequence[RunPart]) -> list[log.Sample]:
     """All whole rows of all parts."""
     texts = [_text(folder / output.pattern.format(part=part.part)) for part in parts]
@@ -167,8 +183,10 @@ def _complete(
     promised = output.last_step is not None and found.gap is None
     if not file.is_file() and not promised:  # a part from a checkpoint at the end writes nothing
         seen = f"no {file.name}"
-    elif not found.steps or found.damaged:
-        seen = f"{file.name} is truncated or empty"
+    elif found.problem:
+        seen = f"{file.name}, {found.problem}"
+    elif not found.steps:
+        seen = f"{file.name} is empty"
     elif found.gap is not None:
         seen = f"step {found.gap} is missing"
     else:

@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from dragdeck.files import file_checksum
 
 CHECKPOINTS_KEPT = 2
 _DAMAGED = "damaged"
+_PIECE_DOUBLES = 1 << 17
+"""Doubles of a checkpoint that are read at once, 1 MiB."""
 _NAME = re.compile(r"checkpoint\.(\d+)(?:\.([0-9a-f]{16}))?\.restart")
 
 
@@ -32,13 +35,28 @@ def checkpoint_step(file: Path) -> int:
     return int(file.name.split(".")[1])
 
 
-def name_whole_checkpoints(folder: Path, particles: int, ranks: int) -> None:
+def name_whole_checkpoints(
+    folder: Path, particles: int, ranks: int, sizes: dict[str, int] | None = None
+) -> None:
     """Give every checkpoint that was written since the last call, and is whole, its checksum.
 
     One that is not whole keeps its name: the engine may still be writing it.
+
+    Parameters
+    ----------
+    folder : Path
+    particles, ranks : int
+        That a checkpoint must hold.
+    sizes : dict of str to int, optional
+        Kept between calls: one that is not whole is read again only once its size has changed.
     """
+    sizes = {} if sizes is None else sizes
     for file in checkpoint_files(folder):
-        if _checksum_in(file) is None and is_whole(file, particles, ranks):
+        size = file.stat().st_size
+        if _checksum_in(file) is not None or sizes.get(file.name) == size:
+            continue
+        sizes[file.name] = size
+        if is_whole(file, particles, ranks):
             with file.open("rb") as stream:
                 os.fsync(stream.fileno())
             named = f"checkpoint.{checkpoint_step(file)}.{_checksum(file)}.restart"
@@ -96,47 +114,79 @@ def is_whole(file: Path, particles: int, ranks: int) -> bool:
 
     After what is common to all, each rank's particles stand as a count of doubles, a 4-byte
     integer, and the doubles; each particle's begin with how many they are (LIGGGHTS 3.8.0,
-    write_restart.cpp). So the chunks are found from the end of the file.
+    write_restart.cpp). So the chunks are found from the end of the file, which is read in pieces.
     """
-    return _holds(file.read_bytes(), particles, ranks)
+    with file.open("rb") as stream:
+        rests = [iter([(os.fstat(stream.fileno()).st_size, particles, ranks)])]
+        while rests:
+            rest = next(rests[-1], None)
+            if rest is None:
+                rests.pop()
+                continue
+            end, missing, left = rest
+            if left and end:
+                rests.append(_before_last_chunk(stream, *rest))
+            elif missing == 0:
+                return True
+    return False
 
 
-def _holds(content: bytes, particles: int, ranks: int) -> bool:
-    """Whether chunks of so many particles together end at the end of the content."""
-    if ranks == 0 or not content:
-        return particles == 0
-    if content.endswith(bytes(4)) and _holds(content[:-4], particles, ranks - 1):
-        return True  # a rank without particles
-    return any(
-        count <= particles and _holds(content[:start], particles - count, ranks - 1)
-        for start, count in _last_chunks(content)
-    )
+def _before_last_chunk(
+    stream: BinaryIO, end: int, missing: int, ranks: int
+) -> Iterator[tuple[int, int, int]]:
+    """Where a last chunk before `end` may begin, and the particles and ranks before it."""
+    if _read(stream, end - 4, 4) == bytes(4):
+        yield end - 4, missing, ranks - 1  # a rank without particles
+    for start, count in _last_chunks(stream, end):
+        if count <= missing:
+            yield start, missing - count, ranks - 1
 
 
-def _last_chunks(content: bytes) -> Iterator[tuple[int, int]]:
-    """Where a last chunk may begin, and how many particles it would hold, longest first."""
-    doubles = (len(content) - 4) // 8
-    if doubles < 1:
-        return
-    first = len(content) - 4 - 8 * doubles
-    words = np.frombuffer(content, "<i4", 2 * doubles + 1, first)[::2]
-    lengths = np.arange(doubles, -1, -1)
-    for place in np.flatnonzero((words == lengths) & (lengths > 0)):
-        start = first + 8 * int(place)
-        count = _particles(np.frombuffer(content, "<f8", offset=start + 4))
-        if count:
-            yield start, count
+def _last_chunks(stream: BinaryIO, end: int) -> Iterator[tuple[int, int]]:
+    """Where a last chunk may begin, and how many particles it would hold, shortest first."""
+    doubles = (end - 4) // 8
+    for least in range(1, doubles + 1, _PIECE_DOUBLES):
+        for length in _lengths(stream, end, least, min(least + _PIECE_DOUBLES - 1, doubles)):
+            start = end - 4 - 8 * length
+            count = _particles(stream, start + 4, length)
+            if count:
+                yield start, count
 
 
-def _particles(values: np.ndarray) -> int:
+def _lengths(stream: BinaryIO, end: int, least: int, most: int) -> list[int]:
+    """Lengths in doubles, in a range, that stand before as many doubles, shortest first."""
+    lengths = np.arange(most, least - 1, -1)
+    content = _read(stream, end - 4 - 8 * most, 8 * len(lengths))
+    if not content:  # cut meanwhile
+        return []
+    found: list[int] = lengths[np.frombuffer(content, "<i4")[::2] == lengths].tolist()
+    return found[::-1]
+
+
+def _particles(stream: BinaryIO, begin: int, doubles: int) -> int:
     """Number of particles in a chunk; 0 where their lengths do not fill it."""
-    place = count = 0
-    while place < len(values):
-        length = values[place]
-        if not 1 <= length <= len(values) - place or length != int(length):
+    count = 0
+    while doubles:
+        values = np.frombuffer(_read(stream, begin, 8 * min(doubles, _PIECE_DOUBLES)), "<f8")
+        place = 0
+        while place < len(values):
+            length = float(values[place])
+            if not 1 <= length <= doubles - place or not length.is_integer():
+                return 0
+            place, count = place + int(length), count + 1
+        if place == 0:  # cut meanwhile
             return 0
-        place, count = place + int(length), count + 1
+        begin, doubles = begin + 8 * place, doubles - place
     return count
+
+
+def _read(stream: BinaryIO, place: int, size: int) -> bytes:
+    """Some bytes of a file; none where it does not have them all."""
+    if place < 0:
+        return b""
+    stream.seek(place)
+    content = stream.read(size)
+    return content if len(content) == size else b""
 
 
 def take_forced_restarts(folder: Path) -> bool:

@@ -21,7 +21,7 @@ from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.process import Ending, Engine, command, execute
 from dragdeck.engine.record import REMEDIES, AcceptanceCheck, CheckCode, RunPart, RunRecord
 from dragdeck.engine.reports import Report
-from dragdeck.engine.space import SPARE_BYTES, check_space, free_bytes, size_of
+from dragdeck.engine.space import SPARE_BYTES, check_space, free_bytes, space_left
 from dragdeck.engine.watch import EngineEnded, LimitMet, Watcher, cut_screen
 from dragdeck.errors import EngineError, RejectedRunError
 
@@ -96,13 +96,12 @@ class PartOfRun:
         outputs, record = self.columns.outputs, self.record
         parts = record.parts if record else []
         count, ranks = self.inputs.media.count, self.inputs.fidelity.ranks
-        written = sum(size_of(file) for file in part_files(self.folder, outputs, parts))
-        check_space(self.folder, outputs, count, written)
+        check_space(self.folder, outputs, count)
         gap = first_gap(self.folder, outputs, parts) if parts else -1
         newest = newest_checkpoint(self.folder, count, ranks, gap, self.report)
         first = checkpoint_step(newest) if newest else 0
-        for name in cut_outputs(self.folder, outputs, parts, first if newest else -1):
-            self.report(f"{name} is truncated or has a gap: it is rewritten from there")
+        for damage in cut_outputs(self.folder, outputs, parts, first if newest else -1):
+            self.report(f"{damage}; the run writes it again from step {first:,}")
         checkpoint = newest.name if newest else None
         part = RunPart(part=len(parts) + 1, checkpoint=checkpoint, from_step=first)
         self.record = RunRecord(
@@ -184,7 +183,8 @@ class PartOfRun:
         full = free_bytes(self.folder) < SPARE_BYTES
         if full or any("Cannot open" in error for error in errors):
             said = "; ".join(errors) or "no message of LIGGGHTS"
-            return f"the disk is full, or a file cannot be written ({said})"
+            left = space_left(self.folder, self.columns.outputs, self.inputs.media.count)
+            return f"the disk is full, or a file cannot be written ({said}); {left}"
         if errors or log.never_settled(screen):
             return None
         killed = ending.exit_status < 0 or ending.exit_status >= 128

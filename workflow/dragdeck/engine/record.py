@@ -20,6 +20,7 @@ CheckCode = Literal[
     "within_limits",
     "output_complete",
     "packing_whole",
+    "packing_in_bowl",
     "ranks",
 ]
 CheckReason = Literal["lost_particles", "other", "particles", "finite_numbers", "energy", "speed"]
@@ -29,6 +30,7 @@ _SMALLER_STEP = "choose a smaller timestep_fraction or a larger youngs_modulus_s
 REMEDIES: Mapping[CheckCode, str] = {
     "neighbour_builds": "choose a larger fidelity.skin_m",
     "at_rest": "choose a larger filling.max_time_s or filling.energy_ratio",
+    "packing_in_bowl": "use fewer particles, or a wider or higher bowl",
     "steady_bed": "choose a longer motion.transient_m, or more motion.path.revolutions",
     "particles_kept": _SMALLER_STEP,
     "finite_numbers": _SMALLER_STEP,

@@ -18,10 +18,14 @@ from dragdeck.engine.part import STATE_FILE, PartOfRun, why_rejected
 from dragdeck.engine.process import find_engine
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import Report, say
+from dragdeck.engine.space import full_disk_named
 from dragdeck.errors import InputError, RejectedRunError
 from dragdeck.files import file_checksum
 
 _ARCHIVE = "archive"
+_OF_THE_WORKFLOW = ("logs", "benchmarks")
+"""Folders in which Snakemake has files open while it runs a job here."""
+
 _AS_RUN = "as_run"
 _PATIENCE_S = 1800.0
 _ANEW = (
@@ -66,7 +70,8 @@ def run(
     """
     inputs = RunInputs.read(folder / CASE_FILE)
     columns = ColumnsFile.read(folder / COLUMNS_FILE)
-    with only_runner(folder, report):
+    full_disk = full_disk_named(folder, columns.outputs, inputs.media.count)
+    with full_disk, only_runner(folder, report):
         _check_files(folder, inputs)
         take_forced_restarts(folder)
         digest = fingerprint(folder, inputs)
@@ -172,7 +177,7 @@ def _archive(folder: Path, name: str, report: Report) -> None:
         number += 1
         place = folder / _ARCHIVE / f"{name}-{number}"
     place.mkdir(parents=True)
-    new = {DECK_FILE, CASE_FILE, COLUMNS_FILE, LOCK_FILE, _ARCHIVE}
+    new = {DECK_FILE, CASE_FILE, COLUMNS_FILE, LOCK_FILE, _ARCHIVE, *_OF_THE_WORKFLOW}
     sources = {file.name for file in (*folder.glob("*.data"), *folder.glob("*.stl"))}
     for file in folder.iterdir():
         if file.name not in new | sources:

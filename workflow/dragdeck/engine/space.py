@@ -1,13 +1,15 @@
 """How much of a disk a run takes."""
 
+import contextlib
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine.checkpoints import CHECKPOINTS_KEPT
 from dragdeck.engine.reports import shown_bytes
 from dragdeck.errors import EngineError
+from dragdeck.files import FULL_DISK
 
 _BINARY_BYTES, _TEXT_BYTES = 8, 12
 """Of a value; text is written with up to nine digits."""
@@ -44,25 +46,60 @@ def _output_bytes(output: OutputOfRun, particles: int) -> float:
     return frames * rows * len(output.columns) * size
 
 
-def check_space(
-    folder: Path, outputs: Mapping[str, OutputOfRun], particles: int, written: float
-) -> None:
+def check_space(folder: Path, outputs: Mapping[str, OutputOfRun], particles: int) -> None:
     """Refuse a run that its disk cannot hold.
-
-    Parameters
-    ----------
-    written : float
-        What earlier parts of the run have written already, bytes.
 
     Raises
     ------
     EngineError
-        Less is free than the run will write by the definition of its outputs.
+        Less is free than the run will still write by the definition of its outputs.
     """
-    free, needed = free_bytes(folder), expected_bytes(outputs, particles) - written
+    free, needed = free_bytes(folder), _still_needed(folder, outputs, particles)
     if free < needed:
-        raise EngineError(
-            f"{folder}: too little disk space for this run\n  value:  {shown_bytes(free)} free\n"
-            f"  limit:  {shown_bytes(needed)}, estimated from its outputs\n"
-            "  remedy: free disk space, or reduce the rates under outputs in the study"
-        )
+        raise _too_little(str(folder), "too little disk space for this run", free, needed)
+
+
+@contextlib.contextmanager
+def full_disk_named(
+    folder: Path, outputs: Mapping[str, OutputOfRun], particles: int
+) -> Iterator[None]:
+    """While inside, say what a run needs if the disk is full when one of its files is written.
+
+    Raises
+    ------
+    EngineError
+        Names the file, and what is free and still needed.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in FULL_DISK:
+            raise
+        place, needed = str(error.filename or folder), _still_needed(folder, outputs, particles)
+        problem = f"the disk is full ({error.strerror})"
+        raise _too_little(place, problem, free_bytes(folder), needed) from None
+
+
+def space_left(folder: Path, outputs: Mapping[str, OutputOfRun], particles: int) -> str:
+    """What is free on the disk of a run, and what the run will still write, for a reader."""
+    needed = _still_needed(folder, outputs, particles)
+    return f"{shown_bytes(free_bytes(folder))} free, {shown_bytes(needed)} needed"
+
+
+def _still_needed(folder: Path, outputs: Mapping[str, OutputOfRun], particles: int) -> float:
+    """What a run will write beyond what its parts have written already, bytes."""
+    written = sum(
+        size_of(file)
+        for output in outputs.values()
+        for file in folder.glob(output.pattern.format(part="*"))
+    )
+    return SPARE_BYTES + max(0.0, expected_bytes(outputs, particles) - written)
+
+
+def _too_little(place: str, problem: str, free: float, needed: float) -> EngineError:
+    return EngineError(
+        f"{place}: {problem}\n  value:  {shown_bytes(free)} free\n"
+        f"  limit:  {shown_bytes(needed)}, estimated from the outputs of the run\n"
+        "  remedy: free disk space, or reduce the rates under outputs in the study; then run it "
+        "again"
+    )

@@ -79,12 +79,13 @@ class Watcher:
     _newest: Sample | None = field(default=None, init=False)
     _written: int = field(default=0, init=False)
     _written_s: float = field(default=0.0, init=False)
+    _sizes: dict[str, int] = field(default_factory=dict, init=False)
 
     def __call__(self, seconds: float) -> None:
         """Look at what the engine has written since the last look."""
         self._end_endless_output()
         self._end_standstill(seconds)
-        name_whole_checkpoints(self.folder, self.particles, self.ranks)
+        name_whole_checkpoints(self.folder, self.particles, self.ranks, self._sizes)
         samples = self._new_samples()
         check = breach(samples, self.limits) if self.limits is not None else None
         if check is not None:

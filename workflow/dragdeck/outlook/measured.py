@@ -7,6 +7,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from dragdeck.documents import Document, Part
 from dragdeck.errors import InputError
 from dragdeck.physics.damping import damping_ratio
@@ -141,6 +143,14 @@ class Prediction(Part):
     met: bool
 
 
+UNIT_STIFFNESS, UNIT_SCALE, UNIT_INERTIA, UNIT_FRICTION = 5e4, 1e-3, 0.1, 0.3
+"""Stiffness number, modulus scale, inertial number and friction about which the laws of reduced
+moduli are written."""
+
+_RATE_STEP = 0.02
+"""Step of the difference that takes the place of the derivative by the rate."""
+
+
 class StiffnessLaw(Part):
     """What a reduced modulus does to a quantity: `dragchain.tradeoff.stiffness_law` defines it.
 
@@ -148,21 +158,77 @@ class StiffnessLaw(Part):
     ----------
     rate : float
         Exponent of the stiffness number.
-    covariance : 3 rows of 3 floats
-        Of the amplitude and its slopes over inertial number and friction.
+    amplitude : (float, float, float)
+        Its mean, and slopes over inertial number and logarithm of friction.
+    covariance : 4 rows of 4 floats
+        Of these and of the rate.
     amplitude_std : float
         From scene to scene.
-    run_std, model_std : float
-        Of the logarithm: in one run, and of what the law does not explain.
+    run_std : float
+        Of the logarithm in one run.
+    misfit : sequence of (float, float)
+        Modulus scales, and the standard deviation of what the law does not explain there.
     """
 
     rate: float
+    amplitude: tuple[float, float, float]
     covariance: tuple[
-        tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]
+        tuple[float, float, float, float],
+        tuple[float, float, float, float],
+        tuple[float, float, float, float],
+        tuple[float, float, float, float],
     ]
     amplitude_std: float
     run_std: float
-    model_std: float
+    misfit: Sequence[tuple[float, float]]
+
+    def effect(
+        self, stiffness: float, inertia: float, friction: float, scale: float
+    ) -> tuple[float, float]:
+        """Expected change of a quantity's logarithm by a modulus scale, and its standard error.
+
+        Parameters
+        ----------
+        stiffness, inertia, friction : float
+            Stiffness number, inertial number and coefficient of friction of the scene.
+        scale : float
+            Factor on every Young's modulus.
+        """
+        softening = -2 / 3 * math.log(scale)
+        g = _reduction(stiffness, softening, self.rate)
+        above, below = (
+            _reduction(stiffness, softening, self.rate + step) for step in (_RATE_STEP, -_RATE_STEP)
+        )
+        of_amplitude = [1.0, inertia / UNIT_INERTIA, math.log(friction / UNIT_FRICTION)]
+        mean = sum(map(math.prod, zip(of_amplitude, self.amplitude, strict=True)))
+        along = [*(g * one for one in of_amplitude), mean * (above - below) / (2 * _RATE_STEP)]
+        variance = sum(
+            one * entry * other
+            for one, row in zip(along, self.covariance, strict=True)
+            for entry, other in zip(row, along, strict=True)
+        )
+        return mean * g, math.sqrt(
+            max(0.0, variance) + (self.amplitude_std * g) ** 2 + self._misfit(softening) ** 2
+        )
+
+    def _misfit(self, softening: float) -> float:
+        """Between the measured scales, and beyond them, in proportion."""
+        known = sorted((-2 / 3 * math.log(scale), std) for scale, std in self.misfit)
+        at, stds = zip((0.0, 0.0), *known, strict=True)
+        beyond = max(softening / at[-1], 1.0) if known else 1.0
+        return beyond * float(np.interp(softening, at, stds))
+
+
+def _reduction(stiffness: float, softening: float, rate: float) -> float:
+    """The function of stiffness number and modulus that the amplitude is multiplied with."""
+    unit = -2 / 3 * math.log(UNIT_SCALE)
+    full = math.pow(stiffness / UNIT_STIFFNESS, -rate)
+    return full * _growth(rate, softening) / _growth(rate, unit)
+
+
+def _growth(rate: float, softening: float) -> float:
+    """What (exp(rate softening) - 1) / rate is, also for a rate of 0."""
+    return math.expm1(rate * softening) / rate if rate else softening
 
 
 class MeasuredLaw(Part):
@@ -177,6 +243,11 @@ class MeasuredLaw(Part):
     quantile: float
     path_to_particle: float
     law: StiffnessLaw
+
+    def effect(self, numbers: Mapping[str, float], scale: float) -> tuple[float, float]:
+        """As of the law, in a scene with these dimensionless numbers."""
+        stiffness, inertia = numbers["stiffness_number"], numbers["inertial_number"]
+        return self.law.effect(stiffness, inertia, numbers[self.friction], scale)
 
 
 class MeasuredScene(Part):

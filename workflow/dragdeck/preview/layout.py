@@ -14,11 +14,8 @@ from numpy.typing import NDArray
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.mesh import bowl, surface
 from dragdeck.scenes.filling import expected_bed
-from dragdeck.scenes.motion import Place, course, pose
-from dragdeck.scenes.moved_workpiece import workpiece_turn
-from dragdeck.scenes.workpiece import fastest_surface, workpiece_mesh, workpiece_radius
-from dragdeck.study.model import Motion
-from dragdeck.study.paths.kind import Leg
+from dragdeck.scenes.motion import Course, Place, course, driven_surface_speed
+from dragdeck.scenes.workpiece import workpiece_mesh, workpiece_radius
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -28,9 +25,6 @@ Floats = NDArray[np.float64]
 _POSES_PER_RADIUS = 4
 """Poses while a surface point moves by the workpiece's radius: a swept cylinder is then at most
 1 % of the radius too narrow between two of them."""
-
-_A_MOMENT_S = 1e-6
-"""After the start of the drag: its spin shows by then, and no stage of it has ended."""
 
 _MOST_POSES = 2000
 """Of a leg: beyond, poses are farther apart."""
@@ -136,15 +130,15 @@ def layout(case: Case) -> Layout:
 
 
 def _moving(case: Case) -> MovingWorkpiece:
-    motion = case.study.motion
-    turn = sum(one.turn_rad(_A_MOMENT_S) for one in motion.superposed().values())
+    way = course(case.study, expected_bed(case.study))
+    turn = sum(one.turn_rad(1, way.drag.timestep_s) for one in way.superposed.values())
     return MovingWorkpiece(
         name=f"workpiece {case.number or ''}".rstrip(),
         mesh=workpiece_mesh(case),
         radius_m=workpiece_radius(case),
-        direction_rad=motion.path.direction_rad,
+        direction_rad=case.study.motion.path.direction_rad,
         spin=int(np.sign(turn)),
-        stages=list(_stages(case)),
+        stages=list(_stages(case, way)),
     )
 
 
@@ -157,28 +151,17 @@ def _disc(radius_m: float, height_m: float) -> "Trimesh":
     return surface(np.vstack([[0, 0, height_m], points]), triangles)
 
 
-def _stages(case: Case) -> Iterator[Stage]:
-    """The legs at the study's own speed; a faster run goes through the same poses."""
-    study = case.study
-    start, legs = course(study, expected_bed(study), speed_factor=1.0)
-    place: Place = (*start, math.radians(workpiece_turn(study)))
-    radius, fastest = workpiece_radius(case), fastest_surface(case)
-    for leg in legs:
-        speed = max(math.hypot(*leg.velocity_m_s), fastest if leg.name == "drag" else 0.0)
+def _stages(case: Case, way: Course) -> Iterator[Stage]:
+    """The legs as they are driven, with their times at the study's own speed."""
+    study, radius = case.study, workpiece_radius(case)
+    factor, fastest = study.chosen_fidelity().speed_factor, driven_surface_speed(study, radius)
+    for leg, start in way.begun():
+        speed = max(leg.speed_m_s, fastest if leg.name == "drag" else 0.0)
         travel = (speed + abs(leg.angular_speed_rad_s) * radius) * leg.duration_s
         count = min(_MOST_POSES, 2 + math.ceil(_POSES_PER_RADIUS * travel / radius))
-        times = np.linspace(0.0, leg.duration_s, count)
-        poses = [_matrix(_moved(leg, place, float(time), study.motion)) for time in times]
-        yield Stage(leg.name, np.array(poses), leg.duration_s)
-        place = pose(leg, place, leg.duration_s)
-
-
-def _moved(leg: Leg, start: Place, time_s: float, motion: Motion) -> Place:
-    """Place on the path, and in the drag what is superposed on it."""
-    x, y, z, turn = pose(leg, start, time_s)
-    for one in motion.superposed().values() if leg.name == "drag" else ():
-        z, turn = z + one.lift_m(time_s), turn + one.turn_rad(time_s)
-    return x, y, z, turn
+        steps = np.linspace(0.0, leg.steps, count)
+        poses = [_matrix(way.pose(leg, start, float(step))) for step in steps]
+        yield Stage(leg.name, np.array(poses), factor * leg.duration_s)
 
 
 def _matrix(place: Place) -> Floats:

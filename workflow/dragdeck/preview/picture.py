@@ -39,7 +39,7 @@ def picture(layout: Layout, swept: Sequence["Trimesh"], title: str, refused: boo
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 10), dpi=110, layout="constrained")
-    colour = "#b3261e" if refused else "#1d2733"
+    colour = COLOURS["refused" if refused else "ink"]
     figure.suptitle(title, fontsize=12, color=colour, parse_math=False)
     layers = list(_layers(layout, swept))
     for axes, view in zip(

@@ -1,23 +1,19 @@
 """From where a layout is seen, and in which colours: the same in the picture and on the page."""
 
+import json
 import math
 from dataclasses import dataclass
+from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-COLOURS = {
-    "bowl": "#b9c6d2",
-    "bed": "#d8b365",
-    "swept": "#5ba3d0",
-    "workpiece": "#c0392b",
-    "plunge": "#6c3483",
-    "approach": "#117a65",
-    "drag": "#14324a",
-}
-"""Of what is drawn, here and on the page."""
+COLOURS: dict[str, str] = json.loads(
+    resources.files("dragdeck").joinpath("data/colours.json").read_text(encoding="utf-8")
+)
+"""Those of all figures, of which ``data/colours.json`` is a copy."""
 
 
 @dataclass(frozen=True)

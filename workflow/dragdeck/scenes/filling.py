@@ -118,7 +118,9 @@ def filling_scene(case: Case) -> Scene[FillingCase]:
             filling_content(case),
             dt,
             rayleigh,
-            settled=SettlingCriterion(energy_ratio=study.filling.energy_ratio),
+            settled=SettlingCriterion(
+                energy_ratio=study.filling.energy_ratio, highest_m=study.bowl.height_m
+            ),
             limits=bed_limits(study, top, particles.fastest_m_s),
         ),
         steps=round(_expected_time(study, particles) / dt),

@@ -23,10 +23,15 @@ from dragdeck.physics.contact_mechanics import fall_speed
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import SPEED_FACTOR
-from dragdeck.scenes.motion import axis_course, course, farthest_reach, vertical_range
+from dragdeck.scenes.motion import (
+    course,
+    driven_surface_speed,
+    farthest_reach,
+    path_heights,
+    vertical_range,
+)
 from dragdeck.scenes.workpiece import (
     farthest_surface,
-    fastest_surface,
     workpiece_length,
     workpiece_radius,
     workpiece_reach,
@@ -65,9 +70,8 @@ class Clearances:
 
 def clearances(case: Case, surface_m: float) -> Clearances:
     """Clearances of a case's workpiece in a bed with its surface at this height, m."""
-    motion = case.study.motion
-    tip = surface_m - motion.immersion_depth_m
-    return Clearances(_wall_gap(case), tip, tip + vertical_range(motion)[0])
+    tip = surface_m - case.study.motion.immersion_depth_m
+    return Clearances(_wall_gap(case), tip, tip + vertical_range(case.study)[0])
 
 
 def _wall_gap(case: Case) -> float:
@@ -141,9 +145,11 @@ def closest(each: Sequence[Case], bed: Bed) -> tuple[float, int, int] | None:
 
 def _way(case: Case, bed: Bed) -> NDArray[np.float64]:
     """X and y, (N, 2), of the workpiece's axis along all its legs."""
-    start, plan = course(case.study, bed, speed_factor=1.0)
-    places = axis_course((*start, 0.0), plan, _PLACES_PER_LEG)
-    return np.array([(x, y) for x, y, _, _ in places])
+    fractions = np.linspace(0.0, 1.0, _PLACES_PER_LEG + 1)
+    begun = course(case.study, bed).begun()
+    return np.array(
+        [leg.pose(start, part * leg.steps)[:2] for leg, start in begun for part in fractions]
+    )
 
 
 def process_cautions(case: Case) -> Iterator[Caution]:
@@ -158,7 +164,7 @@ def process_cautions(case: Case) -> Iterator[Caution]:
             f"{_JAMMING_GAP:g}: particles may jam there and cause very large forces",
         )
     fidelity = study.chosen_fidelity()
-    surface = fidelity.speed_factor * fastest_surface(case)
+    surface = _driven_surface(case)
     contact = impact_time(study, fidelity.youngs_modulus_scale, surface)
     steps = contact / bed_timestep(study, "timestep_fraction")
     if steps * JUST_BEYOND < _FEWEST_STEPS_PER_CONTACT:
@@ -178,7 +184,7 @@ def process_cautions(case: Case) -> Iterator[Caution]:
 
 def _beside(case: Case, gap: float) -> Iterator[InputError]:
     study = case.study
-    reach = farthest_reach(study.motion)
+    reach = farthest_reach(study)
     radius = study.bowl.radius_m - gap - reach
     diameter = 2 * study.media.radius_mean_m
     if gap < diameter:
@@ -229,9 +235,9 @@ def _largest_particle(case: Case) -> float:
 def _up_and_down(case: Case, tip_m: float) -> Iterator[InputError]:
     """Refuse a path or superposed motions that take a workpiece to the floor or out of the bed."""
     motion = case.study.motion
-    depth, (low, high) = motion.immersion_depth_m, vertical_range(motion)
+    depth, (low, high) = motion.immersion_depth_m, vertical_range(case.study)
     deepest = min(depth + tip_m - _largest_particle(case), workpiece_length(case))
-    moving = ["path"] if any(motion.path.heights_m) else []
+    moving = ["path"] if any(path_heights(case.study)) else []
     moving += [name for name, one in motion.superposed().items() if one.vertical_reach_m]
     problems = (
         (depth <= deepest < depth - low, "takes the workpiece too deep", deepest - depth),
@@ -282,7 +288,13 @@ def fastest_motion(case: Case) -> float:
     motion, factor = case.study.motion, case.study.chosen_fidelity().speed_factor
     rim = abs(motion.bowl_rad_s) * case.study.bowl.radius_m
     entry = max(motion.plunge_speed_m_s, motion.approach_speed_m_s)
-    return factor * max(fastest_surface(case), rim, entry)
+    return max(_driven_surface(case), factor * max(rim, entry))
+
+
+def _driven_surface(case: Case) -> float:
+    """Highest speed of the workpiece's surface in the drag as it is driven, m/s."""
+    radius = workpiece_radius(case) if case.study.motion.superposed() else 0.0
+    return driven_surface_speed(case.study, radius)
 
 
 def check_headroom(case: Case, tip_m: float, top_m: float) -> None:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, skin
@@ -40,14 +39,9 @@ from dragdeck.scenes.fit import (
     fastest_motion,
     process_cautions,
 )
-from dragdeck.scenes.motion import in_steps
-from dragdeck.scenes.moved_workpiece import (
-    MovedWorkpiece,
-    ProcessDeck,
-    drag_steps,
-    moved_workpiece,
-    superposed,
-)
+from dragdeck.scenes.motion import Course, course, driven_speed
+from dragdeck.scenes.moved_workpiece import ProcessDeck, moved_workpiece
+from dragdeck.scenes.periods import Periods, output_periods
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.scenes.workpiece import (
     workpiece_length,
@@ -63,15 +57,6 @@ from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
 
 _ENERGY_DRIFT = 0.1
 """Largest change of the mean kinetic energy while it is counted: 5 % in the bed's speed."""
-
-
-@dataclass(frozen=True)
-class Periods:
-    """Steps between frames of each output, each a multiple of the one before."""
-
-    force: int
-    contacts: int
-    network: int
 
 
 def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
@@ -95,16 +80,14 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     fidelity, facets = study.chosen_fidelity(), study.bowl_facet_size_m is not None
     bed = bed or expected_bed(study)
     dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
-    periods = _output_periods(study, dt)
-    meshes = _mesh_files(each)
+    periods, meshes = output_periods(study), _mesh_files(each)
     check_apart(each, bed)
-    moved = []
-    for one in each:
+    courses, moved = [course(one.study, bed) for one in each], []
+    for one, way in zip(each, courses, strict=True):
         check_fit(one, bed.surface_m, dt)
-        mesh = meshes[one.study.workpiece.shape]
-        moved.append(moved_workpiece(one, bed, dt, periods.network, mesh))
-        check_headroom(one, moved[-1].start_m[2], top)
-    steps = drag_steps(moved[0].legs, dt)
+        moved.append(moved_workpiece(one, way, meshes[one.study.workpiece.shape]))
+        check_headroom(one, way.start_m[2], top)
+    steps = courses[0].drag
     types, parts = study.type_names(), rank_split(whole)
     deck = ProcessDeck(
         title=study.title,
@@ -126,18 +109,18 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         bowl_type=types.index(study.bowl.material) + 1,
         bowl_radius_m=study.bowl.radius_m,
         bowl_facets=facets,
-        bowl_rad_s=fidelity.speed_factor * study.motion.bowl_rad_s,
+        bowl_rad_s=study.motion.path.bowl_rad_s(driven_speed(study)),
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpieces=moved,
     )
     number = max(case.number, 1) - 1
     own = {WORKPIECE_MESH: partial(_stl, each[number])}
-    limits = bed_limits(study, top, max(map(_fastest, each, moved)))
+    limits = bed_limits(study, top, max(map(_fastest, each, courses)))
     models = {body.mesh: partial(_stl, one) for one, body in zip(each, moved, strict=True)}
     cautions = {str(caution): caution for one in each for caution in process_cautions(one)}
     return Scene(
         deck=deck,
-        case=_process_case(each, number, bed.surface_m, moved[number], steps, limits),
+        case=_process_case(each, number, bed.surface_m, courses[number], limits),
         steps=steps.end,
         files=own if number else {**models, **_bowl_files(study, top)},
         models=_models(study),
@@ -159,28 +142,21 @@ def _stl(case: Case) -> str:
     return stl_text(workpiece_mesh(case))
 
 
-def _output_periods(study: Study, timestep_s: float) -> Periods:
-    """Steps between frames: at least the asked rates, each a multiple of the faster one."""
-    rates = study.outputs
-    per_second = study.chosen_fidelity().speed_factor * timestep_s
-    force = max(1, math.floor(1 / (rates.workpiece_force_hz * per_second)))
-    contacts = force * max(1, math.floor(1 / (rates.workpiece_contacts_hz * per_second * force)))
-    network = contacts * max(1, math.floor(1 / (rates.network_hz * per_second * contacts)))
-    return Periods(force, contacts, network)
-
-
 def _outputs(
     periods: Periods, drag: DragSteps, workpieces: Sequence[str], facets: bool
 ) -> tuple[Output, ...]:
-    first, last = drag.start, drag.end
-    several = facets or len(workpieces) > 1
+    first, several = drag.start, facets or len(workpieces) > 1
+    force, touching, network = (
+        drag.end - drag.end % period
+        for period in (periods.force, periods.contacts, periods.network)
+    )
     return (
-        outputs.thermo(periods.network, last),
-        *(outputs.workpiece_force(periods.force, last, name) for name in workpieces),
-        outputs.workpiece_particles(periods.contacts, first, last),
-        outputs.workpiece_contacts(periods.contacts, first, last, several),
-        outputs.particles(periods.network, first, last, facets),
-        outputs.contacts(periods.network, first, last),
+        outputs.thermo(periods.network, network),
+        *(outputs.workpiece_force(periods.force, force, name) for name in workpieces),
+        outputs.workpiece_particles(periods.contacts, first, touching),
+        outputs.workpiece_contacts(periods.contacts, first, touching, several),
+        outputs.particles(periods.network, first, network, facets),
+        outputs.contacts(periods.network, first, network),
     )
 
 
@@ -193,13 +169,12 @@ def _process_case(
     each: Sequence[Case],
     number: int,
     surface_m: float,
-    moved: MovedWorkpiece,
-    drag: DragSteps,
+    way: Course,
     limits: RunLimits,
 ) -> ProcessCase:
-    case = each[number]
-    study, motion = case.study, case.study.motion
-    transient_s = motion.uncounted_m / case.axis_speed_m_s
+    case, drag = each[number], way.drag
+    study, motion, speed = case.study, case.study.motion, driven_speed(case.study)
+    transient_s = motion.uncounted_m / speed
     return case_of_study(
         ProcessCase,
         case,
@@ -207,6 +182,7 @@ def _process_case(
         {name: value for name, value in study.plain().items() if name in _INPUTS},
         drag.timestep_s,
         bed_rayleigh_time(study),
+        settings=study.chosen_fidelity().model_dump(include={"timestep_fraction", "speed_factor"}),
         asked=case.advised,
         unsafe_timestep=study.accepted.unsafe_timestep,
         case=case.name,
@@ -224,13 +200,11 @@ def _process_case(
             wake_from_m=_wake_from(each, number),
         ),
         output_of=PROCESS.run_id(case.all_workpieces) if case.number > 1 else None,
-        motion=motion.path.of_run(
-            case.axis_speed_m_s, motion.orientation, in_steps(moved.legs[-1].leg, drag)
-        ),
-        superposed=[one.of_run(drag) for one in superposed(study).values()],
+        motion=motion.path.of_run(speed, motion.orientation, way.legs[-1].stages),
+        superposed=list(way.superposed.values()),
         phases=[
             Phase(name=leg.name, start_step=leg.start_step, end_step=leg.end_step)
-            for leg in moved.legs
+            for leg in way.legs
         ],
         statistics=StatisticsOfRun(transient_s=transient_s),
         steady=SteadyCriterion(
@@ -261,9 +235,9 @@ _INPUTS = (
 )
 
 
-def _fastest(case: Case, moved: MovedWorkpiece) -> float:
+def _fastest(case: Case, way: Course) -> float:
     """Speed of the fastest leg, or of a surface or the bowl if one can be faster, m/s."""
-    speeds, motion = [leg.speed_m_s for leg in moved.legs], case.study.motion
+    speeds, motion = [leg.speed_m_s for leg in way.legs], case.study.motion
     if motion.superposed() or motion.bowl_rad_s or motion.path.peak_speed_ratio > 1:
         speeds.append(fastest_motion(case))
     return max(speeds)
@@ -279,7 +253,7 @@ def _bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:
 
 
 def _models(study: Study) -> dict[str, str]:
-    optional, _ = explained(study.pairs.values())
+    optional, superposed = explained(study.pairs.values())[0], study.motion.superposed()
     exact, why = study.bowl_facet_size_m is None, "facets, as requested"
     if study.motion.bowl_rad_s:
         why = "facets, whose surface moves with the rotation"
@@ -289,7 +263,7 @@ def _models(study: Study) -> dict[str, str]:
         f"bowl: {bowl}": "force chains end there; the force on each particle gives its contacts",
         **{words: "as given in the study" for words in optional},
         "workpiece as facets": "LIGGGHTS moves meshes only",
-        **{f"{name} of the workpiece": "as given in the study" for name in superposed(study)},
+        **{f"{name} of the workpiece": "as given in the study" for name in superposed},
         f"total force, {study.outputs.workpiece_force_hz:g} Hz": "drag, its spread and its peaks",
         f"workpiece contacts, "
         f"{study.outputs.workpiece_contacts_hz:g} Hz": "few contacts, so a high rate is cheap",

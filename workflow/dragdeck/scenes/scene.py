@@ -1,6 +1,6 @@
 """What a scene is to the rest of the project, and what all scenes share."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -136,7 +136,7 @@ def case_of_study(
     timestep_s: float,
     rayleigh_time_s: float,
     *,
-    ranks: int | None = None,
+    settings: Mapping[str, Any] | None = None,
     **own: Any,
 ) -> C:
     """The content of ``case.json`` of a run of a study's case.
@@ -151,13 +151,21 @@ def case_of_study(
     inputs : mapping
         What the run depends on.
     timestep_s, rayleigh_time_s : float
-    ranks : int, optional
-        MPI ranks; the case's if None.
+    settings : mapping, optional
+        What is not the case's modulus, skin and ranks, the given step, and no faster workpiece.
     **own
         What this scene's case file has beyond the others', or has otherwise.
     """
     study = of.study
-    fidelity = study.chosen_fidelity().model_dump()
+    usual = {
+        "name": of.fidelity_name,
+        "youngs_modulus_scale": study.chosen_fidelity().youngs_modulus_scale,
+        "timestep_fraction": round_to(timestep_s / rayleigh_time_s, 3),
+        "speed_factor": 1.0,
+        "skin_m": skin(study),
+        "ranks": of.ranks,
+    }
+    fidelity = FidelityOfRun(**{**usual, **(settings or {})})
     entries = {
         "study": of.study_name,
         "title": study.title,
@@ -165,9 +173,7 @@ def case_of_study(
         "timestep_s": timestep_s,
         "rayleigh_time_s": rayleigh_time_s,
         "gravity_m_s2": study.gravity_m_s2,
-        "fidelity": FidelityOfRun(
-            name=of.fidelity_name, **{**fidelity, "skin_m": skin(study), "ranks": ranks or of.ranks}
-        ),
+        "fidelity": fidelity,
         "inputs": flat(inputs),
         "media": MediaOfRun(
             count=study.media.count,
@@ -179,7 +185,7 @@ def case_of_study(
             radius_m=study.bowl.radius_m,
             walls="primitive" if study.bowl_facet_size_m is None else "mesh",
         ),
-        "contact_moduli": _contact_moduli(study),
+        "contact_moduli": _contact_moduli(study, fidelity.youngs_modulus_scale),
         "assumptions": _assumptions(study),
         "reference": study.reference,
         "versions": {"dragdeck": __version__},
@@ -187,8 +193,8 @@ def case_of_study(
     return kind(**{**entries, **own})
 
 
-def _contact_moduli(study: Study) -> dict[str, ContactConstants]:
-    scale, particle = study.chosen_fidelity().youngs_modulus_scale, particle_material(study)
+def _contact_moduli(study: Study, scale: float) -> dict[str, ContactConstants]:
+    particle = particle_material(study)
     others = {
         "particle": study.media.material,
         "bowl": study.bowl.material,
@@ -218,7 +224,9 @@ def _assumptions(study: Study) -> list[AssumptionOfRun]:
     return found
 
 
-def material_table(study: Study, names: Sequence[str], scale: float, case: Case) -> Materials:
+def material_table(
+    study: Study, names: Sequence[str], scale: float, case: Case, *, one_particle: bool = False
+) -> Materials:
     """The constants of the given materials, and their contact law.
 
     Parameters
@@ -230,6 +238,8 @@ def material_table(study: Study, names: Sequence[str], scale: float, case: Case)
         Factor on every Young's modulus.
     case : Case
         For the error message.
+    one_particle : bool
+        Whether no particle meets another one.
 
     Raises
     ------
@@ -242,7 +252,9 @@ def material_table(study: Study, names: Sequence[str], scale: float, case: Case)
         _check_modulus(name, modulus, scale, case)
     size = range(len(names))
     with_particle = [study.pair(names[0], name) for name in names]
-    # pairs without a particle never touch: they repeat one with a particle
+    if one_particle:
+        with_particle[0] = with_particle[-1]
+    # pairs that never touch repeat one that does
     law = contact_law([[with_particle[max(i, j)] for j in size] for i in size])
     return Materials(
         names=names,

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator
 from itertools import product
 
-from dragdeck.errors import InputError, choices
+from dragdeck.errors import InputError, choices, near
 from dragdeck.study.base import flat
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Scaling, Study
 from dragdeck.study.workpiece import CylinderShape
@@ -22,7 +22,7 @@ _Found = Iterator[tuple[str, str, str]]
 def contradictions(study: Study, whole: bool) -> Iterator[InputError]:
     """Every contradiction within a whole study, or one of its cases; the errors name no file."""
     values = flat(study.plain())
-    for check in (_names, _pairs, _shape, _motion, *([_sweep] if whole else [])):
+    for check in (_names, _pairs, _shape, _motion, _assumptions, *([_sweep] if whole else [])):
         for field, problem, limit in check(study):
             yield InputError(problem, field=field, value=values.get(field), limit=limit)
 
@@ -82,18 +82,39 @@ def _shape(study: Study) -> _Found:
 
 
 def _motion(study: Study) -> _Found:
-    length = study.motion.path_length_m
-    problem = "no path is left for the statistics"
-    if study.motion.transient_m >= length * (1 - 1e-9):
-        limit = f"below the length of the path, {length:.4g} m"
+    """Statistics need a frame of the contact network after all that they leave out."""
+    motion, problem = study.motion, "no path is left for the statistics"
+    length, speed = motion.path_length_m, motion.axis_speed_m_s
+    frame = speed / study.outputs.network_hz
+    if length < frame * (1 - 1e-9):
+        problem = "not one frame of the contact network is written during the drag"
+        limit = f"at least {speed / length:.3g} Hz; or use a longer path"
+        yield "outputs.network_hz", problem, limit
+        return
+    most = (length - frame) * (1 + 1e-9)
+    if motion.transient_m > most:
+        limit = (
+            f"at most {most:.4g} m: the length of the path, {length:.4g} m, minus that between "
+            "two frames of the contact network (outputs.network_hz)"
+        )
         yield "motion.transient_m", problem, limit
-    elif study.motion.uncounted_m >= length * (1 - 1e-9):
+    for name, one in motion.superposed().items():
+        if one.ramp_s * speed > most:
+            limit = f"at most {most / speed:.3g} s; or use a longer path"
+            yield f"motion.{name}.ramp_s", problem, limit
+    if motion.uncounted_m > most and motion.counted_from_revolution is not None:
         limit = "a revolution that begins before the drag ends (motion.path.revolutions)"
         yield "motion.counted_from_revolution", problem, limit
-    rate = study.motion.axis_speed_m_s / length
-    if study.outputs.network_hz < rate:
-        problem = "not one frame of the contact network is written during the drag"
-        yield "outputs.network_hz", problem, f"at least {rate:.3g} Hz; or use a longer path"
+
+
+def _assumptions(study: Study) -> _Found:
+    values = flat(study.model_dump(mode="json"))
+    parts = (name.split(".") for name in values)
+    known = {".".join(words[:count]) for words in parts for count in range(1, len(words) + 1)}
+    for number, entry in enumerate(study.assumptions):
+        if entry.field not in known:
+            limit = f"{near(entry.field, known)}the dotted name of a field, such as media.count"
+            yield f"assumptions.{number}.field", f"no such field {entry.field!r}", limit
 
 
 def _sweep(study: Study) -> _Found:

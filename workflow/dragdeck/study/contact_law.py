@@ -6,14 +6,18 @@ properties and model keywords for particles and walls alike, run ids, what `expl
 numbers that scenes are compared by, and the range of the advisor.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from dragdeck.study.base import Model, Number
+
+_PUSHING = ("hertz", "hertz/stiffness", "hooke", "hooke/stiffness")
+"""Normal models whose force, in LIGGGHTS, is the one to which Coulomb's limit refers."""
 
 _BASE_MODEL = "hertz tangential history"
 """Hertz-Mindlin with the history of the tangential spring (LIGGGHTS: ``pair gran``)."""
@@ -36,6 +40,9 @@ class Coefficient:
     compared : {"each", "lowest"}
         Which value of a scene must lie within the measured range: that of each of the pairs
         particle-particle and particle-workpiece, or the lowest of all pairs.
+    adds_force : bool
+        Whether its model adds a normal force, such as cohesion. LIGGGHTS limits friction by the
+        force without it, so that Coulomb's limit does not follow from the contact force.
     """
 
     engine: str
@@ -43,6 +50,7 @@ class Coefficient:
     model: str = ""
     settings: str = ""
     compared: Literal["each", "lowest"] = "each"
+    adds_force: bool = False
 
 
 class Pair(Model):
@@ -112,6 +120,33 @@ def contact_model(pairs: Iterable[Pair]) -> str:
 def contact_settings(pairs: Iterable[Pair]) -> list[str]:
     """LIGGGHTS's options of that contact model."""
     return [row.settings for row in present(pairs).values() if row.settings]
+
+
+def added_forces(law: Sequence[str]) -> list[str]:
+    """What a contact law adds to the force by which friction is limited.
+
+    Parameters
+    ----------
+    law : sequence of str
+        Words of LIGGGHTS that set the contact law of particles or of a wall.
+
+    Returns
+    -------
+    list of str
+        The models that add a force, and those that are not known not to.
+    """
+    words = list(law)
+    gran = words[:1] == ["gran"] or words[0].startswith("wall/gran")
+    if not gran or "model" not in words[:-1]:
+        return [" ".join(words)]
+    normal, *models = words[words.index("model") + 1 :]
+    found = [] if normal in _PUSHING else [normal]
+    named = dict(pairwise(models))
+    if named.get("cohesion", "off") != "off":
+        found.append(f"cohesion {named['cohesion']}")
+    rows = (row.model for row in coefficients().values() if row.adds_force)
+    found += [model for model in rows if model in " ".join(words) and model not in found]
+    return found
 
 
 def explained(pairs: Iterable[Pair]) -> tuple[list[str], list[str]]:

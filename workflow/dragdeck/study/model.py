@@ -179,7 +179,7 @@ class Motion(Superposed):
         if not self.path.turning:
             return found
         stages = [SpinStage(until_s=end, rpm=rpm) for end, rpm in self.path.turning]
-        return {**found, "spin": Spin(schedule=stages).faster(speed_factor)}
+        return {**found, "spin": Spin(schedule=stages, ramp_s=0.0).faster(speed_factor)}
 
     @property
     def axis_speed_m_s(self) -> float:
@@ -198,9 +198,10 @@ class Motion(Superposed):
 
     @property
     def uncounted_m(self) -> float:
-        """Length of the drag before the statistics begin, m."""
+        """Length of the drag before the statistics begin, m: what is superposed has started."""
         whole = (self.path.revolution_m or 0.0) * ((self.counted_from_revolution or 1) - 1)
-        return max(self.transient_m, whole)
+        starts = (one.ramp_s * self.axis_speed_m_s for one in self.superposed().values())
+        return max(self.transient_m, whole, *starts)
 
     def turned(self, angle_deg: float) -> "Motion":
         """The same motion turned about the bowl's axis, immersed where the drag begins."""
@@ -262,9 +263,10 @@ class Calibration(Model):
 class Filling(Model):
     """When a packing counts as settled."""
 
-    energy_ratio: Annotated[Number, Field(gt=0, le=1)] = Field(
+    energy_ratio: Annotated[Number, Field(gt=0, le=1e-3)] = Field(
         default=1e-5,
-        description="settling criterion: largest mean kinetic energy per particle / (m g d)",
+        description="settling criterion: largest mean kinetic energy per particle / (m g d); "
+        "0.001 lifts a particle by a thousandth of its diameter",
     )
     max_time_s: Positive = Field(
         default=10.0,

@@ -1,7 +1,8 @@
 """A quantity in stages: one value after another, the last of which stays."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import takewhile
 
 
 def chain(
@@ -29,6 +30,40 @@ def chain(
         formulas[variable] = later if number else f"{value!r}"
         end += steps
     return formulas
+
+
+def in_steps(
+    ends_s: Iterable[float], steps: int, timestep_s: float
+) -> Iterator[tuple[int, float, float]]:
+    """Stages in whole steps, which together take a given number of them.
+
+    A quantity that adds up to what it should between the two times of each stage has no error of
+    rounding at the end of any of them. A stage has a step at least, unless there are too few.
+
+    Parameters
+    ----------
+    ends_s : iterable of float
+        End of each stage; those that begin after the last step are left out, and the last one
+        ends with it.
+    steps : int
+        Of all stages together.
+    timestep_s : float
+
+    Yields
+    ------
+    steps : int
+        Of the stage.
+    begin_s, end_s : float
+        Between which it is, before rounding.
+    """
+    whole_s = steps * timestep_s
+    ends = [*takewhile(lambda end: end < whole_s, ends_s), whole_s]
+    begun, begin_s = 0, 0.0
+    for left, end_s in zip(reversed(range(len(ends))), ends, strict=True):
+        end = min(max(begun + 1, round(end_s / timestep_s)), steps - left)
+        if end > begun:
+            yield end - begun, begin_s, end_s
+            begun, begin_s = end, end_s
 
 
 def integral(stages: Sequence[tuple[float, float]], time_s: float) -> float:

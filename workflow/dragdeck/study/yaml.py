@@ -68,7 +68,7 @@ for _tag in ("bool", "float", "int", "timestamp"):
 
 
 def read_yaml(file: Path) -> dict[str, Any]:
-    """Read a study file as plain data.
+    """Read a study file, or another one of its kind, as plain data.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def read_yaml(file: Path) -> dict[str, Any]:
         raise InputError(f"not YAML of plain values: {error}", file=file) from None
     if not isinstance(data, dict):
         raise InputError(
-            "a study must be a mapping of fields", file=file, value=type(data).__name__
+            "the file must be a mapping of fields", file=file, value=type(data).__name__
         )
     return data
 
@@ -132,7 +132,8 @@ def lineage(file: Path) -> list[tuple[Path, dict[str, Any]]]:
     while (name := found[-1][1].get("extends")) is not None:
         studies, place = file.parent.parent, found[-1][0]
         base = studies / str(name) / STUDY_FILE
-        known = sorted(other.parent.name for other in studies.glob(f"*/{STUDY_FILE}"))
+        used = {other.parent.name for other, _ in found}
+        known = {other.parent.name for other in studies.glob(f"*/{STUDY_FILE}")} - used
         problem = None
         if not isinstance(name, str) or not NAME.fullmatch(name) or not base.is_file():
             problem = "extends an unknown study"
@@ -141,7 +142,7 @@ def lineage(file: Path) -> list[tuple[Path, dict[str, Any]]]:
         if problem:
             raise InputError(
                 problem, file=place, field="extends", value=shown(name),
-                limit=choices(str(name), filter(NAME.fullmatch, known)),
+                limit=choices(str(name), filter(NAME.fullmatch, sorted(known))),
                 remedy="name another study, or remove the line",
             )  # fmt: skip
         found.append((base, read_yaml(base)))
@@ -163,14 +164,20 @@ _WHOLE = ("fidelity", "sweep")
 
 
 def _merged(base: Mapping[str, Any], own: Mapping[str, Any], top: bool = True) -> dict[str, Any]:
-    """A study's content with another's changes; a part of another `kind` is replaced."""
+    """A study's content with another's changes.
+
+    A part of another `kind` is replaced, and ``null`` leaves a part out.
+    """
     found = dict(base)
     for key, value in own.items():
         there = base.get(key)
-        found[key] = value
-        if isinstance(value, dict) and isinstance(there, dict) and not (top and key in _WHOLE):
-            same = value.get("kind", there.get("kind")) == there.get("kind")
-            found[key] = _merged(there, value, top=False) if same else value
+        if value is None:
+            found.pop(key, None)
+        elif isinstance(value, dict) and not (top and key in _WHOLE):
+            same = isinstance(there, dict) and value.get("kind") in (None, there.get("kind"))
+            found[key] = _merged(there if same and there else {}, value, top=False)
+        else:
+            found[key] = value
     return found
 
 

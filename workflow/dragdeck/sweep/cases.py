@@ -163,12 +163,14 @@ def new_study(studies: Path, name: str, base: str) -> Path:
         The name cannot be one or is taken, or there is no such study to extend.
     """
     study_file(studies, base)
-    folder = studies / name
-    if not NAME.fullmatch(name) or folder.exists():
+    folder, problem = studies / name, None
+    if not NAME.fullmatch(name):
+        problem = "this name cannot be used for a study"
+    elif folder.exists():
+        problem = "a study has that name already"
+    if problem:
         raise InputError(
-            "a study has that name already"
-            if folder.exists()
-            else "this name cannot be used for a study",
+            problem,
             file=studies,
             value=name,
             limit=f"a name has {NAME_LIMIT}",

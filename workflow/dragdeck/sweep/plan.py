@@ -1,4 +1,4 @@
-"""The points of a trade: which settings are run on a study's scenes, and how often.
+"""The points of a trade-off: which settings are run on a study's scenes, and how often.
 
 A plan is a YAML file that fits any study: it names fields of the study file
 and the values each shall take, alone or together with others, and always holds

@@ -9,7 +9,7 @@ from dragchain.run.superposed.kind import Floats, Ints, SuperposedMotion
 
 
 class Oscillation(SuperposedMotion):
-    """``z = amplitude sin(rate t)``, t from the start of the drag."""
+    """``z = amplitude sin(rate t)``, t the time at full speed since the start of the drag."""
 
     kind: Literal["oscillation"]
     amplitude_m: PositiveFloat
@@ -18,6 +18,6 @@ class Oscillation(SuperposedMotion):
     def velocity(self, steps: Ints, timestep_s: float, arm_m: Floats) -> Floats:
         """Of the whole workpiece, up and down."""
         velocity = np.zeros_like(arm_m)
-        angle = self.rate_rad_s * timestep_s * steps
-        velocity[:, 2] = self.amplitude_m * self.rate_rad_s * np.cos(angle)
+        angle = self.rate_rad_s * timestep_s * self.advance(steps)
+        velocity[:, 2] = self.amplitude_m * self.rate_rad_s * np.cos(angle) * self.pace(steps)
         return velocity

@@ -27,14 +27,17 @@ class Spin(SuperposedMotion):
     def turn(self, steps: Ints, timestep_s: float) -> Floats:
         """The angle since the drag began."""
         rates = np.array([stage.rate_rad_s for stage in self.stages])
-        begun = np.r_[0, np.cumsum(self._lengths())[:-1]]
-        within = np.clip(steps[:, None] - begun, 0, self._lengths())
+        ends = np.cumsum(self._lengths())
+        begun = np.r_[0, ends[:-1]]
+        done = np.maximum(steps[:, None], 0)
+        within = self.advance(np.clip(done, begun, ends)) - self.advance(begun)
         return np.asarray(within @ rates * timestep_s)
 
     def velocity(self, steps: Ints, timestep_s: float, arm_m: Floats) -> Floats:
         """The rate of the stage that a step belongs to, cross the arm."""
         rates = np.array([stage.rate_rad_s for stage in self.stages])
-        return about_vertical(rates[stage_at(steps, self._lengths())], arm_m)
+        rate = rates[stage_at(steps, self._lengths())] * self.pace(steps)
+        return about_vertical(rate, arm_m)
 
     def _lengths(self) -> list[int]:
         return [stage.steps for stage in self.stages]

@@ -113,11 +113,6 @@ class WorkpiecePath(ABC):
         """Direction of motion from +x when the drag begins."""
 
     @property
-    @abstractmethod
-    def reach_m(self) -> float:
-        """Largest distance of the workpiece's axis from the bowl's."""
-
-    @property
     def ahead_deg(self) -> float | None:
         """Angle of its start about the bowl's axis, in the sense of motion; None if no circle."""
         return None
@@ -133,9 +128,9 @@ class WorkpiecePath(ABC):
         return 1.0
 
     @property
-    def heights_m(self) -> Sequence[float]:
-        """Heights of the tip above the immersion depth: at the start, and where it turns round."""
-        return (0.0,)
+    def start_height_m(self) -> float:
+        """Height of the tip above the immersion depth at the start."""
+        return 0.0
 
     @property
     def turning(self) -> Sequence[tuple[float, float]]:
@@ -216,8 +211,3 @@ class AroundBowl(WorkpiecePath):
     def ahead_deg(self) -> float:
         """The angle, or its negative for a clockwise motion."""
         return math.copysign(1.0, math.sin(self.direction_rad - self.start_rad)) * self.start_deg
-
-    @property
-    def reach_m(self) -> float:
-        """The radius."""
-        return self.radius_m

@@ -55,16 +55,6 @@ class LinePath(WorkpiecePath, Model):
         """The direction."""
         return math.radians(self.direction_deg)
 
-    @property
-    def reach_m(self) -> float:
-        """The distance of one end or the other."""
-        x, y = self.start_m
-        end = (
-            x + self.length_m * math.cos(self.direction_rad),
-            y + self.length_m * math.sin(self.direction_rad),
-        )
-        return max(math.hypot(x, y), math.hypot(*end))
-
     def turned(self, angle_deg: float) -> Self:
         """From another place in another direction."""
         return self.model_copy(

@@ -1,6 +1,7 @@
 """A workpiece that stands still in a rotating bowl (stream finishing)."""
 
 import math
+from collections.abc import Mapping
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field, field_validator
@@ -62,6 +63,11 @@ class RestPath(AroundBowl, Model):
     def own_speed_m_s(self) -> float:
         """Speed of the bowl where the workpiece stands."""
         return abs(self._bowl_rad_s) * self.radius_m
+
+    @property
+    def implied(self) -> Mapping[str, float]:
+        """Its speed."""
+        return {"motion.path.speed_m_s": self.own_speed_m_s}
 
     def one_side_inwards(self, orientation: Orientation) -> bool:
         """It stands still."""

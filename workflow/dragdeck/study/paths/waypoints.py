@@ -115,14 +115,9 @@ class WaypointsPath(WorkpiecePath, Model):
         return next(math.atan2(y, x) for _, x, y, _ in self._stretches() if x or y)
 
     @property
-    def reach_m(self) -> float:
-        """The farthest waypoint."""
-        return max(math.hypot(point.x_m, point.y_m) for point in self.points)
-
-    @property
-    def heights_m(self) -> Sequence[float]:
-        """That of each waypoint."""
-        return [point.z_m for point in self.points]
+    def start_height_m(self) -> float:
+        """That of the first waypoint."""
+        return self.points[0].z_m
 
     @property
     def own_speed_m_s(self) -> float:

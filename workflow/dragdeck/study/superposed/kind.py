@@ -7,18 +7,12 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 from markupsafe import Markup
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
+
+from dragdeck.study.base import Model, NonNegative
 
 LIVE_REFERENCE = Markup("${reference_x} ${reference_y} ${reference_z}")
 """The reference point where the engine has it when the drag begins or is resumed."""
-
-
-class SuperposedOfRun(BaseModel):
-    """An entry of ``motion.superposed`` in ``case.json``."""
-
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
-
-    kind: str
 
 
 @dataclass(frozen=True)
@@ -60,7 +54,52 @@ class EngineMotion:
         return EngineMotion(variables, renamed(self.mover))
 
 
-class SuperposedMotion(ABC):
+class SuperposedOfRun(BaseModel, ABC):
+    """An entry of ``superposed`` in ``case.json``: the motion in whole steps, as simulated.
+
+    Attributes
+    ----------
+    ramp_steps : int
+        Steps in which the motion starts from rest; absent if it starts at full speed.
+    """
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+
+    kind: str
+    ramp_steps: int = Field(default=0, exclude_if=lambda value: not value)
+
+    def advance(self, steps: float) -> float:
+        """Steps at full speed that get the motion as far as so many steps from its start.
+
+        Its derivative is 3 x^2 - 2 x^3 at the fraction x of the ramp: speed and acceleration have
+        no jump.
+        """
+        if steps > self.ramp_steps:
+            return steps - self.ramp_steps / 2
+        return steps**3 / self.ramp_steps**2 * (1 - steps / (2 * self.ramp_steps)) if steps else 0.0
+
+    def advance_formula(self, start_step: int) -> str:
+        """`advance` at the engine's ``step``."""
+        since, ramp = f"(step-{start_step})", self.ramp_steps
+        if not ramp:
+            return since
+        starting = f"{since}^3/{float(ramp**2)!r}*(1.0-{since}/{2.0 * ramp!r})"
+        return f"({starting}*({since}<={ramp})+({since}-{ramp / 2!r})*({since}>{ramp}))"
+
+    def lift_m(self, steps: float, timestep_s: float) -> float:
+        """How far it has the workpiece above its path so long after the start of the drag, m."""
+        return 0.0
+
+    def turn_rad(self, steps: float, timestep_s: float) -> float:
+        """How far it has turned the workpiece about +z so long after the start of the drag."""
+        return 0.0
+
+    @abstractmethod
+    def on_engine(self, start_step: int) -> EngineMotion:
+        """Its part of the input script, for a drag that starts at this step."""
+
+
+class SuperposedMotion(Model, ABC):
     """Block of a study: a motion that is superposed on the path during the whole drag.
 
     Attributes
@@ -70,6 +109,12 @@ class SuperposedMotion(ABC):
     """
 
     part: ClassVar[type[SuperposedOfRun]]
+
+    ramp_s: NonNegative = Field(
+        default=0.1,
+        description="time in which the motion starts smoothly from rest when the drag begins, in "
+        "seconds at the study's own speed; no statistic includes it",
+    )
 
     @abstractmethod
     def faster(self, factor: float) -> Self:
@@ -89,18 +134,10 @@ class SuperposedMotion(ABC):
         """How far it takes the workpiece below, and above, its path."""
         return 0.0
 
-    def lift_m(self, time_s: float) -> float:
-        """How far it has the workpiece above its path, this long after the start of the drag, m."""
-        return 0.0
-
-    def turn_rad(self, time_s: float) -> float:
-        """How far it has turned the workpiece about +z, this long after the start of the drag."""
-        return 0.0
-
     @abstractmethod
     def of_run(self, drag: DragSteps) -> SuperposedOfRun:
-        """Its entry in ``case.json``."""
+        """The motion in whole steps, which is its entry in ``case.json``."""
 
-    @abstractmethod
-    def on_engine(self, drag: DragSteps) -> EngineMotion:
-        """Its part of the input script."""
+    def ramp_steps(self, drag: DragSteps) -> int:
+        """Steps in which it starts."""
+        return round(self.ramp_s / drag.timestep_s)

@@ -5,7 +5,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
-from dragdeck.study.base import Model, Positive
+from dragdeck.study.base import Positive
 from dragdeck.study.superposed.kind import (
     DragSteps,
     EngineMotion,
@@ -15,7 +15,7 @@ from dragdeck.study.superposed.kind import (
 
 
 class OscillationOfRun(SuperposedOfRun):
-    """An oscillation as simulated: ``z = amplitude sin(rate t)``, t from the start of the drag.
+    """An oscillation as simulated: ``z = amplitude sin(rate t)``, t the time at full speed.
 
     Attributes
     ----------
@@ -27,8 +27,22 @@ class OscillationOfRun(SuperposedOfRun):
     amplitude_m: float
     rate_rad_s: float
 
+    def lift_m(self, steps: float, timestep_s: float) -> float:
+        """The sine."""
+        return self.amplitude_m * math.sin(self.rate_rad_s * timestep_s * self.advance(steps))
 
-class Oscillation(SuperposedMotion, Model):
+    def on_engine(self, start_step: int) -> EngineMotion:
+        """The mean velocity of each step: the places add up to the sine, also after a restart."""
+        angle = f"{self.rate_rad_s!r}*dt"
+        now, before = (f"sin({angle}*{self.advance_formula(start_step + late)})" for late in (0, 1))
+        speed = f"{self.amplitude_m!r}*({now}-{before})/dt"
+        return EngineMotion(
+            {"oscillation_zero": "0.0", "oscillation_vz": speed},
+            "linear/variable v_oscillation_zero v_oscillation_zero v_oscillation_vz",
+        )
+
+
+class Oscillation(SuperposedMotion):
     """A vertical sine, upwards first."""
 
     part: ClassVar[type[SuperposedOfRun]] = OscillationOfRun
@@ -40,7 +54,8 @@ class Oscillation(SuperposedMotion, Model):
 
     def faster(self, factor: float) -> Self:
         """A higher frequency at the same amplitude."""
-        return self.model_copy(update={"frequency_hz": factor * self.frequency_hz})
+        faster = {"frequency_hz": factor * self.frequency_hz, "ramp_s": self.ramp_s / factor}
+        return self.model_copy(update=faster)
 
     @property
     def _rate_rad_s(self) -> float:
@@ -55,20 +70,10 @@ class Oscillation(SuperposedMotion, Model):
         """The amplitude."""
         return self.amplitude_m
 
-    def lift_m(self, time_s: float) -> float:
-        """The sine."""
-        return self.amplitude_m * math.sin(self._rate_rad_s * time_s)
-
     def of_run(self, drag: DragSteps) -> OscillationOfRun:
         """Amplitude and rate."""
-        return OscillationOfRun(amplitude_m=self.amplitude_m, rate_rad_s=self._rate_rad_s)
-
-    def on_engine(self, drag: DragSteps) -> EngineMotion:
-        """The mean velocity of each step: the places add up to the sine, also after a restart."""
-        angle = f"{self._rate_rad_s!r}*dt"
-        now, before = (f"sin({angle}*(step-{drag.start + late}))" for late in (0, 1))
-        speed = f"{self.amplitude_m!r}*({now}-{before})/dt"
-        return EngineMotion(
-            {"oscillation_zero": "0.0", "oscillation_vz": speed},
-            "linear/variable v_oscillation_zero v_oscillation_zero v_oscillation_vz",
+        return OscillationOfRun(
+            amplitude_m=self.amplitude_m,
+            rate_rad_s=self._rate_rad_s,
+            ramp_steps=self.ramp_steps(drag),
         )

@@ -1,15 +1,15 @@
 """Spin of the workpiece about its own vertical axis, through its reference point."""
 
 import math
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
+from itertools import accumulate, pairwise
 from typing import ClassVar, Literal, Self
 
 from markupsafe import Markup
 from pydantic import Field, model_validator
 
 from dragdeck.study.base import Model, Number, Positive
-from dragdeck.study.stages import chain, integral
+from dragdeck.study.stages import chain, in_steps, integral
 from dragdeck.study.superposed.kind import (
     LIVE_REFERENCE,
     DragSteps,
@@ -32,6 +32,25 @@ class SpinOfRun(SuperposedOfRun):
     kind: Literal["spin"] = "spin"
     stages: Sequence[SpinStageOfRun]
 
+    def turn_rad(self, steps: float, timestep_s: float) -> float:
+        """The sum over its stages."""
+        ends = accumulate(stage.steps for stage in self.stages)
+        rates = [
+            (self.advance(end), timestep_s * stage.rate_rad_s)
+            for end, stage in zip(ends, self.stages, strict=True)
+        ]
+        return integral(rates, self.advance(steps))
+
+    def on_engine(self, start_step: int) -> EngineMotion:
+        """A rotation about the live reference point: a restart does not keep the moved centre."""
+        stages = [(stage.steps, stage.rate_rad_s) for stage in self.stages]
+        rates = chain("spin_rate", start_step, stages)
+        if self.ramp_steps:
+            now, before = (self.advance_formula(start_step + late) for late in (0, 1))
+            rates["spin_started"] = f"v_{[*rates][-1]}*({now}-{before})"
+        mover = Markup("rotate/variable origin {} axis 0. 0. 1. omega v_{}")
+        return EngineMotion(rates, mover.format(LIVE_REFERENCE, [*rates][-1]))
+
 
 class SpinStage(Model):
     """A stretch of constant spin."""
@@ -43,7 +62,7 @@ class SpinStage(Model):
     rpm: Number = Field(description="rotational speed, 1/min; positive: counter-clockwise")
 
 
-class Spin(SuperposedMotion, Model):
+class Spin(SuperposedMotion):
     """A constant spin, or a schedule of them."""
 
     part: ClassVar[type[SuperposedOfRun]] = SpinOfRun
@@ -74,41 +93,33 @@ class Spin(SuperposedMotion, Model):
 
     def faster(self, factor: float) -> Self:
         """The spin at that factor, its stages as much shorter."""
+        ramp = self.ramp_s / factor
         if self.schedule is None:
-            return self.model_copy(update={"rpm": factor * self._stages()[0].rpm})
+            rpm = factor * self._stages()[0].rpm
+            return self.model_copy(update={"rpm": rpm, "ramp_s": ramp})
         stages = [
             SpinStage(until_s=stage.until_s / factor, rpm=factor * stage.rpm)
             for stage in self.schedule
         ]
-        return self.model_copy(update={"schedule": stages})
+        return self.model_copy(update={"schedule": stages, "ramp_s": ramp})
 
     def surface_speed_m_s(self, radius_m: float) -> float:
         """Circumferential speed."""
         return radius_m * max(abs(_rate(stage.rpm)) for stage in self._stages())
 
-    def turn_rad(self, time_s: float) -> float:
-        """The sum over its stages."""
-        return integral([(stage.until_s, _rate(stage.rpm)) for stage in self._stages()], time_s)
-
     def of_run(self, drag: DragSteps) -> SpinOfRun:
-        """The stages that begin before the drag ends."""
-        return SpinOfRun(stages=list(self._in_steps(drag)))
+        """The stages that begin before the drag ends, each as far as it should turn the workpiece.
 
-    def _in_steps(self, drag: DragSteps) -> Iterator[SpinStageOfRun]:
-        *others, last = self._stages()
-        begun, whole = 0, drag.end - drag.start
-        ends = [round(min(whole, stage.until_s / drag.timestep_s)) for stage in others]
-        for stage, end in zip([*others, last], [*ends, whole], strict=True):
-            if end > begun:
-                yield SpinStageOfRun(steps=end - begun, rate_rad_s=_rate(stage.rpm))
-                begun = end
-
-    def on_engine(self, drag: DragSteps) -> EngineMotion:
-        """A rotation about the live reference point: a restart does not keep the moved centre."""
-        stages = ((stage.steps, stage.rate_rad_s) for stage in self._in_steps(drag))
-        rates = chain("spin_rate", drag.start, stages)
-        mover = Markup("rotate/variable origin {} axis 0. 0. 1. omega v_{}")
-        return EngineMotion(rates, mover.format(LIVE_REFERENCE, [*rates][-1]))
+        The ramp is not counted here: while it lasts, the workpiece turns less.
+        """
+        rates = [(stage.until_s, _rate(stage.rpm)) for stage in self._stages()]
+        ends = (end for end, _ in rates)
+        stages = []
+        for steps, begin, end in in_steps(ends, drag.end - drag.start, drag.timestep_s):
+            turned = integral(rates, end) - integral(rates, begin)
+            rate = turned / (steps * drag.timestep_s)
+            stages.append(SpinStageOfRun(steps=steps, rate_rad_s=rate))
+        return SpinOfRun(stages=stages, ramp_steps=self.ramp_steps(drag))
 
 
 def _rate(rpm: float) -> float:

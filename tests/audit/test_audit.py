@@ -1,0 +1,118 @@
+"""Tables of a finished run against a second, plain implementation, to rounding."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from plain_run import PlainRun, bottlenecks, coordination, loads
+from snakemake_calls import copy_of_project, snakemake
+
+pytestmark = [pytest.mark.audit, pytest.mark.engine]
+
+ROUNDING = {"rtol": 1e-9, "atol": 1e-12}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    project = copy_of_project(tmp_path_factory.mktemp("audit"))
+    done = snakemake(project, "all", "--config", "study=small")
+    assert done.returncode == 0, done.stdout + done.stderr
+    (run,) = (project / "results/small/process").iterdir()
+    return run
+
+
+@pytest.fixture(scope="module")
+def plain(folder: Path) -> PlainRun:
+    return PlainRun(folder)
+
+
+def table(folder: Path, name: str) -> pd.DataFrame:
+    return pd.read_parquet(folder / "tables" / f"{name}.parquet")
+
+
+def same(found: object, wanted: object, what: str) -> None:
+    found, wanted = np.asarray(found, float), np.asarray(wanted, float)
+    assert found.shape == wanted.shape, what
+    np.testing.assert_allclose(found, wanted, err_msg=what, **ROUNDING)
+
+
+def test_forces(folder: Path, plain: PlainRun) -> None:
+    rows, forces = pd.DataFrame(plain.forces()), table(folder, "workpiece_force")
+    for name in rows:
+        same(forces[name], rows[name], name)
+    counted = [plain.counted(step) for step in rows["step"]]
+    assert forces["in_statistics"].tolist() == counted
+    found = json.loads((folder / "tables/figures.json").read_text())["forces"]
+    for name in ("drag_n", "lateral_n", "vertical_n"):
+        values = rows[name][counted].tolist()
+        mean = math.fsum(values) / len(values)
+        spread = math.sqrt(math.fsum((v - mean) ** 2 for v in values) / (len(values) - 1))
+        same([found[name]["mean"], found[name]["std"]], [mean, spread], name)
+
+
+def test_contacts_on_the_workpiece(folder: Path, plain: PlainRun) -> None:
+    contacts = table(folder, "workpiece_contacts")
+    loud = contacts[(contacts[["force_x_n", "force_y_n", "force_z_n"]] != 0.0).any(axis=1)]
+    wanted = [(step, one) for step, of_step in plain.on_workpiece() for one in of_step]
+    assert loud["step"].tolist() == [step for step, _ in wanted]
+    assert loud["particle_id"].tolist() == [one.particle for _, one in wanted]
+    assert loud["facet_id"].tolist() == [one.facet for _, one in wanted]
+    for axis, name in enumerate("xyz"):
+        same(loud[f"point_{name}_m"], [one.point[axis] for _, one in wanted], f"point {name}")
+        same(loud[f"force_{name}_n"], [-one.force[axis] for _, one in wanted], f"force {name}")
+    dragged = [(step, one) for step, one in wanted if plain.start < step <= plain.end]
+    moved = loud[(loud["step"] > plain.start) & (loud["step"] <= plain.end)]
+    slips = [plain.slip(one) for _, one in dragged]
+    for axis, name in enumerate("xyz"):
+        same(moved[f"slip_{name}_m_s"], [slip[axis] for slip, _ in slips], f"slip {name}")
+    same(moved["normal_velocity_m_s"], [speed for _, speed in slips], "normal velocity")
+
+
+def test_the_network(folder: Path, plain: PlainRun) -> None:
+    frames = list(plain.networks())
+    contacts = table(folder, "contacts").groupby("step")
+    for step, _, wanted in frames:
+        found = contacts.get_group(step)
+        assert len(found) == len(wanted)
+        by_pair = {(row.a_id, row.b_id): row.normal_force_n for row in found.itertuples()}
+        for _, a, b, force in wanted:
+            if b != 0:  # a particle can have two contacts with the workpiece
+                same(by_pair[a, b], force, f"{step}: {a}-{b}")
+    network = table(folder, "network").set_index("step")
+    rows = {step: coordination(particles, found) for step, particles, found in frames}
+    assert set(network.index) == {step for step in rows if plain.counted(step)}
+    for step, row in network.iterrows():
+        for name, value in rows[step].items():
+            same(row[name], value, f"{step}: {name}")
+
+
+def test_paths_from_the_workpiece_to_the_bowl(folder: Path, plain: PlainRun) -> None:
+    chains = table(folder, "chains")
+    paths = chains[(chains["definition"] == "widest_path") & chains["reaches_bowl"]]
+    for step, _, contacts in plain.networks():
+        if plain.counted(step):
+            wanted = [force for force in bottlenecks(contacts) if force > 0.0]
+            found = paths.loc[paths["step"] == step, "bottleneck_n"].sort_values()
+            same(found, wanted, f"{step}: bottleneck forces")
+
+
+def test_loads_and_events(folder: Path, plain: PlainRun) -> None:
+    totals, by_facet, wanted = loads(plain)
+    found = json.loads((folder / "tables/loading.json").read_text())["totals"]
+    facets = table(folder, "facets").set_index("facet_id")
+    events = table(folder, "contact_events").sort_values(["start_s", "particle_id"])
+    assert len(events) == len(wanted)
+    assert events["particle_id"].tolist() == [event["particle"] for event in wanted]
+    for name, total in totals.items():
+        if name != "samples":
+            same(found[name], total, f"total {name}")
+            same(events[name], [event[name] for event in wanted], f"events' {name}")
+        same(
+            facets[name],
+            [by_facet[number][name] if number in by_facet else 0.0 for number in facets.index],
+            f"facets' {name}",
+        )
+    same(events["peak_normal_force_n"], [event["peak_normal_force_n"] for event in wanted], "peaks")
