@@ -1,4 +1,4 @@
-/*! sources: bd04e439e0c2749b0df398fe4a2a58d295d62c98d15695ea6858ae63891892eb
+/*! sources: 1bdacf19621b3b1fd8fe812c900824746aa57d4b959df519d47518423df8a38e
 Made by ./run web from web/; do not edit. It contains three.js:
 
 The MIT License
