@@ -168,18 +168,27 @@ class Page {
   startSection() {
     const axis = byId("section-axis"),
       at = byId("section-at"),
-      { radius, height } = this.head.bowl;
+      side = byId("section-side");
     const place = () => {
-      const [low, high] = axis.value === "2" ? [0, height] : [-radius, radius];
-      Object.assign(at, { min: low, max: high, value: (low + high) / 2, disabled: !axis.value });
-      byId("section-side").disabled = !axis.value;
+      at.disabled = side.disabled = !axis.value;
+      if (axis.value) this.placeSection(Number(axis.value));
     };
     place();
     axis.onchange = () => {
       place();
       this.redraw();
     };
-    at.oninput = byId("section-side").onchange = () => this.redraw();
+    at.oninput = side.onchange = () => this.redraw();
+  }
+
+  /** Put the section through the workpiece, or in the middle of the height, and show the side behind it. */
+  placeSection(axis) {
+    const { camera, controls } = this.view,
+      { radius, height } = this.head.bowl,
+      { x, y } = this.workpiece.pose(this.number),
+      [low, high] = axis === 2 ? [0, height] : [-radius, radius];
+    Object.assign(byId("section-at"), { min: low, max: high, value: [x, y, height / 2][axis] });
+    byId("section-side").checked = camera.position.getComponent(axis) < controls.target.getComponent(axis);
   }
 
   preset(name) {
@@ -217,7 +226,8 @@ class Page {
 
   startSaving() {
     const video = byId("save-video");
-    byId("save-picture").onclick = () => savePicture(this.view, `${this.head.run}_${this.frames.times[this.number].toFixed(3)}s`);
+    byId("save-picture").onclick = () =>
+      savePicture(this.view, `${this.head.run}_${this.frames.times[this.number].toFixed(3)}s`);
     video.disabled = !filmKind();
     if (video.disabled) video.title = "This browser cannot record a canvas.";
     video.onclick = () => (this.film ? this.player.stop() : this.startFilm());
@@ -315,12 +325,14 @@ class Page {
     const { counts } = this.contacts,
       path = this.head.paths[this.number],
       { look } = this;
+    const kinds = look.others === "hidden" ? ", those of chains only" : "",
+      also = look.path && look.threshold ? ", or on the dominant path" : "";
     counts.forEach((count, kind) => (byId(`count-${kind}`).textContent = whole(count)));
     const parts = [
       ["b", whole(counts.reduce((sum, count) => sum + count))],
       [
         0,
-        ` of ${whole(frame.a.length)} contacts shown${look.others === "hidden" ? ", those of chains only" : ""}, normal force above ${digits(look.threshold, 3)} N. Drag force `,
+        ` of ${whole(frame.a.length)} contacts shown${kinds}: normal force above ${digits(look.threshold, 3)} N${also}. Drag force `,
       ],
       ["b", `${digits(this.curve.at(this.time))} N`],
       [0, ` at ${seconds(this.time)}. `],
@@ -357,7 +369,9 @@ class Page {
     const { measured } = this,
       places = (measured ?? []).map((one) => this.frames.place(frame, one)).filter(Boolean),
       [from, to] = places;
-    const known = to ? `${fixed(Math.hypot(...[0, 1, 2].map((axis) => to[axis] - from[axis])), 2)} mm` : "not in this frame";
+    const known = to
+      ? `${fixed(Math.hypot(...[0, 1, 2].map((axis) => to[axis] - from[axis])), 2)} mm`
+      : "not in this frame";
     byId("distance").hidden = !measured;
     byId("distance").textContent = `Distance: ${measured?.length === 2 ? known : "choose two particles or contacts"}`;
     return places;

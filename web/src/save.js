@@ -73,13 +73,16 @@ function paintElement(context, element) {
   colours?.forEach((colour, k) => fill.addColorStop(k / (colours.length - 1), colour));
   context.fillStyle = fill;
   context.fillRect(left, top, width, height);
-  const [up, right, down, before] = ["Top", "Right", "Bottom", "Left"].map((side) => parseFloat(style[`border${side}Width`]));
+  const [up, right, down, before] = ["Top", "Right", "Bottom", "Left"].map((side) =>
+    parseFloat(style[`border${side}Width`]),
+  );
   context.fillStyle = style.borderBottomColor;
   context.fillRect(left, top, width, up);
   context.fillRect(left + width - right, top, right, height);
   context.fillRect(left, top + height - down, width, down);
   context.fillRect(left, top, before, height);
-  Object.assign(context, { fillStyle: style.color, font: style.font });
+  const { color: fillStyle, fontWeight, fontSize, fontFamily } = style; // `font` is empty with tabular numerals
+  Object.assign(context, { fillStyle, font: `${fontWeight} ${fontSize} ${fontFamily}` });
   for (const node of element.childNodes) if (node.nodeType === Node.TEXT_NODE) paintWords(context, node);
 }
 

@@ -180,13 +180,17 @@ def test_it_plays_pauses_and_ends(page: Browser) -> None:
     page.click("#play")
     assert page.text("#play") == "Play"
     paused = now()
-    page.run("return new Promise(done => setTimeout(done, 1500))")
+    page.run(
+        f"{speed}; return new Promise(done => requestAnimationFrame("
+        "() => requestAnimationFrame(done)))",
+        1e6,
+    )  # it would be at the end now
     assert now() == paused
     page.run(speed, 2)
     page.click("#play")
     page.wait(lambda: page.text("#play") == "Play", "the end")
     assert page.run("return networkPage.frames.count") == now() + 1
-    page.run(speed, 0.02)
+    page.run(speed, 1e-9)
     page.click("#play")
     assert now() == 0
     page.click("#next")
@@ -321,23 +325,29 @@ def test_other_contacts_are_faded_or_hidden(page: Browser, run: Path) -> None:
     assert page.text("#status").startswith(
         f"{path} of {len(contacts)} contacts shown, those of chains only"
     )
+    choose(page, "others", "shown")
+    page.run("networkPage.setThreshold(1e6)")
+    assert drawn() == (path, path, path)
+    assert "N, or on the dominant path." in page.text("#status")
+    page.run("networkPage.setThreshold(0)")
+    choose(page, "others", "hidden")
     page.click("#path")
     page.click("#chains")
     links = (chains[chains["definition"] == "peters"]["n_particles"] - 1).sum()
     assert drawn() == (links, links, links)
 
 
-@pytest.mark.parametrize(("axis", "other_side"), [("x", False), ("y", True), ("z", False)])
+@pytest.mark.parametrize(("axis", "larger"), [("x", False), ("y", True), ("z", False)])
 def test_a_section_plane_hides_what_is_beyond_it(
-    page: Browser, run: Path, axis: str, other_side: bool
+    page: Browser, run: Path, axis: str, larger: bool
 ) -> None:
     choose(page, "section-axis", axis)
     at = move(page, "section-at", 0.6)
-    if other_side:
+    if page.find("#section-side").is_selected() != larger:
         page.click("#section-side")
     particles, contacts = (rows(run, name, step_at(page)) for name in ("particles", "contacts"))
     beyond = 1e3 * particles[f"{axis}_m"] > at
-    kept = set(particles["particle_id"][beyond == other_side])
+    kept = set(particles["particle_id"][beyond == larger])
     assert 0 < len(kept) < len(particles)
     ids = page.run("const {media, frames, number} = networkPage;"
                    "return media.rows.map(row => frames.at(number).id[row])")  # fmt: skip
