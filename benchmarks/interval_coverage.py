@@ -33,7 +33,7 @@ from dragchain.calibration.fit import calibrate  # noqa: E402
 from dragchain.calibration.measured_impacts import measure  # noqa: E402
 from dragchain.calibration.sweep import Sweep, prepare  # noqa: E402
 from dragchain.calibration.trials import Sensor, record_of  # noqa: E402
-from dragchain.loading.facets import standard_errors  # noqa: E402
+from dragchain.loading.facets import LEAST_EVENTS, standard_errors  # noqa: E402
 from dragchain.loading.samples import Sampled  # noqa: E402
 from dragchain.statistics.bed_effects import Factors, fit_effects  # noqa: E402
 from dragchain.statistics.correlated import SLOW_WAVES, estimate_mean  # noqa: E402
@@ -43,7 +43,7 @@ from dragchain.statistics.estimate import (  # noqa: E402
     mean_of,
     t_interval,
 )
-from dragchain.statistics.frame_means import LARGEST_REACH, estimates  # noqa: E402
+from dragchain.statistics.frame_means import estimates  # noqa: E402
 from dragchain.statistics.power_law import Runs, fit_power_law  # noqa: E402
 
 RECORD = ROOT / "docs" / "data" / "benchmarks" / "coverage.csv"
@@ -118,8 +118,7 @@ def facet(random: Random, events: int) -> tuple[Estimate, float]:
     rows = pd.DataFrame({"frame": frame, "facet_id": 0, "load": force}).astype({"frame": np.int64})
     (error,) = standard_errors(Sampled(rows, _FRAMES, 1.0, 1.0, np.zeros(3)), "load", 1)
     found = t_interval(float(force.sum()), float(error), SLOW_WAVES)
-    reliable = found.ci95_high - found.value <= LARGEST_REACH * found.value
-    return replace(found, reliable=reliable), float(events * _LASTS)
+    return replace(found, reliable=len(force) >= _LASTS * LEAST_EVENTS), float(events * _LASTS)
 
 
 # --- several runs ----------------------------------------------------------------------------
@@ -268,7 +267,7 @@ def main() -> None:
             print(*(f"{n:.3f}" if isinstance(n, float) else n for n in row.values()), flush=True)
     if not asked.kind:
         table = pd.DataFrame(found)
-        table.to_csv(RECORD, index=False, float_format="%.4g", lineterminator="\n")
+        table.to_csv(RECORD, index=False, float_format="%.3f", lineterminator="\n")
 
 
 if __name__ == "__main__":

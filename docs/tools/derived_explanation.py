@@ -113,7 +113,7 @@ def _coverage(store: Store) -> pd.DataFrame:
         "shown_reliable": "{reliable_coverage:.1%}",
     }
     texts = {
-        name: [form.format(**row).replace("nan%", "\N{EN DASH}") for row in rows.to_dict("records")]
+        name: [form.format(**row).replace("nan%", "none") for row in rows.to_dict("records")]
         for name, form in shown.items()
     }
     return rows.assign(**{name: [one.replace("%", " %") for one in t] for name, t in texts.items()})

@@ -12,7 +12,7 @@ from dragchain.dumps.frame import Frame
 from dragchain.run.case import Case, friction_with
 from dragchain.run.kinematics import drag_phase, needed
 from dragchain.statistics.correlated import estimate_mean
-from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
+from dragchain.statistics.estimate import Estimate
 from dragchain.tables.network_contacts import KINDS, contact_rows
 from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WorkpieceFrames
@@ -39,15 +39,16 @@ class Dragged(Measured):
 
     Attributes
     ----------
-    drag_mean_n, drag_se_n : float
-        Mean force along the motion and its standard error; infinite if it is not to be relied on.
+    drag_mean_n, drag_half_width_n : float
+        Mean force along the motion and the half-width of its interval; infinite if it is not
+        to be relied on.
     motion_ratio : float
         Median kinetic energy without spin, over that of all particles moving as the workpiece and
         one as after a fall through its diameter.
     """
 
     drag_mean_n: float
-    drag_se_n: float
+    drag_half_width_n: float
     motion_ratio: float
 
     def energy_ratio(self, reference: Self | None) -> float:
@@ -58,8 +59,8 @@ class Dragged(Measured):
         """The relative error of the mean drag, positive where it is stronger."""
         fine = abs(reference.drag_mean_n)
         error = (self.drag_mean_n - reference.drag_mean_n) / -fine
-        half_width = NORMAL_QUANTILE * math.hypot(self.drag_se_n, reference.drag_se_n) / fine
-        return {"mean drag": Estimate.around(error, half_width)}
+        half_width = math.hypot(self.drag_half_width_n, reference.drag_half_width_n)
+        return {"mean drag": Estimate.around(error, half_width / fine)}
 
 
 def measure_drag(point: PointRun, case: CaseOfStudy) -> Dragged:
@@ -77,7 +78,7 @@ def measure_drag(point: PointRun, case: CaseOfStudy) -> Dragged:
         overlap_ratio=overlap,
         frequency_rad_s=frequency,
         drag_mean_n=mean.mean,
-        drag_se_n=mean.se if mean.reliable else math.inf,
+        drag_half_width_n=mean.ci95_high - mean.mean if mean.reliable else math.inf,
         motion_ratio=_median_motion_j(run) / _usual_motion_j(run.case, speed),
     )
 

@@ -30,7 +30,7 @@ COLUMNS = (
     "peak_energy_j",
     "rest_energy_ratio",
     "drag_mean_n",
-    "drag_se_n",
+    "drag_half_width_n",
     "energy_after_over_before",
     "frequency_rad_s",
 )

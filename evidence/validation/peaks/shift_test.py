@@ -30,7 +30,7 @@ class Window:
     last: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ShiftTest(Estimate):
     """A statistic at the events against its null distribution.
 
@@ -134,7 +134,7 @@ def shift_test(
     value = float(reduce(joint(by_shift, zero))[0])
     null = reduce(joint(by_shift, shifts))
     if not np.isfinite(value):
-        return ShiftTest(*[np.nan] * 6)
+        return ShiftTest(np.nan, np.nan, np.nan, p_greater=np.nan, p_less=np.nan, p_two_sided=np.nan)
     over_runs = mean_of([float(reduce(run[:1])[0]) for run in by_shift])
     null = null[np.isfinite(null)]
     middle = null.mean()
@@ -142,9 +142,9 @@ def shift_test(
         value,
         over_runs.ci95_low,
         over_runs.ci95_high,
-        _p_value(null >= value - _ROUNDING),
-        _p_value(null <= value + _ROUNDING),
-        _p_value(np.abs(null - middle) >= abs(value - middle) - _ROUNDING),
+        p_greater=_p_value(null >= value - _ROUNDING),
+        p_less=_p_value(null <= value + _ROUNDING),
+        p_two_sided=_p_value(np.abs(null - middle) >= abs(value - middle) - _ROUNDING),
     )
 
 

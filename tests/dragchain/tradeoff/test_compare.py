@@ -1,10 +1,12 @@
 """The comparison of a trade-off on measures whose effects are known."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 from tradeoff_files import BLOCK_M, VALUES, measures, write
 from tradeoff_runs import (
     BOTH,
@@ -21,6 +23,7 @@ from tradeoff_runs import (
 )
 
 from dragchain.errors import DocumentError, TableError
+from dragchain.tradeoff.compare import compare_quantity
 from dragchain.tradeoff.outcome import (
     Tradeoff,
     breaks,
@@ -29,6 +32,7 @@ from dragchain.tradeoff.outcome import (
     largest_bound,
     run_table,
 )
+from dragchain.tradeoff.quantities import QUANTITIES
 from dragchain.tradeoff.runs import Setting, read_runs
 
 
@@ -201,3 +205,31 @@ def test_what_is_written_is_no_setting(tmp_path: Path) -> None:
     files = write(tmp_path, found)
     runs, reference, _ = read_runs(files, files[0].parent)
     assert {run.setting for run in runs} == {reference}
+
+
+def test_intervals_hold_whatever_settings_do_together(tmp_path: Path) -> None:
+    """An interaction of 1.4 standard deviations of a run is often missed by a test of additivity.
+
+    When such a test chose the effects to add up, 0.79 of the intervals held.
+    """
+    rng, spread = np.random.default_rng(8), 0.03
+    files = write(tmp_path, contents())
+    runs, reference, _ = read_runs(files, files[0].parent)
+    (drag,) = (one for one in QUANTITIES if one.name == "drag_mean")
+    held, trials = 0, 300
+    for _ in range(trials):
+        together = rng.normal(0.0, 1.4 * spread)
+        again = [
+            replace(
+                run,
+                values={
+                    "drag_mean": math.exp(
+                        together * (run.setting == Setting(*BOTH)) + rng.normal(0.0, spread)
+                    )
+                },
+            )
+            for run in runs
+        ]
+        error = compare_quantity(drag, again, reference).errors[Setting(*BOTH)]
+        held += error.ci95_low <= math.expm1(together) <= error.ci95_high
+    assert binomtest(held, trials, 0.95, alternative="less").pvalue > 0.01, held
