@@ -1,6 +1,7 @@
 """From a tolerance to settings, on a trade with made-up numbers."""
 
 import copy
+import itertools
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -277,7 +278,7 @@ def test_a_small_change_of_depth_does_not_change_the_cost_tenfold(
     ]
     assert not found[0].outside and found[-1].outside
     costs = [one.chosen.relative_cost for one in found]
-    assert all(0.1 < one / other < 10 for one, other in zip(costs, costs[1:], strict=False))
+    assert all(0.1 < one / other < 10 for one, other in itertools.pairwise(costs))
     last = found[-1].chosen
     assert last.extrapolated or last.fidelity.youngs_modulus_scale == 1
 
