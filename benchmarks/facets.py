@@ -22,7 +22,7 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.reports import say
 from dragdeck.project import Project, study_templates
 
-SIZES_M = (1.5e-3, 0.75e-3, 0.5e-3, 0.3e-3, 0.2e-3)
+SIZES_M = (1.5e-3, 0.75e-3, 0.5e-3)
 """Lengths of the facets of the lateral surface, round and along it."""
 
 

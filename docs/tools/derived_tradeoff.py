@@ -18,7 +18,7 @@ from dragdeck.advice.advise import advise
 from dragdeck.advice.options import Option
 from dragdeck.outlook.measured import StiffnessRecord, Tradeoff
 from dragdeck.project import Project
-from dragdeck.study.model import Tolerance
+from dragdeck.study.model import BUILT_IN_FIDELITIES, Tolerance
 
 FOLD = 2
 """Relative errors from this on are shown as multiples."""
@@ -245,6 +245,13 @@ def _recommended(store: Store) -> pd.DataFrame:
 def _measured_choice(store: Store) -> pd.DataFrame:
     """One row per tolerance: the measured setting behind the advice on the mean drag."""
     rows = []
+    standard = BUILT_IN_FIDELITIES["standard"]
+    names = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
+    default = next(
+        one
+        for one in _settings(store)
+        if all(one[name] == getattr(standard, name) for name in names)
+    )
     for tolerance in (0.05, 0.1):
         advised = (
             store.table("tradeoff/advised")
@@ -265,6 +272,7 @@ def _measured_choice(store: Store) -> pd.DataFrame:
                 "tolerance": tolerance,
                 "measured": settings_cell(best),
                 "measured_saving": 1 / best["relative_cost"],
+                "saving_against_default": default["relative_cost"] / best["relative_cost"],
                 "advised": settings_cell(advised.to_dict()),
                 "advised_saving": advised["saving"],
                 **best["errors"]["drag_mean"],
@@ -366,7 +374,7 @@ def _new_scenes(store: Store) -> pd.DataFrame:
 @derived("stiffness/scene_ranges")
 def _ranges(store: Store) -> pd.DataFrame:
     """One row: smallest and largest of each number of the designed scenes; runs."""
-    scenes = [one for one in store.record("stiffness")["scenes"] if one["runs"]]
+    scenes = store.record("stiffness")["scenes"]
     row: dict[str, float] = {}
     for name in scenes[0]["numbers"]:
         values = [scene["numbers"][name] for scene in scenes]
@@ -395,9 +403,9 @@ def _checks(store: Store) -> pd.DataFrame:
 def _checks_count(store: Store) -> pd.DataFrame:
     checks = store.record("stiffness")["checks"]
     overlaps = [
-        (1 + one["measured"]) / (1 + one["predicted"]) - 1
+        abs((1 + one["measured"]) / (1 + one["predicted"]) - 1)
         for one in checks
-        if one["quantity"] in ("workpiece_overlap", "overlap_p99") and one["scale"] < 0.1
+        if one["quantity"] in ("workpiece_overlap", "overlap_p99")
     ]
     return pd.DataFrame(
         [
@@ -405,8 +413,7 @@ def _checks_count(store: Store) -> pd.DataFrame:
                 "pairs": len(checks),
                 "inside": sum(one["inside"] for one in checks),
                 "moduli": len({one["scale"] for one in checks}),
-                "overlap_excess_low": min(overlaps),
-                "overlap_excess_high": max(overlaps),
+                "overlap_difference": max(overlaps),
             }
         ]
     )

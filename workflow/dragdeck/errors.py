@@ -103,6 +103,7 @@ class RejectedRunError(DragdeckError):
 
 
 CautionCode = Literal[
+    "facets",
     "gap",
     "implausible",
     "mesh",

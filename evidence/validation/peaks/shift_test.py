@@ -134,7 +134,9 @@ def shift_test(
     value = float(reduce(joint(by_shift, zero))[0])
     null = reduce(joint(by_shift, shifts))
     if not np.isfinite(value):
-        return ShiftTest(np.nan, np.nan, np.nan, p_greater=np.nan, p_less=np.nan, p_two_sided=np.nan)
+        return ShiftTest(
+            np.nan, np.nan, np.nan, p_greater=np.nan, p_less=np.nan, p_two_sided=np.nan
+        )
     over_runs = mean_of([float(reduce(run[:1])[0]) for run in by_shift])
     null = null[np.isfinite(null)]
     middle = null.mean()

@@ -1,6 +1,8 @@
 """What a run is expected to take, and what the things that it leaves out would."""
 
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,7 @@ from made_tradeoff import made_tradeoff
 from dragdeck.cases.case import Case
 from dragdeck.outlook.explain import Cost, expected_cost, explanation, measured_speeds, price_of
 from dragdeck.scenes.filling import FILLING, filling_scene
-from dragdeck.scenes.process import process_scene
+from dragdeck.scenes.process import PROCESS, process_scene
 
 
 def measured(results: Path, name: str, particles: int, steps_per_s: float) -> None:
@@ -68,3 +70,26 @@ def test_explain_names_what_is_surely_cheaper(
     table = explanation(process_scene(case), Cost(1, 1.0, ""), (), tradeoff)
     assert ("wide facets" in list(table.columns[1].cells)) == shown
     assert any("not measured" in str(cell) for cell in table.columns[2].cells)
+
+
+def with_facets(case: Case, size_m: float) -> Case:
+    shape = case.study.workpiece.shape.model_copy(
+        update={"facet_size_m": size_m, "facet_length_m": size_m}
+    )
+    workpiece = case.study.workpiece.model_copy(update={"shape": shape})
+    return replace(case, study=case.study.model_copy(update={"workpiece": workpiece}))
+
+
+def test_facets_cost_time_and_too_many_are_warned_of(case: Case) -> None:
+    """Far finer: the wall time grows, and the size that would do is near the old."""
+    coarse, fine = (process_scene(with_facets(case, size)) for size in (1.5e-3, 2e-4))
+    few, many = (expected_cost(PROCESS, one, []).wall_time_s for one in (coarse, fine))
+    assert fine.facets > 10_000 and coarse.facets < 5000
+    assert many > 10 * few
+    codes = [{one.code for one in scene.warnings} for scene in (coarse, fine)]
+    assert "facets" not in codes[0] and "facets" in codes[1]
+    (text,) = [one.text for one in fine.warnings if one.code == "facets"]
+    found = re.search(r"facet_size_m: (\S+) would do", text)
+    assert found is not None
+    would_do = process_scene(with_facets(case, float(found[1])))
+    assert "facets" not in {one.code for one in would_do.warnings}

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from dragdeck.cases.bed import bed_timestep
-from dragdeck.cases.case import Case
+from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.outlook.measured import Tradeoff
 from dragdeck.scenes.filling import FILLING, expected_surface, expected_time
 from dragdeck.scenes.motion import plunge_point
 from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.workpiece import FACET_STEP_S, workpiece_mesh
 from dragdeck.study.model import Fidelity, Study
 
 
@@ -24,12 +25,15 @@ class Work:
     tradeoff : Tradeoff
     filling_s, process_s : float
         Simulated time, that of the process at the study's own speed, s.
+    facets : int
+        Of all workpieces.
     """
 
     study: Study
     tradeoff: Tradeoff
     filling_s: float
     process_s: float
+    facets: int
 
     @classmethod
     def of(cls, case: Case, tradeoff: Tradeoff) -> "Work":
@@ -41,7 +45,8 @@ class Work:
             + way / motion.approach_speed_m_s
             + motion.path_length_m / motion.axis_speed_m_s
         )
-        return cls(study, tradeoff, expected_time(study), process_s)
+        facets = sum(len(workpiece_mesh(one).faces) for one in of_each_workpiece(case))
+        return cls(study, tradeoff, expected_time(study), process_s, facets)
 
     def cpu_time(self, fidelity: Fidelity) -> float:
         """CPU time of both runs with some settings, s: only ratios of it count."""
@@ -49,8 +54,11 @@ class Work:
         filling = self.filling_s / bed_timestep(study, "filling_timestep_fraction")
         process = self.process_s / bed_timestep(study, "timestep_fraction")
         process *= step_cost(fidelity.youngs_modulus_scale, self.tradeoff) / fidelity.speed_factor
-        rates = FILLING.particle_steps_per_s, PROCESS.particle_steps_per_s
-        return study.media.count * (filling / rates[0] + process / rates[1])
+        count = study.media.count
+        of_facets = self.facets * FACET_STEP_S
+        return filling * count / FILLING.particle_steps_per_s + process * (
+            count / PROCESS.particle_steps_per_s + of_facets
+        )
 
 
 def step_cost(scale: float, tradeoff: Tradeoff) -> float:

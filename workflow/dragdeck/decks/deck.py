@@ -157,6 +157,8 @@ class Scene(Generic[K]):
         What the user should know before the run.
     override : str, optional
         The template, if it is not the scene's own.
+    facets : int
+        Of all workpieces.
     """
 
     deck: Deck
@@ -167,6 +169,7 @@ class Scene(Generic[K]):
     leaves_out: Mapping[str, LeftOut] = field(default_factory=dict)
     warnings: Sequence[Caution] = ()
     override: str | None = None
+    facets: int = 0
 
     @property
     def template(self) -> str:

@@ -14,6 +14,7 @@ from dragdeck.decks.deck import StudyScene
 from dragdeck.engine.reports import shown_time
 from dragdeck.outlook.measured import MeasuredCost, Tradeoff
 from dragdeck.scenes.scene import SceneType
+from dragdeck.scenes.workpiece import FACET_STEP_S
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def expected_cost(kind: SceneType, scene: StudyScene, speeds: Sequence[tuple[int
     if measured:
         rate = sum(particles / count * rate for particles, rate in measured) / len(measured)
         return Cost(scene.steps, scene.steps / rate, f"{len(measured)} run(s) of this study here")
-    rate = kind.particle_steps_per_s / count
+    rate = 1 / (count / kind.particle_steps_per_s + scene.facets * FACET_STEP_S)
     return Cost(scene.steps, scene.steps / rate, "assumed: no run of this study measured here")
 
 

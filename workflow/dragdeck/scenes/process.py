@@ -46,6 +46,7 @@ from dragdeck.scenes.moved_workpiece import ProcessDeck, moved_workpiece
 from dragdeck.scenes.periods import Periods, output_periods
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.scenes.workpiece import (
+    PARTICLE_STEPS_PER_S,
     workpiece_length,
     workpiece_mesh,
     workpiece_radius,
@@ -123,6 +124,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         deck=deck,
         case=_process_case(each, number, bed.surface_m, courses[number], limits),
         steps=steps.end,
+        facets=sum(len(workpiece_mesh(one).faces) for one in each),
         files=own if number else {**models, **_bowl_files(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
@@ -372,6 +374,6 @@ PROCESS = SceneType(
     regime="drag",
     impact_speed=fastest_motion,
     partners=_partners,
-    particle_steps_per_s=7e6,
+    particle_steps_per_s=PARTICLE_STEPS_PER_S,
     needs_bed=True,
 )

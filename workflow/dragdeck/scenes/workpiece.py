@@ -1,6 +1,7 @@
 """The workpiece of a case, generated or from the user's mesh."""
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,12 +25,22 @@ from dragdeck.mesh import (
     tilted,
     upright,
 )
-from dragdeck.physics.rounding import round_to
+from dragdeck.physics.rounding import round_to, rounded
 from dragdeck.scenes.motion import deepest, farthest_reach, plunge_point, surface_speed
 from dragdeck.study.workpiece import CylinderShape, MeshShape
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
+
+PARTICLE_STEPS_PER_S = 7e6
+"""Particles times steps per second of a process, one rank, with a few facets."""
+
+FACET_STEP_S = 4e-7
+"""Time of a step for each facet of a workpiece, s, one rank (docs/data/benchmarks/facets.csv)."""
+
+_MOST_TIMES, _ALWAYS_FACETS = 5, 5000
+"""Facets are too many if they take this many times as long as the particles, and never below that
+number."""
 
 _FREEBOARD_DIAMETERS = 4
 """A generated workpiece stands this many particle diameters out of the bed."""
@@ -52,13 +63,35 @@ def workpiece_mesh(case: Case) -> "Trimesh":
 
 
 def workpiece_warnings(case: Case) -> list[Caution]:
-    """What is doubtful in the mesh of the user's, and what was repaired."""
-    shape = case.study.workpiece.shape
+    """What is doubtful in the mesh of the user's, what was repaired, and what makes it slow."""
+    shape, slow = case.study.workpiece.shape, list(_too_fine(case))
     if isinstance(shape, CylinderShape):
-        return []
+        return slow
     _, found = _of_case(case, shape)
     said = (f"{shape.file}: {one.problem}: {one.value} ({one.remedy})" for one in found)
-    return [Caution("mesh", text) for text in said]
+    return [*(Caution("mesh", text) for text in said), *slow]
+
+
+def _too_fine(case: Case) -> Iterator[Caution]:
+    """A warning where a step is spent on facets."""
+    shape, facets = case.study.workpiece.shape, len(workpiece_mesh(case).faces)
+    particles_s = case.study.media.count / PARTICLE_STEPS_PER_S
+    enough = max(_ALWAYS_FACETS, round(_MOST_TIMES * particles_s / FACET_STEP_S))
+    if facets <= enough:
+        return
+    coarser = math.sqrt(facets / enough)
+    size = shape.facet_size_m
+    along = " (facet_length_m in proportion)" if isinstance(shape, CylinderShape) else ""
+    remedy = (
+        f"mesh it with facets {coarser:.2g} times as long"
+        if size is None
+        else f"workpiece.shape.facet_size_m: {rounded(size * coarser, up=True):g} would do{along}"
+    )
+    yield Caution(
+        "facets",
+        f"{facets:,} facets make a step about {1 + facets * FACET_STEP_S / particles_s:.2g} times "
+        f"as long as the particles alone; about {enough:,} are cheap: {remedy}",
+    )
 
 
 def _of_case(case: Case, shape: MeshShape) -> "tuple[Trimesh, list[Finding]]":
