@@ -2,8 +2,10 @@
 
 import json
 import re
+from pathlib import Path
 from typing import get_args
 
+import nbformat
 import pytest
 import reference
 import study_fields
@@ -164,3 +166,14 @@ def test_a_notebook_is_kept_without_outputs_and_names_its_study_first(file) -> N
 def test_the_notebooks_are_on_a_page() -> None:
     text = text_of("howto/results.md")
     assert NOTEBOOKS and all(f"examples/{file.name}" in text for file in NOTEBOOKS)
+
+
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_a_notebook_is_stored_with_its_output_but_no_place_or_time(file: Path) -> None:
+    notebook = nbformat.read(file, as_version=4)
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    assert [cell.source for cell in cells[1:] if not cell.outputs] == []
+    texts = [one.get("text", "") + one.get("data", {}).get("text/plain", "")
+             for cell in cells for one in cell.outputs]  # fmt: skip
+    assert not re.search(r"(^|[\s'\"(])/\w+/", "\n".join(texts))
+    assert not any("execution" in cell.metadata for cell in cells)
