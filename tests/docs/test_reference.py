@@ -4,6 +4,7 @@ import json
 import re
 from typing import get_args
 
+import nbformat
 import pytest
 import reference
 import study_fields
@@ -184,3 +185,14 @@ def test_a_notebook_is_kept_without_outputs_and_names_its_study_first(file) -> N
 def test_the_notebooks_are_on_a_page() -> None:
     text = text_of("howto/results.md")
     assert NOTEBOOKS and all(f"examples/{file.name}" in text for file in NOTEBOOKS)
+
+
+@pytest.mark.parametrize("name", ["first_look", "chains_and_peaks"])
+def test_a_notebook_is_stored_with_its_output_but_no_place_or_time(name: str) -> None:
+    notebook = nbformat.read(ROOT / f"examples/{name}.ipynb", as_version=4)
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    assert [cell.source for cell in cells[1:] if not cell.outputs] == []
+    texts = [one.get("text", "") + one.get("data", {}).get("text/plain", "")
+             for cell in cells for one in cell.outputs]  # fmt: skip
+    assert not re.search(r"(^|[\s'\"(])/\w+/", "\n".join(texts))
+    assert not any("execution" in cell.metadata for cell in cells)

@@ -7,12 +7,12 @@ from io import BytesIO
 from pathlib import Path
 
 import pytest
+from analysed_run import analysed_tiny_run
 from doc_pages import PAGES, name_of
 from figure_files import write_process_run
 from figures import FIGURES, IMAGES, svg
 from figures.pictures import PICTURES, picture
 from mathml import mathml
-from network_run_files import write_network_run
 from paths import ROOT
 from PIL import Image
 
@@ -104,8 +104,7 @@ def test_a_picture_can_be_drawn_from_a_run(name: str, drawn_run: Path) -> None:
 
 @pytest.mark.slow
 def test_an_export_can_be_drawn(tmp_path: Path) -> None:
-    write_network_run(tmp_path / "run")
-    assert len(picture("export", tmp_path / "run")) > 5000
+    assert len(picture("export", analysed_tiny_run(tmp_path / "tiny"))) > 5000
 
 
 @pytest.fixture(scope="module")

@@ -46,3 +46,10 @@ def test_a_picture_of_few_colours_is_smaller() -> None:
         sizes.append(len(content.getvalue()))
     assert len(whole.getcolors(100_000) or ()) > 256 >= len(few.getcolors(100_000) or ())
     assert sizes[1] < sizes[0]
+
+
+def test_white_stays_white_in_few_colours() -> None:
+    pixels = np.full((40, 40, 3), 254, dtype=np.uint8)
+    pixels[::2] = 255
+    shown = few_colours(Image.fromarray(pixels)).convert("RGB")
+    assert shown.getpixel((0, 0)) == (255, 255, 255)
