@@ -167,7 +167,9 @@ def _in_its_drag(workpiece: MovedWorkpiece, steps: int) -> MovedWorkpiece:
     for leg in workpiece.legs[:-1]:
         u, v, w = leg.velocity_m_s
         x, y, z = (place + leg.duration_s * speed for place, speed in ((x, u), (y, v), (z, w)))
-    drag = replace(workpiece.legs[-1], start_step=0, end_step=steps)
+    last = workpiece.legs[-1]
+    shorter = replace(last.leg, duration_s=last.duration_s * steps / last.steps)
+    drag = replace(last, leg=shorter, start_step=0, end_step=steps)
     return replace(workpiece, start_m=(x, y, z), legs=(drag,))
 
 

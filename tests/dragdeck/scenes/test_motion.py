@@ -220,8 +220,8 @@ def test_the_fraction_of_a_path_that_is_driven_has_to_fit(made: Make) -> None:
     """Waypoints beyond it are never reached."""
     points = [[0, 0, 0], [0.5, 0.01, 0], [1, 0.03, 0, 0.03]]
     case = made(path={"kind": "waypoints", "points": points, "fraction": 0.5})
-    assert farthest_reach(case.study) == pytest.approx(0.01)
-    assert path_heights(case.study) == (0, 0)
+    assert farthest_reach(case.study.motion) == pytest.approx(0.01)
+    assert path_heights(case.study.motion) == (0, 0)
     process_scene(case, BED)
 
 
@@ -257,5 +257,9 @@ def test_the_speed_factor_shortens_the_drag(made: Make) -> None:
 
 
 def test_farthest_reach_counts_the_end_of_a_line_and_the_plunge(made: Make) -> None:
-    assert farthest_reach(made(path=LINE).study) == pytest.approx(math.hypot(*path_end(LINE, 0)))
-    assert farthest_reach(made(path=CIRCLE, plunge_at_m=[0, 0.03]).study) == pytest.approx(0.03)
+    assert farthest_reach(made(path=LINE).study.motion) == pytest.approx(
+        math.hypot(*path_end(LINE, 0))
+    )
+    assert farthest_reach(made(path=CIRCLE, plunge_at_m=[0, 0.03]).study.motion) == pytest.approx(
+        0.03
+    )

@@ -84,7 +84,7 @@ def test_a_file_is_what_stands_in_it(made: Made) -> None:
 
 def test_heights_may_be_left_out(made: Made) -> None:
     case = made("time_s,x_m,y_m\n0,0,0\n1,0.01,0\n")
-    assert path_heights(case.study) == (0, 0)
+    assert path_heights(case.study.motion) == (0, 0)
 
 
 def test_a_study_finds_the_file_of_the_one_it_extends(made: Made, project: Project) -> None:
@@ -181,7 +181,7 @@ def test_a_missing_file_is_named(made: Made, name: str) -> None:
 @pytest.mark.parametrize(
     ("path", "words"),
     [
-        ({"points": None}, "motion.path.points: a list is required"),
+        ({"points": None}, "motion.path: give either file or points, and not both"),
         ({"points": []}, "motion.path.points: the list has 0 entries"),
         ({"points": [[0, 0, 0], [1, 0]]}, "motion.path.points.1.2: a required"),
         ({"points": [[0, 0, 0], [1, 0, 0, 0, 0, 0]]}, "points.1: the list has 6 entries"),

@@ -70,8 +70,9 @@ class Clearances:
 
 def clearances(case: Case, surface_m: float) -> Clearances:
     """Clearances of a case's workpiece in a bed with its surface at this height, m."""
-    tip = surface_m - case.study.motion.immersion_depth_m
-    return Clearances(_wall_gap(case), tip, tip + vertical_range(case.study)[0])
+    motion = case.study.motion
+    tip = surface_m - motion.immersion_depth_m
+    return Clearances(_wall_gap(case), tip, tip + vertical_range(motion)[0])
 
 
 def _wall_gap(case: Case) -> float:
@@ -184,7 +185,7 @@ def process_cautions(case: Case) -> Iterator[Caution]:
 
 def _beside(case: Case, gap: float) -> Iterator[InputError]:
     study = case.study
-    reach = farthest_reach(study)
+    reach = farthest_reach(study.motion)
     radius = study.bowl.radius_m - gap - reach
     diameter = 2 * study.media.radius_mean_m
     if gap < diameter:
@@ -235,9 +236,9 @@ def _largest_particle(case: Case) -> float:
 def _up_and_down(case: Case, tip_m: float) -> Iterator[InputError]:
     """Refuse a path or superposed motions that take a workpiece to the floor or out of the bed."""
     motion = case.study.motion
-    depth, (low, high) = motion.immersion_depth_m, vertical_range(case.study)
+    depth, (low, high) = motion.immersion_depth_m, vertical_range(motion)
     deepest = min(depth + tip_m - _largest_particle(case), workpiece_length(case))
-    moving = ["path"] if any(path_heights(case.study)) else []
+    moving = ["path"] if any(path_heights(motion)) else []
     moving += [name for name, one in motion.superposed().items() if one.vertical_reach_m]
     problems = (
         (depth <= deepest < depth - low, "takes the workpiece too deep", deepest - depth),

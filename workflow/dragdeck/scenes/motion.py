@@ -28,6 +28,9 @@ Place = tuple[float, float, float, float]
 _STAGES_PER_FORMULA = 10
 """Formulas of one stage each take three times as long."""
 
+_MANY_STEPS = 1_000_000
+"""Enough for every stage of a path to have one."""
+
 
 @dataclass(frozen=True)
 class TimedLeg:
@@ -169,9 +172,13 @@ def drag_leg(study: Study) -> TimedLeg:
     """
     motion, timestep = study.motion, bed_timestep(study, "timestep_fraction")
     asked = motion.axis_speed_m_s * study.chosen_fidelity().speed_factor
-    steps = max(1, round(motion.path_length_m / asked / timestep))
-    leg = motion.path.drag(motion.path_length_m / (steps * timestep), motion.orientation)
-    stages = _staged(leg, steps, timestep)
+    return _drag_in(max(1, round(motion.path_length_m / asked / timestep)), timestep, motion)
+
+
+def _drag_in(steps: int, timestep_s: float, motion: Motion) -> TimedLeg:
+    """The drag in so many steps; the places where it starts, turns and ends depend on neither."""
+    leg = motion.path.drag(motion.path_length_m / (steps * timestep_s), motion.orientation)
+    stages = _staged(leg, steps, timestep_s)
     return TimedLeg(leg, 0, steps, motion.path.direction_rad, stages)
 
 
@@ -185,16 +192,17 @@ def driven_factor(study: Study) -> float:
     return driven_speed(study) / study.motion.axis_speed_m_s
 
 
-def _corners(study: Study) -> list[Place]:
+def _corners(motion: Motion) -> list[Place]:
     """Where the drag begins, changes its velocity and ends; heights above the immersion depth."""
-    path = study.motion.path
-    return drag_leg(study).corners((*path.start_point, path.start_height_m, 0.0))
+    path, duration = motion.path, motion.path_length_m / motion.axis_speed_m_s
+    drag = _drag_in(_MANY_STEPS, duration / _MANY_STEPS, motion)
+    return drag.corners((*path.start_point, path.start_height_m, 0.0))
 
 
-def farthest_reach(study: Study) -> float:
+def farthest_reach(motion: Motion) -> float:
     """Largest distance of the workpiece's axis from the bowl's, m."""
-    aside = sum(one.horizontal_reach_m for one in study.motion.superposed().values())
-    places = [plunge_point(study.motion), *((x, y) for x, y, _, _ in _corners(study))]
+    aside = sum(one.horizontal_reach_m for one in motion.superposed().values())
+    places = [plunge_point(motion), *((x, y) for x, y, _, _ in _corners(motion))]
     return max(math.hypot(x, y) for x, y in places) + aside
 
 
@@ -219,22 +227,22 @@ def driven_surface_speed(study: Study, radius_m: float) -> float:
     return drag_leg(study).fastest_m_s + sum(one.surface_speed_m_s(radius_m) for one in moving)
 
 
-def path_heights(study: Study) -> tuple[float, float]:
+def path_heights(motion: Motion) -> tuple[float, float]:
     """Lowest and highest height of the path above the immersion depth, m; 0 is within."""
-    heights = [0.0, *(z for _, _, z, _ in _corners(study))]
+    heights = [0.0, *(z for _, _, z, _ in _corners(motion))]
     return min(heights), max(heights)
 
 
-def vertical_range(study: Study) -> tuple[float, float]:
+def vertical_range(motion: Motion) -> tuple[float, float]:
     """Lowest and highest height of the tip above the immersion depth, m; 0 is within."""
-    reach = sum(one.vertical_reach_m for one in study.motion.superposed().values())
-    low, high = path_heights(study)
+    reach = sum(one.vertical_reach_m for one in motion.superposed().values())
+    low, high = path_heights(motion)
     return low - reach, high + reach
 
 
-def deepest(study: Study) -> float:
+def deepest(motion: Motion) -> float:
     """Largest depth of the tip below the surface in the drag, m."""
-    return study.motion.immersion_depth_m - vertical_range(study)[0]
+    return motion.immersion_depth_m - vertical_range(motion)[0]
 
 
 def workpiece_turn(study: Study) -> float:

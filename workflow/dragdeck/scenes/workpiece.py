@@ -111,7 +111,7 @@ def _generated_length(case: Case) -> float:
     """Length of a generated workpiece along its axis, m."""
     study = case.study
     freeboard = _FREEBOARD_DIAMETERS * 2 * study.media.radius_mean_m
-    depth = deepest(study)
+    depth = deepest(study.motion)
     return round_to((depth + freeboard) / math.cos(math.radians(study.motion.tilt_deg or 0)), 6)
 
 
@@ -139,7 +139,7 @@ def farthest_surface(case: Case) -> float:
     """
     motion = case.study.motion
     if not motion.tilt_deg or not motion.path.one_side_inwards(motion.orientation):
-        return farthest_reach(case.study) + workpiece_reach(case)
+        return farthest_reach(motion) + workpiece_reach(case)
     angle, (x, y) = motion.path.direction_rad, _in_bed(case)
     across = np.array(
         [x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)]
@@ -150,7 +150,7 @@ def farthest_surface(case: Case) -> float:
 
 def _in_bed(case: Case) -> NDArray[np.float64]:
     """X and y, (2, N), of the corners of what is in the bed, its front along +x, m."""
-    return points_below(workpiece_mesh(case), deepest(case.study))[:, :2].T
+    return points_below(workpiece_mesh(case), deepest(case.study.motion))[:, :2].T
 
 
 def fastest_surface(case: Case) -> float:

@@ -21,6 +21,8 @@ class OscillationOfRun(SuperposedOfRun):
     ----------
     rate_rad_s : float
         2 pi times the frequency.
+    ramp_steps : int
+        Steps in which it starts from rest; absent if it starts at full speed.
     """
 
     kind: Literal["oscillation"] = "oscillation"

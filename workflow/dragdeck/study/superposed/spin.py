@@ -27,7 +27,14 @@ class SpinStageOfRun(Model):
 
 
 class SpinOfRun(SuperposedOfRun):
-    """A spin as simulated: consecutive stages from the start of the drag."""
+    """A spin as simulated: consecutive stages from the start of the drag.
+
+    Attributes
+    ----------
+    stages : sequence of SpinStageOfRun
+    ramp_steps : int
+        Steps in which it starts from rest; absent if it starts at full speed.
+    """
 
     kind: Literal["spin"] = "spin"
     stages: Sequence[SpinStageOfRun]
