@@ -155,7 +155,8 @@ class Case(Document):
     and the ``workpiece``, ``numbers`` the dimensionless numbers of a process. ``superposed`` lists
     the superposed motions, ``asked`` is the tolerance for which the settings were chosen, and
     ``output_of`` the run from whose raw output a further workpiece is read. ``added_forces`` are
-    models of the contact law that add a normal force, such as cohesion.
+    models of the contact law that add a normal force, such as cohesion, ``changed_law`` commands on
+    the law that come from a template of the study.
     """
 
     made_by: ClassVar[str] = "dragdeck step render"
@@ -189,6 +190,7 @@ class Case(Document):
     versions: Mapping[str, str]
     asked: AdvisedSettings | None = None
     added_forces: tuple[str, ...] = ()
+    changed_law: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _of_its_scene(self) -> Self:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dragchain.errors import TableError
 from dragchain.report.extrapolated import FILE, Extrapolated, ExtrapolatedQuantity
-from dragchain.run.case import load_case
+from dragchain.run.case import Case, load_case
 from dragchain.tradeoff.path_blocks import quantities_along
 from dragchain.tradeoff.quantities import QUANTITIES
 from dragchain.tradeoff.stiffness_document import StiffnessRecord
@@ -20,6 +20,8 @@ _SCENE_SIZE = "particles"
 
 def extrapolate_run(run_dir: Path, record: Path) -> None:
     """Write ``extrapolated.json`` of a run: every quantity that the record supports.
+
+    None is supported if a template of the study changed the contact law.
 
     Parameters
     ----------
@@ -46,7 +48,7 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
     diameters = along.arc_m / (2.0 * case.media.radius_mean_m)
     values = along.values()
     found = []
-    for quantity in QUANTITIES:
+    for quantity in QUANTITIES if not case.changed_law else ():
         entry, measured = known.laws.get(quantity.name), values.get(quantity.name, 0.0)
         if entry is None or measured == 0.0 or not case.numbers.get(entry.friction):
             continue  # the laws are written in the logarithm of a coefficient of friction
@@ -68,9 +70,14 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
     Extrapolated(
         youngs_modulus_scale=scale,
         source=f"{sum(bool(one.runs) for one in known.scenes)} scenes, measured {known.measured}",
-        outside=tuple(_outside(case.numbers, known)),
+        outside=(*_other_law(case), *_outside(case.numbers, known)),
         quantities=tuple(found),
     ).write(run_dir / FILE)
+
+
+def _other_law(case: Case) -> Iterator[str]:
+    for command in case.changed_law:
+        yield f"the laws were measured without the template's command: {command}"
 
 
 def _outside(numbers: Mapping[str, float], record: StiffnessRecord) -> Iterator[str]:
