@@ -196,3 +196,11 @@ def test_a_contact_law_that_adds_a_force_is_recorded(
     assert main(["step", "render", "small", "filling", FILLING.run_id(case)]) == 0
     recorded = json.loads((project.run_folder(case, FILLING) / "case.json").read_text())
     assert recorded["added_forces"] == ["cohesion sjkr2"]
+    (changed,) = recorded["changed_law"]
+    assert changed == "pair_style gran model hertz tangential history cohesion sjkr2 limitForce on"
+
+
+def test_a_study_without_templates_changes_no_law(case: Case, project: Project) -> None:
+    assert main(["step", "render", "small", "filling", FILLING.run_id(case)]) == 0
+    recorded = json.loads((project.run_folder(case, FILLING) / "case.json").read_text())
+    assert recorded["added_forces"] == recorded["changed_law"] == []

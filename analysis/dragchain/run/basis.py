@@ -155,7 +155,7 @@ def judge(
         low, high = sorted((run.value * law.ci95_low, run.value * law.ci95_high))
         value = Estimate(run.value * law.value, low, high)
         return Standing(quantity, run, value, Basis.CORRECTED, "", reliable)
-    why = _why_not(case.fidelity)
+    why = _why_not(case)
     reason = f"not corrected for {' and '.join(doubts)}: {why}"
     if quantity.robust:
         return Standing(quantity, run, run, scaled, reason, reliable)
@@ -170,7 +170,10 @@ def _doubts(fidelity: Fidelity) -> Iterator[str]:
         yield f"speed {_TIMES} {fidelity.speed_factor:g}"
 
 
-def _why_not(fidelity: Fidelity) -> str:
+def _why_not(case: Case) -> str:
+    fidelity = case.fidelity
+    if case.changed_law:
+        return "a template of the study changes the contact law"
     if fidelity.speed_factor == 1.0:
         return "no law of this quantity is known"
     if fidelity.youngs_modulus_scale == 1.0:

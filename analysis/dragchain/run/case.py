@@ -156,7 +156,8 @@ class Case(Document):
     the superposed motions, ``asked`` is the tolerance for which the settings were chosen,
     ``unsafe_timestep`` why a step beyond the stable one was accepted, and ``output_of`` the run
     from whose raw output a further workpiece is read. ``added_forces`` are models of the contact
-    law that add a normal force, such as cohesion.
+    law that add a normal force, such as cohesion, ``changed_law`` commands on the law that come
+    from a template of the study.
     """
 
     made_by: ClassVar[str] = "dragdeck step render"
@@ -191,6 +192,7 @@ class Case(Document):
     asked: AdvisedSettings | None = None
     added_forces: tuple[str, ...] = ()
     unsafe_timestep: str | None = None
+    changed_law: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _of_its_scene(self) -> Self:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from dragchain.report.extrapolated import FILE, Extrapolated, ExtrapolatedQuantity
-from dragchain.run.case import load_case
+from dragchain.run.case import Case, load_case
 from dragchain.tradeoff.path_blocks import quantities_along
 from dragchain.tradeoff.quantities import QUANTITIES
 from dragchain.tradeoff.stiffness_document import StiffnessRecord
@@ -21,7 +21,8 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
     """Write ``extrapolated.json`` of a run: its quantities, and what the laws make of them.
 
     No law applies to a run at the physical modulus, and none to a workpiece that is faster than
-    the study says: the laws were measured at a study's own speed.
+    the study says: the laws were measured at a study's own speed. None applies if a template of the
+    study changed the contact law.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
     """
     case, known = load_case(run_dir), StiffnessRecord.read(record)
     scale = case.fidelity.youngs_modulus_scale
-    applies = scale < 1.0 and case.fidelity.speed_factor == 1.0
+    applies = scale < 1.0 and case.fidelity.speed_factor == 1.0 and not case.changed_law
     along = quantities_along(run_dir, case)
     diameters = along.arc_m / (2.0 * case.media.radius_mean_m)
     values = along.values()
@@ -70,9 +71,14 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
     Extrapolated(
         youngs_modulus_scale=scale,
         source=f"{len(known.scenes)} scenes, measured {known.measured}",
-        outside=tuple(_outside(case.numbers, known)) if applies else (),
+        outside=(*_other_law(case), *(_outside(case.numbers, known) if applies else ())),
         quantities=tuple(found),
     ).write(run_dir / FILE)
+
+
+def _other_law(case: Case) -> Iterator[str]:
+    for command in case.changed_law:
+        yield f"the laws were measured without the template's command: {command}"
 
 
 def _outside(numbers: Mapping[str, float], record: StiffnessRecord) -> Iterator[str]:

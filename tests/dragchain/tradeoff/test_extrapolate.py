@@ -41,3 +41,18 @@ def test_a_law_applies_to_a_bed_with_friction_at_the_speed_of_the_study(
     assert (contacts.name, contacts.measured) == ("workpiece_contacts", 30.0)
     assert (contacts.estimate is not None) == known
     assert any("particle_friction" in text for text in found.outside) == (friction == 0.0)
+
+
+def test_another_contact_law_is_not_extrapolated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    numbers = {"stiffness_number": 2e5, "inertial_number": 0.02, "particle_friction": 0.34}
+    law = {"changed_law": ["pair_style gran model hooke tangential history"]}
+    case = case_json("process") | {"numbers": numbers} | law
+    (tmp_path / "case.json").write_text(json.dumps(case))
+    along = PathQuantities(arc_m=0.1, block_m=0.01, blocks={"workpiece_contacts": (30.0,) * 10})
+    monkeypatch.setattr(extrapolate, "quantities_along", lambda *_: along)
+    extrapolate_run(tmp_path, RECORD)
+    found = Extrapolated.read(tmp_path / FILE)
+    assert [one.estimate for one in found.quantities] == [None]
+    assert "pair_style gran model hooke" in found.outside[0]

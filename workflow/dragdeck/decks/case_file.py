@@ -134,6 +134,8 @@ class CaseFile(Document):
     added_forces : sequence of str
         Models of the script's contact law that add a normal force; Coulomb's limit of friction
         does not follow from the contact force then.
+    changed_law : sequence of str
+        Commands on contact law, constants and coefficients that come from a template of the study.
     """
 
     study: str
@@ -146,6 +148,7 @@ class CaseFile(Document):
     phases: Sequence[Phase] = ()
     files: Mapping[str, str] = {}
     added_forces: Sequence[str] = ()
+    changed_law: Sequence[str] = ()
 
 
 class CaseOfStudy(CaseFile):

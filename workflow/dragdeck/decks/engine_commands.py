@@ -101,6 +101,16 @@ def contact_laws(deck: str) -> Iterator[list[str]]:
             yield words[3:]
 
 
+def law_commands(deck: str) -> list[str]:
+    """The commands of a deck that set the contact law, and the constants and coefficients in it."""
+    return [
+        command.text
+        for command in commands(deck)
+        if command.words[0] in ("pair_style", "pair_coeff")
+        or (command.words[0] == "fix" and command.words[3:4] == ["property/global"])
+    ]
+
+
 def _inner(words: list[str]) -> Iterator[str]:
     """The commands that ``if`` and ``run every`` carry as words."""
     if words[0] == "if":

@@ -10,7 +10,13 @@ import jinja2
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, END, RUN_FILE
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.engine_commands import commands, contact_laws, endless, leaving_folder
+from dragdeck.decks.engine_commands import (
+    commands,
+    contact_laws,
+    endless,
+    law_commands,
+    leaving_folder,
+)
 from dragdeck.decks.outputs import WORKPIECE_FORCE, ColumnsFile, in_writing_order
 from dragdeck.decks.templates import explained, file_of, replaced, used, without
 from dragdeck.errors import InputError
@@ -117,11 +123,16 @@ def idle(names: Iterable[str], templates: jinja2.Environment) -> Iterator[InputE
 
 def added_forces(text: str) -> list[str]:
     """What the contact laws of a deck add to the force that limits friction."""
-    return list(
-        dict.fromkeys(
-            force for law in contact_laws(text) for force in contact_law.added_forces(law)
-        )
-    )
+    found = (contact_law.added_forces(law) for law in contact_laws(text))
+    return list(dict.fromkeys(force for each in found for force in each))
+
+
+def _of_its_law(scene: AnyScene, templates: jinja2.Environment) -> dict[str, list[str]]:
+    """What ``case.json`` says of the contact law in the deck of a scene."""
+    text, original = _rendered(scene, templates), _rendered(scene, without(templates))
+    known = law_commands(original)
+    changed = [command for command in law_commands(text) if command not in known]
+    return {"added_forces": added_forces(text), "changed_law": changed}
 
 
 def write_workpiece(
@@ -146,7 +157,7 @@ def write_workpiece(
     outputs = {each.name: each.as_part() for each in scene.deck.outputs}
     forces = [outputs.pop(name) for name in list(outputs) if name.startswith(WORKPIECE_FORCE)]
     columns = ColumnsFile(outputs={**outputs, WORKPIECE_FORCE: forces[number - 1]})
-    own = {"added_forces": added_forces(deck_text(scene, templates))}
+    own = _of_its_law(scene, templates)
     texts = {
         CASE_FILE: scene.case.model_copy(update=own).as_text(),
         COLUMNS_FILE: columns.as_text(),
@@ -179,7 +190,7 @@ def write_run(scene: AnyScene, folder: Path, templates: jinja2.Environment) -> l
     source = folder / scene.deck.source
     if scene.deck.source not in texts and source.is_file():
         checksums[scene.deck.source] = file_checksum(source)
-    own = {"files": checksums, "added_forces": added_forces(texts[DECK_FILE])}
+    own = {"files": checksums, **_of_its_law(scene, templates)}
     texts[CASE_FILE] = scene.case.model_copy(update=own).as_text()
     for name, text in texts.items():
         replace_text(folder / name, text)

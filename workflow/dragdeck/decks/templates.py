@@ -360,13 +360,13 @@ def _idle_parts(templates: jinja2.Environment, name: str) -> Iterator[InputError
 
 def _writes(node: nodes.Node) -> bool:
     """Whether a part of a template would be text of the script."""
-    if isinstance(node, nodes.Output):
-        return any(
-            not isinstance(part, nodes.TemplateData) or part.data.strip() for part in node.nodes
-        )
-    inside = node.find_all((nodes.Output, nodes.Include))
-    return isinstance(node, nodes.Include) or any(
-        isinstance(part, nodes.Include) or _writes(part)
-        for part in inside
-        if not isinstance(node, nodes.AssignBlock)
+    if isinstance(node, nodes.AssignBlock):
+        return False
+    parts = (node, *node.find_all((nodes.Output, nodes.Include)))
+    return any(isinstance(part, nodes.Include) or _is_text(part) for part in parts)
+
+
+def _is_text(part: nodes.Node) -> bool:
+    return isinstance(part, nodes.Output) and any(
+        not isinstance(each, nodes.TemplateData) or each.data.strip() for each in part.nodes
     )
