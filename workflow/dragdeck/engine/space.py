@@ -84,13 +84,13 @@ def full_disk_named(
             f"{error.filename or folder}: the disk is full ({error.strerror})\n"
             f"  value:  {shown_bytes(free)} free\n"
             f"  limit:  {shown_bytes(needed)}, estimated from its outputs\n"
-            "  remedy: free disk space, or reduce the rates under outputs in the study; then run it "
-            "again"
+            "  remedy: free disk space, or reduce the rates under outputs in the study; "
+            "then run it again"
         ) from None
 
 
 def space_left(folder: Path, outputs: Mapping[str, OutputOfRun], particles: int) -> str:
-    """What is free on the disk of a run, and what the run will still write, for a reader."""
+    """What is free on the disk of a run, and what it will still write, for a reader."""
     needed = _still_needed(folder, outputs, particles)
     return f"{shown_bytes(free_bytes(folder))} free, {shown_bytes(needed)} needed"
 
