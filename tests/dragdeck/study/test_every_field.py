@@ -136,3 +136,9 @@ def test_a_number_that_cannot_be_meant_is_refused(
         small["fidelity"] = {}
     message = said(small, Place(field, "number", {}), value)
     assert f"{field}: " in message and limit in message
+
+
+def test_a_doubt_about_a_value_hides_no_contradiction(small: dict[str, Any]) -> None:
+    """Above 2 m a transient is unusual, and here longer than the path."""
+    message = said(small, Place("motion.transient_m", "number", {}), 100)
+    assert "motion.transient_m: no path is left for the statistics" in message

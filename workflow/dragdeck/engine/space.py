@@ -56,7 +56,11 @@ def check_space(folder: Path, outputs: Mapping[str, OutputOfRun], particles: int
     """
     free, needed = free_bytes(folder), _still_needed(folder, outputs, particles)
     if free < needed:
-        raise _too_little(str(folder), "too little disk space for this run", free, needed)
+        raise EngineError(
+            f"{folder}: too little disk space for this run\n  value:  {shown_bytes(free)} free\n"
+            f"  limit:  {shown_bytes(needed)}, estimated from its outputs\n"
+            "  remedy: free disk space, or reduce the rates under outputs in the study"
+        )
 
 
 @contextlib.contextmanager
@@ -75,13 +79,18 @@ def full_disk_named(
     except OSError as error:
         if error.errno not in FULL_DISK:
             raise
-        place, needed = str(error.filename or folder), _still_needed(folder, outputs, particles)
-        problem = f"the disk is full ({error.strerror})"
-        raise _too_little(place, problem, free_bytes(folder), needed) from None
+        free, needed = free_bytes(folder), _still_needed(folder, outputs, particles)
+        raise EngineError(
+            f"{error.filename or folder}: the disk is full ({error.strerror})\n"
+            f"  value:  {shown_bytes(free)} free\n"
+            f"  limit:  {shown_bytes(needed)}, estimated from its outputs\n"
+            "  remedy: free disk space, or reduce the rates under outputs in the study; "
+            "then run it again"
+        ) from None
 
 
 def space_left(folder: Path, outputs: Mapping[str, OutputOfRun], particles: int) -> str:
-    """What is free on the disk of a run, and what the run will still write, for a reader."""
+    """What is free on the disk of a run, and what it will still write, for a reader."""
     needed = _still_needed(folder, outputs, particles)
     return f"{shown_bytes(free_bytes(folder))} free, {shown_bytes(needed)} needed"
 
@@ -94,12 +103,3 @@ def _still_needed(folder: Path, outputs: Mapping[str, OutputOfRun], particles: i
         for file in folder.glob(output.pattern.format(part="*"))
     )
     return SPARE_BYTES + max(0.0, expected_bytes(outputs, particles) - written)
-
-
-def _too_little(place: str, problem: str, free: float, needed: float) -> EngineError:
-    return EngineError(
-        f"{place}: {problem}\n  value:  {shown_bytes(free)} free\n"
-        f"  limit:  {shown_bytes(needed)}, estimated from the outputs of the run\n"
-        "  remedy: free disk space, or reduce the rates under outputs in the study; then run it "
-        "again"
-    )

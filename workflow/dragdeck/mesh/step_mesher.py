@@ -30,14 +30,6 @@ _GROWTH = 2.0
 EXPORT = "export the part again as STEP, as one solid; or its surface as STL"
 """What helps against a damaged file."""
 
-_NO_SOLID = (
-    "the STEP file contains no solid",
-    "close the surfaces to a solid body in the CAD program, and export it as STEP",
-)
-_SEVERAL = (
-    "the STEP file contains several parts",
-    "join them into one solid, or remove all others, then export it as STEP",
-)
 _OPTIONS = {
     "General.Terminal": 0,
     "General.NumThreads": 1,  # the same mesh every time
@@ -112,8 +104,12 @@ def _solid(gmsh: Any, file: str) -> int:
     if len(solids) == 1:
         return int(solids[0])
     value = f"{len(solids)} solids, {len(gmsh.model.getEntities(2))} faces"
-    problem, remedy = _NO_SOLID if not solids else _SEVERAL
-    raise Refusal(problem, value, "one solid: the workpiece is one body", remedy)
+    limit = "one solid: the workpiece is one body"
+    if not solids:
+        remedy = "close the surfaces to a solid body in the CAD program, and export it as STEP"
+        raise Refusal("the STEP file contains no solid", value, limit, remedy)
+    parts = "join them into one solid, or remove all others, then export it as STEP"
+    raise Refusal("the STEP file contains several parts", value, limit, parts)
 
 
 def _refuse_too_many(gmsh: Any, size: float) -> None:

@@ -42,9 +42,9 @@ def validate(data: Mapping[str, Any], file: Path | str, *, whole: bool = False) 
     implied = study.motion.path.implied if study else {}
     doubts = [row for row in implausible({**data, **implied}) if row[0].field not in wrong]
     found += [error for error, _ in doubts]
-    doubtful = {error.field for error in found}
+    known = {error.field for error, refused in doubts if refused}
     others = contradictions(study, whole) if study else iter(())
-    more = [error for error in others if error.field not in doubtful]
+    more = [error for error in others if error.field not in known]
     if study is None or more or any(refused for _, refused in doubts):
         raise _of_file([*found, *more], file, places)
     return study
@@ -140,7 +140,8 @@ def _problem(issue: ErrorDetails) -> InputError:
             f"{hint}remove it, or see docs/reference/study.md for its spelling",
         )
     elif kind == "missing":
-        problem, remedy, value = "a required key is missing", "add it", None
+        what = "entry" if isinstance(issue["loc"][-1], int) else "key"
+        problem, remedy, value = f"a required {what} is missing", "add it", None
     if isinstance(value, Mapping | BaseModel):
         value = None
     return InputError(problem, field=field or None, value=shown(value), limit=limit, remedy=remedy)
