@@ -1,6 +1,6 @@
 """How often an interval contains the true value, for every kind of interval, by simulation.
 
-    PYTHONPATH=tests/helpers python benchmarks/interval_coverage.py --trials 1000
+    OPENBLAS_NUM_THREADS=1 python benchmarks/interval_coverage.py --trials 1000
 
 Each kind is a function of a generator and a length that returns an interval of a number that is
 known, by the code that analyses runs; `KINDS` has them all, with their lengths. A length counts
