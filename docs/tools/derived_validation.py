@@ -358,3 +358,10 @@ def _spins(store: Store) -> pd.DataFrame:
 @derived("motion/option_costs")
 def _option_costs(store: Store) -> pd.DataFrame:
     return _worded(store.table("motion/costs/costs"), "name", COSTS)
+
+
+@derived("validation/packings_total")
+def _packings_total(store: Store) -> pd.DataFrame:
+    """One row: the runs with the physical Young's modulus and their CPU time."""
+    runs = store.table("validation/packings")
+    return pd.DataFrame([{"runs": len(runs), "cpu_time_h": runs["cpu_time_s"].sum() / 3600}])

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 PARTICLE_STEPS_PER_S = 7e6
 """Particles times steps per second of a process, one rank, with a few facets."""
 
-FACET_STEP_S = 4e-7
+FACET_STEP_S = 3e-7
 """Time of a step for each facet of a workpiece, s, one rank (docs/data/benchmarks/facets.csv)."""
 
 _MOST_TIMES, _ALWAYS_FACETS = 5, 5000
