@@ -4,6 +4,7 @@ import base64
 import json
 import re
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from dragchain.network_page import frames as frames_module
 from dragchain.network_page.columns import ROUNDING, Columns
 from dragchain.network_page.frames import BODIES, DOMINANT, PATH, QUASI_LINEAR
 from dragchain.network_page.page import write_page
+from dragchain.network_page.scene import load_scene
+from dragchain.tables.run_folder import Run
 
 _BYTES = {"u8": 1, "u16": 2, "u32": 4, "f24": 3}
 
@@ -301,3 +304,18 @@ def test_a_drag_that_is_too_short_is_an_error(tmp_path: Path) -> None:
     force.to_parquet(run / "tables/workpiece_force.parquet")
     with pytest.raises(SeriesError):
         write_page(run)
+
+
+def test_times_and_speeds_of_a_faster_run_are_those_of_the_process(run: Path) -> None:
+    own = Run.open(run)
+    fidelity = own.case.fidelity.model_copy(update={"speed_factor": 5.0})
+    fast = replace(own, case=own.case.model_copy(update={"fidelity": fidelity}))
+    slow, quick = (load_scene(one).head for one in (own, fast))
+    np.testing.assert_allclose(quick["times"], 5 * np.array(slow["times"]))
+    for name in ("first", "interval", "counted", "window"):
+        assert quick["curve"][name] == pytest.approx(5 * slow["curve"][name])
+    assert quick["peaks"][0]["time"] == pytest.approx(5 * slow["peaks"][0]["time"])
+    assert quick["scales"]["speed"] == pytest.approx(slow["scales"]["speed"] / 5)
+    assert quick["scales"]["force"] == slow["scales"]["force"]
+    assert "fewer and larger contact forces" in quick["settings"]
+    assert "fewer" not in slow["settings"]
