@@ -111,8 +111,7 @@ def process_findings(drag: float = -2.5) -> ProcessFindings:
         run="workpiece-1", process_time_zero_s=0.1, confidence=0.95, workpiece_frames=31,
         forces=dict.fromkeys(("drag_n", "lateral_n", "vertical_n"), force(drag)),
         comparison=(Comparison(
-            label="experiment", mean_n=-2.59, std_n=0.66, difference_percent=-3.47,
-            ci95_low=-7.3, ci95_high=0.4, source="a paper"),),
+            label="experiment", mean_n=-2.59, std_n=0.66, source="a paper"),),
         peaks=Peaks(count=4, process_time_s=(), drag_n=(), largest_n=-3.9, separation_s=0.1),
         network=dict.fromkeys(network, 4.5) | {"frames": 31},
         chains=Chains.model_validate(numbers),

@@ -2,14 +2,14 @@
 
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from dragchain.errors import RejectedRunError
 from dragchain.files import write_text
 from dragchain.network_page.columns import ROUNDING
 from dragchain.network_page.scene import Scene, load_scene
-from dragchain.report.notation import TIMES, number
 from dragchain.report.page import NETWORK_PAGE, file_uri, page_environment
+from dragchain.run.basis import changed_settings, effects
 from dragchain.run.case import Case
 from dragchain.run.completeness import read_accepted
 from dragchain.tables.run_folder import Run
@@ -57,40 +57,13 @@ def render(case: Case, scene: Scene, pictures: dict[str, str | None], rejection:
         data=scene.columns.text(),
         pictures=pictures,
         rejection=rejection,
-        settings=settings_of(case),
+        settings=list(changed_settings(case.fidelity)),
+        effects=effects(case.fidelity),
         place_um=1e3 * scene.head["frames"]["step"] / 2,
         rounding=ROUNDING,
         script=_own("network.js"),
         style=_own("network.css"),
     )
-
-
-class Setting(NamedTuple):
-    """A setting in which a run differs from its process: in short, and what it means here."""
-
-    short: str
-    meaning: str
-
-
-def settings_of(case: Case) -> list[Setting]:
-    """The settings in which a run differs from its process, empty if it does not."""
-    own, found = case.fidelity, []
-    if own.youngs_modulus_scale != 1.0:
-        scale = number(own.youngs_modulus_scale)
-        meaning = (
-            f"Young's modulus is {scale} of the physical one: forces, numbers and overlaps of"
-            " contacts are those of this run and not extrapolated to the physical modulus."
-        )
-        found.append(Setting(f"E {TIMES} {scale}", meaning))
-    if own.speed_factor != 1.0:
-        factor = number(own.speed_factor)
-        meaning = (
-            f"The workpiece moves {factor} times as fast as in the process: forces and numbers of"
-            " contacts are those of this run; its times are multiplied and its speeds divided by"
-            f" {factor}."
-        )
-        found.append(Setting(f"speed {TIMES} {factor}", meaning))
-    return found
 
 
 def _own(name: str) -> str:

@@ -24,7 +24,6 @@ from dragchain.network_page.frames import (
     read_shown,
     shown_frames,
 )
-from dragchain.run.basis import notes
 from dragchain.run.case import Case
 from dragchain.run.kinematics import drag_phase, needed, process_time
 from dragchain.run.workpiece import read_surface
@@ -91,7 +90,6 @@ def load_scene(run: Run) -> Scene:
         "curve": _curve(columns, run),
         "peaks": _peaks(peaks, times_s, case),
         "colours": _colours(),
-        "settings": " ".join(notes(case)),
     }
     return Scene(head | {"columns": columns.entries}, columns)
 

@@ -29,8 +29,8 @@ from dragchain.report.findings import (
 from dragchain.report.run_data import RunData
 from dragchain.run.case import Case, load_outputs
 from dragchain.run.kinematics import drag_start_s, motion_of, needed, process_time
-from dragchain.run.reference import ReferenceDrag, reference_drags
-from dragchain.statistics.correlated import MeanEstimate, estimate_mean
+from dragchain.run.reference import reference_drags
+from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
 from dragchain.tables.bed import Packing
 from dragchain.tables.impacts import effective_restitution
@@ -70,8 +70,7 @@ def process_findings(run: RunData) -> ProcessFindings:
         process_time_zero_s=drag_start_s(run.case),
         forces=forces,
         comparison=tuple(
-            compare(forces["drag_n"], reference)
-            for reference in reference_drags(run.case.reference)
+            Comparison(**vars(reference)) for reference in reference_drags(run.case.reference)
         ),
         peaks=_peaks(samples, run),
         network={"frames": len(run.network)} | _means(run.network),
@@ -104,20 +103,6 @@ def _wake(samples: pd.DataFrame, case: Case) -> Wake | None:
     except SeriesError:
         return None
     return Wake(fresh_n=before, wake_n=after, ratio=after.over(before))
-
-
-def compare(ours: MeanEstimate, reference: ReferenceDrag) -> Comparison:
-    """Set the mean drag beside one of the source."""
-    difference = reference.difference(ours.estimate)
-    return Comparison(
-        label=reference.label,
-        mean_n=reference.mean_n,
-        std_n=reference.std_n,
-        difference_percent=100.0 * difference.value,
-        ci95_low=100.0 * difference.ci95_low,
-        ci95_high=100.0 * difference.ci95_high,
-        source=reference.source,
-    )
 
 
 def _peaks(samples: pd.DataFrame, run: RunData) -> Peaks:

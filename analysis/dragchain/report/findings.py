@@ -20,7 +20,7 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
 
 
 class Comparison(Part):
-    """A published mean drag, and the difference of the simulated one from it.
+    """A published mean drag to compare with; `Values.against` has the difference.
 
     Attributes
     ----------
@@ -28,17 +28,13 @@ class Comparison(Part):
         ``experiment`` or ``simulation``.
     mean_n, std_n : float
         Published mean and standard deviation, N; the latter is None if it is not reported.
-    difference_percent, ci95_low, ci95_high : float
-        Relative difference of the simulated mean, %, with its 95 % CI; the latter includes the
-        uncertainty of the simulated mean only.
+    source : str
+        Where it is published.
     """
 
     label: str
     mean_n: float
     std_n: float | None
-    difference_percent: float
-    ci95_low: float
-    ci95_high: float
     source: str
 
 

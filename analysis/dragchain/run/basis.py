@@ -148,7 +148,7 @@ def judge(
     factor = case.fidelity.speed_factor**quantity.time
     run = own.over(1.0 / factor)
     scaled = Basis.SCALED if factor != 1.0 else Basis.MEASURED
-    doubts = list(_doubts(case.fidelity))
+    doubts = changed_settings(case.fidelity)
     if not doubts:
         return Standing(quantity, run, run, scaled, "", reliable)
     if law is not None and case.fidelity.speed_factor == 1.0:
@@ -162,12 +162,22 @@ def judge(
     return Standing(quantity, run, None, Basis.NONE, reason, reliable)
 
 
-def _doubts(fidelity: Fidelity) -> Iterator[str]:
-    """The settings that are not those of the process."""
+def changed_settings(fidelity: Fidelity) -> dict[str, str]:
+    """The settings that are not those of the process, and what they were measured to give."""
+    found = {}
     if fidelity.youngs_modulus_scale != 1.0:
-        yield f"Young's modulus {_TIMES} {fidelity.youngs_modulus_scale:g}"
+        setting = f"Young's modulus {_TIMES} {fidelity.youngs_modulus_scale:g}"
+        found[setting] = "more and smaller contact forces than the physical one"
     if fidelity.speed_factor != 1.0:
-        yield f"speed {_TIMES} {fidelity.speed_factor:g}"
+        setting = f"speed {_TIMES} {fidelity.speed_factor:g}"
+        found[setting] = "fewer and larger contact forces than the speed of the process"
+    return found
+
+
+def effects(fidelity: Fidelity) -> list[str]:
+    """A sentence on each of `changed_settings`."""
+    changed = changed_settings(fidelity).items()
+    return [f"{setting[0].upper()}{setting[1:]} gives {effect}." for setting, effect in changed]
 
 
 def _why_not(case: Case) -> str:
@@ -183,30 +193,22 @@ def _why_not(case: Case) -> str:
 
 def notes(case: Case) -> list[str]:
     """What each setting of a process run does to its numbers, one sentence each."""
-    return [*_of_modulus(case.fidelity), *_of_speed(case.fidelity), _of_step(case)]
+    return [*_of_modulus_and_speed(case), _of_step(case)]
 
 
-def _of_modulus(fidelity: Fidelity) -> Iterator[str]:
-    scale = fidelity.youngs_modulus_scale
+def _of_modulus_and_speed(case: Case) -> Iterator[str]:
+    scale, factor = case.fidelity.youngs_modulus_scale, case.fidelity.speed_factor
     if scale == 1.0:
         yield "Young's modulus is the physical one."
-        return
-    effect = "more and smaller contact forces than at the physical one"
-    done = "Values are corrected to the physical modulus where a law is known."
-    if fidelity.speed_factor != 1.0:
-        done = "Nothing is corrected for it: the laws hold at the speed of the process only."
-    yield f"Young's modulus {_TIMES} {scale:g} gives {effect}. {done}"
-
-
-def _of_speed(fidelity: Fidelity) -> Iterator[str]:
-    factor = fidelity.speed_factor
+    yield from effects(case.fidelity)
     if factor != 1.0:
         yield (
-            f"Speed {_TIMES} {factor:g} gives fewer and larger contact forces than at the speed of "
-            "the process. Nothing is corrected for it: no law is known. Process time is simulated "
-            f"time {_TIMES} {factor:g}: times, impulses and rates of the report are in process "
-            "time, those of the tables in simulated time."
+            f"Nothing is corrected: {_why_not(case)}. Process time is simulated time {_TIMES} "
+            f"{factor:g}: times, impulses and rates of the report are in process time, those of "
+            "the tables in simulated time."
         )
+    elif scale != 1.0:
+        yield "Values are corrected to the physical modulus where a law is known."
 
 
 def _of_step(case: Case) -> str:

@@ -29,10 +29,11 @@ from dragchain.figures import network_picture as scene
 from dragchain.figures.rendering import RenderError, check_rendering
 from dragchain.figures.style import COLOURS, drawing
 from dragchain.network.frame import NetworkFrame
-from dragchain.report.collect import compare
+from dragchain.report.collect import process_findings
 from dragchain.report.findings import (
     FIGURES,
     FILE,
+    Comparison,
     DropFindings,
     FillingFindings,
     ProcessFindings,
@@ -47,7 +48,6 @@ from dragchain.report.run_figures import (
 )
 from dragchain.run.case import Case, PublishedDrag, Reference, load_case
 from dragchain.run.reference import reference_drags
-from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import Estimate
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
@@ -100,13 +100,13 @@ def reference(**drag: float) -> Reference:
 
 
 def test_comparison_is_relative_to_the_reference() -> None:
-    ours = estimate_mean(np.array([-1.98, -2.0] * 8))
+    ours = Estimate(-1.99, -2.01, -1.97)
     (drag,) = reference_drags(reference(drag_mean_n=-2.59, drag_std_n=0.66))
-    row = compare(ours, drag)
-    assert row.label == "experiment"
-    assert row.difference_percent == pytest.approx(100 * (1.99 / 2.59 - 1))
-    assert row.ci95_low < row.difference_percent < row.ci95_high
-    assert row.std_n == 0.66
+    difference = drag.difference(ours)
+    assert drag.label == "experiment"
+    assert difference.value == pytest.approx(1.99 / 2.59 - 1)
+    assert difference.ci95_low < difference.value < difference.ci95_high
+    assert drag.std_n == 0.66
     assert reference_drags(None) == []
 
 
@@ -179,6 +179,22 @@ def test_the_largest_force_has_the_mean_particle_radius() -> None:
 def test_picture_is_of_the_nearest_frame_or_the_last(wanted: float, expected: int) -> None:
     times = np.array([3.6, 4.2, 4.8])
     assert scene.picture_step(np.array([1.0, 2.0, 3.0]), times, wanted) == expected
+
+
+def test_times_of_a_faster_run_are_those_of_the_process(process: Path) -> None:
+    """A workpiece 5 times as fast takes a fifth of the time; its own speed is that of the run."""
+    case = load_case(process)
+    fast = case.model_copy(
+        update={"fidelity": case.fidelity.model_copy(update={"speed_factor": 5.0})}
+    )
+    slow, quick = (process_findings(RunData(process, one)) for one in (case, fast))
+    for name in ("process_time_s", "separation_s"):
+        ours, theirs = (np.array(getattr(found.peaks, name)) for found in (quick, slow))
+        np.testing.assert_allclose(ours, 5 * theirs)
+    assert quick.forces == slow.forces
+    trace, own = RunData(process, fast).drag, RunData(process, case).drag
+    np.testing.assert_allclose(trace.process_time_s, 5 * own.process_time_s)
+    assert scene.load_scene(process, fast).process_time_s == pytest.approx(5 * 0.4)
 
 
 def test_the_workpiece_moves_by_its_reference_point(process: Path) -> None:
@@ -376,7 +392,7 @@ def test_the_experiment_lies_over_the_mean_in_its_own_colour(process: Path) -> N
     run, found = RunData(process, load_case(process)), ProcessFindings.read(process / FILE)
     ours = found.forces["drag_n"].mean
     (published,) = reference_drags(reference(drag_mean_n=ours, drag_std_n=0.66))
-    row = compare(found.forces["drag_n"], published)
+    row = Comparison(**vars(published))
     (axes,) = forces(run, changed(found, comparison=[row])).axes
     at_mean = [line for line in axes.get_lines() if set(line.get_ydata()) == {ours}]
     assert [line.get_color() for line in at_mean] == ["black", COLOURS["experiment"]]
