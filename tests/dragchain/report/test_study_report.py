@@ -54,7 +54,7 @@ def test_summary_has_the_numbers_of_run_filling_and_drop(process: Path, tmp_path
     assert row["fidelity_youngs_modulus_scale"] == 0.01
     assert row["drag_mean_n"] == -2.5
     assert row["drag_ci95_low_n"] == -2.6
-    assert row["drag_against_measured_percent"] == -3.47
+    assert row["drag_against_experiment_percent"] == -3.47
     assert row["peak_max_n"] == -3.9
     assert row["bed_height_m"] == 0.0703
     assert row["restitution_effective"] == 0.71
