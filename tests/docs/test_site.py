@@ -7,7 +7,6 @@ from io import BytesIO
 from pathlib import Path
 
 import pytest
-from analysed_run import analysed_tiny_run
 from doc_pages import PAGES, name_of
 from figure_files import write_process_run
 from figures import FIGURES, IMAGES, svg
@@ -100,11 +99,6 @@ def test_a_figure_can_be_drawn_from_the_records(name: str) -> None:
 def test_a_picture_can_be_drawn_from_a_run(name: str, drawn_run: Path) -> None:
     with Image.open(BytesIO(picture(name, drawn_run))) as drawn:
         assert drawn.mode == "P" and min(drawn.size) > 300
-
-
-@pytest.mark.slow
-def test_an_export_can_be_drawn(tmp_path: Path) -> None:
-    assert len(picture("export", analysed_tiny_run(tmp_path / "tiny"))) > 5000
 
 
 @pytest.fixture(scope="module")

@@ -41,7 +41,7 @@ def _peak(run: Path) -> bytes:
 
 
 def _export(run: Path) -> bytes:
-    """The last frame as exported: half of the particles, and the contacts of the other half."""
+    """The first frame as exported: half of the particles, and the contacts of the other half."""
     import pyvista as pv
 
     case = load_case(run)
