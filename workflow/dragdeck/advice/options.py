@@ -232,6 +232,24 @@ def _sound_settings(tradeoff: Tradeoff) -> Iterator[MeasuredSetting]:
             yield setting
 
 
+def toward_law(
+    case: Case, option: Option, close: float, tradeoff: Tradeoff, asked: Tolerance
+) -> Option:
+    """An extrapolated option as it is at some distance from the scene of the trade-off.
+
+    Its error passes from the one that was measured there (`close` is 1) to that of the law (0), so
+    that nothing jumps where a scene leaves the range.
+    """
+    known = _law(tradeoff, asked)
+    if known is None or option.error is None:
+        return option
+    there = dict(option.error)
+    scale = option.fidelity.youngs_modulus_scale
+    here = dict(_law_error(known, describe(case), scale))
+    mixed = {name: close * there[name] + (1 - close) * here[name] for name in there}
+    return replace(option, error=MeasuredError(**mixed), by_law=close == 0)
+
+
 def _law_error(known: MeasuredLaw, numbers: Mapping[str, float], scale: float) -> MeasuredError:
     """The relative error of an extrapolation from a modulus scale in a scene.
 
