@@ -28,6 +28,7 @@ COUNTS = {
 """Columns of numbers of rows: they follow the rows of a record, not its numbers."""
 
 TEXTS = {
+    "kind",
     "change", "engine", "facets", "label", "levels", "map", "measured", "number_high", "number_low",
     "output", "processes", "program", "scene", "setting", "started", "versions_engine", "what",
     "words",

@@ -11,8 +11,7 @@ from made_tradeoff import made_tradeoff, setting, with_settings
 from random_scenes import random_scenes
 
 from dragdeck.advice.advise import advise, resolve
-from dragdeck.advice.cost import Work
-from dragdeck.advice.options import consistent, process_reference
+from dragdeck.advice.options import Work, consistent, process_reference
 from dragdeck.cases.bed import bed_timestep, skin
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution

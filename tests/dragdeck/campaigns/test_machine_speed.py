@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from made_tradeoff import cost, made_tradeoff
 
-from dragdeck.advice.cost import step_cost
+from dragdeck.advice.options import step_cost
 from dragdeck.advice.speed import Speed
 from dragdeck.campaigns.machine_speed import (
     DRAG_STEPS,

@@ -15,6 +15,7 @@ from dragdeck.advice.options import (
     finest_drop,
     process_options,
     process_reference,
+    toward_law,
     with_option,
 )
 from dragdeck.cases.case import Case
@@ -174,11 +175,15 @@ def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
         held = [(one, _held(close), outside) for one in drop_options(case, tradeoff)]
     else:
         reference = process_reference(case, tradeoff)
-        held = [
-            (one, _held(close) if _at_full_modulus(one) else close, outside)
-            for one in process_options(case, tradeoff, asked)
-        ]
-        held += _extrapolated(case, here, tradeoff, asked)
+        by_law = list(_extrapolated(case, here, tradeoff, asked))
+        held = [*by_law]
+        for one in process_options(case, tradeoff, asked):
+            if one.extrapolated and by_law:
+                _, share, beside = by_law[0]
+                mixed = toward_law(case, one, close, tradeoff, asked)
+                held.append((mixed, share + (1.0 - share) * close, beside if outside else []))
+            else:
+                held.append((one, _held(close) if _at_full_modulus(one) else close**2, outside))
     options = [option for option, _, _ in held]
     holding = [
         one for one in held if one[0].error and one[0].error.limit <= asked.tolerance * one[1]

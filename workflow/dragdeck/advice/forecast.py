@@ -10,8 +10,7 @@ from rich.table import Table
 
 from dragdeck import __version__
 from dragdeck.advice.advise import RESTITUTION, Advice, Spread, percent, signed
-from dragdeck.advice.cost import step_cost
-from dragdeck.advice.options import Option, process_options, with_option
+from dragdeck.advice.options import Option, process_options, step_cost, with_option
 from dragdeck.advice.speed import SCALE, Speed
 from dragdeck.cases.case import Case
 from dragdeck.decks.advised import AdvisedSettings

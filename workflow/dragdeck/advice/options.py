@@ -5,9 +5,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 
-from dragdeck.advice.cost import Work
-from dragdeck.cases.bed import widest_skin
-from dragdeck.cases.case import Case
+import numpy as np
+
+from dragdeck.cases.bed import bed_timestep, widest_skin
+from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.outlook.measured import (
     FidelityParameters,
     MeasuredDrop,
@@ -25,8 +26,10 @@ from dragdeck.physics.similarity import (
     softest_scale,
 )
 from dragdeck.scenes.dimensionless import describe
-from dragdeck.scenes.filling import filling_cautions
+from dragdeck.scenes.filling import FILLING, expected_surface, expected_time, filling_cautions
 from dragdeck.scenes.fit import process_cautions
+from dragdeck.scenes.motion import plunge_point
+from dragdeck.scenes.workpiece import FACET_STEP_S, PARTICLE_STEPS_PER_S, workpiece_mesh
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance
 
 _FEWEST_RUNS = 2
@@ -34,6 +37,75 @@ _FEWEST_RUNS = 2
 
 _PROCESS_OF_DROP = "standard"
 """Fidelity of the process in a study whose tolerance is about the drop test."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """What the filling and the process of a case take. Its drop test is the same at all settings.
+
+    Attributes
+    ----------
+    study : Study
+    tradeoff : Tradeoff
+    filling_s, process_s : float
+        Simulated time, that of the process at the study's own speed, s.
+    facets : int
+        Of all workpieces.
+    """
+
+    study: Study
+    tradeoff: Tradeoff
+    filling_s: float
+    process_s: float
+    facets: int
+
+    @classmethod
+    def of(cls, case: Case, tradeoff: Tradeoff) -> "Work":
+        """Of a case; its own fidelity does not matter."""
+        study, motion = case.study, case.study.motion
+        way = math.dist(plunge_point(motion), motion.path.start_point)
+        process_s = (
+            expected_surface(study) / motion.plunge_speed_m_s
+            + way / motion.approach_speed_m_s
+            + motion.path_length_m / motion.axis_speed_m_s
+        )
+        facets = sum(len(workpiece_mesh(one).faces) for one in of_each_workpiece(case))
+        return cls(study, tradeoff, expected_time(study), process_s, facets)
+
+    def cpu_time(self, fidelity: Fidelity) -> float:
+        """CPU time of both runs with some settings, s: only ratios of it count."""
+        study = self.study.model_copy(update={"fidelity": fidelity})
+        filling = self.filling_s / bed_timestep(study, "filling_timestep_fraction")
+        process = self.process_s / bed_timestep(study, "timestep_fraction")
+        process *= step_cost(fidelity.youngs_modulus_scale, self.tradeoff) / fidelity.speed_factor
+        count = study.media.count
+        of_facets = self.facets * FACET_STEP_S
+        return filling * count / FILLING.particle_steps_per_s + process * (
+            count / PARTICLE_STEPS_PER_S + of_facets
+        )
+
+
+def step_cost(scale: float, tradeoff: Tradeoff) -> float:
+    """Time of a step of the drag at a modulus scale, over that at the others that were timed.
+
+    Soft particles have more contacts, and their steps cost more. Interpolated over
+    logarithms; 1 where nothing was timed.
+
+    Parameters
+    ----------
+    scale : float
+        Factor on every Young's modulus.
+    tradeoff : Tradeoff
+    """
+    timed = sorted(
+        (cost.level, cost.per_step)
+        for cost in tradeoff.costs
+        if cost.parameter == "youngs_modulus_scale" and cost.level and cost.per_step
+    )
+    if not timed:
+        return 1.0
+    levels, logs = zip(*((level, math.log(time)) for level, time in timed), strict=True)
+    return math.exp(np.interp(math.log(scale), np.log(levels), logs))
 
 
 @dataclass(frozen=True)
@@ -230,6 +302,24 @@ def _sound_settings(tradeoff: Tradeoff) -> Iterator[MeasuredSetting]:
         sound = setting.failed == 0 and not setting.breaks and setting.runs >= _FEWEST_RUNS
         if sound and setting.timestep_fraction <= limit and setting.relative_cost is not None:
             yield setting
+
+
+def toward_law(
+    case: Case, option: Option, close: float, tradeoff: Tradeoff, asked: Tolerance
+) -> Option:
+    """An extrapolated option as it is at some distance from the scene of the trade-off.
+
+    Its error passes from the one that was measured there (`close` is 1) to that of the law (0), so
+    that nothing jumps where a scene leaves the range.
+    """
+    known = _law(tradeoff, asked)
+    if known is None or option.error is None:
+        return option
+    there = dict(option.error)
+    scale = option.fidelity.youngs_modulus_scale
+    here = dict(_law_error(known, describe(case), scale))
+    mixed = {name: close * there[name] + (1 - close) * here[name] for name in there}
+    return replace(option, error=MeasuredError(**mixed), by_law=close == 0)
 
 
 def _law_error(known: MeasuredLaw, numbers: Mapping[str, float], scale: float) -> MeasuredError:

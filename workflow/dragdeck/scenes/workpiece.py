@@ -79,7 +79,7 @@ def _too_fine(case: Case) -> Iterator[Caution]:
     enough = max(_ALWAYS_FACETS, round(_MOST_TIMES * particles_s / FACET_STEP_S))
     if facets <= enough:
         return
-    coarser = math.sqrt(facets / enough)
+    coarser = 1.1 * math.sqrt(facets / enough)  # not all facets scale alike
     size = shape.facet_size_m
     along = " (facet_length_m in proportion)" if isinstance(shape, CylinderShape) else ""
     remedy = (
