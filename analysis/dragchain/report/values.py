@@ -206,5 +206,5 @@ def _plain(one: Standing) -> str:
     ends = f"95 % CI {found.ci95_low:#.3g} to {found.ci95_high:#.3g}{unit}{doubt}"
     text = f"{name} {found.value:#.3g}{unit}" + (f" ({ends})" if found.known else "")
     if one.corrected:
-        return f"{text} at the physical Young's modulus, {one.run.value:#.3g}{unit} in the run"
+        return f"{text} at the physical Young's modulus, {one.run.value:#.3g}{unit} as simulated"
     return f"{text}, {what}" if what else text

@@ -134,7 +134,7 @@ def test_an_extrapolated_answer_stands_beside_the_value_of_the_run(tmp_path: Pat
     assert "Values at the physical Young's modulus" in words
     assert "contacts on the workpiece at a time 25.6 (24.2 to 27.4) 32.1 corrected" in words
     assert "through 25.6 contacts at a time" in words
-    assert "this run: 32.1" in words
+    assert "as simulated: 32.1" in words
     assert "25.6 (24.2 to 27.4) 6.2 %" in words  # in the table of tolerances
     row = pd.read_csv(tmp_path / "summary.csv").iloc[0]
     assert row["extrapolated_workpiece_contacts"] == pytest.approx(25.6)

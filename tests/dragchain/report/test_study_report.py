@@ -336,7 +336,7 @@ def test_a_faster_run_says_so_first_and_gives_no_number_of_contacts(
     assert "fewer and larger contact forces" in words
     assert "more and smaller" not in words
     assert "contacts</b> at a time" not in (tmp_path / "report.html").read_text()
-    assert "not available contacts on the workpiece at a time this run:" in words
+    assert "not available contacts on the workpiece at a time as simulated:" in words
     row = pd.read_csv(tmp_path / "summary.csv").iloc[0]
     assert "contacts on the workpiece at a time: not available" in row["headline"]
     assert row["normal_impulse_n_s_per_m"] == pytest.approx(5 * 0.856 / 0.03, rel=1e-3)
@@ -353,7 +353,7 @@ def test_a_reduced_modulus_gives_the_corrected_number_of_contacts_first(
     assert "fewer and larger" not in words
     own = float(pd.read_csv(tmp_path / "summary.csv").iloc[0]["workpiece_contacts"])
     assert f"through {0.8 * own:.2f} contacts at a time" in words
-    assert "mean force of 2.00 N" in words and "this run: \N{MINUS SIGN}2.50 N" in words
+    assert "mean force of 2.00 N" in words and "as simulated: \N{MINUS SIGN}2.50 N" in words
     assert (
         main_numbers(tmp_path)
         .splitlines()[1]
