@@ -24,6 +24,7 @@ from scipy.special import exprel
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
+from dragchain.statistics.estimate import NORMAL_QUANTILE
 from dragchain.tradeoff.six_digits import SixDigits
 
 UNIT = 5e4
@@ -40,9 +41,6 @@ COEFFICIENTS = 3
 
 _RATE, _RATE_STD = 0.5, 1.0
 """What is known of a rate beforehand, for effects too small to have a rate of their own."""
-
-NORMAL_95 = 1.96
-"""Half-width of a 95 % interval in standard deviations of a normal distribution."""
 
 _RATE_STEP = 0.02
 """Step of the differences that take the place of derivatives by the rate."""
@@ -193,7 +191,7 @@ class Extrapolation:
         quantile : float
             Of the errors by the law. The scatter of a run is known from many runs.
         """
-        return math.hypot(quantile * self.law_se, NORMAL_95 * self.run_se)
+        return math.hypot(quantile * self.law_se, NORMAL_QUANTILE * self.run_se)
 
 
 def fit_stiffness_law(scenes: Sequence[ScaledRuns]) -> StiffnessLaw:
@@ -348,8 +346,8 @@ class ErrorIn:
 def with_misfit(law: StiffnessLaw, errors: Mapping[float, Sequence[ErrorIn]]) -> StiffnessLaw:
     """A law with what its errors in scenes left out of the fit are beyond their standard errors.
 
-    Only what exceeds the standard error of such a mean square counts: chance alone would otherwise
-    add a misfit to every other law.
+    The misfit is the moment estimate of a variance between scenes, zero where it is negative
+    (DerSimonian and Laird 1986, Controlled Clinical Trials 7, 177-188).
 
     Parameters
     ----------
@@ -361,8 +359,7 @@ def with_misfit(law: StiffnessLaw, errors: Mapping[float, Sequence[ErrorIn]]) ->
     for scale, found in errors.items():
         expected = float(np.mean([one.found.se**2 for one in found]))
         beyond = float(np.mean([one.found.logarithm**2 for one in found])) - expected
-        by_chance = expected * math.sqrt(2.0 / len(found))
-        misfit.append((scale, math.sqrt(beyond) if beyond > by_chance else 0.0))
+        misfit.append((scale, math.sqrt(max(beyond, 0.0))))
     return replace(law, misfit=tuple(misfit))
 
 
