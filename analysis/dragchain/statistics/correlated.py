@@ -1,5 +1,6 @@
 """The mean of a correlated series and its uncertainty."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,10 +69,9 @@ class MeanEstimate:
 
     def over(self, below: "MeanEstimate") -> Estimate:
         """The ratio to an independent mean: relative half-widths add up as squares do."""
-        both = self, below
-        relative = np.hypot(*(0.5 * (one.ci95_high - one.ci95_low) / one.mean for one in both))
+        above, under = (0.5 * (one.ci95_high - one.ci95_low) / one.mean for one in (self, below))
         value, reliable = self.mean / below.mean, self.reliable and below.reliable
-        half = abs(value) * float(relative)
+        half = abs(value) * math.hypot(above, under)
         return Estimate(value, value - half, value + half, reliable)
 
 
