@@ -73,4 +73,4 @@ def claims(found: Statements) -> tuple[Claim, ...]:
 def claim_table(rows: tuple[Claim, ...]) -> pd.DataFrame:
     """The claims as a table, one row per number."""
     known = [dict(row) | vars(row.estimate) for row in rows]
-    return pd.DataFrame(known).drop(columns="estimate")
+    return pd.DataFrame(known).drop(columns=["estimate", "reliable"])

@@ -65,16 +65,14 @@ class MeanEstimate:
     @property
     def estimate(self) -> Estimate:
         """The mean with its interval."""
-        return Estimate(self.mean, self.ci95_low, self.ci95_high, self.reliable)
+        return Estimate(self.mean, self.ci95_low, self.ci95_high, reliable=self.reliable)
 
     def over(self, below: "MeanEstimate") -> Estimate:
         """The ratio to an independent mean: relative half-widths add up as squares do."""
-        both = self, below
-        widths = [0.5 * (one.ci95_high - one.ci95_low) / one.mean for one in both]
-        relative = math.hypot(*widths)
+        above, under = (0.5 * (one.ci95_high - one.ci95_low) / one.mean for one in (self, below))
         value, reliable = self.mean / below.mean, self.reliable and below.reliable
-        half = abs(value) * relative
-        return Estimate(value, value - half, value + half, reliable)
+        half = abs(value) * math.hypot(above, under)
+        return Estimate(value, value - half, value + half, reliable=reliable)
 
 
 def estimate_mean(series: ArrayLike, *, confidence: float = CONFIDENCE) -> MeanEstimate:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Annotated
 
 import numpy as np
@@ -40,7 +40,7 @@ class Estimate:
     value: Real
     ci95_low: Real
     ci95_high: Real
-    reliable: bool = True
+    reliable: bool = field(default=True, kw_only=True)
 
     @classmethod
     def around(cls, value: float, half_width: float) -> "Estimate":
@@ -63,7 +63,7 @@ class Estimate:
     def over(self, size: float) -> "Estimate":
         """The estimate divided by a number, which may be negative."""
         low, high = sorted((self.ci95_low / size, self.ci95_high / size))
-        return Estimate(self.value / size, low, high, self.reliable)
+        return Estimate(self.value / size, low, high, reliable=self.reliable)
 
     def exp(self, factor: float = 1.0, minus: float = 0.0) -> "Estimate":
         """The estimate of ``exp(factor * x) - minus``, for a positive factor."""
@@ -72,7 +72,7 @@ class Estimate:
     def mapped(self, function: Callable[[float], float]) -> "Estimate":
         """The estimate of a rising function of the number."""
         value, low, high = (float(function(number)) for number in self._numbers)
-        return Estimate(value, low, high, self.reliable)
+        return Estimate(value, low, high, reliable=self.reliable)
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def estimates(sums: Floats, statistic: Callable[[Floats], Floats]) -> list[Estim
     few = ((least == 0.0) & (np.abs(moves) > LARGEST_REACH * means)).any(axis=1)
     reliable = [one is not None and one.reliable for one in found] & ~few
     ends = zip(values.tolist(), low.tolist(), high.tolist(), reliable.tolist(), strict=True)
-    return [Estimate(*end) for end in ends]
+    return [Estimate(*end, reliable=sure) for *end, sure in ends]
 
 
 def _slopes(sums: Floats, means: Floats, statistic: Callable[[Floats], Floats]) -> Floats:
