@@ -185,7 +185,7 @@ def _why_not(case: Case) -> str:
     if case.changed_law:
         return "a template of the study changes the contact law"
     if fidelity.speed_factor == 1.0:
-        return "no law of this quantity is known"
+        return "no law is known for this quantity at this modulus"
     if fidelity.youngs_modulus_scale == 1.0:
         return "no law for a faster workpiece is known"
     return "the laws hold at the speed of the process only"

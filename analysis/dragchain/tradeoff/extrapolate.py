@@ -20,9 +20,9 @@ _SCENE_SIZE = "particles"
 def extrapolate_run(run_dir: Path, record: Path) -> None:
     """Write ``extrapolated.json`` of a run: its quantities, and what the laws make of them.
 
-    No law applies to a run at the physical modulus, and none to a workpiece that is faster than
-    the study says: the laws were measured at a study's own speed. None applies if a template of the
-    study changed the contact law.
+    No law applies to a run at the physical modulus or below the smallest one of the record, nor to
+    a workpiece that is faster than the study says: the laws were measured at a study's own speed.
+    None applies if a template of the study changed the contact law.
 
     Parameters
     ----------
@@ -40,7 +40,8 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
     """
     case, known = load_case(run_dir), StiffnessRecord.read(record)
     scale = case.fidelity.youngs_modulus_scale
-    applies = scale < 1.0 and case.fidelity.speed_factor == 1.0 and not case.changed_law
+    softest = min(float(one) for scene in known.scenes for one in scene.runs)
+    applies = softest <= scale < 1.0 and case.fidelity.speed_factor == 1.0 and not case.changed_law
     along = quantities_along(run_dir, case)
     diameters = along.arc_m / (2.0 * case.media.radius_mean_m)
     values = along.values()

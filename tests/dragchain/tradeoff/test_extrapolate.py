@@ -19,7 +19,7 @@ RECORD = ROOT / "workflow/dragdeck/data/stiffness.json"
     ("friction", "settings", "known"),
     [
         (0.34, {}, True), (0.0, {}, False), (0.34, {"speed_factor": 5.0}, False),
-        (0.34, {"youngs_modulus_scale": 1.0}, False),
+        (0.34, {"youngs_modulus_scale": 1.0}, False), (0.34, {"youngs_modulus_scale": 1e-4}, False),
     ],
 )  # fmt: skip
 def test_a_law_applies_to_a_bed_with_friction_at_the_speed_of_the_study(
