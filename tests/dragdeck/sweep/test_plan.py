@@ -45,6 +45,13 @@ def fidelities(points: Points) -> list[Fidelity]:
     return [case.study.chosen_fidelity() for case in points.processes]
 
 
+def test_a_point_whose_path_is_mostly_transient_is_refused(make: Callable[..., Points]) -> None:
+    rates = ("workpiece_force_hz", "workpiece_contacts_hz", "network_hz")
+    base = PLAN["base"] | {f"outputs.{rate}": 1000 for rate in rates}
+    with pytest.raises(InputError, match=r"arc: of the 1\.57 mm .* 0\.571 mm remain"):
+        make(arc=0.25, base=base, points=[])
+
+
 def test_every_combination_is_a_point_once(make: Callable[..., Points]) -> None:
     points = make()
     assert len(points.processes) == 1 + 4 * 2 + 3

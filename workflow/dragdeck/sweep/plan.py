@@ -27,6 +27,9 @@ from dragdeck.sweep.cases import Resolve, beside_each_other, settle_case
 
 Settings = Mapping[str, Any]
 
+_LEAST_COUNTED = 0.5
+"""Smallest fraction of a point's path that the statistics use."""
+
 
 class Block(Model):
     """Points that belong together: every combination of the values that vary."""
@@ -146,6 +149,7 @@ def plan_points(plan: Plan, plan_file: Path, base: Case, resolve: Resolve | None
         for settings in _settings(plan, block, base.study, scene):
             shown = {**scene, **_unnamed(settings)}
             case = _case(base, {**plan.base, **scene, **settings}, shown, plan_file, resolve)
+            _check_counted(case, plan_file)
             found.setdefault(PROCESS.run_id(case), case)
     drops: dict[str, Case] = {}
     for settings in [
@@ -155,6 +159,21 @@ def plan_points(plan: Plan, plan_file: Path, base: Case, resolve: Resolve | None
         case = _case(base, {**plan.base, **settings}, settings, plan_file, resolve)
         drops.setdefault(DROP_TEST.run_id(case), case)
     return Points(beside_each_other(found.values()), list(drops.values()), plan.cost_rounds)
+
+
+def _check_counted(case: Case, plan_file: Path) -> None:
+    """Refuse a point whose path is mostly transient: the rest is too short for statistics."""
+    motion = case.study.motion
+    whole, counted = motion.path_length_m, motion.path_length_m - motion.uncounted_m
+    if counted < _LEAST_COUNTED * whole:
+        raise InputError(
+            f"of the {1e3 * whole:.3g} mm of path of a point, {1e3 * counted:.3g} mm remain for "
+            "the statistics",
+            file=plan_file,
+            field="arc",
+            limit=f"at least {_LEAST_COUNTED:g} of the path",
+            remedy="a larger arc in the plan, or a study with a longer path or a shorter transient",
+        )
 
 
 def _size(block: Block) -> int:
