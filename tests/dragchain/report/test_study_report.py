@@ -97,8 +97,9 @@ def test_page_shows_the_contacts_on_the_workpiece_if_they_are_known(
     assert len(page.images) == len(PICTURES) + 2
     html = (tmp_path / "with" / "report.html").read_text(encoding="utf-8")
     words = " ".join(re.sub("<[^>]+>", " ", html).split())
-    assert "impact 2 0.33 % (" in words
-    assert "resting 1 17 % (" in words
+    assert "impact 0.0667 0.33 % (" in words  # two of them over a path of 30 mm
+    assert "resting 0.0333 17 % (" in words
+    assert "(too few)" in words
     assert "normal impulse (N s) 0.856" in words
     assert "friction work (J) 0.00200" in words
 
