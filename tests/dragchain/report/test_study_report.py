@@ -103,6 +103,7 @@ def test_page_shows_the_contacts_on_the_workpiece_if_they_are_known(
     words = words_of((tmp_path / "with" / "report.html").read_text(encoding="utf-8"))
     assert "impact 66.7 0.33 % (" in words  # two events over a path of 30 mm
     assert "resting 33.3 17 % (" in words
+    assert "(too few)" in words
     assert "normal impulse per metre of path (N s/m) 28.5" in words
     assert "friction work per metre of path (J/m)" in words
 

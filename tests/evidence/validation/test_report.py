@@ -300,7 +300,7 @@ def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
     page = template.render(found=scalings, picture=lambda name: f"data:image/png;base64,{name}")
     assert 'src="data:image/png;base64,scaling.png"' in page
     for found in scalings:
-        value, low, high = (
-            f"{n:.2f}".replace("-", MINUS) for n in vars(found.judged.exponent).values()
-        )
+        exponent = found.judged.exponent
+        ends = (exponent.value, exponent.ci95_low, exponent.ci95_high)
+        value, low, high = (f"{n:.2f}".replace("-", MINUS) for n in ends)
         assert f"{found.verdict}: exponent {value} ({low} to {high})" in page
