@@ -206,8 +206,8 @@ def test_a_shorter_run_counts_less(points: Points) -> None:
     [
         (1.1, 1.5, "confirmed"),
         (0.5, 0.9, "contradicted"),
-        (0.9, 1.5, "not significant"),
-        (math.nan, math.nan, "not significant"),
+        (0.9, 1.5, "not confirmed"),
+        (math.nan, math.nan, "not confirmed"),
     ],
 )
 def test_a_verdict_is_the_interval_against_no_effect(
@@ -300,7 +300,9 @@ def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
     page = template.render(found=scalings, picture=lambda name: f"data:image/png;base64,{name}")
     assert 'src="data:image/png;base64,scaling.png"' in page
     for found in scalings:
+        exponent = found.judged.exponent
         value, low, high = (
-            f"{n:.2f}".replace("-", MINUS) for n in vars(found.judged.exponent).values()
+            f"{n:.2f}".replace("-", MINUS)
+            for n in (exponent.value, exponent.ci95_low, exponent.ci95_high)
         )
         assert f"{found.verdict}: exponent {value} ({low} to {high})" in page
