@@ -301,8 +301,6 @@ def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
     assert 'src="data:image/png;base64,scaling.png"' in page
     for found in scalings:
         exponent = found.judged.exponent
-        value, low, high = (
-            f"{n:.2f}".replace("-", MINUS)
-            for n in (exponent.value, exponent.ci95_low, exponent.ci95_high)
-        )
+        ends = (exponent.value, exponent.ci95_low, exponent.ci95_high)
+        value, low, high = (f"{n:.2f}".replace("-", MINUS) for n in ends)
         assert f"{found.verdict}: exponent {value} ({low} to {high})" in page
