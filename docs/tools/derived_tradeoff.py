@@ -447,8 +447,8 @@ def _promises_summary(store: Store) -> pd.DataFrame:
                 "quantity": name,
                 "label": LABELS[name],
                 "scenes": len(own),
-                "confirmed": sum(one["verdict"] == "kept" for one in own),
-                "violated": sum(one["verdict"] == "broken" for one in own),
+                "confirmed": sum(one["verdict"] == "confirmed" for one in own),
+                "contradicted": sum(one["verdict"] == "contradicted" for one in own),
                 "half_width_low": min(half),
                 "half_width_high": max(half),
                 "root_mean_square": math.sqrt(np.mean([error["value"] ** 2 for error in errors])),
@@ -471,7 +471,7 @@ def _promises_total(store: Store) -> pd.DataFrame:
         [
             {
                 "confirmed": summary["confirmed"].sum(),
-                "violated": summary["violated"].sum(),
+                "contradicted": summary["contradicted"].sum(),
                 "rejected": len(rejected),
                 "number_low": min(numbers),
                 "number_high": max(numbers),
@@ -562,8 +562,8 @@ def _scaling(store: Store) -> pd.DataFrame:
         found = store.record(f"scaling/{study}")
         fit, levels = found["fit"], found["levels"]
         rejected = fit["lack_of_fit"] < 0.05
-        agrees = found["verdict"] == "agrees"
-        verdict = "exponent agrees, power law rejected" if agrees and rejected else found["verdict"]
+        confirmed = found["verdict"] == "confirmed"
+        verdict = "confirmed, power law rejected" if confirmed and rejected else found["verdict"]
         row = {
             "study": study,
             "label": label,

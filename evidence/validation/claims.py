@@ -1,14 +1,10 @@
 """The source's statements, each with its number, its interval and a verdict by one rule."""
 
-from typing import Literal
-
 import pandas as pd
 
 from dragchain.documents import Part
-from dragchain.statistics.estimate import Estimate
+from dragchain.statistics.estimate import Estimate, Verdict
 from evidence.validation.around_workpiece import Statements
-
-Verdict = Literal["confirmed", "contradicted", "not significant"]
 
 
 class Claim(Part):
@@ -38,10 +34,10 @@ class Claim(Part):
 def verdict(estimate: Estimate, null: float) -> Verdict:
     """Confirmed if the whole interval lies above the null, contradicted if it lies below."""
     if not estimate.known:
-        return "not significant"
+        return "not confirmed"
     if estimate.ci95_low > null:
         return "confirmed"
-    return "contradicted" if estimate.ci95_high < null else "not significant"
+    return "contradicted" if estimate.ci95_high < null else "not confirmed"
 
 
 def claims(found: Statements) -> tuple[Claim, ...]:

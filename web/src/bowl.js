@@ -1,13 +1,13 @@
 // The outline of the bowl, the settled surface of the bed, and the path of the workpiece.
 import { BufferAttribute, BufferGeometry, Group, Line, LineSegments } from "three";
-import { SOFT, STEEL, rgb } from "./colours.js";
+import { COLOURS, STEEL, rgb } from "./colours.js";
 import { lineMaterial } from "./shading.js";
 
 const PARTS = 96;
 
 export function outline({ bowl, surface, workpieces }) {
   const group = new Group(),
-    soft = lineMaterial(rgb(SOFT)),
+    soft = lineMaterial(rgb(COLOURS.bowl)),
     steel = lineMaterial(rgb(STEEL));
   for (const height of [0, surface, bowl.height])
     group.add(line(circle(bowl.radius, height), height === surface ? steel : soft));

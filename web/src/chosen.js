@@ -2,7 +2,7 @@
 // and the line between the places whose distance is measured.
 import { BufferAttribute, BufferGeometry, Group, Mesh } from "three";
 import { Bodies } from "./bodies.js";
-import { CHOSEN, INK, rgb } from "./colours.js";
+import { CHOSEN, COLOURS, rgb } from "./colours.js";
 import { bodyMaterial, facetMaterial } from "./shading.js";
 
 const PARTICLE = 0.6,
@@ -34,8 +34,8 @@ export class Chosen {
     if (chosen?.pair) this.markContact(frame, chosen.pair);
     else if (chosen?.particle !== undefined) this.markParticle(frame, chosen.particle);
     const { radius } = this.frames.head.media;
-    for (const place of places) this.body.add(place, place, END * radius, 0, rgb(INK));
-    if (places.length === 2) this.body.add(...places, LINE * radius, 0, rgb(INK));
+    for (const place of places) this.body.add(place, place, END * radius, 0, rgb(COLOURS.ink));
+    if (places.length === 2) this.body.add(...places, LINE * radius, 0, rgb(COLOURS.ink));
     this.body.show();
     this.facet.visible = chosen?.facet !== undefined;
     if (this.facet.visible) this.markFacet(chosen.facet);

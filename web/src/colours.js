@@ -1,12 +1,11 @@
-// Colours of the scene: one map for force, speed, displacement and load; one colour per class.
+// Colours of the page: those of all figures for what they show too, which `pytest tests/contract --update` copies;
+// one map for force, speed, displacement and load; one colour per class.
+import COLOURS from "./colours.json";
 
-export const INK = "#1d2733",
-  SOFT = "#aab4be",
-  PALE = "#dfe3e8",
+export { COLOURS };
+export const PALE = "#dfe3e8",
   MEDIA = "#b9c2cc",
-  STEEL = "#8d98a5";
-export const PATH_COLOUR = "#1fa2e8",
-  CHAIN_COLOUR = "#009e73",
+  STEEL = "#8d98a5",
   CHOSEN = "#d55e00";
 export const CLASS_COLOURS = ["#56657a", "#d55e00", "#0072b2"]; // told apart with any colour vision
 

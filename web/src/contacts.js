@@ -1,6 +1,6 @@
 // The contacts: one cylinder each, whose radius and colour show the normal force.
 import { Bodies } from "./bodies.js";
-import { CHAIN_COLOUR, CLASS_COLOURS, PALE, PATH_COLOUR, STEEL, blend, rgb } from "./colours.js";
+import { CLASS_COLOURS, COLOURS, PALE, STEEL, blend, rgb } from "./colours.js";
 import { DOMINANT, QUASI_LINEAR } from "./frames.js";
 import { bodyMaterial } from "./shading.js";
 
@@ -28,7 +28,7 @@ export class Contacts {
       tints = CLASS_COLOURS.map(rgb),
       pale = rgb(PALE),
       steel = rgb(STEEL),
-      marks = [PATH_COLOUR, CHAIN_COLOUR].map(rgb);
+      marks = [COLOURS.dominant_path, COLOURS.chain].map(rgb);
     this.rows = [];
     this.counts = [0, 0, 0];
     this.cylinders.clear();

@@ -3,7 +3,7 @@ import { Vector3 } from "three";
 import { outline } from "./bowl.js";
 import { named, underRay } from "./choice.js";
 import { Chosen } from "./chosen.js";
-import { CLASS_COLOURS, colourMap } from "./colours.js";
+import { CLASS_COLOURS, COLOURS, colourMap } from "./colours.js";
 import { readColumns } from "./columns.js";
 import { Contacts } from "./contacts.js";
 import { ForceCurve } from "./force_curve.js";
@@ -29,6 +29,8 @@ class Page {
     this.number = head.peaks[0]?.frame ?? 0;
     this.look = { classes: [true, true, true], threshold: 0, chosen: null, section: null };
     this.measured = null; // the particles or contacts whose distance is measured
+    for (const [name, colour] of Object.entries(COLOURS)) // network.css takes them by name
+      document.documentElement.style.setProperty(`--${name}`, colour);
     this.startCurve(columns);
     this.startProfiles();
     this.startScene(columns);

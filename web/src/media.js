@@ -1,6 +1,6 @@
 // The media: one sphere per particle.
 import { Bodies } from "./bodies.js";
-import { MEDIA, PATH_COLOUR, blend, rgb } from "./colours.js";
+import { COLOURS, MEDIA, blend, rgb } from "./colours.js";
 import { DOMINANT } from "./frames.js";
 import { bodyMaterial } from "./shading.js";
 
@@ -21,7 +21,7 @@ export class Media {
       look.colour
     ];
     const plain = rgb(MEDIA),
-      path = blend(rgb(PATH_COLOUR), [1, 1, 1], 0.25);
+      path = blend(rgb(COLOURS.dominant_path), [1, 1, 1], 0.25);
     this.rows = [];
     this.spheres.clear();
     for (let k = 0; k < frame.id.length; k++) {

@@ -1,6 +1,6 @@
 // The workpiece: its facets, coloured by what acted on them, and an arrow along its motion.
 import { BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, Group, Mesh } from "three";
-import { INK, STEEL, rgb } from "./colours.js";
+import { COLOURS, rgb } from "./colours.js";
 import { facetMaterial } from "./shading.js";
 
 export class Workpiece {
@@ -39,7 +39,7 @@ export class Workpiece {
   /** Colour the facets by a load; plain if there is none of that name. */
   update(look, colourOf) {
     const load = this.own.loads.find(({ name }) => name === look.load),
-      plain = rgb(STEEL);
+      plain = rgb(COLOURS.workpiece);
     if (this.shown === look.load) return;
     this.shown = look.load;
     this.group.visible = look.load !== "hidden";
@@ -129,7 +129,7 @@ function arrow(radius) {
   const parts = [shaft, tip].map((part) => {
     part.rotateZ(-Math.PI / 2);
     const colours = new Float32Array(part.attributes.position.array.length),
-      ink = rgb(INK);
+      ink = rgb(COLOURS.ink);
     for (let at = 0; at < colours.length; at += 3) colours.set(ink, at);
     return new Mesh(part.setAttribute("colour", new BufferAttribute(colours, 3)), facetMaterial());
   });

@@ -7,10 +7,10 @@ from pydantic import Field
 
 from dragchain.documents import Document, Part
 from dragchain.run.case import Fidelity
-from dragchain.statistics.estimate import CONFIDENCE, Estimate
+from dragchain.statistics.estimate import CONFIDENCE, Estimate, Verdict
 from dragchain.statistics.power_law_forms import TwoTerms
 
-Verdict = Literal["agrees", "deviates", "no expectation"]
+Judged = Literal[Verdict, "no expectation"]
 
 
 class Axis(NamedTuple):
@@ -204,7 +204,8 @@ class ScalingFile(Document):
     expected : Expectation
         The expected exponent.
     verdict : str
-        ``agrees`` if the interval of the fitted exponent contains the expected one.
+        ``confirmed`` if the interval of the fitted exponent contains the expected one, otherwise
+        ``contradicted``.
     fit, fit_within : FittedLaw
         Fit to all levels, and to those at which the exponent is expected.
     two_terms, shifted : TwoTerms, ShiftedLaw or None
@@ -233,7 +234,7 @@ class ScalingFile(Document):
     field: str
     confidence: float = CONFIDENCE
     expected: Expectation
-    verdict: Verdict
+    verdict: Judged
     fit: FittedLaw
     fit_within: FittedLaw | None
     two_terms: TwoTerms | None

@@ -101,10 +101,10 @@ def _sample(runs: Sequence[Run]) -> power_law.Runs:
     )
 
 
-def _verdict(exponent: Estimate, expected: float | None) -> document.Verdict:
+def _verdict(exponent: Estimate, expected: float | None) -> document.Judged:
     if expected is None:
         return "no expectation"
-    return "agrees" if exponent.contains(expected) else "deviates"
+    return "confirmed" if exponent.contains(expected) else "contradicted"
 
 
 def _fitted(law: power_law.PowerLaw) -> document.FittedLaw:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +11,9 @@ from pydantic import AllowInfNan, BeforeValidator
 
 CONFIDENCE = 0.95
 """Level of every interval."""
+
+Verdict = Literal["confirmed", "not confirmed", "contradicted"]
+"""What an interval says of a claim, prediction or expectation; each has a rule of its own."""
 
 NORMAL_QUANTILE = 1.959964
 """Half-width of a normal interval of `CONFIDENCE`, in standard errors."""

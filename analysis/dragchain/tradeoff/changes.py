@@ -70,7 +70,7 @@ class Softness:
     mixed: str
 
     @property
-    def verdict(self) -> Literal["ruined", "kept", "open"]:
+    def effect(self) -> Literal["ruined", "kept", "open"]:
         """``ruined``, ``kept`` or ``open``."""
         if self.error.significant and abs(self.error.value) > RUINED:
             return "ruined"
@@ -110,8 +110,8 @@ def softness(tradeoff: Tradeoff, comparison: Comparison, level: float) -> Softne
 
 
 @dataclass(frozen=True)
-class Verdicts:
-    """What a modulus does to the quantities: their labels by verdict."""
+class Effects:
+    """What a modulus does to the quantities: their labels by effect."""
 
     level: float
     ruined: list[str]
@@ -119,14 +119,14 @@ class Verdicts:
     open: list[str]
 
 
-def verdicts(tradeoff: Tradeoff) -> list[Verdicts]:
+def effects(tradeoff: Tradeoff) -> list[Effects]:
     """For each modulus what it ruins, what it keeps, and what the runs cannot decide."""
-    rows = [Verdicts(level, [], [], []) for level in modulus_levels(tradeoff)]
+    rows = [Effects(level, [], [], []) for level in modulus_levels(tradeoff)]
     for row in rows:
         for comparison in tradeoff.comparisons.values():
             soft = softness(tradeoff, comparison, row.level)
             if soft is not None:
-                getattr(row, soft.verdict).append(comparison.quantity.label)
+                getattr(row, soft.effect).append(comparison.quantity.label)
     return rows
 
 

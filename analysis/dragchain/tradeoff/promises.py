@@ -1,15 +1,14 @@
 """Whether the advisor's promise holds on scenes that it was not measured on.
 
 In each scene the runs that were asked for by a tolerance are compared with
-runs at full stiffness. A promise is kept if the whole interval of the error
-lies within the tolerance, broken if it lies outside, and open otherwise.
+runs at full stiffness. A promise is confirmed if the whole interval of the error
+lies within the tolerance, contradicted if it lies outside, and not confirmed otherwise.
 """
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -18,14 +17,13 @@ from dragchain.arrays import Floats
 from dragchain.documents import Document, Part
 from dragchain.errors import TableError
 from dragchain.files import write_text
+from dragchain.statistics.estimate import Verdict
 from dragchain.tradeoff.compare import Error, relative_error
 from dragchain.tradeoff.measures import Asked, Measures
 from dragchain.tradeoff.quantities import QUANTITIES
 from dragchain.tradeoff.runs import Setting, by_scene, values_within
 from dragchain.tradeoff.stiffness_document import ExtrapolationErrors, LawEntry, StiffnessRecord
 from dragchain.tradeoff.stiffness_errors import errors_in_new_scenes
-
-Verdict = Literal["kept", "broken", "open"]
 
 
 class Promise(Part):
@@ -102,10 +100,10 @@ class PromisesFile(Document):
 def verdict(error: Error, tolerance: float) -> Verdict:
     """Whether an error with its interval keeps a tolerance."""
     if -tolerance <= error.ci95_low and error.ci95_high <= tolerance:
-        return "kept"
+        return "confirmed"
     if error.ci95_low > tolerance or error.ci95_high < -tolerance:
-        return "broken"
-    return "open"
+        return "contradicted"
+    return "not confirmed"
 
 
 @dataclass(frozen=True)
@@ -249,7 +247,7 @@ def _promise_of(pair: _Pair, scatter: float, degrees: int) -> Promise:
         reference_runs=len(references),
         error=error,
         verdict=verdict(error, tolerance),
-        met=not pair.failed and verdict(error, held_to) == "kept",
+        met=not pair.failed and verdict(error, held_to) == "confirmed",
     )
 
 

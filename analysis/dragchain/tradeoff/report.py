@@ -8,7 +8,7 @@ from dragchain.figures.style import drawing, png
 from dragchain.report.bundle import write_bundle
 from dragchain.report.page import data_uri, render_page
 from dragchain.statistics.estimate import CONFIDENCE
-from dragchain.tradeoff.changes import RUINED, gains, modulus_levels, softness, verdicts
+from dragchain.tradeoff.changes import RUINED, effects, gains, modulus_levels, softness
 from dragchain.tradeoff.costs import read_costs, step_costs
 from dragchain.tradeoff.drops import Drop, choose_drop, read_drops
 from dragchain.tradeoff.figures import draw
@@ -116,7 +116,7 @@ def render(
             name: [softness(tradeoff, own, level) for level in levels]
             for name, own in comparisons.items()
         },
-        verdicts=verdicts(tradeoff),
+        effects=effects(tradeoff),
         gains=gains(tradeoff),
         paths=[(reach, along(tradeoff, reach.quantity)) for reach in known],
         chance=chance(tradeoff),

@@ -3,29 +3,29 @@
 A statement is judged by its tests at the default thresholds that contain no force on the workpiece;
 for a definition without such a test, by those in which it only decides which chain counts.
 
-Supported
-    At least one has a p-value below `LEVEL` after Holm's adjustment for all tests of claims, and
-    the sign claimed at most thresholds; a statement about most peaks or most chains must also find
-    a fraction above one half.
+A test supports it with a p-value below `LEVEL` after Holm's adjustment for all tests of claims, and
+the sign claimed at most thresholds; a statement about most peaks or most chains must also find a
+fraction above one half.
+
 Confirmed
-    All of them contain no force on the workpiece and have the sign claimed at every threshold, and
-    their intervals over the packings exclude a zero effect.
-Refuted
-    None is supported, and the interval over the packings of each lies below `SMALL` standard
+    A test supports it, and all of them contain no force on the workpiece and have the sign claimed
+    at every threshold, and their intervals over the packings exclude a zero effect.
+Contradicted
+    No test supports it, and the interval over the packings of each lies below `SMALL` standard
     deviations (of a fraction, below one half; of the orientation, below chance).
-Not supported
-    Anything else.
+Not confirmed
+    Anything else; `Judgement.supported` says whether a test supports it.
 
 A ratio with the drag below the line can support a statement, for it errs against the claim, but not
-refute it.
+contradict it.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal, get_args
+from typing import get_args
 
 from dragchain.documents import Part
-from dragchain.statistics.estimate import Real
+from dragchain.statistics.estimate import Real, Verdict
 from evidence.validation.peaks.settings import DEFINITIONS, Definition
 from evidence.validation.peaks.tests import FRACTIONS, ORIENTATION, BuiltIn, PeakTest, Statement
 
@@ -33,7 +33,6 @@ LEVEL = 0.05
 SMALL = 0.2
 """An effect below this many standard deviations is small (Cohen 1988)."""
 
-Verdict = Literal["confirmed", "supported", "refuted", "not supported", "undetermined"]
 _FREE: Definition = "free_path"
 """The only definition free of what is built in: its verdict is that of a statement."""
 
@@ -47,7 +46,7 @@ class Outcome(Part):
         Of the test.
     as_claimed, thresholds : int
         Number of thresholds at which the effect has the sign claimed, and of all thresholds.
-    supports, confirms, refutes : bool
+    supports, confirms, contradicts : bool
     """
 
     descriptor: str
@@ -59,13 +58,20 @@ class Outcome(Part):
     thresholds: int
     supports: bool
     confirms: bool
-    refutes: bool
+    contradicts: bool
 
 
 class Judgement(Part):
-    """The verdict for one definition, and what is built in the tests that it rests on."""
+    """The verdict for one definition, and what is built in the tests that it rests on.
+
+    Attributes
+    ----------
+    supported : bool
+        Whether a test supports the statement.
+    """
 
     verdict: Verdict
+    supported: bool
     built_in: BuiltIn
     tests: tuple[Outcome, ...]
 
@@ -100,18 +106,21 @@ def _judgement(tests: Sequence[PeakTest]) -> Judgement:
     outcomes = [
         _outcome(test, judged) for test in judged if test.default and not math.isnan(test.p_claimed)
     ]
-    return Judgement(verdict=_verdict(outcomes, level), built_in=level, tests=tuple(outcomes))
+    return Judgement(
+        verdict=_verdict(outcomes, level),
+        supported=any(outcome.supports for outcome in outcomes),
+        built_in=level,
+        tests=tuple(outcomes),
+    )
 
 
 def _verdict(outcomes: Sequence[Outcome], level: BuiltIn) -> Verdict:
     full = [outcome for outcome in outcomes if outcome.built_in != "against"]
-    if not outcomes:
-        return "undetermined"
     if any(outcome.supports for outcome in outcomes):
         confirmed = level == "none" and full and all(outcome.confirms for outcome in full)
-        return "confirmed" if confirmed else "supported"
-    refuted = full and all(outcome.refutes for outcome in full)
-    return "refuted" if refuted else "not supported"
+        return "confirmed" if confirmed else "not confirmed"
+    contradicted = full and all(outcome.contradicts for outcome in full)
+    return "contradicted" if contradicted else "not confirmed"
 
 
 def _outcome(test: PeakTest, judged: Sequence[PeakTest]) -> Outcome:
@@ -128,6 +137,6 @@ def _outcome(test: PeakTest, judged: Sequence[PeakTest]) -> Outcome:
         "thresholds": len(like),
         "supports": supports,
         "confirms": supports and as_claimed == len(like) and low > 0.0,
-        "refutes": not supports and high < small,
+        "contradicts": not supports and high < small,
     }
     return Outcome.model_validate({**dict(test), **numbers})

@@ -11,9 +11,11 @@ import pandas as pd
 import pytest
 from browser import MISSING, NO_WEBGL, Browser
 from figure_files import case_json
+from matplotlib.colors import to_hex
 from network_run_files import PEAK_N, PEAKS_S, accept, draw, write_network_run
 from PIL import Image
 
+from dragchain.figures.style import COLOURS
 from dragchain.network_page.page import write_page
 from dragchain.report.notation import MINUS, TIMES
 
@@ -418,6 +420,21 @@ def test_the_distance_of_contacts_is_measured_with_the_keyboard(page: Browser, r
     page.find("#find").clear()
     page.find("#find").send_keys("99999" + Keys.ENTER)
     assert page.text("#distance") == "Distance: not in this frame"
+
+
+def test_what_the_figures_show_too_has_their_colour(page: Browser) -> None:
+    drawn = {
+        "drag": ("#curve .smooth", "stroke"), "peak": ("#curve .peaks circle", "stroke"),
+        "transient": ("#curve .transient", "fill"), "chain": (".check .chain", "backgroundColor"),
+        "dominant_path": (".check .path", "backgroundColor"),
+    }  # fmt: skip
+    look = "return getComputedStyle(document.querySelector(arguments[0]))[arguments[1]]"
+    for name, (place, kind) in drawn.items():
+        channels = map(int, re.findall(r"\d+", page.run(look, place, kind)))
+        assert "#{:02x}{:02x}{:02x}".format(*channels) == COLOURS[name].lower(), name
+    page.run("document.getElementById('load').value = 'plain'; networkPage.redraw()")
+    tint = page.run("return [...networkPage.workpiece.tints.slice(0, 3)]")
+    assert to_hex(tint) == COLOURS["workpiece"]
 
 
 @pytest.mark.parametrize("colour", ["force", "class", "speed", "displacement"])

@@ -72,11 +72,11 @@ def quadratic(write_run: Writer) -> list[Path]:
     ]
 
 
-def test_a_quadratic_drag_agrees_with_two_and_not_with_one(quadratic: list[Path]) -> None:
+def test_a_quadratic_drag_confirms_two_and_contradicts_one(quadratic: list[Path]) -> None:
     found = find(quadratic, DEPTH, Expectation(exponent=2.0, source="somebody 1999"))
-    assert found.verdict == "agrees"
+    assert found.verdict == "confirmed"
     assert found.fit.exponent.value == pytest.approx(2.0, abs=0.01)
-    assert find(quadratic, DEPTH, Expectation(exponent=1.0)).verdict == "deviates"
+    assert find(quadratic, DEPTH, Expectation(exponent=1.0)).verdict == "contradicted"
     assert find(quadratic, DEPTH, Expectation()).verdict == "no expectation"
 
 
@@ -98,9 +98,9 @@ def test_an_expectation_for_some_levels_is_judged_there(write_run: Writer) -> No
         for speed in (0.005, 0.01, 0.02, 0.08)
         for seed in (1, 2)
     ]
-    assert find(folders, field, Expectation(exponent=0.0)).verdict == "deviates"
+    assert find(folders, field, Expectation(exponent=0.0)).verdict == "contradicted"
     slow = find(folders, field, Expectation(exponent=0.0, within=(0.005, 0.02)))
-    assert slow.verdict == "agrees"
+    assert slow.verdict == "confirmed"
     assert slow.fit_within is not None and slow.fit_within.runs == 6
     assert slow.fit_within.change_per_decade.value == pytest.approx(0.0, abs=0.01)
     assert slow.local_exponents[-1].value == pytest.approx(0.5, abs=0.01)
@@ -113,7 +113,7 @@ def test_the_command_writes_all_that_a_page_needs(
     out = tmp_path / "out"
     words = ["step", "scaling", "--out", str(out), "--field", DEPTH, "--expected", "2"]
     assert main([*words, *map(str, quadratic)]) == 0
-    assert "agrees" in capsys.readouterr().out
+    assert "confirmed" in capsys.readouterr().out
     found = ScalingFile.read(out / "scaling.json")
     rows = pd.read_csv(out / "scaling.csv")
     assert rows[DEPTH].tolist() == list(LEVELS) and rows.runs.tolist() == [2, 2, 2]

@@ -18,7 +18,7 @@ from tradeoff_runs import (
     point_of,
 )
 
-from dragchain.tradeoff.changes import gains, hub, softness, speed_up, verdicts
+from dragchain.tradeoff.changes import effects, gains, hub, softness, speed_up
 from dragchain.tradeoff.outcome import Tradeoff
 from dragchain.tradeoff.runs import Setting
 
@@ -31,9 +31,9 @@ def tradeoff(tmp_path: Path) -> Tradeoff:
 def test_softness_alone_and_mixed_with_a_step(tmp_path: Path) -> None:
     tradeoff = made(tmp_path / "all", contents())
     alone = softness(tradeoff, tradeoff.comparisons["contact_force_mean"], 0.01)
-    assert alone is not None and alone.mixed == "" and alone.verdict == "ruined"
+    assert alone is not None and alone.mixed == "" and alone.effect == "ruined"
     kept = softness(tradeoff, tradeoff.comparisons["workpiece_contacts"], 0.01)
-    assert kept is not None and kept.verdict == "kept"
+    assert kept is not None and kept.effect == "kept"
     confounded = [one for one in contents() if point_of(one) in (REFERENCE, BOTH)]
     tradeoff = made(tmp_path / "few", confounded)
     mixed = softness(tradeoff, tradeoff.comparisons["contact_force_mean"], 0.01)
@@ -81,7 +81,7 @@ def test_a_gain_has_an_interval_from_the_scatter_of_costs(tmp_path: Path) -> Non
 
 
 def test_softness_ruins_what_it_was_made_to_ruin(tmp_path: Path) -> None:
-    (row,) = verdicts(made(tmp_path, contents()))
+    (row,) = effects(made(tmp_path, contents()))
     assert row.level == 0.01
     assert "mean normal force per contact on the workpiece" in row.ruined
     assert "mean lateral force" in row.ruined

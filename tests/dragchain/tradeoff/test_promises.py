@@ -42,7 +42,7 @@ def test_promises_are_kept_and_broken_by_their_errors(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     runs = read(tmp_path, [*scene(0.05, 1.02, rng), *scene(0.03, 1.3, rng)])
     kept, broken = check_promises(runs)
-    assert (kept.verdict, broken.verdict) == ("kept", "broken")
+    assert (kept.verdict, broken.verdict) == ("confirmed", "contradicted")
     assert kept.error.ci95_low < 0.02 < kept.error.ci95_high
     assert broken.error.ci95_low < 0.3 < broken.error.ci95_high
     assert dict(broken.scene) == {"motion.immersion_depth_m": "0.03"}
@@ -54,7 +54,7 @@ def test_a_promise_kept_by_the_skin_of_its_teeth_is_not_met(tmp_path: Path) -> N
     asked = {**ASKED, "tolerance": 0.2, "held_to": 0.1}
     found = [{**run, "asked": run["asked"] and asked} for run in scene(0.05, 1.12, rng)]
     (check,) = check_promises(read(tmp_path, found))
-    assert check.verdict == "kept" and not check.met
+    assert check.verdict == "confirmed" and not check.met
 
 
 def test_the_scatter_of_a_quantity_is_its_own(tmp_path: Path) -> None:
@@ -76,7 +76,7 @@ def test_few_runs_leave_a_promise_open(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     runs = read(tmp_path, scene(0.05, 1.08, rng, runs=2))
     (check,) = check_promises(runs)
-    assert check.verdict == "open"
+    assert check.verdict == "not confirmed"
 
 
 def test_the_interval_holds_the_error_as_often_as_it_says(tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_a_failed_run_does_not_count(tmp_path: Path) -> None:
     inputs = {**failed["inputs"], "motion.immersion_depth_m": 0.05}
     runs = read(tmp_path, [*scene(0.05, 1.0, rng), {**failed, "inputs": inputs, "asked": ASKED}])
     (check,) = check_promises(runs)
-    assert (check.runs, check.failed, check.verdict) == (6, 1, "kept") and not check.met
+    assert (check.runs, check.failed, check.verdict) == (6, 1, "confirmed") and not check.met
     (lost,) = failures(runs)
     assert lost.asked and lost.seen == "1 particle"
 
@@ -111,13 +111,18 @@ def test_what_is_written_can_be_read(tmp_path: Path) -> None:
     files = write(tmp_path, scene(0.05, 1.0, rng))
     write_promises(tmp_path / "out", files, ROOT / "workflow/dragdeck/data/stiffness.json")
     (row,) = json.loads((tmp_path / "out" / "promises.json").read_text())["promises"]
-    assert row["verdict"] == "kept" and row["numbers"]["particles"] == 1422
+    assert row["verdict"] == "confirmed" and row["numbers"]["particles"] == 1422
     assert (tmp_path / "out" / "promises.csv").read_text().startswith("scene,")
 
 
 @pytest.mark.parametrize(
     ("low", "high", "expected"),
-    [(-0.09, 0.09, "kept"), (-0.11, 0.02, "open"), (0.11, 0.2, "broken"), (-0.3, -0.2, "broken")],
+    [
+        (-0.09, 0.09, "confirmed"),
+        (-0.11, 0.02, "not confirmed"),
+        (0.11, 0.2, "contradicted"),
+        (-0.3, -0.2, "contradicted"),
+    ],
 )
 def test_verdicts(low: float, high: float, expected: str) -> None:
     assert verdict(Error(0.0, 0.0, low, high, 0.0, False), 0.1) == expected

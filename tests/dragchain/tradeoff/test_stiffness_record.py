@@ -99,7 +99,7 @@ def test_a_promise_about_an_extrapolated_value_is_kept_where_the_raw_one_is_brok
     soft = [run(9, 1e-3, seed, rng, asked=asked) for seed in range(1, 7)]
     files = write(tmp_path, [*full, *soft])
     (kept,) = write_promises(tmp_path / "out", files, record)
-    assert kept.verdict == "kept"
+    assert kept.verdict == "confirmed"
     errors = PromisesFile.read(tmp_path / "out" / "promises.json").extrapolations
     (row,) = [row for row in errors if row.quantity == "workpiece_contacts"]
     assert (dict(row.runs), row.scenes, row.inside) == ({"0.001": 1}, 1, 1)
@@ -111,7 +111,7 @@ def test_a_promise_about_an_extrapolated_value_is_kept_where_the_raw_one_is_brok
         for one in plain
     ]  # fmt: skip
     (broken,) = check_promises(raw)
-    assert broken.verdict == "broken"
+    assert broken.verdict == "contradicted"
 
 
 def test_the_law_of_the_stability_number_is_found(record: Path) -> None:

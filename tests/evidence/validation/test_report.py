@@ -206,8 +206,8 @@ def test_a_shorter_run_counts_less(points: Points) -> None:
     [
         (1.1, 1.5, "confirmed"),
         (0.5, 0.9, "contradicted"),
-        (0.9, 1.5, "not significant"),
-        (math.nan, math.nan, "not significant"),
+        (0.9, 1.5, "not confirmed"),
+        (math.nan, math.nan, "not confirmed"),
     ],
 )
 def test_a_verdict_is_the_interval_against_no_effect(

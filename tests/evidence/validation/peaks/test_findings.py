@@ -23,21 +23,26 @@ def verdicts(findings: Findings) -> dict[str, str]:
     return {row.statement: row.verdict for row in findings.statements}
 
 
+def supported(findings: Findings) -> set[str]:
+    free = {row.statement: row.by_definition["free_path"] for row in findings.statements}
+    return {statement for statement, judged in free.items() if judged.supported}
+
+
 def test_chains_that_make_the_peaks_are_found() -> None:
-    found = verdicts(findings(11, 3.0))
+    made = findings(11, 3.0)
+    found = verdicts(made)
     assert found["presence"] == found["dominance"] == "confirmed"
-    assert found["coverage"] in ("supported", "confirmed")
-    assert found["reverse"] in ("supported", "confirmed")
-    assert found["orientation"] == "not supported" or found["orientation"] == "refuted"
+    assert {"presence", "dominance", "coverage", "reverse"} <= supported(made)
+    assert "orientation" not in supported(made)
 
 
 def test_chains_that_have_nothing_to_do_with_the_peaks_are_not_found() -> None:
-    for verdict in verdicts(findings(12, 0.0)).values():
-        assert verdict in ("not supported", "refuted")
+    made = findings(12, 0.0)
+    assert not supported(made) and "confirmed" not in verdicts(made).values()
 
 
-def test_chains_that_weaken_at_peaks_refute_their_presence() -> None:
-    assert verdicts(findings(13, -3.0))["presence"] == "refuted"
+def test_chains_that_weaken_at_peaks_contradict_their_presence() -> None:
+    assert verdicts(findings(13, -3.0))["presence"] == "contradicted"
 
 
 def test_a_chain_that_follows_the_peak_does_not_lead_it() -> None:
@@ -95,10 +100,11 @@ def test_a_built_in_test_alone_proves_nothing() -> None:
         for one in judge([*held, *tests("free_path", "none", 0.0, 0.5)])
         if one.statement == "dominance"
     )
-    assert row.by_definition["widest_path"].verdict == "supported"
-    assert row.by_definition["widest_path"].built_in == "value"
-    assert row.verdict == "refuted"
-    assert row.by_definition["peters"].verdict == "undetermined"
+    held_by, none = row.by_definition["widest_path"], row.by_definition["peters"]
+    assert (held_by.verdict, held_by.supported) == ("not confirmed", True)
+    assert held_by.built_in == "value"
+    assert row.verdict == "contradicted"
+    assert (none.verdict, none.supported, none.tests) == ("not confirmed", False, ())
 
 
 def test_a_peak_row_ranks_its_chain() -> None:
