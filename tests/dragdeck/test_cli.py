@@ -47,7 +47,9 @@ def test_check_says_how_many_cases(case: Case, capsys: pytest.CaptureFixture[str
     assert lines[-1].startswith("small: no errors, 1 warning; 1 case(s), 3 runs, about ")
     assert "(estimates; speed assumed); LIGGGHTS 3." in lines[-1]
     assert lines[0].startswith("warning: quick: the gap between workpiece and bowl")
-    assert [line.split(":")[0] for line in lines[1:-1]] == ["  drop_test", "  filling", "  process"]
+    assert [line.split(":")[0] for line in lines[1:-1]] == [
+        "note", "  drop_test", "  filling", "  process"
+    ]  # fmt: skip
 
 
 def test_explain_shows_what_is_left_out_and_the_cost(

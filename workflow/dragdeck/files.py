@@ -33,7 +33,8 @@ def replace_bytes(file: Path, content: bytes) -> None:
         waiting.write_bytes(content)
         waiting.replace(file)
     except OSError as error:
-        error.filename = str(file)  # a full disk says so of a stream, which has no name
+        if error.errno is not None:
+            error.filename = str(file)  # a full disk says so of a stream, which has no name
         raise
     finally:
         waiting.unlink(missing_ok=True)

@@ -91,7 +91,7 @@ PLAN, VALIDATION = PLAN or "default", PLAN or "paper"
 explained(PROJECT.plan_file, PLAN)
 CASES = explained(PROJECT.cases, STUDY, FIDELITY or None)
 
-for WARNING in dict.fromkeys(text for case in CASES for text in warnings(case.study)):
+for WARNING in dict.fromkeys(text for case in CASES for text in map(str, warnings(case.study))):
     logger.warning(f"warning: {STUDY}: {WARNING}")
 
 

@@ -328,7 +328,7 @@ def test_a_tolerance_about_restitution_sets_the_drop_alone(case: Case, tradeoff:
     assert found.fidelity_name == "tolerance-0.005-restitution"
     strict = resolve(case, asked(1e-3, quantity="restitution"), tradeoff)
     assert strict.study.drop_test.timestep_fraction == 0.02
-    beyond = advise(case, asked(1e-5, quantity="restitution"), tradeoff)
+    beyond = advise(case, asked(1e-4, quantity="restitution"), tradeoff)
     assert beyond.fallback is not None and beyond.chosen.drop_timestep_fraction == 0.02
 
 

@@ -25,7 +25,8 @@ from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import layout
 from dragdeck.scenes.fit import clearances
-from dragdeck.scenes.motion import course, driven_speed, farthest_reach, path_heights
+from dragdeck.scenes.legs import farthest_reach, path_heights
+from dragdeck.scenes.motion import course, driven_speed
 from dragdeck.scenes.process import process_scene
 from dragdeck.study.check import warnings
 from dragdeck.sweep.cases import load_cases

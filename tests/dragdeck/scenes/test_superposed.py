@@ -20,7 +20,7 @@ from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.fit import fastest_motion
-from dragdeck.scenes.motion import surface_speed
+from dragdeck.scenes.legs import surface_speed
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.model import Motion

@@ -98,7 +98,7 @@ def test_an_upright_study_keeps_its_run_id(moved: Callable[..., Case]) -> None:
     ("motion", "says"),
     [
         ({"tilt_deg": 10, "spin": {"rpm": 60}}, "tilt_deg and a rotation cannot be combined"),
-        ({"tilt_deg": 60}, "less than or equal to 45"),
+        ({"tilt_deg": 60}, "at most 45"),
     ],
 )
 def test_bad_input_is_named(moved: Callable[..., Case], motion: dict[str, Any], says: str) -> None:

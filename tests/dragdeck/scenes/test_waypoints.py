@@ -22,7 +22,8 @@ from dragdeck.preview.layout import layout
 from dragdeck.project import Project
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.fit import clearances, fastest_motion
-from dragdeck.scenes.motion import drag_leg, path_heights, surface_speed
+from dragdeck.scenes.legs import path_heights, surface_speed
+from dragdeck.scenes.motion import drag_leg
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.check import warnings

@@ -28,7 +28,7 @@ from dragdeck.physics.similarity import (
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.filling import FILLING, expected_surface, expected_time, filling_cautions
 from dragdeck.scenes.fit import process_cautions
-from dragdeck.scenes.motion import plunge_point
+from dragdeck.scenes.legs import plunge_point
 from dragdeck.scenes.workpiece import FACET_STEP_S, PARTICLE_STEPS_PER_S, workpiece_mesh
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance
 

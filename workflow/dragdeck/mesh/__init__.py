@@ -12,6 +12,7 @@ from dragdeck.mesh.files import UNITS, read, stl_text, write_stl
 from dragdeck.mesh.shapes import (
     bowl,
     cylinder,
+    cylinder_facets,
     cylinder_radius,
     polygon_radius,
     polygon_sides,
@@ -37,6 +38,7 @@ __all__ = [
     "bowl",
     "check",
     "cylinder",
+    "cylinder_facets",
     "cylinder_radius",
     "envelope",
     "facing_out",

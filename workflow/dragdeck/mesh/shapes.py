@@ -92,6 +92,16 @@ def cylinder_radius(radius_m: float, length_m: float, facet_size_m: float) -> fl
     return float(np.hypot(x, y).max())
 
 
+def cylinder_facets(
+    radius_m: float, length_m: float, facet_size_m: float, facet_length_m: float | None = None
+) -> int:
+    """Number of facets of a `cylinder`, without making the mesh; parameters are those of it."""
+    along_m = facet_size_m if facet_length_m is None else facet_length_m
+    sides = polygon_sides(radius_m, facet_size_m)
+    inner = _ring_counts(sides, polygon_radius(radius_m, sides), facet_size_m)
+    return 2 * (2 * sum(inner) + sides) + 2 * sides * _levels(length_m, along_m)
+
+
 def prism(
     sides: int,
     corner_radius_m: float,
@@ -171,15 +181,25 @@ def _ring(count: int, radius_m: float, start_rad: float = 0.0, z_m: float = 0.0)
     )
 
 
+def _ring_counts(sides: int, corner_radius_m: float, facet_size_m: float) -> list[int]:
+    """Nodes on each ring of a `_disc` between its centre and its edge."""
+    rings = max(1, round(corner_radius_m / facet_size_m))
+    return [max(5, round(sides * ring / rings)) for ring in range(1, rings)]
+
+
+def _levels(length_m: float, facet_size_m: float) -> int:
+    return math.ceil(length_m / facet_size_m - 1e-9)
+
+
 def _disc(sides: int, corner_radius_m: float, facet_size_m: float) -> Trimesh:
     """Triangulate a polygon in z = 0, its normal up: nodes on rings, the outermost last."""
     import pyvista
 
-    rings = max(1, round(corner_radius_m / facet_size_m))
+    counts = _ring_counts(sides, corner_radius_m, facet_size_m)
     parts = [np.zeros((1, 3))]
-    for ring in range(1, rings):
-        count = max(5, round(sides * ring / rings))
-        parts.append(_ring(count, corner_radius_m * ring / rings, math.pi * (ring % 2) / count))
+    for ring, count in enumerate(counts, 1):
+        radius_m = corner_radius_m * ring / (len(counts) + 1)
+        parts.append(_ring(count, radius_m, math.pi * (ring % 2) / count))
     points = np.concatenate([*parts, _ring(sides, corner_radius_m)])
     faces = pyvista.PolyData(points / corner_radius_m).delaunay_2d().regular_faces
     if len(faces) != 2 * len(points) - 2 - sides:
@@ -189,7 +209,7 @@ def _disc(sides: int, corner_radius_m: float, facet_size_m: float) -> Trimesh:
 
 
 def _side(sides: int, corner_radius_m: float, length_m: float, facet_size_m: float) -> Trimesh:
-    levels = math.ceil(length_m / facet_size_m - 1e-9)
+    levels = _levels(length_m, facet_size_m)
     heights = [length_m * k / levels for k in range(levels + 1)]
     points = np.concatenate([_ring(sides, corner_radius_m, z_m=z_m) for z_m in heights])
     lower = np.arange(levels * sides).reshape(levels, sides)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.mesh import bowl, surface
 from dragdeck.scenes.filling import expected_bed
-from dragdeck.scenes.motion import Course, Place, course, driven_surface_speed
+from dragdeck.scenes.legs import Place
+from dragdeck.scenes.motion import Course, course, driven_surface_speed
 from dragdeck.scenes.workpiece import workpiece_mesh, workpiece_radius
 
 if TYPE_CHECKING:

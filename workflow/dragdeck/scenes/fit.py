@@ -23,12 +23,10 @@ from dragdeck.physics.contact_mechanics import fall_speed
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import SPEED_FACTOR
+from dragdeck.scenes.legs import farthest_reach, path_heights, vertical_range
 from dragdeck.scenes.motion import (
     course,
     driven_surface_speed,
-    farthest_reach,
-    path_heights,
-    vertical_range,
 )
 from dragdeck.scenes.workpiece import (
     farthest_surface,

@@ -1,7 +1,7 @@
 """Where the workpiece goes: plunge, approach, drag.
 
-The workpiece's position is that of its reference point, the centre of its tip. What is superposed
-on the path (`dragdeck.study.superposed`) moves the workpiece during the drag only.
+What is superposed on the path (`dragdeck.study.superposed`) moves the workpiece during the drag
+only.
 
 A `Course` is the motion in whole steps, as the engine makes it. Input script, ``case.json``, checks
 and preview are made from it.
@@ -10,114 +10,20 @@ and preview are made from it.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
 
 from dragdeck.cases.bed import bed_timestep
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
+from dragdeck.scenes.legs import Place, TimedLeg, drag_in, plunge_point
 from dragdeck.scenes.periods import output_periods
 from dragdeck.study.model import Motion, Study
-from dragdeck.study.paths.kind import Leg, Point, StageOfRun, Stages
-from dragdeck.study.stages import chain, in_steps, integral
+from dragdeck.study.paths.kind import Leg, Stages
+from dragdeck.study.stages import chain
 from dragdeck.study.superposed.kind import DragSteps, EngineMotion, SuperposedOfRun
 from dragdeck.study.workpiece import MeshShape
 
-Place = tuple[float, float, float, float]
-"""Position of the reference point, m, and turn of the workpiece about +z, rad."""
-
 _STAGES_PER_FORMULA = 10
 """Formulas of one stage each take three times as long."""
-
-_MANY_STEPS = 1_000_000
-"""Enough for every stage of a path to have one."""
-
-
-@dataclass(frozen=True)
-class TimedLeg:
-    """A leg of the motion in whole steps, as the engine makes it.
-
-    Attributes
-    ----------
-    leg : Leg
-        It ends where it should after its steps.
-    start_step, end_step : int
-    direction_rad : float
-        Direction of the drag from +x when it begins.
-    stages : sequence
-        Of a leg in stages: their steps and velocities.
-    """
-
-    leg: Leg
-    start_step: int
-    end_step: int
-    direction_rad: float
-    stages: Stages = ()
-
-    name = property(lambda self: self.leg.name)
-    kind = property(lambda self: self.leg.kind)
-    duration_s = property(lambda self: self.leg.duration_s)
-    velocity_m_s = property(lambda self: self.leg.velocity_m_s)
-    angular_speed_rad_s = property(lambda self: self.leg.angular_speed_rad_s)
-
-    @property
-    def steps(self) -> int:
-        """How many it takes."""
-        return self.end_step - self.start_step
-
-    @property
-    def speed_m_s(self) -> float:
-        """Speed of the workpiece's axis, m/s."""
-        return math.hypot(*self.leg.velocity_m_s)
-
-    @property
-    def fastest_m_s(self) -> float:
-        """Highest speed of the workpiece's axis, m/s."""
-        return max(math.hypot(*velocity) for _, velocity in self._velocities())
-
-    @property
-    def chord_speed_m_s(self) -> float:
-        """Speed along the chord of the arc of a step, m/s: places after whole steps are exact."""
-        half = self.leg.angular_speed_rad_s * self.duration_s / self.steps / 2
-        return float(self.speed_m_s * math.sin(half) / half)
-
-    @property
-    def period_s(self) -> float:
-        """Time of a revolution, s."""
-        return 2 * math.pi / abs(self.leg.angular_speed_rad_s)
-
-    @property
-    def sense(self) -> float:
-        """1 counter-clockwise from above, -1 not."""
-        return math.copysign(1.0, self.leg.angular_speed_rad_s)
-
-    def pose(self, start: Place, steps: float) -> Place:
-        """Where the workpiece is so many steps after it was at the start."""
-        x, y, z, turn = start
-        time = steps * self.duration_s / self.steps
-        if self.kind in ("rotate", "circle"):
-            angle = self.leg.angular_speed_rad_s * time
-            c, s = math.cos(angle), math.sin(angle)
-            return (c * x - s * y, s * x + c * y, z, turn + angle * (self.kind == "rotate"))
-        if self.kind == "rest":
-            return start
-        ends = self._velocities()
-        dx, dy, dz = (integral([(end, v[axis]) for end, v in ends], time) for axis in range(3))
-        return (x + dx, y + dy, z + dz, turn)
-
-    def corners(self, start: Place) -> list[Place]:
-        """Where it begins, changes its velocity and ends: no place of it is farther out."""
-        steps = accumulate((stage.steps for stage in self.stages[:-1]), initial=0)
-        return [self.pose(start, step) for step in (*steps, self.steps)]
-
-    def _velocities(self) -> Sequence[tuple[float, tuple[float, float, float]]]:
-        """End of each stretch of constant velocity from the start, s, and the velocity."""
-        timestep = self.duration_s / self.steps
-        ends = accumulate(stage.steps for stage in self.stages)
-        stages = [
-            (end * timestep, stage.velocity_m_s)
-            for end, stage in zip(ends, self.stages, strict=True)
-        ]
-        return stages or [(self.duration_s, self.velocity_m_s)]
 
 
 @dataclass(frozen=True)
@@ -159,11 +65,6 @@ class Course:
         return x, y, z, turn
 
 
-def plunge_point(motion: Motion) -> Point:
-    """Where the workpiece goes in, m."""
-    return motion.path.plunge_point if motion.plunge_at_m is None else motion.plunge_at_m
-
-
 def drag_leg(study: Study) -> TimedLeg:
     """The drag in whole steps, counted from its start.
 
@@ -172,14 +73,7 @@ def drag_leg(study: Study) -> TimedLeg:
     """
     motion, timestep = study.motion, bed_timestep(study, "timestep_fraction")
     asked = motion.axis_speed_m_s * study.chosen_fidelity().speed_factor
-    return _drag_in(max(1, round(motion.path_length_m / asked / timestep)), timestep, motion)
-
-
-def _drag_in(steps: int, timestep_s: float, motion: Motion) -> TimedLeg:
-    """The drag in so many steps; the places where it starts, turns and ends depend on neither."""
-    leg = motion.path.drag(motion.path_length_m / (steps * timestep_s), motion.orientation)
-    stages = _staged(leg, steps, timestep_s)
-    return TimedLeg(leg, 0, steps, motion.path.direction_rad, stages)
+    return drag_in(max(1, round(motion.path_length_m / asked / timestep)), timestep, motion)
 
 
 def driven_speed(study: Study) -> float:
@@ -192,57 +86,10 @@ def driven_factor(study: Study) -> float:
     return driven_speed(study) / study.motion.axis_speed_m_s
 
 
-def _corners(motion: Motion) -> list[Place]:
-    """Where the drag begins, changes its velocity and ends; heights above the immersion depth."""
-    path, duration = motion.path, motion.path_length_m / motion.axis_speed_m_s
-    drag = _drag_in(_MANY_STEPS, duration / _MANY_STEPS, motion)
-    return drag.corners((*path.start_point, path.start_height_m, 0.0))
-
-
-def farthest_reach(motion: Motion) -> float:
-    """Largest distance of the workpiece's axis from the bowl's, m."""
-    aside = sum(one.horizontal_reach_m for one in motion.superposed().values())
-    places = [plunge_point(motion), *((x, y) for x, y, _, _ in _corners(motion))]
-    return max(math.hypot(x, y) for x, y in places) + aside
-
-
-def surface_speed(motion: Motion, radius_m: float) -> float:
-    """Highest speed of the workpiece's surface in the drag, m/s: of its axis, and what is added.
-
-    The turn of a workpiece that follows a circle is not counted.
-
-    Parameters
-    ----------
-    motion : Motion
-    radius_m : float
-        Of the workpiece.
-    """
-    added = (one.surface_speed_m_s(radius_m) for one in motion.superposed().values())
-    return motion.axis_speed_m_s * motion.path.peak_speed_ratio + sum(added)
-
-
 def driven_surface_speed(study: Study, radius_m: float) -> float:
     """The same of the motion that is driven."""
     moving = study.motion.superposed(driven_factor(study)).values()
     return drag_leg(study).fastest_m_s + sum(one.surface_speed_m_s(radius_m) for one in moving)
-
-
-def path_heights(motion: Motion) -> tuple[float, float]:
-    """Lowest and highest height of the path above the immersion depth, m; 0 is within."""
-    heights = [0.0, *(z for _, _, z, _ in _corners(motion))]
-    return min(heights), max(heights)
-
-
-def vertical_range(motion: Motion) -> tuple[float, float]:
-    """Lowest and highest height of the tip above the immersion depth, m; 0 is within."""
-    reach = sum(one.vertical_reach_m for one in motion.superposed().values())
-    low, high = path_heights(motion)
-    return low - reach, high + reach
-
-
-def deepest(motion: Motion) -> float:
-    """Largest depth of the tip below the surface in the drag, m."""
-    return motion.immersion_depth_m - vertical_range(motion)[0]
 
 
 def workpiece_turn(study: Study) -> float:
@@ -259,7 +106,7 @@ def course(study: Study, bed: Bed) -> Course:
     dive = clear - (bed.surface_m - motion.immersion_depth_m + motion.path.start_height_m)
     found, begun = list[TimedLeg](), 0
     for leg in _entry(motion, dive, study.chosen_fidelity().speed_factor):
-        timed, steps = _in_periods(leg, timestep, output_periods(study).network)
+        timed, steps = _in_periods(leg, timestep, output_periods(study, timestep).network)
         found.append(TimedLeg(timed, begun, begun + steps, motion.path.direction_rad))
         begun += steps
     last = drag_leg(study)
@@ -286,19 +133,6 @@ def on_engine(stages: Stages, start_step: int) -> EngineMotion | None:
         variables |= formulas
         last.append(f"v_{[*formulas][-1]}")
     return EngineMotion(variables, f"linear/variable {' '.join(last)}")
-
-
-def _staged(leg: Leg, steps: int, timestep_s: float) -> Stages:
-    """The stages of a leg in whole steps; each ends where it should."""
-    if not leg.stages:
-        return ()
-    rates = [[(end, velocity[axis]) for end, velocity in leg.stages] for axis in range(3)]
-    found = []
-    for count, begin, end in in_steps((end for end, _ in leg.stages), steps, timestep_s):
-        moved = (integral(rate, end) - integral(rate, begin) for rate in rates)
-        x, y, z = (shift / (count * timestep_s) for shift in moved)
-        found.append(StageOfRun(steps=count, velocity_m_s=(x, y, z)))
-    return found
 
 
 def _entry(motion: Motion, dive_m: float, speed_factor: float) -> Iterator[Leg]:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Deck
-from dragdeck.scenes.motion import Course, TimedLeg, on_engine
+from dragdeck.scenes.legs import TimedLeg
+from dragdeck.scenes.motion import Course, on_engine
 from dragdeck.study.superposed.kind import EngineMotion
 
 

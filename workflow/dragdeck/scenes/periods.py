@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 
-from dragdeck.cases.bed import bed_timestep
 from dragdeck.study.model import Study
 
 
@@ -16,10 +15,10 @@ class Periods:
     network: int
 
 
-def output_periods(study: Study) -> Periods:
+def output_periods(study: Study, timestep_s: float) -> Periods:
     """Steps between frames: at least the asked rates, each a multiple of the faster one."""
     rates, factor = study.outputs, study.chosen_fidelity().speed_factor
-    per_second = factor * bed_timestep(study, "timestep_fraction")
+    per_second = factor * timestep_s
     force = max(1, math.floor(1 / (rates.workpiece_force_hz * per_second)))
     contacts = force * max(1, math.floor(1 / (rates.workpiece_contacts_hz * per_second * force)))
     network = contacts * max(1, math.floor(1 / (rates.network_hz * per_second * contacts)))

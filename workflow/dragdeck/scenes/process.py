@@ -47,6 +47,7 @@ from dragdeck.scenes.periods import Periods, output_periods
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.scenes.workpiece import (
     PARTICLE_STEPS_PER_S,
+    workpiece_facets,
     workpiece_length,
     workpiece_mesh,
     workpiece_radius,
@@ -83,7 +84,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     fidelity, facets = study.chosen_fidelity(), study.bowl_facet_size_m is not None
     bed = bed or expected_bed(study)
     dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
-    periods, meshes = output_periods(study), _mesh_files(each)
+    periods, meshes = output_periods(study, dt), _mesh_files(each)
     check_apart(each, bed)
     courses, moved = [course(one.study, bed) for one in each], []
     for one, way in zip(each, courses, strict=True):
@@ -124,7 +125,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         deck=deck,
         case=_process_case(each, number, bed.surface_m, courses[number], limits),
         steps=steps.end,
-        facets=sum(len(workpiece_mesh(one).faces) for one in each),
+        facets=sum(map(workpiece_facets, each)),
         files=own if number else {**models, **_bowl_files(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),

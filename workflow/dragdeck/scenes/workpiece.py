@@ -16,6 +16,7 @@ from dragdeck.mesh import (
     Surroundings,
     check,
     cylinder,
+    cylinder_facets,
     cylinder_radius,
     envelope,
     facing_out,
@@ -26,7 +27,7 @@ from dragdeck.mesh import (
     upright,
 )
 from dragdeck.physics.rounding import round_to, rounded
-from dragdeck.scenes.motion import deepest, farthest_reach, plunge_point, surface_speed
+from dragdeck.scenes.legs import deepest, farthest_reach, plunge_point, surface_speed
 from dragdeck.study.workpiece import CylinderShape, MeshShape
 
 if TYPE_CHECKING:
@@ -157,6 +158,15 @@ def fastest_surface(case: Case) -> float:
     """Highest speed of the workpiece's surface in the drag, at the study's own speed, m/s."""
     motion = case.study.motion
     return surface_speed(motion, workpiece_radius(case) if motion.superposed() else 0.0)
+
+
+def workpiece_facets(case: Case) -> int:
+    """Number of facets of the workpiece; that of a generated one without making its mesh."""
+    shape = case.study.workpiece.shape
+    if isinstance(shape, CylinderShape):
+        sizes = shape.facet_size_m, shape.facet_length_m
+        return cylinder_facets(shape.radius_m, _generated_length(case), *sizes)
+    return len(workpiece_mesh(case).faces)
 
 
 @lru_cache(maxsize=8)

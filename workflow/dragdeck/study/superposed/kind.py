@@ -9,8 +9,6 @@ from typing import ClassVar, Self
 from markupsafe import Markup
 from pydantic import BaseModel, ConfigDict, Field
 
-from dragdeck.study.base import Model, NonNegative
-
 LIVE_REFERENCE = Markup("${reference_x} ${reference_y} ${reference_z}")
 """The reference point where the engine has it when the drag begins or is resumed."""
 
@@ -100,22 +98,27 @@ class SuperposedOfRun(BaseModel, ABC):
         """Its part of the input script, for a drag that starts at this step."""
 
 
-class SuperposedMotion(Model, ABC):
+RAMP = Field(
+    default=0.1,
+    description="time in which the motion starts smoothly from rest when the drag begins, in "
+    "seconds at the study's own speed; no statistic includes it",
+)
+"""The field `ramp_s` of every block."""
+
+
+class SuperposedMotion(ABC):
     """Block of a study: a motion that is superposed on the path during the whole drag.
 
     Attributes
     ----------
     part : type
         Its model in ``case.json``.
+    ramp_s : float
+        Time in which it starts.
     """
 
     part: ClassVar[type[SuperposedOfRun]]
-
-    ramp_s: NonNegative = Field(
-        default=0.1,
-        description="time in which the motion starts smoothly from rest when the drag begins, in "
-        "seconds at the study's own speed; no statistic includes it",
-    )
+    ramp_s: float
 
     @abstractmethod
     def faster(self, factor: float) -> Self:

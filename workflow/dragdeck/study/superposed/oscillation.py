@@ -5,8 +5,9 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
-from dragdeck.study.base import Positive
+from dragdeck.study.base import Model, NonNegative, Positive
 from dragdeck.study.superposed.kind import (
+    RAMP,
     DragSteps,
     EngineMotion,
     SuperposedMotion,
@@ -44,10 +45,12 @@ class OscillationOfRun(SuperposedOfRun):
         )
 
 
-class Oscillation(SuperposedMotion):
+class Oscillation(Model, SuperposedMotion):
     """A vertical sine, upwards first."""
 
     part: ClassVar[type[SuperposedOfRun]] = OscillationOfRun
+
+    ramp_s: NonNegative = RAMP
 
     amplitude_m: Positive = Field(
         description="amplitude of the vertical oscillation about the immersion depth, m"

@@ -8,10 +8,11 @@ from typing import ClassVar, Literal, Self
 from markupsafe import Markup
 from pydantic import Field, model_validator
 
-from dragdeck.study.base import Model, Number, Positive
+from dragdeck.study.base import Model, NonNegative, Number, Positive
 from dragdeck.study.stages import chain, in_steps, integral
 from dragdeck.study.superposed.kind import (
     LIVE_REFERENCE,
+    RAMP,
     DragSteps,
     EngineMotion,
     SuperposedMotion,
@@ -69,11 +70,12 @@ class SpinStage(Model):
     rpm: Number = Field(description="rotational speed, 1/min; positive: counter-clockwise")
 
 
-class Spin(SuperposedMotion):
+class Spin(Model, SuperposedMotion):
     """A constant spin, or a schedule of them."""
 
     part: ClassVar[type[SuperposedOfRun]] = SpinOfRun
 
+    ramp_s: NonNegative = RAMP
     rpm: Number | None = Field(
         default=None,
         description="rotational speed during the drag, relative to `orientation`, 1/min; positive: "
