@@ -328,7 +328,9 @@ def test_a_tolerance_about_restitution_sets_the_drop_alone(case: Case, tradeoff:
     assert found.fidelity_name == "tolerance-0.005-restitution"
     strict = resolve(case, asked(1e-3, quantity="restitution"), tradeoff)
     assert strict.study.drop_test.timestep_fraction == 0.02
-    beyond = advise(case, asked(1e-4, quantity="restitution"), tradeoff)
+    drops = [one.model_copy(update={"restitution_error": 2e-3}) for one in tradeoff.drop_test]
+    coarse = tradeoff.model_copy(update={"drop_test": drops})
+    beyond = advise(case, asked(1e-3, quantity="restitution"), coarse)
     assert beyond.fallback is not None and beyond.chosen.drop_timestep_fraction == 0.02
 
 

@@ -47,7 +47,8 @@ def drag_way_m(case: Case) -> float:
 
 def test_a_step_of_the_short_run_is_like_one_of_the_real_run(stiff: Case) -> None:
     short = short_case(stiff)
-    assert drag_way_m(short) == pytest.approx(drag_way_m(stiff), rel=1e-9)
+    rounded = 0.5 / DRAG_STEPS  # each drag takes a whole number of steps
+    assert drag_way_m(short) == pytest.approx(drag_way_m(stiff), rel=rounded)
     real, quick = (process_scene(case).deck.outputs for case in (stiff, short))
     for ours, theirs in zip(quick, real, strict=True):
         assert ours.name == theirs.name and ours.period_steps <= theirs.period_steps

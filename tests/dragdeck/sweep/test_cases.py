@@ -12,7 +12,7 @@ from dragdeck.errors import InputError
 from dragdeck.project import Project, by_run
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.process import PROCESS
+from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.registry import SCENES
 from dragdeck.sweep.cases import load_cases, new_study, study_file
 
@@ -224,7 +224,7 @@ def test_a_scaling_that_the_matrix_cannot_tell_is_refused(
     assert caught.value.field == field
 
 
-@pytest.mark.parametrize("field", ["media.cuont", "path", "motion.path.length_m", "media."])
+@pytest.mark.parametrize("field", ["media.cuont", "path", "motion.path.lenght_m", "media."])
 def test_an_assumption_about_no_field_is_refused(
     small: dict[str, Any], write_study: Callable[..., Path], field: str
 ) -> None:
@@ -251,3 +251,14 @@ def test_a_name_that_can_be_none_is_not_called_taken(
 ) -> None:
     with pytest.raises(InputError, match="this name cannot be used for a study"):
         new_study(write_study(small).parent.parent, name, "small")
+
+
+def test_an_assumption_about_another_kind_of_path_is_left_out(
+    small: dict[str, Any], write_study: Callable[..., Path]
+) -> None:
+    small["assumptions"] = [{"field": "motion.path.radius_m", "why": "a guess"}]
+    (circle,) = load_cases(write_study(small))
+    small["motion"]["path"] = {"kind": "line", "start_m": [-0.01, 0.0], "length_m": 0.02}
+    (line,) = load_cases(write_study(small))
+    assumed = [process_scene(one).case.assumptions for one in (circle, line)]
+    assert [len(one) for one in assumed] == [1, 0]

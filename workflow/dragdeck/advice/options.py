@@ -29,7 +29,7 @@ from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.filling import FILLING, expected_surface, expected_time, filling_cautions
 from dragdeck.scenes.fit import process_cautions
 from dragdeck.scenes.legs import plunge_point
-from dragdeck.scenes.workpiece import FACET_STEP_S, PARTICLE_STEPS_PER_S, workpiece_mesh
+from dragdeck.scenes.workpiece import FACET_STEP_S, PARTICLE_STEPS_PER_S, workpiece_facets
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance
 
 _FEWEST_RUNS = 2
@@ -69,7 +69,7 @@ class Work:
             + way / motion.approach_speed_m_s
             + motion.path_length_m / motion.axis_speed_m_s
         )
-        facets = sum(len(workpiece_mesh(one).faces) for one in of_each_workpiece(case))
+        facets = sum(workpiece_facets(one) for one in of_each_workpiece(case))
         return cls(study, tradeoff, expected_time(study), process_s, facets)
 
     def cpu_time(self, fidelity: Fidelity) -> float:

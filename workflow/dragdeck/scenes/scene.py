@@ -211,11 +211,16 @@ def _contact_moduli(study: Study, scale: float) -> dict[str, ContactConstants]:
     }
 
 
+_OF_A_KIND = ("motion.path.", "workpiece.shape.")
+"""Blocks of several kinds: an assumption about a field of another kind says nothing of a run."""
+
+
 def _assumptions(study: Study) -> list[AssumptionOfRun]:
     values = flat(study.plain())
     found = [
         AssumptionOfRun(field=entry.field, value=values.get(entry.field), why=entry.why)
         for entry in study.assumptions
+        if entry.field in values or not entry.field.startswith(_OF_A_KIND)
     ]
     if reason := study.accepted.unsafe_timestep:
         step = study.chosen_fidelity().timestep_fraction

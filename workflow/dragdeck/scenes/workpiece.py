@@ -75,7 +75,7 @@ def workpiece_warnings(case: Case) -> list[Caution]:
 
 def _too_fine(case: Case) -> Iterator[Caution]:
     """A warning where a step is spent on facets."""
-    shape, facets = case.study.workpiece.shape, len(workpiece_mesh(case).faces)
+    shape, facets = case.study.workpiece.shape, workpiece_facets(case)
     particles_s = case.study.media.count / PARTICLE_STEPS_PER_S
     enough = max(_ALWAYS_FACETS, round(_MOST_TIMES * particles_s / FACET_STEP_S))
     if facets <= enough:

@@ -3,11 +3,12 @@
 import math
 from collections.abc import Iterable, Iterator
 from itertools import product
+from typing import get_args
 
 from dragdeck.errors import InputError, choices, near
 from dragdeck.study.base import flat
-from dragdeck.study.model import BUILT_IN_FIDELITIES, Scaling, Study
-from dragdeck.study.workpiece import CylinderShape
+from dragdeck.study.model import BUILT_IN_FIDELITIES, AnyPath, Scaling, Study
+from dragdeck.study.workpiece import CylinderShape, Shape
 
 _NO_SWEEP = ("accepted", "assumptions", "reference", "scaling", "sweep", "title")
 """Blocks that no run depends on: cases that differ in them would be the same."""
@@ -107,8 +108,20 @@ def _motion(study: Study) -> _Found:
         yield "motion.counted_from_revolution", problem, limit
 
 
+_OF_OTHER_KINDS = [
+    f"{block}.{name}"
+    for block, kinds in {
+        "motion.path": get_args(AnyPath),
+        "workpiece.shape": get_args(get_args(Shape)[0]),
+    }.items()
+    for kind in kinds
+    for name in kind.model_fields
+]
+"""Fields of all kinds of path and shape: a study may extend or sweep to another kind."""
+
+
 def _assumptions(study: Study) -> _Found:
-    values = flat(study.model_dump(mode="json"))
+    values = [*flat(study.model_dump(mode="json")), *_OF_OTHER_KINDS]
     parts = (name.split(".") for name in values)
     known = {".".join(words[:count]) for words in parts for count in range(1, len(words) + 1)}
     for number, entry in enumerate(study.assumptions):
