@@ -24,7 +24,7 @@ PLAN: dict[str, Any] = {
     "cost_rounds": 0,
     "points": [
         {"vary": {"fidelity.timestep_fraction": [0.5, 1.9]}},
-        {"vary": {}, "one_by_one": {"workpiece.shape.radius_m": [0.006]}},
+        {"vary": {}, "one_by_one": {"workpiece.shape.radius_m": [0.008]}},
     ],
     "drop_test": {"drop_test.timestep_fraction": [0.1]},
 }
@@ -95,7 +95,7 @@ def test_a_validation_shares_the_runs_of_a_tradeoff(validated: Path, traded: Pat
 def test_a_thicker_workpiece_meets_more_drag(validated: Path) -> None:
     effects = pd.read_parquet(validated / "effects.parquet")
     (row,) = effects[(effects.field != "") & (effects.quantity == "drag_mean")].to_dict("records")
-    assert (row["field"], row["value"]) == ("workpiece.shape.radius_m", 0.006)
+    assert (row["field"], row["value"]) == ("workpiece.shape.radius_m", 0.008)
     assert row["reference_value"] == 0.004 and row["runs"] == 2
     assert row["change"] > 0.0
 
