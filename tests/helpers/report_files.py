@@ -147,7 +147,9 @@ def make_run(results: Path, case: dict[str, Any], findings: Findings, names: lis
     return folder
 
 
-def write_quantities(run: Path, scale: float, corrected: float | None = None) -> None:
+def write_quantities(
+    run: Path, scale: float, corrected: float | None = None, outside: tuple[str, ...] = ()
+) -> None:
     """Write ``extrapolated.json``: all quantities 2, at the physical modulus that many times it."""
     ends = {} if corrected is None else {
         "value": 2.0 * corrected, "ci95_low": 1.8 * corrected, "ci95_high": 2.2 * corrected,
@@ -157,7 +159,7 @@ def write_quantities(run: Path, scale: float, corrected: float | None = None) ->
         for one in QUANTITIES
     )
     document = Extrapolated(
-        youngs_modulus_scale=scale, source="14 scenes", outside=(), quantities=found
+        youngs_modulus_scale=scale, source="14 scenes", outside=outside, quantities=found
     )
     document.write(run / EXTRAPOLATED)
 

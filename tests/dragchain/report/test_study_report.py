@@ -364,6 +364,16 @@ def test_a_reduced_modulus_gives_the_corrected_number_of_contacts_first(
     )
 
 
+@pytest.mark.parametrize("outside", [(), ("inertial_number 0.9 is outside of 0.02 to 0.3",)])
+def test_the_first_screen_says_that_a_scene_is_outside_the_measured_range(
+    process: Path, tmp_path: Path, outside: tuple[str, ...]
+) -> None:
+    run = with_settings(process, youngs_modulus_scale=0.01)
+    write_quantities(run, 0.01, corrected=0.8, outside=outside)
+    write_report(tmp_path, [run])
+    assert ("outside the range in which" in summary_box(tmp_path)) == bool(outside)
+
+
 def test_a_reduced_modulus_without_a_law_is_not_corrected_and_says_so(
     process: Path, tmp_path: Path
 ) -> None:
