@@ -33,7 +33,7 @@ def free_degrees(beds: Sequence[Hashable], effects: int) -> int:
 
     What the runs from one bed have in common is estimated from the same runs. Where it is much,
     an effect is as good as one of the differences within the beds, of which there are as many
-    fewer as there are beds less one.
+    fewer as there are beds, minus one.
     """
     return len(beds) - effects - (len(set(beds)) - 1 if shares_beds(beds) else 0)
 

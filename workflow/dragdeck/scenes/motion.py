@@ -104,9 +104,9 @@ def course(study: Study, bed: Bed) -> Course:
     motion, timestep = study.motion, bed_timestep(study, "timestep_fraction")
     clear = round_to(bed.top_m + study.media.radius_mean_m, 6)
     dive = clear - (bed.surface_m - motion.immersion_depth_m + motion.path.start_height_m)
-    found, begun = list[TimedLeg](), 0
+    found, begun, period = list[TimedLeg](), 0, output_periods(study, timestep).network
     for leg in _entry(motion, dive, study.chosen_fidelity().speed_factor):
-        timed, steps = _in_periods(leg, timestep, output_periods(study, timestep).network)
+        timed, steps = _in_periods(leg, timestep, period)
         found.append(TimedLeg(timed, begun, begun + steps, motion.path.direction_rad))
         begun += steps
     last = drag_leg(study)
