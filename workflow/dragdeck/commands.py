@@ -60,6 +60,7 @@ from dragdeck.preview.page import Words, page
 from dragdeck.preview.picture import picture, small_picture
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
+from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import SceneType, read_bed
 from dragdeck.study.check import explained, warnings
@@ -365,7 +366,7 @@ def render(
     kind = _scene_type(scene)
     points = project.points(study, plan) if plan else None
     every = points.of(kind) if points else project.cases(study, fidelity)
-    runs = by_folder(every, kind)
+    runs = by_folder(with_leads(every) if kind.needs_bed else every, kind)
     if run not in runs:
         raise InputError(
             f"no {scene} run of this name",

@@ -13,6 +13,7 @@ from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
 from dragdeck.errors import InputError, choices
 from dragdeck.outlook.measured import Tradeoff
 from dragdeck.outlook.stable_step import check_timestep
+from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import SceneType
@@ -116,7 +117,7 @@ class Project:
         self, cases: Iterable[Case], scene: SceneType, *, of_plan: bool = False
     ) -> dict[Path, Case]:
         """The folders of the engine runs of cases, each with its first case."""
-        runs = by_run(cases, scene).values()
+        runs = by_run(with_leads(cases) if scene.needs_bed else cases, scene).values()
         return {self.run_folder(case, scene, of_plan=of_plan): case for case in runs}
 
     def run_folder(self, case: Case, scene: SceneType, *, of_plan: bool = False) -> Path:

@@ -26,6 +26,7 @@ from dragdeck.project import (
     study_files,
     study_templates,
 )
+from dragdeck.scenes.lead import led, with_leads, windows_of
 from dragdeck.scenes.registry import SCENES
 from dragdeck.engine.reports import say, shown_bytes
 from dragdeck.engine.space import free_bytes
@@ -181,18 +182,19 @@ def points(plan=PLAN):
 
 
 @cache
-def points_by_run(scene, plan=PLAN):
-    """A case of a plan for each run of a scene."""
-    return by_run(points(plan).of(SCENES[scene]), SCENES[scene])
+def points_by_run(scene, plan=PLAN, leads=False):
+    """A case of a plan for each run of a scene; those that lead to others too, if asked."""
+    cases = points(plan).of(SCENES[scene])
+    return by_run(with_leads(cases) if leads and SCENES[scene].needs_bed else cases, SCENES[scene])
 
 
 def origins(place):
     """Where cases of a folder's runs come from: how to name them on the command line, and by run."""
     scene = PLACES[place]
     if place != POINTS:
-        yield fidelity_option(), by_folder(CASES, scene)
-    yield f"--plan {PLAN}", points_by_run(scene.name)
-    yield f"--plan {VALIDATION}", points_by_run(scene.name, VALIDATION)
+        yield fidelity_option(), by_folder(with_leads(CASES) if scene.needs_bed else CASES, scene)
+    yield f"--plan {PLAN}", points_by_run(scene.name, leads=True)
+    yield f"--plan {VALIDATION}", points_by_run(scene.name, VALIDATION, leads=True)
 
 
 def origin_of(place, run):
@@ -275,6 +277,17 @@ def of_its_bed(place, file):
         return f"{run_path(wildcards.study, 'filling', filling)}/{file}"
 
     return name if PLACES[place].needs_bed else []
+
+
+def of_its_lead(place):
+    """The record of the run from which a run goes on, if there is one."""
+
+    def names(wildcards):
+        lead = led(case_of(place, wildcards.run)).lead
+        run = lead and SCENES["process"].run_id(lead)
+        return [f"{run_path(wildcards.study, place, run)}/{RECORD[place]}"] if lead else []
+
+    return names if PLACES[place].needs_bed else []
 
 
 ADVICE = f"results/{STUDY}/advice.json"

@@ -13,6 +13,7 @@ for PLACE, SCENE in PLACES.items():
         input:
             templates_of(SCENE.name),
             packing=of_its_bed(PLACE, "tables/packing.json"),
+            lead=of_its_lead(PLACE),
         output:
             [
                 of_run(PLACE, file)

@@ -23,6 +23,25 @@ SAID_BY_NAME = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
 
 
 @dataclass(frozen=True)
+class Stretch:
+    """What a run covers of the drag, in fractions of the drag.
+
+    Attributes
+    ----------
+    begin : float
+        0: the run begins with plunge and approach; otherwise it goes on from where its lead, a
+        softer run, was there.
+    end : float
+    marks : tuple of float
+        Where the state is written, for runs that go on from there.
+    """
+
+    begin: float = 0.0
+    end: float = 1.0
+    marks: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
 class Case:
     """One combination of a study's sweep.
 
@@ -44,6 +63,12 @@ class Case:
         Of one of several workpieces: the case of all.
     number : int
         The workpiece's number from 1; 0 for the case of all.
+    stretch : Stretch
+        What its process covers of the drag.
+    lead : Case or None
+        The softer run from which its process goes on; None if it begins by itself.
+    part : str
+        What tells its process from others of the same settings.
     """
 
     file: Path
@@ -54,6 +79,9 @@ class Case:
     beside: int = 1
     whole: "Case | None" = None
     number: int = 0
+    stretch: Stretch = Stretch()
+    lead: "Case | None" = None
+    part: str = ""
 
     @property
     def all_workpieces(self) -> "Case":
@@ -86,7 +114,8 @@ class Case:
         """Readable name: the fidelity and the sweep values."""
         parts = [f"{field.rsplit('.', 1)[-1]}-{value}" for field, value in self.settings.items()]
         workpiece = [f"workpiece-{self.number}"] if self.number else []
-        return slug("_".join([self.fidelity_name, *parts, *workpiece]))
+        part = [self.part] if self.part else []
+        return slug("_".join([self.fidelity_name, *parts, *part, *workpiece]))
 
     @property
     def fidelity_name(self) -> str:

@@ -165,8 +165,8 @@ _CONTACTS_PER_PARTICLE = 3.0
 """A settled bed of spheres with friction has five to six neighbours a particle."""
 
 
-def thermo(period: int, last: int | None) -> Output:
-    """Particle count, kinetic energies and the largest speed of a particle over time."""
+def thermo(period: int, last: int | None, entry: int = 0) -> Output:
+    """Particle count, kinetic energies and the largest speed of a particle after the entry."""
     columns = (
         _STEP,
         _TIME,
@@ -176,7 +176,7 @@ def thermo(period: int, last: int | None) -> Output:
         Column("fastest_particle_m_s", "c_fastest_particle"),
     )
     purpose = "particle count, energies, largest speed, for acceptance checks and thermo.parquet"
-    return Output("thermo", "print", columns, period, period, last, purpose=purpose)
+    return Output("thermo", "print", columns, period, entry + period, last, purpose=purpose)
 
 
 def settled_particles() -> Output:
@@ -186,8 +186,8 @@ def settled_particles() -> Output:
     return Output("particles", "custom", columns, 1, 0, None, True, 1.0, purpose)
 
 
-def workpiece_force(period: int, last: int, workpiece: str) -> Output:
-    """Force and torque on a workpiece, and where its reference point is."""
+def workpiece_force(period: int, last: int, workpiece: str, entry: int = 0) -> Output:
+    """Force and torque on a workpiece after the entry, and where its reference point is."""
     columns = (
         _STEP,
         _TIME,
@@ -197,7 +197,7 @@ def workpiece_force(period: int, last: int, workpiece: str) -> Output:
     )
     name = workpiece.replace("workpiece", WORKPIECE_FORCE)
     purpose = "force, torque and position of the workpiece, for workpiece_force.parquet (drag)"
-    return Output(name, "print", columns, period, period, last, purpose=purpose)
+    return Output(name, "print", columns, period, entry + period, last, purpose=purpose)
 
 
 def workpiece_particles(period: int, first: int, last: int) -> Output:

@@ -65,6 +65,12 @@ class ProcessCase(CaseOfStudy):
         Readable name of the case.
     upstream : mapping
         Run ids of its filling and drop test.
+    lead : str or None
+        Run id of the softer run from which it goes on; absent if there is none.
+    entry_step : int
+        Step of the drag at which it goes on from its lead; absent if it has none.
+    marks : sequence of str
+        Files of states from which other runs go on; absent if there are none.
     numbers : mapping
         Dimensionless numbers of the scene at the physical modulus and the speed of the study.
     surface_m : float
@@ -101,6 +107,9 @@ class ProcessCase(CaseOfStudy):
     case: str
     upstream: Mapping[str, str]
     output_of: str | None = Field(default=None, exclude_if=lambda value: value is None)
+    lead: str | None = Field(default=None, exclude_if=lambda value: value is None)
+    entry_step: int = Field(default=0, exclude_if=lambda value: not value)
+    marks: Sequence[str] = Field(default=(), exclude_if=lambda value: not value)
     numbers: Mapping[str, float]
     surface_m: float
     workpiece: WorkpieceOfRun

@@ -54,6 +54,7 @@ def check_run(
         _no_errors(screens[-1]),
         _neighbour_builds("".join(screens)),
     ]
+    checks += [_packing(folder / mark, inputs.media.count, ranks) for mark in inputs.marks]
     if inputs.settled is not None:
         checks.append(_at_rest(screens[-1]))
         checks.append(_packing(folder / PACKING_FILE, inputs.media.count, ranks))

@@ -18,6 +18,10 @@ class RunInputs(Document):
 
     Attributes
     ----------
+    entry_step : int
+        At which the run begins.
+    marks : sequence of str
+        Files of states from which other runs go on.
     settled : SettlingCriterion or None
         Of a run that must end with a bed at rest.
     steady : SteadyCriterion or None
@@ -33,6 +37,8 @@ class RunInputs(Document):
     fidelity: RanksOfRun
     media: CountOfRun
     phases: Sequence[Phase] = ()
+    entry_step: int = 0
+    marks: Sequence[str] = ()
     files: Mapping[str, str]
     settled: SettlingCriterion | None = None
     steady: SteadyCriterion | None = None

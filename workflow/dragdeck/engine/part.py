@@ -99,7 +99,7 @@ class PartOfRun:
         check_space(self.folder, outputs, count)
         gap = first_gap(self.folder, outputs, parts) if parts else -1
         newest = newest_checkpoint(self.folder, count, ranks, gap, self.report)
-        first = checkpoint_step(newest) if newest else 0
+        first = checkpoint_step(newest) if newest else self.inputs.entry_step
         for damage in cut_outputs(self.folder, outputs, parts, first if newest else -1):
             self.report(f"{damage}; the run writes it again from step {first:,}")
         checkpoint = newest.name if newest else None

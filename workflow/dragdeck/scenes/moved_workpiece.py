@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Deck
-from dragdeck.scenes.legs import TimedLeg
+from dragdeck.scenes.lead import Stop
+from dragdeck.scenes.legs import Place, TimedLeg
 from dragdeck.scenes.motion import Course, on_engine
 from dragdeck.study.superposed.kind import EngineMotion
 
@@ -22,10 +23,11 @@ class MovedWorkpiece:
     mesh : str
         File of its mesh.
     start_m : tuple of 3 floats
-        Its reference point before the plunge.
+        Its reference point as it starts.
     turn_deg : float
         About +z, as it starts.
     legs : sequence of TimedLeg
+        Those that the run moves it along.
     staged : EngineMotion or None
         Of a drag in stages.
     superposed : mapping
@@ -53,6 +55,8 @@ class ProcessDeck(Deck):
     bowl_rad_s: float
     workpiece_type: int
     workpieces: Sequence[MovedWorkpiece]
+    stops: Sequence[Stop]
+    entry_step: int = 0
 
     @property
     def legs(self) -> Sequence[TimedLeg]:
@@ -60,7 +64,7 @@ class ProcessDeck(Deck):
         return self.workpieces[0].legs
 
 
-def moved_workpiece(case: Case, motion: Course, mesh: str) -> MovedWorkpiece:
+def moved_workpiece(case: Case, motion: Course, mesh: str, entry_step: int) -> MovedWorkpiece:
     """A workpiece of a case on its course.
 
     Parameters
@@ -70,16 +74,22 @@ def moved_workpiece(case: Case, motion: Course, mesh: str) -> MovedWorkpiece:
     motion : Course
     mesh : str
         File of its mesh.
+    entry_step : int
+        Step of the drag at which it starts; 0: it starts with the plunge.
     """
     ending, start = f"_{case.number}" if case.number > 1 else "", motion.drag.start
     staged = on_engine(motion.legs[-1].stages, start)
     moving = {name: one.on_engine(start) for name, one in motion.superposed.items()}
+    place: Place = (*motion.start_m, motion.turn_rad)
+    if entry_step:
+        *_, (drag, begun) = motion.begun()
+        place = motion.pose(drag, begun, entry_step - start)
     return MovedWorkpiece(
         ending=ending,
         mesh=mesh,
-        start_m=motion.start_m,
-        turn_deg=math.degrees(motion.turn_rad),
-        legs=motion.legs,
+        start_m=place[:3],
+        turn_deg=math.degrees(place[3]),
+        legs=motion.legs[-1:] if entry_step else motion.legs,
         staged=staged and staged.ending(ending),
         superposed={name: one.ending(ending) for name, one in moving.items()},
     )

@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, skin
-from dragdeck.cases.case import Case, materials_content, mesh_file, of_each_workpiece
+from dragdeck.cases.case import Case, Stretch, materials_content, mesh_file, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
 from dragdeck.decks.case_file import Phase, SteadyCriterion
 from dragdeck.decks.deck import LeftOut, Scene
@@ -41,6 +41,7 @@ from dragdeck.scenes.fit import (
     fastest_motion,
     process_cautions,
 )
+from dragdeck.scenes.lead import Covered, covered, led, mark_file, stops
 from dragdeck.scenes.motion import Course, course, driven_speed
 from dragdeck.scenes.moved_workpiece import ProcessDeck, moved_workpiece
 from dragdeck.scenes.periods import Periods, output_periods
@@ -56,7 +57,6 @@ from dragdeck.scenes.workpiece import (
 from dragdeck.study.base import Json
 from dragdeck.study.contact_law import explained
 from dragdeck.study.model import Study
-from dragdeck.study.superposed.kind import DragSteps
 from dragdeck.study.workpiece import CylinderShape, MeshShape, Shape
 
 _ENERGY_DRIFT = 0.1
@@ -79,7 +79,8 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         The workpiece does not fit between path and bowl, would reach below the
         floor, or has a mesh that cannot be used.
     """
-    whole, each = case.all_workpieces, of_each_workpiece(case.all_workpieces)
+    whole = led(case.all_workpieces)
+    each = of_each_workpiece(whole)
     study = whole.study
     fidelity, facets = study.chosen_fidelity(), study.bowl_facet_size_m is not None
     bed = bed or expected_bed(study)
@@ -87,28 +88,30 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     periods, meshes = output_periods(study, dt), _mesh_files(each)
     check_apart(each, bed)
     courses, moved = [course(one.study, bed) for one in each], []
+    drag = courses[0].drag
+    steps = covered(whole, drag)
     for one, way in zip(each, courses, strict=True):
         check_fit(one, bed.surface_m, dt)
-        moved.append(moved_workpiece(one, way, meshes[one.study.workpiece.shape]))
+        moved.append(moved_workpiece(one, way, meshes[one.study.workpiece.shape], steps.entry))
         check_headroom(one, way.start_m[2], top)
-    steps = courses[0].drag
     types, parts = study.type_names(), rank_split(whole)
+    materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
     deck = ProcessDeck(
         title=study.title,
         study=whole.study_name,
         case=whole.name,
         scene="process",
         run=PROCESS.run_id(whole),
-        source=f"../../filling/{FILLING.run_id(whole)}/{PACKING_FILE}",
-        materials=material_table(study, types, fidelity.youngs_modulus_scale, whole),
+        source=_source(whole),
+        materials=materials,
         limit_force=study.contact.limit_force,
         gravity_m_s2=study.gravity_m_s2,
         skin_m=skin(study),
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
-        outputs=_outputs(periods, steps, [one.name for one in moved], facets),
+        outputs=_outputs(periods, drag.start, steps, [one.name for one in moved], facets),
         thermo_steps=periods.network,
-        checkpoint_steps=_checkpoint_steps(study, steps.end),
+        checkpoint_steps=_checkpoint_steps(study, steps.end - steps.entry),
         processors=parts.line,
         bowl_type=types.index(study.bowl.material) + 1,
         bowl_radius_m=study.bowl.radius_m,
@@ -116,6 +119,8 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         bowl_rad_s=study.motion.path.bowl_rad_s(driven_speed(study)),
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpieces=moved,
+        stops=list(stops(whole, drag, steps, materials.youngs_moduli_pa)),
+        entry_step=steps.entry,
     )
     number = max(case.number, 1) - 1
     own = {WORKPIECE_MESH: partial(_stl, each[number])}
@@ -123,8 +128,8 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     models = {body.mesh: partial(_stl, one) for one, body in zip(each, moved, strict=True)}
     return Scene(
         deck=deck,
-        case=_process_case(each, number, bed.surface_m, courses[number], limits),
-        steps=steps.end,
+        case=_process_case(each, number, bed.surface_m, courses[number], limits, steps),
+        steps=steps.end - steps.entry,
         facets=sum(map(workpiece_facets, each)),
         files=own if number else {**models, **_bowl_files(study, top)},
         models=_models(study),
@@ -157,19 +162,34 @@ def _stl(case: Case) -> str:
     return stl_text(workpiece_mesh(case))
 
 
+def _source(case: Case) -> str:
+    """The packing, or the state of the lead, from which a process starts."""
+    if case.lead is None:
+        return f"../../filling/{FILLING.run_id(case)}/{PACKING_FILE}"
+    number = 1 + case.lead.stretch.marks.index(case.stretch.begin)
+    return f"../{PROCESS.run_id(case.lead)}/{mark_file(number)}"
+
+
 def _outputs(
-    periods: Periods, drag: DragSteps, workpieces: Sequence[str], facets: bool
+    periods: Periods, drag_start: int, steps: Covered, workpieces: Sequence[str], facets: bool
 ) -> tuple[Output, ...]:
-    first, several = drag.start, facets or len(workpieces) > 1
+    several = facets or len(workpieces) > 1
+    begin = max(drag_start, steps.ramp_end)
+    first_touching, first = (
+        math.ceil(begin / period) * period for period in (periods.contacts, periods.network)
+    )
     force, touching, network = (
-        drag.end - drag.end % period
+        steps.end - steps.end % period
         for period in (periods.force, periods.contacts, periods.network)
     )
     return (
-        outputs.thermo(periods.network, network),
-        *(outputs.workpiece_force(periods.force, force, name) for name in workpieces),
-        outputs.workpiece_particles(periods.contacts, first, touching),
-        outputs.workpiece_contacts(periods.contacts, first, touching, several),
+        outputs.thermo(periods.network, network, steps.entry),
+        *(
+            outputs.workpiece_force(periods.force, force, name, steps.entry)
+            for name in workpieces
+        ),
+        outputs.workpiece_particles(periods.contacts, first_touching, touching),
+        outputs.workpiece_contacts(periods.contacts, first_touching, touching, several),
         outputs.particles(periods.network, first, network, facets),
         outputs.contacts(periods.network, first, network),
     )
@@ -186,10 +206,13 @@ def _process_case(
     surface_m: float,
     way: Course,
     limits: RunLimits,
+    steps: Covered,
 ) -> ProcessCase:
     case, drag = each[number], way.drag
     study, motion, speed = case.study, case.study.motion, driven_speed(case.study)
     transient_s = motion.uncounted_m / speed
+    if steps.entry:
+        transient_s = (steps.counted - drag.start) * drag.timestep_s
     return case_of_study(
         ProcessCase,
         case,
@@ -202,6 +225,9 @@ def _process_case(
         unsafe_timestep=study.accepted.unsafe_timestep,
         case=case.name,
         upstream={scene.name: scene.run_id(case) for scene in (FILLING, DROP_TEST)},
+        lead=case.lead and PROCESS.run_id(case.lead),
+        entry_step=steps.entry,
+        marks=[mark_file(number) for number, _ in enumerate(case.stretch.marks, 1)],
         numbers=describe(case),
         surface_m=surface_m,
         workpiece=WorkpieceOfRun(
@@ -218,12 +244,14 @@ def _process_case(
         motion=motion.path.of_run(speed, motion.orientation, way.legs[-1].stages),
         superposed=list(way.superposed.values()),
         phases=[
-            Phase(name=leg.name, start_step=leg.start_step, end_step=leg.end_step)
+            Phase(
+                name=leg.name, start_step=leg.start_step, end_step=min(leg.end_step, steps.end)
+            )
             for leg in way.legs
         ],
         statistics=StatisticsOfRun(transient_s=transient_s),
         steady=SteadyCriterion(
-            from_step=drag.start + math.ceil(transient_s / drag.timestep_s),
+            from_step=steps.counted,
             energy_drift=_ENERGY_DRIFT,
         )
         if motion.bowl_rad_s
@@ -326,8 +354,15 @@ def _carousel(study: Study) -> Json:
     return {"workpieces": plain["workpieces"]} if "workpieces" in plain else {}
 
 
+def _stretches(case: Case) -> Json:
+    """What a run covers, unless that is all, and from which run it goes on."""
+    found = {} if case.stretch == Stretch() else {"stretch": asdict(case.stretch)}
+    return {**found, "lead": PROCESS.run_id(case.lead)} if case.lead else found
+
+
 def _content(case: Case) -> Json:
     """What a process depends on."""
+    case = led(case)
     study = case.study
     shapes = [one.study.workpiece.shape for one in of_each_workpiece(case)]
     files = [mesh_file(case, shape) for shape in shapes if isinstance(shape, MeshShape)]
@@ -342,8 +377,9 @@ def _content(case: Case) -> Json:
         "motion": study.motion.plain(),
         **_carousel(study),
         "outputs": study.outputs.plain(),
-        "fidelity": study.chosen_fidelity().plain(),
+        "fidelity": study.chosen_fidelity().model_copy(update={"windows": None}).plain(),
         **mesh,
+        **_stretches(case),
     }
 
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
     Discriminator,
@@ -300,31 +300,6 @@ class Outputs(Model):
         return self
 
 
-class Fidelity(Model):
-    """Settings for speed and accuracy."""
-
-    youngs_modulus_scale: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=1.0, description="multiplier of every Young's modulus; 1: physical stiffness"
-    )
-    timestep_fraction: Annotated[Number, Field(gt=0, le=2)] = Field(
-        default=0.2, description="time step of the process as a fraction of the Rayleigh time"
-    )
-    filling_timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=0.25, description="time step of the filling as a fraction of the Rayleigh time"
-    )
-    speed_factor: Annotated[Number, Field(ge=1, le=100)] = Field(
-        default=1.0, description="multiplier of the speed of the workpiece; 1: real speed"
-    )
-    skin_m: Positive | None = Field(
-        default=None, description="neighbour skin, m; none: 10 % of the mean particle radius"
-    )
-    ranks: Ranks = Field(
-        default=2,
-        description="number of MPI ranks; auto: chosen from particles, cases and cores "
-        "(docs/howto/scale_up.md)",
-    )
-
-
 Quantity = Literal[
     "drag_mean",
     "drag_std",
@@ -346,6 +321,92 @@ Quantity = Literal[
     "restitution",
 ]
 """Quantities to which a tolerance can apply; docs/evidence/tradeoff.md defines each."""
+
+
+class Windows(Model):
+    """Short runs at physical stiffness along the path, until quantities are known well enough."""
+
+    tolerance: Annotated[Number, Field(ge=1e-4, lt=1)] = Field(
+        description="half-width of the 95 % confidence interval, relative, at which no further "
+        "window is run"
+    )
+    quantities: Annotated[list[Quantity], Field(min_length=1)] = Field(
+        default=["drag_mean"], description="quantities to which the tolerance applies"
+    )
+    most: Annotated[Whole, Field(ge=2, le=64)] = Field(
+        default=16, description="largest number of windows"
+    )
+
+
+class Fidelity(Model):
+    """Settings for speed and accuracy."""
+
+    youngs_modulus_scale: Annotated[Number, Field(gt=0, le=1)] = Field(
+        default=1.0, description="multiplier of every Young's modulus; 1: physical stiffness"
+    )
+    soft_start: Annotated[Number, Field(gt=0, lt=1)] | None = Field(
+        default=None,
+        description="multiplier of every Young's modulus in filling, plunge, approach and the "
+        "beginning of the drag; before the statistics begin, the moduli are raised to "
+        "`youngs_modulus_scale`; none: the same multiplier all the time",
+        exclude_if=lambda value: value is None,
+    )
+    timestep_fraction: Annotated[Number, Field(gt=0, le=2)] = Field(
+        default=0.2, description="time step of the process as a fraction of the Rayleigh time"
+    )
+    filling_timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
+        default=0.25, description="time step of the filling as a fraction of the Rayleigh time"
+    )
+    speed_factor: Annotated[Number, Field(ge=1, le=100)] = Field(
+        default=1.0, description="multiplier of the speed of the workpiece; 1: real speed"
+    )
+    skin_m: Positive | None = Field(
+        default=None, description="neighbour skin, m; none: 10 % of the mean particle radius"
+    )
+    ranks: Ranks = Field(
+        default=2,
+        description="number of MPI ranks; auto: chosen from particles, cases and cores "
+        "(docs/howto/scale_up.md)",
+    )
+
+    windows: Windows | None = Field(
+        default=None,
+        description="windows of a run with reduced moduli; none: its values are not corrected by any",
+        exclude_if=lambda value: value is None,
+    )
+
+    @model_validator(mode="after")
+    def _windows_are_stiffer(self) -> Self:
+        if self.windows is None:
+            return self
+        if self.youngs_modulus_scale == 1 or self.speed_factor != 1 or self.soft_start is not None:
+            raise ValueError(
+                "windows require a youngs_modulus_scale below 1, a speed_factor of 1 and no "
+                "soft_start"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _soft_start_is_softer(self) -> Self:
+        if self.soft_start is not None and self.soft_start >= self.youngs_modulus_scale:
+            raise ValueError(
+                f"soft_start is {self.soft_start:g}, not below youngs_modulus_scale "
+                f"({self.youngs_modulus_scale:g})"
+            )
+        return self
+
+    @property
+    def of_start(self) -> "Fidelity":
+        """The settings of filling, plunge, approach and the beginning of the drag."""
+        if self.soft_start is None:
+            return self
+        scale, step = self.soft_start, max(self.timestep_fraction, _STEP_OF_SOFT_START)
+        changes = {"youngs_modulus_scale": scale, "timestep_fraction": step, "soft_start": None}
+        return self.model_copy(update=changes)
+
+
+_STEP_OF_SOFT_START = 0.5
+"""Smallest time step of a soft start as a fraction of its Rayleigh time: that of `standard`."""
 
 
 class Tolerance(Model):
@@ -526,3 +587,10 @@ class Study(Model):
         if self.fidelity not in known:
             raise ValueError(f"unknown fidelity {self.fidelity!r}; known: {', '.join(known)}")
         return known[self.fidelity]
+
+    def at_start(self) -> "Study":
+        """The study with the settings of its filling, and of what leads to its statistics."""
+        chosen = self.chosen_fidelity()
+        if chosen.soft_start is None:
+            return self
+        return self.model_copy(update={"fidelity": chosen.of_start})

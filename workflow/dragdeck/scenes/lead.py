@@ -1,0 +1,260 @@
+"""Runs that begin softer: the softer run that leads to a run, and how the moduli are raised.
+
+Filling, plunge, approach and the beginning of the drag decide nothing that is counted, so they can
+run with reduced moduli and long time steps. A run then goes on where its lead was: the moduli are
+raised in stages while the drag goes on, the bed relaxes, and the statistics begin.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from dragdeck.cases.bed import bed_timestep
+from dragdeck.cases.case import Case, Stretch
+from dragdeck.physics.rounding import round_to
+from dragdeck.scenes.motion import drag_leg
+from dragdeck.scenes.periods import output_periods
+from dragdeck.study.model import Study
+from dragdeck.study.superposed.kind import DragSteps
+
+RAMP_S = 0.05
+"""Time in which the moduli are raised, s: the bed rises by what the overlaps give up."""
+
+RAMP_STAGES = 24
+
+SETTLING_DIAMETERS = 1.0
+"""Path after the ramp before anything is counted, in mean diameters of the particles."""
+
+SAMPLE_DIAMETERS = 1.0
+"""Path that a window counts, in mean diameters of the particles."""
+
+_WINDOW_TIMESTEP_FRACTION = 0.64
+
+_FRAMES = 10
+"""Least number of frames of the network in a window's sample."""
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A step of the drag up to which the engine runs, and what is done before and after.
+
+    Attributes
+    ----------
+    step : int
+    youngs_moduli_pa : sequence of float
+        Of each type from here on; empty if they stay.
+    first : bool
+        Whether the run of a lead begins here.
+    writes : bool
+        Whether the outputs of the drag begin here.
+    mark : str
+        File into which the state is written then; empty for none.
+    """
+
+    step: int
+    youngs_moduli_pa: Sequence[float] = ()
+    first: bool = False
+    writes: bool = False
+    mark: str = ""
+
+
+@dataclass(frozen=True)
+class Covered:
+    """The steps of a run.
+
+    Attributes
+    ----------
+    entry : int
+        0, or the step of the drag at which the run goes on from its lead.
+    end : int
+    ramp_end : int
+        From here on the moduli are those of the run.
+    counted : int
+        First step of the statistics.
+    """
+
+    entry: int
+    end: int
+    ramp_end: int
+    counted: int
+
+
+def led(case: Case) -> Case:
+    """The case with what its process covers, and with its lead, as its fidelity says."""
+    study, chosen = case.study, case.study.chosen_fidelity()
+    if case.stretch != Stretch():
+        return case
+    if chosen.windows is not None:
+        return replace(case, stretch=Stretch(marks=_marks(study)))
+    if chosen.soft_start is None:
+        return case
+    begin = _entry_fraction(study)
+    whole = replace(case.all_workpieces, stretch=Stretch(0.0, begin, (begin,)), part="lead")
+    lead = replace(whole, study=whole.study.at_start(), asked=None, advised=None)
+    return replace(case, stretch=Stretch(begin), lead=lead)
+
+
+def windows_of(case: Case) -> list[Case]:
+    """The windows of a case in the order in which they are run; none if its fidelity asks for none.
+
+    Each begins at a mark of the case's own run, raises the moduli to the physical ones, relaxes,
+    and samples a stretch. Any number of the first ones is spread over the path.
+    """
+    lead, found = led(case.all_workpieces), []
+    if lead.study.chosen_fidelity().windows is None:
+        return []
+    study = _window_study(lead.study)
+    length = _window_s(study) / drag_leg(study).duration_s
+    for number in _spread_out(len(lead.stretch.marks)):
+        begin = lead.stretch.marks[number]
+        stretch = Stretch(begin, min(begin + length, 1.0))
+        part = f"window-{number + 1}"
+        found.append(replace(lead, study=study, stretch=stretch, lead=lead, part=part))
+    return found
+
+
+def of_filling(case: Case) -> Case:
+    """The case whose filling a run starts from: that of its lead."""
+    case = case.lead or case
+    return replace(case, study=case.study.at_start())
+
+
+def with_leads(cases: Iterable[Case]) -> list[Case]:
+    """Cases, each after the case of its lead and before its windows."""
+    every = (one for case in cases for one in (led(case).lead, case, *windows_of(case)))
+    return [one for one in every if one is not None]
+
+
+def mark_file(number: int) -> str:
+    """File of the state at a mark, by its number from 1."""
+    return f"state.{number}.restart"
+
+
+def covered(case: Case, drag: DragSteps) -> Covered:
+    """The steps that the process of a case runs.
+
+    Parameters
+    ----------
+    case : Case
+        As `led` returns it.
+    drag : DragSteps
+        The whole drag.
+    """
+    study, stretch = case.study, case.stretch
+    end = drag.end if stretch.end == 1 else step_at(stretch.end, drag)
+    uncounted = _seconds(study.motion.uncounted_m, study)
+    own = drag.start + math.ceil(uncounted / drag.timestep_s)
+    if not stretch.begin:
+        return Covered(0, end, 0, own)
+    entry = step_at(stretch.begin, drag)
+    ramp_end = entry + RAMP_STAGES * math.ceil(RAMP_S / drag.timestep_s / RAMP_STAGES)
+    settling = _diameters_s(SETTLING_DIAMETERS, study)
+    settled = ramp_end + math.ceil(settling / drag.timestep_s)
+    return Covered(entry, end, ramp_end, max(settled, own))
+
+
+def step_at(fraction: float, drag: DragSteps) -> int:
+    """The step at a fraction of the drag."""
+    return drag.start + round(fraction * (drag.end - drag.start))
+
+
+def stops(
+    case: Case, drag: DragSteps, steps: Covered, youngs_moduli_pa: Sequence[float]
+) -> Iterator[Stop]:
+    """Where the engine stops in the drag: at marks, where the moduli change, and at the end.
+
+    Parameters
+    ----------
+    case : Case
+        As `led` returns it.
+    drag : DragSteps
+    steps : Covered
+    youngs_moduli_pa : sequence of float
+        Of the run, one per type.
+    """
+    if steps.entry:
+        chosen = case.study.chosen_fidelity()
+        first = chosen.of_start.youngs_modulus_scale / chosen.youngs_modulus_scale
+        every = (steps.ramp_end - steps.entry) // RAMP_STAGES
+        for stage in range(1, RAMP_STAGES + 1):
+            softer = first ** (1 - stage / RAMP_STAGES)
+            moduli = [round_to(softer * modulus, 12) for modulus in youngs_moduli_pa]
+            yield Stop(steps.entry + stage * every, moduli, first=stage == 1)
+    ends = [step_at(mark, drag) for mark in case.stretch.marks]
+    for number, end in enumerate(ends, 1):
+        yield Stop(end, writes=number == 1, mark=mark_file(number))
+    if steps.end not in ends:
+        yield Stop(steps.end, writes=not ends)
+
+
+def _seconds(path_m: float, study: Study) -> float:
+    """Time in which the workpiece is driven along a path, s."""
+    return float(path_m / study.motion.path_length_m * drag_leg(study).duration_s)
+
+
+def _diameters_s(diameters: float, study: Study) -> float:
+    """Time in which the workpiece is driven along so many mean particle diameters, s."""
+    return _seconds(2 * diameters * study.media.radius_mean_m, study)
+
+
+def _frame(study: Study) -> float:
+    """A frame of the network as a fraction of the drag."""
+    timestep = bed_timestep(study, "timestep_fraction")
+    return output_periods(study, timestep).network / drag_leg(study).steps
+
+
+def _entry_fraction(study: Study) -> float:
+    """Where a run with a soft start enters its drag: at a frame of the network."""
+    before = RAMP_S + _diameters_s(SETTLING_DIAMETERS, study)
+    counted = _seconds(study.motion.uncounted_m, study)
+    frame = _frame(study)
+    return frame * max(1, math.floor((counted - before) / drag_leg(study).duration_s / frame))
+
+
+def _window_study(study: Study) -> Study:
+    """The study as its windows run it: at physical stiffness, with a frame for each short path."""
+    chosen, sample = study.chosen_fidelity(), _diameters_s(SAMPLE_DIAMETERS, study)
+    often = _FRAMES / sample
+    rates = study.outputs
+    fidelity = chosen.model_copy(
+        update={
+            "youngs_modulus_scale": 1.0,
+            "soft_start": chosen.youngs_modulus_scale,
+            "timestep_fraction": _WINDOW_TIMESTEP_FRACTION,
+            "ranks": 1,
+            "windows": None,
+        }
+    )
+    outputs = rates.model_copy(
+        update={
+            "network_hz": max(rates.network_hz, often),
+            "workpiece_contacts_hz": max(rates.workpiece_contacts_hz, often),
+            "workpiece_force_hz": max(rates.workpiece_force_hz, often),
+        }
+    )
+    return study.model_copy(update={"fidelity": fidelity, "outputs": outputs})
+
+
+def _window_s(study: Study) -> float:
+    """Time that a window covers, s."""
+    return RAMP_S + _diameters_s(SETTLING_DIAMETERS + SAMPLE_DIAMETERS, study)
+
+
+def _marks(study: Study) -> tuple[float, ...]:
+    """Where windows begin: as many as fit one after another, or the most that are asked."""
+    windows, stiff = study.chosen_fidelity().windows, _window_study(study)
+    assert windows is not None
+    drag, frame = drag_leg(stiff), _frame(stiff)
+    lead_in = RAMP_S + _diameters_s(SETTLING_DIAMETERS, stiff)
+    first = max(frame, (_seconds(study.motion.uncounted_m, stiff) - lead_in) / drag.duration_s)
+    room, length = 1.0 - first, _window_s(stiff) / drag.duration_s
+    count = min(windows.most, math.floor(room / length))
+    starts = (first + number * room / max(count, 1) for number in range(count))
+    return tuple(frame * math.ceil(start / frame - 1e-9) for start in starts)
+
+
+def _spread_out(count: int) -> list[int]:
+    """Numbers below `count`, the first ones spread evenly: van der Corput's sequence."""
+    bits = max(1, (count - 1).bit_length())
+    reversed_bits = (int(f"{number:0{bits}b}"[::-1], 2) for number in range(2**bits))
+    return list(dict.fromkeys(place * count >> bits for place in reversed_bits))
