@@ -186,7 +186,27 @@ STEPS = (
             "Measure the quantities of a run and, if its stiffness is reduced, extrapolate them to "
             "the physical Young's modulus. It reads the tables of the run and writes "
             "extrapolated.json to RUN_DIR.",
-            "tradeoff.extrapolate:extrapolate_run", (RUN_DIR, STIFFNESS)),
+            "windows.extrapolate:extrapolate_run", (
+                RUN_DIR, STIFFNESS,
+                _argument("--windows", type=Path, metavar="FILE", dest="round_file",
+                          help="last round of windows of the run, from dragchain step windows; "
+                          "its values replace those of the laws"))),
+    Command("windows", "what windows say of a run at the physical Young's modulus",
+            "Estimate the quantities of a run with reduced moduli at the physical Young's modulus "
+            "from its windows, and how many more windows the tolerance requires. It reads the "
+            "tables of the runs.",
+            "windows.rounds:judge_windows", (
+                RUN_DIR,
+                _argument("--windows", type=Path, nargs="*", default=[], metavar="RUN_DIR",
+                          help="folders of the windows (default: none yet)"),
+                _argument("--tolerance", type=float, required=True, metavar="X",
+                          help="relative half-width of the 95 %% confidence interval; required"),
+                _argument("--quantities", nargs="+", required=True, metavar="NAME",
+                          help="quantities to which the tolerance applies; required"),
+                _argument("--most", type=int, required=True, metavar="N",
+                          help="largest number of windows; required"),
+                _argument("--out", type=Path, required=True, metavar="FILE",
+                          help="file to write; required"))),
     Command("scaling", "fit a power law to the mean drag",
             "Fit a power law of the mean drag as a function of one field of the study. It reads "
             "the tables of the runs and writes scaling.json, .csv and .png to the folder.",

@@ -1,4 +1,5 @@
 # What the rules share: the study, its cases, the paths of its runs.
+import json
 import os
 import re
 import sys
@@ -288,6 +289,51 @@ def of_its_lead(place):
         return [f"{run_path(wildcards.study, place, run)}/{RECORD[place]}"] if lead else []
 
     return names if PLACES[place].needs_bed else []
+
+
+# --- windows ----------------------------------------------------------------------
+
+
+def round_file(wildcards, number):
+    """The file of a round of windows of a run; the round is judged first."""
+    run = {"study": wildcards.study, "run": wildcards.run}
+    return checkpoints.judge_windows.get(**run, round=number).output[0]
+
+
+def window_folders(wildcards):
+    """The folders of the windows that a round judges: those that the one before wanted."""
+    number, case = int(wildcards.round), case_of("process", wildcards.run)
+    if not number:
+        return []
+    wanted = json.loads(Path(round_file(wildcards, number - 1)).read_text())["wanted"]
+    runs = [SCENES["process"].run_id(one) for one in windows_of(case)[:wanted]]
+    return [run_path(wildcards.study, "process", run) for run in runs]
+
+
+def windows_of_round(wildcards):
+    """What a round reads of its windows."""
+    scene = SCENES["process"]
+    names = ["run.json", *(f"tables/{name}" for name in (*scene.tables, *scene.network))]
+    return [f"{folder}/{name}" for folder in window_folders(wildcards) for name in names]
+
+
+def last_round(wildcards):
+    """The last round of windows of a run, if it has any."""
+    if not windows_of(case_of("process", wildcards.run)):
+        return []
+    number = 0
+    while not json.loads(Path(file := round_file(wildcards, number)).read_text())["last"]:
+        number += 1
+    return file
+
+
+def windows_options(wildcards):
+    """What the windows of a run are asked for, as options of the command line."""
+    case = case_of("process", wildcards.run)
+    asked = case.study.chosen_fidelity().windows
+    quantities = " ".join(map(quote, asked.quantities))
+    most = len(windows_of(case))
+    return f"--tolerance {asked.tolerance} --quantities {quantities} --most {most}"
 
 
 ADVICE = f"results/{STUDY}/advice.json"

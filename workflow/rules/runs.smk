@@ -193,12 +193,38 @@ rule draw_for_journal:
         "dragchain journal $(dirname {input.run}) {params.colours} > {log} 2>&1"
 
 
+# What the windows of a run say so far. Each round decides whether there is another one.
+checkpoint judge_windows:
+    input:
+        tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
+        windows_of_round,
+        run=of_run("process", "run.json"),
+    output:
+        of_run("process", "windows/round-{round}.json"),
+    log:
+        of_run("process", "logs/windows-{round}.log"),
+    benchmark:
+        of_run("process", "benchmarks/windows-{round}.tsv")
+    wildcard_constraints:
+        round="[0-9]+",
+    conda:
+        "../envs/python.yaml"
+    params:
+        windows=window_folders,
+        asked=windows_options,
+        source=source_hash("dragchain.windows.rounds"),
+    shell:
+        "dragchain step windows $(dirname {input.run}) --windows {params.windows} {params.asked}"
+        " --out {output} > {log} 2>&1"
+
+
 # The quantities of a run, and what they would be at the physical Young's modulus.
 rule extrapolate_process:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
         run=of_run("process", "run.json"),
         record=STIFFNESS,
+        windows=last_round,
     output:
         of_run("process", "tables/extrapolated.json"),
     log:
@@ -208,9 +234,11 @@ rule extrapolate_process:
     conda:
         "../envs/python.yaml"
     params:
-        source=source_hash("dragchain.tradeoff.extrapolate"),
+        windows=lambda wildcards, input: f"--windows {input.windows}" if input.windows else "",
+        source=source_hash("dragchain.windows.extrapolate"),
     shell:
-        "dragchain step extrapolate $(dirname {input.run}) --record {input.record} > {log} 2>&1"
+        "dragchain step extrapolate $(dirname {input.run}) --record {input.record}"
+        " {params.windows} > {log} 2>&1"
 
 
 # What is compared of a point: its tables, chains and numbers.

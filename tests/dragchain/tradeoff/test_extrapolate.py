@@ -9,8 +9,8 @@ from paths import ROOT
 
 from dragchain.report.extrapolated import FILE, Extrapolated
 from dragchain.tradeoff import extrapolate
-from dragchain.tradeoff.extrapolate import extrapolate_run
 from dragchain.tradeoff.measures import PathQuantities
+from dragchain.windows.extrapolate import extrapolate_run
 
 RECORD = ROOT / "workflow/dragdeck/data/stiffness.json"
 

@@ -184,10 +184,7 @@ def _outputs(
     )
     return (
         outputs.thermo(periods.network, network, steps.entry),
-        *(
-            outputs.workpiece_force(periods.force, force, name, steps.entry)
-            for name in workpieces
-        ),
+        *(outputs.workpiece_force(periods.force, force, name, steps.entry) for name in workpieces),
         outputs.workpiece_particles(periods.contacts, first_touching, touching),
         outputs.workpiece_contacts(periods.contacts, first_touching, touching, several),
         outputs.particles(periods.network, first, network, facets),
@@ -244,9 +241,7 @@ def _process_case(
         motion=motion.path.of_run(speed, motion.orientation, way.legs[-1].stages),
         superposed=list(way.superposed.values()),
         phases=[
-            Phase(
-                name=leg.name, start_step=leg.start_step, end_step=min(leg.end_step, steps.end)
-            )
+            Phase(name=leg.name, start_step=leg.start_step, end_step=min(leg.end_step, steps.end))
             for leg in way.legs
         ],
         statistics=StatisticsOfRun(transient_s=transient_s),

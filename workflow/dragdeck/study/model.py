@@ -371,7 +371,7 @@ class Fidelity(Model):
 
     windows: Windows | None = Field(
         default=None,
-        description="windows of a run with reduced moduli; none: its values are not corrected by any",
+        description="windows of a run with reduced moduli; none: none are run",
         exclude_if=lambda value: value is None,
     )
 

@@ -2,13 +2,16 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import fields
 from pathlib import Path
 
 from dragchain.report.extrapolated import FILE, Extrapolated, ExtrapolatedQuantity
 from dragchain.run.case import Case, load_case
+from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.path_blocks import quantities_along
 from dragchain.tradeoff.quantities import QUANTITIES
 from dragchain.tradeoff.stiffness_document import StiffnessRecord
+from dragchain.windows.document import Round
 
 _WIDENING = 0.1
 """How far beyond the scenes of the record a number of a scene still counts as measured."""
@@ -17,7 +20,7 @@ _SCENE_SIZE = "particles"
 """A number of a scene that no law depends on."""
 
 
-def extrapolate_run(run_dir: Path, record: Path) -> None:
+def extrapolate_run(run_dir: Path, record: Path, round_file: Path | None = None) -> None:
     """Write ``extrapolated.json`` of a run: its quantities, and what the laws make of them.
 
     No law applies to a run at the physical modulus or below the smallest one of the record, nor to
@@ -30,6 +33,8 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
         A complete process run with tables and chains.
     record : Path
         ``stiffness.json``.
+    round_file : Path, optional
+        Last round of the windows of the run, whose values replace those of the laws.
 
     Raises
     ------
@@ -38,6 +43,9 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
     TableError
         If a table is missing.
     """
+    if round_file is not None:
+        _from_windows(load_case(run_dir), Round.read(round_file)).write(run_dir / FILE)
+        return
     case, known = load_case(run_dir), StiffnessRecord.read(record)
     scale = case.fidelity.youngs_modulus_scale
     softest = min(float(one) for scene in known.scenes for one in scene.runs)
@@ -75,6 +83,26 @@ def extrapolate_run(run_dir: Path, record: Path) -> None:
         outside=(*_other_law(case), *(_outside(case.numbers, known) if applies else ())),
         quantities=tuple(found),
     ).write(run_dir / FILE)
+
+
+def _from_windows(case: Case, found: Round) -> Extrapolated:
+    """The quantities of a run as its windows have them at physical stiffness."""
+    names = [field.name for field in fields(Estimate) if field.name != "reliable"]
+    return Extrapolated(
+        youngs_modulus_scale=case.fidelity.youngs_modulus_scale,
+        source=f"{len(found.windows)} windows at the physical Young's modulus",
+        outside=(),
+        quantities=tuple(
+            ExtrapolatedQuantity(
+                name=one.name,
+                label=one.label,
+                unit=one.unit,
+                measured=one.soft,
+                **({name: getattr(one, name) for name in names} if one.estimate.known else {}),
+            )
+            for one in found.quantities
+        ),
+    )
 
 
 def _other_law(case: Case) -> Iterator[str]:
