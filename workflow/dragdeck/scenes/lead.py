@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case, Stretch
+from dragdeck.errors import InputError
 from dragdeck.physics.rounding import round_to
-from dragdeck.scenes.motion import drag_leg
+from dragdeck.scenes.motion import drag_leg, driven_speed
 from dragdeck.scenes.periods import output_periods
 from dragdeck.study.model import Study
 from dragdeck.study.superposed.kind import DragSteps
@@ -29,6 +30,9 @@ SAMPLE_DIAMETERS = 1.0
 """Path that a window counts, in mean diameters of the particles."""
 
 _WINDOW_TIMESTEP_FRACTION = 0.64
+
+_FEWEST = 2
+"""Windows of which one alone says nothing of its scatter."""
 
 _FRAMES = 10
 """Least number of frames of the network in a window's sample."""
@@ -85,7 +89,10 @@ def led(case: Case) -> Case:
     if case.stretch != Stretch():
         return case
     if chosen.windows is not None:
-        return replace(case, stretch=Stretch(marks=_marks(study)))
+        marks = _marks(study)
+        if len(marks) < _FEWEST:
+            raise _too_short(case)
+        return replace(case, stretch=Stretch(marks=marks))
     if chosen.soft_start is None:
         return case
     begin = _entry_fraction(study)
@@ -111,6 +118,23 @@ def windows_of(case: Case) -> list[Case]:
         part = f"window-{number + 1}"
         found.append(replace(lead, study=study, stretch=stretch, lead=lead, part=part))
     return found
+
+
+def _too_short(case: Case) -> InputError:
+    """Refuses a path on which hardly a window fits."""
+    study = _window_study(case.study)
+    rest, window_m = _window_s(study) - RAMP_S, _window_s(study) * driven_speed(study)
+    before_m = _first_window_s(study) * driven_speed(study)
+    least = before_m + _FEWEST * window_m
+    return InputError(
+        f"the path is too short for {_FEWEST} windows",
+        file=case.file,
+        field=f"motion.path.{study.motion.path.length_field}",
+        value=f"{1e3 * study.motion.path_length_m:.4g} mm of path",
+        limit=f"at least {1e3 * least:.4g} mm: each window needs {1e3 * window_m:.3g} mm "
+        f"({RAMP_S:g} s in which the moduli are raised, {rest:.2g} s to settle and to sample)",
+        remedy="use a longer path, or remove fidelity.windows",
+    )
 
 
 def of_filling(case: Case) -> Case:
@@ -200,15 +224,14 @@ def _diameters_s(diameters: float, study: Study) -> float:
 def _frame(study: Study) -> float:
     """A frame of the network as a fraction of the drag."""
     timestep = bed_timestep(study, "timestep_fraction")
-    return output_periods(study, timestep).network / drag_leg(study).steps
+    return float(output_periods(study, timestep).network / drag_leg(study).steps)
 
 
 def _entry_fraction(study: Study) -> float:
     """Where a run with a soft start enters its drag: at a frame of the network."""
-    before = RAMP_S + _diameters_s(SETTLING_DIAMETERS, study)
-    counted = _seconds(study.motion.uncounted_m, study)
     frame = _frame(study)
-    return frame * max(1, math.floor((counted - before) / drag_leg(study).duration_s / frame))
+    frames = math.floor(_first_window_s(study) / drag_leg(study).duration_s / frame)
+    return max(1, frames) * frame
 
 
 def _window_study(study: Study) -> Study:
@@ -240,13 +263,18 @@ def _window_s(study: Study) -> float:
     return RAMP_S + _diameters_s(SETTLING_DIAMETERS + SAMPLE_DIAMETERS, study)
 
 
+def _first_window_s(study: Study) -> float:
+    """Time of the drag before the first window, whose sample begins with the statistics, s."""
+    before = RAMP_S + _diameters_s(SETTLING_DIAMETERS, study)
+    return max(0.0, _seconds(study.motion.uncounted_m, study) - before)
+
+
 def _marks(study: Study) -> tuple[float, ...]:
     """Where windows begin: as many as fit one after another, or the most that are asked."""
     windows, stiff = study.chosen_fidelity().windows, _window_study(study)
     assert windows is not None
     drag, frame = drag_leg(stiff), _frame(stiff)
-    lead_in = RAMP_S + _diameters_s(SETTLING_DIAMETERS, stiff)
-    first = max(frame, (_seconds(study.motion.uncounted_m, stiff) - lead_in) / drag.duration_s)
+    first = max(frame, _first_window_s(stiff) / drag.duration_s)
     room, length = 1.0 - first, _window_s(stiff) / drag.duration_s
     count = min(windows.most, math.floor(room / length))
     starts = (first + number * room / max(count, 1) for number in range(count))

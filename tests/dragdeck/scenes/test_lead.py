@@ -1,0 +1,182 @@
+"""Runs that go on from a softer run: what decks, steps and names say of it."""
+
+import math
+import re
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dragdeck.cases.case import Case
+from dragdeck.decks.render import deck_text
+from dragdeck.decks.templates import environment
+from dragdeck.errors import InputError
+from dragdeck.physics.packing import Bed
+from dragdeck.project import Project
+from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.lead import RAMP_STAGES, covered, led, windows_of
+from dragdeck.scenes.motion import course
+from dragdeck.scenes.process import PROCESS, process_scene
+from dragdeck.scenes.scene import StudyScene
+from dragdeck.study.base import Json
+from dragdeck.sweep.cases import load_cases
+
+BED = Bed(surface_m=0.038, top_m=0.0446)
+STIFF = {"youngs_modulus_scale": 1, "soft_start": 0.01, "timestep_fraction": 0.5, "ranks": 1}
+WINDOWS = {"tolerance": 0.1, "quantities": ["drag_mean", "workpiece_contacts"], "most": 5}
+SOFT = {"youngs_modulus_scale": 0.01, "timestep_fraction": 0.5, "ranks": 1, "windows": WINDOWS}
+
+PATHS: dict[str, Json] = {
+    "circle": {"kind": "circle", "radius_m": 0.010, "revolutions": 1},
+    "line": {"kind": "line", "start_m": [-0.028, 0], "direction_deg": 0, "length_m": 0.056},
+    "rest": {"kind": "rest", "radius_m": 0.010, "bowl_rpm": -20, "revolutions": 1},
+}
+
+Make = Callable[..., Case]
+
+
+@pytest.fixture
+def made(small: dict[str, Any], write_study: Callable[..., Path]) -> Make:
+    """The small study with these settings, a longer path, and these fields of its motion."""
+
+    def make(fidelity: Json, **motion: Any) -> Case:
+        small["bowl"]["radius_m"] = 0.04
+        small["motion"] |= {"path": PATHS["circle"], "transient_m": 0.01, **motion}
+        if small["motion"]["path"]["kind"] == "rest":
+            del small["motion"]["speed_m_s"]
+            small["bowl"]["facet_size_m"] = 0.005
+        small["fidelity"] = fidelity
+        (only,) = load_cases(write_study(small))
+        return only
+
+    return make
+
+
+def script(scene: StudyScene, project: Project) -> str:
+    """The input script of a scene."""
+    return deck_text(scene, environment(project.templates, project.studies / "none"))
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("more", [{}, {"orientation": "fixed"}, {"spin": {"rpm": 100}}])
+def test_a_run_begins_where_its_course_is(path: str, more: Json, made: Make) -> None:
+    case = led(made(STIFF, path=PATHS[path], **more))
+    scene, way = process_scene(case, BED), course(case.study, BED)
+    *_, (drag, begun) = way.begun()
+    (body,), entry = scene.deck.workpieces, scene.deck.entry_step
+    place = way.pose(drag, begun, entry - way.drag.start)
+    assert (*body.start_m, math.radians(body.turn_deg)) == pytest.approx(place, abs=1e-12)
+    assert [leg.name for leg in body.legs] == ["drag"]
+    assert scene.steps == way.drag.end - entry
+
+
+def test_the_moduli_are_raised_to_those_of_the_run(made: Make, project: Project) -> None:
+    case = made(STIFF)
+    scene = process_scene(case, BED)
+    text = script(scene, project)
+    stages = re.findall(
+        r"youngsModulus peratomtype (\S+) (\S+)\n(?:if.*reset.*\n)?if.*< (\d+)", text
+    )
+    assert len(stages) == RAMP_STAGES
+    moduli = [float(first) for first, _, _ in stages]
+    ratios = [after / before for before, after in pairwise(moduli)]
+    assert ratios == pytest.approx([100 ** (1 / RAMP_STAGES)] * (RAMP_STAGES - 1), rel=1e-9)
+    assert [float(one) for one in stages[-1][:2]] == [77e9, 210e9]
+    steps = covered(led(case), course(case.study, BED).drag)
+    assert int(stages[-1][2]) == steps.ramp_end < steps.counted < steps.end
+    assert text.index("dump write_particles") > text.rindex("youngsModulus")
+    assert f'"reset_timestep {steps.entry}"' in text
+
+
+def test_a_lead_is_soft_and_ends_where_the_run_goes_on(made: Make, project: Project) -> None:
+    case = led(made(STIFF))
+    lead = case.lead
+    assert lead is not None
+    scene = process_scene(lead, BED)
+    assert scene.deck.materials.youngs_modulus_scale == 0.01
+    assert scene.case.marks == ["state.1.restart"]
+    text = script(scene, project)
+    last = scene.case.phases[-1].end_step
+    assert f'"run {last} upto" "write_restart state.1.restart"' in text
+    assert process_scene(case, BED).deck.source == f"../{PROCESS.run_id(lead)}/state.1.restart"
+    reached = (last - scene.case.phases[-1].start_step) * scene.deck.timestep_s
+    stiff = process_scene(case, BED)
+    begun = (stiff.deck.entry_step - stiff.case.phases[-1].start_step) * stiff.deck.timestep_s
+    assert reached == pytest.approx(begun, abs=scene.deck.timestep_s)
+
+
+def test_it_starts_from_the_filling_of_its_lead(made: Make) -> None:
+    stiff = made(STIFF)
+    soft = made({**STIFF, "youngs_modulus_scale": 0.01, "soft_start": None})
+    assert FILLING.run_id(stiff) == FILLING.run_id(soft)
+    assert FILLING.build(stiff, None).deck.materials.youngs_modulus_scale == 0.01
+    plain = made({**STIFF, "soft_start": None})
+    assert FILLING.run_id(plain) != FILLING.run_id(stiff)
+    assert PROCESS.run_id(plain) != PROCESS.run_id(stiff)
+
+
+def test_nothing_is_counted_before_the_bed_has_settled(made: Make) -> None:
+    case = made(STIFF, transient_m=0.0)
+    scene = process_scene(case, BED)
+    drag = scene.case.phases[-1]
+    steps = covered(led(case), course(case.study, BED).drag)
+    counted = drag.start_step + scene.case.statistics.transient_s / scene.deck.timestep_s
+    assert counted == pytest.approx(steps.counted) and steps.counted > steps.ramp_end
+
+
+def test_windows_lie_beside_each_other_on_the_counted_path(made: Make) -> None:
+    case = led(made(SOFT))
+    found = windows_of(case)
+    assert 2 <= len(found) <= WINDOWS["most"]
+    assert {PROCESS.run_id(one.lead) for one in found if one.lead} == {PROCESS.run_id(case)}
+    assert len({PROCESS.run_id(one) for one in found}) == len(found)
+    scenes = [process_scene(one, BED) for one in found]
+    spans = sorted((one.deck.entry_step, one.case.phases[-1].end_step) for one in scenes)
+    assert all(before[1] <= after[0] for before, after in pairwise(spans))
+    way = course(found[0].study, BED)
+    assert spans[-1][1] <= way.drag.end
+    transient = case.study.motion.uncounted_m / case.study.motion.path_length_m
+    first = min(covered(one, way.drag).counted for one in found)
+    assert first >= way.drag.start + transient * (way.drag.end - way.drag.start)
+    for window, scene in zip(found, scenes, strict=True):
+        number = case.stretch.marks.index(window.stretch.begin) + 1
+        assert scene.deck.source == f"../{PROCESS.run_id(case)}/state.{number}.restart"
+        assert scene.deck.materials.youngs_modulus_scale == 1
+
+
+def test_the_first_windows_are_spread_over_the_path(made: Make) -> None:
+    begins = [one.stretch.begin for one in windows_of(made(SOFT))]
+    assert begins[0] == min(begins)
+    middle = 0.5 * (min(begins) + max(begins))
+    assert abs(begins[1] - middle) == min(abs(one - middle) for one in begins)
+
+
+def test_a_tolerance_does_not_name_a_run(made: Make) -> None:
+    other = made({**SOFT, "windows": {**WINDOWS, "tolerance": 0.2, "quantities": ["drag_mean"]}})
+    assert PROCESS.run_id(other) == PROCESS.run_id(made(SOFT))
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"soft_start": 1}, "soft_start"),
+        ({"soft_start": 0.5, "youngs_modulus_scale": 0.1}, "not below youngs_modulus_scale"),
+        ({"windows": WINDOWS}, "windows require a youngs_modulus_scale below 1"),
+        ({**SOFT, "speed_factor": 2}, "windows require"),
+        ({**SOFT, "soft_start": 0.001}, "windows require"),
+    ],
+)
+def test_settings_that_do_not_fit_are_refused(settings: Json, said: str, made: Make) -> None:
+    with pytest.raises(InputError, match=said):
+        made({**STIFF, "soft_start": None, **settings})
+
+
+def test_a_path_too_short_for_windows_is_refused(made: Make) -> None:
+    path = {"kind": "circle", "radius_m": 0.010, "revolutions": 0.4}
+    with pytest.raises(InputError, match="too short for 2 windows") as caught:
+        process_scene(made(SOFT, path=path), BED)
+    needs = float(re.search(r"at least (\S+) mm", str(caught.value))[1]) / 1e3  # type: ignore[index]
+    path["revolutions"] = 1.05 * needs / (2 * math.pi * 0.010)
+    process_scene(made(SOFT, path=path), BED)
