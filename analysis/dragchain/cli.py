@@ -197,8 +197,8 @@ STEPS = (
             "tables of the runs.",
             "windows.rounds:judge_windows", (
                 RUN_DIR,
-                _argument("--windows", type=Path, nargs="*", default=[], metavar="RUN_DIR",
-                          help="folders of the windows (default: none yet)"),
+                _argument("--windows", type=Path, nargs="*", default=[], metavar="MEASURES",
+                          help="measures.json of each window (default: none yet)"),
                 _argument("--tolerance", type=float, required=True, metavar="X",
                           help="relative half-width of the 95 %% confidence interval; required"),
                 _argument("--quantities", nargs="+", required=True, metavar="NAME",

@@ -13,7 +13,7 @@ from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
 from dragdeck.errors import InputError, choices
 from dragdeck.outlook.measured import Tradeoff
 from dragdeck.outlook.stable_step import check_timestep
-from dragdeck.scenes.lead import with_leads
+from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, with_leads
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import SceneType
@@ -26,8 +26,14 @@ from dragdeck.sweep.plan import Points, plan_points, read_plan
 POINTS = "points"
 """Folder of the process runs of a plan."""
 
-PLACES: dict[str, SceneType] = {**SCENES, POINTS: PROCESS}
+WINDOWS = "windows"
+"""Folder of the windows of process runs."""
+
+PLACES: dict[str, SceneType] = {**SCENES, POINTS: PROCESS, WINDOWS: PROCESS}
 """The scene of each folder of runs of a study."""
+
+OUTCOMES = (POINTS, WINDOWS)
+"""Folders of runs of which one that fails is a finding, which others do without."""
 
 
 def run_path(study: str, place: str, run: str) -> str:
@@ -116,13 +122,25 @@ class Project:
     def run_folders(
         self, cases: Iterable[Case], scene: SceneType, *, of_plan: bool = False
     ) -> dict[Path, Case]:
-        """The folders of the engine runs of cases, each with its first case."""
+        """The folders of the engine runs of cases, each with its first case.
+
+        Those from which they go on are among them, and the windows that are certain or begun.
+        """
         runs = by_run(with_leads(cases) if scene.needs_bed else cases, scene).values()
-        return {self.run_folder(case, scene, of_plan=of_plan): case for case in runs}
+        folders = {self.run_folder(case, scene, of_plan=of_plan): case for case in runs}
+        return {
+            folder: case
+            for folder, case in folders.items()
+            if case.rank_of_window <= FIRST_WINDOWS or folder.is_dir()
+        }
 
     def run_folder(self, case: Case, scene: SceneType, *, of_plan: bool = False) -> Path:
-        """The folder of one engine run; process runs of a plan stand apart, as points."""
-        place = POINTS if of_plan and scene.needs_bed else scene.name
+        """The folder of one engine run; windows and process runs of a plan stand apart."""
+        place = scene.name
+        if scene.needs_bed and case.rank_of_window:
+            place = WINDOWS
+        elif scene.needs_bed and of_plan and case.part != LEAD:
+            place = POINTS
         return self.root / run_path(case.study_name, place, scene.run_id(case))
 
 

@@ -18,8 +18,10 @@ from dragdeck.errors import DragdeckError, choices
 from dragdeck.outlook.runs import expected_runs, plan_in_words
 from dragdeck.outlook.timestep import largest_of_case
 from dragdeck.project import (
+    OUTCOMES,
     PLACES,
     POINTS,
+    WINDOWS,
     Project,
     by_folder,
     by_run,
@@ -191,9 +193,13 @@ def points_by_run(scene, plan=PLAN, leads=False):
 
 def origins(place):
     """Where cases of a folder's runs come from: how to name them on the command line, and by run."""
-    scene = PLACES[place]
+    scene, own = PLACES[place], CASES
+    if place == WINDOWS:
+        own = [window for case in CASES for window in windows_of(case)]
+    elif scene.needs_bed:
+        own = with_leads(CASES)
     if place != POINTS:
-        yield fidelity_option(), by_folder(with_leads(CASES) if scene.needs_bed else CASES, scene)
+        yield fidelity_option(), by_folder(own, scene)
     yield f"--plan {PLAN}", points_by_run(scene.name, leads=True)
     yield f"--plan {VALIDATION}", points_by_run(scene.name, VALIDATION, leads=True)
 
@@ -286,7 +292,7 @@ def of_its_lead(place):
     def names(wildcards):
         lead = led(case_of(place, wildcards.run)).lead
         run = lead and SCENES["process"].run_id(lead)
-        return [f"{run_path(wildcards.study, place, run)}/{RECORD[place]}"] if lead else []
+        return [f"{run_path(wildcards.study, 'process', run)}/run.json"] if lead else []
 
     return names if PLACES[place].needs_bed else []
 
@@ -300,21 +306,14 @@ def round_file(wildcards, number):
     return checkpoints.judge_windows.get(**run, round=number).output[0]
 
 
-def window_folders(wildcards):
-    """The folders of the windows that a round judges: those that the one before wanted."""
+def windows_of_round(wildcards):
+    """The measures of the windows that a round judges: of those that the one before wanted."""
     number, case = int(wildcards.round), case_of("process", wildcards.run)
     if not number:
         return []
     wanted = json.loads(Path(round_file(wildcards, number - 1)).read_text())["wanted"]
     runs = [SCENES["process"].run_id(one) for one in windows_of(case)[:wanted]]
-    return [run_path(wildcards.study, "process", run) for run in runs]
-
-
-def windows_of_round(wildcards):
-    """What a round reads of its windows."""
-    scene = SCENES["process"]
-    names = ["run.json", *(f"tables/{name}" for name in (*scene.tables, *scene.network))]
-    return [f"{folder}/{name}" for folder in window_folders(wildcards) for name in names]
+    return [f"{run_path(wildcards.study, WINDOWS, run)}/measures.json" for run in runs]
 
 
 def last_round(wildcards):

@@ -2,7 +2,7 @@
 # A point of a plan that fails is a finding, and its outcome says how; any other run that
 # fails is none, and leaves no run.json. What a process waits for goes before drop tests and figures.
 
-RECORD = {place: "outcome.json" if place == POINTS else "run.json" for place in PLACES}
+RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}
 
 
 for PLACE, SCENE in PLACES.items():
@@ -62,8 +62,8 @@ for PLACE, SCENE in PLACES.items():
             "../envs/python.yaml"
         threads: ranks_of(PLACE)
         params:
-            outcome="--outcome" if PLACE == POINTS else "",
-            file=of_run(PLACE, RECORD[PLACE]) if PLACE == POINTS else "",
+            outcome="--outcome" if PLACE in OUTCOMES else "",
+            file=of_run(PLACE, RECORD[PLACE]) if PLACE in OUTCOMES else "",
             source=source_hash("dragdeck.engine.run_folder"),
         shell:
             "dragdeck run $(dirname {output}) {params.outcome} {params.file} > {log} 2>&1"
@@ -197,8 +197,8 @@ rule draw_for_journal:
 checkpoint judge_windows:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
-        windows_of_round,
         run=of_run("process", "run.json"),
+        windows=windows_of_round,
     output:
         of_run("process", "windows/round-{round}.json"),
     log:
@@ -210,11 +210,10 @@ checkpoint judge_windows:
     conda:
         "../envs/python.yaml"
     params:
-        windows=window_folders,
         asked=windows_options,
         source=source_hash("dragchain.windows.rounds"),
     shell:
-        "dragchain step windows $(dirname {input.run}) --windows {params.windows} {params.asked}"
+        "dragchain step windows $(dirname {input.run}) --windows {input.windows} {params.asked}"
         " --out {output} > {log} 2>&1"
 
 
@@ -241,23 +240,27 @@ rule extrapolate_process:
         " {params.windows} > {log} 2>&1"
 
 
-# What is compared of a point: its tables, chains and numbers.
-rule measure_point:
-    input:
-        of_run(POINTS, "outcome.json"),
-        bed=of_its_bed(POINTS, "tables/packing.json"),
-    output:
-        of_run(POINTS, "measures.json"),
-    log:
-        of_run(POINTS, "logs/measures.log"),
-    benchmark:
-        of_run(POINTS, "benchmarks/measures.tsv")
-    conda:
-        "../envs/python.yaml"
-    params:
-        source=source_hash("dragchain.tradeoff.measure_run"),
-    shell:
-        "dragchain step measure $(dirname {output}) --packing {input.bed} > {log} 2>&1"
+for PLACE in OUTCOMES:
+
+    # What is compared of a point or taken from a window: its tables, chains and numbers.
+    rule:
+        name:
+            f"measure_{PLACE}"
+        input:
+            of_run(PLACE, "outcome.json"),
+            bed=of_its_bed(PLACE, "tables/packing.json"),
+        output:
+            of_run(PLACE, "measures.json"),
+        log:
+            of_run(PLACE, "logs/measures.log"),
+        benchmark:
+            of_run(PLACE, "benchmarks/measures.tsv")
+        conda:
+            "../envs/python.yaml"
+        params:
+            source=source_hash("dragchain.tradeoff.measure_run"),
+        shell:
+            "dragchain step measure $(dirname {output}) --packing {input.bed} > {log} 2>&1"
 
 
 for PLACE, SCENE in PLACES.items():
@@ -270,7 +273,7 @@ for PLACE, SCENE in PLACES.items():
             input:
                 (
                     of_run(PLACE, "measures.json")
-                    if PLACE == POINTS
+                    if PLACE in OUTCOMES
                     else tables_of(PLACE, SCENE.tables)
                 ),
                 record=of_run(PLACE, RECORD[PLACE]),

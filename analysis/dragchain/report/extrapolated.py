@@ -1,5 +1,6 @@
 """Quantities of a run, and at the physical Young's modulus: ``extrapolated.json``."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from dragchain.documents import Document, Part
@@ -37,6 +38,45 @@ class ExtrapolatedQuantity(Part):
         return Estimate(self.value, self.ci95_low, self.ci95_high)
 
 
+class WindowsOfRun(Part):
+    """What the windows of a run were asked for, and what they reached.
+
+    Attributes
+    ----------
+    tolerance : float
+        Relative half-width of the 95 % interval at which no further window is run.
+    asked : tuple of str
+        Quantities to which it applies, in words.
+    reached : bool
+        Whether all of them are inside the tolerance.
+    runs : tuple of str
+        Windows that enter.
+    refused : mapping
+        Reason by window, of those that do not enter.
+    enough : int
+        Expected number of windows that would do.
+    """
+
+    tolerance: float
+    asked: tuple[str, ...]
+    reached: bool
+    runs: tuple[str, ...]
+    refused: Mapping[str, str]
+    enough: int
+
+    @property
+    def said(self) -> str:
+        """What was asked and reached, in a sentence."""
+        percent = f"{100 * self.tolerance:.3g} %"
+        told = f"{len(self.runs)} windows at the physical Young's modulus"
+        if self.reached:
+            return f"{told} give the {' and the '.join(self.asked)} to within {percent}."
+        return (
+            f"{told} do not give the {' and the '.join(self.asked)} to within {percent}: about "
+            f"{self.enough} would, on a longer path or over several seeds."
+        )
+
+
 class Extrapolated(Document):
     """The content of ``extrapolated.json``.
 
@@ -46,6 +86,8 @@ class Extrapolated(Document):
         Multiplier of every Young's modulus in the run.
     source : str
         Source of the laws.
+    windows : WindowsOfRun or None
+        Where the values at the physical modulus are from, if not from laws.
     outside : tuple of str
         Dimensionless numbers of the scene outside the range of the record; the intervals are then
         too narrow by an unknown amount.
@@ -57,6 +99,7 @@ class Extrapolated(Document):
     source: str
     outside: tuple[str, ...]
     quantities: tuple[ExtrapolatedQuantity, ...]
+    windows: WindowsOfRun | None = None
 
     def of(self, name: str) -> ExtrapolatedQuantity | None:
         """A quantity by its name, None if it was not measured."""

@@ -207,8 +207,15 @@ def _of_modulus_and_speed(case: Case) -> Iterator[str]:
             f"{factor:g}: times, impulses and rates of the report are in process time, those of "
             "the tables in simulated time."
         )
+    elif scale != 1.0 and case.marks:
+        yield "Values at the physical modulus are those of windows: short runs at that modulus."
     elif scale != 1.0:
         yield "Values are corrected to the physical modulus where a law is known."
+    if case.lead:
+        yield (
+            "Filling, plunge, approach and the beginning of the drag have a reduced modulus; it "
+            "was raised before the statistics begin."
+        )
 
 
 def _of_step(case: Case) -> str:

@@ -155,9 +155,10 @@ class Case(Document):
     and the ``workpiece``, ``numbers`` the dimensionless numbers of a process. ``superposed`` lists
     the superposed motions, ``asked`` is the tolerance for which the settings were chosen,
     ``unsafe_timestep`` why a step beyond the stable one was accepted, and ``output_of`` the run
-    from whose raw output a further workpiece is read. ``added_forces`` are models of the contact
-    law that add a normal force, such as cohesion, ``changed_law`` commands on the law that come
-    from a template of the study.
+    from whose raw output a further workpiece is read. ``lead`` is the softer run from which the
+    process goes on, and ``marks`` are states from which others go on. ``added_forces``
+    are models of the contact law that add a normal force, such as cohesion, ``changed_law``
+    commands on the law that come from a template of the study.
     """
 
     made_by: ClassVar[str] = "dragdeck step render"
@@ -169,6 +170,8 @@ class Case(Document):
     case: str | None = None
     upstream: Mapping[str, str] = {}
     output_of: str | None = None
+    lead: str | None = None
+    marks: tuple[str, ...] = ()
     timestep_s: PositiveFloat
     rayleigh_time_s: PositiveFloat
     gravity_m_s2: float

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from pathlib import Path
 
-from dragchain.report.extrapolated import FILE, Extrapolated, ExtrapolatedQuantity
+from dragchain.report.extrapolated import FILE, Extrapolated, ExtrapolatedQuantity, WindowsOfRun
 from dragchain.run.case import Case, load_case
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.path_blocks import quantities_along
@@ -92,6 +92,14 @@ def _from_windows(case: Case, found: Round) -> Extrapolated:
         youngs_modulus_scale=case.fidelity.youngs_modulus_scale,
         source=f"{len(found.windows)} windows at the physical Young's modulus",
         outside=(),
+        windows=WindowsOfRun(
+            tolerance=found.tolerance,
+            asked=tuple(one.label for one in found.quantities if one.asked),
+            reached=found.reached,
+            runs=found.windows,
+            refused={one.run: one.why for one in found.refused},
+            enough=found.enough,
+        ),
         quantities=tuple(
             ExtrapolatedQuantity(
                 name=one.name,

@@ -8,9 +8,7 @@ import numpy as np
 
 from dragchain.arrays import Floats
 from dragchain.run.case import load_case
-from dragchain.run.completeness import read_accepted
-from dragchain.tables.by_step import read_table
-from dragchain.tradeoff.measures import PathQuantities
+from dragchain.tradeoff.measures import Measures, PathQuantities
 from dragchain.tradeoff.path_blocks import quantities_along
 from dragchain.tradeoff.quantities import QUANTITIES, Quantity
 from dragchain.windows.document import Refused, Round, WindowedQuantity
@@ -21,9 +19,6 @@ FIRST = 3
 
 _MOST_MORE = 2.0
 """A round has at most so many times the windows of the one before."""
-
-_PLATEAU = 0.15
-"""Largest relative change of the coordination number within a window's sample."""
 
 
 def judge_windows(
@@ -41,7 +36,7 @@ def judge_windows(
     run_dir : Path
         The run with reduced moduli, with tables and chains.
     windows : sequence of Path
-        Its windows so far, with tables and chains.
+        ``measures.json`` of its windows so far.
     tolerance : float
         Relative half-width of the interval at which no further window is run.
     quantities : sequence of str
@@ -52,10 +47,11 @@ def judge_windows(
         The file to write.
     """
     soft = quantities_along(run_dir, load_case(run_dir))
-    refused = [one for folder in windows for one in _refused(folder)]
+    measured = [Measures.read(file) for file in windows]
+    refused = [one for run in measured for one in _refused(run)]
     bad = {one.run for one in refused}
-    good = [folder for folder in windows if folder.name not in bad]
-    values = [quantities_along(folder, load_case(folder)).values() for folder in good]
+    good = [run for run in measured if run.run not in bad]
+    values = [run.values() for run in good]
     found = list(_windowed(soft, values, quantities))
     asked = [one for one in found if one.asked]
     reached = bool(good) and all(one.half_width <= tolerance for one in asked)
@@ -68,7 +64,7 @@ def judge_windows(
     last = reached or len(windows) >= most
     Round(
         tolerance=tolerance,
-        windows=tuple(folder.name for folder in good),
+        windows=tuple(run.run for run in good),
         refused=tuple(refused),
         wanted=len(windows) if last else max(wanted, min(FIRST, most)),
         last=last,
@@ -107,17 +103,10 @@ def _window_like(soft: PathQuantities, quantity: Quantity) -> Floats:
     return np.sqrt(blocks) if quantity.squared else blocks
 
 
-def _refused(folder: Path) -> Iterator[Refused]:
+def _refused(window: Measures) -> Iterator[Refused]:
     """Why a window does not enter, if it does not."""
-    read_accepted(folder)
-    network = read_table(folder / "tables" / "network.parquet")
-    number = network["coordination_number"].to_numpy(np.float64)
-    half = len(number) // 2
-    first, second = float(number[:half].mean()), float(number[half:].mean())
-    if abs(second / first - 1) > _PLATEAU:
-        change = f"{first:.2f} to {second:.2f}"
+    if not window.complete:
+        check = window.telling_failure
         yield Refused(
-            run=folder.name,
-            why=f"the bed does not come to rest after its moduli were raised: its coordination "
-            f"number changes from {change} within the window",
+            run=window.run, why=f"{check.name}: {check.seen}" if check else "not complete"
         )

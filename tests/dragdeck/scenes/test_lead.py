@@ -100,7 +100,10 @@ def test_a_lead_is_soft_and_ends_where_the_run_goes_on(made: Make, project: Proj
     text = script(scene, project)
     last = scene.case.phases[-1].end_step
     assert f'"run {last} upto" "write_restart state.1.restart"' in text
-    assert process_scene(case, BED).deck.source == f"../{PROCESS.run_id(lead)}/state.1.restart"
+    assert (
+        process_scene(case, BED).deck.source
+        == f"../../process/{PROCESS.run_id(lead)}/state.1.restart"
+    )
     reached = (last - scene.case.phases[-1].start_step) * scene.deck.timestep_s
     stiff = process_scene(case, BED)
     begun = (stiff.deck.entry_step - stiff.case.phases[-1].start_step) * stiff.deck.timestep_s
@@ -142,7 +145,7 @@ def test_windows_lie_beside_each_other_on_the_counted_path(made: Make) -> None:
     assert first >= way.drag.start + transient * (way.drag.end - way.drag.start)
     for window, scene in zip(found, scenes, strict=True):
         number = case.stretch.marks.index(window.stretch.begin) + 1
-        assert scene.deck.source == f"../{PROCESS.run_id(case)}/state.{number}.restart"
+        assert scene.deck.source == f"../../process/{PROCESS.run_id(case)}/state.{number}.restart"
         assert scene.deck.materials.youngs_modulus_scale == 1
 
 

@@ -69,6 +69,8 @@ class Case:
         The softer run from which its process goes on; None if it begins by itself.
     part : str
         What tells its process from others of the same settings.
+    rank_of_window : int
+        Of a window: when it is run, from 1; otherwise 0.
     """
 
     file: Path
@@ -82,11 +84,18 @@ class Case:
     stretch: Stretch = Stretch()
     lead: "Case | None" = None
     part: str = ""
+    rank_of_window: int = 0
 
     @property
     def all_workpieces(self) -> "Case":
         """The case that is run: of all workpieces."""
         return self.whole or self
+
+    @property
+    def of_filling(self) -> "Case":
+        """The case whose filling it starts from: that of its lead, with the settings of a start."""
+        first = self.lead or self
+        return replace(first, study=first.study.at_start())
 
     @property
     def ranks(self) -> int:

@@ -12,6 +12,7 @@ from dragdeck.engine.status import RunStatus, run_status
 from dragdeck.errors import InputError
 from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds
 from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.lead import led
 from dragdeck.scenes.scene import SceneType
 
 WAITING = RunStatus("waiting")
@@ -26,7 +27,7 @@ class StudyRun:
     scene : str
     folder : Path
     after : Path or None
-        Folder of the filling that it starts from.
+        Folder of the filling or of the softer run that it starts from.
     ranks : int
     cost : Cost
         Expected for the whole run.
@@ -102,8 +103,9 @@ def alike(runs: Mapping[Path, Case]) -> list[dict[Path, Case]]:
     """Runs by their folders, those that differ in the seed alone together: they cost the same."""
     found: dict[str, dict[Path, Case]] = {}
     for folder, case in runs.items():
-        but_for_the_seed = case.study.model_copy(update={"seed": 0})
-        found.setdefault(but_for_the_seed.model_dump_json(), {})[folder] = case
+        but_for_the_seed = case.study.model_copy(update={"seed": 0}).model_dump_json()
+        covers = led(case).stretch
+        found.setdefault(f"{but_for_the_seed} {covers.end - covers.begin:.6f}", {})[folder] = case
     return list(found.values())
 
 
@@ -134,9 +136,10 @@ def expected_runs(
         size, cost = expected_bytes(outputs, count), expected_cost(kind, scene, speeds)
         ranks = 1 if kind.single_particle else first.ranks
         for folder, case in group.items():
-            filling = folder.parents[1] / FILLING.name / FILLING.run_id(case)
-            after = filling if kind.needs_bed else None
-            yield StudyRun(kind.name, folder, after, ranks, cost, size)
+            after = folder.parents[1] / FILLING.name / FILLING.run_id(case)
+            if kind.needs_bed and (lead := led(case).lead):
+                after = folder.parents[1] / kind.name / kind.run_id(lead)
+            yield StudyRun(kind.name, folder, after if kind.needs_bed else None, ranks, cost, size)
 
 
 def by_their_speeds(runs: Sequence[StudyRun]) -> list[StudyRun]:
@@ -159,12 +162,15 @@ def _corrected(run: StudyRun, slower: Sequence[float]) -> StudyRun:
 def time_left(runs: Sequence[StudyRun], cores: int) -> float:
     """Wall time that runs still need beside each other on so many cores. An estimate.
 
-    No less than their work shared by all cores, and than any run with the filling before it.
+    No less than their work shared by all cores, and than any run with those before it.
     """
-    left = {run.folder: run.left_s for run in runs}
+    by_folder = {run.folder: run for run in runs}
     work = sum(run.left_s * min(run.ranks, cores) for run in runs) / cores
-    chains = (run.left_s + left.get(run.after, 0.0) if run.after else run.left_s for run in runs)
-    return max(work, *chains, 0.0)
+
+    def chain(run: StudyRun | None) -> float:
+        return run.left_s + chain(by_folder.get(run.after) if run.after else None) if run else 0.0
+
+    return max(work, *map(chain, runs), 0.0)
 
 
 def done_fraction(runs: Sequence[StudyRun]) -> float:

@@ -39,7 +39,6 @@ from dragdeck.physics.domain_split import warnings as rank_warnings
 from dragdeck.physics.packing import Bed, Particles, pour
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.run_limits import RunLimits, run_limits
-from dragdeck.scenes.lead import of_filling
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.study.base import Json
 from dragdeck.study.model import Media, Study
@@ -306,7 +305,7 @@ def _particles_data(particles: Particles, study: Study, top_m: float, types: int
 
 def filling_content(case: Case) -> Json:
     """What a filling depends on: less than a process, so that many share one."""
-    study = of_filling(case).study
+    study = case.of_filling.study
     particle, bowl = study.media.material, study.bowl.material
     fidelity, outer = study.chosen_fidelity().plain(), study.bowl.plain()
     settings = ("youngs_modulus_scale", "filling_timestep_fraction", "skin_m", "ranks")
@@ -341,7 +340,7 @@ def partners_in_bed(case: Case) -> list[tuple[str, str, float]]:
 
 
 def _build(case: Case, bed: Bed | None) -> Scene[FillingCase]:
-    return filling_scene(of_filling(case))
+    return filling_scene(case.of_filling)
 
 
 FILLING = SceneType(

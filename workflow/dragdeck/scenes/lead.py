@@ -13,10 +13,14 @@ from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case, Stretch
 from dragdeck.errors import InputError
 from dragdeck.physics.rounding import round_to
+from dragdeck.scenes.legs import Stop
 from dragdeck.scenes.motion import drag_leg, driven_speed
 from dragdeck.scenes.periods import output_periods
 from dragdeck.study.model import Study
 from dragdeck.study.superposed.kind import DragSteps
+
+LEAD = "lead"
+"""Part of a case that only leads to another one's process."""
 
 RAMP_S = 0.05
 """Time in which the moduli are raised, s: the bed rises by what the overlaps give up."""
@@ -29,37 +33,14 @@ SETTLING_DIAMETERS = 1.0
 SAMPLE_DIAMETERS = 1.0
 """Path that a window counts, in mean diameters of the particles."""
 
-_WINDOW_TIMESTEP_FRACTION = 0.64
+FIRST_WINDOWS = 3
+"""Windows of the first round, if so many fit."""
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""
 
 _FRAMES = 10
 """Least number of frames of the network in a window's sample."""
-
-
-@dataclass(frozen=True)
-class Stop:
-    """A step of the drag up to which the engine runs, and what is done before and after.
-
-    Attributes
-    ----------
-    step : int
-    youngs_moduli_pa : sequence of float
-        Of each type from here on; empty if they stay.
-    first : bool
-        Whether the run of a lead begins here.
-    writes : bool
-        Whether the outputs of the drag begin here.
-    mark : str
-        File into which the state is written then; empty for none.
-    """
-
-    step: int
-    youngs_moduli_pa: Sequence[float] = ()
-    first: bool = False
-    writes: bool = False
-    mark: str = ""
 
 
 @dataclass(frozen=True)
@@ -96,7 +77,7 @@ def led(case: Case) -> Case:
     if chosen.soft_start is None:
         return case
     begin = _entry_fraction(study)
-    whole = replace(case.all_workpieces, stretch=Stretch(0.0, begin, (begin,)), part="lead")
+    whole = replace(case.all_workpieces, stretch=Stretch(0.0, begin, (begin,)), part=LEAD)
     lead = replace(whole, study=whole.study.at_start(), asked=None, advised=None)
     return replace(case, stretch=Stretch(begin), lead=lead)
 
@@ -112,11 +93,11 @@ def windows_of(case: Case) -> list[Case]:
         return []
     study = _window_study(lead.study)
     length = _window_s(study) / drag_leg(study).duration_s
-    for number in _spread_out(len(lead.stretch.marks)):
+    for rank, number in enumerate(_spread_out(len(lead.stretch.marks)), 1):
         begin = lead.stretch.marks[number]
         stretch = Stretch(begin, min(begin + length, 1.0))
-        part = f"window-{number + 1}"
-        found.append(replace(lead, study=study, stretch=stretch, lead=lead, part=part))
+        window = replace(lead, study=study, stretch=stretch, lead=lead)
+        found.append(replace(window, part=f"window-{number + 1}", rank_of_window=rank))
     return found
 
 
@@ -135,12 +116,6 @@ def _too_short(case: Case) -> InputError:
         f"({RAMP_S:g} s in which the moduli are raised, {rest:.2g} s to settle and to sample)",
         remedy="use a longer path, or remove fidelity.windows",
     )
-
-
-def of_filling(case: Case) -> Case:
-    """The case whose filling a run starts from: that of its lead."""
-    case = case.lead or case
-    return replace(case, study=case.study.at_start())
 
 
 def with_leads(cases: Iterable[Case]) -> list[Case]:
@@ -231,19 +206,20 @@ def _entry_fraction(study: Study) -> float:
     """Where a run with a soft start enters its drag: at a frame of the network."""
     frame = _frame(study)
     frames = math.floor(_first_window_s(study) / drag_leg(study).duration_s / frame)
-    return max(1, frames) * frame
+    return float(max(1, frames) * frame)
 
 
 def _window_study(study: Study) -> Study:
     """The study as its windows run it: at physical stiffness, with a frame for each short path."""
     chosen, sample = study.chosen_fidelity(), _diameters_s(SAMPLE_DIAMETERS, study)
+    assert chosen.windows is not None
     often = _FRAMES / sample
     rates = study.outputs
     fidelity = chosen.model_copy(
         update={
             "youngs_modulus_scale": 1.0,
             "soft_start": chosen.youngs_modulus_scale,
-            "timestep_fraction": _WINDOW_TIMESTEP_FRACTION,
+            "timestep_fraction": chosen.windows.timestep_fraction,
             "ranks": 1,
             "windows": None,
         }
@@ -266,7 +242,7 @@ def _window_s(study: Study) -> float:
 def _first_window_s(study: Study) -> float:
     """Time of the drag before the first window, whose sample begins with the statistics, s."""
     before = RAMP_S + _diameters_s(SETTLING_DIAMETERS, study)
-    return max(0.0, _seconds(study.motion.uncounted_m, study) - before)
+    return float(max(0.0, _seconds(study.motion.uncounted_m, study) - before))
 
 
 def _marks(study: Study) -> tuple[float, ...]:

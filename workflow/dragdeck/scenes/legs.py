@@ -107,6 +107,30 @@ class TimedLeg:
         return stages or [(self.duration_s, self.velocity_m_s)]
 
 
+@dataclass(frozen=True)
+class Stop:
+    """A step of the drag up to which the engine runs, and what is done before and after.
+
+    Attributes
+    ----------
+    step : int
+    youngs_moduli_pa : sequence of float
+        Of each type from here on; empty if they stay.
+    first : bool
+        Whether the run of a lead begins here.
+    writes : bool
+        Whether the outputs of the drag begin here.
+    mark : str
+        File into which the state is written then; empty for none.
+    """
+
+    step: int
+    youngs_moduli_pa: Sequence[float] = ()
+    first: bool = False
+    writes: bool = False
+    mark: str = ""
+
+
 def plunge_point(motion: Motion) -> Point:
     """Where the workpiece goes in, m."""
     return motion.path.plunge_point if motion.plunge_at_m is None else motion.plunge_at_m

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Deck
-from dragdeck.scenes.lead import Stop
-from dragdeck.scenes.legs import Place, TimedLeg
+from dragdeck.scenes.legs import Place, Stop, TimedLeg
 from dragdeck.scenes.motion import Course, on_engine
 from dragdeck.study.superposed.kind import EngineMotion
 

@@ -167,7 +167,7 @@ def _source(case: Case) -> str:
     if case.lead is None:
         return f"../../filling/{FILLING.run_id(case)}/{PACKING_FILE}"
     number = 1 + case.lead.stretch.marks.index(case.stretch.begin)
-    return f"../{PROCESS.run_id(case.lead)}/{mark_file(number)}"
+    return f"../../{PROCESS.name}/{PROCESS.run_id(case.lead)}/{mark_file(number)}"
 
 
 def _outputs(

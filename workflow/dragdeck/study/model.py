@@ -336,6 +336,9 @@ class Windows(Model):
     most: Annotated[Whole, Field(ge=2, le=64)] = Field(
         default=16, description="largest number of windows"
     )
+    timestep_fraction: Annotated[Number, Field(gt=0, le=2)] = Field(
+        default=0.64, description="time step of the windows as a fraction of the Rayleigh time"
+    )
 
 
 class Fidelity(Model):
@@ -400,13 +403,12 @@ class Fidelity(Model):
         """The settings of filling, plunge, approach and the beginning of the drag."""
         if self.soft_start is None:
             return self
-        scale, step = self.soft_start, max(self.timestep_fraction, _STEP_OF_SOFT_START)
-        changes = {"youngs_modulus_scale": scale, "timestep_fraction": step, "soft_start": None}
-        return self.model_copy(update=changes)
+        changes = {"timestep_fraction": _STEP_OF_SOFT_START, "soft_start": None}
+        return self.model_copy(update={"youngs_modulus_scale": self.soft_start, **changes})
 
 
 _STEP_OF_SOFT_START = 0.5
-"""Smallest time step of a soft start as a fraction of its Rayleigh time: that of `standard`."""
+"""Time step of a soft start as a fraction of its Rayleigh time: that of `standard`."""
 
 
 class Tolerance(Model):

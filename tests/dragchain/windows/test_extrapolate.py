@@ -8,8 +8,8 @@ from figure_files import case_json
 from paths import ROOT
 
 from dragchain.report.extrapolated import FILE, Extrapolated
-from dragchain.tradeoff import extrapolate
 from dragchain.tradeoff.measures import PathQuantities
+from dragchain.windows import extrapolate
 from dragchain.windows.extrapolate import extrapolate_run
 
 RECORD = ROOT / "workflow/dragdeck/data/stiffness.json"

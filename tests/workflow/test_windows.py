@@ -1,0 +1,87 @@
+"""Runs that go on from a softer run, on the real engine: soft start, windows, an interruption."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from paths import SMALL_STUDY
+from snakemake_calls import copy_of_project, jobs, snakemake
+
+from dragchain.report.extrapolated import Extrapolated
+from dragchain.run.case import load_case
+from dragchain.run.kinematics import drag_phase
+from dragchain.windows.document import Round
+
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+STUDY = ("process", "--config", "study=small")
+WINDOWS = {"tolerance": 0.01, "quantities": ["drag_mean", "workpiece_contacts"], "most": 3}
+
+
+def soft_study() -> dict[str, Any]:
+    """The small study with physical moduli as low as cheap windows need, and a longer path."""
+    data: dict[str, Any] = yaml.safe_load(SMALL_STUDY.read_text())
+    for material in data["materials"].values():
+        material["youngs_modulus_pa"] = float(material["youngs_modulus_pa"]) / 100
+    data["motion"] |= {"speed_m_s": 0.05, "transient_m": 0.012}
+    data["motion"]["path"]["revolutions"] = 1
+    data["motion"]["spin"] = {"rpm": 30}
+    return data
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A project in which the study was run with windows."""
+    data = soft_study()
+    data["fidelity"] = {
+        "youngs_modulus_scale": 0.1, "timestep_fraction": 0.5, "ranks": 1, "windows": WINDOWS,
+    }  # fmt: skip
+    folder = copy_of_project(tmp_path_factory.mktemp("windows"), data)
+    done = snakemake(folder, "all", "--config", "study=small")
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "results/small"
+
+
+def test_windows_are_run_until_the_tolerance_or_the_end(finished: Path) -> None:
+    (run,) = (finished / "process").iterdir()
+    rounds = sorted((run / "windows").iterdir())
+    last = Round.read(rounds[-1])
+    assert [Round.read(file).last for file in rounds] == [False] * (len(rounds) - 1) + [True]
+    assert len(last.windows) + len(last.refused) == len(list((finished / "windows").iterdir())) == 3
+    assert not last.reached and last.enough > 3
+    for one in last.quantities:
+        if one.asked:
+            assert one.ci95_low < one.value < one.ci95_high
+            assert one.value == pytest.approx(np.mean(one.windows))
+
+
+def test_the_report_takes_its_values_from_the_windows(finished: Path) -> None:
+    (run,) = (finished / "process").iterdir()
+    found = Extrapolated.read(run / "tables/extrapolated.json")
+    drag, summary = found.of("drag_mean"), pd.read_parquet(finished / "report/summary.parquet")
+    assert drag is not None and found.windows is not None and not found.windows.reached
+    assert summary["extrapolated_drag_mean_n"][0] == pytest.approx(drag.value)
+    assert summary["drag_mean_n"][0] == pytest.approx(drag.measured, rel=0.01)
+    assert found.windows.said in (finished / "report/report.html").read_text()
+
+
+def test_a_window_is_where_the_course_is(finished: Path) -> None:
+    for folder in (finished / "windows").iterdir():
+        case = load_case(folder)
+        force = pd.read_parquet(folder / "tables/workpiece_force.parquet")
+        assert case.motion is not None and case.lead is not None
+        since = (force.step - drag_phase(case).start_step) * case.timestep_s
+        angle = since * case.motion.axis_speed_m_s / 0.010
+        away = np.hypot(
+            force.ref_x_m - 0.010 * np.cos(angle), force.ref_y_m - 0.010 * np.sin(angle)
+        )
+        lead = json.loads((finished / "process" / case.lead / "case.json").read_text())
+        assert away.max() <= 0.5 * case.motion.axis_speed_m_s * lead["timestep_s"] + 1e-9
+
+
+def test_nothing_is_run_again(finished: Path) -> None:
+    assert jobs(finished.parents[1], "all", "--config", "study=small") == set()
