@@ -67,12 +67,13 @@ class WindowsOfRun(Part):
     @property
     def said(self) -> str:
         """What was asked and reached, in a sentence."""
-        percent = f"{100 * self.tolerance:.3g} %"
+        percent, *rest = f"{100 * self.tolerance:.3g} %", self.asked[-1]
+        asked = " and the ".join(filter(None, (", the ".join(self.asked[:-1]), *rest)))
         told = f"{len(self.runs)} windows at the physical Young's modulus"
         if self.reached:
-            return f"{told} give the {' and the '.join(self.asked)} to within {percent}."
+            return f"{told} give the {asked} to within {percent}."
         return (
-            f"{told} do not give the {' and the '.join(self.asked)} to within {percent}: about "
+            f"{told} do not give the {asked} to within {percent}: about "
             f"{self.enough} would, on a longer path or over several seeds."
         )
 

@@ -30,7 +30,8 @@ def loading_along(run_dir: Path, case: Case, blocks: int) -> tuple[dict[str, Flo
     -------
     blocks : dict of str to (B,) ndarray
         Normal load, N: the sum of the normal forces of all contacts; sliding distance of all
-        contacts for a metre of path, m/m; friction work for a metre of path, J/m.
+        contacts for a metre of path, m/m; normal force times sliding distance for a metre of path,
+        N m/m; friction work for a metre of path, J/m.
     load_map : (MAP_DEPTHS, MAP_AZIMUTHS) ndarray
         Mean normal load by depth and azimuth, N.
 
@@ -51,6 +52,7 @@ def loading_along(run_dir: Path, case: Case, blocks: int) -> tuple[dict[str, Flo
     along = {
         "normal_load": per_frame("normal_impulse_n_s") / counted.interval_s,
         "sliding_distance": per_frame("sliding_m") / path_m,
+        "force_slide": per_frame("force_slide_n_m") / path_m,
         "friction_work": per_frame("friction_work_j") / path_m,
     }
     return along, _load_map(counted, needed(case.workpiece, "workpiece").immersion_depth_m)

@@ -105,6 +105,12 @@ QUANTITIES = (
     Quantity("chain_length", "particles per Peters chain", short="particles per chain"),
     Quantity("chain_alignment", "mean squared cosine of the angle between chains and motion"),
     Quantity("path_bottleneck", "bottleneck force of the dominant path", "N"),
+    Quantity(
+        "force_slide",
+        "normal force \N{MULTIPLICATION SIGN} sliding distance per metre of path",
+        "N m/m",
+        friction="workpiece_friction",
+    ),
     Quantity("bed_height", "bed height", "m"),
     Quantity("solid_fraction", "solid fraction"),
 )

@@ -177,7 +177,7 @@ def test_settings_that_do_not_fit_are_refused(settings: Json, said: str, made: M
 
 
 def test_a_path_too_short_for_windows_is_refused(made: Make) -> None:
-    path = {"kind": "circle", "radius_m": 0.010, "revolutions": 0.4}
+    path = {"kind": "circle", "radius_m": 0.010, "revolutions": 0.25}
     with pytest.raises(InputError, match="too short for 2 windows") as caught:
         process_scene(made(SOFT, path=path), BED)
     needs = float(re.search(r"at least (\S+) mm", str(caught.value))[1]) / 1e3  # type: ignore[index]

@@ -22,13 +22,12 @@ from dragdeck.study.superposed.kind import DragSteps
 LEAD = "lead"
 """Part of a case that only leads to another one's process."""
 
-RAMP_S = 0.05
-"""Time in which the moduli are raised, s: the bed rises by what the overlaps give up."""
-
 RAMP_STAGES = 24
 
-SETTLING_DIAMETERS = 1.0
-"""Path after the ramp before anything is counted, in mean diameters of the particles."""
+_SHORTEST_RAMP_S, _RAMP_FALLS, _SETTLING_FALLS = 0.05, 2.0, 1.0
+"""Time in which the moduli are raised, and in which the bed relaxes then, before anything is
+counted: in units of the root of d/g, about the fall over half a particle, and at least the first,
+s. The bed rises by what the overlaps give up (docs/evidence/windows.md)."""
 
 SAMPLE_DIAMETERS = 1.0
 """Path that a window counts, in mean diameters of the particles."""
@@ -104,7 +103,7 @@ def windows_of(case: Case) -> list[Case]:
 def _too_short(case: Case) -> InputError:
     """Refuses a path on which hardly a window fits."""
     study = _window_study(case.study)
-    rest, window_m = _window_s(study) - RAMP_S, _window_s(study) * driven_speed(study)
+    window_m = _window_s(study) * driven_speed(study)
     before_m = _first_window_s(study) * driven_speed(study)
     least = before_m + _FEWEST * window_m
     return InputError(
@@ -112,8 +111,8 @@ def _too_short(case: Case) -> InputError:
         file=case.file,
         field=f"motion.path.{study.motion.path.length_field}",
         value=f"{1e3 * study.motion.path_length_m:.4g} mm of path",
-        limit=f"at least {1e3 * least:.4g} mm: each window needs {1e3 * window_m:.3g} mm "
-        f"({RAMP_S:g} s in which the moduli are raised, {rest:.2g} s to settle and to sample)",
+        limit=f"at least {1e3 * least:.4g} mm: each window needs {1e3 * window_m:.3g} mm to raise "
+        "the moduli, to settle and to sample",
         remedy="use a longer path, or remove fidelity.windows",
     )
 
@@ -146,9 +145,9 @@ def covered(case: Case, drag: DragSteps) -> Covered:
     if not stretch.begin:
         return Covered(0, end, 0, own)
     entry = step_at(stretch.begin, drag)
-    ramp_end = entry + RAMP_STAGES * math.ceil(RAMP_S / drag.timestep_s / RAMP_STAGES)
-    settling = _diameters_s(SETTLING_DIAMETERS, study)
-    settled = ramp_end + math.ceil(settling / drag.timestep_s)
+    ramp, settling = (math.ceil(time / drag.timestep_s) for time in _before_counted(study))
+    ramp_end = entry + RAMP_STAGES * math.ceil(ramp / RAMP_STAGES)
+    settled = ramp_end + settling
     return Covered(entry, end, ramp_end, max(settled, own))
 
 
@@ -184,6 +183,12 @@ def stops(
         yield Stop(end, writes=number == 1, mark=mark_file(number))
     if steps.end not in ends:
         yield Stop(steps.end, writes=not ends)
+
+
+def _before_counted(study: Study) -> tuple[float, float]:
+    """Time in which the moduli are raised, and in which the bed relaxes then, s."""
+    fall = math.sqrt(2 * study.media.radius_mean_m / study.gravity_m_s2)
+    return max(_SHORTEST_RAMP_S, _RAMP_FALLS * fall), _SETTLING_FALLS * fall
 
 
 def _seconds(path_m: float, study: Study) -> float:
@@ -236,12 +241,12 @@ def _window_study(study: Study) -> Study:
 
 def _window_s(study: Study) -> float:
     """Time that a window covers, s."""
-    return RAMP_S + _diameters_s(SETTLING_DIAMETERS + SAMPLE_DIAMETERS, study)
+    return sum(_before_counted(study)) + _diameters_s(SAMPLE_DIAMETERS, study)
 
 
 def _first_window_s(study: Study) -> float:
     """Time of the drag before the first window, whose sample begins with the statistics, s."""
-    before = RAMP_S + _diameters_s(SETTLING_DIAMETERS, study)
+    before = sum(_before_counted(study))
     return float(max(0.0, _seconds(study.motion.uncounted_m, study) - before))
 
 
