@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 
 @contextmanager
@@ -32,3 +33,20 @@ def write_bytes(file: Path, content: bytes) -> None:
     """Write a file that appears under its name only once it is whole."""
     with draft_of(file) as draft:
         draft.write_bytes(content)
+
+
+def write_vtp(file: Path, mesh: Any, *, compressed: bool = True) -> None:
+    """Write a PyVista mesh as a VTP file that appears under its name only once it is whole.
+
+    On a full disk, VTK itself truncates a file without raising an error: it writes to memory.
+    """
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(mesh)
+    writer.SetDataModeToBinary()
+    if not compressed:
+        writer.SetCompressorTypeToNone()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    write_text(file, writer.GetOutputString())

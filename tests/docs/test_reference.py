@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 from typing import get_args
 
 import nbformat
@@ -186,9 +187,9 @@ def test_the_notebooks_are_on_a_page() -> None:
     assert NOTEBOOKS and all(f"examples/{file.name}" in text for file in NOTEBOOKS)
 
 
-@pytest.mark.parametrize("name", ["first_look", "chains_and_peaks"])
-def test_a_notebook_is_stored_with_its_output_but_no_place_or_time(name: str) -> None:
-    notebook = nbformat.read(ROOT / f"examples/{name}.ipynb", as_version=4)
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_a_notebook_is_stored_with_its_output_but_no_place_or_time(file: Path) -> None:
+    notebook = nbformat.read(file, as_version=4)
     cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
     assert [cell.source for cell in cells[1:] if not cell.outputs] == []
     texts = [one.get("text", "") + one.get("data", {}).get("text/plain", "")

@@ -15,6 +15,7 @@ from dragchain.arrays import Floats
 from dragchain.export.frames import FrameData, FrameSeries
 from dragchain.export.view_data import ViewWriter
 from dragchain.figures.network_picture import segments
+from dragchain.files import write_text, write_vtp
 from dragchain.network.chains import major_stress, particle_stress
 from dragchain.network.frame import PARTICLE, NetworkFrame
 from dragchain.network.statistics import contact_counts
@@ -52,8 +53,6 @@ class ParaviewWriter:
 
     def add(self, frame_data: FrameData) -> None:
         """Write the files of one frame."""
-        import pyvista as pv
-
         parts = {"particles": _particles_mesh(frame_data, with_chains=self._with_chains)}
         if frame_data.network is not None:
             parts["contacts"] = _contacts_mesh(frame_data, with_chains=self._with_chains)
@@ -62,13 +61,14 @@ class ParaviewWriter:
         self._view.add(parts)
         name = f"{frame_data.step:0{self._width}d}"
         frames = self._folder / _FRAMES
-        pv.MultiBlock(parts).save(frames / f"{name}.vtm", compression=None)
-        self._list("run", frame_data.time_s, f"{name}.vtm")
+        rows = []
         for number, (part_name, part) in enumerate(parts.items()):
-            file = f"{name}/{name}_{number}.vtp"  # as VTK's writer of VTM files names it
-            if not (frames / file).exists():  # it leaves out a part that is empty
-                part.save(frames / file, compression=None)
+            file = f"{name}/{name}_{number}.vtp"
+            write_vtp(frames / file, part, compressed=False)
             self._list(part_name, frame_data.time_s, file)
+            rows.append(f'index="{number}" name="{part_name}" file="{file}"')
+        write_text(frames / f"{name}.vtm", _data_sets("vtkMultiBlockDataSet", "1.0", rows))
+        self._list("run", frame_data.time_s, f"{name}.vtm")
 
     def _list(self, series: str, time_s: float, file: str) -> None:
         self._series.setdefault(series, []).append((time_s, f"{_FRAMES}/{file}"))
@@ -82,14 +82,18 @@ class ParaviewWriter:
 
 def pvd(files: list[tuple[float, str]]) -> str:
     """A PVD file, which lists times in s and the file of each."""
-    rows = [
-        f'    <DataSet timestep="{time_s!r}" part="0" file={quoteattr(file)}/>\n'
-        for time_s, file in files
-    ]
+    rows = [f'timestep="{time_s!r}" part="0" file={quoteattr(file)}' for time_s, file in files]
+    return _data_sets("Collection", "0.1", rows)
+
+
+def _data_sets(kind: str, version: str, rows: list[str]) -> str:
+    """A file of VTK that lists other files, each by the attributes of its data set."""
     return (
         '<?xml version="1.0"?>\n'
-        '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
-        f"  <Collection>\n{''.join(rows)}  </Collection>\n</VTKFile>\n"
+        f'<VTKFile type="{kind}" version="{version}" byte_order="LittleEndian">\n'
+        f"  <{kind}>\n"
+        + "".join(f"    <DataSet {row}/>\n" for row in rows)
+        + f"  </{kind}>\n</VTKFile>\n"
     )
 
 

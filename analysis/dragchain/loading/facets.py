@@ -1,6 +1,5 @@
 """Load, sliding and friction work of each facet of the workpiece."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,7 +7,6 @@ import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.files import draft_of
 from dragchain.loading.contact_events import AMOUNTS, POINT
 from dragchain.loading.samples import BODY, WORKPIECE, Sampled
 from dragchain.run.case import Case
@@ -98,15 +96,6 @@ def standard_errors(sampled: Sampled, name: str, count: int) -> Floats:
 
 def _axes(name: str, unit: str, vectors: Floats) -> dict[str, Floats]:
     return {f"{name}_{axis}{unit}": column for axis, column in zip("xyz", vectors.T, strict=True)}
-
-
-def write_vtp(surface: Surface, facets: pd.DataFrame, file: Path) -> None:
-    """Write the workpiece's mesh in its own frame with a cell array for each column of `facets`."""
-    mesh = as_polydata(surface)
-    for name in facets:
-        mesh.cell_data[name] = facets[name].to_numpy()
-    with draft_of(file) as draft:
-        mesh.save(draft)
 
 
 def as_polydata(surface: Surface) -> Any:

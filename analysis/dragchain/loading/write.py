@@ -8,9 +8,10 @@ from matplotlib.figure import Figure
 
 from dragchain.errors import TableError
 from dragchain.figures.style import drawing, save
+from dragchain.files import write_vtp
 from dragchain.loading.contact_events import Thresholds, event_types, find_events
 from dragchain.loading.document import Loading
-from dragchain.loading.facets import check_facets, facet_table, write_vtp
+from dragchain.loading.facets import as_polydata, check_facets, facet_table
 from dragchain.loading.figure import workpiece_figure
 from dragchain.loading.samples import DRAWN, Sampled, sample
 from dragchain.loading.summary import summarise
@@ -71,11 +72,14 @@ def write_loading(run_dir: Path, limits: Thresholds | None = None) -> list[Path]
     found = compute_loading(run_dir, limits or Thresholds())
     tables = run_dir / "tables"
     names = ("facets.parquet", "contact_events.parquet", "loading.json", "workpiece.vtp")
-    facets, events, summary, mesh = files = [tables / name for name in names]
+    facets, events, summary, vtp = files = [tables / name for name in names]
     write_parquet(found.facets, facets)
     write_parquet(found.events, events)
     found.summary.write(summary)
-    write_vtp(found.surface, found.facets, mesh)
+    mesh = as_polydata(found.surface)
+    for name in found.facets:
+        mesh.cell_data[name] = found.facets[name].to_numpy()
+    write_vtp(vtp, mesh)
     with drawing():
         return [*files, save(figure_of(found), run_dir / "figures" / "workpiece.png")]
 

@@ -134,7 +134,7 @@ def _with_room_again(
     if first.has_traceback:
         return Got("traceback on a full disk", first.tail)
     if first.status != 0 and not re.search(_NAMES_THE_DISK, first.text, re.IGNORECASE):
-        return Got("the disk is not named", first.tail)
+        return Got("the disk is not named", f"status {first.status}: {first.tail}")
     disk.hold(ROOMY)
     got = finish(arena, phase, project, said_before=f"{first.tail}\nsize {size_of(project)}")
     if got.outcome.startswith("refused") and re.search(_NAMES_THE_DISK, got.seen):

@@ -173,13 +173,14 @@ _WHOLE = ("fidelity", "sweep")
 def _merged(base: Mapping[str, Any], own: Mapping[str, Any], top: bool = True) -> dict[str, Any]:
     """A study's content with another's changes.
 
-    A part of another `kind` is replaced, and ``null`` leaves a part out.
+    A part of another `kind` is replaced, and ``null`` leaves out a part of the base. A ``null``
+    with nothing to leave out stays: only fields that may be empty accept it.
     """
     found = dict(base)
     for key, value in own.items():
         there = base.get(key)
-        if value is None:
-            found.pop(key, None)
+        if value is None and key in base:
+            del found[key]
         elif isinstance(value, dict) and not (top and key in _WHOLE):
             same = isinstance(there, dict) and value.get("kind") in (None, there.get("kind"))
             found[key] = _merged(there if same and there else {}, value, top=False)
