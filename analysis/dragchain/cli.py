@@ -182,29 +182,32 @@ STEPS = (
                 _argument("--tradeoff", type=Path, required=True, metavar="FILE",
                           help="tradeoff.json of another scene, on which the fit is tested; "
                           "required"))),
-    Command("extrapolate", "quantities of a run, extrapolated to the physical Young's modulus",
-            "Measure the quantities of a run and, if its stiffness is reduced, extrapolate them to "
-            "the physical Young's modulus. It reads the tables of the run and writes "
+    Command("extrapolate", "quantities of a run, and at the physical Young's modulus",
+            "Measure the quantities of a run, and take those at the physical Young's modulus from "
+            "its windows, if it has any. It reads the tables of the run and writes "
             "extrapolated.json to RUN_DIR.",
             "windows.extrapolate:extrapolate_run", (
-                RUN_DIR, STIFFNESS,
-                _argument("--windows", type=Path, metavar="FILE", dest="round_file",
-                          help="last round of windows of the run, from dragchain step windows; "
-                          "its values replace those of the laws"))),
+                RUN_DIR,
+                _argument("--round", type=Path, metavar="FILE", dest="round_file",
+                          help="last round of windows of the run, from dragchain step windows"))),
     Command("windows", "what windows say of a run at the physical Young's modulus",
             "Estimate the quantities of a run with reduced moduli at the physical Young's modulus "
             "from its windows, and how many more windows the tolerance requires. It reads the "
-            "tables of the runs.",
+            "tables of the run and the raw output of the windows.",
             "windows.rounds:judge_windows", (
                 RUN_DIR,
-                _argument("--windows", type=Path, nargs="*", default=[], metavar="MEASURES",
-                          help="measures.json of each window (default: none yet)"),
+                _argument("--windows", type=Path, nargs="+", required=True, metavar="RUN_DIR",
+                          help="folder of each window so far; required"),
+                _argument("--before", type=Path, metavar="FILE",
+                          help="the round before, whose windows are not measured again"),
                 _argument("--tolerance", type=float, required=True, metavar="X",
                           help="relative half-width of the 95 %% confidence interval; required"),
                 _argument("--quantities", nargs="+", required=True, metavar="NAME",
                           help="quantities to which the tolerance applies; required"),
                 _argument("--most", type=int, required=True, metavar="N",
                           help="largest number of windows; required"),
+                _argument("--record", type=Path, required=True, metavar="FILE",
+                          help="windows.json, what windows of other scenes say; required"),
                 _argument("--out", type=Path, required=True, metavar="FILE",
                           help="file to write; required"))),
     Command("scaling", "fit a power law to the mean drag",

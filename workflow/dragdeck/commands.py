@@ -20,7 +20,6 @@ from dragdeck.advice.forecast import (
     AdviceFile,
     advice_file,
     forecast,
-    own_option,
     question,
     roles,
     tables,
@@ -51,7 +50,7 @@ from dragdeck.outlook import timestep as timestep_outlook
 from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, show
 from dragdeck.outlook.explain import page as page_of_scene
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_measured
-from dragdeck.outlook.measured_range import outside_of_laws, range_note
+from dragdeck.outlook.reduced_modulus import modulus_note, not_corrected
 from dragdeck.outlook.runs import expected_runs, plan_in_words
 from dragdeck.outlook.stable_step import stable_step_cautions, stable_step_note
 from dragdeck.physics.packing import Bed
@@ -64,6 +63,7 @@ from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import SceneType, read_bed
 from dragdeck.study.check import explained, warnings
+from dragdeck.study.model import RESTITUTION
 from dragdeck.study.yaml import located
 from dragdeck.sweep.cases import new_study
 
@@ -114,7 +114,7 @@ class _Findings:
     templates: jinja2.Environment
     errors: list[InputError] = field(default_factory=list)
     warnings: dict[str, list[str]] = field(default_factory=dict)
-    outside: dict[str, list[str]] = field(default_factory=dict)
+    reduced: dict[str, list[str]] = field(default_factory=dict)
     notes: dict[str, list[str]] = field(default_factory=dict)
     overriding: set[str] = field(default_factory=set)
     effective: set[str] = field(default_factory=set)
@@ -133,8 +133,8 @@ class _Findings:
         for text in dict.fromkeys([*map(str, scene.warnings), *_friction_unknown(script)]):
             names = self.warnings.setdefault(text, [])
             names += [case.name] if case.name not in names else []
-        if kind.needs_bed and (text := outside_of_laws(case)):
-            self.outside.setdefault(text, []).append(case.name)
+        if kind.needs_bed and (text := not_corrected(case)):
+            self.reduced.setdefault(text, []).append(case.name)
         lines = [f"time step: {scene.deck.timestep_s:.3g} s"]
         lines += [f"{what}: {text}" for what, text in _expectations(case, kind, scene)]
         names = [f"{kind.name} {folder.name}" for folder in runs]
@@ -145,7 +145,7 @@ class _Findings:
         """Print the warnings; and what is expected of every run, if that is asked for."""
         for text, names in self.warnings.items():
             print(f"warning: {_first(names)}: {text}")
-        for text, names in self.outside.items():
+        for text, names in self.reduced.items():
             print(f"note: {_first(names)}: {text}")
         for text, names in self.notes.items() if verbose else ():
             print(f"{_first(names)}\n  {text}")
@@ -198,8 +198,8 @@ def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) 
             cost = expected_cost(kind, one, speeds)
             if not verbose:
                 width = min(100, shutil.get_terminal_size().columns)
-                range_text = outside_of_laws(case) if kind.needs_bed else ""
-                print(*page_of_scene(one, cost, len(cases), width, range_text), sep="\n")
+                reduced_text = not_corrected(case) if kind.needs_bed else ""
+                print(*page_of_scene(one, cost, len(cases), width, reduced_text), sep="\n")
                 continue
             notes = _expectations(case, kind, one)
             show([explanation(one, cost, notes, tradeoff_if_measured())])
@@ -211,7 +211,7 @@ def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[
     """What is known of a scene's time step and bed before it is run."""
     notes = timestep_outlook.notes(case, kind, scene)
     if kind.needs_bed:
-        notes += [stable_step_note(case), *fit_outlook.notes(case), range_note(case)]
+        notes += [stable_step_note(case), *fit_outlook.notes(case), modulus_note(case)]
     return [*notes, *([] if kind.single_particle else bed_outlook.notes(case))]
 
 
@@ -311,10 +311,7 @@ def advise(
     quick: bool,
     tradeoff: Tradeoff | None = None,
 ) -> None:
-    """Show the settings for a tolerance, with their error and cost, and keep them.
-
-    They are chosen from the measured trade-off unless another one is given.
-    """
+    """Show the settings for a tolerance, with their cost, and keep them."""
     project = find_project(Path.cwd())
     tradeoff = tradeoff or measured_tradeoff()
     every = list(by_run(project.cases(study, fidelity, tradeoff), SCENES["process"]).values())
@@ -326,14 +323,13 @@ def advise(
     advices = [
         advised_settings(case, wanted, tradeoff) for case, wanted in zip(every, asked, strict=True)
     ]
-    untimed = quick or all(wanted.quantity == "restitution" for wanted in asked)
+    untimed = quick or all(RESTITUTION in wanted.quantities for wanted in asked)
     speed = None if untimed else _machine_speed(project, every[0], advices[0])
     rows = []
     for case, advice in zip(every, advices, strict=True):
-        own = own_option(case, advice.asked, tradeoff)
-        options = [forecast(case, *row, speed, results, tradeoff) for row in roles(advice, own)]
+        options = [forecast(case, *row, speed, results, tradeoff) for row in roles(advice)]
         rows.append((advice, options))
-        show(tables(case, advice, options, own))
+        show(tables(case, advice, options))
     _keep(results / "advice.json", advice_file(every[0], rows, speed))
 
 

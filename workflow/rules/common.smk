@@ -29,7 +29,7 @@ from dragdeck.project import (
     study_files,
     study_templates,
 )
-from dragdeck.scenes.lead import led, with_leads, windows_of
+from dragdeck.scenes.lead import FIRST_WINDOWS, led, with_leads, windows_of
 from dragdeck.scenes.registry import SCENES
 from dragdeck.engine.reports import say, shown_bytes
 from dragdeck.engine.space import free_bytes
@@ -104,6 +104,8 @@ wildcard_constraints:
     run="[A-Za-z0-9._-]+",
 
 
+RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}
+
 # A run of LIGGGHTS, and a further workpiece of one: its number follows the run's name.
 ENGINE_RUN = "[A-Za-z0-9._-]+-[0-9a-f]{8}"
 FURTHER_WORKPIECE = f"{ENGINE_RUN}[.][0-9]+"
@@ -148,6 +150,7 @@ def every_table(place):
 
 
 STIFFNESS = "workflow/dragdeck/data/stiffness.json"
+WINDOWS_RECORD = "workflow/dragdeck/data/windows.json"
 
 
 def relative(file):
@@ -286,6 +289,13 @@ def of_its_bed(place, file):
     return name if PLACES[place].needs_bed else []
 
 
+def of_whole_run(place, file):
+    """A file of the run that a further workpiece shares."""
+    return lambda wildcards: of_run(place, file).format(
+        study=wildcards.study, run=wildcards.run.rpartition(".")[0]
+    )
+
+
 def of_its_lead(place):
     """The record of the run from which a run goes on, if there is one."""
 
@@ -307,32 +317,49 @@ def round_file(wildcards, number):
 
 
 def windows_of_round(wildcards):
-    """The measures of the windows that a round judges: of those that the one before wanted."""
-    number, case = int(wildcards.round), case_of("process", wildcards.run)
-    if not number:
-        return []
-    wanted = json.loads(Path(round_file(wildcards, number - 1)).read_text())["wanted"]
-    runs = [SCENES["process"].run_id(one) for one in windows_of(case)[:wanted]]
-    return [f"{run_path(wildcards.study, WINDOWS, run)}/measures.json" for run in runs]
+    """The folders of the windows that a round judges: of those that the one before wanted."""
+    wanted = FIRST_WINDOWS
+    if before := round_before(wildcards):
+        wanted = json.loads(Path(before).read_text())["wanted"]
+    runs = [SCENES["process"].run_id(one) for one in windows_of_run(wildcards)[:wanted]]
+    return [run_path(wildcards.study, WINDOWS, run) for run in runs]
+
+
+def records_of_round(wildcards):
+    """How the windows of a round ended."""
+    return [f"{folder}/{RECORD[WINDOWS]}" for folder in windows_of_round(wildcards)]
+
+
+def round_before(wildcards):
+    """The file of the round before, if there is one."""
+    number = int(wildcards.round)
+    return round_file(wildcards, number - 1) if number > 1 else []
+
+
+def windows_of_run(wildcards):
+    """All windows that a run may have."""
+    return windows_of(case_of("process", wildcards.run))
 
 
 def last_round(wildcards):
     """The last round of windows of a run, if it has any."""
-    if not windows_of(case_of("process", wildcards.run)):
+    if not windows_of_run(wildcards):
         return []
-    number = 0
+    number = 1
     while not json.loads(Path(file := round_file(wildcards, number)).read_text())["last"]:
         number += 1
     return file
 
 
-def windows_options(wildcards):
+def windows_options(wildcards, input):
     """What the windows of a run are asked for, as options of the command line."""
-    case = case_of("process", wildcards.run)
-    asked = case.study.chosen_fidelity().windows
+    asked = case_of("process", wildcards.run).study.chosen_fidelity().windows
     quantities = " ".join(map(quote, asked.quantities))
-    most = len(windows_of(case))
-    return f"--tolerance {asked.tolerance} --quantities {quantities} --most {most}"
+    before = f"--before {input.before}" if input.before else ""
+    return (
+        f"--tolerance {asked.tolerance} --quantities {quantities} {before}"
+        f" --most {len(windows_of_run(wildcards))}"
+    )
 
 
 ADVICE = f"results/{STUDY}/advice.json"

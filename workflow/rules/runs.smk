@@ -2,9 +2,6 @@
 # A point of a plan that fails is a finding, and its outcome says how; any other run that
 # fails is none, and leaves no run.json. What a process waits for goes before drop tests and figures.
 
-RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}
-
-
 for PLACE, SCENE in PLACES.items():
 
     rule:
@@ -69,35 +66,37 @@ for PLACE, SCENE in PLACES.items():
             "dragdeck run $(dirname {output}) {params.outcome} {params.file} > {log} 2>&1"
 
 
-# Workpieces beyond the first of a run: each has tables, chains and figures of its own.
-rule share_run:
-    input:
-        templates_of("process"),
-        run=lambda wildcards: of_run("process", "run.json").format(
-            study=wildcards.study, run=wildcards.run.rpartition(".")[0]
-        ),
-        packing=of_its_bed("process", "tables/packing.json"),
-    output:
-        [
-            of_run("process", file)
-            for file in ("run.json", "case.json", "columns.json", *SCENES["process"].inputs)
-        ],
-    log:
-        of_run("process", "logs/render.log"),
-    benchmark:
-        of_run("process", "benchmarks/render.tsv")
-    wildcard_constraints:
-        run=FURTHER_WORKPIECE,
-    localrule: True
-    conda:
-        "../envs/python.yaml"
-    params:
-        case=digest_of("process"),
-        cases=cases_option("process"),
-        source=source_hash("dragdeck.decks.render", "dragdeck.scenes.registry"),
-    shell:
-        "dragdeck step render {wildcards.study} process {wildcards.run} {params.cases}"
-        " --packing {input.packing} > {log} 2>&1"
+for PLACE in ("process", WINDOWS):
+
+    # Workpieces beyond the first of a run: each has tables, chains and figures of its own.
+    rule:
+        name:
+            f"share_{PLACE}"
+        input:
+            templates_of("process"),
+            run=of_whole_run(PLACE, RECORD[PLACE]),
+            packing=of_its_bed(PLACE, "tables/packing.json"),
+        output:
+            [
+                of_run(PLACE, file)
+                for file in (RECORD[PLACE], "case.json", "columns.json", *SCENES["process"].inputs)
+            ],
+        log:
+            of_run(PLACE, "logs/render.log"),
+        benchmark:
+            of_run(PLACE, "benchmarks/render.tsv")
+        wildcard_constraints:
+            run=FURTHER_WORKPIECE,
+        localrule: True
+        conda:
+            "../envs/python.yaml"
+        params:
+            case=digest_of(PLACE),
+            cases=cases_option(PLACE),
+            source=source_hash("dragdeck.decks.render", "dragdeck.scenes.registry"),
+        shell:
+            "dragdeck step render {wildcards.study} process {wildcards.run} {params.cases}"
+            " --packing {input.packing} > {log} 2>&1"
 
 
 for PLACE, SCENE in SCENES.items():
@@ -197,8 +196,10 @@ rule draw_for_journal:
 checkpoint judge_windows:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
+        records_of_round,
         run=of_run("process", "run.json"),
-        windows=windows_of_round,
+        before=round_before,
+        record=WINDOWS_RECORD,
     output:
         of_run("process", "windows/round-{round}.json"),
     log:
@@ -206,23 +207,23 @@ checkpoint judge_windows:
     benchmark:
         of_run("process", "benchmarks/windows-{round}.tsv")
     wildcard_constraints:
-        round="[0-9]+",
+        round="[1-9][0-9]*",
     conda:
         "../envs/python.yaml"
     params:
         asked=windows_options,
+        windows=windows_of_round,
         source=source_hash("dragchain.windows.rounds"),
     shell:
-        "dragchain step windows $(dirname {input.run}) --windows {input.windows} {params.asked}"
-        " --out {output} > {log} 2>&1"
+        "dragchain step windows $(dirname {input.run}) --windows {params.windows} {params.asked}"
+        " --record {input.record} --out {output} > {log} 2>&1"
 
 
-# The quantities of a run, and what they would be at the physical Young's modulus.
+# The quantities of a run, and what they are at the physical Young's modulus by its windows.
 rule extrapolate_process:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
         run=of_run("process", "run.json"),
-        record=STIFFNESS,
         windows=last_round,
     output:
         of_run("process", "tables/extrapolated.json"),
@@ -233,37 +234,32 @@ rule extrapolate_process:
     conda:
         "../envs/python.yaml"
     params:
-        windows=lambda wildcards, input: f"--windows {input.windows}" if input.windows else "",
+        windows=lambda wildcards, input: f"--round {input.windows}" if input.windows else "",
         source=source_hash("dragchain.windows.extrapolate"),
     shell:
-        "dragchain step extrapolate $(dirname {input.run}) --record {input.record}"
-        " {params.windows} > {log} 2>&1"
+        "dragchain step extrapolate $(dirname {input.run}) {params.windows} > {log} 2>&1"
 
 
-for PLACE in OUTCOMES:
-
-    # What is compared of a point or taken from a window: its tables, chains and numbers.
-    rule:
-        name:
-            f"measure_{PLACE}"
-        input:
-            of_run(PLACE, "outcome.json"),
-            bed=of_its_bed(PLACE, "tables/packing.json"),
-        output:
-            of_run(PLACE, "measures.json"),
-        log:
-            of_run(PLACE, "logs/measures.log"),
-        benchmark:
-            of_run(PLACE, "benchmarks/measures.tsv")
-        conda:
-            "../envs/python.yaml"
-        params:
-            source=source_hash("dragchain.tradeoff.measure_run"),
-        shell:
-            "dragchain step measure $(dirname {output}) --packing {input.bed} > {log} 2>&1"
+# What is compared of a point: its tables, chains and numbers.
+rule measure_points:
+    input:
+        of_run(POINTS, "outcome.json"),
+        bed=of_its_bed(POINTS, "tables/packing.json"),
+    output:
+        of_run(POINTS, "measures.json"),
+    log:
+        of_run(POINTS, "logs/measures.log"),
+    benchmark:
+        of_run(POINTS, "benchmarks/measures.tsv")
+    conda:
+        "../envs/python.yaml"
+    params:
+        source=source_hash("dragchain.tradeoff.measure_run"),
+    shell:
+        "dragchain step measure $(dirname {output}) --packing {input.bed} > {log} 2>&1"
 
 
-for PLACE, SCENE in PLACES.items():
+for PLACE, SCENE in {**SCENES, POINTS: SCENES["process"]}.items():
     if SCENE.loading:
 
         # Load, sliding and friction work on the workpiece, facet by facet.
@@ -273,7 +269,7 @@ for PLACE, SCENE in PLACES.items():
             input:
                 (
                     of_run(PLACE, "measures.json")
-                    if PLACE in OUTCOMES
+                    if PLACE == POINTS
                     else tables_of(PLACE, SCENE.tables)
                 ),
                 record=of_run(PLACE, RECORD[PLACE]),

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from dragchain.documents import Document, Part
 from dragchain.statistics.estimate import Estimate
@@ -10,7 +11,7 @@ FILE = Path("tables") / "extrapolated.json"
 
 
 class ExtrapolatedQuantity(Part):
-    """A quantity of a run, and its value at the physical modulus where a law gives it.
+    """A quantity of a run, and its value at the physical modulus where windows give it.
 
     Attributes
     ----------
@@ -18,8 +19,7 @@ class ExtrapolatedQuantity(Part):
     measured : float
         Uncorrected value of the run.
     value, ci95_low, ci95_high : float or None
-        At the physical Young's modulus, None if no law applies to the run. The interval includes
-        the scatter of one run, the uncertainty of rate and amplitude, and the model's own error.
+        At the physical Young's modulus, None without windows.
     """
 
     name: str
@@ -38,6 +38,13 @@ class ExtrapolatedQuantity(Part):
         return Estimate(self.value, self.ci95_low, self.ci95_high)
 
 
+class Need(NamedTuple):
+    """How many windows, and else packings of all windows, bring a quantity to its tolerance."""
+
+    windows: int
+    packings: int
+
+
 class WindowsOfRun(Part):
     """What the windows of a run were asked for, and what they reached.
 
@@ -53,8 +60,8 @@ class WindowsOfRun(Part):
         Windows that enter.
     refused : mapping
         Reason by window, of those that do not enter.
-    enough : int
-        Expected number of windows that would do.
+    needed : Need
+        Windows and packings that are expected to do.
     """
 
     tolerance: float
@@ -62,7 +69,7 @@ class WindowsOfRun(Part):
     reached: bool
     runs: tuple[str, ...]
     refused: Mapping[str, str]
-    enough: int
+    needed: Need
 
     @property
     def said(self) -> str:
@@ -72,10 +79,9 @@ class WindowsOfRun(Part):
         told = f"{len(self.runs)} windows at the physical Young's modulus"
         if self.reached:
             return f"{told} give the {asked} to within {percent}."
-        return (
-            f"{told} do not give the {asked} to within {percent}: about "
-            f"{self.enough} would, on a longer path or over several seeds."
-        )
+        windows, packings = self.needed
+        more = f"about {windows} windows" if packings == 1 else f"about {packings} seeds"
+        return f"{told} do not give the {asked} to within {percent}: {more} would."
 
 
 class Extrapolated(Document):
@@ -83,22 +89,12 @@ class Extrapolated(Document):
 
     Attributes
     ----------
-    youngs_modulus_scale : float
-        Multiplier of every Young's modulus in the run.
-    source : str
-        Source of the laws.
     windows : WindowsOfRun or None
-        Where the values at the physical modulus are from, if not from laws.
-    outside : tuple of str
-        Dimensionless numbers of the scene outside the range of the record; the intervals are then
-        too narrow by an unknown amount.
+        Where the values at the physical modulus are from.
     """
 
     made_by = "dragchain step extrapolate"
 
-    youngs_modulus_scale: float
-    source: str
-    outside: tuple[str, ...]
     quantities: tuple[ExtrapolatedQuantity, ...]
     windows: WindowsOfRun | None = None
 

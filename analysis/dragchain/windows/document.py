@@ -1,7 +1,81 @@
-"""What a round of windows found: ``round-<number>.json``."""
+"""What a round of windows found: ``round-<number>.json``; and what is known beforehand."""
+
+from collections.abc import Mapping
 
 from dragchain.documents import Document, Part
+from dragchain.report.extrapolated import Need
 from dragchain.statistics.estimate import Estimate, Real
+
+
+class Known(Part):
+    """What windows of other scenes say of a quantity before there are any.
+
+    Attributes
+    ----------
+    ratio_log, ratio_log_std : float
+        Logarithm of the value at the physical modulus over that of the soft run: its mean, and its
+        standard deviation from scene to scene. An infinite one says nothing.
+    share : float
+        Of a soft stretch's deviation from the mean that the window at this place shares.
+    variance_ratio, degrees : float
+        Relative variance of windows over that of the soft run's stretches of their length, and how
+        many windows' worth of evidence that is.
+    packing_std : float
+        Relative standard deviation of the mean from packing to packing.
+    """
+
+    ratio_log: float
+    ratio_log_std: float
+    share: float
+    variance_ratio: float
+    degrees: float
+    packing_std: float
+
+
+class WindowsRecord(Document):
+    """The content of ``windows.json``: measured in development scenes.
+
+    Attributes
+    ----------
+    measured : str
+        Date.
+    source : str
+    quantities : mapping
+    """
+
+    made_by = "benchmarks/windows.py"
+
+    measured: str
+    source: str
+    quantities: Mapping[str, Known]
+
+
+class WindowOfRun(Part):
+    """A window of a run.
+
+    Attributes
+    ----------
+    run : str
+    refused : str
+        Why it does not enter; empty if it does.
+    begin_m, arc_m : float
+        Path before its sample from the start of the drag, and of the sample, m.
+    values : mapping
+        Quantities of the sample.
+    load_map : sequence of float
+        As in `PathQuantities`.
+    cpu_time_s : float
+    stability_number : float or None
+    """
+
+    run: str
+    refused: str = ""
+    begin_m: float = 0.0
+    arc_m: float = 0.0
+    values: Mapping[str, float] = {}
+    load_map: tuple[float, ...] = ()
+    cpu_time_s: float
+    stability_number: float | None = None
 
 
 class WindowedQuantity(Part):
@@ -16,8 +90,6 @@ class WindowedQuantity(Part):
         Value of the run with reduced moduli.
     value, ci95_low, ci95_high : float
         At physical stiffness; NaN before there are windows.
-    windows : sequence of float
-        One value per window.
     """
 
     name: str
@@ -28,7 +100,6 @@ class WindowedQuantity(Part):
     value: Real
     ci95_low: Real
     ci95_high: Real
-    windows: tuple[float, ...] = ()
 
     @property
     def estimate(self) -> Estimate:
@@ -41,38 +112,35 @@ class WindowedQuantity(Part):
         return abs((self.ci95_high - self.ci95_low) / 2 / self.value)
 
 
-class Refused(Part):
-    """A window that does not enter, and why."""
-
-    run: str
-    why: str
-
-
 class Round(Document):
     """The content of ``round-<number>.json``.
 
     Attributes
     ----------
     tolerance : float
-    windows : sequence of str
-        Runs that enter.
-    refused : sequence of Refused
+    windows : sequence of WindowOfRun
+        So far, in the order in which they were run.
     wanted : int
         How many windows to run in all; as many as there were if this round is the last.
+    last : bool
     reached : bool
         Whether every asked quantity is inside the tolerance.
-    enough : int
-        Expected number of windows that would do.
+    needed : Need
+        Windows of this run, and packings, that are expected to do.
     quantities : sequence of WindowedQuantity
     """
 
     made_by = "dragchain step windows"
 
     tolerance: float
-    windows: tuple[str, ...]
-    refused: tuple[Refused, ...]
+    windows: tuple[WindowOfRun, ...]
     wanted: int
     last: bool
     reached: bool
-    enough: int
+    needed: Need
     quantities: tuple[WindowedQuantity, ...]
+
+    @property
+    def entering(self) -> list[WindowOfRun]:
+        """The windows that were not refused."""
+        return [one for one in self.windows if not one.refused]

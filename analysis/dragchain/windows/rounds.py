@@ -1,32 +1,49 @@
 """Rounds of windows: what the windows so far say, and how many more are needed."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from dragchain.arrays import Floats
+from dragchain.errors import TableError
+from dragchain.network.write import write_chains
+from dragchain.report.extrapolated import Need
 from dragchain.run.case import load_case
-from dragchain.tradeoff.measures import Measures, PathQuantities
+from dragchain.run.completeness import RunRecord
+from dragchain.tables.by_step import read_table
+from dragchain.tables.write import write_tables
+from dragchain.tradeoff.measures import PathQuantities
 from dragchain.tradeoff.path_blocks import quantities_along
 from dragchain.tradeoff.quantities import QUANTITIES, Quantity
-from dragchain.windows.document import Refused, Round, WindowedQuantity
-from dragchain.windows.estimate import joined, needed
+from dragchain.windows.document import (
+    Round,
+    WindowedQuantity,
+    WindowOfRun,
+    WindowsRecord,
+)
+from dragchain.windows.estimate import UNKNOWN, Ratio, at_physical_stiffness, needed, ratio
 
-FIRST = 3
-"""Windows of the first round, at least."""
+_FEWEST = 2
+"""Windows of which one alone says nothing of its scatter."""
 
 _MOST_MORE = 2.0
 """A round has at most so many times the windows of the one before."""
+
+_PLATEAU = 0.15
+"""Largest relative difference of the coordination number in the first third of a sample from that
+in the rest: a bed that was thrown up by the ramp differs by far more (docs/evidence/windows.md)."""
 
 
 def judge_windows(
     run_dir: Path,
     windows: Sequence[Path],
+    before: Path | None,
     tolerance: float,
     quantities: Sequence[str],
     most: int,
+    record: Path,
     out: Path,
 ) -> None:
     """Write what the windows of a run say of its quantities at physical stiffness.
@@ -36,77 +53,138 @@ def judge_windows(
     run_dir : Path
         The run with reduced moduli, with tables and chains.
     windows : sequence of Path
-        ``measures.json`` of its windows so far.
+        Folders of its windows so far, those of the round before first.
+    before : Path or None
+        That round, whose windows are not measured again; None for the first.
     tolerance : float
         Relative half-width of the interval at which no further window is run.
     quantities : sequence of str
         To which the tolerance applies.
     most : int
         Number of windows that there can be.
+    record : Path
+        ``windows.json``.
     out : Path
         The file to write.
+
+    Raises
+    ------
+    TableError
+        A run has no outcome, or its outputs cannot be read.
     """
     soft = quantities_along(run_dir, load_case(run_dir))
-    measured = [Measures.read(file) for file in windows]
-    refused = [one for run in measured for one in _refused(run)]
-    bad = {one.run for one in refused}
-    good = [run for run in measured if run.run not in bad]
-    values = [run.values() for run in good]
-    found = list(_windowed(soft, values, quantities))
-    asked = [one for one in found if one.asked]
-    reached = bool(good) and all(one.half_width <= tolerance for one in asked)
-    enough = max(
-        (needed(soft.of_blocks(one.name), one.windows, tolerance) for one in asked), default=FIRST
-    )
-    wanted = min(most, len(windows) + max(1, enough - len(good)))
-    if windows:
-        wanted = min(wanted, math.ceil(_MOST_MORE * len(windows)))
-    last = reached or len(windows) >= most
-    Round(
-        tolerance=tolerance,
-        windows=tuple(run.run for run in good),
-        refused=tuple(refused),
-        wanted=len(windows) if last else max(wanted, min(FIRST, most)),
-        last=last,
-        reached=reached,
-        enough=enough,
-        quantities=tuple(found),
-    ).write(out)
+    known = Round.read(before).windows if before else ()
+    found = (*known, *(_measured(folder) for folder in windows[len(known) :]))
+    _judged(soft, found, tolerance, quantities, most, WindowsRecord.read(record)).write(out)
 
 
-def _windowed(
-    soft: PathQuantities, values: Sequence[Mapping[str, float]], asked: Sequence[str]
-) -> Iterator[WindowedQuantity]:
-    whole = soft.values()
-    for quantity in QUANTITIES:
-        if quantity.name not in whole:
-            continue
-        own = [one[quantity.name] for one in values if quantity.name in one]
-        blocks = _window_like(soft, quantity)
-        found = joined(blocks, own) if own else None
-        yield WindowedQuantity(
+def _judged(
+    soft: PathQuantities,
+    windows: Sequence[WindowOfRun],
+    tolerance: float,
+    asked: Sequence[str],
+    most: int,
+    record: WindowsRecord,
+) -> Round:
+    """The round that these windows are."""
+    good = [one for one in windows if not one.refused]
+    rows, needs = [], [Need(_FEWEST, 1)]
+    for quantity, found in _ratios(soft, good, record):
+        value = soft.values()[quantity.name]
+        estimate = at_physical_stiffness(found, len(good), value) if found else None
+        row = WindowedQuantity(
             name=quantity.name,
             label=quantity.label,
             unit=quantity.unit,
             asked=quantity.name in asked,
-            soft=whole[quantity.name],
-            value=found.value if found else math.nan,
-            ci95_low=found.ci95_low if found else math.nan,
-            ci95_high=found.ci95_high if found else math.nan,
-            windows=tuple(own),
+            soft=value,
+            value=estimate.value if estimate else math.nan,
+            ci95_low=estimate.ci95_low if estimate else math.nan,
+            ci95_high=estimate.ci95_high if estimate else math.nan,
         )
+        rows.append(row)
+        if row.asked and found:
+            needs.append(needed(found, len(good), tolerance, most))
+    reached = len(good) >= _FEWEST and all(one.half_width <= tolerance for one in rows if one.asked)
+    need = Need(*(max(numbers) for numbers in zip(*needs, strict=True)))
+    last = reached or len(windows) >= most
+    wanted = len(windows) + max(1, need.windows - len(good))
+    wanted = min(wanted, math.ceil(_MOST_MORE * len(windows)), most)
+    return Round(
+        tolerance=tolerance,
+        windows=tuple(windows),
+        wanted=len(windows) if last else wanted,
+        last=last,
+        reached=reached,
+        needed=need,
+        quantities=tuple(rows),
+    )
 
 
-def _window_like(soft: PathQuantities, quantity: Quantity) -> Floats:
+def _ratios(
+    soft: PathQuantities, windows: Sequence[WindowOfRun], record: WindowsRecord
+) -> Iterator[tuple[Quantity, Ratio | None]]:
+    """Each quantity of the soft run, and the ratio to it if at least two windows have it."""
+    for quantity in QUANTITIES:
+        if quantity.name not in soft.values():
+            continue
+        known = record.quantities.get(quantity.name, UNKNOWN)
+        own = [one for one in windows if quantity.name in one.values]
+        if len(own) < max(2, len(windows)):
+            yield quantity, None
+            continue
+        there = [soft.at(quantity.name, one.begin_m, one.arc_m) for one in own]
+        stretches = _stretches(soft, quantity, own[0].arc_m)
+        values = [one.values[quantity.name] for one in own]
+        yield quantity, ratio(values, _rooted(np.array(there), quantity), stretches, known)
+
+
+def _stretches(soft: PathQuantities, quantity: Quantity, arc_m: float) -> Floats:
     """Values of a quantity over stretches of the soft run as long as a window's sample."""
     blocks = soft.of_blocks(quantity.name)
-    return np.sqrt(blocks) if quantity.squared else blocks
+    each = max(1, round(arc_m / soft.block_m))
+    count = max(1, len(blocks) // each)
+    means = [one.mean() for one in np.array_split(blocks, count)]
+    return _rooted(np.array(means), quantity)
 
 
-def _refused(window: Measures) -> Iterator[Refused]:
-    """Why a window does not enter, if it does not."""
-    if not window.complete:
-        check = window.telling_failure
-        yield Refused(
-            run=window.run, why=f"{check.name}: {check.seen}" if check else "not complete"
-        )
+def _rooted(values: Floats, quantity: Quantity) -> Floats:
+    return np.sqrt(values) if quantity.squared else values
+
+
+def _measured(folder: Path) -> WindowOfRun:
+    """A window with its quantities; refused if it failed or its bed has not come to rest."""
+    file = folder / "outcome.json"
+    if not file.is_file():
+        raise TableError(f"{file} is missing: `dragdeck run --outcome` writes it")
+    outcome, case = RunRecord.read(file), load_case(folder)
+    window = WindowOfRun(
+        run=folder.name,
+        cpu_time_s=outcome.processor_time_s,
+        stability_number=next(
+            (one.number for one in outcome.checks if one.code == "stable_timestep"), None
+        ),
+    )
+    if not outcome.complete:
+        why = "; ".join(f"{one.name}: {one.seen}" for one in outcome.failed_checks)
+        return window.model_copy(update={"refused": why or "not complete"})
+    write_tables(folder)
+    write_chains(folder)
+    along = quantities_along(folder, case)
+    found = {name: getattr(along, name) for name in ("begin_m", "arc_m", "load_map")}
+    return window.model_copy(
+        update={**found, "values": along.values(), "refused": _unsettled(folder)}
+    )
+
+
+def _unsettled(folder: Path) -> str:
+    """Why a window's bed has not come to its plateau, empty if it has."""
+    contacts = read_table(folder / "tables" / "network.parquet")["coordination_number"]
+    first = max(1, len(contacts) // 3)
+    early, late = contacts[:first].mean(), contacts[first:].mean()
+    if abs(early / late - 1.0) <= _PLATEAU:
+        return ""
+    return (
+        f"the bed has not settled: its coordination number is {early:.3g} in the first third of "
+        f"the sample and {late:.3g} in the rest"
+    )

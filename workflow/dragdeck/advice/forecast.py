@@ -1,6 +1,5 @@
-"""What a study's run will take and how far it may err: `dragdeck advise`."""
+"""What a study's runs will take: `dragdeck advise`."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -9,8 +8,8 @@ from pathlib import Path
 from rich.table import Table
 
 from dragdeck import __version__
-from dragdeck.advice.advise import RESTITUTION, Advice, Spread, percent, signed
-from dragdeck.advice.options import Option, process_options, step_cost, with_option
+from dragdeck.advice.advise import Advice, percent
+from dragdeck.advice.options import Option, step_cost, with_option
 from dragdeck.advice.speed import SCALE, Speed
 from dragdeck.cases.case import Case
 from dragdeck.decks.advised import AdvisedSettings
@@ -18,15 +17,16 @@ from dragdeck.decks.deck import StudyScene
 from dragdeck.documents import Document, Part
 from dragdeck.engine.reports import shown_time
 from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds
-from dragdeck.outlook.measured import MeasuredError, Tradeoff
+from dragdeck.outlook.measured import Tradeoff
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
+from dragdeck.scenes.lead import FIRST_WINDOWS, with_leads
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.base import Json
-from dragdeck.study.model import Fidelity, Study, Tolerance
+from dragdeck.study.model import Fidelity, Tolerance
 
-_DEFAULT_TOLERANCE = Tolerance(tolerance=0.05)
+_DEFAULT_TOLERANCE = Tolerance(tolerance=0.1)
 """What is advised for where a study asks for nothing."""
 
 
@@ -37,14 +37,15 @@ class Forecast:
     Attributes
     ----------
     role : str
-        ``advised``, ``cheaper``, ``dearer``, ``reference`` or ``own``.
+        ``advised`` or ``reference``.
     option : Option
     case : Case
         With the option's settings.
     inputs : mapping
         Of the process run, as in its ``case.json``: tells which run this is about.
     steps : mapping of str to int
-        Of each scene that the tolerance concerns: fill and process, or the drop.
+        Of each scene that the tolerance concerns: fill and process, or the drop; a softer run and
+        the first windows count in the process.
     wall_times_s : mapping of str to float
         Expected, of the same scenes.
     source : str
@@ -61,13 +62,12 @@ class Forecast:
 
     def for_file(self) -> "OptionEntry":
         """An entry of ``options`` in ``advice.json``."""
-        error = self.option.error
         chosen = self.case.study.chosen_fidelity()
         return OptionEntry(
             role=self.role,
             settings=SettingsOfOption(**chosen.model_dump() | {"ranks": self.case.ranks}),
             drop_timestep_fraction=self.option.drop_timestep_fraction,
-            error=error,
+            error=self.option.error,
             relative_cost=self.option.relative_cost,
             inputs=self.inputs,
             steps=self.steps,
@@ -93,20 +93,20 @@ class SettingsOfOption(Fidelity):
 
 
 class OptionEntry(Part):
-    """An option of ``advice.json``: settings, their error and their expected cost.
+    """An option of ``advice.json``: settings and their expected cost.
 
     Attributes
     ----------
     role : str
-        ``advised``, ``cheaper``, ``dearer``, ``reference`` or ``own``.
+        ``advised`` or ``reference``.
     settings : SettingsOfOption
         Settings of filling and process.
     drop_timestep_fraction : float or None
         Time step of the drop test as a fraction of the Rayleigh time.
-    error : MeasuredError or None
-        Expected error; None for the reference.
+    error : float or None
+        Largest measured error of a drop test.
     relative_cost : float
-        CPU time / CPU time of the reference settings.
+        CPU time / CPU time of a plain run at the physical modulus.
     inputs : mapping
         Inputs of the process run, as in its ``case.json``.
     steps, wall_time_s, steps_per_s : mapping
@@ -118,7 +118,7 @@ class OptionEntry(Part):
     role: str
     settings: SettingsOfOption
     drop_timestep_fraction: float | None
-    error: MeasuredError | None
+    error: float | None
     relative_cost: float
     inputs: Json
     steps: Mapping[str, int]
@@ -135,7 +135,7 @@ class AdvisedCase(Part):
     case, run : str
         Name of the case, and its run id.
     asked : AdvisedSettings
-        The tolerance, and the expected error of the advised settings.
+        The tolerance, and what it costs.
     options : sequence of OptionEntry
         The advised settings first.
     """
@@ -147,7 +147,7 @@ class AdvisedCase(Part):
 
 
 class AdviceFile(Document):
-    """``advice.json``: settings for a tolerance, with their expected error and cost.
+    """``advice.json``: settings for a tolerance, with their expected cost.
 
     Attributes
     ----------
@@ -180,31 +180,11 @@ def question(case: Case, tolerance: float | None, quantity: str | None) -> Toler
     return Tolerance.model_validate({**base.model_dump(), **given})
 
 
-def own_option(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Option | None:
-    """The measured option that a study without a tolerance has chosen itself, if it has."""
-    if case.asked is not None or asked.quantity == RESTITUTION:
-        return None
-    fidelity = case.study.chosen_fidelity()
-    for option in process_options(case, tradeoff, asked):
-        if option.same_settings(fidelity):
-            return replace(option, fidelity=fidelity)
-    return None
-
-
-def roles(advice: Advice, own: Option | None) -> Iterator[tuple[str, Option]]:
+def roles(advice: Advice) -> Iterator[tuple[str, Option]]:
     """Roles and options of an advice, each option once."""
-    found = {
-        "advised": advice.chosen,
-        "cheaper": advice.cheaper,
-        "dearer": advice.dearer,
-        "reference": advice.reference,
-        "own": own,
-    }
-    seen: list[Option] = []
-    for role, option in found.items():
-        if option is not None and option not in seen:
-            seen.append(option)
-            yield role, option
+    yield "advised", advice.chosen
+    if advice.reference != advice.chosen:
+        yield "reference", advice.reference
 
 
 def forecast(
@@ -233,10 +213,13 @@ def forecast(
     chosen = replace(case, study=with_option(case.study, option))
     process = process_scene(chosen)
     about_drop = option.drop_timestep_fraction is not None
-    kinds = [DROP_TEST] if about_drop else [FILLING, PROCESS]
-    costs = {
-        kind.name: _cost(kind, kind.build(chosen, None), speed, results, tradeoff) for kind in kinds
-    }
+    costs = {}
+    for kind in [DROP_TEST] if about_drop else [FILLING, PROCESS]:
+        runs = with_leads([chosen]) if kind is PROCESS else [chosen]
+        scenes = (kind.build(one, None) for one in runs if one.rank_of_window <= FIRST_WINDOWS)
+        found = [_cost(kind, scene, speed, results, tradeoff) for scene in scenes]
+        steps, time = sum(one.steps for one in found), sum(one.wall_time_s for one in found)
+        costs[kind.name] = Cost(steps, time, found[-1].source)
     return Forecast(
         role=role,
         option=option,
@@ -284,102 +267,57 @@ def advice_file(
     )
 
 
-def tables(
-    case: Case, advice: Advice, rows: Sequence[Forecast], own: Option | None
-) -> Iterator[Table]:
+def tables(case: Case, advice: Advice, rows: Sequence[Forecast]) -> Iterator[Table]:
     """What `dragdeck advise` prints of a case: the options, and what must be said of them."""
     asked = advice.asked
-    title = f"{case.study_name} {case.name}: {advice.label} within {percent(asked.tolerance)}"
+    what = ", ".join(asked.quantities)
+    title = f"{case.study_name} {case.name}: {what} within {percent(asked.tolerance)}"
     table = Table(title=title, title_justify="left")
-    for name in ("", "settings", "error (95 %)", "bound", "cost", "steps", "wall time"):
+    for name in ("", "settings", "cost", "steps", "wall time"):
         table.add_column(name)
     for row in rows:
-        option = row.option
-        error = "reference" if option.error is None else _error_text(option.error)
-        bound = "" if option.error is None else percent(option.error.bound)
         style = "bold" if row.role == "advised" else None
-        cost, steps = f"{option.relative_cost:.3g}", f"{sum(row.steps.values()):,}"
+        cost, steps = _cost_text(row.option), f"{sum(row.steps.values()):,}"
         wall = shown_time(sum(row.wall_times_s.values()))
-        table.add_row(row.role, str(option), error, bound, cost, steps, wall, style=style)
+        table.add_row(row.role, str(row.option), cost, steps, wall, style=style)
     yield table
     said = Table(show_header=False)
     said.add_column(style="bold")
     said.add_column()
-    for what, text in [*remarks(advice, case.study), *_about(case, advice, rows[0], own)]:
-        said.add_row(what, text)
+    for heading, text in _about(case, advice, rows[0]):
+        said.add_row(heading, text)
     yield said
 
 
-def _about(
-    case: Case, advice: Advice, advised: Forecast, own: Option | None
-) -> Iterator[tuple[str, str]]:
-    runs = " and ".join(advised.steps)
-    yield "cost", f"CPU time of {runs} / that of the reference; advised: 1/{advice.speedup:.3g}"
-    if skin := advice.chosen.fidelity.skin_m:
+def _cost_text(option: Option) -> str:
+    least, most = f"{option.relative_cost:.3g}", f"{option.largest_cost:.3g}"
+    return least if least == most else f"{least} to {most}"
+
+
+def _about(case: Case, advice: Advice, advised: Forecast) -> Iterator[tuple[str, str]]:
+    runs, chosen = " and ".join(advised.steps), advice.chosen.fidelity
+    yield "cost", f"CPU time of {runs} / that of the reference"
+    if advice.chosen.error is not None:
+        yield "error", f"largest measured error of an impact: {percent(advice.chosen.error)}"
+    elif chosen.windows is not None:
+        yield (
+            "tolerance",
+            (
+                "windows are run until the 95 % confidence interval of each quantity at the physical "
+                f"Young's modulus is inside it; steps and wall time are those of {FIRST_WINDOWS}"
+            ),
+        )
+    elif chosen.soft_start is not None:
+        yield (
+            "tolerance",
+            (
+                "windows would take most of the path: the whole drag has the physical Young's modulus"
+            ),
+        )
+    if advice.fallback:
+        yield "fallback", advice.fallback
+    if skin := chosen.skin_m:
         yield "neighbour skin", f"{1e3 * skin:.3g} mm"
-    yield "errors", f"relative to the reference settings, {advice.source}"
     yield "wall time", f"{runs}; speed: {advised.source}"
     if case.asked is None:
-        yield "tolerance", "the study sets no tolerance and keeps its own fidelity"
-    if case.asked is None and advice.chosen.drop_timestep_fraction is None:
-        yield "own fidelity", _of_own(case, advice, own)
-
-
-def _of_own(case: Case, advice: Advice, own: Option | None) -> str:
-    """What is known of the fidelity of a study that asks for no tolerance."""
-    name, settings = case.fidelity_name, case.study.chosen_fidelity()
-    if advice.reference.same_settings(settings):
-        return f"{name} has the reference settings"
-    if own is None or own.error is None:
-        return f"{name} is not among the measured settings that apply here"
-    return (
-        f"{name}: error of {advice.label} {_error_text(own.error)}, "
-        f"bound {percent(own.error.bound)}, cost {own.relative_cost:.3g}"
-    )
-
-
-def remarks(advice: Advice, study: Study) -> list[tuple[str, str]]:
-    """What must be said of an advice: a heading and a sentence each."""
-    found = [("outside", str(number)) for number in advice.outside]
-    if advice.outside:
-        text = (
-            f"the error is therefore limited to {percent(advice.held_to)} (an assumption: its "
-            "growth outside the measured range is unknown)"
-        )
-        found.append(("safe side", text))
-    if advice.chosen.extrapolated:
-        text = (
-            f"the {advice.label} of the run is extrapolated to the physical Young's modulus; the "
-            "error is that of the extrapolation; the report shows both values"
-        )
-        found.append(("extrapolated", text))
-    if advice.fallback:
-        found.append(("fallback", advice.fallback))
-    cheaper = advice.cheaper
-    if cheaper is not None and cheaper.error is not None:
-        bound = cheaper.error.limit
-        text = f"error up to {percent(bound)}, {percent(bound - advice.held_to)} above the limit"
-        found.append(("cheaper", f"{cheaper}: {text}"))
-    if advice.spread is not None:
-        found.append(("scatter", _of_chance(advice, advice.spread, study)))
-    return found
-
-
-def _of_chance(advice: Advice, spread: Spread, study: Study) -> str:
-    """The uncertainty of one run, and what would bring it below the tolerance."""
-    text = (
-        f"the {advice.label} of a single run has a 95 % confidence interval of +/- "
-        f"{percent(spread.half_width)} over {spread.counted_m:.3g} m of path in the statistics"
-    )
-    if spread.half_width <= advice.asked.tolerance:
-        return text
-    length = spread.needed_m + study.motion.uncounted_m
-    around = study.motion.path.revolution_m
-    whole = f"{length:.3g} m" if around is None else f"{length / around:.3g} revolutions"
-    seeds = math.ceil(spread.needed_m / spread.counted_m)
-    return f"{text}: more than the tolerance, which requires {whole} or the mean of {seeds} seeds"
-
-
-def _error_text(error: MeasuredError) -> str:
-    """An error with its interval."""
-    return f"{signed(error.value)} ({signed(error.ci95_low)} to {signed(error.ci95_high)})"
+        yield "own fidelity", "the study sets no tolerance and keeps its own fidelity"

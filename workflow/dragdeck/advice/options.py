@@ -1,4 +1,4 @@
-"""Measured settings as they are for a case: carried to its scene, and passing every check."""
+"""Settings for a case: soft runs with windows, stiff runs, drop tests; each passing every check."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -7,36 +7,40 @@ from itertools import chain
 
 import numpy as np
 
-from dragdeck.cases.bed import bed_timestep, widest_skin
+from dragdeck.cases.bed import bed_timestep, full_stiffness_number, widest_skin
 from dragdeck.cases.case import Case, of_each_workpiece
-from dragdeck.outlook.measured import (
-    FidelityParameters,
-    MeasuredDrop,
-    MeasuredError,
-    MeasuredLaw,
-    MeasuredSetting,
-    Tradeoff,
-)
-from dragdeck.outlook.stable_step import stable_step_cautions
+from dragdeck.outlook.measured import MeasuredDrop, Tradeoff
+from dragdeck.outlook.stable_step import stable_fraction, stable_step_cautions
 from dragdeck.outlook.timestep import largest_fraction
-from dragdeck.physics.similarity import (
-    SAME_NUMBER,
-    carried_scale,
-    carried_speed,
-    softest_scale,
-)
+from dragdeck.physics.rounding import rounded
+from dragdeck.physics.similarity import softest_scale
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.filling import FILLING, expected_surface, expected_time, filling_cautions
 from dragdeck.scenes.fit import process_cautions
+from dragdeck.scenes.lead import FIRST_WINDOWS, covered_fraction, window_count, window_fraction
 from dragdeck.scenes.legs import plunge_point
 from dragdeck.scenes.workpiece import FACET_STEP_S, PARTICLE_STEPS_PER_S, workpiece_facets
-from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance
-
-_FEWEST_RUNS = 2
-"""Runs of a setting below which its error is not believed."""
+from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance, Windows
 
 _PROCESS_OF_DROP = "standard"
 """Fidelity of the process in a study whose tolerance is about the drop test."""
+
+_SOFT_STIFFNESS = 1000.0
+"""Stiffness number of the softer runs from which others go on (docs/evidence/windows.md)."""
+
+_SOFTEST_START = 0.3
+"""Modulus scale from which on a softer start saves nothing."""
+
+_STABILITY_NUMBER = 0.72
+"""That steps at the physical modulus are forecast to have: up to there they change nothing that was
+measured (docs/evidence/windows.md)."""
+
+_MOST_OF_DRAG = 0.5
+"""Fraction of the drag that the first windows may take: with more, the whole drag at the physical
+modulus is no dearer."""
+
+_PLAIN_FRACTION = 0.64
+"""Time step over the Rayleigh time of the plain run that costs are compared with."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +51,9 @@ class Work:
     ----------
     study : Study
     tradeoff : Tradeoff
-    filling_s, process_s : float
-        Simulated time, that of the process at the study's own speed, s.
+    filling_s, process_s, entry_s : float
+        Simulated time, that of the process and of what goes before its drag at the study's own
+        speed, s.
     facets : int
         Of all workpieces.
     """
@@ -57,6 +62,7 @@ class Work:
     tradeoff: Tradeoff
     filling_s: float
     process_s: float
+    entry_s: float
     facets: int
 
     @classmethod
@@ -64,25 +70,47 @@ class Work:
         """Of a case; its own fidelity does not matter."""
         study, motion = case.study, case.study.motion
         way = math.dist(plunge_point(motion), motion.path.start_point)
-        process_s = (
-            expected_surface(study) / motion.plunge_speed_m_s
-            + way / motion.approach_speed_m_s
-            + motion.path_length_m / motion.axis_speed_m_s
+        entry_s = (
+            expected_surface(study) / motion.plunge_speed_m_s + way / motion.approach_speed_m_s
         )
+        process_s = entry_s + motion.path_length_m / motion.axis_speed_m_s
         facets = sum(workpiece_facets(one) for one in of_each_workpiece(case))
-        return cls(study, tradeoff, expected_time(study), process_s, facets)
+        return cls(study, tradeoff, expected_time(study), process_s, entry_s, facets)
 
-    def cpu_time(self, fidelity: Fidelity) -> float:
-        """CPU time of both runs with some settings, s: only ratios of it count."""
+    def cpu_time(self, fidelity: Fidelity, windows: int = 0) -> float:
+        """CPU time of all runs with some settings, s: only ratios of it count.
+
+        Parameters
+        ----------
+        fidelity : Fidelity
+        windows : int
+            How many are run, if the settings have any.
+        """
         study = self.study.model_copy(update={"fidelity": fidelity})
-        filling = self.filling_s / bed_timestep(study, "filling_timestep_fraction")
-        process = self.process_s / bed_timestep(study, "timestep_fraction")
-        process *= step_cost(fidelity.youngs_modulus_scale, self.tradeoff) / fidelity.speed_factor
-        count = study.media.count
-        of_facets = self.facets * FACET_STEP_S
-        return filling * count / FILLING.particle_steps_per_s + process * (
+        start, entry = study.at_start(), covered_fraction(study)
+        filling = self.filling_s / bed_timestep(start, "filling_timestep_fraction")
+        drag_s = self.process_s - self.entry_s
+        softer = self.entry_s + entry * drag_s
+        steps = self._steps(start, softer) + self._steps(study, self.process_s - softer)
+        if fidelity.windows is not None:
+            stiff = fidelity.model_copy(
+                update={
+                    "youngs_modulus_scale": 1.0,
+                    "timestep_fraction": fidelity.windows.timestep_fraction,
+                }
+            )
+            own = self.study.model_copy(update={"fidelity": stiff})
+            steps += windows * self._steps(own, window_fraction(study) * drag_s)
+        count, of_facets = study.media.count, self.facets * FACET_STEP_S
+        return filling * count / FILLING.particle_steps_per_s + steps * (
             count / PARTICLE_STEPS_PER_S + of_facets
         )
+
+    def _steps(self, study: Study, time_s: float) -> float:
+        """Steps of a stretch of the process, each counted as it costs at its modulus."""
+        chosen = study.chosen_fidelity()
+        steps = time_s / bed_timestep(study, "timestep_fraction") / chosen.speed_factor
+        return steps * step_cost(chosen.youngs_modulus_scale, self.tradeoff)
 
 
 def step_cost(scale: float, tradeoff: Tradeoff) -> float:
@@ -110,44 +138,42 @@ def step_cost(scale: float, tradeoff: Tradeoff) -> float:
 
 @dataclass(frozen=True)
 class Option:
-    """Settings that were measured, as they are for a study.
+    """Settings, as they are for a study.
 
     Attributes
     ----------
     fidelity : Fidelity
-    error : MeasuredError or None
-        None for the reference, which errors are measured against.
     relative_cost : float
-        Forecast CPU time of all runs that depend on the settings, over that with the reference.
+        Forecast CPU time of all runs that depend on the settings, with the first windows, over
+        that of the plain run.
+    largest_cost : float
+        The same with all windows that there can be.
+    error : float or None
+        Of a drop test: the largest measured one of an impact.
     drop_timestep_fraction : float or None
         Step of the drop test over the Rayleigh time, if the option is about it.
-    extrapolated : bool
-        The error is that of the value extrapolated to the physical Young's modulus.
-    by_law : bool
-        It was not measured in the scene of the trade-off, but follows from the law.
     """
 
     fidelity: Fidelity
-    error: MeasuredError | None
     relative_cost: float
+    largest_cost: float
+    error: float | None = None
     drop_timestep_fraction: float | None = None
-    extrapolated: bool = False
-    by_law: bool = False
 
     def __str__(self) -> str:
         if self.drop_timestep_fraction is not None:
             return f"drop at {100 * self.drop_timestep_fraction:.3g} % of the Rayleigh time"
-        chosen = self.fidelity
-        return (
+        chosen, windows = self.fidelity, self.fidelity.windows
+        text = (
             f"E x {chosen.youngs_modulus_scale:g}, {100 * chosen.timestep_fraction:.3g} % of the "
-            f"Rayleigh time, speed x {chosen.speed_factor:g}"
-            f"{', extrapolated to E x 1' if self.extrapolated else ''}"
+            "Rayleigh time"
         )
-
-    def same_settings(self, fidelity: Fidelity | FidelityParameters) -> bool:
-        """Whether a fidelity asks for the same modulus, step and speed."""
-        names = FidelityParameters.model_fields
-        return all(math.isclose(getattr(self.fidelity, n), getattr(fidelity, n)) for n in names)
+        if chosen.soft_start is not None:
+            text += f", begun with E x {chosen.soft_start:g}"
+        if windows is not None:
+            step = f"{100 * windows.timestep_fraction:.3g} %"
+            text += f", {FIRST_WINDOWS} to {windows.most} windows with E x 1 at {step}"
+        return text
 
 
 def with_option(study: Study, option: Option) -> Study:
@@ -158,24 +184,16 @@ def with_option(study: Study, option: Option) -> Study:
     return study.model_copy(update=update)
 
 
-def consistent(case: Case, fidelity: Fidelity) -> Fidelity:
-    """Settings that pass every check of a case: the given ones, or the nearest to them.
+def consistent(case: Case) -> Fidelity:
+    """Settings that pass every check of a case: its own, or the nearest to them.
 
-    Modulus and time step change only to the accurate side, so that a measured error still holds;
-    skin, filling step and ranks do not change the process. Warnings that remain are about the
-    scene itself.
-
-    Parameters
-    ----------
-    case : Case
-        Its own fidelity does not matter.
-    fidelity : Fidelity
+    Modulus and time step change only to the accurate side; skin, filling step and ranks do not
+    change the process. Warnings that remain are about the scene itself.
     """
-    lowest = describe(case)["lowest_restitution"]
+    fidelity, lowest = case.study.chosen_fidelity(), describe(case)["lowest_restitution"]
     filling = min(fidelity.filling_timestep_fraction, largest_fraction("settle", lowest))
     remedy: Mapping[str, float] = {
         "youngs_modulus_scale": max(fidelity.youngs_modulus_scale, softest_scale(case.study)),
-        "timestep_fraction": min(fidelity.timestep_fraction, largest_fraction("drag", lowest)),
         "filling_timestep_fraction": filling,
     }
     while remedy:
@@ -192,174 +210,66 @@ def _remedies(case: Case) -> Iterator[Mapping[str, float]]:
     yield from (one.settings for one in found if one.settings)
 
 
-def process_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterator[Option]:
-    """Every measured setting that may be used, carried to the case's scene.
+def soft_scale(study: Study) -> float:
+    """Factor on every Young's modulus of the softer run that leads to one at the physical one."""
+    scale = (_SOFT_STIFFNESS / full_stiffness_number(study)) ** 1.5
+    return max(rounded(min(scale, 1.0), up=True), softest_scale(study))
 
-    Left out are settings whose step breaks, that too few runs stand
-    behind, whose error was not measured, whose step is beyond the stability
-    limit of the measured scene, or that cost as much as the reference.
+
+def _with(case: Case, **settings: float | str) -> Case:
+    """The case with these settings of a process."""
+    chosen = {"skin_m": widest_skin(case.study), "ranks": "auto", **settings}
+    fidelity = Fidelity.model_validate(chosen)
+    return replace(case, study=case.study.model_copy(update={"fidelity": fidelity}))
+
+
+def stiff_step(case: Case) -> float:
+    """Time step at the physical modulus over the Rayleigh time."""
+    stable = stable_fraction(_with(case), math.log(_STABILITY_NUMBER))
+    limit = float(Fidelity.model_fields["timestep_fraction"].metadata[-1].le)
+    fraction = min(rounded(stable, up=False), limit)
+    return consistent(_with(case, timestep_fraction=fraction)).timestep_fraction
+
+
+def process_option(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Option:
+    """The settings with which a tolerance is met in a case's own scene.
+
+    A soft run over the whole path, and windows at the physical modulus until the tolerance is met;
+    where a few of them would take most of the path, a run at the physical modulus that begins
+    softer; where the material is so soft that nothing is saved, a plain one.
     """
-    reference = process_reference(case, tradeoff)
-    known = _law(tradeoff, asked)
-    work = Work.of(case, tradeoff)
-    whole = work.cpu_time(reference.fidelity)
-    for setting in _sound_settings(tradeoff):
-        error = setting.errors.get(asked.quantity)
-        if error is None:
-            continue
-        fidelity = consistent(case, _carried(case, setting, tradeoff.scene))
-        corrected = fidelity.youngs_modulus_scale < 1 and fidelity.speed_factor == 1
-        shown = _corrected(error, setting, known, tradeoff.scene) if corrected else None
-        cost = work.cpu_time(fidelity) / whole
-        option = Option(fidelity, shown or error, cost, extrapolated=shown is not None)
-        dearest = option.relative_cost >= reference.relative_cost
-        if not dearest and not option.same_settings(reference.fidelity):
-            yield option
+    soft, step = soft_scale(case.study), stiff_step(case)
+    plain = Work.of(case, tradeoff).cpu_time(plain_option(case).fidelity)
 
+    def option(fidelity: Fidelity) -> Option:
+        most = window_count(case.study.model_copy(update={"fidelity": fidelity}))
+        work = Work.of(case, tradeoff)
+        costs = (work.cpu_time(fidelity, min(n, most)) for n in (FIRST_WINDOWS, most))
+        return Option(fidelity, *(cost / plain for cost in costs))
 
-def _law(tradeoff: Tradeoff, asked: Tolerance) -> MeasuredLaw | None:
-    """The law by which the report extrapolates a quantity."""
-    return tradeoff.stiffness.laws.get(asked.quantity) if tradeoff.stiffness else None
-
-
-def _corrected(
-    error: MeasuredError,
-    setting: MeasuredSetting,
-    known: MeasuredLaw | None,
-    scene: Mapping[str, float],
-) -> MeasuredError | None:
-    """A measured error of the extrapolated value; None where nothing is extrapolated.
-
-    The law multiplies every value of a setting by the same number, and so does it the error.
-    """
-    if known is None or not scene.get(known.friction):
-        return None
-    factor = math.exp(-known.effect(scene, setting.youngs_modulus_scale)[0])
-
-    def shifted(value: float) -> float:
-        return (1 + value) * factor - 1
-
-    reach = error.bound - abs(error.value)
-    ends = (abs(shifted(error.value + sign * reach)) for sign in (-1, 1))
-    return MeasuredError(
-        value=shifted(error.value),
-        se=error.se * factor,
-        ci95_low=shifted(error.ci95_low),
-        ci95_high=shifted(error.ci95_high),
-        bound=max(ends),
-        single_parameter_error=error.single_parameter_error,
+    if soft > _SOFTEST_START:
+        return option(_with(case, timestep_fraction=step).study.chosen_fidelity())
+    stable = rounded(stable_fraction(_with(case, youngs_modulus_scale=soft)), up=False)
+    chosen = consistent(_with(case, youngs_modulus_scale=soft, timestep_fraction=stable))
+    windows = Windows(
+        tolerance=asked.tolerance, quantities=list(asked.quantities), timestep_fraction=step
     )
+    windowed = chosen.model_copy(update={"windows": windows})
+    study = case.study.model_copy(update={"fidelity": windowed})
+    if FIRST_WINDOWS * window_fraction(study) <= _MOST_OF_DRAG:
+        return option(windowed)
+    led = _with(case, soft_start=chosen.youngs_modulus_scale, timestep_fraction=step)
+    return option(led.study.chosen_fidelity())
 
 
-SCALES = tuple(step * 10.0**power for power in (-5, -4, -3, -2, -1) for step in (1, 2, 5))
-"""Modulus scales from which a law is asked to extrapolate: so dense that the advice has no jump."""
-
-
-def extrapolated_options(case: Case, tradeoff: Tradeoff, asked: Tolerance) -> Iterator[Option]:
-    """Settings with a reduced modulus whose results are extrapolated to the physical one.
-
-    None where no law of the quantity was measured, and none softer than the runs that it was
-    measured with. The error is that of the law in one scene: how far the effect of a reduced
-    modulus scatters from scene to scene, how well its mean is known, and what extrapolations erred
-    in scenes that were left out.
-    """
-    known, numbers = _law(tradeoff, asked), describe(case)
-    fractions = [
-        setting.timestep_fraction
-        for setting in _sound_settings(tradeoff)
-        if setting.speed_factor == 1 and setting.youngs_modulus_scale < 1
-    ]
-    if (
-        tradeoff.stiffness is None
-        or known is None
-        or not numbers.get(known.friction)
-        or not fractions
-    ):
-        return
-    softest = tradeoff.stiffness.lowest_stiffness_number / numbers["stiffness_number"]
-    work = Work.of(case, tradeoff)
-    whole = work.cpu_time(process_reference(case, tradeoff).fidelity)
-    lowest = max(softest_scale(case.study), (softest * (1 - SAME_NUMBER)) ** 1.5)
-    for scale in (one for one in SCALES if one >= lowest):
-        fidelity = consistent(
-            case,
-            Fidelity(
-                youngs_modulus_scale=scale,
-                timestep_fraction=max(fractions),
-                skin_m=widest_skin(case.study),
-                ranks="auto",
-            ),
-        )
-        error = _law_error(known, numbers, fidelity.youngs_modulus_scale)
-        cost = work.cpu_time(fidelity) / whole
-        yield Option(fidelity, error, cost, extrapolated=True, by_law=True)
-
-
-def _sound_settings(tradeoff: Tradeoff) -> Iterator[MeasuredSetting]:
-    """The measured settings that may be used anywhere."""
-    limit = largest_fraction("drag", tradeoff.scene["lowest_restitution"]) * (1 + 1e-9)
-    for setting in tradeoff.settings:
-        sound = setting.failed == 0 and not setting.breaks and setting.runs >= _FEWEST_RUNS
-        if sound and setting.timestep_fraction <= limit and setting.relative_cost is not None:
-            yield setting
-
-
-def toward_law(
-    case: Case, option: Option, close: float, tradeoff: Tradeoff, asked: Tolerance
-) -> Option:
-    """An extrapolated option as it is at some distance from the scene of the trade-off.
-
-    Its error passes from the one that was measured there (`close` is 1) to that of the law (0), so
-    that nothing jumps where a scene leaves the range.
-    """
-    known = _law(tradeoff, asked)
-    if known is None or option.error is None:
-        return option
-    there = dict(option.error)
-    scale = option.fidelity.youngs_modulus_scale
-    here = dict(_law_error(known, describe(case), scale))
-    mixed = {name: close * there[name] + (1 - close) * here[name] for name in there}
-    return replace(option, error=MeasuredError(**mixed), by_law=close == 0)
-
-
-def _law_error(known: MeasuredLaw, numbers: Mapping[str, float], scale: float) -> MeasuredError:
-    """The relative error of an extrapolation from a modulus scale in a scene.
-
-    The standard error of `dragchain.tradeoff.stiffness_law.extrapolate`, without the scatter of
-    the run.
-    """
-    _, se = known.effect(numbers, scale)
-    low, high = (math.expm1(sign * known.quantile * se) for sign in (-1, 1))
-    return MeasuredError(
-        value=0.0, se=se, ci95_low=low, ci95_high=high, bound=high, single_parameter_error=0.0
-    )
-
-
-def _carried(case: Case, setting: MeasuredSetting, there: Mapping[str, float]) -> Fidelity:
-    """A measured setting in another scene."""
-    here = describe(case)
-    stiffer = here["stiffness_number"] / there["stiffness_number"]
-    slower = there["inertial_number"] / here["inertial_number"]
-    return Fidelity(
-        youngs_modulus_scale=carried_scale(setting.youngs_modulus_scale, stiffer),
-        timestep_fraction=setting.timestep_fraction,
-        speed_factor=carried_speed(setting.speed_factor, slower),
-        skin_m=widest_skin(case.study),
-        ranks="auto",
-    )
-
-
-def process_reference(case: Case, tradeoff: Tradeoff) -> Option:
-    """The settings that errors are measured against, or the nearest that pass every check."""
-    plain = Fidelity(
-        **tradeoff.reference.model_dump(), skin_m=widest_skin(case.study), ranks="auto"
-    )
-    return Option(consistent(case, plain), None, 1.0)
+def plain_option(case: Case) -> Option:
+    """The plain run at the physical modulus that costs are compared with."""
+    return Option(consistent(_with(case, timestep_fraction=_PLAIN_FRACTION)), 1.0, 1.0)
 
 
 def drop_options(case: Case, tradeoff: Tradeoff) -> Iterator[Option]:
     """Every measured step of the drop test that is within the stability limit."""
-    process, limit = _beside_drop(case, tradeoff)
+    process, limit = _beside_drop(case)
     for drop in tradeoff.drop_test:
         if drop.timestep_fraction <= limit * (1 + 1e-9):
             yield _drop_option(process, drop, drop.timestep_fraction)
@@ -367,27 +277,20 @@ def drop_options(case: Case, tradeoff: Tradeoff) -> Iterator[Option]:
 
 def finest_drop(case: Case, tradeoff: Tradeoff) -> Option:
     """The drop test with the smallest measured step, or a smaller one where damping is strong."""
-    process, limit = _beside_drop(case, tradeoff)
+    process, limit = _beside_drop(case)
     finest = min(tradeoff.drop_test, key=lambda drop: drop.timestep_fraction)
     return _drop_option(process, finest, min(finest.timestep_fraction, limit))
 
 
-def _beside_drop(case: Case, tradeoff: Tradeoff) -> tuple[Fidelity, float]:
+def _beside_drop(case: Case) -> tuple[Fidelity, float]:
     """If the drop test is asked about: settings of the process, and largest step of the drop."""
     named = {**BUILT_IN_FIDELITIES, **case.study.fidelities}[_PROCESS_OF_DROP]
     limit = largest_fraction("impact", describe(case)["lowest_restitution"])
-    return consistent(case, named), limit
+    study = case.study.model_copy(update={"fidelity": named})
+    return consistent(replace(case, study=study)), limit
 
 
 def _drop_option(process: Fidelity, drop: MeasuredDrop, fraction: float) -> Option:
-    """A step of the drop test. The error has no chance in it: it is its own bound."""
-    value = drop.restitution_error
-    error = MeasuredError(
-        value=value,
-        se=0.0,
-        ci95_low=value,
-        ci95_high=value,
-        bound=abs(value),
-        single_parameter_error=0.0,
-    )
-    return Option(process, error, drop.relative_cost, fraction)
+    """A step of the drop test, whose error has no scatter."""
+    cost = drop.relative_cost
+    return Option(process, cost, cost, abs(drop.restitution_error), fraction)

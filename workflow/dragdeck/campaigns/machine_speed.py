@@ -118,8 +118,9 @@ def short_case(case: Case) -> Case:
         ranks=case.ranks,
     )
     accepted = study.accepted.model_copy(update={"unsafe_timestep": "only its speed counts"})
-    update = {"fidelity": consistent(case, soft), "accepted": accepted}
-    changed = study.model_copy(update=update)
+    changed = study.model_copy(update={"fidelity": soft, "accepted": accepted})
+    fidelity = consistent(Case(case.file, {}, changed))
+    changed = changed.model_copy(update={"fidelity": fidelity})
     dt = bed_timestep(changed, "timestep_fraction")
     pace = asked.speed_factor * bed_timestep(study, "timestep_fraction") / dt
     update = {"motion": _motion(changed, pace, dt), "outputs": _outputs(study.outputs, pace, dt)}

@@ -132,7 +132,7 @@ class Case:
         if self.asked is not None:
             name = f"tolerance-{self.asked.tolerance:g}"
             default = self.asked.quantity == Tolerance.model_fields["quantity"].default
-            return name if default else f"{name}-{self.asked.quantity}"
+            return name if default else "-".join([name, *self.asked.quantities])
         fidelity = self.study.fidelity
         if isinstance(fidelity, str):
             return fidelity

@@ -5,8 +5,8 @@ CASE_FILE = "case.json"
 COLUMNS_FILE = "columns.json"
 """Files of a run's folder, beside its particles and meshes."""
 
-RUN_FILE = "run.json"
-"""How the run ended, once it is complete."""
+RUN_FILE, OUTCOME_FILE = "run.json", "outcome.json"
+"""How the run ended, once it is complete; and however it ended, of a run that may fail."""
 
 END = "DRAGDECK END"
 """What LIGGGHTS prints when it comes to the last line of a deck."""

@@ -6,45 +6,26 @@ from dragdeck.documents import Part
 
 
 class AdvisedSettings(Part):
-    """The tolerance for which the settings of a run were chosen, and their expected error.
+    """The tolerance for which the settings of a run were chosen.
 
     Attributes
     ----------
-    held_to : float
-        Tolerance that the settings meet: the requested one, or a smaller one outside the measured
-        range.
-    extrapolated : bool
-        Whether the tolerance applies to the value extrapolated to the physical Young's modulus.
-    error, ci95_low, ci95_high, bound : float or None
-        Expected relative error, its 95 % CI, and the bound of its absolute value; None for the
-        reference.
-    half_width : float or None
-        Relative half-width of the 95 % CI of the value of one run.
     tolerance : float
-        Requested relative error.
-    quantity, label : str
-        Quantity to which the tolerance applies: name and wording.
-    relative_cost : float
-        CPU time / CPU time of the reference settings.
-    outside : sequence of str
-        Dimensionless numbers outside the measured range.
+        Requested relative half-width of the 95 % CI, or error of a drop test.
+    quantities : sequence of str
+        Quantities to which the tolerance applies.
+    error : float or None
+        Largest measured error of a drop test; None for a process, whose windows measure it.
+    relative_cost, largest_cost : float
+        CPU time / CPU time of a plain run at the physical modulus: with the first windows, and with
+        all that there can be.
     fallback : str or None
-        Why the reference settings are used.
-    source : str
-        Measurement on which the advice is based.
+        Why the settings do not meet the tolerance.
     """
 
     tolerance: float
-    quantity: str
-    label: str
-    held_to: float
-    extrapolated: bool
+    quantities: Sequence[str]
     error: float | None
-    ci95_low: float | None
-    ci95_high: float | None
-    bound: float | None
     relative_cost: float
-    half_width: float | None
-    outside: Sequence[str]
+    largest_cost: float
     fallback: str | None
-    source: str

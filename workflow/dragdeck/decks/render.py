@@ -8,7 +8,7 @@ from pathlib import Path
 
 import jinja2
 
-from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, END, RUN_FILE
+from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, END, OUTCOME_FILE, RUN_FILE
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.engine_commands import (
     commands,
@@ -162,7 +162,11 @@ def write_workpiece(
         CASE_FILE: scene.case.model_copy(update=own).as_text(),
         COLUMNS_FILE: columns.as_text(),
         **scene.texts(),
-        RUN_FILE: (run / RUN_FILE).read_text(encoding="utf-8"),
+        **{
+            name: (run / name).read_text(encoding="utf-8")
+            for name in (RUN_FILE, OUTCOME_FILE)
+            if (run / name).is_file()
+        },
     }
     for name, text in texts.items():
         replace_text(folder / name, text)

@@ -99,7 +99,7 @@ def _ratio(cost: MeasuredCost, tradeoff: Tradeoff) -> str:
     return f"{cost.ratio:.3g}x{interval}, LIGGGHTS {engine}, {date}"
 
 
-def page(scene: StudyScene, cost: Cost, runs: int, width: int, outside: str = "") -> Iterator[str]:
+def page(scene: StudyScene, cost: Cost, runs: int, width: int, reduced: str = "") -> Iterator[str]:
     """The lines of one scene on a page that fits a terminal: names without reasons and prices.
 
     Parameters
@@ -111,8 +111,8 @@ def page(scene: StudyScene, cost: Cost, runs: int, width: int, outside: str = ""
         How many there are.
     width : int
         Of the page, characters.
-    outside : str
-        What it means that the scene is outside the measured range.
+    reduced : str
+        What a reduced modulus means for the results.
     """
     step = scene.deck.timestep_s
     rayleigh = f"{100 * step / scene.case.rayleigh_time_s:.3g} % of Rayleigh"
@@ -123,7 +123,7 @@ def page(scene: StudyScene, cost: Cost, runs: int, width: int, outside: str = ""
         ("models", scene.models),
     ]
     rows += [("leaves out", scene.leaves_out), ("warning", [str(one) for one in scene.warnings])]
-    rows.append(("range", [outside] if outside else []))
+    rows.append(("modulus", [reduced] if reduced else []))
     for name, texts in rows:
         if joined := "; ".join(texts):
             yield from textwrap.wrap(

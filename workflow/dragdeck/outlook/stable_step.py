@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dragdeck.cases.bed import full_stiffness_number
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution, InputError
-from dragdeck.outlook.measured import measured_stiffness
+from dragdeck.outlook.measured import stable_step_law
 from dragdeck.physics.rounding import rounded
 
 _DOUBT = 2.0
@@ -26,7 +26,7 @@ def stable_fraction(case: Case, margin: float = 0.0) -> float:
     margin : float
         Logarithm of the stability number that the step then is forecast to have.
     """
-    study, law = case.study, measured_stiffness().stable_step
+    study, law = case.study, stable_step_law()
     softer = study.chosen_fidelity().youngs_modulus_scale ** (2 / 3)
     kappa = softer * full_stiffness_number(study)
     restitution = study.pair(study.media.material, study.media.material).restitution
@@ -44,7 +44,7 @@ def stable_step_cautions(case: Case, surely: bool = False) -> Iterator[Caution]:
         With the margin that no measured run would have needed more of, instead of two standard
         deviations.
     """
-    chosen, law = case.study.chosen_fidelity(), measured_stiffness().stable_step
+    chosen, law = case.study.chosen_fidelity(), stable_step_law()
     sure = stable_fraction(case, -law.largest)
     doubtful = sure if surely else stable_fraction(case, -_DOUBT * law.scatter)
     if chosen.timestep_fraction > doubtful * (1 + 1e-9):
@@ -60,7 +60,7 @@ def stable_step_note(case: Case) -> tuple[str, str]:
     """What ``check`` and ``explain`` say of it: a heading and a text."""
     own, limit = case.study.chosen_fidelity().timestep_fraction, stable_fraction(case)
     verdict = "below" if own < limit else "NOT BELOW"
-    runs = measured_stiffness().stable_step.runs
+    runs = stable_step_law().runs
     return "stable step", (
         f"{100 * own:.3g} % is {verdict} {100 * limit:.3g} %, at which the contacts of this "
         f"packing become unstable (law of {runs} runs)"
@@ -75,7 +75,7 @@ def check_timestep(case: Case) -> None:
     InputError
         The contacts will be unstable, and the study gives no reason for that.
     """
-    chosen, law = case.study.chosen_fidelity(), measured_stiffness().stable_step
+    chosen, law = case.study.chosen_fidelity(), stable_step_law()
     limit = stable_fraction(case, _DOUBT * law.scatter)
     if chosen.timestep_fraction > limit and not case.study.accepted.unsafe_timestep:
         stable = rounded(stable_fraction(case, -law.largest), up=False)

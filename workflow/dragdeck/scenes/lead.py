@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from dragdeck.cases.bed import bed_timestep
-from dragdeck.cases.case import Case, Stretch
+from dragdeck.cases.case import Case, Stretch, of_each_workpiece
 from dragdeck.errors import InputError
 from dragdeck.physics.rounding import round_to
 from dragdeck.scenes.legs import Stop
@@ -28,9 +28,6 @@ _SHORTEST_RAMP_S, _RAMP_FALLS, _SETTLING_FALLS = 0.05, 2.0, 1.0
 """Time in which the moduli are raised, and in which the bed relaxes then, before anything is
 counted: in units of the root of d/g, about the fall over half a particle, and at least the first,
 s. The bed rises by what the overlaps give up (docs/evidence/windows.md)."""
-
-SAMPLE_DIAMETERS = 1.0
-"""Path that a window counts, in mean diameters of the particles."""
 
 FIRST_WINDOWS = 3
 """Windows of the first round, if so many fit."""
@@ -85,36 +82,54 @@ def windows_of(case: Case) -> list[Case]:
     """The windows of a case in the order in which they are run; none if its fidelity asks for none.
 
     Each begins at a mark of the case's own run, raises the moduli to the physical ones, relaxes,
-    and samples a stretch. Any number of the first ones is spread over the path.
+    and samples a stretch. Any number of the first ones is spread over the path. Those of a further
+    workpiece are those of the run, seen from it.
     """
     lead, found = led(case.all_workpieces), []
     if lead.study.chosen_fidelity().windows is None:
         return []
     study = _window_study(lead.study)
-    length = _window_s(study) / drag_leg(study).duration_s
+    length = (_before_s(study) + _sample_s(study)) / drag_leg(study).duration_s
     for rank, number in enumerate(_spread_out(len(lead.stretch.marks)), 1):
         begin = lead.stretch.marks[number]
         stretch = Stretch(begin, min(begin + length, 1.0))
         window = replace(lead, study=study, stretch=stretch, lead=lead)
-        found.append(replace(window, part=f"window-{number + 1}", rank_of_window=rank))
+        window = replace(window, part=f"window-{number + 1}", rank_of_window=rank)
+        found.append(of_each_workpiece(window)[case.number - 1] if case.number else window)
     return found
 
 
 def _too_short(case: Case) -> InputError:
     """Refuses a path on which hardly a window fits."""
     study = _window_study(case.study)
-    window_m = _window_s(study) * driven_speed(study)
-    before_m = _first_window_s(study) * driven_speed(study)
-    least = before_m + _FEWEST * window_m
+    speed = driven_speed(study)
+    before, sample = _before_s(study) * speed, _sample_s(study) * speed
+    least = max(before, study.motion.uncounted_m) + _FEWEST * sample
     return InputError(
         f"the path is too short for {_FEWEST} windows",
         file=case.file,
         field=f"motion.path.{study.motion.path.length_field}",
         value=f"{1e3 * study.motion.path_length_m:.4g} mm of path",
-        limit=f"at least {1e3 * least:.4g} mm: each window needs {1e3 * window_m:.3g} mm to raise "
-        "the moduli, to settle and to sample",
-        remedy="use a longer path, or remove fidelity.windows",
+        limit=f"at least {1e3 * least:.4g} mm: a window needs {1e3 * before:.3g} mm to raise the "
+        f"moduli and to settle, and {1e3 * sample:.3g} mm to sample",
+        remedy="use a longer path, or fidelity: {youngs_modulus_scale: 1}",
     )
+
+
+def window_count(study: Study) -> int:
+    """How many windows there can be; 0 if the fidelity asks for none."""
+    return len(_marks(study)) if study.chosen_fidelity().windows is not None else 0
+
+
+def window_fraction(study: Study) -> float:
+    """Part of the drag that a window takes."""
+    stiff = _window_study(study)
+    return float((_before_s(stiff) + _sample_s(stiff)) / drag_leg(stiff).duration_s)
+
+
+def covered_fraction(study: Study) -> float:
+    """Part of the drag that a softer run covers before a run goes on from it; 0 without one."""
+    return 0.0 if study.chosen_fidelity().soft_start is None else _entry_fraction(study)
 
 
 def with_leads(cases: Iterable[Case]) -> list[Case]:
@@ -196,11 +211,6 @@ def _seconds(path_m: float, study: Study) -> float:
     return float(path_m / study.motion.path_length_m * drag_leg(study).duration_s)
 
 
-def _diameters_s(diameters: float, study: Study) -> float:
-    """Time in which the workpiece is driven along so many mean particle diameters, s."""
-    return _seconds(2 * diameters * study.media.radius_mean_m, study)
-
-
 def _frame(study: Study) -> float:
     """A frame of the network as a fraction of the drag."""
     timestep = bed_timestep(study, "timestep_fraction")
@@ -210,15 +220,15 @@ def _frame(study: Study) -> float:
 def _entry_fraction(study: Study) -> float:
     """Where a run with a soft start enters its drag: at a frame of the network."""
     frame = _frame(study)
-    frames = math.floor(_first_window_s(study) / drag_leg(study).duration_s / frame)
-    return float(max(1, frames) * frame)
+    before_s = max(0.0, _seconds(study.motion.uncounted_m, study) - _before_s(study))
+    return float(max(1, math.floor(before_s / drag_leg(study).duration_s / frame)) * frame)
 
 
 def _window_study(study: Study) -> Study:
     """The study as its windows run it: at physical stiffness, with a frame for each short path."""
-    chosen, sample = study.chosen_fidelity(), _diameters_s(SAMPLE_DIAMETERS, study)
+    chosen = study.chosen_fidelity()
     assert chosen.windows is not None
-    often = _FRAMES / sample
+    often = _FRAMES / _block_s(study)
     rates = study.outputs
     fidelity = chosen.model_copy(
         update={
@@ -239,31 +249,39 @@ def _window_study(study: Study) -> Study:
     return study.model_copy(update={"fidelity": fidelity, "outputs": outputs})
 
 
-def _window_s(study: Study) -> float:
-    """Time that a window covers, s."""
-    return sum(_before_counted(study)) + _diameters_s(SAMPLE_DIAMETERS, study)
+def _before_s(study: Study) -> float:
+    """Time that passes in a window before it samples, s."""
+    return sum(_before_counted(study))
 
 
-def _first_window_s(study: Study) -> float:
-    """Time of the drag before the first window, whose sample begins with the statistics, s."""
-    before = sum(_before_counted(study))
-    return float(max(0.0, _seconds(study.motion.uncounted_m, study) - before))
+def _block_s(study: Study) -> float:
+    """Time of a block of the counted path, about a mean particle diameter, s."""
+    motion = study.motion
+    counted_m = motion.path_length_m - motion.uncounted_m
+    blocks = max(1, round(counted_m / (2 * study.media.radius_mean_m)))
+    return _seconds(counted_m / blocks, study)
+
+
+def _sample_s(study: Study) -> float:
+    """Time that a window samples, s: whole blocks, about as long as what goes before."""
+    block = _block_s(study)
+    return block * max(1, round(_before_s(study) / block))
 
 
 def _marks(study: Study) -> tuple[float, ...]:
-    """Where windows begin: as many as fit one after another, or the most that are asked."""
-    windows, stiff = study.chosen_fidelity().windows, _window_study(study)
+    """Where windows begin: each samples blocks of its own of the counted path."""
+    stiff, windows = _window_study(study), study.chosen_fidelity().windows
     assert windows is not None
-    drag, frame = drag_leg(stiff), _frame(stiff)
-    first = max(frame, _first_window_s(stiff) / drag.duration_s)
-    room, length = 1.0 - first, _window_s(stiff) / drag.duration_s
-    count = min(windows.most, math.floor(room / length))
-    starts = (first + number * room / max(count, 1) for number in range(count))
-    return tuple(frame * math.ceil(start / frame - 1e-9) for start in starts)
+    drag, frame, sample = drag_leg(stiff).duration_s, _frame(stiff), _sample_s(stiff)
+    first = max(_seconds(study.motion.uncounted_m, stiff), _before_s(stiff) + frame * drag)
+    places = math.floor((drag - first) / sample + 1e-9)
+    chosen = sorted(_spread_out(places)[: windows.most])
+    starts = ((first + number * sample - _before_s(stiff)) / drag for number in chosen)
+    return tuple(frame * math.floor(start / frame + 1e-9) for start in starts)
 
 
 def _spread_out(count: int) -> list[int]:
     """Numbers below `count`, the first ones spread evenly: van der Corput's sequence."""
     bits = max(1, (count - 1).bit_length())
     reversed_bits = (int(f"{number:0{bits}b}"[::-1], 2) for number in range(2**bits))
-    return list(dict.fromkeys(place * count >> bits for place in reversed_bits))
+    return [*dict.fromkeys(place * count >> bits for place in reversed_bits)] if count > 0 else []

@@ -322,6 +322,9 @@ Quantity = Literal[
 ]
 """Quantities to which a tolerance can apply; docs/evidence/tradeoff.md defines each."""
 
+RESTITUTION = "restitution"
+"""The quantity of the drop test; all others are of the process."""
+
 
 class Windows(Model):
     """Short runs at physical stiffness along the path, until quantities are known well enough."""
@@ -412,14 +415,21 @@ _STEP_OF_SOFT_START = 0.5
 
 
 class Tolerance(Model):
-    """A tolerance instead of settings; the advisor selects settings that meet it."""
+    """A tolerance instead of settings: runs go on until the results are inside it."""
 
     tolerance: Annotated[Number, Field(ge=1e-4, lt=1)] = Field(
-        description="largest relative error caused by the settings"
+        description="half-width of the 95 % confidence interval at the physical Young's modulus, "
+        "relative"
     )
-    quantity: Quantity = Field(
-        default="drag_mean", description="quantity to which the tolerance applies"
+    quantity: Quantity | Annotated[list[Quantity], Field(min_length=1, max_length=8)] = Field(
+        default="drag_mean",
+        description="quantity, or list of those, to which the tolerance applies",
     )
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """All of them."""
+        return self.quantity if isinstance(self.quantity, list) else [self.quantity]
 
 
 def _form(value: object) -> str:
