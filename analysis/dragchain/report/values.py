@@ -122,7 +122,7 @@ def _own(
 ) -> Iterator[tuple[str, Estimate]]:
     """The values of the run in simulated time, later ones instead of earlier ones."""
     for one in extrapolated.quantities if extrapolated else ():
-        yield one.name, Estimate(one.measured, math.nan, math.nan)
+        yield one.name, one.measured
     for name, force in _FORCES.items():
         yield name, of_mean(found.forces[force])
     yield "drag_std", Estimate(found.forces["drag_n"].std, math.nan, math.nan)
@@ -142,8 +142,7 @@ def _own(
 def _factor(law: str, extrapolated: Extrapolated | None) -> Estimate | None:
     """The factor from a run's value to that at the physical modulus."""
     one = extrapolated.of(law) if extrapolated else None
-    known = one.estimate if one else None
-    return known.over(one.measured) if one and known else None
+    return one.value.over(one.measured.value) if one and one.value else None
 
 
 def of_mean(mean: MeanEstimate) -> Estimate:

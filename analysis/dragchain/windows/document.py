@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from dragchain.documents import Document, Part
 from dragchain.report.extrapolated import Need
-from dragchain.statistics.estimate import Estimate, Real
+from dragchain.statistics.estimate import Estimate
 
 
 class Known(Part):
@@ -88,8 +88,8 @@ class WindowedQuantity(Part):
         Whether the tolerance applies to it.
     soft : float
         Value of the run with reduced moduli.
-    value, ci95_low, ci95_high : float
-        At physical stiffness; NaN before there are windows.
+    value : Estimate
+        At physical stiffness; NaN if too few windows have it.
     """
 
     name: str
@@ -97,19 +97,12 @@ class WindowedQuantity(Part):
     unit: str
     asked: bool
     soft: float
-    value: Real
-    ci95_low: Real
-    ci95_high: Real
-
-    @property
-    def estimate(self) -> Estimate:
-        """The value at physical stiffness with its interval."""
-        return Estimate(self.value, self.ci95_low, self.ci95_high)
+    value: Estimate
 
     @property
     def half_width(self) -> float:
-        """Half-width of the interval, relative; NaN before there are windows."""
-        return abs((self.ci95_high - self.ci95_low) / 2 / self.value)
+        """Half-width of the interval, relative."""
+        return abs((self.value.ci95_high - self.value.ci95_low) / 2 / self.value.value)
 
 
 class Round(Document):

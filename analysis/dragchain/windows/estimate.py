@@ -15,7 +15,14 @@ import numpy as np
 
 from dragchain.arrays import Floats
 from dragchain.report.extrapolated import Need
-from dragchain.statistics.estimate import Estimate, student_quantile, t_interval
+from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean
+from dragchain.statistics.estimate import (
+    NORMAL_QUANTILE,
+    Estimate,
+    mean_of,
+    student_quantile,
+    t_interval,
+)
 from dragchain.windows.document import Known
 
 UNKNOWN = Known(
@@ -109,6 +116,15 @@ def ratio(windows: Sequence[float], there: Floats, stretches: Floats, known: Kno
         prior_precision=precision,
         packing_variance=(joined * known.packing_std) ** 2,
         degrees=degrees,
+    )
+
+
+def of_one_run(blocks: Floats, value: float, known: Known) -> Estimate:
+    """A run's value with its interval, from its blocks, (B,), and the scatter between packings."""
+    own = estimate_mean(blocks).estimate if len(blocks) >= MIN_SAMPLES else mean_of(blocks)
+    half = abs((own.ci95_high - own.ci95_low) / 2 / own.value)
+    return Estimate.around(
+        value, abs(value) * math.hypot(half, NORMAL_QUANTILE * known.packing_std)
     )
 
 

@@ -12,6 +12,7 @@ from dragchain.network.write import write_chains
 from dragchain.report.extrapolated import Need
 from dragchain.run.case import load_case
 from dragchain.run.completeness import RunRecord
+from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.tables.write import write_tables
 from dragchain.tradeoff.measures import PathQuantities
@@ -91,16 +92,15 @@ def _judged(
     rows, needs = [], [Need(_FEWEST, 1)]
     for quantity, found in _ratios(soft, good, record):
         value = soft.values()[quantity.name]
-        estimate = at_physical_stiffness(found, len(good), value) if found else None
         row = WindowedQuantity(
             name=quantity.name,
             label=quantity.label,
             unit=quantity.unit,
             asked=quantity.name in asked,
             soft=value,
-            value=estimate.value if estimate else math.nan,
-            ci95_low=estimate.ci95_low if estimate else math.nan,
-            ci95_high=estimate.ci95_high if estimate else math.nan,
+            value=at_physical_stiffness(found, len(good), value)
+            if found
+            else Estimate(math.nan, math.nan, math.nan),
         )
         rows.append(row)
         if row.asked and found:
@@ -136,7 +136,7 @@ def _ratios(
         there = [soft.at(quantity.name, one.begin_m, one.arc_m) for one in own]
         stretches = _stretches(soft, quantity, own[0].arc_m)
         values = [one.values[quantity.name] for one in own]
-        yield quantity, ratio(values, _rooted(np.array(there), quantity), stretches, known)
+        yield quantity, ratio(values, quantity.rooted(np.array(there)), stretches, known)
 
 
 def _stretches(soft: PathQuantities, quantity: Quantity, arc_m: float) -> Floats:
@@ -145,11 +145,7 @@ def _stretches(soft: PathQuantities, quantity: Quantity, arc_m: float) -> Floats
     each = max(1, round(arc_m / soft.block_m))
     count = max(1, len(blocks) // each)
     means = [one.mean() for one in np.array_split(blocks, count)]
-    return _rooted(np.array(means), quantity)
-
-
-def _rooted(values: Floats, quantity: Quantity) -> Floats:
-    return np.sqrt(values) if quantity.squared else values
+    return quantity.rooted(np.array(means))
 
 
 def _measured(folder: Path) -> WindowOfRun:
