@@ -24,13 +24,15 @@ from dragchain.windows.document import (
     WindowOfRun,
     WindowsRecord,
 )
-from dragchain.windows.estimate import UNKNOWN, Ratio, at_physical_stiffness, needed, ratio
+from dragchain.windows.estimate import UNKNOWN, Joined, joined, needed
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""
 
 _MOST_MORE = 2.0
 """A round has at most so many times the windows of the one before."""
+
+_NONE = Estimate(math.nan, math.nan, math.nan)
 
 _PLATEAU = 0.15
 """Largest relative difference of the coordination number in the first third of a sample from that
@@ -90,17 +92,15 @@ def _judged(
     """The round that these windows are."""
     good = [one for one in windows if not one.refused]
     rows, needs = [], [Need(_FEWEST, 1)]
-    for quantity, found in _ratios(soft, good, record):
-        value = soft.values()[quantity.name]
+    values = soft.values()
+    for quantity, found in _joined(soft, good, record):
         row = WindowedQuantity(
             name=quantity.name,
             label=quantity.label,
             unit=quantity.unit,
             asked=quantity.name in asked,
-            soft=value,
-            value=at_physical_stiffness(found, len(good), value)
-            if found
-            else Estimate(math.nan, math.nan, math.nan),
+            soft=values[quantity.name],
+            value=found.estimate(len(good)) if found else _NONE,
         )
         rows.append(row)
         if row.asked and found:
@@ -121,22 +121,20 @@ def _judged(
     )
 
 
-def _ratios(
+def _joined(
     soft: PathQuantities, windows: Sequence[WindowOfRun], record: WindowsRecord
-) -> Iterator[tuple[Quantity, Ratio | None]]:
-    """Each quantity of the soft run, and the ratio to it if at least two windows have it."""
+) -> Iterator[tuple[Quantity, Joined | None]]:
+    """Each quantity of the soft run at physical stiffness, None if not all windows have it."""
     for quantity in QUANTITIES:
         if quantity.name not in soft.values():
             continue
-        known = record.quantities.get(quantity.name, UNKNOWN)
-        own = [one for one in windows if quantity.name in one.values]
-        if len(own) < max(2, len(windows)):
+        own = [one.values[quantity.name] for one in windows if quantity.name in one.values]
+        if len(own) < max(_FEWEST, len(windows)):
             yield quantity, None
-            continue
-        there = [soft.at(quantity.name, one.begin_m, one.arc_m) for one in own]
-        stretches = _stretches(soft, quantity, own[0].arc_m)
-        values = [one.values[quantity.name] for one in own]
-        yield quantity, ratio(values, quantity.rooted(np.array(there)), stretches, known)
+        else:
+            known = record.quantities.get(quantity.name, UNKNOWN)
+            stretches = _stretches(soft, quantity, windows[0].arc_m)
+            yield quantity, joined(own, stretches, known)
 
 
 def _stretches(soft: PathQuantities, quantity: Quantity, arc_m: float) -> Floats:
