@@ -78,10 +78,10 @@ def judge_windows(
     soft = quantities_along(run_dir, load_case(run_dir))
     known = Round.read(before).windows if before else ()
     found = (*known, *(_measured(folder) for folder in windows[len(known) :]))
-    _judged(soft, found, tolerance, quantities, most, WindowsRecord.read(record)).write(out)
+    judged(soft, found, tolerance, quantities, most, WindowsRecord.read(record)).write(out)
 
 
-def _judged(
+def judged(
     soft: PathQuantities,
     windows: Sequence[WindowOfRun],
     tolerance: float,
@@ -89,7 +89,7 @@ def _judged(
     most: int,
     record: WindowsRecord,
 ) -> Round:
-    """The round that these windows are."""
+    """The round that these windows are; see `judge_windows`."""
     good = [one for one in windows if not one.refused]
     rows, needs = [], [Need(_FEWEST, 1)]
     values = soft.values()
