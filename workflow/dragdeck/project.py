@@ -77,6 +77,7 @@ class Project:
             found = load_cases(file, fidelity, partial(resolve, tradeoff=tradeoff))
             for case in found:
                 check_timestep(case)
+                check_timestep(case.of_filling, "fidelity.soft_start")
         except InputError as error:
             raise located(error) from None
         return found
