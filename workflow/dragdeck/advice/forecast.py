@@ -302,17 +302,13 @@ def _about(case: Case, advice: Advice, advised: Forecast) -> Iterator[tuple[str,
     elif chosen.windows is not None:
         yield (
             "tolerance",
-            (
-                "windows are run until the 95 % confidence interval of each quantity at the physical "
-                f"Young's modulus is inside it; steps and wall time are those of {FIRST_WINDOWS}"
-            ),
+            "windows are run until the 95 % confidence interval of each quantity at the physical "
+            f"Young's modulus is inside it; steps and wall time are those of {FIRST_WINDOWS}",
         )
     elif chosen.soft_start is not None:
         yield (
             "tolerance",
-            (
-                "windows would take most of the path: the whole drag has the physical Young's modulus"
-            ),
+            "windows would take most of the path: the whole drag has the physical modulus",
         )
     if advice.fallback:
         yield "fallback", advice.fallback
