@@ -26,7 +26,6 @@ localrules:
     all,
     calibrate,
     crate,
-    promises,
     drop_test,
     export,
     figures,
@@ -37,7 +36,6 @@ localrules:
     report,
     scaling,
     stability,
-    stiffness,
     tradeoff,
     validate,
     verify,
@@ -119,18 +117,6 @@ rule stability:
 rule tradeoff:
     input:
         rules.write_tradeoff.output,
-
-
-# Test of the advisor's predictions on unseen cases: --config plan=promises
-rule promises:
-    input:
-        rules.write_promises.output,
-
-
-# Effect of a reduced Young's modulus on each quantity: --config plan=scenes
-rule stiffness:
-    input:
-        rules.write_stiffness.output,
 
 
 # Comparison with the publication: several packings, a control, assumptions.

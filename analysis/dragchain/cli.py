@@ -43,14 +43,9 @@ DROPS = _argument("--drops", type=Path, required=True, metavar="FILE", dest="dro
 RECORD = _argument("record", type=Path, metavar="RECORD",
                    help="measured drop test: CSV file of force against time")  # fmt: skip
 WINDOWS_RECORD = _argument(
-    "--record",
-    type=Path,
-    required=True,
-    metavar="FILE",
+    "--record", type=Path, required=True, metavar="FILE",
     help="windows.json, what windows of other scenes say; required",
-)
-STIFFNESS = _argument("--record", type=Path, required=True, metavar="FILE",
-                      help="stiffness.json, from dragchain step stiffness; required")  # fmt: skip
+)  # fmt: skip
 MEASURES = _argument("measures", type=Path, nargs="+", metavar="MEASURES",
                      help="measures.json of each run, made by dragchain step measure")  # fmt: skip
 
@@ -168,27 +163,10 @@ STEPS = (
                   help="folders of drop tests with other settings (default: none)"),
         _argument("--costs", type=Path, metavar="FILE",
                   help="costs.json: measured CPU time of model and output options"),
-        _argument("--promises", type=Path, metavar="FILE",
-                  help="promises.json: predictions tested on unseen cases"),
         _argument("--plan", default="", metavar="NAME", help="name of the plan, for the report"),
         _argument("--largest-step", type=float, default=math.inf, metavar="X",
                   help="largest time step to recommend, as a fraction of the Rayleigh time "
                   "(default: no limit)"))),
-    Command("promises", "test the predictions of the advisor on unseen cases",
-            "Compare the errors that the advisor predicts with those in cases that were not used "
-            "to derive the predictions. It reads measures.json of the runs and writes "
-            "promises.json and promises.csv to the folder.",
-            "tradeoff.promises:promises_command", (OUT_DIR, MEASURES, STIFFNESS)),
-    Command("stiffness", "fit the effect of a reduced Young's modulus",
-            "Fit the effect of a reduced Young's modulus on each quantity. It reads measures.json "
-            "of the runs and writes stiffness.json.",
-            "tradeoff.stiffness_record:stiffness_command", (
-                MEASURES,
-                _argument("--out", type=Path, required=True, metavar="FILE", dest="out_file",
-                          help="file to write: stiffness.json; required"),
-                _argument("--tradeoff", type=Path, required=True, metavar="FILE",
-                          help="tradeoff.json of another scene, on which the fit is tested; "
-                          "required"))),
     Command("extrapolate", "quantities of a run, and at the physical Young's modulus",
             "Measure the quantities of a run, and take those at the physical Young's modulus from "
             "its windows, if it has any. It reads the tables of the run and writes "

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from dragdeck.cases.case import Case
-from dragdeck.outlook.measured import FidelityParameters
 from dragdeck.physics.engine_limits import ENGINE_SOFTEST_PA
 from dragdeck.scenes.moved_workpiece import ProcessDeck
 from dragdeck.scenes.process import process_scene
@@ -33,6 +32,8 @@ Change = Literal[
     "filling_contacts",
 ]
 """What no study field can say; `cost_decks` makes the change."""
+
+_PARAMETERS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
 
 _LONGEST_STEP = 0.64
 """Fraction of the Rayleigh time at which full stiffness is timed against the plain
@@ -81,7 +82,7 @@ class Variant:
         """The fidelity parameter that is all its change, if it is one."""
         changed = [name.removeprefix("fidelity.") for name in self.fields]
         alone = len(changed) == 1 and self.change == "none"
-        return changed[0] if alone and changed[0] in FidelityParameters.model_fields else None
+        return changed[0] if alone and changed[0] in _PARAMETERS else None
 
     @property
     def level(self) -> float | None:

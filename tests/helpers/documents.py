@@ -19,9 +19,7 @@ WRITERS = {
     "scaling": "dragchain.scaling.document:ScalingFile",
     "calibration": "dragchain.calibration.results:CalibrationFile",
     "measures": "dragchain.tradeoff.measures:Measures",
-    "promises": "dragchain.tradeoff.promises:PromisesFile",
     "tradeoff": "dragchain.tradeoff.record:TradeoffRecord",
-    "stiffness": "dragchain.tradeoff.stiffness_record:StiffnessRecord",
     "extrapolated": "dragchain.report.extrapolated:Extrapolated",
     "advice": "dragdeck.advice.forecast:AdviceFile",
     "loading": "dragchain.loading.document:Loading",
@@ -45,7 +43,6 @@ READERS = {
     "costs": ["dragchain.tradeoff.costs:CostsFile"],
     "packing": ["dragdeck.scenes.scene:PackingFile"],
     "calibration": ["dragdeck.campaigns.restitution_drops:FitFile"],
-    "stiffness": ["dragdeck.outlook.measured:StiffnessRecord"],
     "tradeoff": ["dragdeck.outlook.measured:Tradeoff"],
     "advice": ["dragchain.report.cost_check:Advice"],
 }

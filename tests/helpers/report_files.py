@@ -9,7 +9,7 @@ from typing import Any
 from pages import Page
 
 from dragchain.report.extrapolated import FILE as EXTRAPOLATED
-from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity
+from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity, Need, WindowsOfRun
 from dragchain.report.findings import (
     FILE,
     AheadBehind,
@@ -42,10 +42,8 @@ PICTURES = [
 ]
 
 ASKED = {
-    "tolerance": 0.05, "quantity": "drag_mean", "label": "mean drag", "held_to": 0.025,
-    "error": 0.012, "ci95_low": -0.018, "ci95_high": 0.042, "bound": 0.037, "relative_cost": 0.04,
-    "half_width": 0.03, "outside": ["depth over particle diameter 3 is outside of 6 to 8"],
-    "fallback": None, "source": "measured 2026-01-02 on small, plan made",
+    "tolerance": 0.05, "quantities": ["drag_mean"], "error": None, "relative_cost": 0.04,
+    "largest_cost": 0.09, "fallback": None,
 }  # fmt: skip
 
 
@@ -147,10 +145,14 @@ def make_run(results: Path, case: dict[str, Any], findings: Findings, names: lis
     return folder
 
 
-def write_quantities(
-    run: Path, scale: float, corrected: float | None = None, outside: tuple[str, ...] = ()
-) -> None:
-    """Write ``extrapolated.json``: all quantities 2, at the physical modulus that many times it."""
+WINDOWS = WindowsOfRun(
+    tolerance=0.1, asked=("mean drag",), reached=True, runs=("window-1", "window-2", "window-3"),
+    refused={}, needed=Need(3, 1),
+)  # fmt: skip
+
+
+def write_quantities(run: Path, corrected: float | None = None, **windows: Any) -> None:
+    """Write ``extrapolated.json``: all quantities 2, by windows that many times it."""
     ends = {} if corrected is None else {
         "value": 2.0 * corrected, "ci95_low": 1.8 * corrected, "ci95_high": 2.2 * corrected,
     }  # fmt: skip
@@ -158,10 +160,8 @@ def write_quantities(
         ExtrapolatedQuantity(name=one.name, label=one.label, unit=one.unit, measured=2.0, **ends)
         for one in QUANTITIES
     )
-    document = Extrapolated(
-        youngs_modulus_scale=scale, source="14 scenes", outside=outside, quantities=found
-    )
-    document.write(run / EXTRAPOLATED)
+    made = WINDOWS.model_copy(update=windows) if corrected else None
+    Extrapolated(quantities=found, windows=made).write(run / EXTRAPOLATED)
 
 
 def page_of(out: Path) -> Page:

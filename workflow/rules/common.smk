@@ -149,7 +149,6 @@ def every_table(place):
     return every(place, *(f"tables/{name}" for name in PLACES[place].tables))
 
 
-STIFFNESS = "workflow/dragdeck/data/stiffness.json"
 WINDOWS_RECORD = "workflow/dragdeck/data/windows.json"
 
 
@@ -428,12 +427,6 @@ def beds_of_regime(wildcards):
 
 
 # --- trade-off --------------------------------------------------------------------
-
-
-def promises_option(wildcards):
-    """How to name the checks on other scenes on the command line, if they were made."""
-    file = of_study("tradeoff/promises", "promises.json")
-    return f"--promises {file}" if (PROJECT.root / file).is_file() else ""
 
 
 def every_drop_point(file):

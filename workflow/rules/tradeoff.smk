@@ -55,7 +55,6 @@ rule write_tradeoff:
         reference=lambda wildcards: every_point("")[0],
         drops=lambda wildcards: every_drop_point(""),
         costs=lambda wildcards, input: f"--costs {input.costs}" if input.costs else "",
-        promises=promises_option,
         plan=Path(PLAN).stem,
         command=f"snakemake tradeoff --config study={STUDY} plan={PLAN}",
         largest_step=lambda wildcards: largest_of_case(CASES[0], SCENES["process"]),
@@ -63,46 +62,5 @@ rule write_tradeoff:
     shell:
         "dragchain step tradeoff --out $(dirname {output.page}) --plan {params.plan}"
         " --command {params.command:q} --largest-step {params.largest_step}"
-        " --reference {params.reference} {params.costs} {params.promises} --drops {params.drops}"
+        " --reference {params.reference} {params.costs} --drops {params.drops}"
         " -- {input.measures} > {log} 2>&1"
-
-
-# What the advisor promised, in scenes that it was not measured on: plan=promises.
-rule write_promises:
-    input:
-        measures=lambda wildcards: every_point("measures.json"),
-        record=STIFFNESS,
-    output:
-        promises=of_tradeoff("promises.json"),
-        table=of_tradeoff("promises.csv"),
-    log:
-        of_tradeoff("logs/promises.log"),
-    benchmark:
-        of_tradeoff("benchmarks/promises.tsv")
-    conda:
-        "../envs/python.yaml"
-    params:
-        source=source_hash("dragchain.tradeoff.promises"),
-    shell:
-        "dragchain step promises --out $(dirname {output.promises}) --record {input.record}"
-        " {input.measures} 2>&1 | tee -i {log}"
-
-
-# What a reduced Young's modulus does to each quantity, in designed scenes: plan=scenes.
-rule write_stiffness:
-    input:
-        measures=lambda wildcards: every_point("measures.json"),
-        tradeoff="workflow/dragdeck/data/tradeoff.json",
-    output:
-        of_tradeoff("stiffness.json"),
-    log:
-        of_tradeoff("logs/stiffness.log"),
-    benchmark:
-        of_tradeoff("benchmarks/stiffness.tsv")
-    conda:
-        "../envs/python.yaml"
-    params:
-        source=source_hash("dragchain.tradeoff.stiffness_record"),
-    shell:
-        "dragchain step stiffness --out {output} --tradeoff {input.tradeoff} {input.measures}"
-        " 2>&1 | tee -i {log}"

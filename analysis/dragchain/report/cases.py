@@ -42,11 +42,6 @@ class ReportedCase:
         """Its quantities, means over the packings."""
         return over_packings([study.values for study in self.studies])
 
-    @property
-    def outside(self) -> tuple[str, ...]:
-        """Numbers of the scene outside the range of the laws that correct its values."""
-        return self.first.outside
-
     @cached_property
     def set_up(self) -> list[tuple[str, str]]:
         """What was simulated, in six lines."""

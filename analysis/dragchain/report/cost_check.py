@@ -1,4 +1,4 @@
-"""What a run was expected to cost and to err, beside what it did.
+"""What a run was expected to cost and asked to reach, beside what it did.
 
 The expectation is ``advice.json`` of `dragdeck advise`; docs/reference/results.md
 describes it.
@@ -13,13 +13,14 @@ from typing import ClassVar
 from pydantic import JsonValue
 
 from dragchain.documents import Document, Part
-from dragchain.report.extrapolated import Extrapolated
+from dragchain.report.cases import ReportedCase
+from dragchain.report.values import Values
 from dragchain.run.case import AdvisedSettings, Case, changed_inputs
 from dragchain.run.completeness import RunRecord
-from dragchain.statistics.correlated import MeanEstimate
+from dragchain.statistics.estimate import Estimate
 
-_INTERVALS = {"drag_mean": "drag_n", "vertical_mean": "vertical_n"}
-"""Quantities of a tolerance of which a run knows an interval, and the force each is a mean of."""
+_RESTITUTION = "restitution"
+"""The quantity of the drop test."""
 
 
 class Settings(Part):
@@ -85,18 +86,31 @@ class CostRow:
 
 
 @dataclass(frozen=True)
-class RunInterval:
-    """Value of one run with its 95 % interval, and the relative half-width of that."""
+class Answer:
+    """What a case says of a quantity to which a tolerance applies.
 
-    mean: float
-    ci95_low: float
-    ci95_high: float
-    fraction: float
+    Attributes
+    ----------
+    label, unit : str
+    value : Estimate or None
+        None where there is none.
+    half_width : float or None
+        Relative half-width of its 95 % CI, or error of a restitution; None where it is not known.
+    tolerance : float
+    """
 
-    @classmethod
-    def of(cls, mean: float, low: float, high: float) -> "RunInterval":
-        """From a value, which is not 0, and its interval."""
-        return cls(mean, low, high, abs((high - low) / (2 * mean)))
+    label: str
+    unit: str
+    value: Estimate | None
+    half_width: float | None
+    tolerance: float
+
+    @property
+    def reached(self) -> str:
+        """Whether it is inside the tolerance."""
+        if self.half_width is None:
+            return "not known"
+        return "yes" if self.half_width <= self.tolerance else "no"
 
 
 def read_advice(file: Path) -> list[Option]:
@@ -137,23 +151,21 @@ def cost_rows(option: Option, records: Mapping[str, RunRecord]) -> Iterator[Cost
             )
 
 
-def actual_interval(
-    asked: AdvisedSettings | None,
-    forces: Mapping[str, MeanEstimate],
-    extrapolated: Extrapolated | None,
-) -> RunInterval | None:
-    """Value and 95 % interval of the quantity asked about, extrapolated if that was asked.
-
-    None where nothing was asked, or a single run has no interval of it.
-    """
+def answers(case: ReportedCase) -> list[Answer]:
+    """The asked quantities of a case; none if nothing was asked."""
+    asked = case.first.process.case.asked
     if asked is None:
-        return None
-    if asked.extrapolated:
-        one = extrapolated.of(asked.quantity) if extrapolated else None
-        found = one.estimate if one else None
-        return RunInterval.of(found.value, found.ci95_low, found.ci95_high) if found else None
-    name = _INTERVALS.get(asked.quantity)
-    if name is None or not forces[name].mean:
-        return None
-    force = forces[name]
-    return RunInterval.of(force.mean, force.ci95_low, force.ci95_high)
+        return []
+    return [_answer(name, asked, case.values) for name in asked.quantities]
+
+
+def _answer(name: str, asked: AdvisedSettings, values: Values) -> Answer:
+    if name == _RESTITUTION:
+        return Answer("coefficient of restitution", "", None, asked.error, asked.tolerance)
+    one = values.of(name)
+    if one is None:
+        return Answer(name, "", None, None, asked.tolerance)
+    found, width = one.value, None
+    if found and found.known and one.reliable and found.value:
+        width = abs((found.ci95_high - found.ci95_low) / 2.0 / found.value)
+    return Answer(one.quantity.label, one.quantity.unit, found, width, asked.tolerance)

@@ -175,7 +175,7 @@ class _Crate:
                 "propertyID": one.quantity.name,
                 "unitText": one.quantity.unit or "1",
                 "value": one.shown.value,
-                "description": f"{one.basis}; {one.reason}" if one.reason else str(one.basis),
+                "description": f"{one.rests_on}; {one.reason}" if one.reason else one.rests_on,
             }
             if one.shown.known:
                 about |= {"minValue": one.shown.ci95_low, "maxValue": one.shown.ci95_high}

@@ -56,11 +56,6 @@ class StudyRuns:
         return values_of(process.case, process.findings, self.loading, self.extrapolated)
 
     @property
-    def outside(self) -> tuple[str, ...]:
-        """Numbers of the scene outside the range of the laws that correct its values."""
-        return self.extrapolated.outside if self.extrapolated else ()
-
-    @property
     def runs(self) -> list[ReportedRun[Findings]]:
         """The runs that there are, the process first."""
         runs: list[ReportedRun[Findings] | None] = [self.process, self.filling, self.drop_test]

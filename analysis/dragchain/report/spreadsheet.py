@@ -91,7 +91,7 @@ def _cells(one: Standing | None) -> list[object]:
     if one is None:
         return [None] * 5
     value = [one.value.value, one.value.ci95_low, one.value.ci95_high] if one.value else [None] * 3
-    return [*value, one.run.value, f"{one.basis}; {one.reason}" if one.reason else str(one.basis)]
+    return [*value, one.run.value, f"{one.rests_on}; {one.reason}" if one.reason else one.rests_on]
 
 
 def summary_workbook(

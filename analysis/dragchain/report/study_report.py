@@ -14,8 +14,7 @@ from dragchain.report.cases import ReportedCase, cases_of
 from dragchain.report.cost_check import (
     CostRow,
     Option,
-    RunInterval,
-    actual_interval,
+    answers,
     cost_rows,
     prediction_for,
     read_advice,
@@ -67,7 +66,6 @@ class Section:
     pictures: list[Picture]
     network: Path | None
     corrections: Corrections | None
-    interval: RunInterval | None
     costs: list[CostRow]
     cost_source: str | None
 
@@ -168,7 +166,6 @@ def _section(study: StudyRuns, options: Sequence[Option]) -> Section:
         pictures=[picture for run in study.runs for picture in _pictures(run)],
         network=network if network.is_file() else None,
         corrections=Corrections.read(corrections) if corrections.is_file() else None,
-        interval=actual_interval(process.case.asked, process.findings.forces, study.extrapolated),
         costs=list(cost_rows(expected, records)) if expected else [],
         cost_source=expected.source if expected else None,
     )
@@ -247,14 +244,8 @@ def _render(
         columns={str(name): table[name].tolist() for name in table},
         shown=_SHOWN,
         reliable_times=RELIABLE_TIMES,
-        laws=_laws(studies),
+        asked=[(one, found) for one in cases if (found := answers(one))],
     )
-
-
-def _laws(studies: Sequence[StudyRuns]) -> list[str]:
-    """Sources of the laws that corrected any value, each once."""
-    corrected = [one for one in studies if one.values.corrected and one.extrapolated]
-    return list(dict.fromkeys(one.extrapolated.source for one in corrected if one.extrapolated))
 
 
 def _network_pages(sections: Sequence[Section]) -> list[str]:

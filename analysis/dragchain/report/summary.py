@@ -11,7 +11,6 @@ from dragchain.report.findings import ProcessFindings
 from dragchain.report.runs import StudyRuns
 from dragchain.report.values import Against
 from dragchain.run.basis import Standing
-from dragchain.run.case import AdvisedSettings
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 
@@ -50,7 +49,7 @@ def _summary_row(study: StudyRuns, headline: str) -> Row:
         **_forces(found.forces),
         **_comparisons(values.against),
         **{key: cell for one in values.standings for key, cell in _of_run(one)},
-        **_asked(case.asked),
+        **_asked(study),
         "peak_max_n": found.peaks.largest_n,
         **_wake(found),
         **_network(found),
@@ -122,18 +121,21 @@ def _estimate(name: str, unit: str, found: Estimate) -> Iterator[tuple[str, Cell
         yield f"{name}_ci95_high{end}", found.ci95_high
 
 
-def _asked(asked: AdvisedSettings | None) -> Row:
-    """What the settings were chosen for, and the error that is expected of them."""
-    if asked is None:
-        return {}
-    return {
-        "asked_quantity": asked.quantity,
-        "asked_tolerance": asked.tolerance,
-        "expected_error": math.nan if asked.error is None else asked.error,
-        "expected_error_ci95_low": math.nan if asked.ci95_low is None else asked.ci95_low,
-        "expected_error_ci95_high": math.nan if asked.ci95_high is None else asked.ci95_high,
-        "expected_error_bound": math.nan if asked.bound is None else asked.bound,
-    }
+def _asked(study: StudyRuns) -> Row:
+    """What the settings were chosen for, their forecast cost, and what windows reached."""
+    asked = study.process.case.asked
+    found = study.extrapolated.tolerance if study.extrapolated else None
+    row: Row = {}
+    if asked is not None:
+        row |= {
+            "asked_quantities": ", ".join(asked.quantities),
+            "asked_tolerance": asked.tolerance,
+            "forecast_cost": asked.relative_cost,
+            "forecast_largest_cost": asked.largest_cost,
+        }
+    if found is not None:
+        row |= {"windows": len(found.runs), "tolerance_reached": found.reached}
+    return row
 
 
 def _wake(found: ProcessFindings) -> Row:

@@ -8,7 +8,7 @@ from functools import cached_property
 from dragchain.loading.document import Loading
 from dragchain.report.extrapolated import Extrapolated
 from dragchain.report.findings import ProcessFindings
-from dragchain.run.basis import QUANTITIES, Basis, Standing, judge, notes
+from dragchain.run.basis import QUANTITIES, Basis, Correction, Standing, judge, notes
 from dragchain.run.case import Case
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import MeanEstimate
@@ -70,7 +70,7 @@ class Values:
 
     @property
     def corrected(self) -> bool:
-        """Whether any value is corrected to the physical Young's modulus."""
+        """Whether any value is from windows at the physical Young's modulus."""
         return any(one.corrected for one in self.standings)
 
     @cached_property
@@ -111,9 +111,9 @@ def values_of(
     for quantity in QUANTITIES:
         if quantity.name in own:
             force = found.forces.get(_FORCES.get(quantity.name, ""))
-            law = _factor(quantity.correction, extrapolated)
+            correction = _correction(quantity.name, extrapolated)
             reliable = force is None or force.reliable
-            standings.append(judge(quantity, own[quantity.name], case, law, reliable))
+            standings.append(judge(quantity, own[quantity.name], case, correction, reliable))
     return Values(case, tuple(standings))
 
 
@@ -121,17 +121,17 @@ def _own(
     case: Case, found: ProcessFindings, loading: Loading | None, extrapolated: Extrapolated | None
 ) -> Iterator[tuple[str, Estimate]]:
     """The values of the run in simulated time, later ones instead of earlier ones."""
-    for one in extrapolated.quantities if extrapolated else ():
-        yield one.name, one.measured
-    for name, force in _FORCES.items():
-        yield name, of_mean(found.forces[force])
     yield "drag_std", Estimate(found.forces["drag_n"].std, math.nan, math.nan)
-    yield "ahead_behind", found.ahead_behind.ratio
     yield "chain_count", Estimate(found.chains.peters_per_frame, math.nan, math.nan)
     yield "chain_length", Estimate(found.chains.peters_particles_mean, math.nan, math.nan)
     for name in ("coordination_number", "mechanical_coordination_number"):
         if name in found.network:
             yield name, Estimate(found.network[name], math.nan, math.nan)
+    for one in extrapolated.quantities if extrapolated else ():
+        yield one.name, one.measured
+    for name, force in _FORCES.items():
+        yield name, of_mean(found.forces[force])
+    yield "ahead_behind", found.ahead_behind.ratio
     if loading is not None:
         yield "workpiece_contacts", loading.mean_contacts
         for name, key in _PER_METRE.items():
@@ -139,10 +139,14 @@ def _own(
         yield "peaks", Estimate(found.peaks.count / loading.path_m, math.nan, math.nan)
 
 
-def _factor(law: str, extrapolated: Extrapolated | None) -> Estimate | None:
-    """The factor from a run's value to that at the physical modulus."""
-    one = extrapolated.of(law) if extrapolated else None
-    return one.value.over(one.measured.value) if one and one.value else None
+def _correction(name: str, extrapolated: Extrapolated | None) -> Correction | None:
+    """What the windows of a run make of a quantity."""
+    if extrapolated is None or extrapolated.tolerance is None:
+        return None
+    one, windows = extrapolated.of(name), len(extrapolated.tolerance.runs)
+    if not windows or one is None or one.value is None:
+        return None
+    return Correction(one.value.over(one.measured.value), windows)
 
 
 def of_mean(mean: MeanEstimate) -> Estimate:
@@ -153,8 +157,8 @@ def of_mean(mean: MeanEstimate) -> Estimate:
 def over_packings(several: Sequence[Values]) -> Values:
     """The means over the packings of one case, each with Student's t interval between them.
 
-    The interval of a corrected value is the wider one of that between packings and the mean one
-    of a single run, which includes the uncertainty of the law that all packings share.
+    That of a value from windows joins those of the single runs, each of which includes the scatter
+    from packing to packing.
     """
     first = several[0]
     if len(several) == 1:
@@ -165,7 +169,8 @@ def over_packings(several: Sequence[Values]) -> Values:
         run = mean_of([one.run.value for one in same])
         value = _common([one.value for one in same if one.value], standing.basis)
         reliable = all(one.reliable for one in same) or run.known
-        found.append(replace(standing, run=run, value=value, reliable=reliable))
+        windows = sum(one.windows for one in same)
+        found.append(replace(standing, run=run, value=value, reliable=reliable, windows=windows))
     return Values(first.case, tuple(found), len(several))
 
 
@@ -173,13 +178,10 @@ def _common(values: Sequence[Estimate], basis: Basis) -> Estimate | None:
     if not values:
         return None
     between = mean_of([one.value for one in values])
-    if basis is not Basis.CORRECTED:
+    if basis is not Basis.WINDOWS:
         return between
-    half = max(
-        0.5 * (between.ci95_high - between.ci95_low),
-        sum(0.5 * (one.ci95_high - one.ci95_low) for one in values) / len(values),
-    )
-    return Estimate.around(between.value, half)
+    widths = [one.ci95_high - one.ci95_low for one in values]
+    return Estimate.around(between.value, 0.5 * math.hypot(*widths) / len(values))
 
 
 def _of_packings(values: Values) -> Iterator[str]:
@@ -205,5 +207,5 @@ def _plain(one: Standing) -> str:
     ends = f"95 % CI {found.ci95_low:#.3g} to {found.ci95_high:#.3g}{unit}{doubt}"
     text = f"{name} {found.value:#.3g}{unit}" + (f" ({ends})" if found.known else "")
     if one.corrected:
-        return f"{text} at the physical Young's modulus, {one.run.value:#.3g}{unit} as simulated"
+        return f"{text} {one.rests_on}, {one.run.value:#.3g}{unit} as simulated"
     return f"{text}, {what}" if what else text

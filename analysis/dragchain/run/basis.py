@@ -8,6 +8,7 @@ what each number stands for and `notes` what the settings do; they decide nothin
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 from dragchain.run.case import Case, Fidelity
 from dragchain.statistics.estimate import Estimate
@@ -19,7 +20,7 @@ class Basis(StrEnum):
     """What a value of the physical process rests on."""
 
     MEASURED = "as measured"
-    CORRECTED = "corrected to the physical Young's modulus"
+    WINDOWS = "from windows at the physical Young's modulus"
     SCALED = "scaled to process time"
     NONE = "not available"
 
@@ -32,8 +33,6 @@ class Quantity:
     ----------
     name, label, unit : str
         The unit is empty for a plain number.
-    law : str
-        Stiffness law that corrects it; the quantity's own if empty.
     time : int
         Power of time in it. A workpiece that is f times as fast takes 1/f of the time.
     robust : bool
@@ -44,14 +43,8 @@ class Quantity:
     name: str
     label: str
     unit: str = ""
-    law: str = ""
     time: int = 0
     robust: bool = False
-
-    @property
-    def correction(self) -> str:
-        """Name of the law that corrects it."""
-        return self.law or self.name
 
 
 QUANTITIES = (
@@ -90,6 +83,13 @@ QUANTITIES = (
 """The registry: what a report tells of a process run, in its order."""
 
 
+class Correction(NamedTuple):
+    """The factor from a run's value to that at the physical modulus, from so many windows."""
+
+    factor: Estimate
+    windows: int
+
+
 @dataclass(frozen=True)
 class Standing:
     """A quantity of a run, and what it says of the process.
@@ -107,6 +107,8 @@ class Standing:
         Why it is not available, or what it is not corrected for; empty if nothing is to be said.
     reliable : bool
         Whether the series is long enough for the interval of the run.
+    windows : int
+        Number of windows that the value is from.
     """
 
     quantity: Quantity
@@ -115,11 +117,17 @@ class Standing:
     basis: Basis
     reason: str = ""
     reliable: bool = True
+    windows: int = 0
 
     @property
     def corrected(self) -> bool:
-        """Whether the value is another than the run's."""
-        return self.basis is Basis.CORRECTED
+        """Whether the value is from windows."""
+        return self.basis is Basis.WINDOWS
+
+    @property
+    def rests_on(self) -> str:
+        """The basis in words, with the number of windows."""
+        return self.basis.replace("windows", f"{self.windows} windows")
 
     @property
     def shown(self) -> Estimate:
@@ -128,7 +136,11 @@ class Standing:
 
 
 def judge(
-    quantity: Quantity, own: Estimate, case: Case, law: Estimate | None, reliable: bool = True
+    quantity: Quantity,
+    own: Estimate,
+    case: Case,
+    correction: Correction | None,
+    reliable: bool = True,
 ) -> Standing:
     """Decide what the value of a run says of the process.
 
@@ -139,9 +151,8 @@ def judge(
         Value of the run, in simulated time.
     case : Case
         A process run.
-    law : Estimate or None
-        Factor from the run's value to that at the physical modulus, with its interval; None if no
-        law applies.
+    correction : Correction or None
+        What windows make of it; None if they do not give it.
     reliable : bool
         Whether the interval of `own` is reliable.
     """
@@ -151,10 +162,11 @@ def judge(
     doubts = changed_settings(case.fidelity)
     if not doubts:
         return Standing(quantity, run, run, scaled, "", reliable)
-    if law is not None and case.fidelity.speed_factor == 1.0:
-        low, high = sorted((run.value * law.ci95_low, run.value * law.ci95_high))
-        value = Estimate(run.value * law.value, low, high)
-        return Standing(quantity, run, value, Basis.CORRECTED, "", reliable)
+    if correction is not None:
+        ends = (correction.factor.ci95_low, correction.factor.ci95_high)
+        low, high = sorted(run.value * end for end in ends)
+        value = Estimate(run.value * correction.factor.value, low, high)
+        return Standing(quantity, run, value, Basis.WINDOWS, "", reliable, correction.windows)
     why = _why_not(case)
     reason = f"not corrected for {' and '.join(doubts)}: {why}"
     if quantity.robust:
@@ -181,14 +193,11 @@ def effects(fidelity: Fidelity) -> list[str]:
 
 
 def _why_not(case: Case) -> str:
-    fidelity = case.fidelity
-    if case.changed_law:
-        return "a template of the study changes the contact law"
-    if fidelity.speed_factor == 1.0:
-        return "no law is known for this quantity at this modulus"
-    if fidelity.youngs_modulus_scale == 1.0:
-        return "no law for a faster workpiece is known"
-    return "the laws hold at the speed of the process only"
+    if case.fidelity.speed_factor != 1.0:
+        return "the effect of a higher speed is not measured"
+    if case.marks:
+        return "its windows do not give this quantity"
+    return "`fidelity: {tolerance: 0.1}` measures it at the physical modulus"
 
 
 def notes(case: Case) -> list[str]:
@@ -208,9 +217,9 @@ def _of_modulus_and_speed(case: Case) -> Iterator[str]:
             "the tables in simulated time."
         )
     elif scale != 1.0 and case.marks:
-        yield "Values at the physical modulus are those of windows: short runs at that modulus."
+        yield "Values at the physical modulus are from windows: short runs at that modulus."
     elif scale != 1.0:
-        yield "Values are corrected to the physical modulus where a law is known."
+        yield f"Nothing is corrected: {_why_not(case)}."
     if case.lead:
         yield (
             "Filling, plunge, approach and the beginning of the drag have a reduced modulus; it "

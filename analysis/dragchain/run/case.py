@@ -101,28 +101,18 @@ class SettlingCriterion(Part):
 
 
 class AdvisedSettings(Part):
-    """The tolerance that a run's settings were chosen for, and what is expected of them.
+    """The tolerance that a run's settings were chosen for, and their forecast cost.
 
-    ``held_to`` is the tolerance that the settings meet: the asked one, or less outside of the
-    measured range, for the value extrapolated to the physical Young's modulus if ``extrapolated``.
-    ``error``, its interval and the ``bound`` of its size are None for the
-    reference; ``half_width`` is that of the relative 95 % interval of one run's value.
+    ``error`` is the largest measured one of a drop test, None for quantities of the process.
+    Costs are relative to a plain run at the physical modulus, ``largest_cost`` with all windows.
     """
 
     tolerance: float
-    quantity: str
-    label: str
-    held_to: float
-    extrapolated: bool = False
+    quantities: tuple[str, ...]
     error: float | None
-    ci95_low: float | None
-    ci95_high: float | None
-    bound: float | None
     relative_cost: float
-    half_width: float | None
-    outside: tuple[str, ...]
+    largest_cost: float
     fallback: str | None
-    source: str
 
 
 class Statistics(Part):

@@ -44,7 +44,7 @@ def _maps(runs: Sequence[Measures]) -> dict[float, list[Floats]]:
     """Shares of the load in each bin, (48,), of every run, by modulus scale."""
     found: dict[float, list[Floats]] = {}
     for run in runs:
-        if run.complete and not run.asked and sum(run.load_map) > 0.0:
+        if run.complete and sum(run.load_map) > 0.0:
             shares = np.array(run.load_map) / sum(run.load_map)
             found.setdefault(run.fidelity.youngs_modulus_scale, []).append(shares)
     return found

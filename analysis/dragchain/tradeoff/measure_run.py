@@ -38,7 +38,6 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
         {
             **dict(case),
             "bed": case.upstream.get("filling"),
-            "asked": case.asked and case.asked.model_dump(),
             "complete": outcome.complete,
             "cost": _cost(case, outcome),
             "versions": {**case.versions, "engine": outcome.engine_version},

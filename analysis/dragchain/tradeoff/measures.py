@@ -55,33 +55,6 @@ class RunCost(Part):
         return self.cpu_time_s / self.steps * self.steps_per_m if self.steps else math.nan
 
 
-class Asked(Part):
-    """The tolerance that a run's settings were chosen for.
-
-    If `extrapolated`, for the value at the physical Young's modulus.
-
-    Attributes
-    ----------
-    quantity : str
-        Quantity to which the tolerance applies.
-    tolerance : float
-        Requested relative error.
-    held_to : float or None
-        Tolerance that the settings meet.
-    extrapolated : bool
-        Whether it applies to the value at the physical modulus.
-    """
-
-    quantity: str
-    tolerance: float
-    held_to: float | None = None
-    extrapolated: bool = False
-
-    def same(self, other: "Asked") -> bool:
-        """Whether the same is asked, however well it can be held."""
-        return (self.quantity, self.tolerance) == (other.quantity, other.tolerance)
-
-
 class PathQuantities(Part):
     """The quantities of a complete run along its counted path.
 
@@ -151,7 +124,6 @@ class Measures(PathQuantities, Document):
     inputs: Mapping[str, JsonValue]
     fidelity: Fidelity
     numbers: Mapping[str, float] = {}
-    asked: Asked | None = None
     complete: bool
     cost: RunCost
     versions: Mapping[str, str]

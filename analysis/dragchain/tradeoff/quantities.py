@@ -21,11 +21,6 @@ class Quantity:
         Its blocks hold squares: a run's value is the root of their mean.
     signed : bool
         It may be zero or change its sign: errors are counted in mean drags.
-    friction : str
-        The number of a scene that the effect of a reduced modulus depends on.
-    stiffness_power : float
-        A law of reduced moduli is fitted to the quantity times kappa to this power: an overlap
-        is proportional to 1 / kappa.
     """
 
     name: str
@@ -34,8 +29,6 @@ class Quantity:
     short: str = ""
     squared: bool = False
     signed: bool = False
-    friction: str = "particle_friction"
-    stiffness_power: float = 0.0
 
     def rooted(self, blocks: Floats) -> Floats:
         """Values of blocks, (B,), as a run's value is one."""
@@ -84,15 +77,13 @@ QUANTITIES = (
     Quantity(
         "sliding_distance",
         "sliding distance of all contacts over the path",
-        friction="workpiece_friction",
     ),
     Quantity(
         "friction_work",
         "friction work on the workpiece for a metre of path",
         "J/m",
-        friction="workpiece_friction",
     ),
-    Quantity("workpiece_overlap", "mean relative overlap on the workpiece", stiffness_power=1.0),
+    Quantity("workpiece_overlap", "mean relative overlap on the workpiece"),
     Quantity(
         "coordination_number",
         "coordination number",
@@ -103,7 +94,6 @@ QUANTITIES = (
     Quantity(
         "overlap_p99",
         "99th percentile of the relative overlap between particles",
-        stiffness_power=1.0,
     ),
     Quantity("chain_count", "Peters chains per frame", short="Peters chains"),
     Quantity("chain_length", "particles per Peters chain", short="particles per chain"),
@@ -113,7 +103,6 @@ QUANTITIES = (
         "force_slide",
         "normal force \N{MULTIPLICATION SIGN} sliding distance per metre of path",
         "N m/m",
-        friction="workpiece_friction",
     ),
     Quantity("bed_height", "bed height", "m"),
     Quantity("solid_fraction", "solid fraction"),

@@ -10,14 +10,12 @@ import numpy as np
 from dragchain.tradeoff.costs import Costs
 from dragchain.tradeoff.drops import Drop
 from dragchain.tradeoff.outcome import Tradeoff, breaks
-from dragchain.tradeoff.promises import Promise
 from dragchain.tradeoff.runs import Setting
 from dragchain.tradeoff.tradeoff_document import (
     DropEntry,
     ErrorEntry,
     FidelityParameters,
     Machine,
-    PromiseEntry,
     QuantityEntry,
     SettingEntry,
     TradeoffRecord,
@@ -28,7 +26,6 @@ def record_of(
     tradeoff: Tradeoff,
     drops: Iterable[Drop],
     costs: Costs,
-    promises: Iterable[Promise],
     plan: str,
     commands: Sequence[str],
 ) -> TradeoffRecord:
@@ -67,7 +64,6 @@ def record_of(
             if not drop.other
         ),
         costs=tuple(costs.entries),
-        promises=tuple(PromiseEntry(numbers=one.numbers, met=one.met) for one in promises),
     )
 
 

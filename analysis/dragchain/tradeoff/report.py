@@ -16,7 +16,6 @@ from dragchain.tradeoff.notation import FILTERS
 from dragchain.tradeoff.outcome import TOLERANCES, Tradeoff, choose, compare, error_table, run_table
 from dragchain.tradeoff.path_blocks import LONG_WAVE, SHORT_WAVE
 from dragchain.tradeoff.path_length import TRIALS, Reach, along, chance, reaches
-from dragchain.tradeoff.promises import PromisesFile
 from dragchain.tradeoff.quantities import MAIN
 from dragchain.tradeoff.record import record_of
 from dragchain.tradeoff.runs import read_runs
@@ -38,7 +37,6 @@ def write_tradeoff(
     reference_run: Path,
     drops: Sequence[Path] = (),
     costs: Path | None = None,
-    promises: Path | None = None,
     plan: str = "",
     command: str | None = None,
     largest_step: float = math.inf,
@@ -58,8 +56,6 @@ def write_tradeoff(
         Folders of drop tests, with their tables.
     costs : Path, optional
         Costs of what the decks leave out.
-    promises : Path, optional
-        ``promises.json`` of promises on other scenes.
     plan : str
         Name of the plan.
     command : str, optional
@@ -75,14 +71,13 @@ def write_tradeoff(
         No run is complete, or a drop cannot be used.
     """
     priced, dropped = read_costs(costs), read_drops(drops)
-    kept = PromisesFile.read(promises).promises if promises else ()
     tradeoff = compare(*read_runs(measures, reference_run), step_costs(priced), largest_step)
     commands = [command] if command else []
-    record = record_of(tradeoff, dropped, priced, kept, plan, commands)
+    record = record_of(tradeoff, dropped, priced, plan, commands)
     known = reaches(tradeoff)
     with drawing():
         figures = {name: png(drawn) for name, drawn in draw(tradeoff, known, dropped).items()}
-    page = render(tradeoff, known, dropped, figures, record=record, costs=priced, promises=kept)
+    page = render(tradeoff, known, dropped, figures, record=record, costs=priced)
     write_bundle(
         out_dir,
         tables={"runs": run_table(tradeoff), "errors": error_table(tradeoff)},

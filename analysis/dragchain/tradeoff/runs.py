@@ -1,6 +1,6 @@
 """The runs of a trade-off: the setting of each, and its values over the path that all have."""
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -178,18 +178,3 @@ def values_within(measures: Measures, arc_m: float, stretch: int = 0) -> dict[st
     count = max(1, round(arc_m / measures.block_m))
     single = {} if stretch else measures.single
     return {**single, **measures.values(stretch * count, (stretch + 1) * count)}
-
-
-def by_scene(runs: Sequence[Measures]) -> Iterator[tuple[dict[str, str], list[Measures]]]:
-    """The inputs that tell a scene from the others, and its runs, failed ones included."""
-    scenes: dict[tuple[tuple[str, str], ...], list[Measures]] = {}
-    for run in runs:
-        scenes.setdefault(_scene(run), []).append(run)
-    common = set.intersection(*map(set, scenes)) if len(scenes) > 1 else set()
-    for key, own in scenes.items():
-        yield dict(item for item in key if item not in common), own
-
-
-def _scene(measures: Measures) -> tuple[tuple[str, str], ...]:
-    inputs = {name: measures.inputs[name] for name in sorted(measures.inputs) if name not in SILENT}
-    return tuple((name, str(value)) for name, value in inputs.items() if value is not None)

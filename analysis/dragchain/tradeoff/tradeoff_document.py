@@ -66,13 +66,6 @@ class DropEntry(Part):
     relative_cost: SixDigits
 
 
-class PromiseEntry(Part):
-    """A scene in which a prediction was tested: its numbers, and whether it was confirmed."""
-
-    numbers: Mapping[str, SixDigits]
-    met: bool
-
-
 class CostEntry(Part):
     """CPU time with one change relative to that without it, timed side by side.
 
@@ -118,4 +111,3 @@ class TradeoffRecord(Document):
     settings: tuple[SettingEntry, ...]
     drop_test: tuple[DropEntry, ...]
     costs: tuple[CostEntry, ...]
-    promises: tuple[PromiseEntry, ...]

@@ -7,21 +7,28 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from report_files import ASKED, PICTURES, case_json, make_run, page_of, process_findings, run_json
+from report_files import (
+    ASKED,
+    PICTURES,
+    WINDOWS,
+    case_json,
+    make_run,
+    page_of,
+    process_findings,
+    run_json,
+    write_quantities,
+)
 
 from dragchain.errors import DocumentError
-from dragchain.report.cost_check import (
-    Option,
-    actual_interval,
-    cost_rows,
-    prediction_for,
-    read_advice,
-)
+from dragchain.report.cases import cases_of
+from dragchain.report.cost_check import Option, answers, cost_rows, prediction_for, read_advice
 from dragchain.report.extrapolated import FILE as EXTRAPOLATED
 from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity
+from dragchain.report.runs import read_study
 from dragchain.report.study_report import write_report
-from dragchain.run.case import AdvisedSettings, Case
+from dragchain.run.case import Case
 from dragchain.run.completeness import RunRecord
+from dragchain.statistics.estimate import Estimate
 
 RECORD = RunRecord.model_validate(run_json())
 
@@ -59,9 +66,8 @@ def test_the_report_compares_cost_and_tolerance(run: Path, tmp_path: Path) -> No
     words = " ".join(page_of(tmp_path).words.split())
     assert "Predicted and actual cost" in words
     assert "150 000 160 000 3000 2100 50 76 1.52 a short run" in spaced(tmp_path)
-    assert "mean drag within 5 %" in words and "+1.2 %" in words and "+3.7 %" in words
-    assert "outside of 6 to 8" in words and "limited to 2.5 %" in words
-    assert "4.0 %" in words  # 0.1 N either way of 2.5 N
+    assert "mean drag within 5 %" in words and "0.04 to 0.09" in words
+    assert "4.0 % yes" in spaced(tmp_path)  # 0.1 N either way of 2.5 N
 
 
 def spaced(folder: Path) -> str:
@@ -97,15 +103,41 @@ def test_only_scenes_that_were_run_and_predicted_have_a_row() -> None:
     assert row.ratio == pytest.approx(76 / 50)
 
 
-def test_the_interval_of_a_run_is_that_of_the_asked_force() -> None:
-    forces = process_findings().forces
-    found = actual_interval(AdvisedSettings(**ASKED), forces, None)
-    assert found is not None
-    assert (found.mean, found.ci95_low, found.ci95_high) == (-2.5, -2.6, -2.4)
-    assert found.fraction == pytest.approx(0.04)
-    other = AdvisedSettings(**ASKED | {"quantity": "chain_count"})
-    assert actual_interval(other, forces, None) is None
-    assert actual_interval(None, forces, None) is None
+def test_each_asked_quantity_has_an_answer(tmp_path: Path) -> None:
+    quantities = ["drag_mean", "chain_count", "drag_std", "workpiece_contacts"]
+    case = case_json("process", "stiff", asked={**ASKED, "quantities": quantities})
+    case["fidelity"]["youngs_modulus_scale"] = 1.0
+    folder = make_run(tmp_path, case, process_findings(), PICTURES)
+    drag, chains, std, contacts = answers(cases_of([read_study(folder)])[0])
+    assert drag.value == Estimate(-2.5, -2.6, -2.4) and drag.half_width == pytest.approx(0.04)
+    assert [one.reached for one in (drag, chains, std, contacts)] == ["yes", *["not known"] * 3]
+    assert chains.value is not None and chains.value.value == 0.25  # no interval from one run
+    assert contacts.value is None  # without loading.json
+
+
+@pytest.mark.parametrize(("error", "reached"), [(0.004, "yes"), (0.2, "no")])
+def test_a_restitution_is_inside_if_its_measured_error_is(
+    tmp_path: Path, error: float, reached: str
+) -> None:
+    asked = {**ASKED, "quantities": ["restitution"], "error": error}
+    case = case_json("process", "run-1", asked=asked)
+    folder = make_run(tmp_path, case, process_findings(), PICTURES)
+    (answer,) = answers(cases_of([read_study(folder)])[0])
+    assert (answer.half_width, answer.reached) == (error, reached)
+
+
+def test_a_case_of_several_packings_is_judged_by_its_mean(tmp_path: Path) -> None:
+    """Its interval is that of single runs over the root of their number."""
+    studies = []
+    for seed in range(4):
+        case = case_json("process", f"run-{seed}", asked={**ASKED, "tolerance": 0.06})
+        case["inputs"] |= {"seed": seed}
+        folder = make_run(tmp_path, case, process_findings(), PICTURES)
+        write_quantities(folder, corrected=0.8)
+        studies.append(read_study(folder))
+    alone, together = (answers(cases_of(some)[0])[0] for some in (studies[:1], studies))
+    assert alone.half_width == pytest.approx(0.1) and alone.reached == "no"
+    assert together.half_width == pytest.approx(0.05) and together.reached == "yes"
 
 
 def test_a_missing_or_foreign_advice_is_refused(tmp_path: Path) -> None:
@@ -115,8 +147,8 @@ def test_a_missing_or_foreign_advice_is_refused(tmp_path: Path) -> None:
         read_advice(advice_file(tmp_path, schema=1))
 
 
-def test_an_extrapolated_answer_stands_beside_the_value_of_the_run(tmp_path: Path) -> None:
-    asked = {**ASKED, "quantity": "workpiece_contacts", "extrapolated": True}
+def test_an_answer_from_windows_stands_beside_the_value_of_the_run(tmp_path: Path) -> None:
+    asked = {**ASKED, "quantities": ["workpiece_contacts"]}
     folder = make_run(
         tmp_path / "results", case_json("process", "workpiece-1", asked=asked),
         process_findings(), PICTURES,
@@ -125,18 +157,16 @@ def test_an_extrapolated_answer_stands_beside_the_value_of_the_run(tmp_path: Pat
         name="workpiece_contacts", label="contacts on the workpiece", unit="", measured=32.1,
         value=25.6, ci95_low=24.2, ci95_high=27.4,
     )  # fmt: skip
-    known = Extrapolated(
-        youngs_modulus_scale=1e-3, source="14 scenes", outside=(), quantities=(contacts,)
-    )
-    known.write(folder / EXTRAPOLATED)
+    Extrapolated(quantities=(contacts,), windows=WINDOWS).write(folder / EXTRAPOLATED)
     write_report(tmp_path, [folder])
     words = " ".join(page_of(tmp_path).words.split())
     assert "Values at the physical Young's modulus" in words
-    assert "contacts on the workpiece at a time 25.6 (24.2 to 27.4) 32.1 corrected" in words
+    assert "contacts on the workpiece at a time 25.6 (24.2 to 27.4) 32.1 from 3 windows" in words
     assert "through 25.6 contacts at a time" in words
     assert "as simulated: 32.1" in words
-    assert "25.6 (24.2 to 27.4) 6.2 %" in words  # in the table of tolerances
+    assert "25.6 (24.2 to 27.4) 6.2 % no" in spaced(tmp_path)  # in the table of tolerances
     row = pd.read_csv(tmp_path / "summary.csv").iloc[0]
     assert row["extrapolated_workpiece_contacts"] == pytest.approx(25.6)
     assert row["extrapolated_workpiece_contacts_ci95_high"] == pytest.approx(27.4)
     assert row["workpiece_contacts"] == 32.1
+    assert (row["asked_quantities"], row["windows"]) == ("workpiece_contacts", 3)

@@ -89,7 +89,7 @@ def test_the_sheets_say_what_there_is(tmp_path: Path) -> None:
 def test_the_overview_has_a_row_per_quantity_with_formats(tmp_path: Path) -> None:
     case = case_json("process", "workpiece-1")
     folder = make_run(tmp_path, case, process_findings(-2.5), PICTURES)
-    write_quantities(folder, 0.01, corrected=0.8)
+    write_quantities(folder, corrected=0.8)
     book = read(summary_workbook(pd.DataFrame({"a": [1]}), {}, cases_of([read_study(folder)])))
     rows = {row[0].value: row for row in book["Overview"].iter_rows()}
     assert [cell.value for cell in rows["quantity"]][2:] == [
@@ -99,5 +99,5 @@ def test_the_overview_has_a_row_per_quantity_with_formats(tmp_path: Path) -> Non
     assert "diameter 10 mm" in str(rows["Workpiece"][2].value)
     drag = rows["mean drag"]
     assert [round(cell.value, 6) for cell in drag[2:6]] == [-2.0, -2.2, -1.8, -2.5]
-    assert drag[6].value == "corrected to the physical Young's modulus"
+    assert drag[6].value == "from 3 windows at the physical Young's modulus"
     assert drag[2].number_format == "0.000"

@@ -28,6 +28,7 @@ from report_files import (
 
 from dragchain.errors import MissingRunsError, TableError
 from dragchain.loading.write import write_loading
+from dragchain.report.extrapolated import Need
 from dragchain.report.findings import FIGURES, FILE
 from dragchain.report.numbers import main_numbers
 from dragchain.report.study_report import write_report
@@ -329,7 +330,7 @@ def test_a_faster_run_says_so_first_and_gives_no_number_of_contacts(
 ) -> None:
     """Fewer and larger contact forces, not more and smaller; times are those of the process."""
     run = with_settings(process, youngs_modulus_scale=1.0, speed_factor=5.0)
-    write_quantities(run, 1.0)
+    write_quantities(run)
     write_report(tmp_path, [run])
     words = summary_box(tmp_path)
     assert "10 mm/s; simulated at 50 mm/s" not in words  # 10 mm/s are the simulated ones here
@@ -343,11 +344,9 @@ def test_a_faster_run_says_so_first_and_gives_no_number_of_contacts(
     assert row["normal_impulse_n_s_per_m"] == pytest.approx(5 * 0.856 / 0.03, rel=1e-3)
 
 
-def test_a_reduced_modulus_gives_the_corrected_number_of_contacts_first(
-    process: Path, tmp_path: Path
-) -> None:
+def test_the_number_of_contacts_from_windows_comes_first(process: Path, tmp_path: Path) -> None:
     run = with_settings(process, youngs_modulus_scale=0.01)
-    write_quantities(run, 0.01, corrected=0.8)
+    write_quantities(run, corrected=0.8)
     write_report(tmp_path, [run])
     words = summary_box(tmp_path)
     assert "more and smaller contact forces" in words
@@ -359,22 +358,27 @@ def test_a_reduced_modulus_gives_the_corrected_number_of_contacts_first(
         main_numbers(tmp_path)
         .splitlines()[1]
         .startswith(
-            "  10 mm <workpiece>: mean drag -2.00 N (95 % CI -2.20 to -1.80 N) at the physical"
+            "  10 mm <workpiece>: mean drag -2.00 N (95 % CI -2.20 to -1.80 N) from 3 windows"
         )
     )
 
 
-@pytest.mark.parametrize("outside", [(), ("inertial_number 0.9 is outside of 0.02 to 0.3",)])
-def test_the_first_screen_says_that_a_scene_is_outside_the_measured_range(
-    process: Path, tmp_path: Path, outside: tuple[str, ...]
+@pytest.mark.parametrize("reached", [True, False])
+def test_the_first_screen_says_what_the_windows_reached(
+    process: Path, tmp_path: Path, reached: bool
 ) -> None:
     run = with_settings(process, youngs_modulus_scale=0.01)
-    write_quantities(run, 0.01, corrected=0.8, outside=outside)
+    refused = {"window-4": "no particle lost: 1421"}
+    write_quantities(run, corrected=0.8, reached=reached, needed=Need(9, 1), refused=refused)
     write_report(tmp_path, [run])
-    assert ("outside the range in which" in summary_box(tmp_path)) == bool(outside)
+    words = summary_box(tmp_path)
+    assert "from 3 windows at the physical Young's modulus" in words
+    assert ("give the mean drag to within 10 %" in words) == reached
+    assert ("about 9 windows would" in words) != reached
+    assert "window-4 does not enter: no particle lost: 1421" in words
 
 
-def test_a_reduced_modulus_without_a_law_is_not_corrected_and_says_so(
+def test_a_reduced_modulus_without_windows_says_what_would_help(
     process: Path, tmp_path: Path
 ) -> None:
     run = with_settings(process, youngs_modulus_scale=1e-4)
@@ -382,12 +386,13 @@ def test_a_reduced_modulus_without_a_law_is_not_corrected_and_says_so(
     words = summary_box(tmp_path)
     assert "not available contacts on the workpiece at a time" in words
     assert "not corrected for Young's modulus \N{MULTIPLICATION SIGN} 0.0001" in words
+    assert "fidelity: {tolerance: 0.1}" in words
     assert "mean force of 2.50 N in this run" in words
 
 
 def test_at_the_settings_of_the_process_all_is_as_measured(process: Path, tmp_path: Path) -> None:
     run = with_settings(process, youngs_modulus_scale=1.0)
-    write_quantities(run, 1.0)
+    write_quantities(run)
     write_report(tmp_path, [run])
     words = page_of(tmp_path).words
     assert "not available" not in summary_box(tmp_path)

@@ -6,12 +6,12 @@ from typing import Any
 import pytest
 from report_files import case_json
 
-from dragchain.run.basis import QUANTITIES, Basis, Quantity, judge, notes
+from dragchain.run.basis import QUANTITIES, Basis, Correction, Quantity, judge, notes
 from dragchain.run.case import Case
 from dragchain.statistics.estimate import Estimate
 
 OWN = Estimate(10.0, 8.0, 12.0)
-LAW = Estimate(0.8, 0.6, 1.0)
+WINDOWS = Correction(Estimate(0.8, 0.6, 1.0), 5)
 PLAIN = Quantity("contacts", "contacts")
 ROBUST = Quantity("drag", "drag", "N", robust=True)
 IMPULSE = Quantity("impulse", "impulse", "N s", time=1, robust=True)
@@ -25,15 +25,15 @@ def case(scale: float = 1.0, factor: float = 1.0, **more: Any) -> Case:
 
 
 @pytest.mark.parametrize(
-    ("quantity", "settings", "law", "basis", "value"),
+    ("quantity", "settings", "windows", "basis", "value"),
     [
         (PLAIN, (1.0, 1.0), None, Basis.MEASURED, 10.0),
-        (PLAIN, (0.01, 1.0), LAW, Basis.CORRECTED, 8.0),
+        (PLAIN, (0.01, 1.0), WINDOWS, Basis.WINDOWS, 8.0),
         (PLAIN, (0.01, 1.0), None, Basis.NONE, None),
         (PLAIN, (1.0, 5.0), None, Basis.NONE, None),
-        (PLAIN, (0.01, 5.0), LAW, Basis.NONE, None),  # the law holds at the process speed only
-        (ROBUST, (0.01, 1.0), LAW, Basis.CORRECTED, 8.0),
-        (ROBUST, (0.01, 5.0), LAW, Basis.MEASURED, 10.0),
+        (PLAIN, (0.01, 5.0), None, Basis.NONE, None),
+        (ROBUST, (0.01, 1.0), WINDOWS, Basis.WINDOWS, 8.0),
+        (ROBUST, (0.01, 5.0), None, Basis.MEASURED, 10.0),
         (IMPULSE, (1.0, 5.0), None, Basis.SCALED, 50.0),
         (IMPULSE, (0.01, 1.0), None, Basis.MEASURED, 10.0),
         (RATE, (1.0, 5.0), None, Basis.SCALED, 2.0),
@@ -42,28 +42,43 @@ def case(scale: float = 1.0, factor: float = 1.0, **more: Any) -> Case:
 def test_the_basis_follows_from_all_settings(
     quantity: Quantity,
     settings: tuple[float, float],
-    law: Estimate | None,
+    windows: Correction | None,
     basis: Basis,
     value: float | None,
 ) -> None:
-    found = judge(quantity, OWN, case(*settings), law)
+    found = judge(quantity, OWN, case(*settings), windows)
     assert found.basis is basis
     assert (found.value.value if found.value else None) == (
         None if value is None else pytest.approx(value)
     )
     scale, factor = settings
     changed = [(scale != 1.0, "Young's modulus"), (factor != 1.0, "speed")]
-    corrected = basis is Basis.CORRECTED
+    corrected = basis is Basis.WINDOWS
     assert [name in found.reason for _, name in changed] == [
         there and not corrected for there, _ in changed
     ]
 
 
-def test_the_interval_of_a_corrected_value_is_that_of_the_law() -> None:
-    found = judge(PLAIN, Estimate(-10.0, -12.0, -8.0), case(0.01), LAW)
+def test_the_interval_of_a_value_from_windows_is_theirs() -> None:
+    found = judge(PLAIN, Estimate(-10.0, -12.0, -8.0), case(0.01), WINDOWS)
     assert found.value is not None
     assert (found.value.ci95_low, found.value.ci95_high) == (-10.0, -6.0)
     assert found.run == Estimate(-10.0, -12.0, -8.0)
+    assert found.rests_on == "from 5 windows at the physical Young's modulus"
+
+
+@pytest.mark.parametrize(
+    ("settings", "more", "remedy"),
+    [
+        ((0.01, 1.0), {}, "`fidelity: {tolerance: 0.1}` measures it"),
+        ((0.01, 1.0), {"marks": ["state.1.restart"]}, "its windows do not give"),
+        ((0.01, 5.0), {}, "higher speed is not measured"),
+    ],
+)
+def test_what_is_not_available_says_what_would_help(
+    settings: tuple[float, float], more: dict[str, Any], remedy: str
+) -> None:
+    assert remedy in judge(PLAIN, OWN, case(*settings, **more), None).reason
 
 
 def test_an_interval_that_is_not_known_stays_unknown() -> None:
@@ -75,7 +90,7 @@ def test_an_interval_that_is_not_known_stays_unknown() -> None:
     ("scale", "factor", "said", "not_said"),
     [
         (1.0, 1.0, ["is the physical one"], ["fewer", "more and", "process time"]),
-        (0.01, 1.0, ["more and smaller", "corrected to the physical"], ["fewer", "process time"]),
+        (0.01, 1.0, ["more and smaller", "tolerance: 0.1"], ["fewer", "process time"]),
         (1.0, 5.0, ["fewer and larger", "simulated time \N{MULTIPLICATION SIGN} 5:"], ["more and"]),
         (1e-4, 5.0, ["more and smaller", "fewer and larger", "Nothing is corrected"], ["where a"]),
     ],

@@ -61,7 +61,7 @@ def write_summary(results: Path) -> None:
     upstream = {"filling": "filling-1", "drop_test": "drop-1"}
     case = case_json("process", "workpiece-1", upstream=upstream, asked=ASKED)
     run = make_run(results, case, process_findings(), PICTURES)
-    write_quantities(run, 0.01, corrected=0.8)
+    write_quantities(run, corrected=0.8)
     made = write_run(results / "made", made_contacts())
     write_loading(made)
     (run / "tables/loading.json").write_bytes((made / "tables/loading.json").read_bytes())

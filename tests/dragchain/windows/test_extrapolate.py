@@ -1,58 +1,54 @@
-"""Runs that no law of reduced moduli covers: their quantities are measured, none is corrected."""
+"""The quantities of a run as it is, and at the physical Young's modulus from its windows."""
 
 import json
 from pathlib import Path
 
 import pytest
 from figure_files import case_json
-from paths import ROOT
 
-from dragchain.report.extrapolated import FILE, Extrapolated
+from dragchain.report.extrapolated import FILE, Extrapolated, Need
+from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import PathQuantities
 from dragchain.windows import extrapolate
+from dragchain.windows.document import Round, WindowedQuantity, WindowOfRun
 from dragchain.windows.extrapolate import extrapolate_run
 
-RECORD = ROOT / "workflow/dragdeck/data/stiffness.json"
 
-
-@pytest.mark.parametrize(
-    ("friction", "settings", "known"),
-    [
-        (0.34, {}, True), (0.0, {}, False), (0.34, {"speed_factor": 5.0}, False),
-        (0.34, {"youngs_modulus_scale": 1.0}, False), (0.34, {"youngs_modulus_scale": 1e-4}, False),
-    ],
-)  # fmt: skip
-def test_a_law_applies_to_a_bed_with_friction_at_the_speed_of_the_study(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    friction: float,
-    settings: dict[str, float],
-    known: bool,
+def test_a_run_without_windows_is_measured_and_not_corrected(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    numbers = {"stiffness_number": 2e5, "inertial_number": 0.02, "particle_friction": friction}
-    case = case_json("process") | {"numbers": numbers}
-    case["fidelity"] |= settings
-    (tmp_path / "case.json").write_text(json.dumps(case))
+    (tmp_path / "case.json").write_text(json.dumps(case_json("process")))
     along = PathQuantities(arc_m=0.1, block_m=0.01, blocks={"workpiece_contacts": (30.0,) * 10})
     monkeypatch.setattr(extrapolate, "quantities_along", lambda *_: along)
-    extrapolate_run(tmp_path, RECORD)
+    extrapolate_run(tmp_path)
     found = Extrapolated.read(tmp_path / FILE)
     (contacts,) = found.quantities
     assert (contacts.name, contacts.measured) == ("workpiece_contacts", 30.0)
-    assert (contacts.estimate is not None) == known
-    assert any("particle_friction" in text for text in found.outside) == (friction == 0.0)
+    assert contacts.estimate is None and found.windows is None
 
 
-def test_another_contact_law_is_not_extrapolated(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    numbers = {"stiffness_number": 2e5, "inertial_number": 0.02, "particle_friction": 0.34}
-    law = {"changed_law": ["pair_style gran model hooke tangential history"]}
-    case = case_json("process") | {"numbers": numbers} | law
-    (tmp_path / "case.json").write_text(json.dumps(case))
-    along = PathQuantities(arc_m=0.1, block_m=0.01, blocks={"workpiece_contacts": (30.0,) * 10})
-    monkeypatch.setattr(extrapolate, "quantities_along", lambda *_: along)
-    extrapolate_run(tmp_path, RECORD)
+def test_windows_give_the_values_they_have_and_say_which_they_are(tmp_path: Path) -> None:
+    (tmp_path / "tables").mkdir()
+    refused = WindowOfRun(run="w-3", refused="a particle was lost", cpu_time_s=9.0)
+    drag, peaks = (
+        WindowedQuantity(
+            name=name, label=name, unit="N", asked=asked, soft=2.0, value=value,
+            ci95_low=0.9 * value, ci95_high=1.1 * value,
+        )
+        for name, asked, value in (("drag", True, 1.8), ("peaks", False, float("nan")))
+    )  # fmt: skip
+    Round(
+        tolerance=0.05, wanted=3, last=True, reached=False, needed=Need(8, 2),
+        windows=(*(WindowOfRun(run=f"w-{n}", cpu_time_s=9.0) for n in (1, 2)), refused),
+        quantities=(drag, peaks),
+    ).write(tmp_path / "round-1.json")  # fmt: skip
+    extrapolate_run(tmp_path, tmp_path / "round-1.json")
     found = Extrapolated.read(tmp_path / FILE)
-    assert [one.estimate for one in found.quantities] == [None]
-    assert "pair_style gran model hooke" in found.outside[0]
+    one, other = found.quantities
+    assert one.estimate == Estimate(1.8, pytest.approx(1.62), pytest.approx(1.98))
+    assert other.estimate is None and other.measured == 2.0
+    assert found.windows is not None and found.windows.refused == {"w-3": "a particle was lost"}
+    assert found.windows.said == (
+        "2 windows at the physical Young's modulus do not give the drag to within 5 %: "
+        "about 2 seeds would."
+    )
