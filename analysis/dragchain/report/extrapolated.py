@@ -83,18 +83,19 @@ class Extrapolated(Document):
         found = self.tolerance
         if found is None:
             return ""
-        labels = [one.label for one in self.quantities if one.name in found.asked]
-        asked = " and the ".join(filter(None, (", the ".join(labels[:-1]), labels[-1])))
-        percent = f"{100 * found.tolerance:.3g} %"
-        told = "The run at the physical Young's modulus gives"
+        known = {one.name: one.label for one in self.quantities}
+        labels = [f"the {known.get(name, name)}" for name in found.asked]
+        what = " and ".join(filter(None, (", ".join(labels[:-1]), labels[-1])))
+        asked = f"{what} to within {100 * found.tolerance:.3g} %"
+        who, verb = "The run at the physical Young's modulus", ("gives", "does not give")
         if found.runs:
-            told = f"{len(found.runs)} windows at the physical Young's modulus give"
+            who = f"{len(found.runs)} windows at the physical Young's modulus"
+            verb = ("give", "do not give")
         if found.reached:
-            return f"{told} the {asked} to within {percent}."
+            return f"{who} {verb[0]} {asked}."
         windows, packings = found.needed
         more = f"{windows} windows" if packings == 1 and found.runs else f"{packings} seeds"
-        told = told.replace("gives", "does not give").replace(" give", " do not give")
-        return f"{told} the {asked} to within {percent}: about {more} would."
+        return f"{who} {verb[1]} {asked}: about {more} would."
 
     def of(self, name: str) -> ExtrapolatedQuantity | None:
         """A quantity by its name, None if it was not measured."""

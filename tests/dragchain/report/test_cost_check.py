@@ -1,6 +1,7 @@
 """What a run was expected to cost, beside what it did."""
 
 import json
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import pytest
 from report_files import (
     ASKED,
     PICTURES,
-    WINDOWS,
+    REACHED,
     case_json,
     make_run,
     page_of,
@@ -154,10 +155,10 @@ def test_an_answer_from_windows_stands_beside_the_value_of_the_run(tmp_path: Pat
         process_findings(), PICTURES,
     )  # fmt: skip
     contacts = ExtrapolatedQuantity(
-        name="workpiece_contacts", label="contacts on the workpiece", unit="", measured=32.1,
-        value=25.6, ci95_low=24.2, ci95_high=27.4,
+        name="workpiece_contacts", label="contacts on the workpiece", unit="",
+        measured=Estimate(32.1, math.nan, math.nan), value=Estimate(25.6, 24.2, 27.4),
     )  # fmt: skip
-    Extrapolated(quantities=(contacts,), windows=WINDOWS).write(folder / EXTRAPOLATED)
+    Extrapolated(quantities=(contacts,), tolerance=REACHED).write(folder / EXTRAPOLATED)
     write_report(tmp_path, [folder])
     words = " ".join(page_of(tmp_path).words.split())
     assert "Values at the physical Young's modulus" in words
