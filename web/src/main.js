@@ -29,7 +29,8 @@ class Page {
     this.number = head.peaks[0]?.frame ?? 0;
     this.look = { classes: [true, true, true], threshold: 0, chosen: null, section: null };
     this.measured = null; // the particles or contacts whose distance is measured
-    for (const [name, colour] of Object.entries(COLOURS)) // network.css takes them by name
+    for (const [name, colour] of Object.entries(COLOURS))
+      // network.css takes them by name
       document.documentElement.style.setProperty(`--${name}`, colour);
     this.startCurve(columns);
     this.startProfiles();
@@ -49,16 +50,11 @@ class Page {
     this.curve = new ForceCurve(
       byId("curve"),
       { curve, peaks, values: resistance, end: this.frames.times.at(-1) },
-      { go, goToPeak },
+      { go, goToPeak, told: (text) => (hovered.textContent = text) },
     );
-    this.curve.hovered = (at) =>
-      (hovered.textContent = at ? `${seconds(at.time)}: raw ${digits(at.raw)} N, filtered ${digits(at.smooth)} N` : "");
-    for (const name of ["raw", "smooth"])
-      byId(name).onchange = () => {
-        this.curve.shown[name] = byId(name).checked;
-        this.curve.draw();
-      };
-    byId("whole").onclick = () => this.curve.zoom([...this.curve.whole]);
+    for (const [k, name] of ["raw", "smooth"].entries())
+      byId(name).onchange = () => this.curve.plot.setSeries(k + 1, { show: byId(name).checked });
+    byId("whole").onclick = () => this.curve.zoom(this.curve.whole);
     byId("peaks").append(
       ...peaks.map(({ time, force }, rank) => {
         const item = document.createElement("li"),
