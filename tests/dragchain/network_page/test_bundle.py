@@ -15,7 +15,12 @@ BUNDLE = ROOT / "analysis/dragchain/network_page/network.js"
 
 
 def test_the_bundle_is_made_from_these_sources() -> None:
-    own = ["../workflow/dragdeck/data/colours.json", "build.mjs", "package.json", "package-lock.json"]
+    own = [
+        "../workflow/dragdeck/data/colours.json",
+        "build.mjs",
+        "package.json",
+        "package-lock.json",
+    ]
     total = hashlib.sha256()
     for name in sorted([*own, *(f"src/{file.name}" for file in (WEB / "src").iterdir())]):
         total.update(f"{name}\n".encode() + (WEB / name).read_bytes())
@@ -40,7 +45,9 @@ def test_the_licences_of_its_libraries_stay_with_it() -> None:
     head = BUNDLE.read_text()[:3000]
     assert "three.js authors" in head and "Leon Sorokin" in head
     assert head.count("The MIT License") == 2
-    assert head.count("The above copyright notice and this permission notice shall be included") == 2
+    assert (
+        head.count("The above copyright notice and this permission notice shall be included") == 2
+    )
 
 
 def test_packages_are_pinned_and_name_no_registry() -> None:
