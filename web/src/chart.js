@@ -1,9 +1,10 @@
 // What all charts have in common: uPlot fitted to an element, its axes, and marks over the plotting area.
 import uPlot from "uplot";
 import style from "uplot/dist/uPlot.min.css";
+import { make } from "./dom.js";
 import { plain } from "./numbers.js";
 
-document.head.prepend(Object.assign(document.createElement("style"), { textContent: style }));
+document.head.prepend(make("style", {}, style));
 
 /** An axis of uPlot with a name; `more`: options that differ. */
 export const axis = (label, more) => ({
@@ -34,7 +35,7 @@ export class Chart {
 
   /** Mark a stretch: `place()` gives two values along x, and along y unless the mark crosses the chart. */
   mark(className, place, more, layer = this.plot.over) {
-    const element = Object.assign(document.createElement("i"), { className, ...more });
+    const element = make("i", { className, ...more });
     layer.append(element);
     this.marks.push({ element, place });
     return element;

@@ -1,6 +1,7 @@
 // The plots of the profiles: a frame over the mean of all frames, and the map of the workpiece.
 import uPlot from "uplot";
 import { axis, Chart, line } from "./chart.js";
+import { colourBar } from "./legend.js";
 import { digits, plain, seconds, tenTo, whole } from "./numbers.js";
 import { profilesOf } from "./profiles.js";
 
@@ -121,9 +122,7 @@ export class ProfilePlots {
     this.bars[2].mark("mean", () => mark(head.scales.mean));
     this.bars[2].mark("now", () => mark(size.means[this.number]));
     this.addMap(parts.map, map, colourOf);
-    const bar = document.createElement("i");
-    bar.style.background = `linear-gradient(to right, ${head.colours.join(", ")})`;
-    parts.scale.append("0", bar, `${digits(map.top, 3)} N`);
+    parts.scale.append("0", colourBar(head.colours), `${digits(map.top, 3)} N`);
   }
 
   /** Bars of a profile: upright, or over depth from the left edge. */
