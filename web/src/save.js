@@ -1,5 +1,4 @@
 // The scene as a picture or a film, with the labels that lie over it.
-
 import { make } from "./dom.js";
 
 const KINDS = ["video/webm;codecs=vp9", "video/webm", "video/mp4"];

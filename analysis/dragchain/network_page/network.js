@@ -1,4 +1,4 @@
-/*! sources: 5f8e3de041578d417caeb69bcf24ca83acc0e776bcafcc4efcfd170e612ab428
+/*! sources: 697fb7de5a038000c74e467860498e66dc50d53dd138f96d9dc8884d236e5992
 Made by ./run web from web/; do not edit. It contains three.js:
 
 The MIT License
