@@ -164,7 +164,7 @@ def test_tests_bring_their_packages(clone: Clone, arguments: list[str], called: 
     ended = clone.run("test", *arguments)
     assert ended.returncode == 0
     assert re.fullmatch(rf"{called} in .*\n", ended.stdout)
-    assert clone.extras() == ["cad", "crate", "docs", "test"]
+    assert clone.extras() == ["cad", "crate", "docs", "notebook", "test"]
 
 
 def test_a_failed_check_fails_the_whole_and_still_tests(clone: Clone, tmp_path: Path) -> None:
@@ -322,7 +322,7 @@ def test_every_dependency_is_pinned_at_or_above_its_minimum() -> None:
             pins.setdefault(re.sub(r"[-_.]+", "-", pin.name.lower()), []).append(version)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     wanted = [*project["project"]["dependencies"], *project["build-system"]["requires"]]
-    for extra in ("cad", "crate", "docs", "slurm", "test"):
+    for extra in ("cad", "crate", "docs", "notebook", "slurm", "test"):
         wanted += project["project"]["optional-dependencies"][extra]
     for requirement in map(Requirement, wanted):
         for version in pins[requirement.name.lower()]:
