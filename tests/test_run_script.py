@@ -302,7 +302,7 @@ def test_packages_of_no_known_name(clone: Clone) -> None:
 def test_two_calls_at_once_set_up_once(clone: Clone) -> None:
     write_program(clone.python, "#!/bin/sh\necho called >>calls\nsleep 1\n")
     with ThreadPoolExecutor() as pool:
-        calls = [pool.submit(clone.run, "setup", "crate") for _ in range(2)]
+        calls = [pool.submit(clone.run, "crate") for _ in range(2)]
     assert [call.result().returncode for call in calls] == [0, 0]
     assert (clone.root / "calls").read_text() == "called\n"
     assert clone.extras() == ["crate"]
