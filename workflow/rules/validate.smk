@@ -8,7 +8,7 @@ rule write_validation:
         templates=page_templates(
             *(
                 f"validation/{name}.html.j2"
-                for name in ("validation", "peaks/peaks", "scaling", "load")
+                for name in ("validation", "peaks", "scaling", "load")
             ),
             package="evidence",
         ),
