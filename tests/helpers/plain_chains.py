@@ -1,7 +1,6 @@
 """The oracle of the chain tests: chains, paths and clusters particle by particle, in plain Python.
 
-This is how the package itself found them before it held arrays. Nothing but tests and
-`benchmarks/chains.py` may use it.
+This is how the package itself found them before it held arrays. Nothing but tests may use it.
 """
 
 import heapq

@@ -80,7 +80,7 @@ def segments(frame: NetworkFrame) -> Floats:
 
 
 def cylinder_radii(normal_force_n: Floats, radius_mean_m: float) -> Floats:
-    """Return radii proportional to the force, (M,) in m: the mean particle radius at the largest."""
+    """Radii proportional to the force, (M,) in m: the mean particle radius at the largest."""
     largest = normal_force_n.max(initial=0.0)
     if largest <= 0.0:
         return np.zeros_like(normal_force_n)
