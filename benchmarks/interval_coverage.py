@@ -229,7 +229,7 @@ _FEW = 50
 
 
 def simulate(case: Simulated, length: int, trials: int) -> dict[str, object]:
-    """One row of the record."""
+    """One row of the record, with the exact interval of Clopper and Pearson (1934)."""
     random = np.random.default_rng([length, *case.name.encode()])
     found = [case.kind(random, length) for _ in range(trials)]
     held = np.array([one.contains(true) for one, true in found])
