@@ -20,7 +20,7 @@ from tiny_run_files import (
 )
 
 from dragchain import DumpError, RejectedRunError, TableError, load_case, load_outputs, write_tables
-from dragchain.drag.force import FORCES, read_counted, summarise_forces
+from dragchain.drag.force import read_counted, summarise_forces
 from dragchain.dumps.run_parts import iter_prints
 from dragchain.loading.write import write_loading
 from dragchain.tables.columns import FORCES, REFERENCE
@@ -83,7 +83,7 @@ def test_the_counted_samples_alone_make_the_statistics(tiny_run: Path) -> None:
     write_tables(tiny_run)
     mean = -np.mean([chain_n(step) for step in range(40, LAST + 1, 2)])
     assert len(read_counted(tiny_run)) == 31
-    assert summarise_forces(read_counted(tiny_run, FORCES))["drag_n"].mean == pytest.approx(mean)
+    assert summarise_forces(read_counted(tiny_run))["drag_n"].mean == pytest.approx(mean)
 
 
 def test_workpiece_contacts_hold_the_applied_force_on_the_workpiece(tables) -> None:
