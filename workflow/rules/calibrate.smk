@@ -98,8 +98,7 @@ rule write_calibration_report:
             labels={"run": "drop test", "figure": "report"},
         ),
         figures=[
-            of_study("calibration", f"figures/{name}.png")
-            for name in ("impacts", "fit", "bias")
+            of_study("calibration", f"figures/{name}.png") for name in ("impacts", "fit", "bias")
         ],
     log:
         of_study("calibration", "logs/report.log"),
