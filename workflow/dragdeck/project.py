@@ -1,7 +1,4 @@
-"""Where things are: the project's folders and the paths of a run.
-
-The grammar of result paths stands here and nowhere else.
-"""
+"""Where things are: the project's folders and the paths of a run."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
