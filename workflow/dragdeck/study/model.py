@@ -350,7 +350,7 @@ class Fidelity(Model):
     soft_start: Annotated[Number, Field(gt=0, lt=1)] | None = Field(
         default=None,
         description="multiplier of every Young's modulus in filling, plunge, approach and the "
-        "beginning of the drag; before the statistics begin, the moduli are raised to "
+        "start of the drag; before the statistics start, the moduli are raised to "
         "`youngs_modulus_scale`; none: the same multiplier all the time",
         exclude_if=lambda value: value is None,
     )
