@@ -370,7 +370,7 @@ class Fidelity(Model):
     )
     soft_start: SoftStart | None = Field(
         default=None,
-        description="settings of filling, plunge, approach and the beginning of the drag; none: "
+        description="settings of filling, plunge, approach and the start of the drag; none: "
         "those of the rest",
         exclude_if=lambda value: value is None,
     )
