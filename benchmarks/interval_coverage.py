@@ -45,6 +45,9 @@ from dragchain.statistics.estimate import (  # noqa: E402
 )
 from dragchain.statistics.frame_means import estimates  # noqa: E402
 from dragchain.statistics.power_law import Runs, fit_power_law  # noqa: E402
+from dragchain.tradeoff.measures import PathQuantities  # noqa: E402
+from dragchain.windows.document import WindowOfRun, WindowsRecord  # noqa: E402
+from dragchain.windows.rounds import judged  # noqa: E402
 
 RECORD = ROOT / "docs" / "data" / "benchmarks" / "coverage.csv"
 
@@ -191,6 +194,46 @@ def calibration(random: Random, impacts: int) -> tuple[Estimate, float]:
 # --- all kinds -------------------------------------------------------------------------------
 
 
+_TOLERANCE, _MOST_WINDOWS, _SOFT_BLOCKS = 0.1, 16, 18
+
+
+def windows(
+    random: Random, percent: int, name: str = "drag_mean", unlike: float = 0.0
+) -> tuple[Estimate, float]:
+    """A quantity from windows that stop at a tolerance, with so many percent of scatter each.
+
+    The scene's ratio to the soft run is drawn from those of other scenes, or so many of their
+    standard deviations away from them.
+    """
+    known = _windows_record().quantities[name]
+    std = min(known.ratio_log_std, 0.15)
+    ratio_log = known.ratio_log + std * (unlike or random.normal())
+    packing, scatter = known.packing_std * random.normal(), 0.01 * percent
+    variance_ratio = known.variance_ratio * random.chisquare(known.degrees) / known.degrees
+    soft = 1.0 + scatter / math.sqrt(variance_ratio) * random.normal(size=_SOFT_BLOCKS)
+    soft *= (1.0 + packing) * math.exp(-ratio_log)
+    along = PathQuantities(
+        arc_m=0.01 * _SOFT_BLOCKS, block_m=0.01, blocks={name: tuple(soft.tolist())}
+    )
+    every = [
+        WindowOfRun(run=str(number), values={name: value}, arc_m=0.01, cpu_time_s=0.0)
+        for number, value in enumerate(
+            (1.0 + packing) * (1.0 + scatter * random.normal(size=_MOST_WINDOWS))
+        )
+    ]
+    count, last = 3, False
+    while not last:
+        found = judged(along, every[:count], _TOLERANCE, [name], _MOST_WINDOWS, _windows_record())
+        count, last = found.wanted, found.last
+    (row,) = found.quantities
+    return row.value, 1.0
+
+
+@cache
+def _windows_record() -> WindowsRecord:
+    return WindowsRecord.read(ROOT / "workflow/dragdeck/data/windows.json")
+
+
 @dataclass(frozen=True)
 class Simulated:
     """A kind of interval and the lengths at which it is simulated, in a unit."""
@@ -202,6 +245,7 @@ class Simulated:
 
 
 _TIMES, _EVENTS, _PACKINGS = "autocorrelation times", "contact events", "packings"
+_SCATTER = "percent of scatter"
 
 KINDS = (
     Simulated("mean of a run", _TIMES, (5, 10, 20, 40, 80, 200, 1000), mean),
@@ -220,8 +264,15 @@ KINDS = (
     Simulated("effect, settings interact", _PACKINGS, (2, 4), partial(effect, interaction=1.4)),
     Simulated("exponent", _PACKINGS, (2, 4), exponent),
     Simulated("calibration", "impacts", (4,), calibration),
+    Simulated("drag from windows", _SCATTER, (5, 10, 20), windows),
+    Simulated(
+        "contacts from windows", _SCATTER, (5, 10, 20), partial(windows, name="workpiece_contacts")
+    ),
+    Simulated(
+        "drag from windows, scene unlike others", _SCATTER, (5, 10, 20), partial(windows, unlike=2.0)
+    ),
 )
-"""Every kind of interval. A law of extrapolation is one function more."""
+"""Every kind of interval."""
 
 
 _FEW = 50

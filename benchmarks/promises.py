@@ -60,7 +60,7 @@ def draw(rng: np.random.Generator, number: int) -> dict[str, Any]:
     name = [*MATERIALS][number % len(MATERIALS)]
     modulus, poisson, density = MATERIALS[name]
     d = round(rng.uniform(5e-3, 9e-3), 4)
-    thick, gap = rng.uniform(1.0, 1.6), rng.uniform(2.1, 2.5)
+    thick, gap = rng.uniform(1.0, 1.6), rng.uniform(3.0, 3.4)
     reach = rng.uniform(1.5, 2.2)
     outer = reach + thick / 2 + gap
     height = rng.uniform(5.5, 6.5)

@@ -16,8 +16,10 @@ SHORT = {
     ("mean of a run, a fifth of it slow", 80),
     ("mean of a run, a fifth of it slow", 200),
     ("ratio", 10),
+    ("drag from windows, scene unlike others", 20),
 }
-"""Lengths at which a series does not show how short it is; the page on statistics says so."""
+"""Lengths at which a series does not show how short it is, and scenes that do not show how unlike
+others they are; the page on statistics says so."""
 
 
 @pytest.mark.parametrize("case", KINDS, ids=lambda case: case.name)
