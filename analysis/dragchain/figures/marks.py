@@ -84,20 +84,17 @@ def compass_bars(
     axes.set_xlabel(f"mean normal force ({symbol} per {np.degrees(edges[1] - edges[0]):.0f}°)")
 
 
-def row(
-    axes: Axes, place: float, value: float, interval: _Interval, colour: str, filled: bool = True
-) -> None:
+def row(axes: Axes, place: float, value: float, interval: _Interval, colour: str) -> None:
     """Draw a value with its interval in a row."""
     span = [interval.ci95_low, interval.ci95_high]
     axes.plot(span, [place, place], color=colour, linewidth=1.8, alpha=0.6)
-    axes.plot(value, place, "o", color=colour, mfc=colour if filled else "white")
+    axes.plot(value, place, "o", color=colour)
 
 
-def row_names(axes: Axes, names: Sequence[str], places: Sequence[float] | None = None) -> None:
-    """Name rows, the first at the top; they lie at 0, 1, ... unless `places` are given."""
-    at = range(len(names)) if places is None else places
-    axes.set_yticks(at, names)
-    axes.set_ylim(at[-1] + 0.5, at[0] - 0.5)
+def row_names(axes: Axes, names: Sequence[str]) -> None:
+    """Name rows, the first at the top; they lie at 0, 1, ..."""
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(len(names) - 0.5, -0.5)
 
 
 def key(axes: Axes, label: str, **style: Any) -> None:

@@ -23,7 +23,7 @@ def axes() -> Axes:
 
 def test_the_first_row_is_at_the_top(axes: Axes) -> None:
     row(axes, 0, 1.0, Estimate(1.0, 0.5, 1.5), "black")
-    row(axes, 1, 2.0, Estimate(2.0, 1.5, 4.0), "black", filled=False)
+    row(axes, 1, 2.0, Estimate(2.0, 1.5, 4.0), "black")
     row_names(axes, ["first", "second"])
     assert axes.get_ylim() == (1.5, -0.5)
     assert [tick.get_text() for tick in axes.get_yticklabels()] == ["first", "second"]
