@@ -42,6 +42,13 @@ DROPS = _argument("--drops", type=Path, required=True, metavar="FILE", dest="dro
                   help="drops.json of the simulated drop tests (sweep); required")  # fmt: skip
 RECORD = _argument("record", type=Path, metavar="RECORD",
                    help="measured drop test: CSV file of force against time")  # fmt: skip
+WINDOWS_RECORD = _argument(
+    "--record",
+    type=Path,
+    required=True,
+    metavar="FILE",
+    help="windows.json, what windows of other scenes say; required",
+)
 MEASURES = _argument("measures", type=Path, nargs="+", metavar="MEASURES",
                      help="measures.json of each run, made by dragchain step measure")  # fmt: skip
 
@@ -168,7 +175,7 @@ STEPS = (
             "its windows, if it has any. It reads the tables of the run and writes "
             "extrapolated.json to RUN_DIR.",
             "windows.extrapolate:extrapolate_run", (
-                RUN_DIR,
+                RUN_DIR, WINDOWS_RECORD,
                 _argument("--round", type=Path, metavar="FILE", dest="round_file",
                           help="last round of windows of the run, from dragchain step windows"))),
     Command("windows", "what windows say of a run at the physical Young's modulus",
@@ -187,8 +194,7 @@ STEPS = (
                           help="quantities to which the tolerance applies; required"),
                 _argument("--most", type=int, required=True, metavar="N",
                           help="largest number of windows; required"),
-                _argument("--record", type=Path, required=True, metavar="FILE",
-                          help="windows.json, what windows of other scenes say; required"),
+                WINDOWS_RECORD,
                 _argument("--out", type=Path, required=True, metavar="FILE",
                           help="file to write; required"))),
     Command("scaling", "fit a power law to the mean drag",

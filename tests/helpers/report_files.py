@@ -9,7 +9,7 @@ from typing import Any
 from pages import Page
 
 from dragchain.report.extrapolated import FILE as EXTRAPOLATED
-from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity, Need, WindowsOfRun
+from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity, Need, Reached
 from dragchain.report.findings import (
     FILE,
     AheadBehind,
@@ -145,23 +145,24 @@ def make_run(results: Path, case: dict[str, Any], findings: Findings, names: lis
     return folder
 
 
-WINDOWS = WindowsOfRun(
-    tolerance=0.1, asked=("mean drag",), reached=True, runs=("window-1", "window-2", "window-3"),
+REACHED = Reached(
+    tolerance=0.1, asked=("drag_mean",), reached=True, runs=("window-1", "window-2", "window-3"),
     refused={}, needed=Need(3, 1),
 )  # fmt: skip
 
 
-def write_quantities(run: Path, corrected: float | None = None, **windows: Any) -> None:
+def write_quantities(run: Path, corrected: float | None = None, **reached: Any) -> None:
     """Write ``extrapolated.json``: all quantities 2, by windows that many times it."""
-    ends = {} if corrected is None else {
-        "value": 2.0 * corrected, "ci95_low": 1.8 * corrected, "ci95_high": 2.2 * corrected,
-    }  # fmt: skip
+    value = None if corrected is None else Estimate.around(2.0 * corrected, 0.2 * corrected)
+    own = Estimate(2.0, math.nan, math.nan)
     found = tuple(
-        ExtrapolatedQuantity(name=one.name, label=one.label, unit=one.unit, measured=2.0, **ends)
+        ExtrapolatedQuantity(
+            name=one.name, label=one.label, unit=one.unit, measured=own, value=value
+        )
         for one in QUANTITIES
     )
-    made = WINDOWS.model_copy(update=windows) if corrected else None
-    Extrapolated(quantities=found, windows=made).write(run / EXTRAPOLATED)
+    made = REACHED.model_copy(update=reached) if corrected else None
+    Extrapolated(quantities=found, tolerance=made).write(run / EXTRAPOLATED)
 
 
 def page_of(out: Path) -> Page:

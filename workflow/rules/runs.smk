@@ -224,6 +224,7 @@ rule extrapolate_process:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
         run=of_run("process", "run.json"),
+        record=WINDOWS_RECORD,
         windows=last_round,
     output:
         of_run("process", "tables/extrapolated.json"),
@@ -237,7 +238,8 @@ rule extrapolate_process:
         windows=lambda wildcards, input: f"--round {input.windows}" if input.windows else "",
         source=source_hash("dragchain.windows.extrapolate"),
     shell:
-        "dragchain step extrapolate $(dirname {input.run}) {params.windows} > {log} 2>&1"
+        "dragchain step extrapolate $(dirname {input.run}) --record {input.record}"
+        " {params.windows} > {log} 2>&1"
 
 
 # What is compared of a point: its tables, chains and numbers.

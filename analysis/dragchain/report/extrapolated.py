@@ -16,26 +16,17 @@ class ExtrapolatedQuantity(Part):
     Attributes
     ----------
     name, label, unit : str
-    measured : float
-        Uncorrected value of the run.
-    value, ci95_low, ci95_high : float or None
-        At the physical Young's modulus, None without windows.
+    measured : Estimate
+        Value of the run as it was simulated.
+    value : Estimate or None
+        At the physical Young's modulus, None if neither windows nor the run itself give it.
     """
 
     name: str
     label: str
     unit: str
-    measured: float
-    value: float | None = None
-    ci95_low: float | None = None
-    ci95_high: float | None = None
-
-    @property
-    def estimate(self) -> Estimate | None:
-        """The value at the physical modulus with its interval."""
-        if self.value is None or self.ci95_low is None or self.ci95_high is None:
-            return None
-        return Estimate(self.value, self.ci95_low, self.ci95_high)
+    measured: Estimate
+    value: Estimate | None = None
 
 
 class Need(NamedTuple):
@@ -45,43 +36,31 @@ class Need(NamedTuple):
     packings: int
 
 
-class WindowsOfRun(Part):
-    """What the windows of a run were asked for, and what they reached.
+class Reached(Part):
+    """What a run was asked for, and what it and its windows reached.
 
     Attributes
     ----------
     tolerance : float
         Relative half-width of the 95 % interval at which no further window is run.
     asked : tuple of str
-        Quantities to which it applies, in words.
+        Quantities to which it applies, by name.
     reached : bool
         Whether all of them are inside the tolerance.
-    runs : tuple of str
-        Windows that enter.
-    refused : mapping
-        Reason by window, of those that do not enter.
     needed : Need
         Windows and packings that are expected to do.
+    runs : tuple of str
+        Windows that enter; none if the run itself has the physical modulus.
+    refused : mapping
+        Reason by window, of those that do not enter.
     """
 
     tolerance: float
     asked: tuple[str, ...]
     reached: bool
-    runs: tuple[str, ...]
-    refused: Mapping[str, str]
     needed: Need
-
-    @property
-    def said(self) -> str:
-        """What was asked and reached, in a sentence."""
-        percent, *rest = f"{100 * self.tolerance:.3g} %", self.asked[-1]
-        asked = " and the ".join(filter(None, (", the ".join(self.asked[:-1]), *rest)))
-        told = f"{len(self.runs)} windows at the physical Young's modulus"
-        if self.reached:
-            return f"{told} give the {asked} to within {percent}."
-        windows, packings = self.needed
-        more = f"about {windows} windows" if packings == 1 else f"about {packings} seeds"
-        return f"{told} do not give the {asked} to within {percent}: {more} would."
+    runs: tuple[str, ...] = ()
+    refused: Mapping[str, str] = {}
 
 
 class Extrapolated(Document):
@@ -89,14 +68,38 @@ class Extrapolated(Document):
 
     Attributes
     ----------
-    windows : WindowsOfRun or None
-        Where the values at the physical modulus are from.
+    tolerance : Reached or None
+        Of a run that was asked for one.
     """
 
     made_by = "dragchain step extrapolate"
 
     quantities: tuple[ExtrapolatedQuantity, ...]
-    windows: WindowsOfRun | None = None
+    tolerance: Reached | None = None
+
+    @property
+    def said(self) -> str:
+        """What was asked and reached, in a sentence; empty if nothing was asked."""
+        found = self.tolerance
+        if found is None:
+            return ""
+        labels = [one.label if (one := self.of(name)) else name for name in found.asked]
+        asked = " and the ".join(filter(None, (", the ".join(labels[:-1]), labels[-1])))
+        percent = f"{100 * found.tolerance:.3g} %"
+        who, gives, not_give = "The run", "gives", "does not give"
+        if self.windows:
+            who, gives, not_give = f"{len(self.windows)} windows", "give", "do not give"
+        where, what = "at the physical Young's modulus", f"the {asked} to within {percent}"
+        if found.reached:
+            return f"{who} {where} {gives} {what}."
+        windows, packings = found.needed
+        more = f"{windows} windows" if packings == 1 and self.windows else f"{packings} seeds"
+        return f"{who} {where} {not_give} {what}: about {more} would."
+
+    @property
+    def windows(self) -> tuple[str, ...]:
+        """Windows that enter; none of a run without."""
+        return self.tolerance.runs if self.tolerance else ()
 
     def of(self, name: str) -> ExtrapolatedQuantity | None:
         """A quantity by its name, None if it was not measured."""

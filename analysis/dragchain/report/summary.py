@@ -124,7 +124,7 @@ def _estimate(name: str, unit: str, found: Estimate) -> Iterator[tuple[str, Cell
 def _asked(study: StudyRuns) -> Row:
     """What the settings were chosen for, their forecast cost, and what windows reached."""
     asked = study.process.case.asked
-    windows = study.extrapolated.windows if study.extrapolated else None
+    found = study.extrapolated.tolerance if study.extrapolated else None
     row: Row = {}
     if asked is not None:
         row |= {
@@ -133,8 +133,8 @@ def _asked(study: StudyRuns) -> Row:
             "forecast_cost": asked.relative_cost,
             "forecast_largest_cost": asked.largest_cost,
         }
-    if windows is not None:
-        row |= {"windows": len(windows.runs), "windows_reached": windows.reached}
+    if found is not None:
+        row |= {"windows": len(found.runs), "tolerance_reached": found.reached}
     return row
 
 

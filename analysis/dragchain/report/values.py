@@ -122,7 +122,7 @@ def _own(
 ) -> Iterator[tuple[str, Estimate]]:
     """The values of the run in simulated time, later ones instead of earlier ones."""
     for one in extrapolated.quantities if extrapolated else ():
-        yield one.name, Estimate(one.measured, math.nan, math.nan)
+        yield one.name, one.measured
     for name, force in _FORCES.items():
         yield name, of_mean(found.forces[force])
     yield "drag_std", Estimate(found.forces["drag_n"].std, math.nan, math.nan)
@@ -141,12 +141,10 @@ def _own(
 
 def _correction(name: str, extrapolated: Extrapolated | None) -> Correction | None:
     """What the windows of a run make of a quantity."""
-    if extrapolated is None or extrapolated.windows is None:
+    one = extrapolated.of(name) if extrapolated else None
+    if extrapolated is None or one is None or one.value is None or not extrapolated.windows:
         return None
-    one = extrapolated.of(name)
-    known = one.estimate if one else None
-    windows = len(extrapolated.windows.runs)
-    return Correction(known.over(one.measured), windows) if one and known else None
+    return Correction(one.value.over(one.measured.value), len(extrapolated.windows))
 
 
 def of_mean(mean: MeanEstimate) -> Estimate:
@@ -177,23 +175,33 @@ def over_packings(several: Sequence[Values]) -> Values:
 def _common(values: Sequence[Estimate], basis: Basis) -> Estimate | None:
     if not values:
         return None
-    between = mean_of([one.value for one in values])
-    if basis is not Basis.WINDOWS:
-        return between
+    if basis is Basis.WINDOWS:
+        return mean_over_packings(values)
+    return mean_of([one.value for one in values])
+
+
+def mean_over_packings(values: Sequence[Estimate]) -> Estimate:
+    """The mean of values whose intervals include the scatter between packings."""
     widths = [one.ci95_high - one.ci95_low for one in values]
-    return Estimate.around(between.value, 0.5 * math.hypot(*widths) / len(values))
+    mean = math.fsum(one.value for one in values) / len(values)
+    return Estimate.around(mean, 0.5 * math.hypot(*widths) / len(values))
 
 
 def _of_packings(values: Values) -> Iterator[str]:
+    windows = (
+        "; those of values from windows include the scatter from packing to packing"
+        if values.corrected
+        else ""
+    )
     if values.packings > 1:
         yield (
             f"Means over {values.packings} packings (seeds); 95 % confidence intervals are "
-            "Student's t between packings."
+            f"Student's t between packings{windows}."
         )
     else:
         yield (
             "One packing (seed): 95 % confidence intervals cover the scatter along its path, not "
-            "that between packings."
+            f"that between packings{windows}."
         )
 
 

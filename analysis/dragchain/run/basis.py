@@ -163,9 +163,9 @@ def judge(
     if not doubts:
         return Standing(quantity, run, run, scaled, "", reliable)
     if correction is not None:
-        factor = correction.factor
-        low, high = sorted((run.value * factor.ci95_low, run.value * factor.ci95_high))
-        value = Estimate(run.value * factor.value, low, high)
+        ratio = correction.factor
+        low, high = sorted((run.value * ratio.ci95_low, run.value * ratio.ci95_high))
+        value = Estimate(run.value * ratio.value, low, high)
         return Standing(quantity, run, value, Basis.WINDOWS, "", reliable, correction.windows)
     why = _why_not(case)
     reason = f"not corrected for {' and '.join(doubts)}: {why}"

@@ -30,6 +30,10 @@ class Quantity:
     squared: bool = False
     signed: bool = False
 
+    def rooted(self, blocks: Floats) -> Floats:
+        """Values of blocks, (B,), as a run's value is one."""
+        return np.sqrt(blocks) if self.squared else blocks
+
     def of_blocks(self, blocks: Floats) -> float:
         """A run's value from the values of its blocks, (B,)."""
         mean = float(np.mean(blocks))

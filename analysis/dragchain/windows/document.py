@@ -1,10 +1,18 @@
 """What a round of windows found: ``round-<number>.json``; and what is known beforehand."""
 
+import math
 from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import AllowInfNan, BeforeValidator
 
 from dragchain.documents import Document, Part
 from dragchain.report.extrapolated import Need
-from dragchain.statistics.estimate import Estimate, Real
+from dragchain.statistics.estimate import Estimate
+
+
+def _infinite(number: object) -> object:
+    return math.inf if number is None else number
 
 
 class Known(Part):
@@ -14,9 +22,7 @@ class Known(Part):
     ----------
     ratio_log, ratio_log_std : float
         Logarithm of the value at the physical modulus over that of the soft run: its mean, and its
-        standard deviation from scene to scene. An infinite one says nothing.
-    share : float
-        Of a soft stretch's deviation from the mean that the window at this place shares.
+        standard deviation from scene to scene; infinite if they say nothing.
     variance_ratio, degrees : float
         Relative variance of windows over that of the soft run's stretches of their length, and how
         many windows' worth of evidence that is.
@@ -25,8 +31,7 @@ class Known(Part):
     """
 
     ratio_log: float
-    ratio_log_std: float
-    share: float
+    ratio_log_std: Annotated[float, AllowInfNan(True), BeforeValidator(_infinite)]
     variance_ratio: float
     degrees: float
     packing_std: float
@@ -88,8 +93,8 @@ class WindowedQuantity(Part):
         Whether the tolerance applies to it.
     soft : float
         Value of the run with reduced moduli.
-    value, ci95_low, ci95_high : float
-        At physical stiffness; NaN before there are windows.
+    value : Estimate
+        At physical stiffness; NaN if too few windows have it.
     """
 
     name: str
@@ -97,19 +102,12 @@ class WindowedQuantity(Part):
     unit: str
     asked: bool
     soft: float
-    value: Real
-    ci95_low: Real
-    ci95_high: Real
-
-    @property
-    def estimate(self) -> Estimate:
-        """The value at physical stiffness with its interval."""
-        return Estimate(self.value, self.ci95_low, self.ci95_high)
+    value: Estimate
 
     @property
     def half_width(self) -> float:
-        """Half-width of the interval, relative; NaN before there are windows."""
-        return abs((self.ci95_high - self.ci95_low) / 2 / self.value)
+        """Half-width of the interval, relative."""
+        return abs((self.value.ci95_high - self.value.ci95_low) / 2 / self.value.value)
 
 
 class Round(Document):

@@ -1,68 +1,106 @@
-"""The quantities of one run, and at the physical Young's modulus where windows give them."""
+"""The quantities of one run, and at the physical Young's modulus where it or windows give them."""
 
+import math
+from collections.abc import Iterator
 from pathlib import Path
 
-from dragchain.report.extrapolated import FILE, Extrapolated, ExtrapolatedQuantity, WindowsOfRun
-from dragchain.run.case import load_case
+from dragchain.report.extrapolated import (
+    FILE,
+    Extrapolated,
+    ExtrapolatedQuantity,
+    Need,
+    Reached,
+)
+from dragchain.run.case import Case, load_case
+from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.path_blocks import quantities_along
 from dragchain.tradeoff.quantities import QUANTITIES
-from dragchain.windows.document import Round
+from dragchain.windows.document import Round, WindowsRecord
+from dragchain.windows.estimate import UNKNOWN, of_one_run
 
 
-def extrapolate_run(run_dir: Path, round_file: Path | None = None) -> None:
+def extrapolate_run(run_dir: Path, record: Path, round_file: Path | None = None) -> None:
     """Write ``extrapolated.json`` of a run: its quantities, and what its windows make of them.
 
     Parameters
     ----------
     run_dir : Path
         A complete process run with tables and chains.
+    record : Path
+        ``windows.json``.
     round_file : Path, optional
         Last round of the windows of the run.
 
     Raises
     ------
     DocumentError
-        If the round or the run's case cannot be used.
+        If a document or the run's case cannot be used.
     TableError
         If a table is missing.
     """
-    found = _windowed(Round.read(round_file)) if round_file else _as_simulated(run_dir)
+    if round_file is not None:
+        found = _windowed(Round.read(round_file))
+    else:
+        found = _alone(run_dir, load_case(run_dir), WindowsRecord.read(record))
     found.write(run_dir / FILE)
 
 
-def _as_simulated(run_dir: Path) -> Extrapolated:
-    values = quantities_along(run_dir, load_case(run_dir)).values()
+def _alone(run_dir: Path, case: Case, record: WindowsRecord) -> Extrapolated:
+    """The quantities of a run without windows."""
+    quantities = tuple(_quantities(run_dir, case, record))
+    asked = case.asked
+    if asked is None or asked.error is not None:
+        return Extrapolated(quantities=quantities)
+    ratios = [
+        (one.value.ci95_high - one.value.ci95_low) / 2 / abs(one.value.value) / asked.tolerance
+        for one in quantities
+        if one.name in asked.quantities and one.value
+    ]
+    worst = max(ratios, default=math.inf)
+    packings = math.ceil(worst**2) if math.isfinite(worst) else 1
     return Extrapolated(
-        quantities=tuple(
-            ExtrapolatedQuantity(
-                name=one.name, label=one.label, unit=one.unit, measured=values[one.name]
-            )
-            for one in QUANTITIES
-            if one.name in values
-        )
+        quantities=quantities,
+        tolerance=Reached(
+            tolerance=asked.tolerance,
+            asked=asked.quantities,
+            reached=worst <= 1.0,
+            needed=Need(0, packings),
+        ),
     )
+
+
+def _quantities(run_dir: Path, case: Case, record: WindowsRecord) -> Iterator[ExtrapolatedQuantity]:
+    along = quantities_along(run_dir, case)
+    values = along.values()
+    for one in QUANTITIES:
+        if one.name in values:
+            blocks = one.rooted(along.of_blocks(one.name))
+            known = record.quantities.get(one.name, UNKNOWN)
+            found = of_one_run(blocks, values[one.name], known)
+            physical = found if case.fidelity.youngs_modulus_scale == 1.0 else None
+            yield ExtrapolatedQuantity(
+                name=one.name, label=one.label, unit=one.unit, measured=found, value=physical
+            )
 
 
 def _windowed(found: Round) -> Extrapolated:
     """The quantities of a run as its windows have them at physical stiffness."""
     return Extrapolated(
-        windows=WindowsOfRun(
+        tolerance=Reached(
             tolerance=found.tolerance,
-            asked=tuple(one.label for one in found.quantities if one.asked),
+            asked=tuple(one.name for one in found.quantities if one.asked),
             reached=found.reached,
+            needed=found.needed,
             runs=tuple(one.run for one in found.entering),
             refused={one.run: one.refused for one in found.windows if one.refused},
-            needed=found.needed,
         ),
         quantities=tuple(
             ExtrapolatedQuantity(
                 name=one.name,
                 label=one.label,
                 unit=one.unit,
-                measured=one.soft,
-                value=one.value,
-                ci95_low=one.ci95_low,
-                ci95_high=one.ci95_high,
+                measured=Estimate(one.soft, math.nan, math.nan),
+                value=one.value if one.value.known else None,
             )
             for one in found.quantities
         ),

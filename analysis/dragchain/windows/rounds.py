@@ -12,6 +12,7 @@ from dragchain.network.write import write_chains
 from dragchain.report.extrapolated import Need
 from dragchain.run.case import load_case
 from dragchain.run.completeness import RunRecord
+from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.tables.write import write_tables
 from dragchain.tradeoff.measures import PathQuantities
@@ -23,13 +24,15 @@ from dragchain.windows.document import (
     WindowOfRun,
     WindowsRecord,
 )
-from dragchain.windows.estimate import UNKNOWN, Ratio, at_physical_stiffness, needed, ratio
+from dragchain.windows.estimate import UNKNOWN, Joined, joined, needed
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""
 
 _MOST_MORE = 2.0
 """A round has at most so many times the windows of the one before."""
+
+_NONE = Estimate(math.nan, math.nan, math.nan)
 
 _PLATEAU = 0.15
 """Largest relative difference of the coordination number in the first third of a sample from that
@@ -75,10 +78,10 @@ def judge_windows(
     soft = quantities_along(run_dir, load_case(run_dir))
     known = Round.read(before).windows if before else ()
     found = (*known, *(_measured(folder) for folder in windows[len(known) :]))
-    _judged(soft, found, tolerance, quantities, most, WindowsRecord.read(record)).write(out)
+    judged(soft, found, tolerance, quantities, most, WindowsRecord.read(record)).write(out)
 
 
-def _judged(
+def judged(
     soft: PathQuantities,
     windows: Sequence[WindowOfRun],
     tolerance: float,
@@ -86,21 +89,18 @@ def _judged(
     most: int,
     record: WindowsRecord,
 ) -> Round:
-    """The round that these windows are."""
+    """The round that these windows are; see `judge_windows`."""
     good = [one for one in windows if not one.refused]
     rows, needs = [], [Need(_FEWEST, 1)]
-    for quantity, found in _ratios(soft, good, record):
-        value = soft.values()[quantity.name]
-        estimate = at_physical_stiffness(found, len(good), value) if found else None
+    values = soft.values()
+    for quantity, found in _joined(soft, good, record):
         row = WindowedQuantity(
             name=quantity.name,
             label=quantity.label,
             unit=quantity.unit,
             asked=quantity.name in asked,
-            soft=value,
-            value=estimate.value if estimate else math.nan,
-            ci95_low=estimate.ci95_low if estimate else math.nan,
-            ci95_high=estimate.ci95_high if estimate else math.nan,
+            soft=values[quantity.name],
+            value=found.estimate(len(good)) if found else _NONE,
         )
         rows.append(row)
         if row.asked and found:
@@ -121,22 +121,20 @@ def _judged(
     )
 
 
-def _ratios(
+def _joined(
     soft: PathQuantities, windows: Sequence[WindowOfRun], record: WindowsRecord
-) -> Iterator[tuple[Quantity, Ratio | None]]:
-    """Each quantity of the soft run, and the ratio to it if at least two windows have it."""
+) -> Iterator[tuple[Quantity, Joined | None]]:
+    """Each quantity of the soft run at physical stiffness, None if not all windows have it."""
     for quantity in QUANTITIES:
         if quantity.name not in soft.values():
             continue
-        known = record.quantities.get(quantity.name, UNKNOWN)
-        own = [one for one in windows if quantity.name in one.values]
-        if len(own) < max(2, len(windows)):
+        own = [one.values[quantity.name] for one in windows if quantity.name in one.values]
+        if len(own) < max(_FEWEST, len(windows)):
             yield quantity, None
-            continue
-        there = [soft.at(quantity.name, one.begin_m, one.arc_m) for one in own]
-        stretches = _stretches(soft, quantity, own[0].arc_m)
-        values = [one.values[quantity.name] for one in own]
-        yield quantity, ratio(values, _rooted(np.array(there), quantity), stretches, known)
+        else:
+            known = record.quantities.get(quantity.name, UNKNOWN)
+            stretches = _stretches(soft, quantity, windows[0].arc_m)
+            yield quantity, joined(own, stretches, known)
 
 
 def _stretches(soft: PathQuantities, quantity: Quantity, arc_m: float) -> Floats:
@@ -145,11 +143,7 @@ def _stretches(soft: PathQuantities, quantity: Quantity, arc_m: float) -> Floats
     each = max(1, round(arc_m / soft.block_m))
     count = max(1, len(blocks) // each)
     means = [one.mean() for one in np.array_split(blocks, count)]
-    return _rooted(np.array(means), quantity)
-
-
-def _rooted(values: Floats, quantity: Quantity) -> Floats:
-    return np.sqrt(values) if quantity.squared else values
+    return quantity.rooted(np.array(means))
 
 
 def _measured(folder: Path) -> WindowOfRun:

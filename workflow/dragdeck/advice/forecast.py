@@ -29,6 +29,15 @@ from dragdeck.study.model import Fidelity, Tolerance
 _DEFAULT_TOLERANCE = Tolerance(tolerance=0.1)
 """What is advised for where a study asks for nothing."""
 
+_OF_WINDOWS = (
+    "windows are run until the 95 % confidence interval of each quantity at the physical Young's "
+    f"modulus is inside it; steps and wall time are those of {FIRST_WINDOWS}"
+)
+
+_OF_STIFF_RUN = (
+    "windows would take most of the path: the whole drag has the physical Young's modulus"
+)
+
 
 @dataclass(frozen=True)
 class Forecast:
@@ -300,16 +309,9 @@ def _about(case: Case, advice: Advice, advised: Forecast) -> Iterator[tuple[str,
     if advice.chosen.error is not None:
         yield "error", f"largest measured error of an impact: {percent(advice.chosen.error)}"
     elif chosen.windows is not None:
-        yield (
-            "tolerance",
-            "windows are run until the 95 % confidence interval of each quantity at the physical "
-            f"Young's modulus is inside it; steps and wall time are those of {FIRST_WINDOWS}",
-        )
+        yield "tolerance", _OF_WINDOWS
     elif chosen.soft_start is not None:
-        yield (
-            "tolerance",
-            "windows would take most of the path: the whole drag has the physical modulus",
-        )
+        yield "tolerance", _OF_STIFF_RUN
     if advice.fallback:
         yield "fallback", advice.fallback
     if skin := chosen.skin_m:

@@ -77,8 +77,8 @@ class Work:
         facets = sum(workpiece_facets(one) for one in of_each_workpiece(case))
         return cls(study, tradeoff, expected_time(study), process_s, entry_s, facets)
 
-    def cpu_time(self, fidelity: Fidelity, windows: int = 0) -> float:
-        """CPU time of all runs with some settings, s: only ratios of it count.
+    def steps(self, fidelity: Fidelity, windows: int = 0) -> float:
+        """Time steps of process and windows, each counted as it costs at its modulus.
 
         Parameters
         ----------
@@ -88,7 +88,6 @@ class Work:
         """
         study = self.study.model_copy(update={"fidelity": fidelity})
         start, entry = study.at_start(), covered_fraction(study)
-        filling = self.filling_s / bed_timestep(start, "filling_timestep_fraction")
         drag_s = self.process_s - self.entry_s
         softer = self.entry_s + entry * drag_s
         steps = self._steps(start, softer) + self._steps(study, self.process_s - softer)
@@ -101,8 +100,14 @@ class Work:
             )
             own = self.study.model_copy(update={"fidelity": stiff})
             steps += windows * self._steps(own, window_fraction(study) * drag_s)
-        count, of_facets = study.media.count, self.facets * FACET_STEP_S
-        return filling * count / FILLING.particle_steps_per_s + steps * (
+        return steps
+
+    def cpu_time(self, fidelity: Fidelity, windows: int = 0) -> float:
+        """CPU time of all runs with some settings, s: only ratios of it count."""
+        start = self.study.model_copy(update={"fidelity": fidelity}).at_start()
+        filling = self.filling_s / bed_timestep(start, "filling_timestep_fraction")
+        count, of_facets = self.study.media.count, self.facets * FACET_STEP_S
+        return filling * count / FILLING.particle_steps_per_s + self.steps(fidelity, windows) * (
             count / PARTICLE_STEPS_PER_S + of_facets
         )
 

@@ -24,10 +24,11 @@ LEAD = "lead"
 
 RAMP_STAGES = 24
 
-_SHORTEST_RAMP_S, _RAMP_FALLS, _SETTLING_FALLS = 0.05, 2.0, 1.0
+_SHORTEST_RAMP_S, _RAMP_FALLS, _SETTLING_FALLS = 0.05, 2.0, 9.0
 """Time in which the moduli are raised, and in which the bed relaxes then, before anything is
 counted: in units of the root of d/g, about the fall over half a particle, and at least the first,
-s. The bed rises by what the overlaps give up (docs/evidence/windows.md)."""
+s. The bed rises by what the overlaps give up; in a drag with an inertial number of 0.06, its
+coordination number is at its plateau after that time (docs/evidence/windows.md)."""
 
 FIRST_WINDOWS = 3
 """Windows of the first round, if so many fit."""
