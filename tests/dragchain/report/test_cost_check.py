@@ -27,6 +27,7 @@ from dragchain.report.extrapolated import FILE as EXTRAPOLATED
 from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity
 from dragchain.report.runs import read_study
 from dragchain.report.study_report import write_report
+from dragchain.run.basis import QUANTITIES
 from dragchain.run.case import Case
 from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
@@ -74,9 +75,10 @@ def test_the_report_compares_cost_and_tolerance(run: Path, tmp_path: Path) -> No
 
 def write_physical(folder: Path, **found: tuple[float, float]) -> None:
     """Write ``extrapolated.json`` of a run at the physical modulus: values and half-widths."""
+    labels = {one.name: one.label for one in QUANTITIES}
     quantities = (
         ExtrapolatedQuantity(
-            name=name, label=name, unit="N", measured=Estimate(value, math.nan, math.nan),
+            name=name, label=labels[name], unit="N", measured=Estimate(value, math.nan, math.nan),
             value=Estimate.around(value, half),
         )
         for name, (value, half) in found.items()
