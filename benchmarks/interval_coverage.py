@@ -24,15 +24,15 @@ from scipy.signal import lfilter
 from scipy.stats import binomtest
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "helpers"))
+sys.path[:0] = [str(ROOT / "tests" / "helpers"), str(ROOT / "studies" / "droptest")]
 
+from make_record import Sensor, record_of  # noqa: E402
 from paper_drops import FALL_S, HEIGHT, paper_drop, paper_drops  # noqa: E402
 
 from dragchain.arrays import Floats  # noqa: E402
 from dragchain.calibration.fit import calibrate  # noqa: E402
 from dragchain.calibration.measured_impacts import measure  # noqa: E402
 from dragchain.calibration.sweep import Sweep, prepare  # noqa: E402
-from dragchain.calibration.trials import Sensor, record_of  # noqa: E402
 from dragchain.loading.facets import LEAST_EVENTS, standard_errors  # noqa: E402
 from dragchain.loading.samples import Sampled  # noqa: E402
 from dragchain.statistics.bed_effects import Factors, fit_effects  # noqa: E402
@@ -229,7 +229,7 @@ _FEW = 50
 
 
 def simulate(case: Simulated, length: int, trials: int) -> dict[str, object]:
-    """One row of the record."""
+    """One row of the record, with the exact interval of Clopper and Pearson (1934)."""
     random = np.random.default_rng([length, *case.name.encode()])
     found = [case.kind(random, length) for _ in range(trials)]
     held = np.array([one.contains(true) for one, true in found])

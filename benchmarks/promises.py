@@ -26,7 +26,7 @@ from dragchain.run.completeness import RunRecord
 from dragchain.tradeoff.path_blocks import quantities_along
 from dragchain.windows.document import Round, WindowsRecord
 from dragchain.windows.rounds import judged
-from dragdeck.advice.options import Work, plain_option, soft_scale, stiff_step
+from dragdeck.advice.options import Work, plain_option, stiff_settings
 from dragdeck.cases.case import Case
 from dragdeck.outlook.measured import measured_tradeoff
 from dragdeck.project import Project, by_run
@@ -136,12 +136,7 @@ def write_studies(seed: int, project: Project, scenes: int) -> None:
         asked = {"tolerance": TOLERANCE, "quantity": QUANTITIES}
         _write(project, f"drawn-{number:02d}", {**data, "fidelity": asked})
         (case,) = project.cases(f"drawn-{number:02d}")
-        stiff = {
-            "youngs_modulus_scale": 1.0,
-            "soft_start": soft_scale(case.study),
-            "timestep_fraction": stiff_step(case),
-            "ranks": 1,
-        }
+        stiff = {**stiff_settings(case).plain(), "ranks": 1}
         seeds = [data["seed"] + 1 + one for one in range(REFERENCE_PACKINGS)]
         reference = {**data, "fidelity": stiff, "sweep": {"seed": seeds}}
         _write(project, f"drawn-{number:02d}-stiff", reference)

@@ -1,508 +1,329 @@
-"""The entry script against a machine made of fakes: no network, no real environment."""
+"""The entry script in a clone whose Python packages are stand-ins, on a PATH with few programs.
+
+A set-up with network is a matter of a container: docs/start/installation.md has its command.
+"""
 
 import os
 import re
 import shutil
 import subprocess
+import sys
 import tomllib
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import pytest
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[1]
 
-SYSTEM_TOOLS = [
-    "sh",
-    "bash",
-    "env",
-    "cat",
-    "cksum",
-    "cp",
-    "df",
-    "chmod",
-    "dirname",
-    "find",
-    "flock",
-    "ln",
-    "mkdir",
-    "readlink",
-    "rm",
-    "sed",
-    "sleep",
-    "touch",
-]
-
-SHOWN = "[--logger] [dragdeck] [--show-failed-logs]"
-"""What follows the name of Snakemake in every call."""
-
-FAKE_PYTHON = """\
-#!/bin/sh
-case "$*" in
-    *version_info*) exit "${FAKE_OLD:-0}" ;;
-    *"import gmsh"*) exit "${FAKE_NO_CAD:-0}" ;;
-    *executor_plugin*) exit "${FAKE_NO_PLUGIN:-0}" ;;
-    *ensurepip*) exit "${FAKE_NO_VENV:-0}" ;;
-    --version) echo Python 3.12.1 ;;
-    "-m venv --clear "*)
-        echo venv >>"$FAKE_LOG"
-        sleep "${FAKE_SLOW:-0}"
-        mkdir -p "$4/bin"
-        cp "$0" "$4/bin/python"
-        for tool in snakemake dragdeck dragchain pytest ruff mypy lint-imports snakefmt; do
-            cp "$FAKE_TOOL" "$4/bin/$tool"
-        done
-        ;;
-    "-m pip "*)
-        echo "pip $*" >>"$FAKE_LOG"
-        exit "${FAKE_PIP:-0}"
-        ;;
-    -)
-        cat >/dev/null
-        echo picture >>"$FAKE_LOG"
-        exit "${FAKE_PICTURE:-0}"
-        ;;
-esac
+SYSTEM_TOOLS = """
+    bash cat cksum df dirname env false find flock grep id readlink rm sed sh sleep tr true
 """
 
-FAKE_TOOL = """\
+CALLED = """\
 #!/bin/sh
 name=${0##*/}
-{
-    printf '%s' "$name"
-    printf ' [%s]' "$@"
-    printf ' in %s with %s\\n' "$PWD" "${DRAGDECK_ENGINE:-no engine}"
-} >>"$FAKE_LOG"
-[ "$name" != "${FAKE_FAILS:-}" ] || exit "${FAKE_STATUS:-7}"
+printf '%s' "$name"
+printf ' [%s]' "$@"
+printf ' in %s with %s\\n' "$PWD" "${DRAGDECK_ENGINE:-no engine}"
+[ "$name" != "${FAILS:-}" ] || exit 5
 """
+"""A program that says how it was called."""
 
-FAKE_APT = """\
-#!/bin/sh
-echo "apt-get $*" >>"$FAKE_LOG"
-case "$*" in *liggghts*) cp "$FAKE_TOOL" "$FAKE_BIN/liggghts" ;; esac
-"""
+PACKAGES = ["snakemake", "dragdeck", "dragchain", "pytest", "ruff", "mypy", "lint-imports"]
+
+SNAKEMAKE = "snakemake [--logger] [dragdeck] [--show-failed-logs]"
 
 
-class Machine:
-    """A clone and a PATH that holds what a test puts there."""
+class Clone:
+    """A clone of the project's entry that is set up, and the programs on its PATH."""
 
     def __init__(self, folder: Path) -> None:
-        self.clone = folder / "a clone"
-        self.bin = folder / "bin"
-        self.log = folder / "log"
-        self.clone.mkdir()
-        self.bin.mkdir()
+        self.root = folder / "a clone"
+        self.path = folder / "bin"
+        self.path.mkdir()
         for name in ("run", "pyproject.toml", "constraints.txt", ".ci/run"):
-            (self.clone / name).parent.mkdir(exist_ok=True)
-            shutil.copy(ROOT / name, self.clone / name)
-        for tool in SYSTEM_TOOLS:
+            (self.root / name).parent.mkdir(exist_ok=True)
+            shutil.copy(ROOT / name, self.root / name)
+        for tool in SYSTEM_TOOLS.split():
             if found := shutil.which(tool):
-                (self.bin / tool).symlink_to(found)
-        self.add("tool", FAKE_TOOL)
-        self.add("id", "#!/bin/sh\necho 1000\n")
+                (self.path / tool).symlink_to(found)
         for name in ("liggghts", "mpirun"):
-            self.add(name, FAKE_TOOL)
-        self.add("python3", FAKE_PYTHON)
-
-    def add(self, name: str, text: str) -> Path:
-        path = self.bin / name
-        path.write_text(text)
-        path.chmod(0o755)
-        return path
-
-    def make_root(self) -> None:
-        self.add("id", "#!/bin/sh\necho 0\n")
-        self.add("apt-get", FAKE_APT)
-
-    def remove(self, name: str) -> None:
-        (self.bin / name).unlink()
+            write_program(self.path / name, CALLED)
+        self.packages = self.root / ".venv/bin"
+        self.packages.mkdir(parents=True)
+        for name in PACKAGES:
+            write_program(self.packages / name, CALLED)
+        self.python = self.packages / "python"
+        self.python.symlink_to("/bin/true")
+        self.stamp = self.root / ".venv/dragdeck-stamp"
+        pins = b"".join((self.root / n).read_bytes() for n in ("pyproject.toml", "constraints.txt"))
+        checksum = subprocess.run(["cksum"], input=pins, capture_output=True, check=True).stdout
+        self.stamp.write_text(f"{self.root}\n{checksum.decode()}")
 
     def run(
-        self, *arguments: str, cwd: Path | None = None, script: str = "run", **settings: str
+        self, *arguments: str, cwd: Path | None = None, script: str = "run", **settings: Any
     ) -> subprocess.CompletedProcess[str]:
-        self.log.touch()
-        fakes = {"LOG": self.log, "TOOL": self.bin / "tool", "BIN": self.bin}
-        environment = {"PATH": str(self.bin), "HOME": str(self.clone)}
-        environment |= {f"FAKE_{name}": str(path) for name, path in fakes.items()}
+        options = {name: settings.pop(name) for name in ("user",) if name in settings}
         return subprocess.run(
-            [self.clone / script, *arguments],
-            cwd=cwd or self.clone,
-            env=environment | settings,
+            [self.root / script, *arguments],
+            cwd=cwd or self.root,
+            env={"PATH": str(self.path), "HOME": str(self.root), "PIP_NO_INDEX": "1", **settings},
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
             check=False,
+            **options,
         )
 
-    def done(self) -> list[str]:
-        """What the fakes were asked to do, and forget it."""
-        lines = self.log.read_text().splitlines()
-        self.log.write_text("")
-        return lines
+    def extras(self) -> list[str]:
+        """The extras that are there according to the stamp."""
+        return self.stamp.read_text().splitlines()[2:]
+
+    def write_study(self, name: str, text: str) -> None:
+        (self.root / "studies" / name).mkdir(parents=True)
+        (self.root / "studies" / name / "study.yaml").write_text(text)
+
+
+def write_program(file: Path, text: str) -> Path:
+    file.unlink(missing_ok=True)
+    file.write_text(text)
+    file.chmod(0o755)
+    return file
+
+
+def refused(call: subprocess.CompletedProcess[str], *words: str) -> bool:
+    """Whether a call ended with a message that has these words and a remedy, and ran nothing."""
+    assert call.returncode == 1 and call.stdout == ""
+    assert all(word in call.stderr for word in (*words, "remedy:")), call.stderr
+    return True
 
 
 @pytest.fixture
-def machine(tmp_path: Path) -> Iterator[Machine]:
-    yield Machine(tmp_path)
+def clone(tmp_path: Path) -> Clone:
+    return Clone(tmp_path)
 
 
 @pytest.mark.parametrize("script", ["run", ".ci/run"])
-def test_scripts_are_executable_and_parse(script: str):
+def test_scripts_are_executable_and_parse(script: str) -> None:
     shell = (ROOT / script).read_text().splitlines()[0].split("/")[-1].split()[-1]
     assert os.access(ROOT / script, os.X_OK)
     subprocess.run([shell, "-n", ROOT / script], check=True)
 
 
+# --- what is called ----------------------------------------------------------------------
+
+
 @pytest.mark.parametrize("arguments", [[], ["--help"], ["-h"]])
-def test_usage_needs_nothing(machine: Machine, arguments: list[str]):
-    machine.remove("liggghts")
-    machine.remove("python3")
-    shown = machine.run(*arguments)
+def test_usage_needs_nothing(clone: Clone, arguments: list[str]) -> None:
+    shutil.rmtree(clone.root / ".venv")
+    (clone.path / "liggghts").unlink()
+    shown = clone.run(*arguments)
     assert shown.returncode == 0
     assert shown.stdout.startswith("usage: ./run")
-    assert "DRAGDECK_ENGINE" in shown.stdout
-
-
-def test_arguments_reach_snakemake_whole_and_from_anywhere(machine: Machine, tmp_path: Path):
-    ended = machine.run("all", "--config", "study=two words", cwd=tmp_path)
-    assert ended.returncode == 0
-    assert machine.done()[-1].startswith(
-        f"snakemake {SHOWN} [all] [--config] [study=two words] in {machine.clone} "
-    )
-
-
-def test_a_symbolic_link_leads_to_the_clone(machine: Machine, tmp_path: Path):
-    (tmp_path / "link").symlink_to(machine.clone / "run")
-    ended = machine.run("all", cwd=tmp_path, script="../link")
-    assert ended.returncode == 0
-    assert machine.done()[-1].startswith(f"snakemake {SHOWN} [all] in {machine.clone} ")
-
-
-@pytest.mark.parametrize("name", ["dragdeck", "dragchain"])
-def test_console_scripts_are_reached(machine: Machine, name: str):
-    machine.run(name, "explain", "--help")
-    assert machine.done()[-1].startswith(f"{name} [explain] [--help] ")
-
-
-@pytest.mark.parametrize("name", ["status", "open"])
-def test_status_and_report_are_near(machine: Machine, name: str):
-    machine.run(name, "small")
-    assert machine.done()[-1].startswith(f"dragdeck [{name}] [small] ")
 
 
 @pytest.mark.parametrize(
-    ("fails", "arguments"),
-    [("snakemake", ["all"]), ("dragdeck", ["dragdeck", "x"]), ("pytest", ["test"])],
+    ("arguments", "called"),
+    [
+        (["all", "--config", "study=two words"], f"{SNAKEMAKE} [all] [--config] [study=two words]"),
+        (["dragdeck", "explain", "--help"], "dragdeck [explain] [--help]"),
+        (["dragchain", "tables", "a b"], "dragchain [tables] [a b]"),
+        (["status", "small"], "dragdeck [status] [small]"),
+        (["open", "small"], "dragdeck [open] [small]"),
+    ],
 )
-def test_exit_status_passes_through(machine: Machine, fails: str, arguments: list[str]):
-    assert machine.run(*arguments, FAKE_FAILS=fails, FAKE_STATUS="5").returncode == 5
+def test_arguments_arrive_whole_from_anywhere(
+    clone: Clone, tmp_path: Path, arguments: list[str], called: str
+) -> None:
+    (tmp_path / "link").symlink_to(clone.root / "run")
+    for script in ("run", "../link"):
+        ended = clone.run(*arguments, cwd=tmp_path, script=script)
+        assert ended.stdout == f"{called} in {clone.root} with no engine\n"
+        assert ended.returncode == 0
+        assert clone.run(*arguments, FAILS=called.split()[0]).returncode == 5
 
 
-# --- the environment ---------------------------------------------------------------
-
-
-def test_set_up_once_and_again_when_the_pins_change(machine: Machine):
-    machine.run("setup")
-    first = machine.done()
-    assert first[0] == "venv"
-    assert all("--constraint constraints.txt" in line for line in first if line[:3] == "pip")
-    assert first[-1] == "picture"
-
-    machine.run("setup")
-    assert machine.done() == []
-
-    with (machine.clone / "constraints.txt").open("a") as pins:
-        pins.write("# changed\n")
-    machine.run("setup")
-    assert machine.done() == first
-
-
-def test_a_moved_clone_is_set_up_again(machine: Machine):
-    machine.run("setup")
-    machine.done()
-    machine.clone = machine.clone.rename(machine.clone.with_name("moved"))
-    machine.run("setup")
-    assert machine.done()[0] == "venv"
-
-
-def test_a_set_up_that_failed_is_not_taken_for_done(machine: Machine):
-    failed = machine.run("setup", FAKE_PIP="1")
-    assert failed.returncode == 1
-    assert "remedy" in failed.stderr
-    machine.done()
-    assert machine.run("setup").returncode == 0
-    assert machine.done()[0] == "venv"
-
-
-@pytest.mark.skipif(not shutil.which("flock"), reason="the lock is flock's")
-def test_two_calls_at_once_set_up_once(machine: Machine):
-    with ThreadPoolExecutor() as pool:
-        calls = [pool.submit(machine.run, "setup", FAKE_SLOW="1") for _ in range(2)]
-    assert [call.result().returncode for call in calls] == [0, 0]
-    assert machine.done().count("venv") == 1
-
-
-# --- what is missing -----------------------------------------------------------------
-
-
-def test_missing_engine_is_named_with_both_ways_out(machine: Machine):
-    machine.remove("liggghts")
-    refused = machine.run("all")
-    assert refused.returncode == 1
-    assert "apt-get install --no-install-recommends liggghts" in refused.stderr
-    assert "DRAGDECK_ENGINE" in refused.stderr
-    assert machine.done() == []
-
-
-def test_missing_engine_is_installed_by_root(machine: Machine):
-    machine.remove("liggghts")
-    machine.make_root()
-    assert machine.run("setup").returncode == 0
-    assert machine.done()[:2] == [
-        "apt-get update -q",
-        "apt-get install -q -y --no-install-recommends liggghts",
-    ]
-
-
-def test_sudo_that_asks_for_a_password_is_not_used(machine: Machine):
-    machine.remove("liggghts")
-    machine.make_root()
-    machine.add("id", "#!/bin/sh\necho 1000\n")
-    machine.add("sudo", "#!/bin/sh\nexit 1\n")
-    assert machine.run("setup").returncode == 1
-    assert machine.done() == []
-
-
-def test_engine_of_ones_own(machine: Machine, tmp_path: Path):
-    machine.remove("liggghts")
-    own = machine.add("own-engine", FAKE_TOOL)
-    ended = machine.run("all", cwd=tmp_path, DRAGDECK_ENGINE="./bin/own-engine")
+@pytest.mark.parametrize(
+    ("arguments", "called"),
+    [
+        (
+            ["--quick", "-x"],
+            r"ruff .*\npytest .*\[-m\] \[not engine and not slow\] \[-x\]",
+        ),
+        (["--attacks", "-k", "kill"], r"pytest .*\[--attacks\] \[-m\] \[attack\] \[-k\] \[kill\]"),
+        (["--audit"], r"pytest \[--audit\] \[-m\] \[audit\]"),
+        (["-k", "mesh or run"], r"pytest \[-k\] \[mesh or run\]"),
+        ([], r"ruff .*\nruff .*\nmypy .*\nlint-imports .*\npytest \[-n\] [^k]*"),
+    ],
+)
+def test_tests_bring_their_packages(clone: Clone, arguments: list[str], called: str) -> None:
+    ended = clone.run("test", *arguments)
     assert ended.returncode == 0
-    assert own.samefile(machine.done()[-1].split(" with ")[-1])
-
-    refused = machine.run("all", DRAGDECK_ENGINE="/no/such/engine")
-    assert refused.returncode == 1
-    assert "/no/such/engine" in refused.stderr
+    assert re.fullmatch(rf"{called} in .*\n", ended.stdout)
+    assert clone.extras() == ["cad", "crate", "docs", "notebook", "test"]
 
 
-@pytest.mark.parametrize("settings", [{"FAKE_OLD": "1"}, {"PYTHON": "/no/such/python"}])
-def test_python_that_is_no_use(machine: Machine, settings: dict[str, str]):
-    for newer in ("python3.11", "python3.12", "python3.13", "python3.14"):
-        (machine.bin / newer).unlink(missing_ok=True)
-    refused = machine.run("setup", **settings)
-    assert refused.returncode == 1
-    assert "3.11 or newer" in refused.stderr
-    assert "PYTHON" in refused.stderr
+def test_a_failed_check_fails_the_whole_and_still_tests(clone: Clone, tmp_path: Path) -> None:
+    ended = clone.run(script=".ci/run", cwd=tmp_path, FAILS="mypy")
+    assert ended.returncode == 1
+    assert "quality check failed" in ended.stderr
+    assert ended.stdout.splitlines()[-1].startswith("pytest ")
+    assert clone.run(script=".ci/run", cwd=tmp_path, FAILS="pytest").returncode == 5
 
 
-def test_python_of_ones_own(machine: Machine):
-    own = machine.add("newer", FAKE_PYTHON)
-    machine.remove("python3")
-    assert machine.run("setup", PYTHON=str(own)).returncode == 0
+# --- what is missing -----------------------------------------------------------------------
 
 
-def test_python_without_venv(machine: Machine):
-    refused = machine.run("setup", FAKE_NO_VENV="1")
-    assert refused.returncode == 1
-    assert "python3-venv" in refused.stderr
+def test_missing_engine_is_named_with_both_ways_out(clone: Clone) -> None:
+    (clone.path / "liggghts").unlink()
+    install = "apt-get install --no-install-recommends liggghts"
+    assert refused(clone.run("all"), install, "DRAGDECK_ENGINE")
 
 
-def test_drawing_is_installed_or_missed_aloud(machine: Machine):
-    warned = machine.run("setup", FAKE_PICTURE="1")
-    assert warned.returncode == 0
-    assert "libegl1" in warned.stderr
-
-    machine.make_root()
-    (machine.clone / ".venv/dragdeck-stamp").unlink()
-    machine.done()
-    machine.run("setup", FAKE_PICTURE="1")
-    done = machine.done()
-    assert any("libegl1" in line for line in done if line.startswith("apt-get install"))
-    assert done.count("picture") == 2
+def test_engine_of_ones_own_is_seen_from_where_the_caller_is(clone: Clone, tmp_path: Path) -> None:
+    own = (clone.path / "liggghts").rename(clone.path / "own")
+    ended = clone.run("all", cwd=tmp_path, DRAGDECK_ENGINE="./bin/own")
+    assert own.samefile(ended.stdout.strip().split(" with ")[-1])
+    assert refused(clone.run("all", DRAGDECK_ENGINE="./no/such"), f"{clone.root}/./no/such")
 
 
-def test_what_step_files_need_is_installed_or_missed_aloud(machine: Machine):
-    warned = machine.run("setup", FAKE_NO_CAD="1")
-    assert warned.returncode == 0
-    assert "STEP" in warned.stderr and "libglu1-mesa" in warned.stderr
-    assert any(".[cad,crate,docs,test]" in line for line in machine.done())
-
-    machine.make_root()
-    (machine.clone / ".venv/dragdeck-stamp").unlink()
-    machine.run("setup", FAKE_NO_CAD="1")
-    assert any("libglu1-mesa" in line for line in machine.done() if line.startswith("apt-get i"))
-
-
-def test_missing_mpirun_is_only_a_warning(machine: Machine):
-    machine.remove("mpirun")
-    warned = machine.run("setup")
+def test_missing_mpirun_is_only_a_warning(clone: Clone) -> None:
+    (clone.path / "mpirun").unlink()
+    warned = clone.run("all")
     assert warned.returncode == 0
     assert "openmpi-bin" in warned.stderr
 
 
-# --- a queue ---------------------------------------------------------------------------
+@pytest.mark.parametrize("there", [None, "false"])
+def test_python_that_is_no_use(clone: Clone, there: str | None) -> None:
+    clone.stamp.unlink()
+    if there:
+        (clone.path / "python3").symlink_to(clone.path / there)
+    assert refused(clone.run("all"), "3.11 or newer", "PYTHON")
+    assert refused(clone.run("all", PYTHON="bin/python"), f"{clone.root}/bin/python")
 
 
-def test_only_the_queue_needs_its_plugin(machine: Machine):
-    machine.run("setup")
-    machine.done()
-    machine.run("all", FAKE_NO_PLUGIN="1")
-    assert names(machine.done()) == ["snakemake"]
-    machine.run("all", "--workflow-profile", "profiles/slurm", FAKE_NO_PLUGIN="1")
-    installed, ran = machine.done()
-    assert ".[slurm]" in installed and "--constraint constraints.txt" in installed
-    assert ran.startswith(f"snakemake {SHOWN} [all] [--workflow-profile] [profiles/slurm] ")
-    machine.run("all", "--workflow-profile", "profiles/slurm")
-    assert names(machine.done()) == ["snakemake"]
+def test_python_without_venv(clone: Clone, tmp_path: Path) -> None:
+    """As Debian's is without its package python3-venv."""
+    clone.stamp.unlink()
+    (tmp_path / "ensurepip.py").write_text("raise ImportError")
+    python = f"#!/bin/sh\nPYTHONPATH='{tmp_path}' exec '{sys.executable}' \"$@\"\n"
+    write_program(clone.path / "python3", python)
+    assert refused(clone.run("all"), "apt-get install python3-venv")
 
 
-def test_a_queue_that_would_cut_ranks_is_refused(machine: Machine):
-    machine.run("setup")
-    machine.done()
-    refused = machine.run("all", "--profile", "profiles/slurm")
-    assert refused.returncode == 1
-    assert "remedy: --workflow-profile profiles/slurm" in refused.stderr
-    assert machine.done() == []
+def test_bundling_scripts_needs_npm(clone: Clone) -> None:
+    assert refused(clone.run("web"), "npm is missing")
 
 
-def test_the_test_of_the_queue_installs_a_slurm(machine: Machine):
-    machine.run("setup")
-    machine.done()
-    if not shutil.which("slurmctld", path="/usr/sbin"):
-        refused = machine.run("test", "--slurm")
-        assert refused.returncode == 1
-        assert "slurm-wlm munge" in refused.stderr
-    for name in ("slurmctld", "munged"):
-        machine.add(name, FAKE_TOOL)
-    assert machine.run("test", "--slurm", "-x").returncode == 0
-    assert machine.done()[-1].startswith("pytest [--slurm] [-m] [slurm] [-x] ")
+def test_a_queue_that_would_cut_ranks_is_refused(clone: Clone) -> None:
+    call = clone.run("all", "--profile", "profiles/slurm")
+    assert refused(call, "remedy: --workflow-profile profiles/slurm")
 
 
-# --- the tests -------------------------------------------------------------------------
+def test_a_folder_that_cannot_be_written() -> None:
+    with TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)
+        clone = Clone(Path(folder))
+        clone.root.chmod(0o555)
+        other = {"user": 65534} if os.geteuid() == 0 else {}
+        assert refused(clone.run("all", **other), "cannot be written to", str(clone.root))
+        clone.root.chmod(0o755)
 
 
-def names(lines: list[str]) -> list[str]:
-    return [line.split(" [")[0].split(" in ")[0] for line in lines]
+def test_a_full_disk(clone: Clone) -> None:
+    write_program(clone.path / "df", "#!/bin/sh\necho /dev/vda 9999999 9999957 42 100% /\n")
+    assert refused(clone.run("all"), "the disk is full", "42 kB free")
 
 
-def test_test_runs_the_checks_then_pytest(machine: Machine):
-    (machine.clone / "Snakefile").touch()
-    (machine.clone / "workflow/rules").mkdir(parents=True)
-    (machine.clone / "workflow/rules/decks.smk").touch()
-    machine.run("setup")
-    machine.done()
-    assert machine.run("test").returncode == 0
-    done = machine.done()
-    checks = ["ruff", "ruff", "mypy", "lint-imports", "snakefmt", "snakemake"]
-    assert names(done) == [*checks, "pytest"]
-    assert "[Snakefile] [workflow/rules/decks.smk]" in done[4]
+# --- the set-up ------------------------------------------------------------------------------
 
 
-def test_the_browser_of_the_tests_is_installed_or_missed_aloud(machine: Machine):
-    machine.run("setup")
-    assert not any("chromium" in line for line in machine.done())
-    warned = machine.run("test")
-    assert warned.returncode == 0
-    assert "chromium-driver" in warned.stderr
-
-    machine.make_root()
-    machine.done()
-    machine.run("test")
-    assert any("chromium chromium-driver" in line for line in machine.done())
-    for name in ("chromium", "chromedriver"):
-        machine.add(name, FAKE_TOOL)
-    machine.run("test")
-    assert not any("apt-get" in line for line in machine.done())
+@pytest.mark.slow
+def test_a_set_up_that_failed_is_not_taken_for_done(clone: Clone) -> None:
+    """A real one, which ends where pip asks for packages."""
+    (clone.path / "python3").symlink_to(sys.executable)
+    with (clone.root / "constraints.txt").open("a") as pins:
+        pins.write("# changed\n")
+    assert refused(clone.run("all"), "making .venv", "network access")
+    assert not clone.stamp.exists()
 
 
-def test_bundling_scripts_needs_npm_alone(machine: Machine):
-    for name in ("liggghts", "python3"):
-        machine.remove(name)
-    refused = machine.run("web")
-    assert refused.returncode == 1
-    assert "npm is missing" in refused.stderr
-    for name in ("npm", "node"):
-        machine.add(name, FAKE_TOOL)
-    assert machine.run("web").returncode == 0
-    assert names(machine.done()) == ["npm", "node"]
+def test_a_moved_clone_is_set_up_again(clone: Clone) -> None:
+    clone.root = clone.root.rename(clone.root.with_name("moved"))
+    assert refused(clone.run("all"), "3.11 or newer")
 
 
-def test_a_quick_test_leaves_out_what_is_slow(machine: Machine):
-    machine.run("setup")
-    machine.done()
-    assert machine.run("test", "--quick", "-x").returncode == 0
-    linted, tested = machine.done()
-    assert linted.startswith("ruff [check]")
-    assert "[-m] [not engine and not slow] [-x]" in tested
+STEP = "workpiece: {shape: {kind: mesh, file: part.STP}}\n"
 
 
-def test_all_attacks_are_made_when_asked_for(machine: Machine):
-    machine.run("setup")
-    machine.done()
-    assert machine.run("test", "--attacks", "-k", "kill").returncode == 0
-    (line,) = machine.done()
-    assert line.startswith("pytest [-n]")
-    assert "[--attacks] [-m] [attack] [-k] [kill]" in line
+@pytest.mark.parametrize(
+    ("arguments", "extra"),
+    [
+        (["all", "--config", "study=cut"], "cad"),
+        (["dragdeck", "check", "child"], "cad"),
+        (["crate", "--config", "study=plain"], "crate"),
+        (["all", "--workflow-profile", "profiles/slurm"], "slurm"),
+        (["setup", "docs"], "docs"),
+    ],
+)
+def test_packages_are_added_when_first_asked_for(
+    clone: Clone, arguments: list[str], extra: str
+) -> None:
+    clone.write_study("cut", STEP)
+    clone.write_study("child", "extends: cut\n")
+    clone.write_study("plain", "# not a part.step\nextends: plain\n")
+    for others in (["all", "--config", "study=plain"], ["status", "cut"], ["setup"]):
+        assert clone.run(*others).returncode == 0
+    assert clone.extras() == []
+
+    clone.python.unlink()
+    clone.python.symlink_to("/bin/false")
+    assert refused(clone.run(*arguments), f"packages of {extra}", "pip could not install")
+    assert clone.extras() == []
+    assert clone.run("all").returncode == 0
+
+    clone.python.unlink()
+    clone.python.symlink_to("/bin/true")
+    assert f"packages of {extra}" in clone.run(*arguments).stderr
+    assert clone.extras() == [extra]
+    assert clone.run(*arguments).stderr == ""
 
 
-def test_everything_leaves_no_test_out(machine: Machine):
-    machine.run("setup")
-    for name in ("slurmctld", "munged"):
-        machine.add(name, FAKE_TOOL)
-    machine.done()
-    assert machine.run("test", "--everything").returncode == 0
-    tested = machine.done()[-1]
-    assert "[--attacks] [--slurm] [--audit] [--long-commands]" in tested and "[-m]" not in tested
+def test_packages_of_no_known_name(clone: Clone) -> None:
+    assert refused(clone.run("setup", "crates"), "crates", "cad, crate, docs")
 
 
-def test_the_audit_runs_alone_when_asked_for(machine: Machine):
-    machine.run("setup")
-    machine.done()
-    assert machine.run("test", "--audit", "-x").returncode == 0
-    assert machine.done()[-1].startswith("pytest [--audit] [-m] [audit] [-x] ")
+@pytest.mark.skipif(not shutil.which("flock"), reason="the lock is flock's")
+def test_two_calls_at_once_set_up_once(clone: Clone) -> None:
+    write_program(clone.python, "#!/bin/sh\necho called >>calls\nsleep 1\n")
+    with ThreadPoolExecutor() as pool:
+        calls = [pool.submit(clone.run, "crate") for _ in range(2)]
+    assert [call.result().returncode for call in calls] == [0, 0]
+    assert (clone.root / "calls").read_text() == "called\n"
+    assert clone.extras() == ["crate"]
 
 
-def test_arguments_go_to_pytest_alone(machine: Machine):
-    machine.run("setup")
-    machine.done()
-    assert machine.run("test", "-k", "mesh or run").returncode == 0
-    (line,) = machine.done()
-    assert line.startswith("pytest [-k] [mesh or run] ")
+# --- the pins ----------------------------------------------------------------------------------
 
 
-def test_a_failed_check_fails_the_whole_and_still_tests(machine: Machine):
-    ended = machine.run("test", FAKE_FAILS="mypy")
-    assert ended.returncode == 1
-    assert "quality check failed" in ended.stderr
-    assert names(machine.done())[-1] == "pytest"
-
-
-def test_ci_does_what_the_readme_says(machine: Machine, tmp_path: Path):
-    ended = machine.run(script=".ci/run", cwd=tmp_path, FAKE_FAILS="pytest", FAKE_STATUS="4")
-    assert ended.returncode == 4
-    assert names(machine.done())[-1] == "pytest"
-
-
-# --- the pins ----------------------------------------------------------------------------
-
-
-def pins() -> dict[str, str]:
+def test_every_dependency_is_pinned_at_or_above_its_minimum() -> None:
     lines = (ROOT / "constraints.txt").read_text().splitlines()
-    entries = [line for line in lines if not line.startswith("#")]
-    assert all(re.fullmatch(r"[A-Za-z0-9._-]+==[A-Za-z0-9.!+]+", entry) for entry in entries)
-    named = (entry.lower().split("==") for entry in entries)
-    return {re.sub(r"[-_.]+", "-", name): version for name, version in named}
-
-
-def test_every_dependency_is_pinned_at_or_above_its_minimum():
+    pins: dict[str, list[str]] = {}
+    for line in lines:
+        if not line.startswith("#"):
+            pin = Requirement(line)
+            ((operator, version),) = ((one.operator, one.version) for one in pin.specifier)
+            assert operator == "==" and "*" not in version
+            pins.setdefault(re.sub(r"[-_.]+", "-", pin.name.lower()), []).append(version)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    wanted = [
-        *project["project"]["dependencies"],
-        *project["project"]["optional-dependencies"]["test"],
-        *project["project"]["optional-dependencies"]["slurm"],
-        *project["build-system"]["requires"],
-    ]
+    wanted = [*project["project"]["dependencies"], *project["build-system"]["requires"]]
+    for extra in ("cad", "crate", "docs", "notebook", "slurm", "test"):
+        wanted += project["project"]["optional-dependencies"][extra]
     for requirement in map(Requirement, wanted):
-        assert requirement.specifier.contains(pins()[requirement.name.lower()]), requirement
+        for version in pins[requirement.name.lower()]:
+            assert requirement.specifier.contains(version), requirement

@@ -43,12 +43,9 @@ DROPS = _argument("--drops", type=Path, required=True, metavar="FILE", dest="dro
 RECORD = _argument("record", type=Path, metavar="RECORD",
                    help="measured drop test: CSV file of force against time")  # fmt: skip
 WINDOWS_RECORD = _argument(
-    "--record",
-    type=Path,
-    required=True,
-    metavar="FILE",
+    "--record", type=Path, required=True, metavar="FILE",
     help="windows.json, what windows of other scenes say; required",
-)
+)  # fmt: skip
 MEASURES = _argument("measures", type=Path, nargs="+", metavar="MEASURES",
                      help="measures.json of each run, made by dragchain step measure")  # fmt: skip
 
@@ -235,20 +232,6 @@ STEPS = (
             "the simulated drop tests, writes result.json, impacts.csv and bias.csv to the folder, "
             "and prints the value for the study.",
             "calibration.results:calibrate_command", (RECORD, DROPS, OUT_DIR)),
-    Command("trials", "test the calibration on synthetic records",
-            "Test whether the calibration recovers known restitutions from synthetic force records "
-            "with noise. It reads simulated drop tests and writes trials.json and trials.csv.",
-            "calibration.trials:write_trials", (
-                DROPS,
-                _argument("--trials", type=Path, required=True, metavar="FILE",
-                          dest="trials_file",
-                          help="drops.json of the drop tests with random restitutions; required"),
-                _argument("--seed", type=int, default=1, metavar="N",
-                          help="random seed of sensors and noise (default: %(default)s)"),
-                _argument("--records", type=int, default=1, metavar="N",
-                          help="number of records per drop test (default: %(default)s)"),
-                _argument("--out", type=Path, required=True, metavar="FILE",
-                          help="file to write: trials.json; required"))),
     Command("calibration-report", "write the report on a calibration",
             "Write the report on a calibration. It reads the CSV file and the results in DIR, and "
             "writes report.html and figures to DIR.",

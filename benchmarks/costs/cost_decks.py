@@ -18,6 +18,7 @@ from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import timestep
 from dragdeck.scenes.drop_test import DropDeck, drop_scene
 from dragdeck.scenes.filling import FillingDeck, filling_scene
+from dragdeck.scenes.legs import Stop
 from dragdeck.scenes.moved_workpiece import MovedWorkpiece, ProcessDeck
 from dragdeck.scenes.process import process_scene
 from dragdeck.study.model import Study
@@ -159,7 +160,9 @@ def _begun(scene: AnyScene, source: str, steps: int) -> AnyScene:
     deck = scene.deck
     assert isinstance(deck, ProcessDeck)
     workpieces = [_in_its_drag(workpiece, steps) for workpiece in deck.workpieces]
-    return replace(scene, deck=replace(deck, source=source, workpieces=workpieces))
+    stops = [Stop(steps, writes=True)]
+    deck = replace(deck, source=source, workpieces=workpieces, stops=stops)
+    return replace(scene, deck=deck)
 
 
 def _in_its_drag(workpiece: MovedWorkpiece, steps: int) -> MovedWorkpiece:
@@ -178,7 +181,8 @@ def workpiece_in(case: Case, bed: Bed, source: str) -> AnyScene:
     scene = process_scene(case, bed)
     assert isinstance(scene.deck, ProcessDeck)
     workpieces = [replace(one, legs=one.legs[:-1]) for one in scene.deck.workpieces]
-    deck = replace(scene.deck, source=source, workpieces=workpieces, outputs=())
+    stops = [Stop(workpieces[0].legs[-1].end_step)]
+    deck = replace(scene.deck, source=source, workpieces=workpieces, stops=stops, outputs=())
     phases = scene.case.model_copy(update={"phases": scene.case.phases[:-1]})
     return replace(scene, deck=deck, case=phases, override="costs/keep_particles.in.j2")
 

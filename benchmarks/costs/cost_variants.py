@@ -117,10 +117,12 @@ def standard_case(case: Case) -> Case:
     """The case whose decks are the standard: its modulus and step, one rank, speed as it is.
 
     It has no restart points, because a short arc would have one or none by
-    chance, and one impact in its drop.
+    chance, and one impact in its drop. It neither continues a softer run nor has windows.
     """
     data = copy.deepcopy(case.study.model_dump(mode="json", exclude_unset=True))
-    data["fidelity"] = case.study.chosen_fidelity().model_dump(mode="json", exclude_unset=True)
+    data["fidelity"] = case.study.chosen_fidelity().model_dump(
+        mode="json", exclude_unset=True, exclude={"soft_start", "windows"}
+    )
     values = {
         "fidelity.ranks": 1,
         "fidelity.speed_factor": 1.0,

@@ -33,7 +33,7 @@ import pandas as pd
 CODE = r"(?P<code>^(?P<indent> *)(?P<ticks>```+).*?^(?P=indent)(?P=ticks) *$)"
 BLOCK = re.compile(
     rf"{CODE}|"
-    r"(?P<head><!-- (?P<what>[a-z](?:[^-]|-(?!->))*?)\s*-->)(?P<made>.*?)(?P<tail><!-- end -->)",
+    r"(?P<head><!-- (?P<what>[a-z](?:[^-]|-(?!->))*?)\s*-->).*?(?P<tail><!-- end -->)",
     re.M | re.S,
 )
 """A block, or code in which nothing is made; what is made may contain code."""
@@ -61,11 +61,10 @@ class Shown(float):
 
 @dataclass(frozen=True)
 class Block:
-    """A part of a page that is made: what it says of itself, and what stands there now."""
+    """A part of a page that is made, by what it says of itself."""
 
     page: Path
     what: str
-    made: str
 
     @property
     def kind(self) -> str:
@@ -88,23 +87,12 @@ class Records:
     ----------
     table : callable
         Table of a name.
-    labels : callable
-        The same table, in which rows are looked for. It differs from `table` only in a test that
-        changes the numbers.
     text : mapping of str to callable
         Markdown of a name.
     """
 
     table: Callable[[str], pd.DataFrame]
-    labels: Callable[[str], pd.DataFrame]
     text: Mapping[str, Callable[[], str]]
-
-
-def blocks(page: Path, text: str) -> Iterator[Block]:
-    """Every block of a page."""
-    for found in BLOCK.finditer(text):
-        if not found["code"]:
-            yield Block(page, found["what"], found["made"])
 
 
 def without_blocks(text: str) -> str:
@@ -136,7 +124,7 @@ def renewed(page: Path, text: str, records: Records) -> str:
     def made(found: re.Match[str]) -> str:
         if found["code"]:
             return found["code"]
-        block = Block(page, found["what"], found["made"])
+        block = Block(page, found["what"])
         return f"{found['head']}{content(block, records)}{found['tail']}"
 
     return BLOCK.sub(made, text)
@@ -187,15 +175,14 @@ def markdown_table(
 def selected(query: str, records: Records) -> Iterator[dict[str, Any]]:
     """The rows of a table that have the values of a query."""
     name, *conditions = shlex.split(query)
-    table, labels = records.table(name), records.labels(name)
-    labels = labels if len(labels) == len(table) else table
-    chosen = pd.Series(True, index=labels.index)
+    table = records.table(name)
+    chosen = pd.Series(True, index=table.index)
     for condition in conditions:
         column, _, value = condition.partition("=")
         if column.endswith("!"):
-            chosen &= ~_is(labels[column[:-1]], value)
+            chosen &= ~_is(table[column[:-1]], value)
         else:
-            chosen &= _is(labels[column], value)
+            chosen &= _is(table[column], value)
     for row in table[chosen.to_numpy()].to_dict("records"):
         yield {str(name): _shown(value) for name, value in row.items()}
 

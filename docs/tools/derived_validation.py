@@ -276,14 +276,6 @@ SPIN_PACKINGS = 3
 
 ORDINALS = {"1": "first", "2": "second", "3": "third"}
 
-COSTS = {
-    "spin": "spin",
-    "oscillation": "vertical oscillation",
-    "tilt": "tilt",
-    "workpieces": "three workpieces on the circle",
-    "rotating_bowl": "rotating bowl of facets, workpiece at rest",
-}
-
 
 def _drags(store: Store, study: str, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Mean drag of every workpiece, and the half-width of its interval."""
@@ -353,11 +345,6 @@ def _spins(store: Store) -> pd.DataFrame:
         )
     }
     return table.assign(**halves, change=table["drag_n"] / table["drag_n"].iloc[0] - 1)
-
-
-@derived("motion/option_costs")
-def _option_costs(store: Store) -> pd.DataFrame:
-    return _worded(store.table("motion/costs/costs"), "name", COSTS)
 
 
 @derived("validation/packings_total")

@@ -19,7 +19,7 @@ def pages() -> list[Path]:
 
 def records() -> Records:
     """The committed records."""
-    return Records(table, table, TEXTS)
+    return Records(table, TEXTS)
 
 
 def changed_pages(names: Sequence[str] = ()) -> Iterator[tuple[Path, str]]:

@@ -1,14 +1,12 @@
 """Texts of the reference pages that are made from the code."""
 
 import argparse
-import ast
 import csv
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from fnmatch import fnmatchcase
 from functools import cache
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -165,86 +163,6 @@ def _attributes(text: str) -> dict[str, str]:
     return said if found else {}
 
 
-# --- messages ---------------------------------------------------------------------------
-
-
-def messages() -> str:
-    """Every error that the packages raise on purpose, by the file that raises it."""
-    parts = []
-    for package in ("workflow/dragdeck", "analysis/dragchain"):
-        for file in sorted((ROOT / package).rglob("*.py")):
-            rows = [[_cell(one) for one in row] for row in raised(file.read_text())]
-            if rows:
-                name = str(file.relative_to(ROOT / Path(package).parent))
-                heads = ["message", "limit", "remedy"]
-                parts.append(
-                    f"## `{name}`\n\n{markdown_table(heads, list(dict.fromkeys(map(tuple, rows))))}"
-                )
-    return "\n\n".join(parts)
-
-
-ERRORS = re.compile(r"^(_?[a-z_]*error|[A-Z]\w*Error|Refusal|EngineEnded)$")
-
-IN_ORDER = {
-    "Refusal": ("message", "value", "limit", "remedy"),
-    "EngineEnded": ("message", "remedy"),
-}
-"""The arguments of errors that take no keywords."""
-
-LINE = re.compile(r"\s*\b(value|limit|remedy): +")
-"""Where another line starts in a message that is a single text."""
-
-
-def raised(source: str) -> Iterator[tuple[str, str, str]]:
-    """Message, limit and remedy of every error that a module makes; an ellipsis is a value."""
-    tree = ast.parse(source)
-    assigned = (
-        (node.lineno, node.targets[0].id, node.value)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
-    )
-    texts = sorted(assigned, key=itemgetter(0))
-    for node in ast.walk(tree):
-        name = (
-            node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
-        )
-        if not ERRORS.match(name) or name in ("ValueError", "TypeError", "AttributeError"):
-            continue
-        assert isinstance(node, ast.Call)
-        before = {given: value for at, given, value in texts if at < node.lineno}
-        found = [_text(argument, before) for argument in node.args]
-        given = {item.arg: _text(item.value, before) for item in node.keywords if item.arg}
-        if name in IN_ORDER:
-            given |= dict(zip(IN_ORDER[name], found, strict=False))
-            found = []
-        found += [given.get(key, "") for key in ("problem", "message")]
-        message, *more = LINE.split(max(found, key=len))
-        given |= dict(zip(more[::2], more[1::2], strict=True))
-        if re.search("[a-z]", message):
-            limit, remedy = (given.get(key, "") for key in ("limit", "remedy"))
-            yield message, limit, remedy if re.search("[a-z]", remedy) else ""
-
-
-def _text(node: ast.expr, known: Mapping[str, ast.expr]) -> str:
-    """A text as it stands in the code, with an ellipsis for each value."""
-    if isinstance(node, ast.Constant):
-        return node.value if isinstance(node.value, str) else ""
-    if isinstance(node, ast.Name) and node.id in known:
-        others = {name: value for name, value in known.items() if name != node.id}
-        return _text(known[node.id], others)
-    if isinstance(node, ast.JoinedStr):
-        return "".join(_text(part, {}) or "…" for part in node.values)
-    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
-        return (_text(node.left, known) or "…") + (_text(node.right, known) or "…")
-    if isinstance(node, ast.IfExp):
-        return " / ".join(filter(None, (_text(node.body, known), _text(node.orelse, known))))
-    return ""
-
-
-def _cell(text: str) -> str:
-    return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
-
-
 # --- bibliography ------------------------------------------------------------------------
 
 
@@ -265,7 +183,6 @@ TEXTS: dict[str, Callable[[], str]] = {
     "dragchain_commands": lambda: commands(dragchain_cli._parser()),
     "columns": all_columns,
     "contracts": contracts,
-    "messages": messages,
     "bibliography": bibliography,
 }
 """What a block ``text`` can name."""

@@ -54,24 +54,16 @@ def derived(name: str) -> Callable[[Callable[["Store"], pd.DataFrame]], None]:
 
 
 class Store:
-    """The records.
+    """The records, each read once."""
 
-    Parameters
-    ----------
-    change : callable, optional
-        Applied to each record when it is read, with its name: a test changes the numbers with it.
-    """
-
-    def __init__(self, change: Callable[[str, Any], Any] = lambda name, record: record) -> None:
-        self.change = change
+    def __init__(self) -> None:
         self.record = cache(self._record)
         self.table = cache(self._table)
 
     def _record(self, name: str) -> Any:
         """What a file contains: a table, or the objects of JSON."""
         file = RECORDS[name]
-        found = pd.read_csv(file) if file.suffix == ".csv" else json.loads(file.read_text())
-        return self.change(name, found)
+        return pd.read_csv(file) if file.suffix == ".csv" else json.loads(file.read_text())
 
     def _table(self, name: str) -> pd.DataFrame:
         """A table of a name; KeyError if there is none."""

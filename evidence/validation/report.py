@@ -16,14 +16,13 @@ from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.figures import draw_scalings
 from dragchain.scaling.fit import read_scalings
 from dragchain.statistics.estimate import EstimateColumns
-from evidence.validation import figures
+from evidence.validation import chain_peaks, figures
 from evidence.validation import loading_over_packings as loading
 from evidence.validation.around_workpiece import Profile, Statements, of_packings
 from evidence.validation.claims import Claim, claim_table, claims
 from evidence.validation.effects import Effect, effect_table, effects
 from evidence.validation.force import Compared, Force, compare
 from evidence.validation.force import of_packings as force_of
-from evidence.validation.peaks.report import PeaksReport, report_peaks
 from evidence.validation.runs_by_bed import Points, read_points
 
 _SAME_SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particles")
@@ -70,16 +69,14 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     """
     points = read_points(run_dirs)
     found = validate(points, command)
-    peaks = report_peaks([point.folder for point in points.packings])
+    peaks = chain_peaks.of_runs([point.folder for point in points.packings])
     pictures = _draw(points, found)
-    page = render(points, found, peaks, pictures)
-    peaks.write(out_dir)
     write_bundle(
         out_dir,
-        tables=tables(points, found),
+        tables={**tables(points, found), "chain_tests": peaks.table()},
         figures=pictures,
-        documents={"validation": found},
-        pages={"report": page},
+        documents={"validation": found, "peaks": peaks},
+        pages={"report": render(points, found, peaks, pictures)},
     )
 
 
@@ -175,14 +172,13 @@ def _draw(points: Points, found: Validation) -> dict[str, bytes]:
 
 
 def render(
-    points: Points, found: Validation, peaks: PeaksReport, pictures: Mapping[str, bytes]
+    points: Points, found: Validation, peaks: chain_peaks.Findings, pictures: Mapping[str, bytes]
 ) -> str:
     """The page: HTML that needs no other file and no network."""
-    files = {f"{name}.png": png for name, png in {**pictures, **peaks.pictures}.items()}
-    files["peak_film.gif"] = peaks.film
 
     def picture(name: str) -> str | None:
-        return data_uri(files[name], Path(name).suffix[1:]) if name in files else None
+        shown = pictures.get(Path(name).stem)
+        return data_uri(shown, "png") if shown else None
 
     return render_page(
         "validation/validation.html.j2",
@@ -190,7 +186,7 @@ def render(
         "evidence",
         found=json.loads(found.as_text()),
         scalings=found.scalings,
-        peaks=json.loads(peaks.findings.as_text()),
+        peaks=json.loads(peaks.as_text()),
         assumptions=points.packings[0].case.assumptions,
         varied={row.field for row in found.effects},
         points=points,

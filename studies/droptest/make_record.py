@@ -5,12 +5,77 @@ How ``record.csv`` was made is described in docs/evidence/calibration.md.
 
 import argparse
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from dragchain.calibration.force_record import Record, check_samples
+from dragchain.calibration.measured_impacts import IMPACTS
 from dragchain.calibration.simulated_drops import DropRun, read_drops
-from dragchain.calibration.trials import Sensor, record_of
+from dragdeck.campaigns.restitution_drops import Drop, full, run_drops, settings
+from dragdeck.cases.case import Case
+from dragdeck.decks.templates import environment
+from dragdeck.engine.batch import Batch
+from dragdeck.engine.reports import say
+from dragdeck.project import find_project, study_templates
+
+LEAD_S, TAIL_S = 0.02, 0.01
+"""What a record shows before the first impact and after the last, s."""
+
+STEP_FRACTION = 0.005
+"""Time step of the drop over the Rayleigh time: half the finest of a calibration."""
+
+RESTITUTIONS = (0.5, 0.9)
+"""Range of the value in the deck, which is drawn."""
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A force sensor without dynamics of its own.
+
+    Attributes
+    ----------
+    rate_hz : float
+    noise_n : float
+        Standard deviation of white noise, N.
+    offset_n : float
+    drift_n_per_s : float
+    resolution_n : float
+        Values are rounded to multiples of it; 0: not at all.
+    """
+
+    rate_hz: float
+    noise_n: float
+    offset_n: float = 0.0
+    drift_n_per_s: float = 0.0
+    resolution_n: float = 0.0
+
+
+def record_of(run: DropRun, sensor: Sensor, random: np.random.Generator) -> Record:
+    """What a sensor shows of a simulated drop, begun at a random phase."""
+    step = 1.0 / sensor.rate_hz
+    first, last = run.impacts[0].time_s[0], run.impacts[IMPACTS - 1].time_s[-1]
+    start = first - LEAD_S + random.random() * step
+    time = start + step * np.arange(int((last + TAIL_S - start) / step))
+    force = np.zeros(len(time))
+    for shape in run.impacts[:IMPACTS]:
+        force += np.interp(time, shape.time_s, shape.force_n, 0.0, 0.0)
+    since = time - start
+    force += sensor.offset_n + sensor.drift_n_per_s * since
+    force += random.normal(0.0, sensor.noise_n, len(time))
+    if sensor.resolution_n > 0.0:
+        force = np.round(force / sensor.resolution_n) * sensor.resolution_n
+    return check_samples(since, force)
+
+
+def drop_of(case: Case, seed: int) -> Drop:
+    """A drop with a seeded restitution and a seeded height, as if it had been set by hand."""
+    random, study = np.random.default_rng(seed), case.study
+    value = round(float(random.uniform(*RESTITUTIONS)), 4)
+    height = study.drop_test.height_m + float(random.normal(0.0, settings(case).height_std_m))
+    option = study.contact.limit_force
+    return Drop("drop", "reference", value, option, height, full(study, STEP_FRACTION))
 
 
 def synthetic_record(run: DropRun, sensor: Sensor, seed: int) -> str:
@@ -37,9 +102,9 @@ def synthetic_record(run: DropRun, sensor: Sensor, seed: int) -> str:
 
 
 def main() -> None:
-    """Write the record of the first drop of a list."""
+    """Run the drop and write its record."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("drops", type=Path, help="drops.json of one drop")
+    parser.add_argument("folder", type=Path, help="folder of the drop")
     parser.add_argument("out", type=Path, help="the CSV")
     parser.add_argument("--rate", type=float, required=True, help="samples per second, Hz")
     parser.add_argument("--noise", type=float, required=True, help="standard deviation, N")
@@ -49,8 +114,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, required=True)
     options = parser.parse_args()
     sensor = Sensor(options.rate, options.noise, options.offset, options.drift, options.resolution)
-    run = read_drops(options.drops).runs[0]
-    options.out.write_text(synthetic_record(run, sensor, options.seed), encoding="utf-8")
+    project = find_project(Path.cwd())
+    case = project.cases("droptest")[0]
+    batch = Batch(options.folder, environment(project.templates, study_templates(case)))
+    drops = run_drops(case, [drop_of(case, options.seed)], batch, say)
+    text = synthetic_record(read_drops(drops).runs[0], sensor, options.seed)
+    options.out.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -161,6 +161,16 @@ def test_the_standard_drag_is_the_process_without_what_goes_before(
     assert "move_plunge" not in text and "move_drag" in text
 
 
+def test_the_standard_drag_continues_no_softer_run(
+    small: dict[str, Any], write_study: Any, base: Case, templates: jinja2.Environment
+) -> None:
+    small["fidelity"] = {"youngs_modulus_scale": 0.01, "soft_start": 0.001}
+    (soft,) = load_cases(write_study(small))
+    assert process_scene(soft).deck.entry_step
+    text = text_of(standard_case(soft), "standard", templates)
+    assert text.count("youngsModulus peratomtype") == 1 and "reset_timestep 0" in text
+
+
 def test_the_plain_deck(base: Case, templates: jinja2.Environment) -> None:
     plain, standard = (scene_of(base, name) for name in ("plain", "standard"))
     fraction = base.study.chosen_fidelity().timestep_fraction

@@ -85,21 +85,6 @@ def test_every_check_and_warning_is_on_the_page() -> None:
     assert {name for name in first_cells(rest) if re.fullmatch("[a-z_]+", name)} <= known
 
 
-def test_every_error_in_the_code_is_on_the_page() -> None:
-    """Messages are collected from the code; the page is up to date by test_numbers."""
-    made = reference.TEXTS["messages"]()
-    rows = [line for line in made.splitlines() if line.startswith("| ")]
-    assert len(rows) > 150
-    assert "was not found" in made or "no such" in made
-
-
-def test_the_collection_of_messages_sees_parts_of_a_text() -> None:
-    source = (
-        'raise InputError(f"no {x} here", limit="one" + " two", remedy=r)\nraise ValueError("no")'
-    )
-    assert list(reference.raised(source)) == [("no … here", "one two", "")]
-
-
 @pytest.mark.parametrize("deck", [DropDeck, FillingDeck, ProcessDeck])
 def test_every_value_of_a_deck_is_on_the_page(deck: type) -> None:
     names = set(re.findall(r"[`.](\w+)`", text_of("reference/templates.md")))

@@ -11,9 +11,7 @@ from doc_pages import FENCE, name_of
 from doc_pages import PAGES as ALL_PAGES
 from paths import ROOT
 
-PAGES = [
-    page for page in ALL_PAGES if page.name not in ("bibliography.md", "glossary.md", "renamed.md")
-]
+PAGES = [page for page in ALL_PAGES if page.name not in ("bibliography.md", "glossary.md")]
 """Others quote titles, or name the words that others replace."""
 
 TERMS = ROOT / "docs/words.txt"

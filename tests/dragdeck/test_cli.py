@@ -100,6 +100,7 @@ def test_a_new_study_can_be_run_at_once(
     for name, problem in (
         ("mine", "has that name already"),
         ("../x", "this name cannot be used for a study"),
+        (".", "this name cannot be used for a study"),
     ):
         assert main(["new", name, "--from", "small"]) == 1
         assert problem in capsys.readouterr().err

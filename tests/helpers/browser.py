@@ -82,26 +82,18 @@ class Browser:
 
     def click_at(self, selector: str, x: float, y: float) -> None:
         """Click a point of an element, in pixels from its upper left corner."""
-        from selenium.webdriver import ActionChains
+        self.drag(selector, (x, y), (x, y))
 
-        element = self.find(selector)
-        size = element.size
-        off = round(x - size["width"] / 2), round(y - size["height"] / 2)
-        ActionChains(self.driver).move_to_element_with_offset(element, *off).click().perform()
-
-    def drag(self, selector: str, start: tuple[int, int], end: tuple[int, int]) -> None:
+    def drag(self, selector: str, start: tuple[float, float], end: tuple[float, float]) -> None:
         """Drag the mouse over an element, from and to pixels from its upper left corner."""
         from selenium.webdriver import ActionChains
 
-        element = self.find(selector)
-        size = element.size
-        middle = size["width"] / 2, size["height"] / 2
-        (x, y), (u, v) = (
-            [round(at - half) for at, half in zip(place, middle, strict=True)]
-            for place in (start, end)
-        )
-        chain = ActionChains(self.driver).move_to_element_with_offset(element, x, y)
-        chain.click_and_hold().move_to_element_with_offset(element, u, v).release().perform()
+        element, chain = self.find(selector), ActionChains(self.driver)
+        for (x, y), press in ((start, chain.click_and_hold), (end, chain.release)):
+            off = round(x - element.size["width"] / 2), round(y - element.size["height"] / 2)
+            chain.move_to_element_with_offset(element, *off)
+            press()
+        chain.perform()
 
     def phone(self) -> None:
         """Show pages as a phone of 390 x 844 pixels does, until `desktop`."""

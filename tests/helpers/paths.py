@@ -5,6 +5,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "tests" / "data"
 SMALL_STUDY = DATA / "small_study.yaml"
+WINDOWS_RECORD = ROOT / "workflow" / "dragdeck" / "data" / "windows.json"
 PROJECT = (
     *("analysis", "config", "evidence", "meshes", "profiles", "templates", "workflow", "Snakefile"),
 )

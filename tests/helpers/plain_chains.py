@@ -1,7 +1,6 @@
 """The oracle of the chain tests: chains, paths and clusters particle by particle, in plain Python.
 
-This is how the package itself found them before it held arrays. Nothing but tests and
-`benchmarks/chains.py` may use it.
+This is how the package itself found them before it held arrays. Nothing but tests may use it.
 """
 
 import heapq
@@ -20,39 +19,10 @@ from dragchain.network.chains import (
     dominant_path,
     major_stress,
 )
-from dragchain.network.frame import FLOOR, KINDS, PARTICLE, SIDE, WORKPIECE, NetworkFrame
+from dragchain.network.frame import FLOOR, KINDS, SIDE, WORKPIECE, NetworkFrame
 
 BOWL = -1
-POINT_AND_FORCE = (("point", "m"), ("force", "n"))
 Net = dict[int, list[tuple[float, int, int]]]
-
-
-def plain_frame(contacts: pd.DataFrame, particles: pd.DataFrame) -> NetworkFrame:
-    particles = particles.sort_values("particle_id")
-    particle_id = particles["particle_id"].to_numpy(np.int64)
-    a_id, b_id = contacts["a_id"].to_numpy(np.int64), contacts["b_id"].to_numpy(np.int64)
-    b = np.full(b_id.shape, -1, dtype=np.int64)
-    b[b_id > 0] = _rows_of(b_id[b_id > 0], particle_id)
-    vectors = [[f"{name}_{axis}_{unit}" for axis in "xyz"] for name, unit in POINT_AND_FORCE]
-    return NetworkFrame(
-        step=int(particles["step"].iloc[0]),
-        time_s=float(particles["time_s"].iloc[0]),
-        direction_rad=0.0,
-        particle_id=particle_id,
-        centre=particles[["x_m", "y_m", "z_m"]].to_numpy(np.float64),
-        radius=particles["radius_m"].to_numpy(np.float64),
-        a=_rows_of(a_id, particle_id),
-        b=b,
-        other=np.where(b_id > 0, PARTICLE, b_id),
-        point=contacts[vectors[0]].to_numpy(np.float64),
-        force=contacts[vectors[1]].to_numpy(np.float64),
-        normal_force=contacts["normal_force_n"].to_numpy(np.float64),
-    )
-
-
-def _rows_of(ids: Ints, particle_id: Ints) -> Ints:
-    assert np.isin(ids, particle_id).all()
-    return np.searchsorted(particle_id, ids)
 
 
 def plain_stress(frame: NetworkFrame) -> Floats:

@@ -146,14 +146,14 @@ def make_run(results: Path, case: dict[str, Any], findings: Findings, names: lis
 
 
 REACHED = Reached(
-    tolerance=0.1, asked=("drag_mean",), reached=True, runs=("window-1", "window-2", "window-3"),
-    refused={}, needed=Need(3, 1),
+    tolerance=0.1, asked=("drag_mean",), reached=True, needed=Need(3, 1),
+    runs=("window-1", "window-2", "window-3"),
 )  # fmt: skip
 
 
 def write_quantities(run: Path, corrected: float | None = None, **reached: Any) -> None:
     """Write ``extrapolated.json``: all quantities 2, by windows that many times it."""
-    value = None if corrected is None else Estimate.around(2.0 * corrected, 0.2 * corrected)
+    value = None if corrected is None else Estimate.around(2.0 * corrected, abs(0.2 * corrected))
     own = Estimate(2.0, math.nan, math.nan)
     found = tuple(
         ExtrapolatedQuantity(

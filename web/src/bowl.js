@@ -1,43 +1,26 @@
 // The outline of the bowl, the settled surface of the bed, and the path of the workpiece.
-import { BufferAttribute, BufferGeometry, Group, Line, LineSegments } from "three";
+import { BufferGeometry, Group, Line, LineSegments, Vector3 } from "three";
 import { COLOURS, STEEL, rgb } from "./colours.js";
 import { lineMaterial } from "./shading.js";
 
 const PARTS = 96;
+const UP = new Vector3(0, 0, 1);
 
 export function outline({ bowl, surface, workpieces }) {
-  const group = new Group(),
-    soft = lineMaterial(rgb(COLOURS.bowl)),
+  const soft = lineMaterial(rgb(COLOURS.bowl)),
     steel = lineMaterial(rgb(STEEL));
-  for (const height of [0, surface, bowl.height])
-    group.add(line(circle(bowl.radius, height), height === surface ? steel : soft));
-  const edges = [0, 1, 2, 3].flatMap((quarter) => {
-    const [x, y] = [Math.cos((quarter * Math.PI) / 2), Math.sin((quarter * Math.PI) / 2)].map(
-      (value) => value * bowl.radius,
-    );
-    return [x, y, 0, x, y, bowl.height];
-  });
-  group.add(new LineSegments(geometry(edges), soft));
-  for (const { poses } of workpieces)
-    group.add(
-      line(
-        poses.flatMap(([x, y]) => [x, y, surface]),
-        steel,
-      ),
-    );
-  return group;
+  const at = (turn, height) => new Vector3(bowl.radius, 0, height).applyAxisAngle(UP, 2 * Math.PI * turn),
+    circle = (height) => Array.from({ length: PARTS + 1 }, (_, k) => at(k / PARTS, height));
+  const edges = [0, 0.25, 0.5, 0.75].flatMap((turn) => [at(turn, 0), at(turn, bowl.height)]);
+  const lines = [
+    new Line(geometry(circle(0)), soft),
+    new Line(geometry(circle(surface)), steel),
+    new Line(geometry(circle(bowl.height)), soft),
+    new LineSegments(geometry(edges), soft),
+    ...workpieces.map(({ poses }) => new Line(geometry(poses.map(([x, y]) => new Vector3(x, y, surface))), steel)),
+  ];
+  for (const line of lines) line.frustumCulled = false;
+  return new Group().add(...lines);
 }
 
-function circle(radius, height) {
-  return Array.from({ length: PARTS + 1 }, (_, k) => (2 * Math.PI * k) / PARTS).flatMap((angle) => [
-    radius * Math.cos(angle),
-    radius * Math.sin(angle),
-    height,
-  ]);
-}
-
-function geometry(points) {
-  return new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(points), 3));
-}
-
-const line = (points, material) => Object.assign(new Line(geometry(points), material), { frustumCulled: false });
+const geometry = (points) => new BufferGeometry().setFromPoints(points);

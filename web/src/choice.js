@@ -2,20 +2,25 @@
 // facet of the workpiece: { particle }, { pair } or { facet }.
 
 /** What a ray through a point of the picture meets first; within `near` mm of thin contacts if it meets nothing. */
-export function underRay({ origin, direction }, near, frame, { frames, media, contacts, workpiece }) {
+export function underRay(caster, near, frame, { frames, media, contacts, workpiece }) {
   const pair = (row) => [String(frame.id[frame.a[row]]), String(frames.other(frame, row))];
-  const hits = (reach) => [
-    { hit: media.hit(origin, direction), choice: (row) => ({ particle: frame.id[row] }) },
-    { hit: contacts.hit(origin, direction, reach), choice: (row) => ({ pair: pair(row) }) },
-    { hit: workpiece.hit(origin, direction), choice: (row) => ({ facet: row }) },
-  ];
   for (const reach of [0, near]) {
-    const found = hits(reach).filter(({ hit }) => hit);
-    found.sort((one, other) => one.hit.distance - other.hit.distance);
-    if (found.length) return found[0].choice(found[0].hit.row);
+    const found = [
+      { ...media.hit(caster), choice: (row) => ({ particle: frame.id[row] }) },
+      { ...contacts.hit(caster, reach), choice: (row) => ({ pair: pair(row) }) },
+      { ...workpiece.hit(caster), choice: (row) => ({ facet: row }) },
+    ].filter(({ distance }) => distance < Infinity);
+    found.sort((one, other) => one.distance - other.distance);
+    if (found.length) return found[0].choice(found[0].row);
   }
   return null;
 }
+
+/** The row with the smallest distance, and that; `distance(at)`: of the row there, nothing if the ray passes it. */
+export const nearest = (rows, distance) =>
+  rows
+    .map((row, at) => ({ row, distance: distance(at) ?? Infinity }))
+    .reduce((one, other) => (other.distance < one.distance ? other : one), { distance: Infinity });
 
 /** What a text names, such as "12", "12 345" or "12 workpiece"; null if it names nothing. */
 export function named(text) {

@@ -1,6 +1,6 @@
-// Colours of the page: those of all figures for what they show too, which `pytest tests/contract --update` copies;
-// one map for force, speed, displacement and load; one colour per class.
-import COLOURS from "./colours.json";
+// Colours of the page: those of all figures for what they show too; one map for force, speed,
+// displacement and load; one colour per class.
+import COLOURS from "../../workflow/dragdeck/data/colours.json";
 
 export { COLOURS };
 export const PALE = "#dfe3e8",

@@ -1,5 +1,7 @@
 // The contacts: one cylinder each, whose radius and colour show the normal force.
+import { Vector3 } from "three";
 import { Bodies } from "./bodies.js";
+import { nearest } from "./choice.js";
 import { CLASS_COLOURS, COLOURS, PALE, STEEL, blend, rgb } from "./colours.js";
 import { DOMINANT, QUASI_LINEAR } from "./frames.js";
 import { bodyMaterial } from "./shading.js";
@@ -58,28 +60,12 @@ export class Contacts {
   }
 
   /** The nearest contact that a ray meets, or that it passes within `near` mm: row and distance. */
-  hit(origin, direction, near) {
-    let nearest = null;
-    this.rows.forEach((row, at) => {
+  hit({ ray }, near) {
+    const met = new Vector3();
+    return nearest(this.rows, (at) => {
       const [start, end, radius] = this.cylinders.at(at),
-        [apart, distance] = rayToLine(origin, direction, start, end);
-      if (apart <= Math.max(radius, near) && !(nearest?.distance < distance)) nearest = { row, distance };
+        square = ray.distanceSqToSegment(new Vector3(...start), new Vector3(...end), met);
+      return square <= Math.max(radius, near) ** 2 ? met.distanceTo(ray.origin) : undefined;
     });
-    return nearest;
   }
-}
-
-/** Smallest distance of a ray from the line between two points, and how far along the ray that is. */
-function rayToLine(origin, direction, from, to) {
-  const line = [0, 1, 2].map((axis) => to[axis] - from[axis]);
-  const away = [0, 1, 2].map((axis) => from[axis] - origin[axis]);
-  const dot = (one, other) => one[0] * other[0] + one[1] * other[1] + one[2] * other[2];
-  const square = dot(line, line),
-    mixed = dot(line, direction),
-    rest = square - mixed * mixed;
-  const free = rest > 1e-9 ? (mixed * dot(direction, away) - dot(line, away)) / rest : 0;
-  const part = Math.min(Math.max(free, 0), 1);
-  const point = away.map((value, axis) => value + part * line[axis]),
-    along = dot(point, direction);
-  return [Math.sqrt(Math.max(dot(point, point) - along * along, 0)), along];
 }

@@ -1,5 +1,6 @@
 // What colours and lengths mean.
 import { CLASS_COLOURS } from "./colours.js";
+import { make } from "./dom.js";
 import { CLASSES } from "./frames.js";
 import { digits } from "./numbers.js";
 
@@ -20,32 +21,25 @@ export function showLegend(element, { colours, scales }, look, load) {
 }
 
 function scale(title, top, colours) {
-  const bar = block("bar"),
-    ends = block("ends"),
-    part = block("", title);
+  const words = ["0", digits(top / 2, 3), `≥ ${digits(top, 3)}`].map((text) => make("span", {}, text));
+  return make("div", {}, title, colourBar(colours), make("div", { className: "ends" }, ...words));
+}
+
+/** A bar with all colours of a map. */
+export function colourBar(colours) {
+  const bar = make("div", { className: "bar" });
   bar.style.background = `linear-gradient(to right, ${colours.join(", ")})`;
-  ends.append(
-    ...["0", digits(top / 2, 3), `≥ ${digits(top, 3)}`].map((text) =>
-      Object.assign(document.createElement("span"), { textContent: text }),
-    ),
-  );
-  part.append(bar, ends);
-  return part;
+  return bar;
 }
 
 function classes() {
-  const part = block("", "Class of a contact");
-  CLASSES.forEach((name, kind) => {
-    const row = block("", name.replace("-", "–")),
-      swatch = document.createElement("i");
+  const rows = CLASSES.map((name, kind) => {
+    const swatch = make("i");
     swatch.style.background = CLASS_COLOURS[kind];
-    row.prepend(swatch);
-    part.append(row);
+    return make("div", {}, swatch, name.replace("-", "–"));
   });
-  return part;
+  return make("div", {}, "Class of a contact", ...rows);
 }
-
-const block = (name, text = "") => Object.assign(document.createElement("div"), { className: name, textContent: text });
 
 /** Draw a bar of a round length in mm. */
 export function showScale(bar, label, millimetresPerPixel) {

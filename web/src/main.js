@@ -6,6 +6,7 @@ import { Chosen } from "./chosen.js";
 import { CLASS_COLOURS, COLOURS, colourMap } from "./colours.js";
 import { readColumns } from "./columns.js";
 import { Contacts } from "./contacts.js";
+import { byId, make } from "./dom.js";
 import { ForceCurve } from "./force_curve.js";
 import { Frames } from "./frames.js";
 import { showLegend, showScale } from "./legend.js";
@@ -19,7 +20,6 @@ import { PRESETS, View } from "./view.js";
 import { Workpiece } from "./workpiece.js";
 
 const NEAR = 5; // pixels within which a click meets a thin contact
-const byId = (id) => document.getElementById(id);
 
 class Page {
   constructor(head, columns) {
@@ -29,7 +29,8 @@ class Page {
     this.number = head.peaks[0]?.frame ?? 0;
     this.look = { classes: [true, true, true], threshold: 0, chosen: null, section: null };
     this.measured = null; // the particles or contacts whose distance is measured
-    for (const [name, colour] of Object.entries(COLOURS)) // network.css takes them by name
+    for (const [name, colour] of Object.entries(COLOURS))
+      // network.css takes them by name
       document.documentElement.style.setProperty(`--${name}`, colour);
     this.startCurve(columns);
     this.startProfiles();
@@ -49,33 +50,21 @@ class Page {
     this.curve = new ForceCurve(
       byId("curve"),
       { curve, peaks, values: resistance, end: this.frames.times.at(-1) },
-      { go, goToPeak },
+      { go, goToPeak, told: (text) => (hovered.textContent = text) },
     );
-    this.curve.hovered = (at) =>
-      (hovered.textContent = at ? `${seconds(at.time)}: raw ${digits(at.raw)} N, filtered ${digits(at.smooth)} N` : "");
-    for (const name of ["raw", "smooth"])
-      byId(name).onchange = () => {
-        this.curve.shown[name] = byId(name).checked;
-        this.curve.draw();
-      };
-    byId("whole").onclick = () => this.curve.zoom([...this.curve.whole]);
+    for (const [k, name] of ["raw", "smooth"].entries())
+      byId(name).onchange = () => this.curve.plot.setSeries(k + 1, { show: byId(name).checked });
+    byId("whole").onclick = () => this.curve.zoom(this.curve.whole);
     byId("peaks").append(
-      ...peaks.map(({ time, force }, rank) => {
-        const item = document.createElement("li"),
-          button = document.createElement("button");
-        button.type = "button";
-        button.append(
-          ...[seconds(time), `${digits(force, 3)} N`].map((text) =>
-            Object.assign(document.createElement("span"), { textContent: text }),
-          ),
-        );
-        button.setAttribute("aria-label", `Peak ${rank + 1}: ${digits(force)} N at ${seconds(time)}`);
-        button.onclick = () => this.showPeak(rank);
-        item.append(button);
-        return item;
-      }),
+      ...peaks.map(({ time, force }, rank) => this.peakButton(rank, seconds(time), digits(force, 3))),
     );
-    if (!peaks.length) byId("peaks").append(Object.assign(document.createElement("li"), { textContent: "none" }));
+    if (!peaks.length) byId("peaks").append(make("li", {}, "none"));
+  }
+
+  peakButton(rank, time, force) {
+    const parts = [time, `${force} N`].map((text) => make("span", {}, text)),
+      title = `Peak ${rank + 1}: ${force} N at ${time}`;
+    return make("li", {}, make("button", { type: "button", title, onclick: () => this.showPeak(rank) }, ...parts));
   }
 
   startProfiles() {
@@ -330,40 +319,30 @@ class Page {
     const kinds = look.others === "hidden" ? ", those of chains only" : "",
       also = look.path && look.threshold ? ", or on the dominant path" : "";
     counts.forEach((count, kind) => (byId(`count-${kind}`).textContent = whole(count)));
+    const bold = (text) => make("b", {}, text);
     const parts = [
-      ["b", whole(counts.reduce((sum, count) => sum + count))],
-      [
-        0,
-        ` of ${whole(frame.a.length)} contacts shown${kinds}: normal force above ${digits(look.threshold, 3)} N${also}. Drag force `,
-      ],
-      ["b", `${digits(this.curve.at(this.time))} N`],
-      [0, ` at ${seconds(this.time)}. `],
+      bold(whole(counts.reduce((sum, count) => sum + count))),
+      ` of ${whole(frame.a.length)} contacts shown${kinds}: normal force above ${digits(look.threshold, 3)} N${also}. Drag force `,
+      bold(`${digits(this.curve.at(this.time))} N`),
+      ` at ${seconds(this.time)}. `,
     ];
     if (look.path && path)
       parts.push(
-        [0, "Dominant path: bottleneck "],
-        ["b", `${digits(path.bottleneck)} N`],
-        [0, `, mean ${digits(path.mean)} N, ${path.particles.length} particles, from workpiece to ${path.end}.`],
+        "Dominant path: bottleneck ",
+        bold(`${digits(path.bottleneck)} N`),
+        `, mean ${digits(path.mean)} N, ${path.particles.length} particles, from workpiece to ${path.end}.`,
       );
-    if (look.path && !path) parts.push([0, "No path of contacts above the mean force leads from workpiece to bowl."]);
-    byId("status").replaceChildren(
-      ...parts.map(([tag, text]) => (tag ? Object.assign(document.createElement(tag), { textContent: text }) : text)),
-    );
+    if (look.path && !path) parts.push("No path of contacts above the mean force leads from workpiece to bowl.");
+    byId("status").replaceChildren(...parts);
     if (look.chosen) this.tellChosen(frame);
   }
 
   tellChosen(frame) {
-    const [title, rows] = numbers(this.look.chosen, frame, this.frames, this.workpiece),
-      table = document.createElement("table");
-    for (const [name, value] of rows) {
-      const row = table.insertRow(),
-        head = document.createElement("th");
-      head.scope = "row";
-      head.textContent = name;
-      row.append(head);
-      row.insertCell().textContent = value;
-    }
-    byId("chosen").replaceChildren(Object.assign(document.createElement("h3"), { textContent: title }), table);
+    const [title, rows] = numbers(this.look.chosen, frame, this.frames, this.workpiece);
+    const lines = rows.map(([name, value]) =>
+      make("tr", {}, make("th", { scope: "row" }, name), make("td", {}, value)),
+    );
+    byId("chosen").replaceChildren(make("h3", {}, title), make("table", {}, ...lines));
   }
 
   /** Tell the distance between the measured places; returns those of them that are in the frame. */
@@ -427,7 +406,7 @@ class Page {
       { group, normals } = this.workpiece,
       { centre } = this.workpiece.facet(facet);
     group.updateMatrixWorld();
-    const target = new Vector3(...centre).applyMatrix4(group.matrixWorld),
+    const target = centre.applyMatrix4(group.matrixWorld),
       from = new Vector3(...normals.subarray(9 * facet, 9 * facet + 3)).transformDirection(group.matrixWorld);
     Object.assign(this.view, { follows: null, framed: null });
     from.add(new Vector3(0, 0, 0.15));

@@ -1,5 +1,7 @@
 // The media: one sphere per particle.
+import { Sphere, Vector3 } from "three";
 import { Bodies } from "./bodies.js";
+import { nearest } from "./choice.js";
 import { COLOURS, MEDIA, blend, rgb } from "./colours.js";
 import { DOMINANT } from "./frames.js";
 import { bodyMaterial } from "./shading.js";
@@ -35,18 +37,13 @@ export class Media {
     this.spheres.show();
   }
 
-  /** The nearest sphere that a ray meets: its particle's row and its distance, or null. */
-  hit(origin, direction) {
-    let nearest = null;
-    this.rows.forEach((row, at) => {
+  /** The nearest sphere that a ray meets: its particle's row and its distance. */
+  hit({ ray }) {
+    return nearest(this.rows, (at) => {
       const [centre, , radius] = this.spheres.at(at),
-        to = [0, 1, 2].map((axis) => centre[axis] - origin[axis]);
-      const along = to[0] * direction[0] + to[1] * direction[1] + to[2] * direction[2];
-      const inside = radius ** 2 - (to[0] ** 2 + to[1] ** 2 + to[2] ** 2 - along ** 2);
-      const distance = along - Math.sqrt(Math.max(inside, 0));
-      if (inside >= 0 && distance > 0 && !(nearest?.distance < distance)) nearest = { row, distance };
+        met = ray.intersectSphere(new Sphere(new Vector3(...centre), radius), new Vector3());
+      return met?.distanceTo(ray.origin);
     });
-    return nearest;
   }
 }
 

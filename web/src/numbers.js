@@ -4,6 +4,9 @@ const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
 
 export const minus = (text) => text.replaceAll("-", "−");
 
+/** A round number, without needless digits. */
+export const plain = (value) => minus(String(Number(value.toPrecision(6))));
+
 export const tenTo = (power) =>
   `10${power < 0 ? "⁻" : ""}${[...String(Math.abs(power))].map((digit) => RAISED[digit]).join("")}`;
 

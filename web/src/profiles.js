@@ -1,5 +1,4 @@
 // Profiles of the normal forces: on the workpiece by azimuth and depth, and of all contacts by size.
-import { roundStep } from "./axes.js";
 
 const SECTORS = 24, // of the circumference, as in loading.json
   LEVELS = 20, // of depth, at most
@@ -107,4 +106,10 @@ function sizes(frames) {
   const limits = Array.from({ length: last - first + 1 }, (_, k) => LEAST_DECADE + (first + k) / PER_DECADE);
   const shown = counts.map((bins) => bins.subarray(first, last));
   return { ...profile(limits, shown), means };
+}
+
+/** The least of 1, 2, 5, 10, ... times a power of ten that is not below a number. */
+function roundStep(least) {
+  const power = 10 ** Math.floor(Math.log10(least));
+  return [1, 2, 5, 10].map((factor) => factor * power).find((one) => one >= least);
 }

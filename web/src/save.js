@@ -1,4 +1,5 @@
 // The scene as a picture or a film, with the labels that lie over it.
+import { make } from "./dom.js";
 
 const KINDS = ["video/webm;codecs=vp9", "video/webm", "video/mp4"];
 const RATE = 30, // pictures per second of a film
@@ -50,7 +51,7 @@ export class Film {
 /** An empty canvas of the size of the picture that was drawn last, in even numbers of pixels, as films need. */
 function sheet({ renderer: { domElement } }) {
   const [width, height] = [domElement.width, domElement.height].map((size) => size - (size % 2));
-  return Object.assign(document.createElement("canvas"), { width, height });
+  return make("canvas", { width, height });
 }
 
 /** Paint what was just drawn, and what lies over it where the browser shows it. */
@@ -98,7 +99,7 @@ function paintWords(context, node) {
 }
 
 function download(blob, name) {
-  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: name });
+  const link = make("a", { href: URL.createObjectURL(blob), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }

@@ -14,6 +14,8 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 ColorManagement.enabled = false; // colours are shown as they are given
 
 export const PRESETS = ["overview", "above", "along", "side", "follow"];
+// Where presets look from: ahead of the workpiece, to its right, and above; "above" keeps y upright instead.
+const FROM = { overview: [0.55, 0.75, 0.4], along: [-1, 0, 0], side: [0, 1, 0], follow: [-0.75, 0.5, 0.45] };
 const FINE = 2; // pixels of the picture per pixel of the page at rest: smooth edges
 const LEAST_RATIO = 0.6;
 const REST_MS = 180,
@@ -92,24 +94,12 @@ export class View {
     const { heading } = this.pose(),
       { centre, radius } = this.area(),
       ahead = new Vector3(Math.cos(heading), Math.sin(heading), 0);
-    const right = new Vector3().crossVectors(ahead, UP);
-    const from = {
-      overview: () =>
-        ahead
-          .clone()
-          .multiplyScalar(0.55)
-          .addScaledVector(right, 0.75)
-          .add(new Vector3(0, 0, 0.4)),
-      above: () => new Vector3(0, -1e-4, 1),
-      along: () => ahead.clone().negate(),
-      side: () => right,
-      follow: () =>
-        ahead
-          .clone()
-          .multiplyScalar(-0.75)
-          .addScaledVector(right, 0.5)
-          .add(new Vector3(0, 0, 0.45)),
-    }[name]();
+    const right = new Vector3().crossVectors(ahead, UP),
+      [forth, aside, up] = FROM[name] ?? [];
+    const from =
+      forth === undefined
+        ? new Vector3(0, -1e-4, 1)
+        : new Vector3(0, 0, up).addScaledVector(ahead, forth).addScaledVector(right, aside);
     this.follows = name === "follow" ? heading : null;
     this.framed = name; // until the user moves the camera: a window of another size is filled again
     this.look(
@@ -179,12 +169,12 @@ export class View {
     this.wanted();
   }
 
-  /** Start and direction of the ray under a point of the canvas, in pixels from its corner. */
+  /** The ray under a point of the canvas, in pixels from its corner. */
   ray(x, y) {
     const { clientWidth, clientHeight } = this.renderer.domElement,
       caster = new Raycaster();
     caster.setFromCamera(new Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.camera);
-    return { origin: caster.ray.origin.toArray(), direction: caster.ray.direction.toArray() };
+    return caster;
   }
 
   /** Where a point of the scene is on the canvas, in pixels. */

@@ -1,5 +1,5 @@
 // The workpiece: its facets, coloured by what acted on them, and an arrow along its motion.
-import { BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, Group, Mesh } from "three";
+import { BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, Group, Mesh, Triangle, Vector3 } from "three";
 import { COLOURS, rgb } from "./colours.js";
 import { facetMaterial } from "./shading.js";
 
@@ -9,11 +9,11 @@ export class Workpiece {
     this.columns = columns;
     this.corners = columns.corners;
     this.count = this.corners.length / 9;
-    this.normals = normals(this.corners);
     this.tints = new Float32Array(this.corners.length);
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(this.corners, 3));
-    geometry.setAttribute("normal", new BufferAttribute(this.normals, 3));
+    geometry.computeVertexNormals(); // no corner is shared: those of the facets
+    this.normals = geometry.attributes.normal.array;
     geometry.setAttribute("colour", new BufferAttribute(this.tints, 3));
     this.body = new Mesh(geometry, facetMaterial());
     this.body.frustumCulled = false;
@@ -58,66 +58,17 @@ export class Workpiece {
 
   /** Centre of a facet in the workpiece's own frame, its depth below the surface and its azimuth. */
   facet(number) {
-    const centre = [0, 1, 2].map(
-      (axis) =>
-        (this.corners[9 * number + axis] + this.corners[9 * number + 3 + axis] + this.corners[9 * number + 6 + axis]) /
-        3,
-    );
-    return { centre, depth: this.own.immersion - centre[2], azimuth: Math.atan2(centre[1], centre[0]) };
+    const { position } = this.body.geometry.attributes,
+      corners = new Triangle().setFromAttributeAndIndices(position, 3 * number, 3 * number + 1, 3 * number + 2),
+      centre = corners.getMidpoint(new Vector3());
+    return { centre, depth: this.own.immersion - centre.z, azimuth: Math.atan2(centre.y, centre.x) };
   }
 
-  /** The nearest facet that a ray meets (Moeller and Trumbore 1997): its number and its distance, or null. */
-  hit(origin, direction) {
-    if (!this.group.visible) return null;
-    const { x, y, z } = this.group.position,
-      turn = -this.group.rotation.z;
-    const start = turned([origin[0] - x, origin[1] - y, origin[2] - z], turn),
-      along = turned(direction, turn);
-    let nearest = null;
-    for (let facet = 0; facet < this.count; facet++) {
-      const distance = toFacet(this.corners, 9 * facet, start, along);
-      if (distance > 0 && !(nearest?.distance < distance)) nearest = { row: facet, distance };
-    }
-    return nearest;
+  /** The nearest facet that a ray meets: its number and its distance. */
+  hit(caster) {
+    const [met] = this.group.visible ? caster.intersectObject(this.body) : [];
+    return met && { row: met.faceIndex, distance: met.distance };
   }
-}
-
-const minus = (one, other) => one.map((value, axis) => value - other[axis]);
-const dot = (one, other) => one[0] * other[0] + one[1] * other[1] + one[2] * other[2];
-const cross = ([a, b, c], [d, e, f]) => [b * f - c * e, c * d - a * f, a * e - b * d];
-const turned = ([x, y, z], angle) => [
-  x * Math.cos(angle) - y * Math.sin(angle),
-  x * Math.sin(angle) + y * Math.cos(angle),
-  z,
-];
-
-function toFacet(corners, at, start, along) {
-  const [first, second, third] = [0, 3, 6].map((corner) => [...corners.subarray(at + corner, at + corner + 3)]);
-  const one = minus(second, first),
-    other = minus(third, first),
-    across = cross(along, other),
-    size = dot(one, across);
-  if (Math.abs(size) < 1e-12) return -1;
-  const away = minus(start, first),
-    u = dot(away, across) / size,
-    turn = cross(away, one),
-    v = dot(along, turn) / size;
-  return u < 0 || v < 0 || u + v > 1 ? -1 : dot(other, turn) / size;
-}
-
-function normals(corners) {
-  const all = new Float32Array(corners.length);
-  for (let at = 0; at < corners.length; at += 9) {
-    const [first, second, third] = [0, 3, 6].map((corner) => [...corners.subarray(at + corner, at + corner + 3)]);
-    const normal = cross(minus(second, first), minus(third, first)),
-      size = Math.hypot(...normal) || 1;
-    for (const corner of [0, 3, 6])
-      all.set(
-        normal.map((value) => value / size),
-        at + corner,
-      );
-  }
-  return all;
 }
 
 /** An arrow along +x that starts beside a body of this radius. */

@@ -164,15 +164,10 @@ STEPS = (
             "drops.json to the folder.",
             "campaigns.restitution_drops:drops_command", (
                 STUDY, FIDELITY, OUT_DIR,
-                _argument("set", choices=("sweep", "confirm", "trials"),
-                          help="sweep: a range of restitutions; confirm: the fitted one; trials: "
-                          "random ones, to test the fit"),
+                _argument("set", choices=("sweep", "confirm"),
+                          help="sweep: a range of restitutions; confirm: the fitted one"),
                 _argument("--fit", type=Path, metavar="FILE",
-                          help="result.json of the fit; required for confirm"),
-                _argument("--count", type=int, default=10, metavar="N",
-                          help="number of trials (default: %(default)s)"),
-                _argument("--seed", type=int, default=1, metavar="N",
-                          help="random seed of the trials (default: %(default)s)"))),
+                          help="result.json of the fit; required for confirm"))),
 )  # fmt: skip
 """What the rules call: ``dragdeck step NAME``."""
 

@@ -1,7 +1,4 @@
-"""Where things are: the project's folders and the paths of a run.
-
-The grammar of result paths stands here and nowhere else.
-"""
+"""Where things are: the project's folders and the paths of a run."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -77,6 +74,7 @@ class Project:
             found = load_cases(file, fidelity, partial(resolve, tradeoff=tradeoff))
             for case in found:
                 check_timestep(case)
+                check_timestep(case.of_filling, "fidelity.soft_start")
         except InputError as error:
             raise located(error) from None
         return found

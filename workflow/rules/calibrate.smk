@@ -83,51 +83,9 @@ rule confirm_restitution:
         " --out $(dirname {output}) 2>&1 | tee -i {log}"
 
 
-rule drop_for_trials:
-    input:
-        calibration_inputs(),
-        of_study("calibration", "record.json"),
-    output:
-        of_study("calibration", "trials/drops.json"),
-    log:
-        of_study("calibration", "logs/trial_drops.log"),
-    benchmark:
-        of_study("calibration", "benchmarks/trial_drops.tsv")
-    conda:
-        "../envs/python.yaml"
-    params:
-        study=STUDY,
-        fidelity=fidelity_option,
-        source=source_hash("dragdeck.campaigns.restitution_drops"),
-    shell:
-        "dragdeck step drops {params.study} trials {params.fidelity} --count 10 --seed 1"
-        " --out $(dirname {output}) 2>&1 | tee -i {log}"
-
-
-rule recover_trials:
-    input:
-        sweep=of_study("calibration", "sweep/drops.json"),
-        trials=of_study("calibration", "trials/drops.json"),
-    output:
-        summary=of_study("calibration", "trials.json"),
-        rows=of_study("calibration", "trials.csv"),
-    log:
-        of_study("calibration", "logs/trials.log"),
-    benchmark:
-        of_study("calibration", "benchmarks/trials.tsv")
-    conda:
-        "../envs/python.yaml"
-    params:
-        source=source_hash("dragchain.calibration.trials"),
-    shell:
-        "dragchain step trials --drops {input.sweep} --trials {input.trials}"
-        " --seed 1 --out {output.summary} 2>&1 | tee -i {log}"
-
-
 rule write_calibration_report:
     input:
         rules.fit_restitution.output,
-        rules.recover_trials.output,
         of_study("calibration", "sweep/drops.json"),
         of_study("calibration", "confirm/drops.json"),
         record=drop_record,
@@ -140,8 +98,7 @@ rule write_calibration_report:
             labels={"run": "drop test", "figure": "report"},
         ),
         figures=[
-            of_study("calibration", f"figures/{name}.png")
-            for name in ("impacts", "fit", "bias", "trials")
+            of_study("calibration", f"figures/{name}.png") for name in ("impacts", "fit", "bias")
         ],
     log:
         of_study("calibration", "logs/report.log"),

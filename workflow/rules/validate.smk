@@ -6,10 +6,7 @@ rule write_validation:
         measures=lambda wildcards: every_point("measures.json", VALIDATION),
         loads=lambda wildcards: every_packing("tables/loading.json"),
         templates=page_templates(
-            *(
-                f"validation/{name}.html.j2"
-                for name in ("validation", "peaks/peaks", "scaling", "load")
-            ),
+            *(f"validation/{name}.html.j2" for name in ("validation", "peaks", "scaling", "load")),
             package="evidence",
         ),
         words="analysis/dragchain/scaling/words.html.j2",

@@ -137,23 +137,3 @@ def _measured_lines(axes: Axes, rebound: float, deck: float) -> None:
     for label, place in labels.items():
         axes.annotate(label, place, (3, 3), textcoords="offset points", color=COLOURS["experiment"])
     axes.set(xlim=ends, ylim=ends)
-
-
-def draw_trials(trials: pd.DataFrame) -> Figure:
-    """Recovered less known value with its interval, trial by trial."""
-    shown = trials[trials["refused"].isna()].reset_index(drop=True)
-    figure, panels = new_panels(3.0, 2)
-    names = (("deck", "input value"), ("effective", "rebound, production settings"))
-    for axes, (name, title) in zip(panels, names, strict=True):
-        value, low, high = (shown[f"{name}{end}"] for end in ("", "_ci95_low", "_ci95_high"))
-        error = value - shown[f"{name}_known"]
-        held = shown[f"{name}_held"].astype(bool)
-        for mask, colour in ((held, BLUE), (~held, RED)):
-            reach = [(value - low)[mask], (high - value)[mask]]
-            place = shown.index[mask] + 1
-            axes.errorbar(place, error[mask], reach, fmt="o", ms=3, color=colour, capsize=2)
-        axes.axhline(0.0, color="black", linewidth=0.8)
-        axes.set(xlabel="trial", ylabel="recovered minus true")
-        axes.set_title(f"{title}: {int(held.sum())} of {len(trials)} within CI")
-        axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 2))
-    return figure

@@ -4,12 +4,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from dragchain.calibration.figures import draw_bias, draw_fit, draw_impacts, draw_trials
+from dragchain.calibration.figures import draw_bias, draw_fit, draw_impacts
 from dragchain.calibration.fit import calibrate_file
 from dragchain.calibration.force_record import read_record
 from dragchain.calibration.results import CalibrationFile, confirmed
 from dragchain.calibration.simulated_drops import read_drops
-from dragchain.calibration.trials import TrialsFile
 from dragchain.errors import TableError
 from dragchain.figures.style import drawing, png
 from dragchain.report.bundle import write_bundle
@@ -24,8 +23,8 @@ def write_report(record: Path, folder: Path) -> None:
     record : Path
         The CSV.
     folder : Path
-        With ``result.json``, ``impacts.csv``, ``bias.csv``, ``trials.json``,
-        ``trials.csv``, ``sweep/drops.json`` and ``confirm/drops.json``.
+        With ``result.json``, ``impacts.csv``, ``bias.csv``, ``sweep/drops.json`` and
+        ``confirm/drops.json``.
 
     Raises
     ------
@@ -35,13 +34,12 @@ def write_report(record: Path, folder: Path) -> None:
     result = CalibrationFile.read(folder / "result.json")
     sweep, confirm = (read_drops(folder / name / "drops.json") for name in ("sweep", "confirm"))
     found = calibrate_file(record, sweep)
-    impacts, bias, trials = (_csv(folder / f"{name}.csv") for name in ("impacts", "bias", "trials"))
+    impacts, bias = (_csv(folder / f"{name}.csv") for name in ("impacts", "bias"))
     with drawing():
         figures = {
             "impacts": png(draw_impacts(read_record(record), found, confirm)),
             "fit": png(draw_fit(found)),
             "bias": png(draw_bias(bias, result)),
-            "trials": png(draw_trials(trials)),
         }
     page = render_page(
         "calibration/calibration.html.j2",
@@ -49,7 +47,6 @@ def write_report(record: Path, folder: Path) -> None:
         impacts=impacts.to_dict("records"),
         bias=_by_deck_value(bias),
         confirm=confirmed(confirm),
-        trials=TrialsFile.read(folder / "trials.json"),
         pictures={name: data_uri(picture) for name, picture in figures.items()},
     )
     write_bundle(folder, figures=figures, pages={"report": page})

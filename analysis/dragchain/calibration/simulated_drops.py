@@ -17,7 +17,7 @@ from dragchain.errors import TableError
 from dragchain.run.case import load_case, load_outputs
 from dragchain.tables.impacts import speed_at_plate
 
-Purpose = Literal["production", "reference", "confirm", "trial"]
+Purpose = Literal["production", "reference", "confirm"]
 
 _SAMPLES = ("step", "time_s", "z_m", "vz_m_s", "force_n")
 """Columns of a drop's output around its impacts."""
@@ -77,7 +77,7 @@ class Drop(Settings):
     folder : str
         Beside the list.
     purpose : str
-        ``production``, ``reference``, ``confirm`` or ``trial``.
+        ``production``, ``reference`` or ``confirm``.
     restitution : float
         In the deck.
     """

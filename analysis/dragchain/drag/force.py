@@ -8,6 +8,9 @@ import pandas as pd
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.tables.by_step import intact
 
+FORCES = ("drag_n", "lateral_n", "vertical_n")
+"""The force on the workpiece in the workpiece frame."""
+
 
 def read_counted(run_dir: Path | str, columns: Sequence[str] | None = None) -> pd.DataFrame:
     """Read the samples of the force on the workpiece that statistics use.
@@ -22,7 +25,7 @@ def read_counted(run_dir: Path | str, columns: Sequence[str] | None = None) -> p
     Returns
     -------
     DataFrame
-        The rows of ``workpiece_force.parquet`` with ``counted`` true.
+        The rows of ``workpiece_force.parquet`` with ``in_statistics`` true.
 
     Raises
     ------
@@ -35,26 +38,12 @@ def read_counted(run_dir: Path | str, columns: Sequence[str] | None = None) -> p
         return pd.read_parquet(file, columns=wanted, filters=[("in_statistics", "==", True)])
 
 
-def summarise_forces(run_dir: Path | str) -> dict[str, MeanEstimate]:
-    """Mean and spread of the force on the workpiece in the workpiece frame.
-
-    Parameters
-    ----------
-    run_dir : Path or str
-        The run folder, with its tables made.
-
-    Returns
-    -------
-    dict of str to MeanEstimate
-        For ``drag_n``, ``lateral_n`` and ``vertical_n``, in N.
+def summarise_forces(samples: pd.DataFrame) -> dict[str, MeanEstimate]:
+    """Mean and spread of `FORCES` over samples of `read_counted`, in N.
 
     Raises
     ------
-    TableError
-        If ``workpiece_force.parquet`` is not there.
     SeriesError
-        If too few samples are counted.
+        If there are too few samples.
     """
-    names = ("drag_n", "lateral_n", "vertical_n")
-    samples = read_counted(run_dir, names)
-    return {name: estimate_mean(samples[name].to_numpy()) for name in names}
+    return {name: estimate_mean(samples[name].to_numpy()) for name in FORCES}

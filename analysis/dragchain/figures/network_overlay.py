@@ -16,39 +16,29 @@ from dragchain.figures.rendering import Image
 from dragchain.figures.style import COLOURS, force_map
 
 
-def show_network(
-    axes: Axes,
-    shown: Scene,
-    view: View,
-    image: Image,
-    extent: Floats,
-    width: float = 1.6,
-    halo: float = 3.0,
-) -> None:
+def show_network(axes: Axes, shown: Scene, view: View, image: Image, extent: Floats) -> None:
     """Set a rendered view on axes in mm, with the dominant path and the motion marked.
 
     Parameters
     ----------
     image, extent : array
         What `network_picture.render` returned.
-    width, halo : float
-        Line width of the path and of the white line below it.
     """
     axes.imshow(image, extent=tuple(extent.tolist()), interpolation="antialiased")
     axes.grid(False)
     axes.set(xlabel="x (mm)", ylabel=f"{view[1]} (mm)", xlim=extent[:2], ylim=extent[2:])
-    _mark_chain(axes, shown, [0, 1] if view == "xy" else [0, 2], width, halo)
+    _mark_chain(axes, shown, [0, 1] if view == "xy" else [0, 2])
     _mark_motion(axes, shown, view)
 
 
-def force_bar(figure: Figure, panels: Sequence[Axes], largest_n: float) -> None:
-    """Put the colours of the normal force beside panels."""
+def force_bar(figure: Figure, panel: Axes, largest_n: float) -> None:
+    """Put the colours of the normal force beside a panel."""
     scale = ScalarMappable(Normalize(0.0, largest_n), force_map())
     label = "normal force per contact (N);\ncylinder radius proportional"
-    figure.colorbar(scale, ax=list(panels), shrink=0.8, pad=0.02, aspect=28, label=label)
+    figure.colorbar(scale, ax=panel, shrink=0.8, pad=0.02, aspect=28, label=label)
 
 
-def _mark_chain(axes: Axes, shown: Scene, pick: Sequence[int], width: float, halo: float) -> None:
+def _mark_chain(axes: Axes, shown: Scene, pick: Sequence[int]) -> None:
     """Outline the dominant path on axes in mm; `pick` names the two coordinates."""
     if shown.dominant is None:
         return
@@ -56,7 +46,7 @@ def _mark_chain(axes: Axes, shown: Scene, pick: Sequence[int], width: float, hal
     ends = frame.point[[path.contacts[0], path.contacts[-1]]]
     centres, radii = frame.centre[list(path.particles)], frame.radius[list(path.particles)] * 1e3
     line = np.vstack([ends[:1], centres, ends[1:]])[:, pick] * 1e3
-    for colour, thick in (("white", halo), (COLOURS["dominant_path"], width)):
+    for colour, thick in (("white", 3.0), (COLOURS["dominant_path"], 1.6)):
         axes.plot(*line.T, color=colour, linewidth=thick)
         for centre, radius in zip(line[1:-1], radii, strict=True):
             axes.add_patch(Circle(centre, radius, fill=False, edgecolor=colour, linewidth=thick))

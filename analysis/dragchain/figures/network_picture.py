@@ -6,7 +6,6 @@ largest normal force), its radius is proportional to the normal force and reache
 radius at the largest.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -14,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from dragchain.arrays import Floats, Ints
+from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.figures.rendering import Camera, Image, new_plotter, photograph
 from dragchain.figures.style import COLOURS, force_map
@@ -34,7 +33,6 @@ _PICTURE_TIME_S = 4.5
 _PIXELS_PER_MM = 10
 _SIDES = 18
 _MARGIN_M = 0.004
-_FADED = 0.3
 
 WINDOW_DIAMETERS = 12.0
 """Mean particle diameters to either side of the workpiece that a picture of a wider bowl shows."""
@@ -81,14 +79,9 @@ def segments(frame: NetworkFrame) -> Floats:
     return np.stack([frame.centre[frame.a], end], axis=1)
 
 
-def cylinder_radii(
-    normal_force_n: Floats, radius_mean_m: float, largest_n: float | None = None
-) -> Floats:
-    """Return radii proportional to the force, (M,) in m: the mean particle radius at `largest_n`.
-
-    That is the largest of the forces if None; pictures that are to be compared share one.
-    """
-    largest = normal_force_n.max(initial=0.0) if largest_n is None else largest_n
+def cylinder_radii(normal_force_n: Floats, radius_mean_m: float) -> Floats:
+    """Radii proportional to the force, (M,) in m: the mean particle radius at the largest."""
+    largest = normal_force_n.max(initial=0.0)
     if largest <= 0.0:
         return np.zeros_like(normal_force_n)
     return np.asarray(np.clip(normal_force_n, 0.0, None) / largest * radius_mean_m)
@@ -110,8 +103,8 @@ def picture_step(steps: Floats, process_time_s: Floats, wanted_s: float = _PICTU
     return int(steps[row])
 
 
-def load_scene(run_dir: Path, case: Case, wanted_s: float = _PICTURE_TIME_S) -> Scene:
-    """Read what the picture of a process run shows at the frame nearest to `wanted_s`.
+def load_scene(run_dir: Path, case: Case) -> Scene:
+    """Read what the picture of a process run shows at the frame of `picture_step`.
 
     Raises
     ------
@@ -120,20 +113,13 @@ def load_scene(run_dir: Path, case: Case, wanted_s: float = _PICTURE_TIME_S) -> 
     """
     network = read_table(run_dir / "tables" / "network.parquet", ["step", "time_s"])
     times = process_time(network["time_s"].to_numpy(np.float64), case)
-    step = picture_step(network["step"].to_numpy(np.float64), times, wanted_s)
+    step = picture_step(network["step"].to_numpy(np.float64), times)
     frame = next(read_frames(run_dir, (step, step)), None)
     if frame is None:
         raise TableError(f"particles.parquet lacks step {step}, which network.parquet has")
-    return scene_of(frame, workpiece_places(run_dir, case), case)
-
-
-def scene_of(
-    frame: NetworkFrame, place: Callable[[int], tuple[Floats, float]], case: Case
-) -> Scene:
-    """What the picture of a frame shows, from the workpiece's place and turn at each step."""
     path = dominant_path(frame, widest_paths(frame))
     moment = float(process_time(np.array(frame.time_s), case))
-    return Scene(frame, *place(frame.step), path, moment)
+    return Scene(frame, *workpiece_places(run_dir, case)(frame.step), path, moment)
 
 
 @dataclass(frozen=True)
@@ -189,30 +175,12 @@ def cut_words(case: Case, view: View) -> str:
     return words + (f", {DEPTH_DIAMETERS:g} in front of and behind it" if view == "xz" else "")
 
 
-@dataclass(frozen=True)
-class Look:
-    """How a picture is rendered.
-
-    Attributes
-    ----------
-    pixels_per_mm : float
-        Resolution; less where a picture would be larger than VTK renders well.
-    largest_n : float or None
-        Normal force at the red end of the colours and at the mean particle radius; the frame's
-        largest if None.
-    kept : (k,) ndarray of int or None
-        Contacts that stay opaque while the others are seen through; None: all are opaque.
-    """
-
-    pixels_per_mm: float = _PIXELS_PER_MM
-    largest_n: float | None = None
-    kept: Ints | None = None
-
-
 def render(
-    run_dir: Path, case: Case, scene: Scene, view: View, look: Look | None = None
+    run_dir: Path, case: Case, scene: Scene, view: View, pixels_per_mm: float = _PIXELS_PER_MM
 ) -> tuple[Image, Floats]:
     """Render one view in parallel projection.
+
+    The resolution is less where a picture would be larger than VTK renders well.
 
     Returns
     -------
@@ -221,16 +189,16 @@ def render(
     extent : (4,) array
         Its left, right, lower and upper edge in mm along the axes of `view`.
     """
-    look, part = look or Look(), window(case, scene, view)
+    part = window(case, scene, view)
     low, high = part.low, part.high
     size_mm = (high - low) * 1e3
-    pixels_per_mm = min(look.pixels_per_mm, _MOST_PIXELS / float(size_mm.max()))
+    pixels_per_mm = min(pixels_per_mm, _MOST_PIXELS / float(size_mm.max()))
     plotter = new_plotter(*np.ceil(size_mm * pixels_per_mm).astype(int).tolist())
     plotter.enable_depth_peeling(number_of_peels=8)
     _add_bowl(plotter, case, view)
     workpiece = placed(workpiece_mesh(run_dir, case), scene.workpiece_m, scene.workpiece_turn_rad)
     plotter.add_mesh(workpiece, color=COLOURS["workpiece"], opacity=0.45)
-    _add_contacts(plotter, scene.frame, case.media.radius_mean_m, look, part.contacts)
+    _add_contacts(plotter, scene.frame, case.media.radius_mean_m, part.contacts)
     image = photograph(plotter, _camera((low + high) / 2, view, case), float(high[1] - low[1]))
     return image, np.array([low[0], high[0], low[1], high[1]]) * 1e3
 
@@ -259,23 +227,23 @@ def _add_bowl(plotter: Any, case: Case, view: View) -> None:
 
 
 def _add_contacts(
-    plotter: Any,
-    frame: NetworkFrame,
-    radius_mean_m: float,
-    look: Look,
-    within: NDArray[np.bool_] | None,
+    plotter: Any, frame: NetworkFrame, radius_mean_m: float, within: NDArray[np.bool_] | None
 ) -> None:
     force = frame.normal_force
-    largest = float(force.max(initial=0.0)) if look.largest_n is None else look.largest_n
-    radius = cylinder_radii(force, radius_mean_m, largest)
+    radius = cylinder_radii(force, radius_mean_m)
     shown = force > 0.0 if within is None else (force > 0.0) & within
-    kept = shown if look.kept is None else np.isin(np.arange(force.size), look.kept)
-    colours = {"scalars": "force", "cmap": force_map(), "clim": (0.0, largest)}
-    for part, opacity in ((shown & ~kept, _FADED), (shown & kept, 1.0)):
-        if part.any():
-            light = {"opacity": opacity, "ambient": 0.35, "diffuse": 0.7}
-            tubes = _tubes(segments(frame)[part], force[part], radius[part])
-            plotter.add_mesh(tubes, **colours, **light, show_scalar_bar=False)
+    if not shown.any():
+        return
+    tubes = _tubes(segments(frame)[shown], force[shown], radius[shown])
+    plotter.add_mesh(
+        tubes,
+        scalars="force",
+        cmap=force_map(),
+        clim=(0.0, float(force.max(initial=0.0))),
+        ambient=0.35,
+        diffuse=0.7,
+        show_scalar_bar=False,
+    )
 
 
 def _tubes(axis: Floats, force: Floats, radius: Floats) -> Any:

@@ -7,7 +7,7 @@ and its passing from facet to facet does not end it. One sample without force
 ends it. What happens between two samples is not seen.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -56,15 +56,6 @@ class Thresholds:
     impact_times: float = 5.0
     rest: float = 0.1
     slide_to_roll: float = 1.0
-
-    def varied(self) -> "dict[str, Thresholds]":
-        """Each limit of the types halved and doubled, and named."""
-        names = ("impact_times", "rest", "slide_to_roll")
-        return {
-            f"{name} x {factor:g}": replace(self, **{name: getattr(self, name) * factor})
-            for name in names
-            for factor in (0.5, 2.0)
-        }
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,6 @@ from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 
 FILE = Path("tables") / "loading.json"
 
-Fractions = Mapping[str, Mapping[str, Real]]
-"""Each type's fraction (by type) of an amount (by amount)."""
-
 
 class Totals(Part):
     """Sums over all contacts and counted samples, and what follows from them.
@@ -74,53 +71,6 @@ class ContactType(Part):
     intensity: Mapping[str, Quantiles]
 
 
-class Sensitivity(Part):
-    """Fractions by type with one of the limits halved or doubled.
-
-    Attributes
-    ----------
-    limits : str
-        Which limit was changed, and how.
-    fraction_of : mapping
-        Fraction of each amount, by type.
-    """
-
-    limits: str
-    fraction_of: Fractions
-
-
-class MobilisedLimit(Part):
-    """Sums with another limit for sliding, see `Thresholds.mobilised`.
-
-    Attributes
-    ----------
-    limit : float
-        Ratio of tangential force to the Coulomb limit from which a contact slides.
-    load_while_sliding_fraction, sliding_m, force_slide_n_m : float
-        Sums with this limit.
-    """
-
-    limit: float
-    load_while_sliding_fraction: float
-    sliding_m: float
-    force_slide_n_m: float
-
-
-class Gap(Part):
-    """Number of events if samples without force are tolerated within an event.
-
-    Attributes
-    ----------
-    samples : int
-        Tolerated number of consecutive samples without force.
-    events : int
-        Number of events.
-    """
-
-    samples: int
-    events: int
-
-
 class Profile(Part):
     """Normal force times sliding distance per metre of path in bins of depth (m) or azimuth (rad).
 
@@ -134,33 +84,6 @@ class Profile(Part):
 
     edges: tuple[float, ...]
     force_slide: EstimateColumns
-
-
-class Thinned(Part):
-    """The results if only every n-th sample was used.
-
-    The errors of the sums are the largest over the n possible starts, the number of events is
-    the mean over them; the fractions by type are those of the first start.
-
-    Attributes
-    ----------
-    every : int
-        n.
-    samples_hz : float
-        Resulting sampling rate, Hz.
-    largest_relative_error : mapping
-        By amount.
-    events : float
-        Number of events.
-    fraction_of : mapping
-        Fraction of each amount, by type.
-    """
-
-    every: int
-    samples_hz: float
-    largest_relative_error: Mapping[str, Real]
-    events: float
-    fraction_of: Fractions
 
 
 class Impulse(Part):
@@ -222,8 +145,6 @@ class Loading(Totals, Document):
         Limits between the types of contact events.
     types : mapping of ContactType
         By type: impact, sliding, rolling, resting.
-    sensitivity, mobilised, gaps, sampling : tuple
-        Effect of the limits, of gaps and of the sampling rate on the results.
     profiles : mapping of Profile
         By depth and azimuth.
     closure : Closure
@@ -243,9 +164,5 @@ class Loading(Totals, Document):
     impact_seen_fraction: float
     limits: Thresholds
     types: Mapping[str, ContactType]
-    sensitivity: tuple[Sensitivity, ...]
-    mobilised: tuple[MobilisedLimit, ...]
-    gaps: tuple[Gap, ...]
     profiles: Mapping[str, Profile]
-    sampling: tuple[Thinned, ...]
     closure: Closure

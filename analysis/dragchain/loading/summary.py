@@ -8,7 +8,6 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.drag.azimuth import circumference, parts, within
@@ -16,36 +15,21 @@ from dragchain.loading.contact_events import (
     AMOUNTS,
     TYPES,
     Thresholds,
-    event_types,
-    find_events,
     surfaces,
 )
 from dragchain.loading.document import (
     Closure,
     ContactType,
-    Gap,
     Impulse,
     Loading,
-    MobilisedLimit,
     Profile,
     Quantiles,
-    Sensitivity,
-    Thinned,
     Totals,
 )
 from dragchain.loading.samples import WORKPIECE, Sampled
 from dragchain.run.case import Case
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
 from dragchain.statistics.frame_means import estimates
-
-_THINNING = (2, 5, 10)
-"""Every n-th sample is taken to see what a lower rate of samples would give."""
-
-_GAPS = (0, 1, 2, 5)
-"""Samples without force that may lie within an event, to see what they do to its number."""
-
-_MOBILISED = (0.9, 0.95, 0.99, 0.999)
-"""Limits of a sliding contact, to see what they do to the sums."""
 
 DEPTH_BINS, AZIMUTH_BINS = 20, 24
 
@@ -101,17 +85,7 @@ def summarise(
         limits=limits,
         **dict(_totals(sampled, events)),
         types=_types(sampled, events, event),
-        sensitivity=tuple(
-            Sensitivity(
-                limits=name,
-                fraction_of=_fractions(events, event_types(events, case, interval_s, moved)),
-            )
-            for name, moved in {"as stated": limits, **limits.varied()}.items()
-        ),
-        mobilised=tuple(_mobilised(sampled.rows, limit) for limit in _MOBILISED),
-        gaps=tuple(Gap(samples=gap, events=_count(sampled.rows, 1 + gap)) for gap in _GAPS),
         profiles=_profiles(sampled),
-        sampling=tuple(_thinned(sampled, every, case, limits) for every in _THINNING),
         closure=_closure(sampled, facets, events, off_facet_m),
     )
 
@@ -193,35 +167,6 @@ def _quantiles(values: pd.Series) -> Quantiles:
     )
 
 
-def _fractions(events: pd.DataFrame, kind: NDArray[np.str_]) -> dict[str, dict[str, float]]:
-    """Each type's fraction of the events and of what they bring; NaN of nothing."""
-    amounts = {"events": np.ones(len(events))} | {
-        name: events[name].to_numpy()
-        for name in ("normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
-    }
-    return {
-        name: {t: _ratio(values[kind == t].sum(), values.sum()) for t in TYPES}
-        for name, values in amounts.items()
-    }
-
-
-def _ratio(part: float, whole: float) -> float:
-    return float(part) / float(whole) if whole else np.nan
-
-
-def _mobilised(rows: pd.DataFrame, limit: float) -> MobilisedLimit:
-    """What counts as sliding with another limit of `Thresholds.mobilised`."""
-    slides = rows["mobilisation"] >= limit
-    path = rows["relative_path_m"][slides]
-    load = rows["normal_impulse_n_s"][slides].sum() / rows["normal_impulse_n_s"].sum()
-    return MobilisedLimit(
-        limit=limit,
-        load_while_sliding_fraction=float(load),
-        sliding_m=float(path.sum()),
-        force_slide_n_m=float((rows["normal_force_n"][slides] * path).sum()),
-    )
-
-
 def _profiles(sampled: Sampled) -> dict[str, Profile]:
     """Force times sliding distance by depth and by azimuth, per metre of path."""
     rows = sampled.rows
@@ -243,49 +188,6 @@ def _profile(sampled: Sampled, edges: Floats, halves: tuple[Ints, Ints]) -> Prof
     scale = sampled.path_m / sampled.frames * (edges[1] - edges[0])
     found = estimates(sums, lambda means: means / scale)
     return Profile(edges=tuple(edges.tolist()), force_slide=EstimateColumns.of(found))
-
-
-# --- fewer samples ---------------------------------------------------------------------------
-
-
-def _thinned(sampled: Sampled, every: int, case: Case, limits: Thresholds) -> Thinned:
-    """What every n-th sample alone would give."""
-    counts = [_count_thinned(sampled.rows, every, start) for start in range(every)]
-    interval_s = every * sampled.interval_s
-    events, _ = find_events(_thin(sampled.rows, every), -(-sampled.frames // every), interval_s)
-    return Thinned(
-        every=every,
-        samples_hz=1.0 / interval_s,
-        largest_relative_error={name: _error(sampled.rows, name, every) for name in AMOUNTS},
-        events=float(np.mean(counts)),
-        fraction_of=_fractions(events, event_types(events, case, interval_s, limits)),
-    )
-
-
-def _thin(rows: pd.DataFrame, every: int) -> pd.DataFrame:
-    """The contacts of every n-th frame, each standing for n; frames are numbered anew."""
-    rows = rows[rows["frame"] % every == 0]
-    amounts = {name: every * rows[name] for name in AMOUNTS}
-    return rows.assign(frame=rows["frame"] // every, **amounts).reset_index(drop=True)
-
-
-def _error(rows: pd.DataFrame, name: str, every: int) -> float:
-    """The largest relative error of a sum over every n-th frame."""
-    parts = np.bincount(rows["frame"] % every, rows[name], every)
-    return float(np.abs(every * parts / parts.sum() - 1.0).max()) if parts.sum() else np.nan
-
-
-def _count_thinned(rows: pd.DataFrame, every: int, start: int) -> int:
-    """The number of events that every n-th frame shows."""
-    rows = rows.loc[rows["frame"] % every == start, ["particle_id", "frame"]]
-    return _count(rows.assign(frame=rows["frame"] // every))
-
-
-def _count(rows: pd.DataFrame, step: int = 1) -> int:
-    """The number of events on the workpiece; samples of one are at most `step` apart."""
-    touches = rows[["particle_id", "frame"]].drop_duplicates().sort_values(["particle_id", "frame"])
-    particle, frame = touches["particle_id"].to_numpy(), touches["frame"].to_numpy()
-    return int(len(touches) > 0) + int(((np.diff(particle) != 0) | (np.diff(frame) > step)).sum())
 
 
 # --- closure ---------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import pandas as pd
 
 from dragchain.arrays import Ints
 from dragchain.drag.around import ahead_behind, azimuth_profile, depth_profile, depth_slope
-from dragchain.drag.force import read_counted, summarise_forces
+from dragchain.drag.force import FORCES, read_counted, summarise_forces
 from dragchain.drag.peaks import drag_peaks, peak_separation_s
 from dragchain.errors import SeriesError
 from dragchain.report.findings import (
@@ -57,8 +57,8 @@ def write_findings(run: RunData) -> Findings:
 
 def process_findings(run: RunData) -> ProcessFindings:
     """Compute the findings of a process run; errors are those of `write_findings`."""
-    samples = read_counted(run.folder, ("step", "time_s", "drag_n"))
-    forces = summarise_forces(run.folder)
+    samples = read_counted(run.folder, ("step", "time_s", *FORCES))
+    forces = summarise_forces(samples)
     frame, frames, contacts = _workpiece_contacts(run, samples)
     azimuth, depth, force = (
         contacts[name].to_numpy(np.float64) for name in ("azimuth_rad", "depth_m", "normal_force_n")

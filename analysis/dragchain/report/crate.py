@@ -101,7 +101,7 @@ class _Crate:
         try:
             from rocrate.rocrate import ROCrate
         except ModuleNotFoundError as error:
-            remedy = "./run setup; or pip install 'dragdeck[crate]'"
+            remedy = "./run setup crate; or pip install 'dragdeck[crate]'"
             raise ExportError(f"{error}\n  remedy: {remedy}") from None
         self._folder = folder
         self._crate = ROCrate(version=_SPECIFICATION)

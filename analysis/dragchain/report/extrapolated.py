@@ -83,23 +83,19 @@ class Extrapolated(Document):
         found = self.tolerance
         if found is None:
             return ""
-        labels = [one.label if (one := self.of(name)) else name for name in found.asked]
-        asked = " and the ".join(filter(None, (", the ".join(labels[:-1]), labels[-1])))
-        percent = f"{100 * found.tolerance:.3g} %"
-        who, gives, not_give = "The run", "gives", "does not give"
-        if self.windows:
-            who, gives, not_give = f"{len(self.windows)} windows", "give", "do not give"
-        where, what = "at the physical Young's modulus", f"the {asked} to within {percent}"
+        known = {one.name: one.label for one in self.quantities}
+        labels = [f"the {known.get(name, name)}" for name in found.asked]
+        what = " and ".join(filter(None, (", ".join(labels[:-1]), labels[-1])))
+        asked = f"{what} to within {100 * found.tolerance:.3g} %"
+        who, verb = "The run at the physical Young's modulus", ("gives", "does not give")
+        if found.runs:
+            who = f"{len(found.runs)} windows at the physical Young's modulus"
+            verb = ("give", "do not give")
         if found.reached:
-            return f"{who} {where} {gives} {what}."
+            return f"{who} {verb[0]} {asked}."
         windows, packings = found.needed
-        more = f"{windows} windows" if packings == 1 and self.windows else f"{packings} seeds"
-        return f"{who} {where} {not_give} {what}: about {more} would."
-
-    @property
-    def windows(self) -> tuple[str, ...]:
-        """Windows that enter; none of a run without."""
-        return self.tolerance.runs if self.tolerance else ()
+        more = f"{windows} windows" if packings == 1 and found.runs else f"{packings} seeds"
+        return f"{who} {verb[1]} {asked}: about {more} would."
 
     def of(self, name: str) -> ExtrapolatedQuantity | None:
         """A quantity by its name, None if it was not measured."""

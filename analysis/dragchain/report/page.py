@@ -1,7 +1,7 @@
 """Pages: each one HTML file that needs no other file and no network.
 
 All pages extend ``page.html.j2``, which has the head, the style and the frame, and share the
-macros of ``macros.html.j2`` and the filters of `dragchain.notation`.
+macros of ``macros.html.j2`` and the filters of `dragchain.report.notation`.
 """
 
 import base64

@@ -111,7 +111,7 @@ def _network(run: RunData, view: network_picture.View, side: str) -> Figure:
     figure, (axes,) = new_panels(height, width_in=HALF_IN)
     show_network(axes, shown, view, image, extent)
     largest = float(shown.frame.normal_force.max(initial=0.0))
-    force_bar(figure, [axes], largest)
+    force_bar(figure, axes, largest)
     title = (
         f"contact network {side}, process time {shown.process_time_s:.2f} s\n"
         f"largest normal force {largest:.2f} N"

@@ -121,17 +121,17 @@ def _own(
     case: Case, found: ProcessFindings, loading: Loading | None, extrapolated: Extrapolated | None
 ) -> Iterator[tuple[str, Estimate]]:
     """The values of the run in simulated time, later ones instead of earlier ones."""
-    for one in extrapolated.quantities if extrapolated else ():
-        yield one.name, one.measured
-    for name, force in _FORCES.items():
-        yield name, of_mean(found.forces[force])
     yield "drag_std", Estimate(found.forces["drag_n"].std, math.nan, math.nan)
-    yield "ahead_behind", found.ahead_behind.ratio
     yield "chain_count", Estimate(found.chains.peters_per_frame, math.nan, math.nan)
     yield "chain_length", Estimate(found.chains.peters_particles_mean, math.nan, math.nan)
     for name in ("coordination_number", "mechanical_coordination_number"):
         if name in found.network:
             yield name, Estimate(found.network[name], math.nan, math.nan)
+    for one in extrapolated.quantities if extrapolated else ():
+        yield one.name, one.measured
+    for name, force in _FORCES.items():
+        yield name, of_mean(found.forces[force])
+    yield "ahead_behind", found.ahead_behind.ratio
     if loading is not None:
         yield "workpiece_contacts", loading.mean_contacts
         for name, key in _PER_METRE.items():
@@ -141,10 +141,12 @@ def _own(
 
 def _correction(name: str, extrapolated: Extrapolated | None) -> Correction | None:
     """What the windows of a run make of a quantity."""
-    one = extrapolated.of(name) if extrapolated else None
-    if extrapolated is None or one is None or one.value is None or not extrapolated.windows:
+    if extrapolated is None or extrapolated.tolerance is None:
         return None
-    return Correction(one.value.over(one.measured.value), len(extrapolated.windows))
+    one, windows = extrapolated.of(name), len(extrapolated.tolerance.runs)
+    if not windows or one is None or one.value is None:
+        return None
+    return Correction(one.value.over(one.measured.value), windows)
 
 
 def of_mean(mean: MeanEstimate) -> Estimate:

@@ -163,9 +163,9 @@ def judge(
     if not doubts:
         return Standing(quantity, run, run, scaled, "", reliable)
     if correction is not None:
-        ratio = correction.factor
-        low, high = sorted((run.value * ratio.ci95_low, run.value * ratio.ci95_high))
-        value = Estimate(run.value * ratio.value, low, high)
+        ends = (correction.factor.ci95_low, correction.factor.ci95_high)
+        low, high = sorted(run.value * end for end in ends)
+        value = Estimate(run.value * correction.factor.value, low, high)
         return Standing(quantity, run, value, Basis.WINDOWS, "", reliable, correction.windows)
     why = _why_not(case)
     reason = f"not corrected for {' and '.join(doubts)}: {why}"

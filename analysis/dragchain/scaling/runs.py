@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dragchain.drag.force import summarise_forces
+from dragchain.drag.force import FORCES, read_counted, summarise_forces
 from dragchain.errors import TableError
 from dragchain.run.case import Case, load_case
 from dragchain.run.kinematics import needed
@@ -58,7 +58,7 @@ def _read_run(folder: Path, field: str) -> Run:
     level = case.inputs.get(field)
     if isinstance(level, bool) or not isinstance(level, int | float) or level <= 0:
         raise TableError(f"{folder}: field {field} is {level!r}, a power law needs numbers above 0")
-    drag = summarise_forces(folder)["drag_n"]
+    drag = summarise_forces(read_counted(folder, FORCES))["drag_n"]
     if drag.mean >= 0.0:
         raise TableError(f"{folder}: the mean drag is {drag.mean:+.3g} N, along the motion")
     workpiece = needed(case.workpiece, "workpiece")

@@ -167,11 +167,11 @@ def _measured(folder: Path) -> WindowOfRun:
     along = quantities_along(folder, case)
     found = {name: getattr(along, name) for name in ("begin_m", "arc_m", "load_map")}
     return window.model_copy(
-        update={**found, "values": along.values(), "refused": _unsettled(folder)}
+        update={**found, "values": along.values(), "refused": unsettled(folder)}
     )
 
 
-def _unsettled(folder: Path) -> str:
+def unsettled(folder: Path) -> str:
     """Why a window's bed has not come to its plateau, empty if it has."""
     contacts = read_table(folder / "tables" / "network.parquet")["coordination_number"]
     first = max(1, len(contacts) // 3)

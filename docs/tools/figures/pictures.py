@@ -22,7 +22,6 @@ from dragchain.report.run_data import RunData
 from dragchain.report.run_figures import network_xz
 from dragchain.run.case import load_case
 from dragchain.run.kinematics import needed
-from evidence.validation.peaks.film import peak_and_quiet
 
 STUDY = "half_minute"
 """Its results are needed: ``./run all --config study=half_minute``."""
@@ -34,10 +33,6 @@ _THICKEST_M = 2e-3
 def _network(run: Path) -> bytes:
     with drawing():
         return png(network_xz(RunData(run, load_case(run)), ProcessFindings.read(run / FILE)))
-
-
-def _peak(run: Path) -> bytes:
-    return peak_and_quiet(run)["peak_and_quiet_xz"]
 
 
 def _export(run: Path) -> bytes:
@@ -112,7 +107,6 @@ PICTURES: Mapping[str, Callable[[Path], bytes]] = {
     "network_page": _network_page,
     "network_xz": _network,
     "paraview": _paraview,
-    "peak": _peak,
 }
 """What draws a picture from the folder of a process run, by the name of its file."""
 

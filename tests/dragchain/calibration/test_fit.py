@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from make_record import Sensor, record_of
 from paper_drops import BIAS, FALL_S, HEIGHT, G, paper_drop, paper_drops, rebound
-from scipy.stats import binom
 
 from dragchain.calibration.fit import WIDTH_LIMIT, calibrate
 from dragchain.calibration.measured_impacts import Measured, measure
@@ -18,7 +18,6 @@ from dragchain.calibration.simulated_drops import (
     waveform,
 )
 from dragchain.calibration.sweep import Sweep, emulate, emulator_of, prepare
-from dragchain.calibration.trials import Sensor, coverage, record_of, run_trials
 from dragchain.errors import RecordError, TableError
 from dragchain.statistics.estimate import Estimate
 
@@ -222,20 +221,6 @@ def test_any_rate_and_noise_recovers_the_rebound(
     assert abs(got.restitution - e) < 2 * half
 
 
-@pytest.mark.slow
-def test_intervals_hold_what_they_say() -> None:
-    """160 records of one drop, against a sweep without any error of its own.
-
-    The interval is 95 %, so the number that holds is binomial: within the
-    limits but for one chance in 1,000.
-    """
-    count = 160
-    trials = run_trials([paper_drop(0.68)], prepare(paper_drops()), seed=5, sensors=count)
-    low, high = binom.ppf([5e-4, 1 - 5e-4], count, 0.95)
-    assert low <= sum(trial.deck_held for trial in trials) <= high
-    assert high < count  # an interval that always holds would fail
-
-
 # --- tables ----------------------------------------------------------------------------------
 
 
@@ -266,16 +251,3 @@ def test_the_result_names_the_field_and_the_value(sweep: Sweep) -> None:
     assert got.correction == pytest.approx(-BIAS * (1 - 0.68) / (1 - BIAS), abs=1e-3)
     (used,) = [row for row in got.put_for if row.used]
     assert used.value == got.fit.restitution
-
-
-@pytest.mark.parametrize(
-    ("held", "low", "high"),
-    [(9, 0.5550, 0.9975), (10, 0.6915, 1.0), (0, 0.0, 0.3085)],
-)
-def test_coverage_with_the_interval_of_clopper_and_pearson(
-    held: int, low: float, high: float
-) -> None:
-    """n = 10: for none and all, 1 - 0.025^(1/10) = 0.3085 exactly."""
-    got = coverage([True] * held + [False] * (10 - held))
-    assert got.ci95_low == pytest.approx(low, abs=1e-4)
-    assert got.ci95_high == pytest.approx(high, abs=1e-4)

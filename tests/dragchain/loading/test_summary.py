@@ -183,15 +183,6 @@ def test_an_interval_holds_its_value_and_has_a_width(found: Loading) -> None:
     assert per_metre.ci95_low < per_metre.value < per_metre.ci95_high
 
 
-def test_fewer_samples_change_the_number_of_stays(found: Loading) -> None:
-    """Every tenth sees the two hits as one stay of two samples, or not at all."""
-    table = {row.every: row for row in found.sampling}
-    assert table[10].largest_relative_error["sliding_m"] == pytest.approx(0.0, abs=1e-12)
-    assert table[10].events == pytest.approx(3 + 1 / 10)
-    assert table[2].events == pytest.approx(3 + 1)
-    assert table[2].fraction_of["force_slide_n_m"]["sliding"] == 1.0
-
-
 def test_the_vtp_file_holds_the_table(run: Path, facets: pd.DataFrame) -> None:
     mesh = pv.read(run / "tables/workpiece.vtp")
     assert mesh.n_cells == 2

@@ -14,15 +14,16 @@ WEB = ROOT / "web"
 BUNDLE = ROOT / "analysis/dragchain/network_page/network.js"
 
 
-def sources() -> list[Path]:
-    own = [WEB / name for name in ("build.mjs", "package.json", "package-lock.json")]
-    return sorted([*own, *(WEB / "src").iterdir()], key=lambda file: str(file.relative_to(WEB)))
-
-
 def test_the_bundle_is_made_from_these_sources() -> None:
+    own = [
+        "../workflow/dragdeck/data/colours.json",
+        "build.mjs",
+        "package.json",
+        "package-lock.json",
+    ]
     total = hashlib.sha256()
-    for file in sources():
-        total.update(f"{file.relative_to(WEB)}\n".encode() + file.read_bytes())
+    for name in sorted([*own, *(f"src/{file.name}" for file in (WEB / "src").iterdir())]):
+        total.update(f"{name}\n".encode() + (WEB / name).read_bytes())
     recorded = re.match(r"/\*! sources: (\w+)\n", BUNDLE.read_text())
     assert recorded is not None
     assert recorded[1] == total.hexdigest(), "web/ was edited: call ./run web"
@@ -36,14 +37,13 @@ def test_the_bundle_is_what_npm_builds_here(tmp_path: Path) -> None:
     assert built.read_bytes() == BUNDLE.read_bytes()
 
 
-def test_the_bundle_can_stand_in_a_script_element() -> None:
-    assert not re.search(r"</script|<!--", BUNDLE.read_text(), re.IGNORECASE)
-
-
-def test_the_licence_of_three_js_stays_with_it() -> None:
+def test_the_licences_of_its_libraries_stay_with_it() -> None:
     head = BUNDLE.read_text()[:3000]
-    assert "The MIT License" in head and "three.js authors" in head
-    assert "The above copyright notice and this permission notice shall be included" in head
+    assert "three.js authors" in head and "Leon Sorokin" in head
+    assert head.count("The MIT License") == 2
+    assert (
+        head.count("The above copyright notice and this permission notice shall be included") == 2
+    )
 
 
 def test_packages_are_pinned_and_name_no_registry() -> None:

@@ -271,7 +271,7 @@ def test_a_picture_of_a_wide_bowl_has_no_more_pixels_than_vtk_takes(process: Pat
     case = widened(load_case(process), 2.0)
     frame = network_frame([2.0, 0.5])
     shown = scene.Scene(frame, np.array([0.015, 0.012, 0.01]), 0.0, None, 0.2)
-    image, extent = scene.render(process, case, shown, "xy", scene.Look(pixels_per_mm=40.0))
+    image, extent = scene.render(process, case, shown, "xy", 40.0)
     assert max(image.shape[:2]) <= 1401
     assert is_strongest(pixel(image, extent, 0.0, 0.0))
 

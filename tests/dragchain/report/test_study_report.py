@@ -144,6 +144,14 @@ def test_two_cases_have_two_rows_and_an_overview(process: Path, tmp_path: Path) 
     assert "#workpiece-2" in page.references
 
 
+def test_one_case_is_not_repeated_in_an_overview(process: Path, tmp_path: Path) -> None:
+    write_report(tmp_path, [process])
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    first, *others = re.findall(r"<h2 id=[^>]*>([^<]+)", page)
+    assert first.startswith("Values")
+    assert not {"Drag by case", "Packings", "Comparison with reference values"} & set(others)
+
+
 def test_the_page_on_the_contact_network_is_beside_the_report(
     process: Path, tmp_path: Path
 ) -> None:

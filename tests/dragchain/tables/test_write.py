@@ -83,7 +83,7 @@ def test_the_counted_samples_alone_make_the_statistics(tiny_run: Path) -> None:
     write_tables(tiny_run)
     mean = -np.mean([chain_n(step) for step in range(40, LAST + 1, 2)])
     assert len(read_counted(tiny_run)) == 31
-    assert summarise_forces(tiny_run)["drag_n"].mean == pytest.approx(mean)
+    assert summarise_forces(read_counted(tiny_run))["drag_n"].mean == pytest.approx(mean)
 
 
 def test_workpiece_contacts_hold_the_applied_force_on_the_workpiece(tables) -> None:

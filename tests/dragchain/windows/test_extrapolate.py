@@ -1,13 +1,12 @@
-"""The quantities of a run as it is, and at the physical Young's modulus by it or its windows."""
+"""The quantities of a run as it is, and at the physical Young's modulus from its windows."""
 
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import pytest
 from figure_files import case_json
-from paths import ROOT
+from paths import WINDOWS_RECORD
 from report_files import ASKED
 
 from dragchain.report.extrapolated import FILE, Extrapolated, Need
@@ -17,74 +16,78 @@ from dragchain.windows import extrapolate
 from dragchain.windows.document import Round, WindowedQuantity, WindowOfRun
 from dragchain.windows.extrapolate import extrapolate_run
 
-RECORD = ROOT / "workflow/dragdeck/data/windows.json"
 
-
-def alone(folder: Path, patch: pytest.MonkeyPatch, scale: float, **more: Any) -> Extrapolated:
-    """A run without windows that has 30 contacts, within 2 from block to block."""
-    case = case_json("process") | more
-    case["fidelity"] |= {"youngs_modulus_scale": scale}
-    (folder / "case.json").write_text(json.dumps(case))
-    blocks = {"workpiece_contacts": (28.0, 32.0) * 16}
-    along = PathQuantities(arc_m=0.32, block_m=0.01, blocks=blocks)
-    patch.setattr(extrapolate, "quantities_along", lambda *_: along)
-    extrapolate_run(folder, RECORD)
-    return Extrapolated.read(folder / FILE)
-
-
-@pytest.mark.parametrize("scale", [1.0, 0.01])
-def test_only_the_physical_modulus_gives_values_without_windows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scale: float
+def test_a_run_without_windows_is_measured_and_not_corrected(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = alone(tmp_path, monkeypatch, scale)
-    (contacts,) = found.quantities
-    assert contacts.measured.value == 30.0 and contacts.measured.known
-    assert contacts.value == (contacts.measured if scale == 1.0 else None)
-    assert found.tolerance is None and found.said == ""
+    blocks = (30.0, 31.0, 29.0, 30.5, 29.5, 30.0, 31.0, 29.0, 30.0)
+    along = PathQuantities(arc_m=0.1, block_m=0.01, blocks={"workpiece_contacts": blocks})
+    monkeypatch.setattr(extrapolate, "quantities_along", lambda *_: along)
+    for scale in (0.01, 1.0):
+        case = case_json("process")
+        case["fidelity"]["youngs_modulus_scale"] = scale
+        (tmp_path / "case.json").write_text(json.dumps(case))
+        extrapolate_run(tmp_path, WINDOWS_RECORD)
+        (contacts,) = Extrapolated.read(tmp_path / FILE).quantities
+        assert contacts.measured.value == pytest.approx(30.0)
+        assert contacts.measured.ci95_low < 29.8 < 30.2 < contacts.measured.ci95_high
+        assert contacts.value == (contacts.measured if scale == 1.0 else None)
 
 
-@pytest.mark.parametrize(("tolerance", "reached"), [(0.5, True), (0.001, False)])
-def test_a_run_at_the_physical_modulus_says_what_it_reached(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tolerance: float, reached: bool
+def test_a_stiff_run_says_whether_it_is_inside_the_tolerance(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = {**ASKED, "quantities": ["workpiece_contacts"], "tolerance": tolerance}
-    found = alone(tmp_path, monkeypatch, 1.0, asked=asked)
-    assert found.tolerance is not None and found.tolerance.reached == reached
-    assert ("does not give the contacts on the workpiece" in found.said) != reached
-    if not reached:
-        contacts = found.quantities[0].measured
-        packings = math.ceil(((contacts.ci95_high - 30.0) / 30.0 / tolerance) ** 2)
-        assert f"about {packings} seeds would" in found.said
+    blocks = (30.0, 40.0, 20.0, 35.0, 25.0, 30.0, 40.0, 20.0, 30.0)
+    along = PathQuantities(arc_m=0.1, block_m=0.01, blocks={"workpiece_contacts": blocks})
+    monkeypatch.setattr(extrapolate, "quantities_along", lambda *_: along)
+    case = case_json("process")
+    case["fidelity"]["youngs_modulus_scale"] = 1.0
+    case["asked"] = {
+        "tolerance": 0.1, "quantities": ["workpiece_contacts"], "error": None,
+        "relative_cost": 0.3, "largest_cost": 0.3, "fallback": None,
+    }  # fmt: skip
+    for tolerance, reached in ((0.1, False), (0.5, True)):
+        case["asked"]["tolerance"] = tolerance
+        (tmp_path / "case.json").write_text(json.dumps(case))
+        extrapolate_run(tmp_path, WINDOWS_RECORD)
+        found = Extrapolated.read(tmp_path / FILE)
+        assert found.tolerance is not None and found.tolerance.reached == reached
+        assert (found.tolerance.needed.packings > 1) == (not reached)
+        assert ("does not give" in found.said) == (not reached)
 
 
 def test_a_tolerance_of_the_restitution_says_nothing_of_the_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = {**ASKED, "quantities": ["restitution"], "error": 0.004}
-    assert alone(tmp_path, monkeypatch, 1.0, asked=asked).tolerance is None
+    monkeypatch.setattr(extrapolate, "quantities_along", lambda *_: PathQuantities())
+    case = case_json("process") | {"asked": {**ASKED, "quantities": ["restitution"], "error": 0.1}}
+    (tmp_path / "case.json").write_text(json.dumps(case))
+    extrapolate_run(tmp_path, WINDOWS_RECORD)
+    assert Extrapolated.read(tmp_path / FILE).tolerance is None
 
 
 def test_windows_give_the_values_they_have_and_say_which_they_are(tmp_path: Path) -> None:
     (tmp_path / "tables").mkdir()
     refused = WindowOfRun(run="w-3", refused="a particle was lost", cpu_time_s=9.0)
-    drag, lateral = (
+    none = Estimate(math.nan, math.nan, math.nan)
+    drag, peaks = (
         WindowedQuantity(name=name, label=name, unit="N", asked=asked, soft=2.0, value=value)
         for name, asked, value in (
-            ("drag", True, Estimate.around(1.8, 0.18)),
-            ("lateral", False, Estimate(math.nan, math.nan, math.nan)),
+            ("drag", True, Estimate(1.8, 1.62, 1.98)), ("peaks", False, none),
         )
-    )
+    )  # fmt: skip
     Round(
         tolerance=0.05, wanted=3, last=True, reached=False, needed=Need(8, 2),
         windows=(*(WindowOfRun(run=f"w-{n}", cpu_time_s=9.0) for n in (1, 2)), refused),
-        quantities=(drag, lateral),
+        quantities=(drag, peaks),
     ).write(tmp_path / "round-1.json")  # fmt: skip
-    extrapolate_run(tmp_path, RECORD, tmp_path / "round-1.json")
+    extrapolate_run(tmp_path, WINDOWS_RECORD, tmp_path / "round-1.json")
     found = Extrapolated.read(tmp_path / FILE)
     one, other = found.quantities
-    assert one.value == drag.value and other.value is None and other.measured.value == 2.0
-    assert found.windows == ("w-1", "w-2")
-    assert found.tolerance is not None and found.tolerance.refused == {"w-3": "a particle was lost"}
+    assert one.value == Estimate(1.8, 1.62, 1.98)
+    assert other.value is None and other.measured.value == 2.0
+    assert found.tolerance is not None
+    assert found.tolerance.refused == {"w-3": "a particle was lost"}
     assert found.said == (
         "2 windows at the physical Young's modulus do not give the drag to within 5 %: "
         "about 2 seeds would."

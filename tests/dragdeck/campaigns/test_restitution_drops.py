@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from make_record import synthetic_record
+from make_record import Sensor, synthetic_record
 from scipy.integrate import solve_ivp
 
 from dragchain.calibration.fit import calibrate_file
@@ -14,7 +14,6 @@ from dragchain.calibration.report import write_report
 from dragchain.calibration.results import confirmed, write_calibration
 from dragchain.calibration.simulated_drops import read_drops
 from dragchain.calibration.sweep import prepare
-from dragchain.calibration.trials import Sensor, write_trials
 from dragdeck.campaigns.restitution_drops import (
     Drop,
     confirmation,
@@ -25,7 +24,6 @@ from dragdeck.campaigns.restitution_drops import (
     run_drops,
     settings,
     sweep,
-    trials,
 )
 from dragdeck.cases.case import Case
 from dragdeck.cli import main
@@ -96,15 +94,8 @@ def test_the_sweep_covers_both_contact_options(measured_case: Case) -> None:
     assert max(heights) - min(heights) == pytest.approx(0.75 * path, rel=1e-3)
 
 
-def test_trials_are_seeded(measured_case: Case) -> None:
-    study = measured_case.study
-    first, again, other = (list(trials(study, 5, seed)) for seed in (3, 3, 4))
-    assert first == again != other
-    assert len({drop.height_m for drop in first}) == 5
-
-
 def test_a_drop_changes_only_what_it_says(measured_case: Case) -> None:
-    drop = Drop("x", "trial", 0.8, False, 0.011, DropFidelity())
+    drop = Drop("x", "reference", 0.8, False, 0.011, DropFidelity())
     changed = drop_case(measured_case, drop).study
     assert changed.pair("ceramic", "steel").restitution == 0.8
     assert changed.pair("ceramic", "ceramic") == measured_case.study.pair("ceramic", "ceramic")
@@ -170,7 +161,7 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
 
     listed = run(short_sweep(case), "sweep")
     known = [
-        Drop(f"trial-{k}", "trial", value, True, height, full(case.study, 0.02))
+        Drop(f"trial-{k}", "reference", value, True, height, full(case.study, 0.02))
         for k, (value, height) in enumerate([(0.68, 0.01008), (0.86, 0.00995)])
     ]
     made = run(known, "trials")
@@ -189,11 +180,10 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
     values = (result.fit.restitution, result.fit_full.restitution)
     checked = confirmed(read_drops(run(list(confirmation(case.study, *values))[::2], "confirm")))
     assert checked.effective == pytest.approx(result.measured.value, abs=4 * checked.std)
-    write_trials(listed, made, 1, 1, folder / "trials.json")
     write_report(folder / "trial-0.csv", folder)
     page = (folder / "report.html").read_text()
     assert f"<b>{result.put.value:.4g}</b>" in page
-    assert page.count("data:image/") == 4
+    assert page.count("data:image/") == 3
     assert "http" not in page
 
 

@@ -222,11 +222,13 @@ def test_empty_mesh():
     assert problems(m.surface(np.empty((0, 3)), np.empty((0, 3)))) == ["the mesh is empty"]
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_coordinate_that_is_no_number(value: float):
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1e160])
+@pytest.mark.filterwarnings("error")
+def test_coordinate_that_is_no_length(value: float):
     points = TETRAHEDRON.vertices.copy()
     points[3, 1] = value
-    assert problems(m.surface(points, TETRAHEDRON.faces)) == ["a coordinate is not a number"]
+    mesh = m.upright(m.weld(m.surface(points, TETRAHEDRON.faces)), "+y")
+    assert problems(mesh) == ["a coordinate is not a length"]
 
 
 def test_degenerate_facets():

@@ -24,7 +24,8 @@ from dragdeck.study.base import Json
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)
-STIFF = {"youngs_modulus_scale": 1, "soft_start": 0.01, "timestep_fraction": 0.5, "ranks": 1}
+START = {"youngs_modulus_scale": 0.01, "timestep_fraction": 0.5}
+STIFF = {"youngs_modulus_scale": 1, "soft_start": START, "timestep_fraction": 0.5, "ranks": 1}
 WINDOWS = {"tolerance": 0.1, "quantities": ["drag_mean", "workpiece_contacts"], "most": 5}
 SOFT = {"youngs_modulus_scale": 0.01, "timestep_fraction": 0.5, "ranks": 1, "windows": WINDOWS}
 
@@ -165,11 +166,11 @@ def test_a_tolerance_does_not_name_a_run(made: Make) -> None:
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"soft_start": 1}, "soft_start"),
-        ({"soft_start": 0.5, "youngs_modulus_scale": 0.1}, "not below youngs_modulus_scale"),
+        ({"soft_start": {"youngs_modulus_scale": 1}}, "soft_start"),
+        ({"soft_start": {"youngs_modulus_scale": 0.5}, "youngs_modulus_scale": 0.1}, "not below"),
         ({"windows": WINDOWS}, "windows require a youngs_modulus_scale below 1"),
         ({**SOFT, "speed_factor": 2}, "windows require"),
-        ({**SOFT, "soft_start": 0.001}, "windows require"),
+        ({**SOFT, "soft_start": {"youngs_modulus_scale": 0.001}}, "windows require"),
     ],
 )
 def test_settings_that_do_not_fit_are_refused(settings: Json, said: str, made: Make) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from pydantic import ValidationError
 
 from dragdeck.campaigns.machine_speed import short_case
@@ -258,6 +259,23 @@ def test_blocks_that_cannot_be(block: dict[str, Any], words: str) -> None:
 def test_a_slip_of_the_unit_in_a_schedule_is_named(with_motion: Callable[..., Case]) -> None:
     with pytest.raises(InputError, match=r"motion\.spin\.schedule\.0\.rpm: is not plausible"):
         with_motion(spin={"schedule": [{"until_s": 1, "rpm": 1e6}]})
+
+
+def test_a_long_schedule_is_refused_after_one_look_at_its_file(
+    with_motion: Callable[..., Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks: list[str] = []
+    compose = yaml.compose
+
+    def counted(text: str, Loader: Any) -> Any:
+        looks.append(text)
+        return compose(text, Loader=Loader)
+
+    monkeypatch.setattr(yaml, "compose", counted)
+    schedule = [{"until_s": 1e-3 * n, "rpm": 10.0} for n in range(1, 1001)]
+    with pytest.raises(InputError, match=r"spin\.schedule: the list has 1000 entries"):
+        with_motion(spin={"schedule": schedule})
+    assert len(looks) == 1
 
 
 def test_a_spin_of_zero_is_a_level_of_a_sweep(with_motion: Callable[..., Case]) -> None:

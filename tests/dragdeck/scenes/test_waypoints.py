@@ -182,7 +182,7 @@ def test_a_missing_file_is_named(made: Made, name: str) -> None:
 @pytest.mark.parametrize(
     ("path", "words"),
     [
-        ({"points": None}, "motion.path: give either file or points, and not both"),
+        ({"points": None}, "motion.path.points: a list is required"),
         ({"points": []}, "motion.path.points: the list has 0 entries"),
         ({"points": [[0, 0, 0], [1, 0]]}, "motion.path.points.1.2: a required"),
         ({"points": [[0, 0, 0], [1, 0, 0, 0, 0, 0]]}, "points.1: the list has 6 entries"),

@@ -20,7 +20,15 @@ from dragdeck.scenes.fit import process_cautions
 from dragdeck.scenes.lead import FIRST_WINDOWS, covered_fraction, window_count, window_fraction
 from dragdeck.scenes.legs import plunge_point
 from dragdeck.scenes.workpiece import FACET_STEP_S, PARTICLE_STEPS_PER_S, workpiece_facets
-from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study, Tolerance, Windows
+from dragdeck.study.model import (
+    BUILT_IN_FIDELITIES,
+    LARGEST_TIMESTEP_FRACTION,
+    Fidelity,
+    SoftStart,
+    Study,
+    Tolerance,
+    Windows,
+)
 
 _PROCESS_OF_DROP = "standard"
 """Fidelity of the process in a study whose tolerance is about the drop test."""
@@ -31,9 +39,10 @@ _SOFT_STIFFNESS = 1000.0
 _SOFTEST_START = 0.3
 """Modulus scale from which on a softer start saves nothing."""
 
-_STABILITY_NUMBER = 0.72
-"""That steps at the physical modulus are forecast to have: up to there they change nothing that was
-measured (docs/evidence/windows.md)."""
+_STABILITY_NUMBER, _FAST = 0.72, 0.1
+"""Stability number that steps at the physical modulus are forecast to have, and inertial number
+above which they are no larger than those of the plain run: there, impacts decide, and a sliding
+distance was 12 % too small at the larger step (docs/evidence/windows.md)."""
 
 _MOST_OF_DRAG = 0.5
 """Fraction of the drag that the first windows may take: with more, the whole drag at the physical
@@ -174,7 +183,7 @@ class Option:
             "Rayleigh time"
         )
         if chosen.soft_start is not None:
-            text += f", begun with E x {chosen.soft_start:g}"
+            text += f", begun with E x {chosen.soft_start.youngs_modulus_scale:g}"
         if windows is not None:
             step = f"{100 * windows.timestep_fraction:.3g} %"
             text += f", {FIRST_WINDOWS} to {windows.most} windows with E x 1 at {step}"
@@ -215,56 +224,65 @@ def _remedies(case: Case) -> Iterator[Mapping[str, float]]:
     yield from (one.settings for one in found if one.settings)
 
 
-def soft_scale(study: Study) -> float:
-    """Factor on every Young's modulus of the softer run that leads to one at the physical one."""
-    scale = (_SOFT_STIFFNESS / full_stiffness_number(study)) ** 1.5
-    return max(rounded(min(scale, 1.0), up=True), softest_scale(study))
-
-
-def _with(case: Case, **settings: float | str) -> Case:
+def _with(case: Case, **settings: float | str | SoftStart) -> Case:
     """The case with these settings of a process."""
     chosen = {"skin_m": widest_skin(case.study), "ranks": "auto", **settings}
     fidelity = Fidelity.model_validate(chosen)
     return replace(case, study=case.study.model_copy(update={"fidelity": fidelity}))
 
 
-def stiff_step(case: Case) -> float:
-    """Time step at the physical modulus over the Rayleigh time."""
-    stable = stable_fraction(_with(case), math.log(_STABILITY_NUMBER))
-    limit = float(Fidelity.model_fields["timestep_fraction"].metadata[-1].le)
-    fraction = min(rounded(stable, up=False), limit)
-    return consistent(_with(case, timestep_fraction=fraction)).timestep_fraction
+def soft_settings(case: Case) -> Fidelity:
+    """Those of the soft run from which others go on, with its largest stable step."""
+    scale = min((_SOFT_STIFFNESS / full_stiffness_number(case.study)) ** 1.5, 1.0)
+    scale = max(rounded(scale, up=True), softest_scale(case.study))
+    stable = stable_fraction(_with(case, youngs_modulus_scale=scale))
+    return consistent(_with(case, youngs_modulus_scale=scale, timestep_fraction=_step(stable)))
+
+
+def stiff_settings(case: Case) -> Fidelity:
+    """Those of a run at the physical modulus, begun softer if that saves anything."""
+    stable = _step(stable_fraction(_with(case), math.log(_STABILITY_NUMBER)))
+    if describe(case)["inertial_number"] > _FAST:
+        stable = min(stable, _PLAIN_FRACTION)
+    chosen = consistent(_with(case, timestep_fraction=stable))
+    soft = soft_settings(case)
+    if soft.youngs_modulus_scale > _SOFTEST_START:
+        return chosen
+    start = SoftStart(
+        youngs_modulus_scale=soft.youngs_modulus_scale, timestep_fraction=soft.timestep_fraction
+    )
+    return chosen.model_copy(update={"soft_start": start})
+
+
+def _step(stable: float) -> float:
+    """A time step over the Rayleigh time that is stable and may be set."""
+    return min(rounded(stable, up=False), LARGEST_TIMESTEP_FRACTION)
 
 
 def process_option(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Option:
     """The settings with which a tolerance is met in a case's own scene.
 
-    A soft run over the whole path, and windows at the physical modulus until the tolerance is met;
-    where a few of them would take most of the path, a run at the physical modulus that begins
-    softer; where the material is so soft that nothing is saved, a plain one.
+    A soft run over the whole path, and windows at the physical modulus until the tolerance is met.
+    Where a few of them would take most of the path, or the material is so soft that nothing is
+    saved, a run at the physical modulus.
     """
-    soft, step = soft_scale(case.study), stiff_step(case)
-    plain = Work.of(case, tradeoff).cpu_time(plain_option(case).fidelity)
-
-    def option(fidelity: Fidelity) -> Option:
-        most = window_count(case.study.model_copy(update={"fidelity": fidelity}))
-        work = Work.of(case, tradeoff)
-        costs = (work.cpu_time(fidelity, min(n, most)) for n in (FIRST_WINDOWS, most))
-        return Option(fidelity, *(cost / plain for cost in costs))
-
-    if soft > _SOFTEST_START:
-        return option(_with(case, timestep_fraction=step).study.chosen_fidelity())
-    stable = rounded(stable_fraction(_with(case, youngs_modulus_scale=soft)), up=False)
-    chosen = consistent(_with(case, youngs_modulus_scale=soft, timestep_fraction=stable))
-    windows = Windows(
-        tolerance=asked.tolerance, quantities=list(asked.quantities), timestep_fraction=step
-    )
-    windowed = chosen.model_copy(update={"windows": windows})
-    study = case.study.model_copy(update={"fidelity": windowed})
-    if FIRST_WINDOWS * window_fraction(study) <= _MOST_OF_DRAG:
-        return option(windowed)
-    led = _with(case, soft_start=chosen.youngs_modulus_scale, timestep_fraction=step)
-    return option(led.study.chosen_fidelity())
+    stiff, soft = stiff_settings(case), soft_settings(case)
+    work = Work.of(case, tradeoff)
+    plain = work.cpu_time(plain_option(case).fidelity)
+    if stiff.soft_start is not None:
+        windows = Windows(
+            tolerance=asked.tolerance,
+            quantities=list(asked.quantities),
+            timestep_fraction=stiff.timestep_fraction,
+        )
+        windowed = soft.model_copy(update={"windows": windows})
+        study = case.study.model_copy(update={"fidelity": windowed})
+        if FIRST_WINDOWS * window_fraction(study) <= _MOST_OF_DRAG:
+            most = window_count(study)
+            costs = (work.cpu_time(windowed, min(n, most)) for n in (FIRST_WINDOWS, most))
+            return Option(windowed, *(cost / plain for cost in costs))
+    cost = work.cpu_time(stiff) / plain
+    return Option(stiff, cost, cost)
 
 
 def plain_option(case: Case) -> Option:

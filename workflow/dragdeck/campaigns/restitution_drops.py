@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
 from dragdeck.decks.templates import environment
@@ -43,16 +41,10 @@ path, so that the first contact begins at another place within a time step."""
 _REFERENCE_FRACTION = 0.01
 """Finest time step of the sweep over the Rayleigh time: restitution converged to 1e-4."""
 
-_TRIAL_FRACTION = 0.005
-"""Time step of a trial's record over the Rayleigh time: half the sweep's finest."""
-
 _GOLDEN = 0.618
 """Fraction of a step between the phases of reference drops, one a deck value."""
 
-_TRIAL_RANGE = (0.5, 0.9)
-"""Deck values of the trials' records."""
-
-Purpose = Literal["production", "reference", "confirm", "trial"]
+Purpose = Literal["production", "reference", "confirm"]
 
 
 class FittedRestitution(Part):
@@ -112,8 +104,7 @@ class Drop:
         Of its folder.
     purpose : str
         ``production``: as the process runs; ``reference``: full modulus, fine
-        step; ``confirm``: production at the fitted value; ``trial``: to make a
-        record of.
+        step; ``confirm``: production at the fitted value.
     restitution : float
         In the deck.
     limit_force : bool
@@ -206,23 +197,6 @@ def confirmation(study: Study, restitution: float, full_restitution: float) -> I
     fine = full(study, _REFERENCE_FRACTION)
     height = study.drop_test.height_m
     yield Drop("confirm-full", "reference", full_restitution, option, height, fine)
-
-
-def trials(study: Study, count: int, seed: int) -> Iterator[Drop]:
-    """Drops with seeded deck values and heights, to make records with a known answer.
-
-    The height is drawn about the study's with ``calibration.height_std_m``, as
-    if it had been set by hand.
-    """
-    random = np.random.default_rng(seed)
-    section = study.calibration
-    spread = section.height_std_m if section else 0.0
-    finer = full(study, _TRIAL_FRACTION)
-    for number in range(1, count + 1):
-        value = round(float(random.uniform(*_TRIAL_RANGE)), 4)
-        height = study.drop_test.height_m + float(random.normal(0.0, spread))
-        option = study.contact.limit_force
-        yield Drop(f"trial-{number:03d}", "trial", value, option, height, finer)
 
 
 def full(study: Study, fraction: float) -> DropFidelity:
@@ -324,8 +298,6 @@ def drops_command(
     out: Path,
     set: str,
     fit: Path | None,
-    count: int,
-    seed: int,
 ) -> None:
     """Run one set of drop tests.
 
@@ -338,8 +310,6 @@ def drops_command(
     case = project.cases(study, fidelity)[0]
     if set == "sweep":
         drops = list(sweep(case.study))
-    elif set == "trials":
-        drops = list(trials(case.study, count, seed))
     elif fit is not None:
         fitted = FitFile.read(fit)
         drops = list(confirmation(case.study, fitted.fit.restitution, fitted.fit_full.restitution))

@@ -127,7 +127,7 @@ class LeftOut:
     ----------
     why : str
     cost : str, optional
-        The variant of `dragdeck.costs` that puts it back.
+        The variant of ``benchmarks/costs`` that puts it back.
     """
 
     why: str

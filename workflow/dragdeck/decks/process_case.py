@@ -66,11 +66,11 @@ class ProcessCase(CaseOfStudy):
     upstream : mapping
         Run ids of its filling and drop test.
     lead : str or None
-        Run id of the softer run from which it goes on; absent if there is none.
+        Run id of the softer run that it continues; absent if there is none.
     entry_step : int
-        Step of the drag at which it goes on from its lead; absent if it has none.
+        Step of the drag at which it continues its lead; absent if it has none.
     marks : sequence of str
-        Files of states from which other runs go on; absent if there are none.
+        Files of states from which other runs continue; absent if there are none.
     numbers : mapping
         Dimensionless numbers of the scene at the physical modulus and the speed of the study.
     surface_m : float

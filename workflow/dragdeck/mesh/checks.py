@@ -19,6 +19,7 @@ from dragdeck.mesh.surface import (
     NODE_PRECISION_M,
     Floats,
     Integers,
+    are_lengths,
     facing_out,
 )
 
@@ -123,7 +124,7 @@ def findings(
     surroundings : Surroundings, optional
         To see whether the size is plausible.
     """
-    broken = _empty(mesh) or _not_finite(mesh)
+    broken = _empty(mesh) or _no_lengths(mesh)
     if broken:
         return broken
     found = _implausible_size(mesh, surroundings) if surroundings else []
@@ -156,10 +157,10 @@ def _empty(mesh: Trimesh) -> list[Finding]:
     return [Finding("the mesh is empty", "0 facets", "at least one facet", remedy)]
 
 
-def _not_finite(mesh: Trimesh) -> list[Finding]:
-    bad = ~np.isfinite(mesh.triangles).all(axis=(1, 2))
-    problem = "a coordinate is not a number"
-    return _facets(bad, problem, limit="finite numbers", remedy="export the mesh again")
+def _no_lengths(mesh: Trimesh) -> list[Finding]:
+    bad = ~are_lengths(mesh.triangles).all(axis=(1, 2))
+    problem, limit = "a coordinate is not a length", "finite numbers, at most 1e100 m"
+    return _facets(bad, problem, limit, remedy="export the mesh again")
 
 
 def _implausible_size(mesh: Trimesh, scene: Surroundings) -> list[Finding]:

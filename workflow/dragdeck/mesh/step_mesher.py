@@ -39,7 +39,7 @@ _OPTIONS = {
     "Mesh.MeshSizeFromCurvature": 8,  # facets around a full circle, at least
 }
 _INSTALL = (
-    "./run setup; or pip install 'dragdeck[cad]', and on Debian apt-get install libgl1 "
+    "./run setup cad; or pip install 'dragdeck[cad]', and on Debian apt-get install libgl1 "
     "libglu1-mesa libxcursor1 libxft2 libxinerama1 libgomp1; or export the surface as STL"
 )
 

@@ -20,15 +20,18 @@ NODE_PRECISION_M = 1e-8
 MERGED, CAD_VOLUME = "merged_nodes", "cad_volume_m3"
 """Keys of a mesh's metadata: what it was read from, for `findings`."""
 
+_FARTHEST_M = 1e100
+"""Lengths up to here can be squared and multiplied."""
+
 _TURNED = {
-    "+x": ((0, 0, -1), (0, 1, 0), (1, 0, 0)),
-    "-x": ((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
-    "+y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
-    "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
-    "+z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
-    "-z": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+    "+x": ((2, 1, 0), (-1, 1, 1)),
+    "-x": ((2, 1, 0), (1, 1, -1)),
+    "+y": ((0, 2, 1), (1, -1, 1)),
+    "-y": ((0, 2, 1), (1, 1, -1)),
+    "+z": ((0, 1, 2), (1, 1, 1)),
+    "-z": ((0, 1, 2), (1, -1, -1)),
 }
-"""Rotations of an axis to +z: those of x about y, the others about x."""
+"""Rotations of an axis to +z, those of x about y, the others about x: old axes and their signs."""
 
 _KEY_FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 
@@ -69,7 +72,7 @@ def weld(mesh: Trimesh, precision_m: float = NODE_PRECISION_M) -> Trimesh:
     from scipy.spatial import KDTree
     from trimesh.graph import connected_component_labels
 
-    if mesh.is_empty or not np.isfinite(mesh.vertices).all():
+    if mesh.is_empty or not are_lengths(mesh.vertices).all():
         return mesh
     used = surface(mesh.vertices[mesh.referenced_vertices], _renumbered(mesh))
     places, same = _distinct(used.vertices)
@@ -78,6 +81,11 @@ def weld(mesh: Trimesh, precision_m: float = NODE_PRECISION_M) -> Trimesh:
     label = connected_component_labels(close, node_count=len(places))[same]
     _, kept = np.unique(label, return_index=True)
     return surface(used.vertices[kept], label[used.faces])
+
+
+def are_lengths(coordinates: Floats) -> NDArray[np.bool_]:
+    """Which coordinates are numbers with which a surface can be measured."""
+    return np.abs(coordinates) <= _FARTHEST_M
 
 
 def _distinct(points: Floats) -> tuple[Floats, Integers]:
@@ -147,7 +155,8 @@ def _one_side(mesh: Trimesh) -> Trimesh | None:
 
 def upright(mesh: Trimesh, axis: str) -> Trimesh:
     """Turn a mesh so that a direction of its file, such as "+x", points up, away from the floor."""
-    turned = surface(mesh.vertices @ np.transpose(_TURNED[axis]), mesh.faces)
+    axes, signs = _TURNED[axis]
+    turned = surface(mesh.vertices[:, axes] * signs, mesh.faces)
     turned.metadata.update(mesh.metadata)
     return turned
 

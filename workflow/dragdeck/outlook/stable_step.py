@@ -67,7 +67,7 @@ def stable_step_note(case: Case) -> tuple[str, str]:
     )
 
 
-def check_timestep(case: Case) -> None:
+def check_timestep(case: Case, block: str = "fidelity") -> None:
     """Refuse a step with which the run is sure to be rejected, unless the study accepts it.
 
     Raises
@@ -83,7 +83,7 @@ def check_timestep(case: Case) -> None:
             f"the contacts are not stable at this time step with E x "
             f"{chosen.youngs_modulus_scale:g}",
             file=case.file,
-            field="fidelity.timestep_fraction",
+            field=f"{block}.timestep_fraction",
             value=chosen.timestep_fraction,
             limit=f"{stable:g} of the Rayleigh time (docs/evidence/stability.md)",
             remedy="choose a smaller one, or give a reason in accepted.unsafe_timestep",

@@ -16,7 +16,7 @@ from dragdeck.physics.rounding import round_to
 from dragdeck.scenes.legs import Stop
 from dragdeck.scenes.motion import drag_leg, driven_speed
 from dragdeck.scenes.periods import output_periods
-from dragdeck.study.model import Study
+from dragdeck.study.model import SoftStart, Study
 from dragdeck.study.superposed.kind import DragSteps
 
 LEAD = "lead"
@@ -234,7 +234,10 @@ def _window_study(study: Study) -> Study:
     fidelity = chosen.model_copy(
         update={
             "youngs_modulus_scale": 1.0,
-            "soft_start": chosen.youngs_modulus_scale,
+            "soft_start": SoftStart(
+                youngs_modulus_scale=chosen.youngs_modulus_scale,
+                timestep_fraction=chosen.timestep_fraction,
+            ),
             "timestep_fraction": chosen.windows.timestep_fraction,
             "ranks": 1,
             "windows": None,

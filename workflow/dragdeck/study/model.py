@@ -326,6 +326,10 @@ RESTITUTION = "restitution"
 """The quantity of the drop test; all others are of the process."""
 
 
+LARGEST_TIMESTEP_FRACTION = 2.0
+"""Of the Rayleigh time: no larger step was ever stable (docs/development/liggghts.md)."""
+
+
 class Windows(Model):
     """Short runs at physical stiffness along the path, until quantities are known well enough."""
 
@@ -339,8 +343,22 @@ class Windows(Model):
     most: Annotated[Whole, Field(ge=2, le=64)] = Field(
         default=16, description="largest number of windows"
     )
-    timestep_fraction: Annotated[Number, Field(gt=0, le=2)] = Field(
+    timestep_fraction: Annotated[Number, Field(gt=0, le=LARGEST_TIMESTEP_FRACTION)] = Field(
         default=0.64, description="time step of the windows as a fraction of the Rayleigh time"
+    )
+
+
+class SoftStart(Model):
+    """Settings of what goes before the statistics, with smaller moduli.
+
+    The moduli are raised to those of the run before the statistics begin.
+    """
+
+    youngs_modulus_scale: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        description="multiplier of every Young's modulus"
+    )
+    timestep_fraction: Annotated[Number, Field(gt=0, le=LARGEST_TIMESTEP_FRACTION)] = Field(
+        default=0.3, description="time step as a fraction of the Rayleigh time"
     )
 
 
@@ -350,14 +368,13 @@ class Fidelity(Model):
     youngs_modulus_scale: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=1.0, description="multiplier of every Young's modulus; 1: physical stiffness"
     )
-    soft_start: Annotated[Number, Field(gt=0, lt=1)] | None = Field(
+    soft_start: SoftStart | None = Field(
         default=None,
-        description="multiplier of every Young's modulus in filling, plunge, approach and the "
-        "beginning of the drag; before the statistics begin, the moduli are raised to "
-        "`youngs_modulus_scale`; none: the same multiplier all the time",
+        description="settings of filling, plunge, approach and the start of the drag; none: "
+        "those of the rest",
         exclude_if=lambda value: value is None,
     )
-    timestep_fraction: Annotated[Number, Field(gt=0, le=2)] = Field(
+    timestep_fraction: Annotated[Number, Field(gt=0, le=LARGEST_TIMESTEP_FRACTION)] = Field(
         default=0.2, description="time step of the process as a fraction of the Rayleigh time"
     )
     filling_timestep_fraction: Annotated[Number, Field(gt=0, le=1)] = Field(
@@ -394,10 +411,11 @@ class Fidelity(Model):
 
     @model_validator(mode="after")
     def _soft_start_is_softer(self) -> Self:
-        if self.soft_start is not None and self.soft_start >= self.youngs_modulus_scale:
+        start = self.soft_start
+        if start is not None and start.youngs_modulus_scale >= self.youngs_modulus_scale:
             raise ValueError(
-                f"soft_start is {self.soft_start:g}, not below youngs_modulus_scale "
-                f"({self.youngs_modulus_scale:g})"
+                f"soft_start has a youngs_modulus_scale of {start.youngs_modulus_scale:g}, not "
+                f"below {self.youngs_modulus_scale:g}"
             )
         return self
 
@@ -406,12 +424,7 @@ class Fidelity(Model):
         """The settings of filling, plunge, approach and the beginning of the drag."""
         if self.soft_start is None:
             return self
-        changes = {"timestep_fraction": _STEP_OF_SOFT_START, "soft_start": None}
-        return self.model_copy(update={"youngs_modulus_scale": self.soft_start, **changes})
-
-
-_STEP_OF_SOFT_START = 0.5
-"""Time step of a soft start as a fraction of its Rayleigh time: that of `standard`."""
+        return self.model_copy(update={**dict(self.soft_start), "soft_start": None})
 
 
 class Tolerance(Model):

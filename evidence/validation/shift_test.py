@@ -2,32 +2,24 @@
 
 A shift moves all events of a run by the same number of frames, round the end to the beginning. It
 keeps the autocorrelation of the series and the spacing of the events and breaks only what ties the
-one to the other. Runs are shifted independently
-of each other, so their joint null distribution is that of the mean over runs of one shift each.
+one to the other. Runs are shifted independently of each other, so their joint null distribution is
+that of the mean over runs of one shift each.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.statistics.estimate import CONFIDENCE, Estimate, mean_of
+from dragchain.statistics.estimate import Estimate, mean_of
 
 SHIFTS = 19_999
 """Random shifts of the joint null distribution: the smallest p-value is 1 in 20,000."""
 
 _SEED = 20150101
 _ROUNDING = 1e-9
-
-
-@dataclass(frozen=True)
-class Window:
-    """Frames that count for an event: from `first` to `last` frames after it."""
-
-    first: int
-    last: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,17 +31,14 @@ class ShiftTest(Estimate):
 
     Attributes
     ----------
-    p_greater, p_less, p_two_sided : float
-        Share of shifts, the true position included, whose statistic is at least as large, as
-        small, or as far from the mean of the null distribution.
+    p_greater : float
+        Share of shifts, the true position included, whose statistic is at least as large.
     """
 
     p_greater: float
-    p_less: float
-    p_two_sided: float
 
 
-def shifted_means(series: Floats, events: Ints, window: Window) -> Floats:
+def shifted_means(series: Floats, events: Ints, reach: int) -> Floats:
     """Mean of a series around the events, for every circular shift of the events.
 
     Parameters
@@ -58,8 +47,8 @@ def shifted_means(series: Floats, events: Ints, window: Window) -> Floats:
         One value a frame; NaN where there is none. Such frames count in no mean.
     events : (K,) ndarray of int
         Frames of the events.
-    window : Window
-        Frames around each event.
+    reach : int
+        Frames before and after each event that count for it.
 
     Returns
     -------
@@ -68,7 +57,7 @@ def shifted_means(series: Floats, events: Ints, window: Window) -> Floats:
     """
     count = len(series)
     near = np.zeros(count)
-    offsets = np.arange(window.first, window.last + 1)
+    offsets = np.arange(-reach, reach + 1)
     np.add.at(near, (events[:, None] + offsets).ravel() % count, 1.0)
     there = np.isfinite(series)
     sums = _correlate(near, np.where(there, series, 0.0))
@@ -102,7 +91,7 @@ def joint(by_shift: Sequence[Floats], shifts: Ints) -> Floats:
 
     Parameters
     ----------
-    by_shift : sequence of (N_r, ...) ndarray
+    by_shift : sequence of (N_r,) ndarray
         A run's statistic for each of its circular shifts.
     shifts : (S, R) ndarray of int
         A shift for each run, modulo its number of frames.
@@ -113,69 +102,28 @@ def joint(by_shift: Sequence[Floats], shifts: Ints) -> Floats:
         return np.asarray(np.where(there, drawn, 0.0).sum(axis=0) / there.sum(axis=0))
 
 
-def shift_test(
-    by_shift: Sequence[Floats],
-    shifts: Ints,
-    combine: Callable[[Floats], Floats] | None = None,
-) -> ShiftTest:
+def shift_test(by_shift: Sequence[Floats], shifts: Ints) -> ShiftTest:
     """Test the true position, shift 0 of every run, against joint shifts.
 
     Parameters
     ----------
-    by_shift : sequence of (N_r,) or (N_r, k) ndarray
+    by_shift : sequence of (N_r,) ndarray
         As for `joint`.
     shifts : (S, R) ndarray of int
         As drawn by `draw_shifts`.
-    combine : callable, optional
-        Turns means over runs, (..., k), into the statistic, (...).
     """
-    reduce = combine if combine is not None else lambda means: means
     zero = np.zeros((1, len(by_shift)), dtype=np.int64)
-    value = float(reduce(joint(by_shift, zero))[0])
-    null = reduce(joint(by_shift, shifts))
+    value = float(joint(by_shift, zero)[0])
     if not np.isfinite(value):
-        return ShiftTest(
-            np.nan, np.nan, np.nan, p_greater=np.nan, p_less=np.nan, p_two_sided=np.nan
-        )
-    over_runs = mean_of([float(reduce(run[:1])[0]) for run in by_shift])
-    null = null[np.isfinite(null)]
-    middle = null.mean()
-    return ShiftTest(
-        value,
-        over_runs.ci95_low,
-        over_runs.ci95_high,
-        p_greater=_p_value(null >= value - _ROUNDING),
-        p_less=_p_value(null <= value + _ROUNDING),
-        p_two_sided=_p_value(np.abs(null - middle) >= abs(value - middle) - _ROUNDING),
-    )
+        return ShiftTest(np.nan, np.nan, np.nan, p_greater=np.nan)
+    over_runs = mean_of([float(run[0]) for run in by_shift])
+    null = joint(by_shift, shifts)
+    reached = null[np.isfinite(null)] >= value - _ROUNDING
+    return ShiftTest(value, over_runs.ci95_low, over_runs.ci95_high, p_greater=_p_value(reached))
 
 
-def _p_value(reached: np.typing.NDArray[np.bool_]) -> float:
+def _p_value(reached: NDArray[np.bool_]) -> float:
     return float((1 + reached.sum()) / (1 + len(reached)))
-
-
-def band(by_shift: Sequence[Floats], shifts: Ints, lags: Ints) -> float:
-    """How far from zero a curve over lags reaches by chance.
-
-    Parameters
-    ----------
-    by_shift : sequence of (N_r,) ndarray
-        A run's standardised statistic for each shift, of events alone (a window of one frame).
-    shifts : (S, R) ndarray of int
-        Shifts of the null distribution.
-    lags : (L,) ndarray of int
-        Lags of the curve in frames.
-
-    Returns
-    -------
-    float
-        The half-width that 95 % of shifted data sets keep at all lags at once.
-    """
-    largest = np.zeros(len(shifts))
-    for lag in lags:
-        curve = joint(by_shift, shifts + lag)
-        np.maximum(largest, np.abs(np.nan_to_num(curve)), out=largest)
-    return float(np.quantile(largest, CONFIDENCE))
 
 
 def holm(p_values: ArrayLike) -> Floats:

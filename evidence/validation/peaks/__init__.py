@@ -1,1 +1,0 @@
-"""Whether force chains explain the peaks of the drag."""

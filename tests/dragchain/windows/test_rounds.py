@@ -1,0 +1,77 @@
+"""Rounds of windows: when they stop, how many more they ask for, what they refuse."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from paths import WINDOWS_RECORD
+
+from dragchain.tradeoff.measures import PathQuantities
+from dragchain.windows.document import Round, WindowOfRun, WindowsRecord
+from dragchain.windows.rounds import judged, unsettled
+
+RECORD = WindowsRecord.read(WINDOWS_RECORD)
+SOFT = PathQuantities(
+    arc_m=0.1, block_m=0.01, blocks={"workpiece_contacts": (19.0, 20.0, 21.0, 20.0) * 3}
+)
+
+
+def windows(values: Sequence[float]) -> list[WindowOfRun]:
+    """Windows with these numbers of contacts."""
+    return [
+        WindowOfRun(
+            run=f"w-{number}", values={"workpiece_contacts": value}, arc_m=0.01, cpu_time_s=1.0
+        )
+        for number, value in enumerate(values)
+    ]
+
+
+def judge(values: Sequence[float], tolerance: float, most: int = 16) -> Round:
+    return judged(SOFT, windows(values), tolerance, ["workpiece_contacts"], most, RECORD)
+
+
+def test_it_stops_when_the_tolerance_is_reached() -> None:
+    found = judge([15.0, 15.5, 14.5], 0.2)
+    assert found.reached and found.last and found.wanted == 3
+    (contacts,) = found.quantities
+    assert contacts.half_width <= 0.2 and contacts.value.contains(15.0)
+
+
+def test_a_round_asks_for_the_windows_that_would_do_but_at_most_twice_as_many() -> None:
+    close, far = judge([15.0, 16.5, 13.5], 0.085), judge([15.0, 19.0, 11.0], 0.1)
+    assert not close.reached and not close.last
+    assert 3 < close.wanted == close.needed.windows <= 6
+    assert far.wanted == 6 < far.needed.windows
+
+
+def test_the_last_window_is_the_last() -> None:
+    found = judge([15.0, 19.0, 11.0], 0.01, most=3)
+    assert found.last and not found.reached and found.wanted == 3 and found.needed.packings > 1
+
+
+def test_a_refused_window_does_not_enter_and_is_made_up_for() -> None:
+    good = windows([15.0, 15.1, 14.9, 15.0])
+    bad = good[3].model_copy(update={"refused": "lost", "values": {"workpiece_contacts": 99.0}})
+    found = judged(SOFT, [*good[:3], bad], 0.05, ["workpiece_contacts"], 16, RECORD)
+    (contacts,) = found.quantities
+    assert contacts.value.value == pytest.approx(15.0)
+    assert [one.run for one in found.entering] == ["w-0", "w-1", "w-2"]
+    assert found.wanted == min(8, 4 + max(1, found.needed.windows - 3)) > 4
+
+
+def test_a_quantity_that_a_window_lacks_is_never_reached() -> None:
+    some = windows([15.0, 15.0, 15.0])
+    some[1] = some[1].model_copy(update={"values": {}})
+    found = judged(SOFT, some, 0.5, ["workpiece_contacts"], 3, RECORD)
+    assert not found.reached and not found.quantities[0].value.known
+
+
+@pytest.mark.parametrize(("early", "settled"), [(3.4, True), (0.3, False), (4.5, False)])
+def test_a_bed_that_is_still_moving_is_refused(early: float, settled: bool, tmp_path: Path) -> None:
+    (tmp_path / "tables").mkdir()
+    numbers = np.array([early] * 4 + [3.5] * 8)
+    table = pd.DataFrame({"coordination_number": numbers})
+    table.to_parquet(tmp_path / "tables" / "network.parquet")
+    assert (unsettled(tmp_path) == "") == settled

@@ -1,0 +1,141 @@
+"""Chains that cause peaks, and chains that do not."""
+
+import json
+import math
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from chain_runs import found_of
+from figure_files import save, workpiece_force_table, write_process_run
+from networks import R, make_frame, row
+from numpy import array
+
+from dragchain.errors import TableError
+from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame
+from dragchain.report.page import page_environment
+from evidence.validation.chain_peaks import (
+    Findings,
+    PeakTest,
+    chain_numbers,
+    judge,
+    near_any,
+    of_runs,
+    read_run,
+)
+
+
+def verdicts(found: Findings) -> dict[str, str]:
+    return {row.statement: row.verdict for row in found.statements}
+
+
+def supported(found: Findings) -> set[str]:
+    return {row.statement for row in found.statements if row.supported}
+
+
+def test_chains_that_make_the_peaks_are_found() -> None:
+    found = found_of(11, 3.0)
+    assert verdicts(found)["presence"] == verdicts(found)["dominance"] == "confirmed"
+    assert supported(found) == {"presence", "dominance", "coverage", "reverse"}
+
+
+def test_chains_that_have_nothing_to_do_with_the_peaks_are_not_found() -> None:
+    found = found_of(12, 0.0)
+    assert not supported(found) and "confirmed" not in verdicts(found).values()
+
+
+def test_chains_that_weaken_at_peaks_contradict_their_presence() -> None:
+    assert verdicts(found_of(13, -3.0))["presence"] == "contradicted"
+
+
+def test_one_packing_has_no_interval_and_confirms_nothing() -> None:
+    found = found_of(15, 3.0, runs=1)
+    assert all(math.isnan(test.ci95_low) for test in found.tests)
+    assert "confirmed" not in verdicts(found).values() and "presence" in supported(found)
+    again = Findings.model_validate_json(found.as_text(), strict=True)
+    assert again.as_text() == found.as_text()
+
+
+def test_a_conservative_test_supports_but_does_not_contradict() -> None:
+    def judged(ratio: tuple[float, float], drag: tuple[float, float]) -> tuple[str, bool]:
+        tests = [
+            PeakTest(
+                test=name, statement="dominance", at_peaks=1.0, expected=1.0, effect=effect,
+                ci95_low=effect - 0.1, ci95_high=effect + 0.1, p=p, p_holm=p,
+            )
+            for name, (effect, p) in (
+                ("strength_over_surroundings", ratio), ("strength_over_drag", drag)
+            )
+        ]  # fmt: skip
+        row = judge("dominance", tests)
+        return row.verdict, row.supported
+
+    assert judged((0.0, 0.5), (-1.0, 0.99)) == ("contradicted", False)
+    assert judged((0.15, 0.5), (-1.0, 0.99)) == ("not confirmed", False)
+    assert judged((0.0, 0.5), (1.0, 1e-3)) == ("not confirmed", True)
+    assert judged((1.0, 1e-3), (-1.0, 0.99)) == ("confirmed", True)
+
+
+def test_near_any_includes_its_reach() -> None:
+    times = array([0.0, 0.25, 0.5, 1.0])
+    assert near_any(times, array([0.25, 0.9]), 0.25).tolist() == [True, True, True, True]
+    assert near_any(times, array([1.0]), 0.25).tolist() == [False, False, False, True]
+    assert near_any(times, array([]), 1.0).tolist() == [False] * 4
+
+
+# --- the chains of a run ---------------------------------------------------------------------
+
+
+def straight_chain(first: float = 4.0) -> NetworkFrame:
+    """Return a chain along x from the workpiece to the side, and weak contacts."""
+    contacts = [(1, WORKPIECE, first), (1, 2, 3.0), (2, 3, 5.0), (3, SIDE, 6.0)]
+    weak = [(particle, FLOOR, 0.01) for particle in (8, 9)]
+    return make_frame(row(3) | {8: (0.5, 0.5, R), 9: (0.5, 0.6, R)}, [*contacts, *weak])
+
+
+def test_numbers_of_a_straight_chain() -> None:
+    found = chain_numbers(straight_chain())
+    assert found["strength"] == pytest.approx(3.0 / (14.02 / 5))
+    assert found["strength_over_surroundings"] == pytest.approx(1.0)
+    assert found["strength_over_drag"] == pytest.approx(0.75)
+
+
+def test_the_force_on_the_workpiece_plays_no_part_in_the_strength() -> None:
+    weak, strong = chain_numbers(straight_chain(2.0)), chain_numbers(straight_chain(40.0))
+    assert weak["strength"] == strong["strength"]
+    assert weak["strength_over_surroundings"] == strong["strength_over_surroundings"]
+
+
+def test_a_frame_without_a_path_has_no_numbers() -> None:
+    frame = make_frame(row(2), [(1, WORKPIECE, 4.0), (1, 2, 3.0)])
+    assert all(math.isnan(value) for value in chain_numbers(frame).values())
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a made process run with one peak, with tables and chains."""
+    return write_process_run(tmp_path_factory.mktemp("made"))
+
+
+def test_a_run_is_read_with_its_peaks(made: Path) -> None:
+    found = of_runs([made])
+    assert [run.peaks for run in found.runs] == [1]
+    assert found.table()["test"].tolist() == [test.test for test in found.tests]
+
+
+def test_a_drag_without_a_peak_is_refused(made: Path, tmp_path: Path) -> None:
+    for name in ("case.json", "columns.json"):
+        (tmp_path / name).write_bytes((made / name).read_bytes())
+    for name in ("contacts", "particles", "network"):
+        save(pd.read_parquet(made / "tables" / f"{name}.parquet"), tmp_path, name)
+    save(workpiece_force_table().assign(drag_n=-2.0), tmp_path, "workpiece_force")
+    with pytest.raises(TableError, match="no peak"):
+        read_run(tmp_path)
+
+
+@pytest.mark.parametrize(("seed", "pull", "answer"), [(11, 3.0, "yes"), (12, 0.0, "no")])
+def test_the_section_answers_by_the_verdicts(seed: int, pull: float, answer: str) -> None:
+    found = found_of(seed, pull)
+    template = page_environment(package="evidence").get_template("validation/peaks.html.j2")
+    page = template.render(found=json.loads(found.as_text()))
+    assert f'data-answer="{answer}"' in page and "None" not in page
