@@ -11,6 +11,7 @@ _TALLEST = 70
 QUANTITIES = (
     "drag_mean", "drag_std", "vertical_mean", "workpiece_contacts", "contact_force_mean",
     "contact_force_p90", "coordination_number", "chain_count", "chain_length", "restitution",
+    ["drag_mean", "workpiece_contacts"],
 )  # fmt: skip
 
 

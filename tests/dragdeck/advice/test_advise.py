@@ -19,7 +19,6 @@ from dragdeck.advice.options import Work, consistent, plain_option, with_option
 from dragdeck.cases.bed import full_stiffness_number
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
-from dragdeck.outlook import timestep as stability
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import drop_scene
@@ -96,7 +95,8 @@ def test_where_windows_would_take_the_path_the_whole_drag_is_stiff(
 ) -> None:
     found = advise(moved(paper, speed_m_s=0.3), asked(), tradeoff).chosen
     assert found.fidelity.windows is None and found.fidelity.youngs_modulus_scale == 1
-    assert found.fidelity.soft_start is not None and found.fidelity.soft_start < 0.3
+    start = found.fidelity.soft_start
+    assert start is not None and start.youngs_modulus_scale < 0.3
     assert found.relative_cost == found.largest_cost < 1
 
 
@@ -138,13 +138,9 @@ def test_the_work_that_is_compared_is_that_of_the_runs(paper: Case, speed: float
 # --- the step stays within the stability limits --------------------------------------------------
 
 
-def test_strong_damping_shortens_the_steps(
-    small: dict[str, Any], write_study: Write, tradeoff: Tradeoff, monkeypatch: pytest.MonkeyPatch
+def test_strong_damping_shortens_the_steps_of_the_filling(
+    small: dict[str, Any], write_study: Write, tradeoff: Tradeoff
 ) -> None:
-    known = stability.stability_map()
-    drag = known.regimes["drag"].model_copy(update={"safe_fraction": 0.4})
-    shorter = known.model_copy(update={"regimes": {**known.regimes, "drag": drag}})
-    monkeypatch.setattr(stability, "stability_map", lambda: shorter)
     for pair in small["pairs"].values():
         pair["restitution"] = 0.3
     (damped,) = load_cases(write_study(small))
@@ -156,9 +152,7 @@ def test_strong_damping_shortens_the_steps(
         found.reference.fidelity,
         consistent(replace(damped, study=study)),
     ):
-        assert fidelity.timestep_fraction <= 0.8 * 0.4 * (1 + 1e-9)
-        assert fidelity.filling_timestep_fraction <= 0.8 * 0.2 * (1 + 1e-9)
-    assert fidelity.timestep_fraction == pytest.approx(0.8 * 0.4)
+        assert fidelity.filling_timestep_fraction == pytest.approx(0.8 * 0.2)
 
 
 # --- the drop test -------------------------------------------------------------------------------
