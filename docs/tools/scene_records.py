@@ -17,14 +17,14 @@ from statistics import median
 
 import numpy as np
 import pandas as pd
+from dragchain.tradeoff.stiffness_document import LawEntry, StiffnessRecord
+from dragchain.tradeoff.stiffness_errors import errors_entry, scaled_runs
+from dragchain.tradeoff.stiffness_law import left_out
 
 from dragchain.arrays import Floats
 from dragchain.tradeoff.measures import Measures, RunCost
 from dragchain.tradeoff.quantities import QUANTITIES
 from dragchain.tradeoff.runs import by_scene
-from dragchain.tradeoff.stiffness_document import LawEntry, StiffnessRecord
-from dragchain.tradeoff.stiffness_errors import errors_entry, scaled_runs
-from dragchain.tradeoff.stiffness_law import left_out
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = ROOT / "docs/data/scenes"

@@ -11,6 +11,7 @@ _TALLEST = 70
 QUANTITIES = (
     "drag_mean", "drag_std", "vertical_mean", "workpiece_contacts", "contact_force_mean",
     "contact_force_p90", "coordination_number", "chain_count", "chain_length", "restitution",
+    ["drag_mean", "workpiece_contacts"],
 )  # fmt: skip
 
 
@@ -84,7 +85,9 @@ def random_scenes(draw: st.DrawFn) -> dict[str, Any]:
         },
         "fidelity": {
             "tolerance": draw(st.sampled_from([0.03, 0.1, 0.15, 0.2, 0.4, 0.8])),
-            "quantity": draw(st.sampled_from([*5 * ["drag_mean"], *QUANTITIES])),
+            "quantity": draw(
+                st.sampled_from([*5 * ["drag_mean"], ["drag_mean", "drag_std"], *QUANTITIES])
+            ),
         },
         "seed": draw(st.integers(0, 2**32 - 1)),
     }

@@ -12,8 +12,6 @@ import yaml
 from made_tradeoff import made_tradeoff
 from paths import PROJECT, ROOT, SMALL_STUDY
 
-from dragdeck.sweep.cases import load_cases
-
 pytestmark = pytest.mark.slow
 
 
@@ -26,9 +24,8 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "studies/small").mkdir(parents=True)
     study = tmp_path / "studies/small/study.yaml"
     study.write_text(SMALL_STUDY.read_text())
-    (case,) = load_cases(study)
     tradeoff = tmp_path / "workflow/dragdeck/data/tradeoff.json"
-    made_tradeoff(case).write(tradeoff)
+    made_tradeoff().write(tradeoff)
     return tmp_path
 
 

@@ -14,7 +14,7 @@ from pydantic import JsonValue
 
 from dragchain.documents import Document, Part
 from dragchain.report.cases import ReportedCase
-from dragchain.report.values import Values
+from dragchain.report.values import mean_over_packings
 from dragchain.run.case import AdvisedSettings, Case, changed_inputs
 from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
@@ -154,18 +154,15 @@ def cost_rows(option: Option, records: Mapping[str, RunRecord]) -> Iterator[Cost
 def answers(case: ReportedCase) -> list[Answer]:
     """The asked quantities of a case; none if nothing was asked."""
     asked = case.first.process.case.asked
-    if asked is None:
-        return []
-    return [_answer(name, asked, case.values) for name in asked.quantities]
+    return [_answer(name, case, asked) for name in asked.quantities] if asked else []
 
 
-def _answer(name: str, asked: AdvisedSettings, values: Values) -> Answer:
+def _answer(name: str, case: ReportedCase, asked: AdvisedSettings) -> Answer:
     if name == _RESTITUTION:
         return Answer("coefficient of restitution", "", None, asked.error, asked.tolerance)
-    one = values.of(name)
-    if one is None:
+    known = [one for study in case.studies if (one := study.physical(name))]
+    if len(known) < len(case.studies):
         return Answer(name, "", None, None, asked.tolerance)
-    found, width = one.value, None
-    if found and found.known and one.reliable and found.value:
-        width = abs((found.ci95_high - found.ci95_low) / 2.0 / found.value)
-    return Answer(one.quantity.label, one.quantity.unit, found, width, asked.tolerance)
+    found = mean_over_packings([one.value for one in known if one.value])
+    width = abs((found.ci95_high - found.ci95_low) / 2.0 / found.value)
+    return Answer(known[0].label, known[0].unit, found, width, asked.tolerance)

@@ -10,7 +10,7 @@ from dragchain.errors import DocumentError, RejectedRunError
 from dragchain.loading.document import FILE as LOADING
 from dragchain.loading.document import Loading
 from dragchain.report.extrapolated import FILE as EXTRAPOLATED
-from dragchain.report.extrapolated import Extrapolated
+from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity
 from dragchain.report.findings import (
     FILE,
     DropFindings,
@@ -54,6 +54,11 @@ class StudyRuns:
         """The quantities of the process run, each with what it says of the process."""
         process = self.process
         return values_of(process.case, process.findings, self.loading, self.extrapolated)
+
+    def physical(self, name: str) -> ExtrapolatedQuantity | None:
+        """A quantity with its value at the physical modulus, None if that is not known."""
+        one = self.extrapolated.of(name) if self.extrapolated else None
+        return one if one and one.value else None
 
     @property
     def runs(self) -> list[ReportedRun[Findings]]:

@@ -177,23 +177,33 @@ def over_packings(several: Sequence[Values]) -> Values:
 def _common(values: Sequence[Estimate], basis: Basis) -> Estimate | None:
     if not values:
         return None
-    between = mean_of([one.value for one in values])
-    if basis is not Basis.WINDOWS:
-        return between
+    if basis is Basis.WINDOWS:
+        return mean_over_packings(values)
+    return mean_of([one.value for one in values])
+
+
+def mean_over_packings(values: Sequence[Estimate]) -> Estimate:
+    """The mean of values whose intervals include the scatter between packings."""
     widths = [one.ci95_high - one.ci95_low for one in values]
-    return Estimate.around(between.value, 0.5 * math.hypot(*widths) / len(values))
+    mean = math.fsum(one.value for one in values) / len(values)
+    return Estimate.around(mean, 0.5 * math.hypot(*widths) / len(values))
 
 
 def _of_packings(values: Values) -> Iterator[str]:
+    windows = (
+        "; those of values from windows include the scatter from packing to packing"
+        if values.corrected
+        else ""
+    )
     if values.packings > 1:
         yield (
             f"Means over {values.packings} packings (seeds); 95 % confidence intervals are "
-            "Student's t between packings."
+            f"Student's t between packings{windows}."
         )
     else:
         yield (
             "One packing (seed): 95 % confidence intervals cover the scatter along its path, not "
-            "that between packings."
+            f"that between packings{windows}."
         )
 
 

@@ -49,7 +49,7 @@ def _alone(run_dir: Path, case: Case, record: WindowsRecord) -> Extrapolated:
     """The quantities of a run without windows."""
     quantities = tuple(_quantities(run_dir, case, record))
     asked = case.asked
-    if asked is None:
+    if asked is None or asked.error is not None:
         return Extrapolated(quantities=quantities)
     ratios = [
         (one.value.ci95_high - one.value.ci95_low) / 2 / abs(one.value.value) / asked.tolerance

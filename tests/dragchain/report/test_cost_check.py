@@ -27,6 +27,7 @@ from dragchain.report.extrapolated import FILE as EXTRAPOLATED
 from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity
 from dragchain.report.runs import read_study
 from dragchain.report.study_report import write_report
+from dragchain.run.basis import QUANTITIES
 from dragchain.run.case import Case
 from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
@@ -63,12 +64,26 @@ def run(tmp_path: Path) -> Path:
 
 def test_the_report_compares_cost_and_tolerance(run: Path, tmp_path: Path) -> None:
     file = advice_file(tmp_path, option(ranks=1), option())
+    write_physical(run, drag_mean=(-2.5, 0.1))
     write_report(tmp_path, [run], file)
     words = " ".join(page_of(tmp_path).words.split())
     assert "Predicted and actual cost" in words
     assert "150 000 160 000 3000 2100 50 76 1.52 a short run" in spaced(tmp_path)
     assert "mean drag within 5 %" in words and "0.04 to 0.09" in words
-    assert "4.0 % yes" in spaced(tmp_path)  # 0.1 N either way of 2.5 N
+    assert "4.0 % yes" in spaced(tmp_path)
+
+
+def write_physical(folder: Path, **found: tuple[float, float]) -> None:
+    """Write ``extrapolated.json`` of a run at the physical modulus: values and half-widths."""
+    labels = {one.name: one.label for one in QUANTITIES}
+    quantities = (
+        ExtrapolatedQuantity(
+            name=name, label=labels[name], unit="N", measured=Estimate(value, math.nan, math.nan),
+            value=Estimate.around(value, half),
+        )
+        for name, (value, half) in found.items()
+    )  # fmt: skip
+    Extrapolated(quantities=tuple(quantities)).write(folder / EXTRAPOLATED)
 
 
 def spaced(folder: Path) -> str:
@@ -105,15 +120,14 @@ def test_only_scenes_that_were_run_and_predicted_have_a_row() -> None:
 
 
 def test_each_asked_quantity_has_an_answer(tmp_path: Path) -> None:
-    quantities = ["drag_mean", "chain_count", "drag_std", "workpiece_contacts"]
+    quantities = ["drag_mean", "chain_count", "contact_force_mean"]
     case = case_json("process", "stiff", asked={**ASKED, "quantities": quantities})
-    case["fidelity"]["youngs_modulus_scale"] = 1.0
     folder = make_run(tmp_path, case, process_findings(), PICTURES)
-    drag, chains, std, contacts = answers(cases_of([read_study(folder)])[0])
-    assert drag.value == Estimate(-2.5, -2.6, -2.4) and drag.half_width == pytest.approx(0.04)
-    assert [one.reached for one in (drag, chains, std, contacts)] == ["yes", *["not known"] * 3]
-    assert chains.value is not None and chains.value.value == 0.25  # no interval from one run
-    assert contacts.value is None  # without loading.json
+    write_physical(folder, drag_mean=(-2.5, 0.1), chain_count=(40.0, 4.0))
+    drag, chains, forces = answers(cases_of([read_study(folder)])[0])
+    assert drag.value == Estimate.around(-2.5, 0.1) and drag.half_width == pytest.approx(0.04)
+    assert chains.half_width == pytest.approx(0.1)
+    assert [one.reached for one in (drag, chains, forces)] == ["yes", "no", "not known"]
 
 
 @pytest.mark.parametrize(("error", "reached"), [(0.004, "yes"), (0.2, "no")])
@@ -156,18 +170,18 @@ def test_an_answer_from_windows_stands_beside_the_value_of_the_run(tmp_path: Pat
     )  # fmt: skip
     contacts = ExtrapolatedQuantity(
         name="workpiece_contacts", label="contacts on the workpiece", unit="",
-        measured=Estimate(32.1, math.nan, math.nan), value=Estimate(25.6, 24.2, 27.4),
+        measured=Estimate(32.1, math.nan, math.nan), value=Estimate(25.6, 24.0, 27.2),
     )  # fmt: skip
     Extrapolated(quantities=(contacts,), tolerance=REACHED).write(folder / EXTRAPOLATED)
     write_report(tmp_path, [folder])
     words = " ".join(page_of(tmp_path).words.split())
     assert "Values at the physical Young's modulus" in words
-    assert "contacts on the workpiece at a time 25.6 (24.2 to 27.4) 32.1 from 3 windows" in words
+    assert "contacts on the workpiece at a time 25.6 (24.0 to 27.2) 32.1 from 3 windows" in words
     assert "through 25.6 contacts at a time" in words
     assert "as simulated: 32.1" in words
-    assert "25.6 (24.2 to 27.4) 6.2 % no" in spaced(tmp_path)  # in the table of tolerances
+    assert "25.6 (24.0 to 27.2) 6.3 % no" in spaced(tmp_path)  # in the table of tolerances
     row = pd.read_csv(tmp_path / "summary.csv").iloc[0]
     assert row["extrapolated_workpiece_contacts"] == pytest.approx(25.6)
-    assert row["extrapolated_workpiece_contacts_ci95_high"] == pytest.approx(27.4)
+    assert row["extrapolated_workpiece_contacts_ci95_high"] == pytest.approx(27.2)
     assert row["workpiece_contacts"] == 32.1
     assert (row["asked_quantities"], row["windows"]) == ("workpiece_contacts", 3)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from figure_files import case_json
 from paths import WINDOWS_RECORD
+from report_files import ASKED
 
 from dragchain.report.extrapolated import FILE, Extrapolated, Need
 from dragchain.statistics.estimate import Estimate
@@ -53,6 +54,16 @@ def test_a_stiff_run_says_whether_it_is_inside_the_tolerance(
         assert found.tolerance is not None and found.tolerance.reached == reached
         assert (found.tolerance.needed.packings > 1) == (not reached)
         assert ("does not give" in found.said) == (not reached)
+
+
+def test_a_tolerance_of_the_restitution_says_nothing_of_the_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(extrapolate, "quantities_along", lambda *_: PathQuantities())
+    case = case_json("process") | {"asked": {**ASKED, "quantities": ["restitution"], "error": 0.1}}
+    (tmp_path / "case.json").write_text(json.dumps(case))
+    extrapolate_run(tmp_path, WINDOWS_RECORD)
+    assert Extrapolated.read(tmp_path / FILE).tolerance is None
 
 
 def test_windows_give_the_values_they_have_and_say_which_they_are(tmp_path: Path) -> None:

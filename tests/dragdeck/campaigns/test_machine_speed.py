@@ -95,7 +95,7 @@ def test_the_speed_is_that_of_the_engine(case: Case, project: Project, tmp_path:
     assert math.isfinite(found.filling_steps_per_s) and found.filling_steps_per_s > 0
 
 
-def test_steps_of_softer_particles_cost_what_was_timed(case: Case) -> None:
+def test_steps_of_softer_particles_cost_what_was_timed() -> None:
     modulus = "youngs_modulus_scale"
     costs = [
         cost("stiff", parameter=modulus, level=1.0, per_step=0.8),
@@ -103,8 +103,8 @@ def test_steps_of_softer_particles_cost_what_was_timed(case: Case) -> None:
         cost("fast", parameter="speed_factor", level=5.0, per_step=3.0),
         cost("plain", per_step=9.0),
     ]
-    tradeoff = made_tradeoff(case, costs=costs)
+    tradeoff = made_tradeoff(costs=costs)
     assert step_cost(1.0, tradeoff) == pytest.approx(0.8)
     assert step_cost(1e-6, tradeoff) == pytest.approx(1.6)
     assert step_cost(0.01, tradeoff) == pytest.approx((0.8 * 1.6) ** 0.5)
-    assert step_cost(0.01, made_tradeoff(case)) == 1.0
+    assert step_cost(0.01, made_tradeoff()) == 1.0

@@ -45,9 +45,9 @@ def test_other_runs_count_by_their_particles(case: Case, tmp_path: Path) -> None
     assert cost.wall_time_s == pytest.approx(scene.steps / 500.0)
 
 
-def test_a_price_is_quoted_with_engine_and_date(case: Case) -> None:
+def test_a_price_is_quoted_with_engine_and_date() -> None:
     costs = [priced("bowl_facets", 1.9, ci95_low=1.85, ci95_high=1.951), priced("bowl_fine", 1.9)]
-    tradeoff = made_tradeoff(case, costs=costs)
+    tradeoff = made_tradeoff(costs=costs)
     said = "enabling it costs 1.9x (1.85 to 1.95), LIGGGHTS 3.8.0, 2026-01-02"
     assert price_of("bowl_facets", tradeoff) == said
     assert price_of("bowl_fine", tradeoff).startswith("enabling it costs 1.9x, LIGGGHTS")
@@ -66,7 +66,7 @@ def test_explain_names_what_is_surely_cheaper(
 ) -> None:
     low = None if high is None else 0.85
     wide = priced("wide facets", 0.9, scene=scene, unit=unit, ci95_low=low, ci95_high=high)
-    tradeoff = made_tradeoff(case, costs=[wide])
+    tradeoff = made_tradeoff(costs=[wide])
     table = explanation(process_scene(case), Cost(1, 1.0, ""), (), tradeoff)
     assert ("wide facets" in list(table.columns[1].cells)) == shown
     assert any("not measured" in str(cell) for cell in table.columns[2].cells)

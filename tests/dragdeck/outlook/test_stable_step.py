@@ -7,7 +7,7 @@ from paths import ROOT
 
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
-from dragdeck.outlook.measured import StableStepLaw, measured_stiffness
+from dragdeck.outlook.measured import StableStepLaw, stable_step_law
 from dragdeck.outlook.stable_step import (
     check_timestep,
     stable_fraction,
@@ -36,7 +36,7 @@ MEASURED = [
 def test_the_law_gives_the_numbers_of_a_scene_it_was_not_fitted_to(
     scale: float, fraction: float, number: float
 ) -> None:
-    law = measured_stiffness().stable_step
+    law = stable_step_law()
     kappa = scale ** (2 / 3) * describe(paper(scale, fraction))["stiffness_number"]
     assert law.largest_fraction(kappa, 0.86, 0.15 / 3.27, number) == pytest.approx(
         fraction, rel=0.15
