@@ -269,7 +269,10 @@ KINDS = (
         "contacts from windows", _SCATTER, (5, 10, 20), partial(windows, name="workpiece_contacts")
     ),
     Simulated(
-        "drag from windows, scene unlike others", _SCATTER, (5, 10, 20), partial(windows, unlike=2.0)
+        "drag from windows, scene unlike others",
+        _SCATTER,
+        (5, 10, 20),
+        partial(windows, unlike=2.0),
     ),
 )
 """Every kind of interval."""
