@@ -59,7 +59,7 @@ def _pairs(store: Store) -> pd.DataFrame:
 def _presets(store: Store) -> pd.DataFrame:
     """Time steps of uhlmann2015 by preset, and the step at which its contacts become unstable."""
     study, rows = _study(), []
-    law = StableStepLaw.model_validate(store.record("stiffness")["stable_step"])
+    law = StableStepLaw.model_validate(store.record("stable_step")["stable_step"])
     restitution = study.pair(study.media.material, study.media.material).restitution
     spread = study.media.radius_std_m / study.media.radius_mean_m
     duration_s = study.motion.path_length_m / study.motion.axis_speed_m_s
@@ -122,7 +122,7 @@ def _coverage(store: Store) -> pd.DataFrame:
 @derived("timestep/law")
 def _law(store: Store) -> pd.DataFrame:
     """The law of the stability number, its largest deviation upwards as a fraction."""
-    found = store.table("stiffness/stable_step")
+    found = store.table("stable_step/stable_step")
     return found.assign(largest_fraction=found["largest"].map(math.expm1))
 
 

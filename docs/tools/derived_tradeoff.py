@@ -1,7 +1,7 @@
-"""Derived tables of the trade-off, the extrapolation, simplified scenes, and scaling laws."""
+"""Derived tables of the trade-off, simplified scenes, and scaling laws."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,7 @@ from dragchain.scaling.fit import said
 from dragchain.statistics.estimate import NORMAL_QUANTILE, student_quantile
 from dragchain.statistics.power_law import Runs, fit_power_law
 from dragchain.tradeoff.notation import in_percent
-from dragdeck.advice.advise import advise
-from dragdeck.advice.options import Option
-from dragdeck.outlook.measured import StiffnessRecord, Tradeoff
 from dragdeck.project import Project
-from dragdeck.study.model import BUILT_IN_FIDELITIES, Tolerance
 
 FOLD = 2
 """Relative errors from this on are shown as multiples."""
@@ -161,14 +157,6 @@ def _unstable(store: Store) -> pd.DataFrame:
     return pd.DataFrame([{"smallest": min(losses), "largest": max(losses)}])
 
 
-@derived("tradeoff/selections")
-def _selections(store: Store) -> pd.DataFrame:
-    """Simulated selections, and those whose true error exceeds the tolerance."""
-    table = store.table("tradeoff/selection")
-    exceeded = (table["draws"] * table["exceeded_fraction"]).sum()
-    return pd.DataFrame([{"selections": table["draws"].sum(), "exceeded": exceeded}])
-
-
 @derived("tradeoff/plain")
 def _plain(store: Store) -> pd.DataFrame:
     """One row: cost of the plain input script at the physical modulus over the reference's."""
@@ -181,104 +169,6 @@ def _plain(store: Store) -> pd.DataFrame:
         == (0.01, 0.5, 1)
     )
     return pd.DataFrame([{"ratio": plain * base}])
-
-
-ADVISED = (
-    "drag_mean",
-    "drag_std",
-    "workpiece_contacts",
-    "contact_force_mean",
-    "contact_force_p90",
-    "coordination_number",
-    "network_force_mean",
-    "chain_count",
-    "chain_length",
-    "path_bottleneck",
-    "sliding_distance",
-    "friction_work",
-    "restitution",
-)
-
-
-@derived("tradeoff/advised")
-def _advised(store: Store) -> pd.DataFrame:
-    """One row per quantity and tolerance: what the advisor takes for uhlmann2015."""
-    laws = StiffnessRecord.model_validate(store.record("stiffness"))
-    known = Tradeoff.model_validate(store.record("tradeoff")).model_copy(update={"stiffness": laws})
-    case = Project(ROOT).cases("uhlmann2015")[0]
-    rows = []
-    for quantity in ADVISED:
-        for tolerance in (0.05, 0.1, 0.2):
-            advice = advise(case, Tolerance(tolerance=tolerance, quantity=quantity), known)
-            rows.append(
-                {
-                    "quantity": quantity,
-                    "label": LABELS.get(quantity, "restitution (drop test)"),
-                    "tolerance": tolerance,
-                    **advice.chosen.fidelity.model_dump(),
-                    "saving": advice.speedup,
-                    "text": _advised_cell(advice.chosen, advice.speedup, bool(advice.fallback)),
-                }
-            )
-    return pd.DataFrame(rows)
-
-
-def _advised_cell(option: Option, saving: float, fallback: bool) -> str:
-    if fallback:
-        return "none"
-    if option.drop_timestep_fraction is not None:
-        return f"time step {100 * option.drop_timestep_fraction:.3g} %: {fold(saving)}"
-    text = settings_cell(option.fidelity.model_dump())
-    return f"{text}{', extrapolated' if option.extrapolated else ''}: {fold(saving)}"
-
-
-@derived("tradeoff/recommended")
-def _recommended(store: Store) -> pd.DataFrame:
-    """One row per quantity, one column per tolerance in per cent."""
-    rows = store.table("tradeoff/advised")
-    rows = rows.assign(column=[f"within_{round(100 * one)}" for one in rows["tolerance"]])
-    wide = rows.pivot(index=["quantity", "label"], columns="column", values="text").reset_index()
-    return wide.set_index("quantity").loc[list(ADVISED)].reset_index()
-
-
-@derived("tradeoff/measured_choice")
-def _measured_choice(store: Store) -> pd.DataFrame:
-    """One row per tolerance: the measured setting behind the advice on the mean drag."""
-    rows = []
-    standard = BUILT_IN_FIDELITIES["standard"]
-    names = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
-    default = next(
-        one
-        for one in _settings(store)
-        if all(one[name] == getattr(standard, name) for name in names)
-    )
-    for tolerance in (0.05, 0.1):
-        advised = (
-            store.table("tradeoff/advised")
-            .query("quantity == 'drag_mean' & tolerance == @tolerance")
-            .iloc[0]
-        )
-        same = [
-            one
-            for one in _settings(store)
-            if one["youngs_modulus_scale"] == advised["youngs_modulus_scale"]
-            and one["speed_factor"] == advised["speed_factor"]
-            and one["timestep_fraction"] >= advised["timestep_fraction"]
-            and not one["breaks"]
-        ]
-        best = min(same, key=lambda one: one["timestep_fraction"])
-        rows.append(
-            {
-                "tolerance": tolerance,
-                "measured": settings_cell(best),
-                "measured_saving": 1 / best["relative_cost"],
-                "saving_against_default": default["relative_cost"] / best["relative_cost"],
-                "advised": settings_cell(advised.to_dict()),
-                "advised_saving": advised["saving"],
-                **best["errors"]["drag_mean"],
-            }
-        )
-    return pd.DataFrame(rows)
 
 
 @derived("tradeoff/further_shown")
@@ -326,204 +216,6 @@ def _cells(rows: pd.DataFrame) -> pd.DataFrame:
             for row in rows.to_dict("records")
         ]
     return shown
-
-
-# --- extrapolation ---------------------------------------------------------------------------
-
-
-_PLANS = {
-    frozenset({"0.001"}): "m3",
-    frozenset({"0.01"}): "m2",
-    frozenset({"0.001", "0.01"}): "both",
-}
-
-
-def _extrapolations(rows: Iterable[Row], laws: Iterable[str]) -> pd.DataFrame:
-    """One row per quantity: errors as they are and corrected, for each way to extrapolate."""
-    found: dict[str, dict[str, Any]] = {}
-    for row in rows:
-        name, plan = row["quantity"], _PLANS[frozenset(row["runs"])]
-        own = found.setdefault(
-            name,
-            {
-                "quantity": name,
-                "label": LABELS[name],
-                "used": "yes" if name in laws else "no",
-            },
-        )
-        raw = own[f"{plan}_raw"] = row["raw_root_mean_square"]
-        own[f"{plan}_as_is"] = f"{100 * raw:.0f}" if raw >= 1 else f"{100 * raw:.2g}"
-        own[f"{plan}_corrected"] = row["root_mean_square"]
-        own[f"{plan}_inside"], own[f"{plan}_scenes"] = row["inside"], row["scenes"]
-        own[plan] = f"{100 * row['root_mean_square']:.2g} ({row['inside']:g} of {row['scenes']:g})"
-    return pd.DataFrame(found.values())
-
-
-@derived("stiffness/left_out_shown")
-def _left_out(store: Store) -> pd.DataFrame:
-    found = store.record("stiffness")
-    return _extrapolations(found["left_out"], found["laws"])
-
-
-@derived("scenes/extrapolations")
-def _new_scenes(store: Store) -> pd.DataFrame:
-    laws = store.record("stiffness")["laws"]
-    return _extrapolations(store.record("scenes/promises")["extrapolations"], laws)
-
-
-@derived("stiffness/scene_ranges")
-def _ranges(store: Store) -> pd.DataFrame:
-    """One row: smallest and largest of each number of the designed scenes; runs."""
-    scenes = store.record("stiffness")["scenes"]
-    row: dict[str, float] = {}
-    for name in scenes[0]["numbers"]:
-        values = [scene["numbers"][name] for scene in scenes]
-        row |= {f"{name}_low": min(values), f"{name}_high": max(values)}
-    row["scenes"] = len(scenes)
-    row["rejected"] = sum(scene["failed"] for scene in scenes)
-    row["runs"] = row["rejected"] + sum(sum(scene["runs"].values()) for scene in scenes)
-    return pd.DataFrame([row])
-
-
-@derived("stiffness/checks_shown")
-def _checks(store: Store) -> pd.DataFrame:
-    """One row per quantity: change predicted by the law and measured, at two moduli."""
-    rows: dict[str, dict[str, Any]] = {}
-    for check in store.record("stiffness")["checks"]:
-        name, plan = check["quantity"], _modulus_name(check["scale"])
-        own = rows.setdefault(name, {"quantity": name, "label": LABELS[name]})
-        own[f"{plan}_law"], own[f"{plan}_measured"] = (
-            check["predicted"],
-            error_cell({"value": check["measured"], **check}),
-        )
-    return pd.DataFrame(rows.values())
-
-
-@derived("stiffness/checks_count")
-def _checks_count(store: Store) -> pd.DataFrame:
-    checks = store.record("stiffness")["checks"]
-    overlaps = [
-        abs((1 + one["measured"]) / (1 + one["predicted"]) - 1)
-        for one in checks
-        if one["quantity"] in ("workpiece_overlap", "overlap_p99")
-    ]
-    return pd.DataFrame(
-        [
-            {
-                "pairs": len(checks),
-                "inside": sum(one["inside"] for one in checks),
-                "moduli": len({one["scale"] for one in checks}),
-                "overlap_difference": max(overlaps),
-            }
-        ]
-    )
-
-
-@derived("scenes/promises_shown")
-def _promises(store: Store) -> pd.DataFrame:
-    """One row per new scene, with both predictions."""
-    rows: dict[float, dict[str, Any]] = {}
-    for one in store.record("scenes/promises")["promises"]:
-        numbers, name = one["numbers"], one["quantity"]
-        own = rows.setdefault(numbers["inertial_number"], dict(numbers))
-        own[f"{name}_step"] = one["timestep_fraction"]
-        error = one["error"]
-        ends = f"({percent(error['ci95_low'])} to {percent(error['ci95_high'])})"
-        own[name] = f"{percent(error['value'])} {ends}"
-    return pd.DataFrame(rows.values()).sort_values("inertial_number")
-
-
-@derived("scenes/promises_summary")
-def _promises_summary(store: Store) -> pd.DataFrame:
-    """One row per promised quantity: verdicts, half-widths, root mean square of the errors."""
-    found = store.record("scenes/promises")
-    rows = []
-    for name in ("drag_mean", "workpiece_contacts"):
-        own = [one for one in found["promises"] if one["quantity"] == name]
-        errors = [one["error"] for one in own]
-        half = [(error["ci95_high"] - error["ci95_low"]) / 2 for error in errors]
-        rows.append(
-            {
-                "quantity": name,
-                "label": LABELS[name],
-                "scenes": len(own),
-                "confirmed": sum(one["verdict"] == "confirmed" for one in own),
-                "contradicted": sum(one["verdict"] == "contradicted" for one in own),
-                "half_width_low": min(half),
-                "half_width_high": max(half),
-                "root_mean_square": math.sqrt(np.mean([error["value"] ** 2 for error in errors])),
-                "largest": max(abs(error["value"]) for error in errors),
-                "kappa_low": min(one["numbers"]["stiffness_number"] for one in own),
-                "kappa_high": max(one["numbers"]["stiffness_number"] for one in own),
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-@derived("scenes/promises_total")
-def _promises_total(store: Store) -> pd.DataFrame:
-    """One row: predictions over both quantities; the scene whose advised runs were all rejected."""
-    found = store.record("scenes/promises")
-    summary = store.table("scenes/promises_summary")
-    rejected = [one for one in found["failed"] if one["asked"]]
-    numbers = [float(one["seen"].split()[2]) for one in rejected]
-    return pd.DataFrame(
-        [
-            {
-                "confirmed": summary["confirmed"].sum(),
-                "contradicted": summary["contradicted"].sum(),
-                "rejected": len(rejected),
-                "number_low": min(numbers),
-                "number_high": max(numbers),
-            }
-        ]
-    )
-
-
-@derived("scenes/merged_shown")
-def _merged(store: Store) -> pd.DataFrame:
-    """One row per quantity: changes by two reduced moduli, as they are and corrected."""
-    rows = store.table("scenes/merged")
-    found: dict[str, dict[str, Any]] = {}
-    for row in rows.to_dict("records"):
-        own = found.setdefault(
-            row["quantity"], {"quantity": row["quantity"], "label": LABELS[row["quantity"]]}
-        )
-        name = _modulus_name(row["youngs_modulus_scale"])
-        own |= {f"{name}_{key}": row[key] for key in ("change", "corrected", "half_width")}
-    return pd.DataFrame(found.values())
-
-
-@derived("scenes/cost_ranges")
-def _cost_ranges(store: Store) -> pd.DataFrame:
-    """One row per archive and modulus, or also time step: by how much steps and CPU time fall."""
-    rows = store.table("scenes/costs")
-    rows = pd.concat(
-        [rows.assign(step="any"), rows.assign(step=rows["timestep_fraction"].map("{:g}".format))]
-    )
-    groups = rows.groupby(["archive", "youngs_modulus_scale", "step"])[
-        ["steps_ratio", "cpu_time_ratio"]
-    ]
-    found = groups.agg(["min", "max"])
-    found.columns = ["_".join(names) for names in found.columns]
-    return found.reset_index()
-
-
-# --- predictions in unseen scenes of the trade-off ---------------------------------------------
-
-
-@derived("tradeoff/unseen_shown")
-def _unseen(store: Store) -> pd.DataFrame:
-    """One row per scene and set of settings: error in per cent, and prediction."""
-    rows = store.table("tradeoff/unseen").copy()
-    rows["setting"] = [settings_cell(row) for row in rows.to_dict("records")]
-    rows["error"] = [
-        "no comparison"
-        if math.isnan(row["value"])
-        else f"{percent(row['value'])} ({percent(row['ci95_low'])} to {percent(row['ci95_high'])})"
-        for row in rows.to_dict("records")
-    ]
-    return rows
 
 
 # --- scaling laws -----------------------------------------------------------------------------

@@ -243,7 +243,7 @@ def _fast(value: float) -> str:
 @derived("stability/forecasts")
 def _forecasts(store: Store) -> pd.DataFrame:
     """Forecast and measured stability numbers, with the relative error of the forecast."""
-    table, law = store.table("stability/forecast"), store.record("stiffness")["stable_step"]
+    table, law = store.table("stability/forecast"), store.record("stable_step")["stable_step"]
     study = Project(ROOT).cases("uhlmann2015")[0].study
     restitution = study.pair(study.media.material, study.media.material).restitution
     spread = study.media.radius_std_m / study.media.radius_mean_m

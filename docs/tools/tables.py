@@ -27,7 +27,7 @@ LABELS = {quantity.name: quantity.label for quantity in QUANTITIES}
 RECORDS = {
     "tradeoff": ROOT / "workflow/dragdeck/data/tradeoff.json",
     "stability": ROOT / "workflow/dragdeck/data/stability.json",
-    "stiffness": ROOT / "workflow/dragdeck/data/stiffness.json",
+    "stable_step": ROOT / "workflow/dragdeck/data/stable_step.json",
     **{
         f"scaling/{file.stem}": file
         for file in (ROOT / "analysis/dragchain/scaling/data").glob("*.json")

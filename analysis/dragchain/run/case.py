@@ -147,8 +147,7 @@ class Case(Document):
     ``unsafe_timestep`` why a step beyond the stable one was accepted, and ``output_of`` the run
     from whose raw output a further workpiece is read. ``lead`` is the softer run from which the
     process goes on, and ``marks`` are states from which others go on. ``added_forces``
-    are models of the contact law that add a normal force, such as cohesion, ``changed_law``
-    commands on the law that come from a template of the study.
+    are models of the contact law that add a normal force, such as cohesion.
     """
 
     made_by: ClassVar[str] = "dragdeck step render"
@@ -185,7 +184,6 @@ class Case(Document):
     asked: AdvisedSettings | None = None
     added_forces: tuple[str, ...] = ()
     unsafe_timestep: str | None = None
-    changed_law: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _of_its_scene(self) -> Self:
