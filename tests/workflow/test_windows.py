@@ -89,5 +89,12 @@ def test_a_window_is_where_the_course_is(finished: Path) -> None:
         assert away.max() <= 0.5 * case.motion.axis_speed_m_s * lead["timestep_s"] + 1e-9
 
 
+def test_a_window_counts_its_own_steps(finished: Path) -> None:
+    for folder in (finished / "windows").iterdir():
+        case = json.loads((folder / "case.json").read_text())
+        own = case["phases"][-1]["end_step"] - case["entry_step"]
+        assert json.loads((folder / "run.json").read_text())["steps"] == own > 0
+
+
 def test_nothing_is_run_again(finished: Path) -> None:
     assert jobs(finished.parents[1], "all", "--config", "study=small") == set()

@@ -132,7 +132,9 @@ class Case:
         if self.asked is not None:
             name = f"tolerance-{self.asked.tolerance:g}"
             default = self.asked.quantity == Tolerance.model_fields["quantity"].default
-            return name if default else "-".join([name, *self.asked.quantities])
+            first, *others = self.asked.quantities
+            more = [f"and-{len(others)}-more"] if others else []
+            return name if default else "-".join([name, first, *more])
         fidelity = self.study.fidelity
         if isinstance(fidelity, str):
             return fidelity

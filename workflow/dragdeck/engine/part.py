@@ -145,7 +145,7 @@ class PartOfRun:
         self.record = self._record.model_copy(
             update={
                 "parts": parts,
-                "steps": parts[-1].to_step or 0,
+                "steps": max(0, (parts[-1].to_step or 0) - self.inputs.entry_step),
                 "wall_time_s": round(wall_s, 3),
                 "cpu_time_s": round(sum(part.cpu_time_s or 0.0 for part in parts), 3),
                 "steps_per_s": round(done / wall_s, 1) if wall_s > 0 else None,

@@ -95,8 +95,8 @@ def _unfinished(folder: Path, record: RunRecord, held: bool) -> RunStatus:
     energy, at_rest = _rest(folder, inputs, sample)
     return RunStatus(
         state="running" if held else "interrupted",
-        step=step,
-        last=inputs.phases[-1].end_step if inputs.phases else None,
+        step=step - inputs.entry_step,
+        last=inputs.phases[-1].end_step - inputs.entry_step if inputs.phases else None,
         steps_per_s=(step - first) / seconds if step > first and seconds > 0 else None,
         wall_time_s=record.wall_time_s,
         energy=energy,
