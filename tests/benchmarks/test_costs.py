@@ -164,7 +164,8 @@ def test_the_standard_drag_is_the_process_without_what_goes_before(
 def test_the_standard_drag_continues_no_softer_run(
     small: dict[str, Any], write_study: Any, base: Case, templates: jinja2.Environment
 ) -> None:
-    small["fidelity"] = {"youngs_modulus_scale": 0.01, "soft_start": 0.001}
+    start = {"youngs_modulus_scale": 0.001, "timestep_fraction": 0.3}
+    small["fidelity"] = {"youngs_modulus_scale": 0.01, "soft_start": start}
     (soft,) = load_cases(write_study(small))
     assert process_scene(soft).deck.entry_step
     text = text_of(standard_case(soft), "standard", templates)
