@@ -158,7 +158,7 @@ def _empty(mesh: Trimesh) -> list[Finding]:
 
 
 def _no_lengths(mesh: Trimesh) -> list[Finding]:
-    bad = ~are_lengths(mesh.triangles).all(axis=(1, 2))
+    bad = np.asarray(~are_lengths(mesh.triangles).all(axis=(1, 2)))
     problem, limit = "a coordinate is not a length", "finite numbers, at most 1e100 m"
     return _facets(bad, problem, limit, remedy="export the mesh again")
 

@@ -85,7 +85,7 @@ def weld(mesh: Trimesh, precision_m: float = NODE_PRECISION_M) -> Trimesh:
 
 def are_lengths(coordinates: Floats) -> NDArray[np.bool_]:
     """Which coordinates are numbers with which a surface can be measured."""
-    return np.asarray(np.abs(coordinates) <= _FARTHEST_M)
+    return np.abs(coordinates) <= _FARTHEST_M
 
 
 def _distinct(points: Floats) -> tuple[Floats, Integers]:
