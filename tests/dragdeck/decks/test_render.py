@@ -260,3 +260,22 @@ def test_a_narrow_gap_is_a_warning(small: dict[str, Any], write_study: Callable[
     (case,) = load_cases(write_study(small))
     (gap,) = (one for one in process_scene(case, BED).warnings if one.code == "gap")
     assert "jam" in gap.text and not gap.settings
+
+
+@pytest.mark.parametrize(("size_m", "many"), [(1.5e-3, False), (2e-4, True)])
+def test_a_particle_may_have_each_facet_as_its_neighbour(
+    small: dict[str, Any],
+    write_study: Callable[..., Path],
+    project: Project,
+    size_m: float,
+    many: bool,
+) -> None:
+    """LIGGGHTS ends with `mesh neighbor list overflow` beyond 2000 of them."""
+    small["workpiece"]["shape"] |= {"facet_size_m": size_m, "facet_length_m": size_m}
+    (case,) = load_cases(write_study(small))
+    scene = process_scene(case, BED)
+    facets = scene.files["workpiece.stl"]().count("facet normal")
+    assert (facets > 2000) == many
+    text = deck_text(scene, environment(project.templates))
+    room = f" one {facets} page {10 * facets}" if many else ""
+    assert f"\nneigh_modify delay 0{room}\n\n# ---" in text

@@ -9,7 +9,7 @@ from dragdeck.decks.case_file import CaseFile, CaseOfStudy
 from dragdeck.decks.outputs import Output
 from dragdeck.errors import Caution
 from dragdeck.physics.domain_split import ENGINE_CHOOSES
-from dragdeck.physics.engine_limits import ENGINE_HARD_PA
+from dragdeck.physics.engine_limits import ENGINE_HARD_PA, ENGINE_NEIGHBOURS
 from dragdeck.study.contact_law import Pair, contact_model, contact_settings, present
 
 
@@ -91,6 +91,8 @@ class Deck:
         Name of the case; empty for a run that cases share.
     rayleigh_time_s : float
         Rayleigh time of the smallest particle; 0 if the time step is not a fraction of it.
+    neighbours : int
+        Room for neighbours of a particle, facets included.
     """
 
     title: str
@@ -110,6 +112,7 @@ class Deck:
     processors: str = ENGINE_CHOOSES
     case: str = ""
     rayleigh_time_s: float = 0.0
+    neighbours: int = ENGINE_NEIGHBOURS
     version: str = __version__
     templates: str = ""
 
@@ -117,6 +120,11 @@ class Deck:
     def hard(self) -> bool:
         """Whether a modulus is above the engine's usual range."""
         return max(self.materials.youngs_moduli_pa) > ENGINE_HARD_PA
+
+    @property
+    def crowded(self) -> bool:
+        """Whether a particle may have more neighbours than the engine has room for by itself."""
+        return self.neighbours > ENGINE_NEIGHBOURS
 
 
 @dataclass(frozen=True)

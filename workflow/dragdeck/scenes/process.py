@@ -20,6 +20,7 @@ from dragdeck.errors import Caution
 from dragdeck.files import file_checksum
 from dragdeck.mesh import bowl, stl_text
 from dragdeck.physics.domain_split import warnings as rank_warnings
+from dragdeck.physics.engine_limits import ENGINE_NEIGHBOURS
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.physics.run_limits import RunLimits
@@ -81,7 +82,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     """
     whole = led(case.all_workpieces)
     each = of_each_workpiece(whole)
-    study = whole.study
+    study, counts = whole.study, [workpiece_facets(one) for one in each]
     fidelity, facets = study.chosen_fidelity(), study.bowl_facet_size_m is not None
     bed = bed or expected_bed(study)
     dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
@@ -109,6 +110,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         skin_m=skin(study),
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
+        neighbours=max(ENGINE_NEIGHBOURS, *counts),
         outputs=_outputs(periods, drag.start, steps, [one.name for one in moved], facets),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, steps.end - steps.entry),
@@ -130,7 +132,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         deck=deck,
         case=_process_case(each, number, bed.surface_m, courses[number], limits, steps),
         steps=steps.end - steps.entry,
-        facets=sum(map(workpiece_facets, each)),
+        facets=sum(counts),
         files=own if number else {**models, **_bowl_files(study, top)},
         models=_models(study),
         leaves_out=_leaves_out(study),
