@@ -198,4 +198,6 @@ def notes(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str
         f"{factor:g} (safety factor) times the {100 * fraction:.3g} % measured to be "
         f"safe ({source})"
     )
+    if kind.needs_bed:
+        text += "; of a drag, the stable step decides"
     return [*found, ("safe step", text)]
