@@ -49,7 +49,8 @@ def first_run(
     (folder / ".venv/bin").symlink_to(Path(sys.executable).parent)
     wanted = "printf '%s\\n' \"$PWD\" && cat pyproject.toml constraints.txt | cksum"
     stamp = subprocess.run(["sh", "-c", wanted], cwd=folder, capture_output=True, check=True)
-    (folder / ".venv/dragdeck-stamp").write_bytes(stamp.stdout)
+    extras = "".join(f"{extra}\n" for extra in ("cad", "crate", "docs", "notebook", "test"))
+    (folder / ".venv/dragdeck-stamp").write_bytes(stamp.stdout + extras.encode())
     return folder, shell(f"./run all --cores 2 --config study={STUDY}", folder)
 
 

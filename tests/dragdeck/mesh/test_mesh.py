@@ -631,7 +631,7 @@ def engine_reads(mesh: Trimesh, folder: Path) -> tuple[bool, str]:
         cwd=folder,
         stdin=subprocess.DEVNULL,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
     return done.returncode == 0, done.stdout + done.stderr
