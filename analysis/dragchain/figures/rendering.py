@@ -55,7 +55,9 @@ def check_rendering() -> None:
     """
     _prefer_egl()
     words = [sys.executable, "-c", _EMPTY_PICTURE]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        words, capture_output=True, encoding="utf-8", errors="replace", check=False
+    )
     if done.returncode != 0:
         said = re.sub(r"\x1b\[[0-9;]*m", "", done.stderr).strip().splitlines()
         raise RenderError(

@@ -96,7 +96,13 @@ def find_engine() -> Engine:
 def _version(path: str) -> str:
     words = [path, "-h"]
     shown = subprocess.run(
-        words, capture_output=True, text=True, check=False, timeout=60, env=_environment(words)
+        words,
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",
+        check=False,
+        timeout=60,
+        env=_environment(words),
     )
     found = re.search(r"LIGGGHTS[^\n]*?(\d+)\.(\d+)\.(\d+)", shown.stdout)
     oldest = ".".join(map(str, OLDEST_VERSION))
