@@ -60,8 +60,6 @@ class PathQuantities(Part):
 
     Attributes
     ----------
-    begin_m : float
-        Path from the start of the drag to the counted path, m.
     arc_m : float
         Counted path, m.
     block_m : float
@@ -74,7 +72,6 @@ class PathQuantities(Part):
         Mean normal load by depth and azimuth, N, a depth after the other.
     """
 
-    begin_m: float = 0.0
     arc_m: float = 0.0
     block_m: float = 0.0
     blocks: Mapping[str, tuple[float | None, ...]] = {}
@@ -84,14 +81,6 @@ class PathQuantities(Part):
     def of_blocks(self, name: str) -> Floats:
         """The values of a quantity, (B,), NaN where a block has none; (0,) if none has one."""
         return np.array(self.blocks.get(name, ()), dtype=np.float64)
-
-    def at(self, name: str, begin_m: float, arc_m: float) -> float:
-        """Mean of a quantity's blocks over another stretch of the path; NaN where it has none."""
-        blocks = self.of_blocks(name)
-        edges = self.begin_m + self.block_m * np.arange(len(blocks) + 1)
-        inside = np.minimum(edges[1:], begin_m + arc_m) - np.maximum(edges[:-1], begin_m)
-        share = inside.clip(0.0)
-        return float(share @ blocks / share.sum()) if share.sum() > 0.5 * arc_m else math.nan
 
     def values(self, start: int = 0, stop: int | None = None) -> dict[str, float]:
         """The quantities over some blocks, all if not given, that have a value in each."""

@@ -34,7 +34,6 @@ class CountedPath:
 
     first_step: int
     last_step: int
-    begin_m: float
     length_m: float
     diameter_m: float
     blocks: int
@@ -48,8 +47,8 @@ class CountedPath:
         first, last = int(counted_steps[0]), int(counted_steps[-1])
         start, per_step = drag_phase(case).start_step, case.timestep_s * motion.axis_speed_m_s
         before = max(first - int(np.median(np.diff(counted_steps))), start)
-        length, begin = (last - before) * per_step, (before - start) * per_step
-        return cls(before, last, begin, length, diameter, max(1, round(length / diameter)))
+        length = (last - before) * per_step
+        return cls(before, last, length, diameter, max(1, round(length / diameter)))
 
     def block(self, steps: Ints) -> Ints:
         """Number of the block of each step, (N,); steps outside get the nearest."""
@@ -96,7 +95,6 @@ def quantities_along(run_dir: Path, case: Case) -> PathQuantities:
     loading, load_map = loading_along(run_dir, case, path.blocks)
     blocks = {**_of_force(force, path), **on_workpiece, **loading, **_of_network(run_dir, path)}
     return PathQuantities(
-        begin_m=path.begin_m,
         arc_m=path.length_m,
         block_m=path.length_m / path.blocks,
         blocks={name: tuple(map(finite, values)) for name, values in blocks.items()},

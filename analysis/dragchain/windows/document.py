@@ -63,22 +63,18 @@ class WindowOfRun(Part):
     run : str
     refused : str
         Why it does not enter; empty if it does.
-    begin_m, arc_m : float
-        Path before its sample from the start of the drag, and of the sample, m.
+    arc_m : float
+        Path of the sample, m.
     values : mapping
         Quantities of the sample.
-    load_map : sequence of float
-        As in `PathQuantities`.
     cpu_time_s : float
     stability_number : float or None
     """
 
     run: str
     refused: str = ""
-    begin_m: float = 0.0
     arc_m: float = 0.0
     values: Mapping[str, float] = {}
-    load_map: tuple[float, ...] = ()
     cpu_time_s: float
     stability_number: float | None = None
 

@@ -165,10 +165,8 @@ def _measured(folder: Path) -> WindowOfRun:
     write_tables(folder)
     write_chains(folder)
     along = quantities_along(folder, case)
-    found = {name: getattr(along, name) for name in ("begin_m", "arc_m", "load_map")}
-    return window.model_copy(
-        update={**found, "values": along.values(), "refused": unsettled(folder)}
-    )
+    found = {"arc_m": along.arc_m, "values": along.values(), "refused": unsettled(folder)}
+    return window.model_copy(update=found)
 
 
 def unsettled(folder: Path) -> str:

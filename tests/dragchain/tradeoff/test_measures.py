@@ -66,7 +66,7 @@ def test_a_mean_belongs_to_the_longest_waves() -> None:
 
 
 PATH = CountedPath(
-    first_step=100, last_step=500, begin_m=0.0, length_m=0.04, diameter_m=0.01, blocks=4
+    first_step=100, last_step=500, length_m=0.04, diameter_m=0.01, blocks=4
 )
 
 
