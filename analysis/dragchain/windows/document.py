@@ -112,6 +112,8 @@ class Round(Document):
     Attributes
     ----------
     tolerance : float
+    asked : sequence of str
+        Quantities to which it applies, whether the run has them or not.
     windows : sequence of WindowOfRun
         So far, in the order in which they were run.
     wanted : int
@@ -127,6 +129,7 @@ class Round(Document):
     made_by = "dragchain step windows"
 
     tolerance: float
+    asked: tuple[str, ...]
     windows: tuple[WindowOfRun, ...]
     wanted: int
     last: bool

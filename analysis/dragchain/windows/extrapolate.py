@@ -51,12 +51,12 @@ def _alone(run_dir: Path, case: Case, record: WindowsRecord) -> Extrapolated:
     asked = case.asked
     if asked is None or asked.error is not None:
         return Extrapolated(quantities=quantities)
-    ratios = [
-        (one.value.ci95_high - one.value.ci95_low) / 2 / abs(one.value.value) / asked.tolerance
+    widths = {
+        one.name: (one.value.ci95_high - one.value.ci95_low) / 2 / abs(one.value.value)
         for one in quantities
-        if one.name in asked.quantities and one.value
-    ]
-    worst = max(ratios, default=math.inf)
+        if one.value
+    }
+    worst = max(widths.get(name, math.inf) / asked.tolerance for name in asked.quantities)
     packings = math.ceil(worst**2) if math.isfinite(worst) else 1
     return Extrapolated(
         quantities=quantities,
@@ -88,7 +88,7 @@ def _windowed(found: Round) -> Extrapolated:
     return Extrapolated(
         tolerance=Reached(
             tolerance=found.tolerance,
-            asked=tuple(one.name for one in found.quantities if one.asked),
+            asked=found.asked,
             reached=found.reached,
             needed=found.needed,
             runs=tuple(one.run for one in found.entering),

@@ -1,7 +1,7 @@
 """Rounds of windows: what the windows so far say, and how many more are needed."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -93,7 +93,7 @@ def judged(
     good = [one for one in windows if not one.refused]
     rows, needs = [], [Need(_FEWEST, 1)]
     values = soft.values()
-    for quantity, found in _joined(soft, good, record):
+    for quantity, found in _joined(soft, values, good, record):
         row = WindowedQuantity(
             name=quantity.name,
             label=quantity.label,
@@ -105,13 +105,17 @@ def judged(
         rows.append(row)
         if row.asked and found:
             needs.append(needed(found, len(good), tolerance, most))
-    reached = len(good) >= _FEWEST and all(one.half_width <= tolerance for one in rows if one.asked)
+    widths = {one.name: one.half_width for one in rows}
+    reached = len(good) >= _FEWEST and all(
+        widths.get(name, math.inf) <= tolerance for name in asked
+    )
     need = Need(*(max(numbers) for numbers in zip(*needs, strict=True)))
     last = reached or len(windows) >= most
     wanted = len(windows) + max(1, need.windows - len(good))
     wanted = min(wanted, math.ceil(_MOST_MORE * len(windows)), most)
     return Round(
         tolerance=tolerance,
+        asked=tuple(asked),
         windows=tuple(windows),
         wanted=len(windows) if last else wanted,
         last=last,
@@ -122,11 +126,14 @@ def judged(
 
 
 def _joined(
-    soft: PathQuantities, windows: Sequence[WindowOfRun], record: WindowsRecord
+    soft: PathQuantities,
+    values: Mapping[str, float],
+    windows: Sequence[WindowOfRun],
+    record: WindowsRecord,
 ) -> Iterator[tuple[Quantity, Joined | None]]:
     """Each quantity of the soft run at physical stiffness, None if not all windows have it."""
     for quantity in QUANTITIES:
-        if quantity.name not in soft.values():
+        if quantity.name not in values:
             continue
         own = [one.values[quantity.name] for one in windows if quantity.name in one.values]
         if len(own) < max(_FEWEST, len(windows)):

@@ -54,6 +54,11 @@ def test_a_stiff_run_says_whether_it_is_inside_the_tolerance(
         assert found.tolerance is not None and found.tolerance.reached == reached
         assert (found.tolerance.needed.packings > 1) == (not reached)
         assert ("does not give" in found.said) == (not reached)
+    case["asked"]["quantities"] = ["workpiece_contacts", "drag_mean"]
+    (tmp_path / "case.json").write_text(json.dumps(case))
+    extrapolate_run(tmp_path, WINDOWS_RECORD)
+    found = Extrapolated.read(tmp_path / FILE)
+    assert found.tolerance is not None and not found.tolerance.reached  # no drag is known
 
 
 def test_a_tolerance_of_the_restitution_says_nothing_of_the_process(
@@ -77,7 +82,7 @@ def test_windows_give_the_values_they_have_and_say_which_they_are(tmp_path: Path
         )
     )  # fmt: skip
     Round(
-        tolerance=0.05, wanted=3, last=True, reached=False, needed=Need(8, 2),
+        tolerance=0.05, asked=("drag",), wanted=3, last=True, reached=False, needed=Need(8, 2),
         windows=(*(WindowOfRun(run=f"w-{n}", cpu_time_s=9.0) for n in (1, 2)), refused),
         quantities=(drag, peaks),
     ).write(tmp_path / "round-1.json")  # fmt: skip

@@ -68,6 +68,12 @@ def test_a_quantity_that_a_window_lacks_is_never_reached() -> None:
     assert not found.reached and not found.quantities[0].value.known
 
 
+def test_an_asked_quantity_that_the_run_lacks_is_never_reached() -> None:
+    every = windows([15.0, 15.0, 15.0])
+    found = judged(SOFT, every, 0.5, ["workpiece_contacts", "drag_mean"], 3, RECORD)
+    assert not found.reached and found.asked == ("workpiece_contacts", "drag_mean")
+
+
 @pytest.mark.parametrize(("early", "settled"), [(3.4, True), (0.3, False), (4.5, False)])
 def test_a_bed_that_is_still_moving_is_refused(early: float, settled: bool, tmp_path: Path) -> None:
     (tmp_path / "tables").mkdir()
