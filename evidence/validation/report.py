@@ -13,8 +13,7 @@ from dragchain.figures.style import drawing, png
 from dragchain.report.bundle import write_bundle
 from dragchain.report.page import data_uri, render_page
 from dragchain.scaling.document import ScalingFile
-from dragchain.scaling.figures import draw_scalings
-from dragchain.scaling.fit import read_scalings
+from dragchain.scaling.fit import draw_scalings, read_scalings
 from dragchain.statistics.estimate import EstimateColumns
 from evidence.validation import chain_peaks, figures
 from evidence.validation import loading_over_packings as loading

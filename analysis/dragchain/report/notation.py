@@ -59,6 +59,11 @@ def fraction(value: float | None) -> str:
     return percent(None if value is None else 100 * value)
 
 
+def in_percent(value: float | None, digits: int = 3) -> str:
+    """A fraction of 1 as a number of hundredths without its sign of percent, a dash for none."""
+    return DASH if value is None else number(100 * value, digits)
+
+
 def with_interval(estimate: Estimate, unit: str = "") -> str:
     """A value with its 95 % interval, all three to the second digit of the half-width."""
     after = f" {unit}" if unit else ""

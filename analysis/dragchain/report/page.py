@@ -62,11 +62,21 @@ def page_environment(
     )
     shared = (
         *("number", "measured", "fixed", "percent", "fraction", "interval"),
-        *("with_interval", "mean_interval", "ends"),
+        *("with_interval", "mean_interval", "ends", "in_percent"),
     )
     environment.filters |= {name: getattr(notation, name) for name in shared}
-    environment.filters |= {"slug": slug, "sections": sections, **(filters or {})}
+    environment.filters |= {"slug": slug, "sections": sections, "cell": cell, **(filters or {})}
     return environment
+
+
+@jinja2.pass_environment
+def cell(environment: jinja2.Environment, row: object, key: str, form: str = "") -> object:
+    """A value of a row by its dotted key, written by a filter: ``number``, ``measured:2``."""
+    value = row
+    for part in key.split("."):
+        value = environment.getitem(value, part)
+    name, _, digits = form.partition(":")
+    return environment.filters[name](value, *map(int, digits.split())) if name else value
 
 
 def slug(title: str) -> str:
