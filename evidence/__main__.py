@@ -21,6 +21,9 @@ _OUT_DIR: Argument = ("--out",), {
 _RUN_DIRS: Argument = ("run_dirs",), {
     "type": Path, "nargs": "+", "metavar": "RUN_DIR", "help": "folders of the runs",
 }  # fmt: skip
+_CORES: Argument = ("--cores",), {
+    "type": int, "default": 1, "metavar": "N", "help": "runs at the same time; default: 1",
+}  # fmt: skip
 _REPORT_DIR: Argument = ("report_dir",), {
     "type": Path, "metavar": "DIR", "help": "folder of the report on the verification suite",
 }  # fmt: skip
@@ -42,10 +45,8 @@ _LISTS: Argument = ("lists",), {
 }  # fmt: skip
 
 COMMANDS: dict[str, tuple[str, str, tuple[Argument, ...]]] = {
-    "render-suite": ("write the input scripts of all cases of the verification suite",
-                     "verification.suite:render_suite", (STUDY, FIDELITY)),
-    "judge-suite": ("compare the runs of the verification suite with reference solutions",
-                    "verification.report:write_verification", (_OUT_DIR, _RUN_DIRS)),
+    "verify": ("run the verification suite and compare it with reference solutions",
+               "verification.report:verify", (STUDY, FIDELITY, _OUT_DIR, _CORES)),
     "verdict": ("print the verdict of the verification suite; fail if a quantity failed",
                 "verification.report:verdict", (_REPORT_DIR,)),
     "run-map": ("run all points of one regime of the stability map",

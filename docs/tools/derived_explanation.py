@@ -13,7 +13,7 @@ from dragdeck.physics.contact_mechanics import effective_modulus, effective_shea
 from dragdeck.physics.damping import damping_ratio
 from dragdeck.project import Project
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Study
-from evidence.contact_law.impact import limited_restitution
+from evidence.verification.law import limited_restitution
 
 ENTERED = (0.05, 0.1, 0.3, 0.5, 0.68, 0.86, 0.95, 1.0)
 

@@ -30,7 +30,7 @@ from dragdeck.scenes.process import PROCESS, ProcessDeck
 DOCS = ROOT / "docs"
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
 CONFIG = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())["properties"]
-INSIDE = {"pass_verdict", "render_verification"}
+INSIDE = {"pass_verdict"}
 """Rules without outputs of their own that are no targets."""
 
 

@@ -12,7 +12,7 @@ from dragchain.contact_law.hertz import (
     sphere_mass,
     tangential_damping_ratio,
 )
-from evidence.contact_law.impact import CONTACT_TIME, Contact, Particle, largest_overlap
+from evidence.verification.law import CONTACT_TIME, Contact, Particle, largest_overlap
 
 STEEL = Elastic(2e11, 0.3)
 
