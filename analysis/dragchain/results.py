@@ -10,7 +10,7 @@ from typing import Any, Literal, SupportsIndex
 import pandas as pd
 import pyarrow.parquet as pq
 
-from dragchain.errors import RejectedRunError, TableError, UnknownNameError
+from dragchain.errors import TableError, UnknownNameError
 from dragchain.report.collect import process_findings
 from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData
@@ -21,6 +21,7 @@ from dragchain.run.case import Scene, load_case
 from dragchain.run.completeness import read_accepted
 from dragchain.tables.by_step import intact, read_table
 from dragchain.tables.meanings import descriptions, unit_of
+from dragdeck.errors import RejectedRunError
 
 _ON_WORKPIECE = ("workpiece_force", "workpiece_contacts", "facets", "contact_events")
 _NETWORK = ("particles", "contacts", "network", "clusters", "chains")

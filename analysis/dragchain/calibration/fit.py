@@ -23,9 +23,9 @@ from dragchain.calibration.measured_impacts import IMPACTS, Impact, Measured, me
 from dragchain.calibration.sampling import Observed, Sampling, observe, sample_impact
 from dragchain.calibration.simulated_drops import DropRun, Drops, Waveform
 from dragchain.calibration.sweep import Emulator, Sweep, prepare
-from dragchain.documents import Part
 from dragchain.errors import RecordError
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
+from dragdeck.documents import Part
 
 _RISE = float(chi2.ppf(CONFIDENCE, 1))
 """Chi square above its least value at the ends of a 95 % interval of one number: 3.84."""

@@ -28,7 +28,7 @@ def write_report(record: Path, folder: Path) -> None:
 
     Raises
     ------
-    DragchainError
+    DragdeckError
         A file is missing, or the record cannot be used.
     """
     result = CalibrationFile.read(folder / "result.json")

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -11,11 +11,11 @@ from pydantic import PositiveFloat
 
 from dragchain.arrays import Floats
 from dragchain.calibration.measured_impacts import IMPACTS
-from dragchain.documents import Document, Part
 from dragchain.dumps.run_parts import iter_prints
 from dragchain.errors import TableError
 from dragchain.run.case import load_case, load_outputs
 from dragchain.tables.impacts import speed_at_plate
+from dragdeck.documents import Document, Part
 
 Purpose = Literal["production", "reference", "confirm"]
 
@@ -44,7 +44,7 @@ class DropTest(Document):
         Time of the fall before the first impact, and contact time of an elastic impact, s.
     """
 
-    made_by: ClassVar[str] = "snakemake calibrate"
+    remedy = "make it with: snakemake calibrate"
 
     study: str
     title: str

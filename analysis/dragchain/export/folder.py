@@ -5,12 +5,12 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePath
-from typing import ClassVar
 
 from pydantic import field_validator
 
-from dragchain.documents import Document
-from dragchain.errors import DocumentError, ExportError
+from dragchain.errors import ExportError
+from dragdeck.documents import Document
+from dragdeck.errors import DocumentError
 
 LIST = "export.json"
 
@@ -20,7 +20,7 @@ _ELSEWHERE = "name another folder with --out, or move this one away"
 class ExportFile(Document):
     """What an export is of, and all the files that it wrote: ``export.json``."""
 
-    made_by: ClassVar[str] = "dragchain export"
+    remedy = "make it with: dragchain export"
 
     format: str
     study: str

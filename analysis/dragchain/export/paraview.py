@@ -15,12 +15,12 @@ from dragchain.arrays import Floats
 from dragchain.export.frames import FrameData, FrameSeries
 from dragchain.export.view_data import ViewWriter
 from dragchain.figures.network_picture import segments
-from dragchain.files import write_text, write_vtp
 from dragchain.network.chains import major_stress, particle_stress
 from dragchain.network.frame import PARTICLE, NetworkFrame
 from dragchain.network.statistics import contact_counts
 from dragchain.run.workpiece import placed, workpiece_mesh
 from dragchain.tables.run_folder import Run
+from dragdeck.files import write_text, write_vtp
 
 MAIN = "run.pvd"
 """The file to open: all there is."""

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from dragchain.documents import Document
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
+from dragdeck.documents import Document
 
 SCRIPT = "view.py"
 DATA = "view.json"
@@ -32,7 +32,7 @@ class View(Document):
         Upper end of the colour scale of each array that there is, in the array's unit.
     """
 
-    made_by: ClassVar[str] = "dragchain export"
+    remedy = "make it with: dragchain export"
 
     chains: bool
     bowl_radius_m: float

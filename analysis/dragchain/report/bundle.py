@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from dragchain.documents import Document
-from dragchain.files import write_bytes, write_text
 from dragchain.tables.parquet import write_parquet
+from dragdeck.documents import Document
+from dragdeck.files import write_bytes, write_text
 
 
 def write_bundle(

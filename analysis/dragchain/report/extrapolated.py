@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from dragchain.documents import Document, Part
 from dragchain.statistics.estimate import Estimate
+from dragdeck.documents import Document, Part
 
 FILE = Path("tables") / "extrapolated.json"
 
@@ -72,7 +72,7 @@ class Extrapolated(Document):
         Of a run that was asked for one.
     """
 
-    made_by = "dragchain step extrapolate"
+    remedy = "make it with: dragchain step extrapolate"
 
     quantities: tuple[ExtrapolatedQuantity, ...]
     tolerance: Reached | None = None

@@ -5,9 +5,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from dragchain.errors import DragchainError
 from dragchain.run.case import load_case
 from dragchain.run.completeness import RunRecord
+from dragdeck.errors import DragdeckError
 
 _STEPS = ("render", "run", "tables", "chains", "loading", "figures")
 """The steps of a run that have a log, in order: the first that failed is to blame."""
@@ -47,30 +47,30 @@ def scene_of(run_dir: Path) -> str:
     """The scene of a run by its case, or by the path of its folder where that has none."""
     try:
         return load_case(run_dir).scene
-    except DragchainError:
+    except DragdeckError:
         return run_dir.resolve().parent.name
 
 
-def missing_run(run_dir: Path, error: DragchainError) -> MissingRun:
+def missing_run(run_dir: Path, error: DragdeckError) -> MissingRun:
     """Say why a run has no result.
 
     Parameters
     ----------
     run_dir : Path
         Its folder, which need not exist.
-    error : DragchainError
+    error : DragdeckError
         What reading it ended in; it counts only if the run's logs and records say nothing.
     """
     try:
         case = load_case(run_dir)
         name = case.case or case.run
-    except DragchainError:
+    except DragdeckError:
         name = run_dir.name
     problem, remedy = _reason(run_dir, error)
     return MissingRun(scene_of(run_dir), name, run_dir, problem, remedy)
 
 
-def _reason(run_dir: Path, error: DragchainError) -> tuple[str, str]:
+def _reason(run_dir: Path, error: DragdeckError) -> tuple[str, str]:
     for step in _STEPS:
         if step == "run" and (found := _of_records(run_dir)):
             return found
@@ -84,7 +84,7 @@ def _reason(run_dir: Path, error: DragchainError) -> tuple[str, str]:
 def _of_records(run_dir: Path) -> tuple[str, str] | None:
     """What is recorded of a run that did not come to its end, or failed a check."""
     for name in ("state.json", "run.json"):
-        with suppress(DragchainError):
+        with suppress(DragdeckError):
             if found := _of_record(RunRecord.read(run_dir / name)):
                 return found
     return None

@@ -6,7 +6,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from dragchain.errors import DocumentError, RejectedRunError
 from dragchain.loading.document import FILE as LOADING
 from dragchain.loading.document import Loading
 from dragchain.report.extrapolated import FILE as EXTRAPOLATED
@@ -21,6 +20,7 @@ from dragchain.report.findings import (
 from dragchain.report.values import Values, values_of
 from dragchain.run.case import Case, load_case
 from dragchain.run.completeness import RunRecord, read_accepted
+from dragdeck.errors import DocumentError, RejectedRunError
 
 F = TypeVar("F", bound=Findings, covariant=True)
 

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from dragchain.errors import DragchainError, MissingRunsError, TableError
-from dragchain.files import write_bytes
+from dragchain.errors import MissingRunsError, TableError
 from dragchain.report.bundle import write_bundle
 from dragchain.report.cases import ReportedCase, cases_of
 from dragchain.report.cost_check import (
@@ -35,6 +34,8 @@ from dragchain.report.summary import summary
 from dragchain.run.case import Assumption, load_case
 from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.tables.corrections import Corrections
+from dragdeck.errors import DragdeckError
+from dragdeck.files import write_bytes
 
 _SHOWN = 6
 """Cases that the head of the page names; more are in its first table alone."""
@@ -133,7 +134,7 @@ def _with_upstream(run_dirs: Sequence[Path]) -> list[Path]:
     """The folders of runs and of the runs that these name, each once, in the order of scenes."""
     folders = [folder.resolve() for folder in run_dirs]
     for folder in tuple(folders):
-        with suppress(DragchainError):
+        with suppress(DragdeckError):
             folders += upstream_folders(folder, load_case(folder)).values()
     return sorted(dict.fromkeys(folders), key=lambda folder: scene_of(folder) == "process")
 
@@ -149,7 +150,7 @@ def _read(
                 sections.append(_section(read_study(folder), options))
             else:
                 read_upstream(folder)
-        except DragchainError as error:
+        except DragdeckError as error:
             missing.append(missing_run(folder, error))
     return sections, missing
 

@@ -1,12 +1,12 @@
 """How far the tables change the contacts that LIGGGHTS wrote."""
 
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.documents import Document
 from dragchain.tables.network_contacts import KINDS, ContactRows
+from dragdeck.documents import Document
 
 _ROUNDING = 1e-6
 """A force above the limit by this fraction is rounded, not cut."""
@@ -35,7 +35,7 @@ class Corrections(Document):
         What was cut off, over the sum of the tangential forces between particles as written.
     """
 
-    made_by: ClassVar[str] = "dragchain tables"
+    remedy = "make it with: dragchain tables"
 
     friction: float
     particle_contacts: int

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dragchain.documents import Document, Part
 from dragchain.statistics.estimate import finite
 from dragchain.tradeoff.changes import hub
 from dragchain.tradeoff.outcome import StepCosts, Tradeoff
 from dragchain.tradeoff.runs import Setting
 from dragchain.tradeoff.tradeoff_document import CostEntry
+from dragdeck.documents import Document, Part
 
 _PLAIN = ("plain_full", "plain")
 """Names of the cost of the plain deck, that at full stiffness first."""
@@ -26,7 +26,7 @@ class StandardFidelity(Part):
 class CostsFile(Document):
     """What is read of ``costs.json``."""
 
-    made_by = "python benchmarks/costs"
+    remedy = "make it with: python benchmarks/costs"
 
     fidelity: StandardFidelity | None = None
     costs: tuple[CostEntry, ...]

@@ -11,10 +11,10 @@ import numpy as np
 from pydantic import JsonValue
 
 from dragchain.arrays import Floats
-from dragchain.documents import Document, Part
 from dragchain.run.case import Fidelity
 from dragchain.run.completeness import AcceptanceCheck
 from dragchain.tradeoff.quantities import QUANTITIES
+from dragdeck.documents import Document, Part
 
 FILE = "measures.json"
 
@@ -105,7 +105,7 @@ class Measures(PathQuantities, Document):
         Stability number of the time step from the acceptance check.
     """
 
-    made_by = "dragchain step measure"
+    remedy = "make it with: dragchain step measure"
 
     study: str
     run: str

@@ -6,9 +6,9 @@ from typing import Annotated
 
 from pydantic import AllowInfNan, BeforeValidator
 
-from dragchain.documents import Document, Part
 from dragchain.report.extrapolated import Need
 from dragchain.statistics.estimate import Estimate
+from dragdeck.documents import Document, Part
 
 
 def _infinite(number: object) -> object:
@@ -48,7 +48,7 @@ class WindowsRecord(Document):
     quantities : mapping
     """
 
-    made_by = "benchmarks/windows.py"
+    remedy = "make it with: benchmarks/windows.py"
 
     measured: str
     source: str
@@ -126,7 +126,7 @@ class Round(Document):
     quantities : sequence of WindowedQuantity
     """
 
-    made_by = "dragchain step windows"
+    remedy = "make it with: dragchain step windows"
 
     tolerance: float
     asked: tuple[str, ...]
