@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import polygamma
 
-from dragchain.tradeoff.quantities import QUANTITIES, Quantity
+from dragchain.tradeoff.measures import QUANTITIES, Quantity
 from dragchain.windows.document import Known, WindowsRecord
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -40,7 +40,7 @@ READERS = {
         "dragchain.calibration.simulated_drops:DropTest",
         "dragchain.calibration.simulated_drops:DropsFile",
     ],
-    "costs": ["dragchain.tradeoff.costs:CostsFile"],
+    "costs": ["dragchain.tradeoff.changes:CostsFile"],
     "packing": ["dragdeck.scenes.scene:PackingFile"],
     "calibration": ["dragdeck.campaigns.restitution_drops:FitFile"],
     "tradeoff": ["dragdeck.outlook.measured:Tradeoff"],

@@ -13,8 +13,8 @@ from dragchain.report.extrapolated import (
 )
 from dragchain.run.case import Case, load_case
 from dragchain.statistics.estimate import Estimate
-from dragchain.tradeoff.path_blocks import quantities_along
-from dragchain.tradeoff.quantities import QUANTITIES
+from dragchain.tradeoff.measure_run import quantities_along
+from dragchain.tradeoff.measures import QUANTITIES
 from dragchain.windows.document import Round, WindowsRecord
 from dragchain.windows.estimate import UNKNOWN, of_one_run
 

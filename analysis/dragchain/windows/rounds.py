@@ -15,9 +15,8 @@ from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.tables.write import write_tables
-from dragchain.tradeoff.measures import PathQuantities
-from dragchain.tradeoff.path_blocks import quantities_along
-from dragchain.tradeoff.quantities import QUANTITIES, Quantity
+from dragchain.tradeoff.measure_run import quantities_along
+from dragchain.tradeoff.measures import QUANTITIES, PathQuantities, Quantity
 from dragchain.windows.document import (
     Round,
     WindowedQuantity,

@@ -20,7 +20,7 @@ from dragchain.report.page import (
     sections,
     slug,
 )
-from dragchain.tradeoff.notation import FILTERS
+from dragchain.tradeoff.report import FILTERS
 
 FOLDERS = [Path(package.__path__[0]) for package in (dragchain, evidence)]
 TEMPLATES = {
