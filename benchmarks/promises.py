@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from dragchain.report.extrapolated import Extrapolated
+from dragchain.report.values import Extrapolated
 from dragchain.run.case import load_case
 from dragchain.run.completeness import RunRecord
 from dragchain.tradeoff.measure_run import quantities_along

@@ -11,10 +11,9 @@ import pandas as pd
 import pyarrow.parquet as pq
 
 from dragchain.errors import RejectedRunError, TableError, UnknownNameError
-from dragchain.report.collect import process_findings
+from dragchain.report.cases import read_optional, upstream_folders
 from dragchain.report.findings import FILE, ProcessFindings
-from dragchain.report.run_data import RunData
-from dragchain.report.runs import read_optional, upstream_folders
+from dragchain.report.run_data import RunData, process_findings
 from dragchain.report.values import Values, values_of
 from dragchain.run.basis import Basis, notes
 from dragchain.run.case import Scene, load_case

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from tables import LABELS, ROOT, Store, derived
 
-from dragchain.report.notation import MINUS
+from dragchain.report.page import MINUS
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import said
 from dragchain.statistics.estimate import NORMAL_QUANTILE, student_quantile

@@ -20,7 +20,7 @@ WRITERS = {
     "calibration": "dragchain.calibration.results:CalibrationFile",
     "measures": "dragchain.tradeoff.measures:Measures",
     "tradeoff": "dragchain.tradeoff.record:TradeoffRecord",
-    "extrapolated": "dragchain.report.extrapolated:Extrapolated",
+    "extrapolated": "dragchain.report.values:Extrapolated",
     "advice": "dragdeck.advice.forecast:AdviceFile",
     "loading": "dragchain.loading.document:Loading",
     "figures.drop_test": "dragchain.report.findings:DropFindings",

@@ -11,8 +11,7 @@ from dragchain.calibration.results import CalibrationFile, confirmed
 from dragchain.calibration.simulated_drops import read_drops
 from dragchain.errors import TableError
 from dragchain.figures.style import drawing, png
-from dragchain.report.bundle import write_bundle
-from dragchain.report.page import data_uri, render_page
+from dragchain.report.page import data_uri, render_page, write_bundle
 
 
 def write_report(record: Path, folder: Path) -> None:

@@ -5,9 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from dragchain.figures.style import drawing, png
-from dragchain.report.bundle import write_bundle
-from dragchain.report.notation import DASH, MINUS, number
-from dragchain.report.page import data_uri, render_page
+from dragchain.report.page import DASH, MINUS, data_uri, number, render_page, write_bundle
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
 from dragchain.tradeoff.changes import (
     RUINED,

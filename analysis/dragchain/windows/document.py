@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import AllowInfNan, BeforeValidator
 
 from dragchain.documents import Document, Part
-from dragchain.report.extrapolated import Need
+from dragchain.report.values import Need
 from dragchain.statistics.estimate import Estimate
 
 

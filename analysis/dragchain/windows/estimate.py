@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.report.extrapolated import Need
+from dragchain.report.values import Need
 from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean
 from dragchain.statistics.estimate import (
     NORMAL_QUANTILE,

@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from dragchain.report.extrapolated import (
-    FILE,
+from dragchain.report.values import (
+    EXTRAPOLATED,
     Extrapolated,
     ExtrapolatedQuantity,
     Need,
@@ -42,7 +42,7 @@ def extrapolate_run(run_dir: Path, record: Path, round_file: Path | None = None)
         found = _windowed(Round.read(round_file))
     else:
         found = _alone(run_dir, load_case(run_dir), WindowsRecord.read(record))
-    found.write(run_dir / FILE)
+    found.write(run_dir / EXTRAPOLATED)
 
 
 def _alone(run_dir: Path, case: Case, record: WindowsRecord) -> Extrapolated:

@@ -9,7 +9,7 @@ import numpy as np
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.network.write import write_chains
-from dragchain.report.extrapolated import Need
+from dragchain.report.values import Need
 from dragchain.run.case import load_case
 from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate

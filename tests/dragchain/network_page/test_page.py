@@ -22,7 +22,7 @@ from dragchain.network_page import frames as frames_module
 from dragchain.network_page.columns import ROUNDING, Columns
 from dragchain.network_page.frames import BODIES, DOMINANT, PATH, QUASI_LINEAR
 from dragchain.network_page.page import write_page
-from dragchain.report.notation import TIMES
+from dragchain.report.page import TIMES
 
 _BYTES = {"u8": 1, "u16": 2, "u32": 4, "f24": 3}
 
