@@ -25,7 +25,7 @@ from dragchain.report.values import Extrapolated
 from dragchain.run.case import load_case
 from dragchain.run.completeness import RunRecord
 from dragchain.tradeoff.measure_run import quantities_along
-from dragchain.windows.document import Round, WindowsRecord
+from dragchain.windows.estimate import Round, WindowsRecord
 from dragchain.windows.rounds import judged
 from dragdeck.advice.options import Work, plain_option, stiff_settings
 from dragdeck.cases.case import Case

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from dragchain.errors import UnknownNameError
-from dragchain.figures.marks import as_compass, compass_bars
+from dragchain.figures.panels import as_compass, compass_bars
 from dragchain.figures.style import COLOURS, true_minus
 from dragchain.report import run_figures
 from dragchain.results import FinishedRun

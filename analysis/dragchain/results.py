@@ -19,7 +19,7 @@ from dragchain.run.basis import Basis, notes
 from dragchain.run.case import Scene, load_case
 from dragchain.run.completeness import read_accepted
 from dragchain.tables.by_step import intact, read_table
-from dragchain.tables.meanings import descriptions, unit_of
+from dragchain.tables.columns import descriptions, unit_of
 
 _ON_WORKPIECE = ("workpiece_force", "workpiece_contacts", "facets", "contact_events")
 _NETWORK = ("particles", "contacts", "network", "clusters", "chains")

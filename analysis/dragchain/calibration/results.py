@@ -10,10 +10,15 @@ import numpy as np
 import pandas as pd
 
 from dragchain.calibration.fit import Calibration, Fit, calibrate_file
-from dragchain.calibration.force_record import read_record
-from dragchain.calibration.measured_impacts import Measured, measure
-from dragchain.calibration.simulated_drops import Drops, DropTest, Settings, read_drops
-from dragchain.calibration.sweep import Emulator, emulator_of
+from dragchain.calibration.measured_impacts import Measured, measure, read_record
+from dragchain.calibration.simulated_drops import (
+    Drops,
+    DropTest,
+    Emulator,
+    Settings,
+    emulator_of,
+    read_drops,
+)
 from dragchain.documents import Document, Part
 from dragchain.errors import TableError
 from dragchain.files import write_text

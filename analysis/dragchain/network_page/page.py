@@ -6,8 +6,7 @@ from typing import Any
 
 from dragchain.errors import RejectedRunError
 from dragchain.files import write_text
-from dragchain.network_page.columns import ROUNDING
-from dragchain.network_page.scene import Scene, load_scene
+from dragchain.network_page.scene import ROUNDING, Scene, load_scene
 from dragchain.report.page import NETWORK_PAGE, file_uri, page_environment
 from dragchain.run.basis import changed_settings, effects
 from dragchain.run.case import Case

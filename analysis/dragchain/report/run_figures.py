@@ -14,9 +14,18 @@ from matplotlib.figure import Figure
 from dragchain.arrays import Floats
 from dragchain.dumps.run_parts import iter_prints
 from dragchain.figures import network_picture
-from dragchain.figures.marks import compass, compass_bars, depth_bars, row, row_names
-from dragchain.figures.network_overlay import force_bar, show_network
-from dragchain.figures.panels import head, legend_below, new_figure, new_panels
+from dragchain.figures.network_picture import force_bar, show_network
+from dragchain.figures.panels import (
+    compass,
+    compass_bars,
+    depth_bars,
+    head,
+    legend_below,
+    new_figure,
+    new_panels,
+    row,
+    row_names,
+)
 from dragchain.figures.style import BLUE, COLOURS, HALF_IN, RED, drawing, save
 from dragchain.report.findings import (
     FIGURES,

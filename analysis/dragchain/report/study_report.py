@@ -41,7 +41,7 @@ from dragchain.report.summary import summary
 from dragchain.run.case import Assumption, load_case
 from dragchain.run.completeness import RunRecord
 from dragchain.statistics.correlated import RELIABLE_TIMES
-from dragchain.tables.corrections import Corrections
+from dragchain.tables.network_contacts import Corrections
 
 _STEPS = ("render", "run", "tables", "chains", "loading", "figures")
 """The steps of a run that have a log, in order: the first that failed is to blame."""

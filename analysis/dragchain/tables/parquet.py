@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dragchain.dumps.frame import is_integer_column
 from dragchain.files import draft_of
-from dragchain.tables.meanings import described
+from dragchain.tables.columns import described
 
 GROUP_ROWS = 131_072
 """Rows of a row group: what a table holds in memory while it is written."""

@@ -11,8 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.figures.marks import key, log_ticks
-from dragchain.figures.panels import legend_below, new_panels
+from dragchain.figures.panels import key, legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, INK, LIGHT, MARKERS, SERIES, WIDE_IN
 from dragchain.tradeoff.changes import differing, hub, modulus_levels
 from dragchain.tradeoff.compare import Error, Run, Setting

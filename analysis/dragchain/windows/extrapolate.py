@@ -15,8 +15,7 @@ from dragchain.run.case import Case, load_case
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measure_run import quantities_along
 from dragchain.tradeoff.measures import QUANTITIES
-from dragchain.windows.document import Round, WindowsRecord
-from dragchain.windows.estimate import UNKNOWN, of_one_run
+from dragchain.windows.estimate import UNKNOWN, Round, WindowsRecord, of_one_run
 
 
 def extrapolate_run(run_dir: Path, record: Path, round_file: Path | None = None) -> None:

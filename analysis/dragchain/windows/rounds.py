@@ -17,13 +17,16 @@ from dragchain.tables.by_step import read_table
 from dragchain.tables.write import write_tables
 from dragchain.tradeoff.measure_run import quantities_along
 from dragchain.tradeoff.measures import QUANTITIES, PathQuantities, Quantity
-from dragchain.windows.document import (
+from dragchain.windows.estimate import (
+    UNKNOWN,
+    Joined,
     Round,
     WindowedQuantity,
     WindowOfRun,
     WindowsRecord,
+    joined,
+    needed,
 )
-from dragchain.windows.estimate import UNKNOWN, Joined, joined, needed
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""

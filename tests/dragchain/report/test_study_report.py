@@ -33,7 +33,7 @@ from dragchain.report.study_report import write_report
 from dragchain.report.summary import input_column, main_numbers
 from dragchain.report.values import Need
 from dragchain.run.completeness import RunRecord, refusal
-from dragchain.tables.corrections import Corrections
+from dragchain.tables.network_contacts import Corrections
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from dragchain.report.values import EXTRAPOLATED, Extrapolated, Need
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import PathQuantities
 from dragchain.windows import extrapolate
-from dragchain.windows.document import Round, WindowedQuantity, WindowOfRun
+from dragchain.windows.estimate import Round, WindowedQuantity, WindowOfRun
 from dragchain.windows.extrapolate import extrapolate_run
 
 
