@@ -19,7 +19,7 @@ from pydantic import AllowInfNan, BeforeValidator
 
 from dragchain.arrays import Floats
 from dragchain.documents import Document, Part
-from dragchain.report.values import Need
+from dragchain.report.values import LoadMap, Need
 from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean
 from dragchain.statistics.estimate import (
     NORMAL_QUANTILE,
@@ -85,6 +85,8 @@ class WindowOfRun(Part):
         Path of the sample, m.
     values : mapping
         Quantities of the sample.
+    load_map : tuple of float
+        As in `PathQuantities`.
     cpu_time_s : float
     stability_number : float or None
     """
@@ -93,6 +95,7 @@ class WindowOfRun(Part):
     refused: str = ""
     arc_m: float = 0.0
     values: Mapping[str, float] = {}
+    load_map: tuple[float, ...] = ()
     cpu_time_s: float
     stability_number: float | None = None
 
@@ -142,6 +145,8 @@ class Round(Document):
     needed : Need
         Windows of this run, and packings, that are expected to do.
     quantities : sequence of WindowedQuantity
+    load_map : LoadMap or None
+        At physical stiffness; None if fewer than two windows have one.
     """
 
     made_by = "dragchain step windows"
@@ -154,6 +159,7 @@ class Round(Document):
     reached: bool
     needed: Need
     quantities: tuple[WindowedQuantity, ...]
+    load_map: LoadMap | None = None
 
     @property
     def entering(self) -> list[WindowOfRun]:

@@ -103,4 +103,5 @@ def _windowed(found: Round) -> Extrapolated:
             )
             for one in found.quantities
         ),
+        load_map=found.load_map,
     )
