@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from dragchain.calibration.measured_impacts import IMPACTS, Record, check_samples
+from dragchain.calibration.force_record import Record, check_samples
+from dragchain.calibration.measured_impacts import IMPACTS
 from dragchain.calibration.simulated_drops import DropRun, read_drops
 from dragdeck.campaigns.restitution_drops import Drop, full, run_drops, settings
 from dragdeck.cases.case import Case

@@ -19,14 +19,8 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.stats import chi2
 
 from dragchain.arrays import Floats
-from dragchain.calibration.measured_impacts import (
-    IMPACTS,
-    Impact,
-    Measured,
-    measure,
-    pulse,
-    read_record,
-)
+from dragchain.calibration.force_record import read_record
+from dragchain.calibration.measured_impacts import IMPACTS, Impact, Measured, measure, pulse
 from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Sweep, Waveform, prepare
 from dragchain.documents import Part
 from dragchain.errors import RecordError

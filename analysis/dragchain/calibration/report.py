@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
 from dragchain.calibration.fit import Calibration, calibrate_file
-from dragchain.calibration.measured_impacts import Record, read_record
+from dragchain.calibration.force_record import Record, read_record
 from dragchain.calibration.results import PURPOSES, CalibrationFile, confirmed
 from dragchain.calibration.simulated_drops import DropRun, Drops, read_drops
 from dragchain.errors import TableError

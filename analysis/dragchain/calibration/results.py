@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from dragchain.calibration.fit import Calibration, Fit, calibrate_file
-from dragchain.calibration.measured_impacts import Measured, measure, read_record
+from dragchain.calibration.force_record import read_record
+from dragchain.calibration.measured_impacts import Measured, measure
 from dragchain.calibration.simulated_drops import (
     Drops,
     DropTest,

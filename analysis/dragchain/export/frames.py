@@ -15,15 +15,9 @@ from dragchain.arrays import Floats, Ints
 from dragchain.errors import ExportError, TableError
 from dragchain.network.frame import KINDS, WORKPIECE, NetworkFrame, frame_of
 from dragchain.run.case import Case
-from dragchain.tables.by_step import (
-    WORKPIECE_COLUMNS,
-    RisingSteps,
-    read_groups,
-    read_steps,
-    workpiece_place,
-)
+from dragchain.tables.by_step import RisingSteps, read_groups, read_steps
 from dragchain.tables.columns import CONTACTS, KINEMATICS
-from dragchain.tables.run_folder import Run
+from dragchain.tables.run_folder import WORKPIECE_COLUMNS, Run, workpiece_place
 
 _BODY = {name: body for body, name in KINDS.items()}
 

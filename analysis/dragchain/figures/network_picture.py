@@ -29,7 +29,8 @@ from dragchain.network.frame import NetworkFrame, read_frames
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed, process_time
 from dragchain.run.workpiece import placed, workpiece_mesh
-from dragchain.tables.by_step import read_table, workpiece_places
+from dragchain.tables.by_step import read_table
+from dragchain.tables.run_folder import workpiece_places
 
 View = Literal["xy", "xz"]
 

@@ -1,10 +1,7 @@
-"""Tables read a row group at a time, and where the workpiece is at a step.
-
-Memory does not grow with the length of a table.
-"""
+"""Tables read a row group at a time, so that memory does not grow with their length."""
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import groupby, pairwise
 from operator import itemgetter
@@ -16,10 +13,8 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from dragchain.arrays import Floats, Ints
+from dragchain.arrays import Ints
 from dragchain.errors import TableError
-from dragchain.run.case import Case
-from dragchain.run.kinematics import workpiece_turn
 
 PIECE_ROWS = 32_768
 """Rows that come at once: what is computed of them is a multiple of their size."""
@@ -228,51 +223,3 @@ def read_table(path: Path, columns: list[str] | None = None) -> pd.DataFrame:
     """
     with intact(path):
         return pd.read_parquet(path, columns=columns)
-
-
-WorkpiecePlaces = Callable[[int], tuple[Floats, float]]
-
-WORKPIECE_COLUMNS = ("step", "ref_x_m", "ref_y_m", "ref_z_m", "direction_rad")
-"""Columns of ``workpiece_force.parquet`` that say where the workpiece is."""
-
-
-def workpiece_places(run_dir: Path, case: Case) -> WorkpiecePlaces:
-    """A function of a step: the workpiece's reference point in m, and its turn in rad.
-
-    Raises
-    ------
-    TableError
-        If ``workpiece_force.parquet`` is not there.
-    """
-    workpiece = read_table(run_dir / "tables" / "workpiece_force.parquet", list(WORKPIECE_COLUMNS))
-    return lambda step: workpiece_place(workpiece, step, case)
-
-
-def workpiece_place(workpiece: pd.DataFrame, step: int, case: Case) -> tuple[Floats, float]:
-    """The workpiece's reference point at a step in m, (3,), and its turn in rad.
-
-    Parameters
-    ----------
-    workpiece : DataFrame
-        `WORKPIECE_COLUMNS` of ``workpiece_force.parquet``, of the samples around that step at
-        least.
-    step : int
-        The step.
-    case : Case
-        The case, of a process.
-    """
-    return _reference_point(workpiece, step), _workpiece_turn(workpiece, step, case)
-
-
-def _reference_point(workpiece: pd.DataFrame, step: int) -> Floats:
-    """The reference point at a step, between the samples around it."""
-    at = workpiece["step"].to_numpy(np.float64)
-    point = workpiece[["ref_x_m", "ref_y_m", "ref_z_m"]].to_numpy(np.float64)
-    return np.array([np.interp(step, at, column) for column in point.T])
-
-
-def _workpiece_turn(workpiece: pd.DataFrame, step: int, case: Case) -> float:
-    """The workpiece's angle at a step, its direction of motion that of the nearest sample."""
-    nearest = [int(np.abs(workpiece["step"].to_numpy(np.int64) - step).argmin())]
-    direction = workpiece["direction_rad"].to_numpy(np.float64)[nearest]
-    return float(workpiece_turn(np.array([step]), direction, case)[0])

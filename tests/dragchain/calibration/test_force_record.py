@@ -9,13 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from dragchain.calibration.measured_impacts import (
-    Measured,
-    check_samples,
-    measure,
-    parse_record,
-    read_record,
-)
+from dragchain.calibration.force_record import check_samples, parse_record, read_record
+from dragchain.calibration.measured_impacts import Measured, measure
 from dragchain.errors import RecordError
 
 Floats = NDArray[np.float64]
