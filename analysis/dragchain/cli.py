@@ -93,7 +93,7 @@ COMMANDS = (
 STEPS = (
     Command("numbers", "print the main numbers of a report",
             "Print the path of a report and the mean drag of each case. It reads summary.parquet.",
-            "report.numbers:main_numbers",
+            "report.summary:main_numbers",
             (Argument("report_dir", type=Path, metavar="REPORT_DIR",
                        help="folder of the report: results/STUDY/report"),)),
     Command("measure", "measure a run of a plan",

@@ -16,8 +16,8 @@ from pybtex.plugin import find_plugin
 from study_fields import fidelities, fields, plausible_ranges
 
 from dragchain.cli import PROGRAM as DRAGCHAIN
-from dragchain.tables.meanings import _UNITS as UNITS
-from dragchain.tables.meanings import _rows, columns_of, descriptions, unit_end
+from dragchain.tables.columns import _UNITS as UNITS
+from dragchain.tables.columns import _rows, columns_of, descriptions, unit_end
 from dragdeck.cli import PROGRAM as DRAGDECK
 
 ROOT = Path(__file__).resolve().parents[2]

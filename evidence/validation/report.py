@@ -9,8 +9,7 @@ from typing import Any
 import pandas as pd
 
 from dragchain.figures.style import drawing, png
-from dragchain.report.bundle import write_bundle
-from dragchain.report.page import data_uri, render_page
+from dragchain.report.page import data_uri, render_page, write_bundle
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.figures import draw_scalings
 from dragchain.scaling.fit import read_scalings

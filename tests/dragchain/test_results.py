@@ -20,8 +20,8 @@ from dragchain import (
     UnknownNameError,
     load,
 )
-from dragchain.report.collect import write_findings
 from dragchain.report.findings import FILE
+from dragchain.report.run_data import write_findings
 
 
 @pytest.fixture(scope="module")

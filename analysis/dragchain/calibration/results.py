@@ -12,8 +12,14 @@ import pandas as pd
 from dragchain.calibration.fit import Calibration, Fit, calibrate_file
 from dragchain.calibration.force_record import read_record
 from dragchain.calibration.measured_impacts import Measured, measure
-from dragchain.calibration.simulated_drops import Drops, DropTest, Settings, read_drops
-from dragchain.calibration.sweep import Emulator, emulator_of
+from dragchain.calibration.simulated_drops import (
+    Drops,
+    DropTest,
+    Emulator,
+    Settings,
+    emulator_of,
+    read_drops,
+)
 from dragchain.errors import TableError
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 from dragdeck.documents import Document, Part

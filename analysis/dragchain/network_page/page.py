@@ -4,8 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from dragchain.network_page.columns import ROUNDING
-from dragchain.network_page.scene import Scene, load_scene
+from dragchain.network_page.scene import ROUNDING, Scene, load_scene
 from dragchain.report.page import NETWORK_PAGE, file_uri, page_environment
 from dragchain.run.basis import changed_settings, effects
 from dragchain.run.case import Case

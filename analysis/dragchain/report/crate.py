@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from dragchain.errors import ExportError
-from dragchain.report.runs import read_study
+from dragchain.report.cases import read_study
 from dragchain.run.case import Case, load_case
 from dragchain.run.completeness import read_accepted
 from dragdeck.files import write_text

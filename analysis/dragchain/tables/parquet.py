@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from dragchain.dumps.frame import is_integer_column
-from dragchain.tables.meanings import described
+from dragchain.tables.columns import described
 from dragdeck.files import draft_of
 
 GROUP_ROWS = 131_072

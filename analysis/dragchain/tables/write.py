@@ -37,9 +37,14 @@ from dragchain.tables.columns import (
     WORKPIECE_CONTACTS,
     WORKPIECE_FORCE,
 )
-from dragchain.tables.corrections import Corrections, count_corrections
 from dragchain.tables.impacts import find_impacts
-from dragchain.tables.network_contacts import KINDS, ContactRows, contact_rows
+from dragchain.tables.network_contacts import (
+    KINDS,
+    ContactRows,
+    Corrections,
+    contact_rows,
+    count_corrections,
+)
 from dragchain.tables.parquet import Rows, category, table_writer
 from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WallContacts

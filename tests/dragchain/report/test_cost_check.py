@@ -20,12 +20,10 @@ from report_files import (
     write_quantities,
 )
 
-from dragchain.report.cases import cases_of
+from dragchain.report.cases import cases_of, read_study
 from dragchain.report.cost_check import Option, answers, cost_rows, prediction_for, read_advice
-from dragchain.report.extrapolated import FILE as EXTRAPOLATED
-from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity
-from dragchain.report.runs import read_study
 from dragchain.report.study_report import write_report
+from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity
 from dragchain.run.basis import QUANTITIES
 from dragchain.run.case import Case
 from dragchain.run.completeness import RunRecord

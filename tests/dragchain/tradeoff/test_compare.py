@@ -24,7 +24,8 @@ from tradeoff_runs import (
 
 from dragchain.errors import TableError
 from dragchain.statistics.estimate import student_quantile
-from dragchain.tradeoff.compare import compare_quantity
+from dragchain.tradeoff.compare import Setting, compare_quantity, read_runs
+from dragchain.tradeoff.measures import QUANTITIES
 from dragchain.tradeoff.outcome import (
     Tradeoff,
     breaks,
@@ -33,8 +34,6 @@ from dragchain.tradeoff.outcome import (
     largest_bound,
     run_table,
 )
-from dragchain.tradeoff.quantities import QUANTITIES
-from dragchain.tradeoff.runs import Setting, read_runs
 from dragdeck.errors import DocumentError
 
 

@@ -14,9 +14,9 @@ from tradeoff_files import measures, write, write_drop
 from tradeoff_runs import BOTH, FAILURE, contents
 
 from dragchain.cli import main as dragchain
-from dragchain.tradeoff.costs import read_costs
+from dragchain.tradeoff.changes import read_costs
 from dragchain.tradeoff.drops import choose_drop, read_drops
-from dragchain.tradeoff.notation import in_percent, plainly, times
+from dragchain.tradeoff.report import in_percent, plainly, times
 from dragdeck.errors import DocumentError
 
 pytestmark = pytest.mark.slow  # its data take seconds to make

@@ -12,8 +12,7 @@ from changed import changed
 from scipy import stats
 
 from dragchain.errors import SeriesError
-from dragchain.report.notation import MINUS
-from dragchain.report.page import page_environment
+from dragchain.report.page import MINUS, page_environment
 from dragchain.run.case import PublishedDrag, Reference, load_case
 from dragchain.scaling.fit import read_scalings
 from dragchain.statistics.estimate import Estimate
