@@ -49,7 +49,7 @@ COMMANDS: dict[str, tuple[str, str, tuple[Argument, ...]]] = {
     "verdict": ("print the verdict of the verification suite; fail if a quantity failed",
                 "verification.report:verdict", (_REPORT_DIR,)),
     "run-map": ("run all points of one regime of the stability map",
-                "stability.map_runs:stability_command", (_REGIME, _MAP)),
+                "stability.runs:stability_command", (_REGIME, _MAP)),
     "report-map": ("write the report on a stability map",
                    "stability.report:write_stability", (_OUT_DIR, _LISTS)),
     "validate": ("compare the runs of a study with the publication it reproduces; write the report",
