@@ -46,7 +46,7 @@ def write_report(
     Parameters
     ----------
     out_dir : Path
-        Gets the files of `dragchain.report.bundle.write_bundle`.
+        Gets the files of `dragchain.report.page.write_bundle`.
     template : str
         Of the page, see `dragchain.report.page.render_page`.
     draw : callable
