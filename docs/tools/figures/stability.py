@@ -8,7 +8,7 @@ from matplotlib.patches import Patch
 from tables import table
 
 from dragchain.figures.style import INK
-from evidence.stability.figures import COLOURS
+from evidence.stability.report import COLOURS
 
 TITLES = {"impact": "Single impacts", "column": "Packing at rest under a load"}
 
