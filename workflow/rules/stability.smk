@@ -24,6 +24,8 @@ rule settle_beds:
         "results/stability/benchmarks/beds.tsv"
     conda:
         "../envs/python.yaml"
+    resources:
+        prints=1,
     params:
         source=source_hash("evidence.stability.map_runs"),
     shell:
@@ -46,6 +48,8 @@ rule run_regime:
         regime="impact|settle|column|drag",
     conda:
         "../envs/python.yaml"
+    resources:
+        prints=1,
     params:
         source=source_hash("evidence.stability.map_runs"),
     shell:
