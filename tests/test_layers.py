@@ -45,17 +45,6 @@ def test_no_cycle_and_few_levels(package: str, modules: int, most: int) -> None:
     assert max(levels.values()) <= most
 
 
-@pytest.mark.parametrize(
-    ("package", "others"),
-    [("dragdeck", {"dragchain", "evidence"}), ("dragchain", {"dragdeck", "evidence"})],
-)
-def test_a_study_needs_neither_evidence_nor_the_other_package(
-    package: str, others: set[str]
-) -> None:
-    graph = grimp.build_graph(package, include_external_packages=True, cache_dir=None)
-    assert not others & graph.modules
-
-
 def test_no_module_imports_upward() -> None:
     found = lint_imports(config_filename=str(ROOT / "pyproject.toml"), no_cache=True)
     assert found == EXIT_STATUS_SUCCESS

@@ -42,7 +42,7 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
 from dragdeck.errors import DragdeckError, InputError, choices, together
-from dragdeck.files import replace_bytes, replace_text
+from dragdeck.files import write_bytes, write_text
 from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, show
 from dragdeck.outlook.explain import page as page_of_scene
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_measured
@@ -255,9 +255,9 @@ def _drawn(found: Layout, words: Words, folder: Path) -> list[Path]:
     png = picture(found, swept, words.heading, refused=bool(words.refusal))
     folder.mkdir(parents=True, exist_ok=True)
     files = [folder / name for name in ("preview.png", "preview.html", "set_up.png")]
-    replace_bytes(files[0], png)
-    replace_text(files[1], page(found, swept, words, png))
-    replace_bytes(files[2], small_picture(found, swept))
+    write_bytes(files[0], png)
+    write_text(files[1], page(found, swept, words, png))
+    write_bytes(files[2], small_picture(found, swept))
     return files
 
 

@@ -22,9 +22,9 @@ from dragchain.arrays import Floats
 from dragchain.calibration.force_record import read_record
 from dragchain.calibration.measured_impacts import IMPACTS, Impact, Measured, measure, pulse
 from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Sweep, Waveform, prepare
-from dragchain.documents import Part
 from dragchain.errors import RecordError
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
+from dragdeck.documents import Part
 
 _SAMPLINGS = 200
 """Random samplings of a simulated impact, to know what sampling does to it."""

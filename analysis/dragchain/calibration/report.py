@@ -154,7 +154,7 @@ def write_report(record: Path, folder: Path) -> None:
 
     Raises
     ------
-    DragchainError
+    DragdeckError
         A file is missing, or the record cannot be used.
     """
     result = CalibrationFile.read(folder / "result.json")

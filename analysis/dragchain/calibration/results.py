@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -20,10 +20,10 @@ from dragchain.calibration.simulated_drops import (
     emulator_of,
     read_drops,
 )
-from dragchain.documents import Document, Part
 from dragchain.errors import TableError
-from dragchain.files import write_text
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
+from dragdeck.documents import Document, Part
+from dragdeck.files import write_text
 
 SweepPurpose = Literal["production", "reference"]
 PURPOSES: tuple[SweepPurpose, ...] = ("production", "reference")
@@ -119,7 +119,7 @@ class CalibrationFile(Document):
         Impacts of the measured record.
     """
 
-    made_by: ClassVar[str] = "snakemake calibrate"
+    remedy = "make it with: snakemake calibrate"
 
     known: DropTest
     put: Put
@@ -162,7 +162,7 @@ def write_calibration(record: Path, drops_file: Path, out: Path) -> CalibrationF
 
     Raises
     ------
-    DragchainError
+    DragdeckError
         The record or the sweep cannot be used.
     """
     drops = read_drops(drops_file)

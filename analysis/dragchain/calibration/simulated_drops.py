@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -14,11 +14,11 @@ from scipy.optimize import brentq
 
 from dragchain.arrays import Floats
 from dragchain.calibration.measured_impacts import IMPACTS
-from dragchain.documents import Document, Part
 from dragchain.dumps.run_parts import iter_prints
 from dragchain.errors import TableError
 from dragchain.run.case import load_case, load_outputs
 from dragchain.tables.impacts import speed_at_plate
+from dragdeck.documents import Document, Part
 
 Purpose = Literal["production", "reference", "confirm"]
 
@@ -47,7 +47,7 @@ class DropTest(Document):
         Time of the fall before the first impact, and contact time of an elastic impact, s.
     """
 
-    made_by: ClassVar[str] = "snakemake calibrate"
+    remedy = "make it with: snakemake calibrate"
 
     study: str
     title: str

@@ -6,17 +6,15 @@ files (``id``, ``radius``, ``v``, ``omega``), so that OVITO opens the same serie
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats
-from dragchain.documents import Document
 from dragchain.export.frames import FrameData, FrameSeries
 from dragchain.figures.network_picture import segments
-from dragchain.files import write_text, write_vtp
 from dragchain.network.chains import major_stress, particle_stress
 from dragchain.network.frame import PARTICLE, NetworkFrame
 from dragchain.network.statistics import contact_counts
@@ -24,6 +22,8 @@ from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
 from dragchain.run.workpiece import placed, workpiece_mesh
 from dragchain.tables.run_folder import Run
+from dragdeck.documents import Document
+from dragdeck.files import write_text, write_vtp
 
 SCRIPT = "view.py"
 DATA = "view.json"
@@ -47,7 +47,7 @@ class View(Document):
         Upper end of the colour scale of each array that there is, in the array's unit.
     """
 
-    made_by: ClassVar[str] = "dragchain export"
+    remedy = "make it with: dragchain export"
 
     chains: bool
     bowl_radius_m: float

@@ -6,15 +6,16 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePath
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 from pydantic import field_validator
 
-from dragchain.documents import Document
-from dragchain.errors import DocumentError, ExportError
+from dragchain.errors import ExportError
 from dragchain.export import paraview, xyz
 from dragchain.export.frames import FrameData, FrameSeries, Selection
 from dragchain.tables.run_folder import Run
+from dragdeck.documents import Document
+from dragdeck.errors import DocumentError
 
 LIST = "export.json"
 
@@ -24,7 +25,7 @@ _ELSEWHERE = "name another folder with --out, or move this one away"
 class ExportFile(Document):
     """What an export is of, and all the files that it wrote: ``export.json``."""
 
-    made_by: ClassVar[str] = "dragchain export"
+    remedy = "make it with: dragchain export"
 
     format: str
     study: str

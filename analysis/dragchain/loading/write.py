@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 
 from dragchain.errors import TableError
 from dragchain.figures.style import drawing, save
-from dragchain.files import write_vtp
 from dragchain.loading.contact_events import Thresholds, event_types, find_events
 from dragchain.loading.document import Loading
 from dragchain.loading.figure import workpiece_figure
@@ -17,6 +16,7 @@ from dragchain.loading.summary import summarise
 from dragchain.run.case import Case, load_case
 from dragchain.run.workpiece import Surface, read_surface
 from dragchain.tables.parquet import write_parquet
+from dragdeck.files import write_vtp
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from typing import Generic, TypeVar
 
 from pydantic import JsonValue
 
-from dragchain.errors import DocumentError, RejectedRunError
 from dragchain.loading.document import FILE as LOADING
 from dragchain.loading.document import Loading
 from dragchain.report.findings import (
@@ -35,6 +34,7 @@ from dragchain.report.values import (
 from dragchain.run.case import Case, changed_inputs, load_case
 from dragchain.run.completeness import RunRecord, read_accepted
 from dragchain.run.kinematics import drag_phase, motion_of, needed
+from dragdeck.errors import DocumentError, RejectedRunError
 
 _PATHS = {
     "": "path",

@@ -15,12 +15,12 @@ import jinja2
 import pandas as pd
 from PIL import Image
 
-from dragchain.documents import Document
 from dragchain.errors import TableError
-from dragchain.files import write_bytes, write_text
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.parquet import write_parquet
+from dragdeck.documents import Document
+from dragdeck.files import write_bytes, write_text
 
 DASH, MINUS, TIMES = "\N{EN DASH}", "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
 _GROUPS = "\N{NARROW NO-BREAK SPACE}"

@@ -326,7 +326,7 @@ def write_figures(run_dir: Path) -> list[Path]:
 
     Raises
     ------
-    DragchainError
+    DragdeckError
         If a table is missing, a series is too short, or pictures cannot be rendered here.
     """
     run = RunData(run_dir, load_case(run_dir))

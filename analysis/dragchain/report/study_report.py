@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from dragchain.errors import DragchainError, MissingRunsError, TableError
-from dragchain.files import write_bytes
+from dragchain.errors import MissingRunsError, TableError
 from dragchain.report.cases import (
     ReportedCase,
     ReportedRun,
@@ -42,6 +41,8 @@ from dragchain.run.case import Assumption, load_case
 from dragchain.run.completeness import RunRecord
 from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.tables.network_contacts import Corrections
+from dragdeck.errors import DragdeckError
+from dragdeck.files import write_bytes
 
 _STEPS = ("render", "run", "tables", "chains", "loading", "figures")
 """The steps of a run that have a log, in order: the first that failed is to blame."""
@@ -81,30 +82,30 @@ def scene_of(run_dir: Path) -> str:
     """The scene of a run by its case, or by the path of its folder where that has none."""
     try:
         return load_case(run_dir).scene
-    except DragchainError:
+    except DragdeckError:
         return run_dir.resolve().parent.name
 
 
-def missing_run(run_dir: Path, error: DragchainError) -> MissingRun:
+def missing_run(run_dir: Path, error: DragdeckError) -> MissingRun:
     """Say why a run has no result.
 
     Parameters
     ----------
     run_dir : Path
         Its folder, which need not exist.
-    error : DragchainError
+    error : DragdeckError
         What reading it ended in; it counts only if the run's logs and records say nothing.
     """
     try:
         case = load_case(run_dir)
         name = case.case or case.run
-    except DragchainError:
+    except DragdeckError:
         name = run_dir.name
     problem, remedy = _reason(run_dir, error)
     return MissingRun(scene_of(run_dir), name, run_dir, problem, remedy)
 
 
-def _reason(run_dir: Path, error: DragchainError) -> tuple[str, str]:
+def _reason(run_dir: Path, error: DragdeckError) -> tuple[str, str]:
     for step in _STEPS:
         if step == "run" and (found := _of_records(run_dir)):
             return found
@@ -118,7 +119,7 @@ def _reason(run_dir: Path, error: DragchainError) -> tuple[str, str]:
 def _of_records(run_dir: Path) -> tuple[str, str] | None:
     """What is recorded of a run that did not come to its end, or failed a check."""
     for name in ("state.json", "run.json"):
-        with suppress(DragchainError):
+        with suppress(DragdeckError):
             if found := _of_record(RunRecord.read(run_dir / name)):
                 return found
     return None
@@ -251,7 +252,7 @@ def _with_upstream(run_dirs: Sequence[Path]) -> list[Path]:
     """The folders of runs and of the runs that these name, each once, in the order of scenes."""
     folders = [folder.resolve() for folder in run_dirs]
     for folder in tuple(folders):
-        with suppress(DragchainError):
+        with suppress(DragdeckError):
             folders += upstream_folders(folder, load_case(folder)).values()
     return sorted(dict.fromkeys(folders), key=lambda folder: scene_of(folder) == "process")
 
@@ -267,7 +268,7 @@ def _read(
                 sections.append(_section(read_study(folder), options))
             else:
                 read_upstream(folder)
-        except DragchainError as error:
+        except DragdeckError as error:
             missing.append(missing_run(folder, error))
     return sections, missing
 

@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from dragchain.documents import Document, Part
 from dragchain.loading.document import Loading
 from dragchain.report.findings import ProcessFindings
 from dragchain.run.basis import QUANTITIES, Basis, Correction, Standing, judge, notes
@@ -15,6 +14,7 @@ from dragchain.run.case import Case
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, mean_of
+from dragdeck.documents import Document, Part
 
 EXTRAPOLATED = Path("tables") / "extrapolated.json"
 
@@ -113,7 +113,7 @@ class Extrapolated(Document):
         Of a run with windows.
     """
 
-    made_by = "dragchain step extrapolate"
+    remedy = "make it with: dragchain step extrapolate"
 
     quantities: tuple[ExtrapolatedQuantity, ...]
     tolerance: Reached | None = None

@@ -1,18 +1,18 @@
 """All contacts of a network frame in one form: point, force on body a, normal part."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints, places
 from dragchain.contact_law.coulomb import within_friction
-from dragchain.documents import Document
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
 from dragchain.tables.columns import CENTRE, FLOOR_FORCES, FORCES, SIDE_FORCES
 from dragchain.tables.workpiece_contacts import WallContacts, tangential_force
+from dragdeck.documents import Document
 
 KINDS = ("particle-particle", "particle-workpiece", "particle-floor", "particle-side")
 """Kinds of contact; their position is the code in `ContactRows.kind`."""
@@ -257,7 +257,7 @@ class Corrections(Document):
         What was cut off, over the sum of the tangential forces between particles as written.
     """
 
-    made_by: ClassVar[str] = "dragchain tables"
+    remedy = "make it with: dragchain tables"
 
     friction: float
     particle_contacts: int

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from dragchain.arrays import Floats, Ints, wrap_angle
 from dragchain.dumps.frame import Columns
-from dragchain.errors import RejectedRunError, TableError
+from dragchain.errors import TableError
 from dragchain.run.case import Case, Scene, friction_with
 from dragchain.run.kinematics import (
     counted_mask,
@@ -48,6 +48,7 @@ from dragchain.tables.network_contacts import (
 from dragchain.tables.parquet import Rows, category, table_writer
 from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WallContacts
+from dragdeck.errors import RejectedRunError
 
 
 @dataclass(frozen=True)

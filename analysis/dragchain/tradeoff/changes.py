@@ -9,12 +9,12 @@ from typing import Literal
 import numpy as np
 from scipy import stats
 
-from dragchain.documents import Document, Part
 from dragchain.statistics.estimate import Estimate, finite, student_quantile
 from dragchain.tradeoff.compare import OTHER, Comparison, Error, Setting
 from dragchain.tradeoff.measures import MAIN
 from dragchain.tradeoff.outcome import StepCosts, Tradeoff
 from dragchain.tradeoff.tradeoff_document import CostEntry
+from dragdeck.documents import Document, Part
 
 RUINED = 0.1
 """A significant error above this ruins a quantity; a bound below it keeps it."""
@@ -224,7 +224,7 @@ class StandardFidelity(Part):
 class CostsFile(Document):
     """What is read of ``costs.json``."""
 
-    made_by = "python benchmarks/costs"
+    remedy = "make it with: python benchmarks/costs"
 
     fidelity: StandardFidelity | None = None
     costs: tuple[CostEntry, ...]

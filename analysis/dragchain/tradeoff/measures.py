@@ -12,9 +12,9 @@ import numpy as np
 from pydantic import JsonValue
 
 from dragchain.arrays import Floats
-from dragchain.documents import Document, Part
 from dragchain.run.case import Fidelity
 from dragchain.run.completeness import AcceptanceCheck
+from dragdeck.documents import Document, Part
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,7 @@ class Measures(PathQuantities, Document):
         Stability number of the time step from the acceptance check.
     """
 
-    made_by = "dragchain step measure"
+    remedy = "make it with: dragchain step measure"
 
     study: str
     run: str

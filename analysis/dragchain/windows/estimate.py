@@ -18,7 +18,6 @@ import numpy as np
 from pydantic import AllowInfNan, BeforeValidator
 
 from dragchain.arrays import Floats
-from dragchain.documents import Document, Part
 from dragchain.report.values import LoadMap, Need
 from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean
 from dragchain.statistics.estimate import (
@@ -27,6 +26,7 @@ from dragchain.statistics.estimate import (
     mean_of,
     student_quantile,
 )
+from dragdeck.documents import Document, Part
 
 
 def _infinite(number: object) -> object:
@@ -66,7 +66,7 @@ class WindowsRecord(Document):
     quantities : mapping
     """
 
-    made_by = "benchmarks/windows.py"
+    remedy = "make it with: benchmarks/windows.py"
 
     measured: str
     source: str
@@ -149,7 +149,7 @@ class Round(Document):
         At physical stiffness; None if fewer than two windows have one.
     """
 
-    made_by = "dragchain step windows"
+    remedy = "make it with: dragchain step windows"
 
     tolerance: float
     asked: tuple[str, ...]
