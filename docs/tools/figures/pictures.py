@@ -10,16 +10,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from PIL import Image
-from tables import ROOT
+from records import ROOT
 
 from dragchain.errors import DragchainError
 from dragchain.export.frames import Selection
 from dragchain.export.write import write_export
 from dragchain.figures.rendering import Camera, new_plotter, photograph
-from dragchain.figures.style import COLOURS, drawing, few_colours, force_map, png
-from dragchain.report.findings import FILE, ProcessFindings
-from dragchain.report.run_data import RunData
-from dragchain.report.run_figures import network_xz
+from dragchain.figures.style import COLOURS, few_colours, force_map
 from dragchain.run.case import load_case
 from dragchain.run.kinematics import needed
 
@@ -28,11 +25,6 @@ STUDY = "half_minute"
 
 _PIXELS = (1000, 760)
 _THICKEST_M = 2e-3
-
-
-def _network(run: Path) -> bytes:
-    with drawing():
-        return png(network_xz(RunData(run, load_case(run)), ProcessFindings.read(run / FILE)))
 
 
 def _export(run: Path) -> bytes:
@@ -105,7 +97,6 @@ PICTURES: Mapping[str, Callable[[Path], bytes]] = {
     "carousel": _carousel,
     "export": _export,
     "network_page": _network_page,
-    "network_xz": _network,
     "paraview": _paraview,
 }
 """What draws a picture from the folder of a process run, by the name of its file."""
