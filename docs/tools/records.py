@@ -11,13 +11,14 @@ expression over the columns::
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from string import Formatter
 from typing import Any
 
 import pandas as pd
+import paper_study
 
 from dragchain.tradeoff.quantities import QUANTITIES
 from dragdeck.project import Project
@@ -40,6 +41,13 @@ RECORDS = {
 }
 """File of each record."""
 
+COMPUTED: dict[str, Callable[[], pd.DataFrame]] = {
+    "paper/contacts": paper_study.contacts,
+    "paper/presets": paper_study.presets,
+    "quantities": lambda: pd.DataFrame({"name": x.name, "label": x.label} for x in QUANTITIES),
+}
+"""Tables that the code contains."""
+
 
 # --- tables ------------------------------------------------------------------------------
 
@@ -47,8 +55,8 @@ RECORDS = {
 @cache
 def table(name: str) -> pd.DataFrame:
     """A record, or a part of one, as a table; KeyError if there is none."""
-    if name == "quantities":
-        return pd.DataFrame({"name": one.name, "label": one.label} for one in QUANTITIES)
+    if name in COMPUTED:
+        return COMPUTED[name]()
     if name.startswith("study/"):
         study = Project(ROOT).cases(name.removeprefix("study/"))[0].study
         return pd.DataFrame(_rows(study.model_dump(mode="json")))

@@ -10,11 +10,6 @@ from page_parts import PageError, Parts, changed, tables, values
 from paths import ROOT
 from records import change, number, table
 
-from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep
-from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear
-from dragdeck.physics.damping import damping_ratio
-from dragdeck.project import Project
-from dragdeck.study.model import BUILT_IN_FIDELITIES
 from evidence.contact_law.impact import limited_restitution
 
 TEXT = "".join(page.read_text(encoding="utf-8") for page in PAGES)
@@ -75,24 +70,9 @@ def test_numbers_are_shown_as_the_pages_do() -> None:
     assert change(18.0, 17.0, 19.0) == "19-fold"
 
 
-def test_the_constants_of_the_explanation_are_those_of_the_code() -> None:
-    study = Project(ROOT).cases("uhlmann2015")[0].study
-    particle = study.materials["ceramic"]
-    for row in table("explanation/contacts").itertuples():
-        other = study.materials[row.pair.partition("-")[2]]
-        e = study.pair(*row.pair.split("-")).restitution
-        found = (effective_modulus(particle, other) / 1e9, effective_shear(particle, other) / 1e9)
-        assert (row.modulus_gpa, row.shear_gpa) == pytest.approx(found, rel=1e-4)
-        assert row.beta == pytest.approx(damping_ratio(e), rel=1e-4)
-    for row in table("explanation/restitution").itertuples():
+def test_the_effective_restitution_is_that_of_the_closed_form() -> None:
+    for row in table("verification/effective_restitution").itertuples():
         assert row.effective == pytest.approx(limited_restitution(row.entered), rel=1e-4)
-    presets = table("explanation/timesteps").set_index("preset")
-    assert set(presets.index) == set(BUILT_IN_FIDELITIES)
-    for name, fidelity in BUILT_IN_FIDELITIES.items():
-        scaled = study.model_copy(update={"fidelity": fidelity})
-        found = (bed_rayleigh_time(scaled), bed_timestep(scaled, "timestep_fraction"))
-        shown = presets.loc[name, ["rayleigh_us", "timestep_us"]] / 1e6
-        assert list(shown) == pytest.approx(found, rel=1e-4)
 
 
 # --- numbers that are typed ---------------------------------------------------------------

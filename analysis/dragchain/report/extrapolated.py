@@ -63,6 +63,36 @@ class Reached(Part):
     refused: Mapping[str, str] = {}
 
 
+class LoadMap(Part):
+    """Mean normal load on the workpiece by depth and azimuth; 4 depths, 12 azimuths each.
+
+    Attributes
+    ----------
+    soft : tuple of float
+        Of the run with reduced moduli, N.
+    value, std : tuple of float
+        At the physical modulus, N, and its standard deviation.
+    soft_error, error : float
+        Expected relative L1 error (sum of the absolute errors over the total load): of the soft
+        run's map, and of the corrected one.
+    """
+
+    soft: tuple[float, ...]
+    value: tuple[float, ...]
+    std: tuple[float, ...]
+    soft_error: float
+    error: float
+
+    @property
+    def said(self) -> str:
+        """How far both maps are expected to be off, in a sentence."""
+        return (
+            f"The load map of the run is off by about {self.soft_error:.0%} of the load at the "
+            f"physical Young's modulus, the corrected one in {FILE.name} by about {self.error:.0%} "
+            "(sum of the absolute errors of 48 patches, over the total load)."
+        )
+
+
 class Extrapolated(Document):
     """The content of ``extrapolated.json``.
 
@@ -70,12 +100,15 @@ class Extrapolated(Document):
     ----------
     tolerance : Reached or None
         Of a run that was asked for one.
+    load_map : LoadMap or None
+        Of a run with windows.
     """
 
     made_by = "dragchain step extrapolate"
 
     quantities: tuple[ExtrapolatedQuantity, ...]
     tolerance: Reached | None = None
+    load_map: LoadMap | None = None
 
     @property
     def said(self) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import AllowInfNan, BeforeValidator
 
 from dragchain.documents import Document, Part
-from dragchain.report.extrapolated import Need
+from dragchain.report.extrapolated import LoadMap, Need
 from dragchain.statistics.estimate import Estimate
 
 
@@ -67,6 +67,8 @@ class WindowOfRun(Part):
         Path of the sample, m.
     values : mapping
         Quantities of the sample.
+    load_map : tuple of float
+        As in `PathQuantities`.
     cpu_time_s : float
     stability_number : float or None
     """
@@ -75,6 +77,7 @@ class WindowOfRun(Part):
     refused: str = ""
     arc_m: float = 0.0
     values: Mapping[str, float] = {}
+    load_map: tuple[float, ...] = ()
     cpu_time_s: float
     stability_number: float | None = None
 
@@ -124,6 +127,8 @@ class Round(Document):
     needed : Need
         Windows of this run, and packings, that are expected to do.
     quantities : sequence of WindowedQuantity
+    load_map : LoadMap or None
+        At physical stiffness; None if fewer than two windows have one.
     """
 
     made_by = "dragchain step windows"
@@ -136,6 +141,7 @@ class Round(Document):
     reached: bool
     needed: Need
     quantities: tuple[WindowedQuantity, ...]
+    load_map: LoadMap | None = None
 
     @property
     def entering(self) -> list[WindowOfRun]:

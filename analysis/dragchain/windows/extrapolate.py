@@ -104,4 +104,5 @@ def _windowed(found: Round) -> Extrapolated:
             )
             for one in found.quantities
         ),
+        load_map=found.load_map,
     )
