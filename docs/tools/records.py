@@ -107,13 +107,13 @@ def chosen(
 ) -> pd.DataFrame:
     """Rows of a record, or of several below each other; ValueError if there is none.
 
-    `join` names another record with more columns, and the column that both have.
+    `join` names another record, and the column by which its columns are added.
     """
     several = [records] if isinstance(records, str) else records
     found = pd.concat([table(one) for one in several], ignore_index=True)
     if join is not None:
         other = chosen(join["record"])
-        found = found.merge(other, on=join["on"], suffixes=("", "_joined"))
+        found = found.merge(other, on=join["by"], suffixes=("", "_joined"))
     if re.fullmatch(r"[\w.-]+", rows) and rows not in found:
         names = found["name"] if "name" in found else found.iloc[:, 0]
         found = found[names.astype(str) == rows]
