@@ -1,20 +1,18 @@
 """What the inputs of the paper's study mean: its contacts, and its time steps by preset."""
 
-import json
 import math
 from pathlib import Path
 
 import pandas as pd
 
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, full_stiffness_number
-from dragdeck.outlook.measured import StableStepLaw
+from dragdeck.outlook.measured import stable_step_law
 from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear, shear_modulus
 from dragdeck.physics.damping import damping_ratio
 from dragdeck.project import Project
 from dragdeck.study.model import BUILT_IN_FIDELITIES
 
-ROOT = Path(__file__).resolve().parents[2]
-STUDY = Project(ROOT).cases("uhlmann2015")[0].study
+STUDY = Project(Path(__file__).resolve().parents[2]).cases("uhlmann2015")[0].study
 
 
 def contacts() -> pd.DataFrame:
@@ -44,8 +42,7 @@ def contacts() -> pd.DataFrame:
 
 def presets() -> pd.DataFrame:
     """Time steps, and the fraction at which the contacts are forecast to become unstable."""
-    record = json.loads((ROOT / "workflow/dragdeck/data/stable_step.json").read_text())
-    law = StableStepLaw.model_validate(record["stable_step"])
+    law = stable_step_law()
     media, motion, rows = STUDY.media, STUDY.motion, []
     restitution = STUDY.pair(media.material, media.material).restitution
     for name, fidelity in BUILT_IN_FIDELITIES.items():

@@ -15,10 +15,10 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 from records import ROOT
 
-from dragchain import cli as dragchain_cli
-from dragchain.tables.meanings import _UNITS as UNITS
-from dragchain.tables.meanings import unit_end
-from dragdeck import cli as dragdeck_cli
+from dragchain.cli import PROGRAM as DRAGCHAIN
+from dragchain.tables.columns import _UNITS as UNITS
+from dragchain.tables.columns import unit_end
+from dragdeck.cli import PROGRAM as DRAGDECK
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
 from dragdeck.study.plausible import _RANGES as RANGES
 
@@ -209,8 +209,8 @@ TEXTS: dict[str, Callable[[], str]] = {
     "fields": fields,
     "fidelities": fidelities,
     "ranges": plausible_ranges,
-    "dragdeck": lambda: commands(dragdeck_cli._parser()),
-    "dragchain": lambda: commands(dragchain_cli._parser()),
+    "dragdeck": lambda: commands(DRAGDECK.parser()),
+    "dragchain": lambda: commands(DRAGCHAIN.parser()),
     "columns": columns,
     "bibliography": bibliography,
 }

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import erf
 
 from dragchain.arrays import Floats
-from dragchain.report.extrapolated import LoadMap
+from dragchain.report.values import LoadMap
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 
 _FEWEST = 2

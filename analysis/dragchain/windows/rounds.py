@@ -9,22 +9,24 @@ import numpy as np
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.network.write import write_chains
-from dragchain.report.extrapolated import LoadMap, Need
+from dragchain.report.values import LoadMap, Need
 from dragchain.run.case import load_case
 from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.tables.write import write_tables
-from dragchain.tradeoff.measures import PathQuantities
-from dragchain.tradeoff.path_blocks import quantities_along
-from dragchain.tradeoff.quantities import QUANTITIES, Quantity
-from dragchain.windows.document import (
+from dragchain.tradeoff.measure_run import quantities_along
+from dragchain.tradeoff.measures import QUANTITIES, PathQuantities, Quantity
+from dragchain.windows.estimate import (
+    UNKNOWN,
+    Joined,
     Round,
     WindowedQuantity,
     WindowOfRun,
     WindowsRecord,
+    joined,
+    needed,
 )
-from dragchain.windows.estimate import UNKNOWN, Joined, joined, needed
 from dragchain.windows.load_map import corrected
 
 _FEWEST = 2

@@ -8,15 +8,17 @@ from pathlib import Path
 
 import matplotlib
 
-from dragchain.errors import DragchainError
 from dragchain.figures.style import drawing, true_minus
+from dragdeck.errors import DragdeckError
 from figures.charts import CHARTS
-from figures.drawings import geometry, workflow
+from figures.drawings import draw_geometry, draw_workflow
 from figures.pictures import PICTURES, picture, run_of_study
 
 IMAGES = Path(__file__).resolve().parents[2] / "images"
 
-FIGURES = {draw.__name__: draw for draw in (*CHARTS, geometry, workflow)}
+FIGURES = {
+    draw.__name__.removeprefix("draw_"): draw for draw in (*CHARTS, draw_geometry, draw_workflow)
+}
 """What draws a figure, by the name of its file."""
 
 
@@ -39,5 +41,5 @@ def draw_all() -> None:
     for name in PICTURES:
         try:
             (IMAGES / f"{name}.png").write_bytes(picture(name, run_of_study()))
-        except DragchainError as error:
+        except DragdeckError as error:
             print(f"{name}.png was not drawn: {error}")

@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter
 from records import chosen, document, table
 
-from dragchain.figures.marks import log_ticks
+from dragchain.figures.panels import log_ticks
 from dragchain.figures.style import (
     BLUE,
     COLOURS,
@@ -29,7 +29,7 @@ def _figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def calibration() -> Figure:
+def draw_calibration() -> Figure:
     """Effective minus entered restitution by fidelity and limitForce; range of single impacts."""
     kinds = {
         "standard": ("production", "standard", BLUE),
@@ -55,7 +55,7 @@ def calibration() -> Figure:
     return figure
 
 
-def forces() -> Figure:
+def draw_forces() -> Figure:
     """Force on the workpiece over one revolution, with the experiment as a band."""
     force, run = table("validation/run_force"), table("validation/run").iloc[0]
     paper, colour = table("study/uhlmann2015").iloc[0], COLOURS["experiment"]
@@ -83,7 +83,7 @@ def forces() -> Figure:
     return figure
 
 
-def load_map() -> Figure:
+def draw_load_map() -> Figure:
     """Load-distance integral per area and path length on the unrolled lateral surface."""
     facets, study = table("validation/run_facets"), table("study/uhlmann2015").iloc[0]
     side = facets[facets["centre_z_m"] > 1e-6]
@@ -111,7 +111,7 @@ def load_map() -> Figure:
     return figure
 
 
-def scaling() -> Figure:
+def draw_scaling() -> Figure:
     """Mean drag over depth, diameter, friction and speed, with the fitted power laws."""
     labels = {
         "drag-depth": ("immersion depth (mm)", 1e3),
@@ -138,7 +138,7 @@ def scaling() -> Figure:
     return figure
 
 
-def spin() -> Figure:
+def draw_spin() -> Figure:
     """Mean drag and torque over the spin ratio, with 95 % confidence intervals."""
     rows = table("motion/spin")
     figure = _figure(7.6, 2.8)
@@ -155,7 +155,7 @@ def spin() -> Figure:
     return figure
 
 
-def stability() -> Figure:
+def draw_stability() -> Figure:
     """Stable and unstable time steps: a panel per regime, a row per condition."""
     titles = {"impact": "Single impacts", "column": "Packing at rest under a load"}
     points = chosen("stability/points", "not reference").rename(columns={"class": "kind"})
@@ -193,7 +193,7 @@ def _regime(axes: Axes, points: pd.DataFrame) -> None:
     axes.grid(visible=False)
 
 
-def tradeoff(tolerance: float = 0.1) -> Figure:
+def draw_tradeoff(tolerance: float = 0.1) -> Figure:
     """Signed error of the mean drag against CPU time; Pareto-optimal settings are numbered."""
     rows = chosen("tradeoff/settings/errors", "name == 'drag_mean' and not breaks")
     rows = rows[(rows["failed"] == 0) & (rows["runs"] > 1)].sort_values("relative_cost")
@@ -236,7 +236,7 @@ def tradeoff(tolerance: float = 0.1) -> Figure:
     return figure
 
 
-def validation() -> Figure:
+def draw_validation() -> Figure:
     """Mean drag by packing, setting and changed input, beside measured and published values."""
     effects = chosen("validation/effects", "quantity == 'drag_mean'")
     mean, low, high = table("validation/force").iloc[0][["mean_value", *_ENDS]]
@@ -270,7 +270,7 @@ def validation() -> Figure:
 _ENDS = ("mean_ci95_low", "mean_ci95_high")
 
 
-def verification(smallest: float = 1e-12) -> Figure:
+def draw_verification(smallest: float = 1e-12) -> Figure:
     """Largest error relative to its tolerance, where that is a number."""
     rows = table("verification/results")
     rows = rows.assign(tolerance=pd.to_numeric(rows["tolerance"], errors="coerce"))
@@ -290,13 +290,13 @@ def verification(smallest: float = 1e-12) -> Figure:
 
 
 CHARTS = (
-    calibration,
-    forces,
-    load_map,
-    scaling,
-    spin,
-    stability,
-    tradeoff,
-    validation,
-    verification,
+    draw_calibration,
+    draw_forces,
+    draw_load_map,
+    draw_scaling,
+    draw_spin,
+    draw_stability,
+    draw_tradeoff,
+    draw_validation,
+    draw_verification,
 )

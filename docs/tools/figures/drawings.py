@@ -22,7 +22,7 @@ BED_HEIGHT = 70.0
 # --- geometry ----------------------------------------------------------------------------
 
 
-def geometry() -> Figure:
+def draw_geometry() -> Figure:
     """Bowl, bed, workpiece and path, with the frames of the results: side and top view in mm."""
     study = table("study/uhlmann2015").iloc[0]
     sizes = {
@@ -119,7 +119,7 @@ SCENES = ("drop_test", "filling", "process")
 """One row each."""
 
 
-def workflow() -> Figure:
+def draw_workflow() -> Figure:
     """The jobs of `snakemake all` and what each needs, from Snakemake's own rule graph."""
     words = [sys.executable, "-m", "snakemake", "--rulegraph", "dot", "all", "--cores", "1"]
     words += ["--config", "study=quickstart", "--forceall"]
