@@ -128,7 +128,7 @@ def _value(row: Mapping[str, str]) -> str:
     return shown.pop()
 
 
-def tables() -> dict[str, dict[str, Any]]:
+def table_recipes() -> dict[str, dict[str, Any]]:
     """The recipe of each table."""
     return yaml.safe_load(TABLES.read_text(encoding="utf-8"))
 
@@ -142,9 +142,9 @@ def made_table(recipe: Mapping[str, Any]) -> str:
     return markdown_table(list(recipe["columns"]), list(zip(*cells, strict=True)))
 
 
-def changed() -> Iterator[tuple[Path, str]]:
+def stale_files() -> Iterator[tuple[Path, str]]:
     """Every file that is not up to date, the values first, with its text as it should be."""
-    old, recipes = values(), tables()
+    old, recipes = values(), table_recipes()
     new = old.assign(value=[_value(row) for row in old.to_dict("records")])
     yield from _if_changed(VALUES, new.to_csv(index=False))
     parts = Parts(

@@ -15,7 +15,7 @@ from dragdeck.study.model import BUILT_IN_FIDELITIES
 STUDY = Project(Path(__file__).resolve().parents[2]).cases("uhlmann2015")[0].study
 
 
-def contacts() -> pd.DataFrame:
+def paper_contacts() -> pd.DataFrame:
     """Constants of the contacts with the physical Young's modulus."""
     rows = []
     media = STUDY.media.material
@@ -40,7 +40,7 @@ def contacts() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def presets() -> pd.DataFrame:
+def paper_presets() -> pd.DataFrame:
     """Time steps, and the fraction at which the contacts are forecast to become unstable."""
     law = stable_step_law()
     media, motion, rows = STUDY.media, STUDY.motion, []

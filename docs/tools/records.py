@@ -42,8 +42,8 @@ RECORDS = {
 """File of each record."""
 
 COMPUTED: dict[str, Callable[[], pd.DataFrame]] = {
-    "paper/contacts": paper_study.contacts,
-    "paper/presets": paper_study.presets,
+    "paper/contacts": paper_study.paper_contacts,
+    "paper/presets": paper_study.paper_presets,
     "quantities": lambda: pd.DataFrame({"name": x.name, "label": x.label} for x in QUANTITIES),
 }
 """Tables that the code contains."""
@@ -53,7 +53,7 @@ COMPUTED: dict[str, Callable[[], pd.DataFrame]] = {
 
 
 @cache
-def table(name: str) -> pd.DataFrame:
+def record_table(name: str) -> pd.DataFrame:
     """A record, or a part of one, as a table; KeyError if there is none."""
     if name in COMPUTED:
         return COMPUTED[name]()
@@ -110,7 +110,7 @@ def chosen(
     `join` names another record, and the column by which its columns are added.
     """
     several = [records] if isinstance(records, str) else records
-    found = pd.concat([table(one) for one in several], ignore_index=True)
+    found = pd.concat([record_table(one) for one in several], ignore_index=True)
     if join is not None:
         other = chosen(join["record"])
         found = found.merge(other, on=join["by"], suffixes=("", "_joined"))
@@ -151,10 +151,10 @@ def _field(found: pd.DataFrame, field: str, spec: str) -> list[str]:
     values = found[field] if field in found else found.eval(field, engine="python")
     if not isinstance(values, pd.Series):
         values = pd.Series([values] * len(found))
-    return [number(value, spec) for value in values.tolist()]
+    return [shown_value(value, spec) for value in values.tolist()]
 
 
-def number(value: Any, spec: str) -> str:
+def shown_value(value: Any, spec: str) -> str:
     """A value by a format of Python; ``on|off`` are words for a truth value.
 
     ``%`` has a space before it, a zero no minus, and a number that is missing shows nothing.

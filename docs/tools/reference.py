@@ -36,7 +36,7 @@ def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 # --- command line --------------------------------------------------------------------
 
 
-def commands(parser: argparse.ArgumentParser) -> str:
+def command_sections(parser: argparse.ArgumentParser) -> str:
     """Every command of a program with its arguments."""
     return "\n\n".join(_commands(parser))
 
@@ -209,8 +209,8 @@ TEXTS: dict[str, Callable[[], str]] = {
     "fields": fields,
     "fidelities": fidelities,
     "ranges": plausible_ranges,
-    "dragdeck": lambda: commands(DRAGDECK.parser()),
-    "dragchain": lambda: commands(DRAGCHAIN.parser()),
+    "dragdeck": lambda: command_sections(DRAGDECK.parser()),
+    "dragchain": lambda: command_sections(DRAGCHAIN.parser()),
     "columns": columns,
     "bibliography": bibliography,
 }

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 from doc_pages import PAGES, name_of, prose
-from page_parts import PageError, Parts, changed, tables, values
+from page_parts import PageError, Parts, stale_files, table_recipes, values
 from paths import ROOT
-from records import change, number, table
+from records import change, record_table, shown_value
 
 from evidence.contact_law.impact import limited_restitution
 
@@ -17,11 +17,11 @@ TEXT = "".join(page.read_text(encoding="utf-8") for page in PAGES)
 
 def test_values_and_pages_are_up_to_date() -> None:
     """`./run docs` renews them."""
-    assert [name_of(file) for file, _ in changed()] == []
+    assert [name_of(file) for file, _ in stale_files()] == []
 
 
 def test_every_name_is_short_and_on_a_page() -> None:
-    names = [*values()["name"], *tables()]
+    names = [*values()["name"], *table_recipes()]
     assert len(set(names)) == len(names)
     assert [name for name in names if len(f"<!--{name}-->") > 25] == []
     assert [name for name in names if f"<!--{name}-->" not in TEXT] == []
@@ -63,15 +63,15 @@ def test_a_value_that_was_typed_is_refused(page: str) -> None:
 
 
 def test_numbers_are_shown_as_the_pages_do() -> None:
-    assert number(0.1234, ".1%") == "12.3 %" and number(-0.001, "+.0%") == "0 %"
-    assert number(math.nan, ".2f") == "" and number(True, "on|off") == "on"
+    assert shown_value(0.1234, ".1%") == "12.3 %" and shown_value(-0.001, "+.0%") == "0 %"
+    assert shown_value(math.nan, ".2f") == "" and shown_value(True, "on|off") == "on"
     assert change(0.12, 0.05, 0.2) == "+12 (+5.0 to +20)"
     assert change(0.12, -0.05, 0.2, ".1f") == "n.s. (-5.0 to +20.0)"
     assert change(18.0, 17.0, 19.0) == "19-fold"
 
 
 def test_the_effective_restitution_is_that_of_the_closed_form() -> None:
-    for row in table("verification/effective_restitution").itertuples():
+    for row in record_table("verification/effective_restitution").itertuples():
         assert row.effective == pytest.approx(limited_restitution(row.entered), rel=1e-4)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from doc_pages import PAGES, name_of
 from figures import FIGURES, IMAGES, svg
-from figures.pictures import PICTURES, picture
+from figures.pictures import PICTURES, drawn_picture
 from mathml import mathml
 from paths import ROOT
 from PIL import Image
@@ -90,7 +90,7 @@ def test_a_figure_can_be_drawn_from_the_records(name: str) -> None:
 
 @pytest.mark.slow
 def test_a_picture_can_be_drawn() -> None:
-    with Image.open(BytesIO(picture("carousel", ROOT))) as drawn:
+    with Image.open(BytesIO(drawn_picture("carousel", ROOT))) as drawn:
         assert drawn.mode == "P" and min(drawn.size) > 300
 
 

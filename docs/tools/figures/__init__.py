@@ -12,13 +12,11 @@ from dragchain.figures.style import drawing, true_minus
 from dragdeck.errors import DragdeckError
 from figures.charts import CHARTS
 from figures.drawings import draw_geometry, draw_workflow
-from figures.pictures import PICTURES, picture, run_of_study
+from figures.pictures import PICTURES, drawn_picture, run_of_study
 
 IMAGES = Path(__file__).resolve().parents[2] / "images"
 
-FIGURES = {
-    draw.__name__.removeprefix("draw_"): draw for draw in (*CHARTS, draw_geometry, draw_workflow)
-}
+FIGURES = {**CHARTS, "geometry": draw_geometry, "workflow": draw_workflow}
 """What draws a figure, by the name of its file."""
 
 
@@ -40,6 +38,6 @@ def draw_all() -> None:
         (IMAGES / f"{name}.svg").write_text(svg(name), encoding="utf-8")
     for name in PICTURES:
         try:
-            (IMAGES / f"{name}.png").write_bytes(picture(name, run_of_study()))
+            (IMAGES / f"{name}.png").write_bytes(drawn_picture(name, run_of_study()))
         except DragdeckError as error:
             print(f"{name}.png was not drawn: {error}")

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter
-from records import chosen, document, table
+from records import chosen, document, record_table
 
 from dragchain.figures.panels import log_ticks
 from dragchain.figures.style import (
@@ -29,7 +29,7 @@ def _figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def draw_calibration() -> Figure:
+def _draw_calibration() -> Figure:
     """Effective minus entered restitution by fidelity and limitForce; range of single impacts."""
     kinds = {
         "standard": ("production", "standard", BLUE),
@@ -55,10 +55,10 @@ def draw_calibration() -> Figure:
     return figure
 
 
-def draw_forces() -> Figure:
+def _draw_forces() -> Figure:
     """Force on the workpiece over one revolution, with the experiment as a band."""
-    force, run = table("validation/run_force"), table("validation/run").iloc[0]
-    paper, colour = table("study/uhlmann2015").iloc[0], COLOURS["experiment"]
+    force, run = record_table("validation/run_force"), record_table("validation/run").iloc[0]
+    paper, colour = record_table("study/uhlmann2015").iloc[0], COLOURS["experiment"]
     mean, std = paper["reference_experiment_drag_mean_n"], paper["reference_experiment_drag_std_n"]
     figure = _figure(7.6, 3.2)
     axes = figure.subplots()
@@ -83,9 +83,9 @@ def draw_forces() -> Figure:
     return figure
 
 
-def draw_load_map() -> Figure:
+def _draw_load_map() -> Figure:
     """Load-distance integral per area and path length on the unrolled lateral surface."""
-    facets, study = table("validation/run_facets"), table("study/uhlmann2015").iloc[0]
+    facets, study = record_table("validation/run_facets"), record_table("study/uhlmann2015").iloc[0]
     side = facets[facets["centre_z_m"] > 1e-6]
     depth_m = study["motion_immersion_depth_m"]
     turn = np.degrees(np.arctan2(side["centre_y_m"], side["centre_x_m"]))
@@ -111,7 +111,7 @@ def draw_load_map() -> Figure:
     return figure
 
 
-def draw_scaling() -> Figure:
+def _draw_scaling() -> Figure:
     """Mean drag over depth, diameter, friction and speed, with the fitted power laws."""
     labels = {
         "drag-depth": ("immersion depth (mm)", 1e3),
@@ -138,9 +138,9 @@ def draw_scaling() -> Figure:
     return figure
 
 
-def draw_spin() -> Figure:
+def _draw_spin() -> Figure:
     """Mean drag and torque over the spin ratio, with 95 % confidence intervals."""
-    rows = table("motion/spin")
+    rows = record_table("motion/spin")
     figure = _figure(7.6, 2.8)
     panels = (
         ("drag_n", "drag_half_n", "mean drag (N)", COLOURS["drag"]),
@@ -155,7 +155,7 @@ def draw_spin() -> Figure:
     return figure
 
 
-def draw_stability() -> Figure:
+def _draw_stability() -> Figure:
     """Stable and unstable time steps: a panel per regime, a row per condition."""
     titles = {"impact": "Single impacts", "column": "Packing at rest under a load"}
     points = chosen("stability/points", "not reference").rename(columns={"class": "kind"})
@@ -193,7 +193,7 @@ def _regime(axes: Axes, points: pd.DataFrame) -> None:
     axes.grid(visible=False)
 
 
-def draw_tradeoff(tolerance: float = 0.1) -> Figure:
+def _draw_tradeoff(tolerance: float = 0.1) -> Figure:
     """Signed error of the mean drag against CPU time; Pareto-optimal settings are numbered."""
     rows = chosen("tradeoff/settings/errors", "name == 'drag_mean' and not breaks")
     rows = rows[(rows["failed"] == 0) & (rows["runs"] > 1)].sort_values("relative_cost")
@@ -236,12 +236,12 @@ def draw_tradeoff(tolerance: float = 0.1) -> Figure:
     return figure
 
 
-def draw_validation() -> Figure:
+def _draw_validation() -> Figure:
     """Mean drag by packing, setting and changed input, beside measured and published values."""
     effects = chosen("validation/effects", "quantity == 'drag_mean'")
-    mean, low, high = table("validation/force").iloc[0][["mean_value", *_ENDS]]
+    mean, low, high = record_table("validation/force").iloc[0][["mean_value", *_ENDS]]
     rows = [("all packings, physical E", mean, low, high, COLOURS["drag"])]
-    for row in table("validation/packings").itertuples():
+    for row in record_table("validation/packings").itertuples():
         ends = row.drag_n_ci95_low, row.drag_n_ci95_high
         rows.append((f"packing {row.seed}", row.drag_n_mean, *ends, COLOURS["drag"]))
     for row in effects.itertuples():
@@ -253,7 +253,7 @@ def draw_validation() -> Figure:
         rows.append((name, *values, colour))
     figure = _figure(7.6, 0.26 * len(rows) + 1.1)
     axes = figure.subplots()
-    compared = table("validation/comparison").set_index("label")["mean_n"]
+    compared = record_table("validation/comparison").set_index("label")["mean_n"]
     for label, style in (("experiment", "--"), ("simulation", ":")):
         source = f"Uhlmann et al. (2015), {label}"
         axes.axvline(compared[label], color=COLOURS[label], ls=style, label=source)
@@ -270,9 +270,9 @@ def draw_validation() -> Figure:
 _ENDS = ("mean_ci95_low", "mean_ci95_high")
 
 
-def draw_verification(smallest: float = 1e-12) -> Figure:
+def _draw_verification(smallest: float = 1e-12) -> Figure:
     """Largest error relative to its tolerance, where that is a number."""
-    rows = table("verification/results")
+    rows = record_table("verification/results")
     rows = rows.assign(tolerance=pd.to_numeric(rows["tolerance"], errors="coerce"))
     rows = rows.dropna(subset=["tolerance"])
     ratio = (rows["largest_error"] / rows["tolerance"]).clip(lower=smallest)
@@ -289,14 +289,9 @@ def draw_verification(smallest: float = 1e-12) -> Figure:
     return figure
 
 
-CHARTS = (
-    draw_calibration,
-    draw_forces,
-    draw_load_map,
-    draw_scaling,
-    draw_spin,
-    draw_stability,
-    draw_tradeoff,
-    draw_validation,
-    draw_verification,
-)
+CHARTS = {
+    name.removeprefix("_draw_"): draw
+    for name, draw in list(globals().items())
+    if name.startswith("_draw_")
+}
+"""What draws a chart, by the name of its file."""

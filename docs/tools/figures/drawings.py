@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Rectangle
-from records import ROOT, table
+from records import ROOT, record_table
 
 from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, RED
 
@@ -24,7 +24,7 @@ BED_HEIGHT = 70.0
 
 def draw_geometry() -> Figure:
     """Bowl, bed, workpiece and path, with the frames of the results: side and top view in mm."""
-    study = table("study/uhlmann2015").iloc[0]
+    study = record_table("study/uhlmann2015").iloc[0]
     sizes = {
         "bowl": 1e3 * study["bowl_radius_m"],
         "height": 1e3 * study["bowl_height_m"],
