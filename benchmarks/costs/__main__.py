@@ -12,13 +12,13 @@ from functools import partial
 from pathlib import Path
 
 from cost_timing import SECONDS, measure
-from dragdeck.cli import guarded
+from dragdeck.command_line import guarded
 from dragdeck.engine.reports import say
 from dragdeck.project import find_project
 
 
 def main() -> int:
-    """Time a study's variants and return the exit status; see `dragdeck.cli.guarded`."""
+    """Time a study's variants and return the exit status; see `dragdeck.command_line.guarded`."""
     parser = argparse.ArgumentParser(
         prog="python benchmarks/costs", description="Time what each omitted option would cost."
     )
@@ -29,7 +29,7 @@ def main() -> int:
     add("--seconds", type=float, default=SECONDS, help="simulated time of the timed drag, s")
     add("--only", nargs="+", default=[], metavar="NAME", help="time only these variants")
     add("--out", type=Path, required=True, metavar="FILE", help="costs.json")
-    return guarded(partial(_measure, parser.parse_args()))
+    return guarded("costs", partial(_measure, parser.parse_args()))
 
 
 def _measure(asked: argparse.Namespace) -> None:

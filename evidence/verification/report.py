@@ -13,7 +13,6 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dragchain.errors import RejectedRunError
 from dragchain.figures.panels import legend_below, new_panels
 from dragchain.figures.style import GREY, MARKERS, SERIES
 from dragchain.report.campaign import write_report
@@ -22,6 +21,7 @@ from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine import run_folder
 from dragdeck.engine.reports import say, silent
+from dragdeck.errors import RejectedRunError
 from dragdeck.project import find_project, run_path, study_templates
 from evidence.verification.checks import (
     COULOMB,

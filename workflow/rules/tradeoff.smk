@@ -17,6 +17,8 @@ rule measure_costs:
     conda:
         "../envs/python.yaml"
     threads: workflow.cores
+    resources:
+        prints=1,
     params:
         study=STUDY,
         fidelity=fidelity_option,

@@ -28,6 +28,8 @@ rule judge_verification:
     conda:
         "../envs/python.yaml"
     threads: 4
+    resources:
+        prints=1,
     params:
         study=STUDY,
         fidelity=fidelity_option,

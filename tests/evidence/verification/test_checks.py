@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from recordings import recording
 
-from dragchain.errors import RejectedRunError
+from dragdeck.errors import RejectedRunError
 from evidence.verification import checks
 from evidence.verification.checks import (
     COULOMB,
