@@ -15,7 +15,7 @@ from dragdeck.project import Project
 from dragdeck.study.model import Study
 from evidence.verification.checks import CHECKS
 from evidence.verification.experiment import Experiment, collide_scene, frame_period
-from evidence.verification.suite import Impacts, contact_time, suite_file, suite_of
+from evidence.verification.suite import Impacts, hertz_time, suite_file, suite_of
 
 
 @pytest.fixture
@@ -142,8 +142,8 @@ def test_no_particle_of_the_suite_can_leave_its_box(experiments: dict[str, Exper
 
 def test_two_equal_particles_touch_shorter_than_one_on_its_like(case: Case) -> None:
     steel = case.study.materials["steel"]
-    plane = contact_time(steel, 0.01, steel, None, 1.0)
-    pair = contact_time(steel, 0.01, steel, 0.01, 1.0)
+    plane = hertz_time(steel, 0.01, steel, None, 1.0)
+    pair = hertz_time(steel, 0.01, steel, 0.01, 1.0)
     assert pair / plane == pytest.approx((0.5**2 / 0.5) ** 0.2)
 
 
