@@ -22,7 +22,7 @@ from dragchain.figures.style import (
     RED,
     force_map,
 )
-from evidence.stability.figures import COLOURS as CLASSES
+from evidence.stability.report import COLOURS as CLASSES
 
 
 def _figure(width: float, height: float) -> Figure:

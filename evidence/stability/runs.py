@@ -1,6 +1,8 @@
-"""The runs of a stability map: the scene of each point, and how a batch of them is run."""
+"""The runs of a stability map: the scene of each point, in a batch for each regime."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import jinja2
@@ -9,32 +11,24 @@ from dragdeck.cases.case import Case
 from dragdeck.decks import PACKING_FILE
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.templates import environment
-from dragdeck.documents import Document
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.reports import Report, say
 from dragdeck.errors import InputError
-from dragdeck.physics.packing import Bed
 from dragdeck.project import find_project
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.process import process_scene
 from dragdeck.scenes.scene import read_bed
 from dragdeck.study.model import Motion, Study
 from dragdeck.sweep.cases import load_cases
-from evidence.stability.column import Packing, column_scene
-from evidence.stability.impact import Impact, impact_scene
-from evidence.stability.map import (
-    BedOfMap,
-    BedsFile,
+from evidence.stability.points import (
     Point,
-    PointOfMap,
     PointsFile,
     Settings,
     bed_name,
     bed_settings,
     load_points,
 )
-
-_BEDS = "beds"
+from evidence.stability.scenes import Impact, LoadedPacking, column_scene, impact_scene
 
 _BED_ENERGY_RATIO = 1e-4
 """When such a bed counts as settled: without friction single particles go round for long."""
@@ -42,7 +36,7 @@ _BED_ENERGY_RATIO = 1e-4
 _SAFE_FILLING_FRACTION = 0.1
 """Step over the Rayleigh time of the beds that drags and columns start from."""
 
-DRAG_S, SHORTEST_DRAG_M, LONGEST_DRAG_REVOLUTIONS = 1.0, 0.005, 2.0
+_DRAG_S, _SHORTEST_DRAG_M, _LONGEST_DRAG_REVOLUTIONS = 1.0, 0.005, 2.0
 """A drag lasts this long, but goes this far at the least and at the most."""
 
 _TRANSIENT_FRACTION = 0.2
@@ -58,10 +52,11 @@ def point_case(base: Case, settings: Settings, fraction: float) -> Case:
     study = base.study
     pair = {"restitution": settings["restitution"], "friction": settings["friction"]}
     particles = study.materials[study.media.material]
-    scale = float(settings["youngs_modulus_pa"]) / particles.youngs_modulus_pa
     fidelity = study.chosen_fidelity().model_copy(
         update={
-            "youngs_modulus_scale": scale,
+            "youngs_modulus_scale": (
+                float(settings["youngs_modulus_pa"]) / particles.youngs_modulus_pa
+            ),
             "timestep_fraction": fraction,
             "filling_timestep_fraction": fraction,
             "speed_factor": 1.0,
@@ -81,7 +76,7 @@ def _motion(study: Study, speed: float) -> Motion:
     around = study.motion.path.revolution_m
     if around is None:
         raise InputError("the map's study drags on a circle", field="motion.path")
-    length = min(max(DRAG_S * speed, SHORTEST_DRAG_M), LONGEST_DRAG_REVOLUTIONS * around)
+    length = min(max(_DRAG_S * speed, _SHORTEST_DRAG_M), _LONGEST_DRAG_REVOLUTIONS * around)
     motion = study.motion.at(speed / study.motion.axis_speed_m_s, length)
     return motion.model_copy(update={"transient_m": _TRANSIENT_FRACTION * length})
 
@@ -108,8 +103,8 @@ class MapRuns:
     templates: jinja2.Environment
     report: Report
 
-    def settle_beds(self, map_file: Path) -> Path:
-        """Settle the beds with a small step; the list of them.
+    def settle_beds(self, map_file: Path) -> None:
+        """Settle the beds with a small step.
 
         Raises
         ------
@@ -118,19 +113,13 @@ class MapRuns:
         RejectedRunError
             A bed did not come to rest.
         """
-        batch, beds = Batch(self.results / "filling", self.templates), []
+        batch = Batch(self.results / "filling", self.templates)
         for name, own in bed_settings(map_file).items():
-            batch.result(name, self._bed(own))
-            beds.append(BedOfMap(settings=own, folder=f"filling/{name}"))
+            case = point_case(self.base, own, _SAFE_FILLING_FRACTION)
+            filling = case.study.filling.model_copy(update={"energy_ratio": _BED_ENERGY_RATIO})
+            study = case.study.model_copy(update={"filling": filling})
+            batch.result(name, filling_scene(replace(case, study=study)))
             self.report(f"bed settled: {name}")
-        return self._listed(_BEDS, BedsFile(beds=beds))
-
-    def _bed(self, own: Settings) -> AnyScene:
-        case = point_case(self.base, own, _SAFE_FILLING_FRACTION)
-        filling = case.study.filling.model_copy(update={"energy_ratio": _BED_ENERGY_RATIO})
-        return filling_scene(
-            replace(case, study=case.study.model_copy(update={"filling": filling}))
-        )
 
     def run_points(self, map_file: Path, regime: str) -> Path:
         """Run all points of a regime; the list of them. A run that fails is a finding.
@@ -142,48 +131,49 @@ class MapRuns:
         EngineError
             No LIGGGHTS, or it was interrupted.
         """
-        points, rows = load_points(map_file, regime), []
+        points = load_points(map_file, regime)
         batch = Batch(self.results / regime, self.templates)
-        for number, point in enumerate(points, 1):
-            rows.append(self._run(batch, point))
-            self.report(f"{regime} {number} of {len(points)}: {point.name}: {rows[-1].state}")
-        return self._listed(regime, PointsFile(points=rows))
-
-    def _listed(self, name: str, content: Document) -> Path:
-        file = self.results / "points" / f"{name}.json"
-        content.write(file)
+        refused = batch.each({point.name: self._scene(point) for point in points}, self.report)
+        rows = [one.model_copy(update={"refused": refused.get(one.name)}) for one in points]
+        file = self.results / "points" / f"{regime}.json"
+        PointsFile(points=rows).write(file)
         return file
 
-    def _run(self, batch: Batch, point: Point) -> PointOfMap:
-        bed = self._settled(point) if point.regime == "drag" else None
-        own = {**dict(point), "folder": f"{point.regime}/{point.name}"}
-        try:
-            scene = self._scene(point, bed)
-        except InputError as error:
-            return PointOfMap(**own, state="refused", refused=str(error))
-        passed = batch.run(point.name, scene).state == "complete"
-        return PointOfMap(**own, state="complete" if passed else "failed")
-
-    def _settled(self, point: Point) -> Bed:
-        """The bed that a drag starts from; one that is missing is no finding."""
+    def _scene(self, point: Point) -> Callable[[], AnyScene]:
+        """What makes the scene of a point; the bed of a drag has to be there before."""
+        make = {"impact": _impact, "settle": _settle, "column": _column}.get(point.regime)
+        if make is not None:
+            return partial(make, self.base, point)
         folder = self.results / "filling" / bed_name(point.settings)
-        return read_bed(folder / "tables" / "packing.json")
+        bed = read_bed(folder / "tables" / "packing.json")
 
-    def _scene(self, point: Point, settled: Bed | None) -> AnyScene:
-        case = point_case(self.base, point.settings, point.fraction)
-        bed = bed_name(point.settings)
-        if point.regime == "impact":
-            how = Impact(*map(point.number, ("speed_m_s", "angle_deg", "size_ratio")))
-            return impact_scene(case, point.name, how, point.fraction)
-        if point.regime == "settle":
-            return filling_scene(case)
-        if point.regime == "column":
-            packing: Packing = "stack" if point.packing == "stack" else "bed"
-            load = point.number("load_factor")
-            return column_scene(case, point.name, packing, load, point.fraction, bed)
-        scene = process_scene(case, settled)
-        source = f"../../filling/{bed}/{PACKING_FILE}"
-        return replace(scene, deck=replace(scene.deck, source=source))
+        def drag() -> AnyScene:
+            scene = process_scene(_case(self.base, point), bed)
+            source = f"../../filling/{folder.name}/{PACKING_FILE}"
+            return replace(scene, deck=replace(scene.deck, source=source))
+
+        return drag
+
+
+def _case(base: Case, point: Point) -> Case:
+    return point_case(base, point.settings, point.fraction)
+
+
+def _impact(base: Case, point: Point) -> AnyScene:
+    how = Impact(*map(point.number, ("speed_m_s", "angle_deg", "size_ratio")))
+    return impact_scene(_case(base, point), point.name, how, point.fraction)
+
+
+def _settle(base: Case, point: Point) -> AnyScene:
+    return filling_scene(_case(base, point))
+
+
+def _column(base: Case, point: Point) -> AnyScene:
+    load = LoadedPacking.model_validate(
+        {"packing": point.packing, "load_factor": point.number("load_factor")}
+    )
+    bed = bed_name(point.settings)
+    return column_scene(_case(base, point), point.name, load, point.fraction, bed)
 
 
 def map_runs(study_file: Path, results: Path, templates: Path, report: Report) -> MapRuns:
@@ -203,7 +193,7 @@ def stability_command(regime: str, points: Path) -> None:
     project = find_project(Path.cwd())
     study = project.studies / "stability" / "study.yaml"
     runs = map_runs(study, project.results("stability"), project.templates, say)
-    if regime == _BEDS:
+    if regime == "beds":
         runs.settle_beds(points)
     else:
         runs.run_points(points, regime)

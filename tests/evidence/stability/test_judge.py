@@ -1,13 +1,14 @@
-"""Classes of points, by the codes and reasons of acceptance checks and by numbers."""
+"""The judgement of a map: classes of points, and the largest safe steps."""
 
 import math
 from typing import Any
 
+import pandas as pd
 import pytest
 
 from dragchain.run.completeness import AcceptanceCheck, CheckCode, CheckReason
 from dragchain.statistics.estimate import Estimate
-from evidence.stability.classes import (
+from evidence.stability.judge import (
     ENERGY,
     ENERGY_LIMITS,
     INACCURATE,
@@ -16,8 +17,12 @@ from evidence.stability.classes import (
     OVERLAP_LIMIT,
     REFUSED,
     STABLE,
+    UNSTABLE,
     Seen,
     classify,
+    conditions,
+    regimes,
+    safe_fraction,
 )
 
 
@@ -72,3 +77,69 @@ def test_the_worse_of_two_classes_counts() -> None:
     assert classify(point)[0] == ENERGY
     kind, why, _ = classify(seen(overlap_ratio=0.2, errors={"restitution": Estimate(1, 1, 1)}))
     assert kind == OVERLAP and "0.2" in why
+
+
+def table(*classes: str) -> pd.DataFrame:
+    return pd.DataFrame({"fraction": [0.1, 0.2, 0.4, 0.8][: len(classes)], "class": classes})
+
+
+@pytest.mark.parametrize(
+    ("classes", "safe"),
+    [
+        ((STABLE, STABLE, INACCURATE, LOST), 0.4),
+        ((STABLE, ENERGY, STABLE, STABLE), 0.1),
+        ((STABLE, STABLE, STABLE, STABLE), 0.8),
+        ((LOST, STABLE, STABLE, STABLE), math.nan),
+    ],
+)
+def test_a_safe_step_has_no_unsafe_step_below(classes: tuple[str, ...], safe: float) -> None:
+    shuffled = table(*classes).sample(frac=1, random_state=1)
+    assert safe_fraction(shuffled, UNSTABLE) == pytest.approx(safe, nan_ok=True)
+
+
+def points(condition: str, classes: list[str], restitution: float = 0.9) -> pd.DataFrame:
+    fractions = [0.1, 0.2, 0.4, 0.8][: len(classes)]
+    return pd.DataFrame(
+        {
+            "regime": "settle",
+            "condition": condition,
+            "axis": "base" if condition == "a" else "restitution",
+            "label": condition,
+            "fraction": fractions,
+            "reference": [n == 0 for n in range(len(classes))],
+            "class": classes,
+            "why": "",
+            "rayleigh_time_s": 2e-5,
+            "critical_step_s": 1e-5,
+            "damped_fraction": 1.0,
+            "setting_restitution": restitution,
+        }
+    )
+
+
+def test_a_regime_is_as_safe_as_its_worst_condition() -> None:
+    found = conditions(
+        pd.concat(
+            [
+                points("a", [STABLE, STABLE, STABLE, LOST]),
+                points("b", [STABLE, STABLE, ENERGY, LOST], restitution=0.1),
+                points("c", [OVERLAP, STABLE, STABLE, STABLE]),
+            ]
+        )
+    )
+    rows = regimes(found)
+    assert list(rows) == ["settle"]
+    row = rows["settle"]
+    assert row.conditions == 3 and row.usable == 2
+    assert row.base_fraction == 0.4 and row.ordinary_fraction == 0.4
+    assert row.safe_fraction == 0.2 and row.limited_by == "b"
+    assert row.safe_critical == pytest.approx(0.4)  # the critical step is half the Rayleigh time
+    assert row.over_rule == pytest.approx(1.0)
+    assert row.recommended_fraction == pytest.approx(0.16)
+
+
+def test_a_regime_without_a_usable_condition_has_no_safe_step() -> None:
+    assert regimes(conditions(points("a", [OVERLAP, STABLE, STABLE]))) == {}
+    row = regimes(conditions(points("b", [STABLE, STABLE, LOST], restitution=0.1)))["settle"]
+    assert row.ordinary_fraction is None and row.base_fraction is None
+    assert row.safe_fraction == 0.2
