@@ -10,7 +10,7 @@ from dragchain.statistics.estimate import Estimate, student_quantile
 from dragdeck.cases.bed import full_stiffness_number
 from dragdeck.physics.damping import damping_ratio
 from dragdeck.project import Project
-from evidence.validation.runs_by_bed import over_packings
+from evidence.validation.runs import over_packings
 
 STATEMENTS = {
     "ahead_above_behind": "Forces ahead of the workpiece are far above those behind it",
