@@ -4,16 +4,16 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from dragchain.documents import Document, Part
 from dragchain.run.completeness import AcceptanceCheck, CheckCode, CheckReason
 from dragchain.statistics.estimate import Estimate, flattened
+from dragdeck.documents import Document, Part
 from evidence.stability.measures import (
     COLUMNS,
     MEASURES,
@@ -403,7 +403,7 @@ class StabilityFile(Document):
     regimes : mapping of str to SafeSteps
     """
 
-    made_by: ClassVar[str] = "snakemake stability"
+    remedy = "make it with: snakemake stability"
 
     commands: tuple[str, ...]
     engine_versions: tuple[str, ...]

@@ -9,7 +9,6 @@ from pydantic import JsonValue
 from scipy import signal, stats
 
 from dragchain.arrays import Floats
-from dragchain.documents import Part
 from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
 from dragchain.loading.contact_events import Thresholds
@@ -21,6 +20,7 @@ from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.statistics.estimate import Estimate, Real
 from dragchain.tables.by_step import read_table
+from dragdeck.documents import Part
 from evidence.validation.runs import MeasuredRun, RunsByBed, over_packings
 
 _COMPONENTS = ("drag_n", "lateral_n", "vertical_n")

@@ -10,17 +10,26 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dragchain.documents import Document
 from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import drag_peaks
-from dragchain.figures.marks import band, compass, compass_bars, depth_bars, row, row_names
-from dragchain.figures.panels import legend_below, new_figure, new_panels
+from dragchain.figures.panels import (
+    band,
+    compass,
+    compass_bars,
+    depth_bars,
+    legend_below,
+    new_figure,
+    new_panels,
+    row,
+    row_names,
+)
 from dragchain.figures.style import BLUE, COLOURS, GREY, RED
 from dragchain.report.campaign import write_report
 from dragchain.run.kinematics import drag_start_s
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import SCENE, draw_scalings, read_scalings
 from dragchain.statistics.estimate import Estimate, EstimateColumns
+from dragdeck.documents import Document
 from evidence.validation import peaks as chain_peaks
 from evidence.validation.force import (
     Compared,

@@ -13,7 +13,6 @@ import pandas as pd
 from scipy.stats import binned_statistic
 
 from dragchain.arrays import Floats
-from dragchain.documents import Part
 from dragchain.drag.around import AZIMUTH_BINS, DEPTH_BINS
 from dragchain.drag.azimuth import circumference, parts, to_the_left, within
 from dragchain.drag.force import read_counted
@@ -23,6 +22,7 @@ from dragchain.run.kinematics import needed
 from dragchain.run.paths.circle import Circle
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real, Verdict
 from dragchain.tables.by_step import read_groups, read_table
+from dragdeck.documents import Part
 from evidence.validation.runs import MeasuredRun, over_packings
 
 # --- the network in a corridor along the motion ------------------------------------------------

@@ -23,10 +23,9 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
-from dragchain.documents import Document
 from dragchain.figures.style import drawing, png
-from dragchain.report.bundle import write_bundle
-from dragchain.report.page import Filters, data_uri, render_page
+from dragchain.report.page import Filters, data_uri, render_page, write_bundle
+from dragdeck.documents import Document
 
 
 def write_report(
@@ -47,7 +46,7 @@ def write_report(
     Parameters
     ----------
     out_dir : Path
-        Gets the files of `dragchain.report.bundle.write_bundle`.
+        Gets the files of `dragchain.report.page.write_bundle`.
     template : str
         Of the page, see `dragchain.report.page.render_page`.
     draw : callable

@@ -14,10 +14,8 @@ from matplotlib.figure import Figure
 from dragchain.arrays import Floats
 from dragchain.drag.force import FORCES, read_counted, summarise_forces
 from dragchain.errors import TableError
-from dragchain.figures.marks import log_ticks
-from dragchain.figures.panels import legend_below, new_panels
+from dragchain.figures.panels import legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN, drawing, png
-from dragchain.files import write_bytes, write_text
 from dragchain.report.page import page_environment
 from dragchain.run.case import Case, load_case
 from dragchain.run.completeness import RunRecord
@@ -36,6 +34,7 @@ from dragchain.scaling.document import (
 from dragchain.statistics import power_law
 from dragchain.statistics.estimate import Estimate, flattened
 from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
+from dragdeck.files import write_bytes, write_text
 
 _STORED = Path(__file__).parent / "data"
 """The scalings that were measured for the documentation."""
