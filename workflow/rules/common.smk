@@ -2,6 +2,7 @@
 import json
 import os
 import re
+import signal
 import sys
 from functools import cache
 from pathlib import Path
@@ -236,10 +237,9 @@ def every_packing(file):
 
 def planned_runs(jobs):
     """The engine runs of jobs: what is expected of each, and how far it is."""
-    found = {}
+    found, places = {}, {f"run_{place}": place for place in PLACES}
     for job in jobs:
-        place = job.rule.name.removeprefix("run_")
-        if place in PLACES and place != job.rule.name:
+        if place := places.get(job.rule.name):
             folder = PROJECT.root / Path(job.output[0]).parent
             found.setdefault(place, {})[folder] = case_of(place, job.wildcards.run)
     runs = (expected_runs(PLACES[place], folders) for place, folders in found.items())

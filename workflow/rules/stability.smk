@@ -23,6 +23,8 @@ rule settle_beds:
         "results/stability/benchmarks/beds.tsv"
     conda:
         "../envs/python.yaml"
+    resources:
+        prints=1,
     params:
         source=source_hash("evidence.stability.runs"),
     shell:
@@ -45,6 +47,8 @@ rule run_regime:
         regime="impact|settle|column|drag",
     conda:
         "../envs/python.yaml"
+    resources:
+        prints=1,
     params:
         source=source_hash("evidence.stability.runs"),
     shell:
