@@ -7,7 +7,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from chain_runs import found_of
-from figure_files import save, workpiece_force_table, write_process_run
+from figure_files import workpiece_force_table, write_process_run
+from made_run import save
 from networks import R, make_frame, row
 from numpy import array
 
