@@ -2,12 +2,11 @@
 
 import re
 import signal
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
+from made_study import Made
 from markupsafe import Markup
 
 from dragdeck.cases.case import Case
@@ -24,7 +23,6 @@ from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.process import process_scene
-from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)
 
@@ -52,11 +50,8 @@ def test_plain_values_stay_as_they_are() -> None:
     assert number(1e-300) == "1e-300"
 
 
-def test_a_title_stays_in_its_comment(
-    project: Project, small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
-    small["title"] = 'R&D of "Müller" # $x &'
-    (case,) = load_cases(write_study(small))
+def test_a_title_stays_in_its_comment(project: Project, made: Made) -> None:
+    case = made({"title": 'R&D of "Müller" # $x &'})
     text = deck_text(process_scene(case, BED), environment(project.templates))
     assert text.splitlines()[0] == "# RD of Müller  x "
     assert comment("a\nb") == "ab"
