@@ -90,25 +90,6 @@ def test_strong_damping_has_its_own_safe_step(made: Made) -> None:
     assert safe_fraction(damped, FILLING)[0] < ordinary
 
 
-def test_explain_names_every_pair(
-    case: Case,
-    project: Project,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(project.root)
-    assert main(["explain", "small", "process", "--verbose"]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    for words in (
-        "particle on workpiece",
-        "particle on bowl",
-        "steps per contact",
-        "safe step",
-        "safety",
-    ):
-        assert words in said
-
-
 @pytest.mark.engine
 def test_check_says_what_the_step_means(
     case: Case,

@@ -15,7 +15,7 @@ from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.registry import SCENES
-from dragdeck.sweep.cases import load_cases, new_study, study_file
+from dragdeck.sweep.cases import load_cases, study_file
 
 
 @pytest.fixture
@@ -134,11 +134,6 @@ def test_the_fidelity_of_the_command_line_goes_first(
     assert PROCESS.run_id(case).startswith("draft-")
 
 
-def test_an_unknown_study_lists_the_known(project: Project, case: Case) -> None:
-    with pytest.raises(InputError, match="one of: small"):
-        study_file(project.studies, "large")
-
-
 def test_an_edited_mesh_names_another_run(
     project: Project, small: dict[str, Any], write_study: Callable[..., Path]
 ) -> None:
@@ -226,14 +221,6 @@ def test_an_assumption_about_no_field_is_refused(field: str, load: Load) -> None
 @pytest.mark.parametrize("field", ["media.count", "pairs", "motion.tilt_deg", "reference"])
 def test_an_assumption_may_be_about_a_field_or_a_block(field: str, load: Load) -> None:
     assert load({"assumptions": [{"field": field, "why": "any"}]})
-
-
-@pytest.mark.parametrize("name", [".", "..", "", "a/b"])
-def test_a_name_that_can_be_none_is_not_called_taken(
-    write_study: Any, small: Any, name: str
-) -> None:
-    with pytest.raises(InputError, match="this name cannot be used for a study"):
-        new_study(write_study(small).parent.parent, name, "small")
 
 
 def test_an_assumption_about_another_kind_of_path_is_left_out(made: Made) -> None:
