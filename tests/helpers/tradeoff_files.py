@@ -10,11 +10,11 @@ import pandas as pd
 from made_run import run_json, save, write_documents
 from report_files import case_json
 
-from dragchain.documents import SCHEMA
+from dragchain.tradeoff.compare import read_runs
+from dragchain.tradeoff.measure_run import FORCE_BINS
+from dragchain.tradeoff.measures import QUANTITIES
 from dragchain.tradeoff.outcome import Tradeoff, compare
-from dragchain.tradeoff.path_blocks import FORCE_BINS
-from dragchain.tradeoff.quantities import QUANTITIES
-from dragchain.tradeoff.runs import read_runs
+from dragdeck.documents import SCHEMA
 
 BLOCK_M = 0.0065
 VALUES = {

@@ -16,7 +16,7 @@ from selenium.webdriver import ActionChains, Keys
 from selenium.webdriver.support.ui import Select
 
 from dragchain.network_page.page import write_page
-from dragchain.report.notation import MINUS, TIMES
+from dragchain.report.page import MINUS, TIMES
 
 pytestmark = [
     pytest.mark.slow,

@@ -15,7 +15,6 @@ from made_run import Raw
 
 from dragchain.dumps.any_dump import read_dump
 from dragchain.dumps.careful_reader import read_print_file
-from dragchain.errors import DragchainError
 from dragchain.run.case import Output
 from dragdeck.errors import DragdeckError
 from dragdeck.mesh.checks import findings
@@ -170,7 +169,7 @@ def _compare(reader: Callable, oracle: Callable) -> None:  # type: ignore[type-a
         for frame in reader():
             columns = {name: values.tolist() for name, values in frame.columns.items()}
             found.append((frame.step, columns))
-    except DragchainError as error:
+    except DragdeckError as error:
         assert "a." in str(error), "the message does not name the file"
         whole = False
     wanted, wanted_whole = prefix(oracle())
@@ -196,7 +195,7 @@ def _try_print_file(folder: Path, content: bytes) -> None:
         for block in read_print_file(file, layout):
             steps += block["step"].tolist()
             values += block["force_n"].tolist()
-    except DragchainError as error:
+    except DragdeckError as error:
         assert "a.1.txt" in str(error), "the message does not name the file"
     lines = content.decode("latin-1").split("\n")
     rows = [line.split() for line in lines if line.split() != list(_PRINTED)]
