@@ -28,7 +28,7 @@ from dragdeck.scenes.process import PROCESS, ProcessDeck
 
 DOCS = ROOT / "docs"
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
-INSIDE = {"pass_verdict", "render_verification"}
+INSIDE = {"pass_verdict"}
 """Rules without outputs of their own that are no targets."""
 
 

@@ -13,7 +13,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 import pyvista as pv
-from analysed_run import analysed_tiny_run
+from finished_runs import analysed_tiny_run
 from tiny_run_files import (
     CHAIN_Z_M,
     LAST,
