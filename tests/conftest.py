@@ -105,6 +105,7 @@ def made(load: Load) -> Made:
 
 
 @pytest.fixture
-def case(made: Made) -> Case:
+def case(load: Load) -> Case:
     """The one case of the small study."""
-    return made()
+    (only,) = load()
+    return only
