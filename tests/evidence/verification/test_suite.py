@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from paths import ROOT
 from pydantic import ValidationError
 
-from dragdeck.cases.case import Case
+from dragdeck.cases.case import Case, digest
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
 from dragdeck.project import Project
@@ -47,8 +48,10 @@ def test_every_experiment_is_a_deck(experiments: dict[str, Experiment], project:
         assert experiment.steps - scene.deck.outputs[1].period_steps < last <= experiment.steps
 
 
-def test_the_suite_is_always_the_same(case: Case) -> None:
-    assert list(suite_of(case.study)) == list(suite_of(case.study))
+def test_the_runs_of_the_default_study_keep_their_names() -> None:
+    """The digest in a name depends on all that its run does."""
+    study = Project(ROOT).cases("uhlmann2015")[0].study
+    assert digest(list(suite_of(study))) == "b20bef91"
 
 
 def test_a_study_changes_its_own_series_and_no_other(case: Case) -> None:
