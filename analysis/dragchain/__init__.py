@@ -10,25 +10,24 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from dragchain import plot
-    from dragchain.dumps.any_dump import read_dump
-    from dragchain.dumps.frame import Frame
-    from dragchain.dumps.run_parts import iter_frames, iter_prints
     from dragchain.errors import (
         DocumentError,
         DragchainError,
-        DumpError,
         RecordError,
         RejectedRunError,
         SeriesError,
         TableError,
-        TruncatedDumpError,
         UnknownNameError,
     )
     from dragchain.results import FinishedRun, Study, load
     from dragchain.run.case import Case, Output, load_case, load_outputs
+    from dragchain.run.run_parts import iter_frames, iter_prints
     from dragchain.statistics.correlated import MeanEstimate, estimate_mean
     from dragchain.tables.convert import dump_to_parquet
     from dragchain.tables.write import write_tables
+    from dragdeck.dumps.frame import Frame
+    from dragdeck.dumps.reader import read_dump
+    from dragdeck.errors import DumpError, TruncatedDumpError
 
 __all__ = [
     "Case",
@@ -59,14 +58,15 @@ __all__ = [
 ]
 
 _MODULES = {
-    "dumps.any_dump": ("read_dump",),
-    "dumps.frame": ("Frame",),
-    "dumps.run_parts": ("iter_frames", "iter_prints"),
-    "results": ("FinishedRun", "Study", "load"),
-    "run.case": ("Case", "Output", "load_case", "load_outputs"),
-    "statistics.correlated": ("MeanEstimate", "estimate_mean"),
-    "tables.convert": ("dump_to_parquet",),
-    "tables.write": ("write_tables",),
+    "dragchain.results": ("FinishedRun", "Study", "load"),
+    "dragchain.run.case": ("Case", "Output", "load_case", "load_outputs"),
+    "dragchain.run.run_parts": ("iter_frames", "iter_prints"),
+    "dragchain.statistics.correlated": ("MeanEstimate", "estimate_mean"),
+    "dragchain.tables.convert": ("dump_to_parquet",),
+    "dragchain.tables.write": ("write_tables",),
+    "dragdeck.dumps.frame": ("Frame",),
+    "dragdeck.dumps.reader": ("read_dump",),
+    "dragdeck.errors": ("DumpError", "TruncatedDumpError"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
 
@@ -76,7 +76,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     if name == "plot":
         return import_module(f"{__name__}.plot")
-    return getattr(import_module(f"{__name__}.{_HOMES.get(name, 'errors')}"), name)
+    return getattr(import_module(_HOMES.get(name, "dragchain.errors")), name)
 
 
 def __dir__() -> list[str]:

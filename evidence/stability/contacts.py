@@ -7,8 +7,8 @@ from scipy.spatial import KDTree
 
 from dragchain.arrays import Floats, Ints
 from dragchain.contact_law.hertz import sphere_mass
-from dragchain.dumps.frame import Frame
 from dragdeck.decks.case_file import CaseOfStudy
+from dragdeck.dumps.frame import Frame
 from evidence.stability.critical_timestep import hertz_stiffness, largest_frequency
 
 PARTNERS = ("particle", "bowl", "workpiece")

@@ -8,7 +8,6 @@ from typing import Self
 import numpy as np
 
 from dragchain.contact_law.hertz import sphere_mass
-from dragchain.dumps.frame import Frame
 from dragchain.run.case import Case, friction_with
 from dragchain.run.kinematics import drag_phase, needed
 from dragchain.statistics.correlated import estimate_mean
@@ -18,6 +17,7 @@ from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WorkpieceFrames
 from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks.case_file import CaseOfStudy
+from dragdeck.dumps.frame import Frame
 from evidence.stability import contacts as network
 from evidence.stability.measured import Measured
 from evidence.stability.points import PointRun

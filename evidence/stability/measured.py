@@ -13,10 +13,10 @@ import numpy as np
 
 from dragchain.arrays import Floats
 from dragchain.contact_law.hertz import sphere_mass
-from dragchain.dumps.frame import Frame
 from dragchain.run.kinematics import needed
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 from dragdeck.decks.case_file import CaseOfStudy
+from dragdeck.dumps.frame import Frame
 from evidence.stability import contacts as network
 from evidence.stability.contacts import centres, in_id_order, network_frequency, radii
 from evidence.stability.points import PointRun

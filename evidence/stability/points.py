@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from dragchain.dumps.frame import Columns, Frame
-from dragchain.dumps.run_parts import iter_frames, iter_prints
 from dragchain.errors import TableError
 from dragchain.run.case import load_outputs
 from dragchain.run.completeness import RunRecord
+from dragchain.run.run_parts import iter_frames, iter_prints
 from dragdeck.decks import CASE_FILE
 from dragdeck.decks.case_file import CaseOfStudy
+from dragdeck.dumps.frame import Columns, Frame
 from evidence.stability.impact import ImpactCase, ImpactOfRun
 from evidence.stability.map import PointOfMap, PointsFile
 

@@ -12,9 +12,9 @@ from pydantic import PositiveFloat
 from dragchain.arrays import Floats
 from dragchain.calibration.measured_impacts import IMPACTS
 from dragchain.documents import Document, Part
-from dragchain.dumps.run_parts import iter_prints
 from dragchain.errors import TableError
 from dragchain.run.case import load_case, load_outputs
+from dragchain.run.run_parts import iter_prints
 from dragchain.tables.impacts import speed_at_plate
 
 Purpose = Literal["production", "reference", "confirm"]

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.dumps.run_parts import iter_prints
 from dragchain.figures import network_picture
 from dragchain.figures.marks import compass, compass_bars, row, row_names
 from dragchain.figures.network_overlay import force_bar, show_network
@@ -26,6 +25,7 @@ from dragchain.report.findings import (
 )
 from dragchain.report.run_data import RunData
 from dragchain.run.case import Case, load_case, load_outputs
+from dragchain.run.run_parts import iter_prints
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
 from dragchain.tables.corrections import Corrections, count_corrections
 from dragchain.tables.network_contacts import KINDS, contact_rows
 from dragchain.tables.workpiece_contacts import WallContacts
+from dragdeck.dumps.frame import Frame
 
 PARTICLES = (
     *("particle_id", "x_m", "y_m", "z_m", "radius_m"),

@@ -16,10 +16,9 @@ from hypothesis.errors import HypothesisException
 
 from attack.calls import run_function
 from attack.case import Attack, Got
-from dragchain.dumps.any_dump import read_dump
-from dragchain.dumps.careful_reader import read_print_file
 from dragchain.errors import DragchainError
 from dragchain.run.case import Output
+from dragdeck.dumps.reader import read_dump, read_prints
 from dragdeck.errors import DragdeckError
 from dragdeck.mesh.checks import findings
 from dragdeck.mesh.files import read
@@ -206,7 +205,7 @@ def _try_print_file(folder: Path, content: bytes) -> None:
     steps: list[float] = []
     values: list[float] = []
     try:
-        for block in read_print_file(file, layout):
+        for block in read_prints(file, layout):
             steps += block["step"].tolist()
             values += block["force_n"].tolist()
     except DragchainError as error:
