@@ -36,7 +36,8 @@ CUSTOM = written("custom", "particles", ["a_id", "force_n"], None)
 
 def text_frame(step: int, rows: list[str]) -> str:
     box = "ITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
-    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ENTRIES\n{len(rows)}\n{box}ITEM: ENTRIES a_id force_n \n"
+    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ENTRIES\n{len(rows)}\n{box}"
+    head += "ITEM: ENTRIES a_id force_n \n"
     return head + "".join(row + "\n" for row in rows)
 
 
