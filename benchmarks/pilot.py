@@ -33,7 +33,7 @@ from dragdeck.engine.decomposition import decomposition
 from dragdeck.engine.process import Ending, command, execute, find_engine
 from dragdeck.engine.record import ParticlesPerRank, RunRecord
 from dragdeck.engine.run_folder import run
-from dragdeck.files import replace_text
+from dragdeck.files import write_text
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project, find_project, study_templates
 from dragdeck.scenes.filling import FILLING
@@ -132,7 +132,7 @@ def kept(name: str, folder: Path) -> Command:
 def write(file: Path, content: object) -> None:
     """Write a JSON file."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    replace_text(file, json.dumps(content, indent=1) + "\n")
+    write_text(file, json.dumps(content, indent=1) + "\n")
 
 
 def bed_of(filling: Path) -> Bed:

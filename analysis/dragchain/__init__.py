@@ -11,10 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from dragchain import plot
     from dragchain.errors import (
-        DocumentError,
-        DragchainError,
         RecordError,
-        RejectedRunError,
         SeriesError,
         TableError,
         UnknownNameError,
@@ -27,12 +24,18 @@ if TYPE_CHECKING:
     from dragchain.tables.write import write_tables
     from dragdeck.dumps.frame import Frame
     from dragdeck.dumps.reader import read_dump
-    from dragdeck.errors import DumpError, TruncatedDumpError
+    from dragdeck.errors import (
+        DocumentError,
+        DragdeckError,
+        DumpError,
+        RejectedRunError,
+        TruncatedDumpError,
+    )
 
 __all__ = [
     "Case",
     "DocumentError",
-    "DragchainError",
+    "DragdeckError",
     "DumpError",
     "FinishedRun",
     "Frame",
@@ -66,7 +69,10 @@ _MODULES = {
     "dragchain.tables.write": ("write_tables",),
     "dragdeck.dumps.frame": ("Frame",),
     "dragdeck.dumps.reader": ("read_dump",),
-    "dragdeck.errors": ("DumpError", "TruncatedDumpError"),
+    "dragdeck.errors": (
+        *("DocumentError", "DragdeckError", "DumpError", "RejectedRunError"),
+        "TruncatedDumpError",
+    ),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
 

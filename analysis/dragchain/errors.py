@@ -2,47 +2,11 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
-from pathlib import Path
 
-from dragdeck.errors import DragdeckError
-
-DragchainError = DragdeckError
-"""Base of every error that is raised on purpose."""
+from dragdeck.errors import DragdeckError, rendered
 
 
-def _joined(lines: list[str], remedy: str | None) -> str:
-    if remedy is not None:
-        lines.append(f"remedy: {remedy}")
-    return "\n  ".join(lines)
-
-
-class DocumentError(DragchainError):
-    """A ``case.json`` or ``columns.json`` that cannot be used.
-
-    Parameters
-    ----------
-    file : Path
-        The file.
-    field : str or None
-        Dotted name of the offending key, None for the file as a whole.
-    problem : str
-        What is wrong, without a full stop.
-    remedy : str, optional
-        What the user can do.
-    """
-
-    def __init__(
-        self, file: Path, field: str | None, problem: str, *, remedy: str | None = None
-    ) -> None:
-        self.file = file
-        self.field = field
-        self.problem = problem
-        self.remedy = remedy
-        where = f"{file}: {field}" if field is not None else f"{file}"
-        super().__init__(_joined([f"{where}: {problem}"], remedy))
-
-
-class TableError(DragchainError):
+class TableError(DragdeckError):
     """Raw outputs or tables that are missing, damaged or inconsistent with each other."""
 
 
@@ -50,7 +14,7 @@ _MOST = 30
 """More known names are listed only if none of them resembles the wrong one."""
 
 
-class UnknownNameError(DragchainError):
+class UnknownNameError(DragdeckError):
     """An unknown name of a study, run, table or column.
 
     Parameters
@@ -69,28 +33,25 @@ class UnknownNameError(DragchainError):
         self, problem: str, name: str, known: Iterable[str], *, remedy: str | None = None
     ) -> None:
         self.known = tuple(known)
-        near = [f"did you mean {one!r}?" for one in get_close_matches(name, self.known, 1)]
-        every = [] if near and len(self.known) > _MOST else [f"known: {', '.join(self.known)}"]
-        super().__init__(_joined([problem, *near, *every], remedy))
+        near = get_close_matches(name, self.known, 1)
+        every = None if near and len(self.known) > _MOST else ", ".join(self.known)
+        asked = f"{problem}: did you mean {near[0]!r}?" if near else problem
+        super().__init__(rendered(asked, known=every, remedy=remedy))
 
 
-class ExportError(DragchainError):
+class ExportError(DragdeckError):
     """An export that cannot be made, or not in this place."""
 
 
-class SeriesError(DragchainError):
+class SeriesError(DragdeckError):
     """A series of samples without usable statistics."""
 
 
-class RejectedRunError(DragchainError):
-    """A run that did not pass the acceptance checks, or is not complete."""
-
-
-class MissingRunsError(DragchainError):
+class MissingRunsError(DragdeckError):
     """Runs of a study that have no result; the report shows the others."""
 
 
-class RecordError(DragchainError):
+class RecordError(DragdeckError):
     """A measured record that cannot be used.
 
     Parameters
@@ -117,7 +78,5 @@ class RecordError(DragchainError):
         self.value = value
         self.limit = limit
         self.remedy = remedy
-        lines = [f"the record cannot be used ({reason}): {problem}"]
-        lines += [f"value:  {value}"] if value is not None else []
-        lines += [f"limit:  {limit}"] if limit is not None else []
-        super().__init__(_joined(lines, remedy))
+        said = f"the record cannot be used ({reason}): {problem}"
+        super().__init__(rendered(said, value=value, limit=limit, remedy=remedy))

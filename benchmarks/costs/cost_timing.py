@@ -43,7 +43,7 @@ from dragdeck.engine.process import Engine, command, execute, find_engine
 from dragdeck.engine.reports import Report
 from dragdeck.engine.run_folder import fingerprint
 from dragdeck.errors import EngineError, InputError
-from dragdeck.files import replace_text
+from dragdeck.files import write_text
 from dragdeck.project import study_templates
 from dragdeck.scenes.process import process_scene
 
@@ -249,7 +249,7 @@ class _Bench:
         for old in place.iterdir():
             old.unlink()
         write_run(deck.whole, place, templates)
-        replace_text(place / _START_FILE, deck_text(deck.start, templates))
+        write_text(place / _START_FILE, deck_text(deck.start, templates))
         return fingerprint(place, RunInputs.read(place / CASE_FILE))
 
     def rounds(self, count: int) -> list[TimedVariant]:

@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 from tables import LABELS, ROOT, Store, derived
 
-from dragchain.report.notation import MINUS
+from dragchain.report.page import MINUS
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import said
 from dragchain.statistics.estimate import NORMAL_QUANTILE, student_quantile
 from dragchain.statistics.power_law import Runs, fit_power_law
-from dragchain.tradeoff.notation import in_percent
+from dragchain.tradeoff.report import in_percent
 from dragdeck.project import Project
 
 FOLD = 2

@@ -15,10 +15,10 @@ from pybtex.database import parse_file
 from pybtex.plugin import find_plugin
 from study_fields import fidelities, fields, plausible_ranges
 
-from dragchain import cli as dragchain_cli
-from dragchain.tables.meanings import _UNITS as UNITS
-from dragchain.tables.meanings import _rows, columns_of, descriptions, unit_end
-from dragdeck import cli as dragdeck_cli
+from dragchain.cli import PROGRAM as DRAGCHAIN
+from dragchain.tables.columns import _UNITS as UNITS
+from dragchain.tables.columns import _rows, columns_of, descriptions, unit_end
+from dragdeck.cli import PROGRAM as DRAGDECK
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -179,8 +179,8 @@ TEXTS: dict[str, Callable[[], str]] = {
     "study_fields": fields,
     "built_in_fidelities": fidelities,
     "plausible_ranges": plausible_ranges,
-    "dragdeck_commands": lambda: commands(dragdeck_cli._parser()),
-    "dragchain_commands": lambda: commands(dragchain_cli._parser()),
+    "dragdeck_commands": lambda: commands(DRAGDECK.parser()),
+    "dragchain_commands": lambda: commands(DRAGCHAIN.parser()),
     "columns": all_columns,
     "contracts": contracts,
     "bibliography": bibliography,

@@ -15,7 +15,7 @@ from typing import Any
 
 import pandas as pd
 
-from dragchain.tradeoff.quantities import QUANTITIES
+from dragchain.tradeoff.measures import QUANTITIES
 from dragdeck.project import Project
 
 ROOT = Path(__file__).resolve().parents[2]

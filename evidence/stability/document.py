@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from pydantic import BeforeValidator
 
-from dragchain.documents import Document, Part
+from dragdeck.documents import Document, Part
 
 
 def _to_digits(digits: int) -> BeforeValidator:
@@ -116,7 +116,7 @@ class StabilityFile(Document):
     regimes : mapping of str to SafeSteps
     """
 
-    made_by: ClassVar[str] = "snakemake stability"
+    remedy = "make it with: snakemake stability"
 
     commands: tuple[str, ...]
     engine_versions: tuple[str, ...]

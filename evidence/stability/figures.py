@@ -9,8 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.figures.marks import key, log_ticks, row_names
-from dragchain.figures.panels import head, legend_below, new_panels
+from dragchain.figures.panels import head, key, legend_below, log_ticks, new_panels, row_names
 from dragchain.figures.style import BLUE, GREEN, GREY, INK, ORANGE, RED
 from evidence.stability.classes import (
     CLASSES,

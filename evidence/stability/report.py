@@ -8,8 +8,7 @@ from pathlib import Path
 import pandas as pd
 
 from dragchain.figures.style import drawing, png
-from dragchain.report.bundle import write_bundle
-from dragchain.report.page import data_uri, render_page
+from dragchain.report.page import data_uri, render_page, write_bundle
 from evidence.stability import safe_steps
 from evidence.stability.classes import CLASSES, ENERGY_LIMITS, OVERLAP_LIMIT, REFUSED, TOLERANCE
 from evidence.stability.document import Criteria, StabilityFile

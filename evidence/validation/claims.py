@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from dragchain.documents import Part
 from dragchain.statistics.estimate import Estimate, Verdict
+from dragdeck.documents import Part
 from evidence.validation.around_workpiece import Statements
 
 

@@ -15,7 +15,7 @@ from paths import ROOT
 from pybtex.database import parse_file
 
 import dragchain
-from dragchain.report.notation import MINUS
+from dragchain.report.page import MINUS
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import read_scalings, said
 from dragdeck.cases.case import Case

@@ -8,8 +8,6 @@ from typing import Any
 
 from pages import Page
 
-from dragchain.report.extrapolated import FILE as EXTRAPOLATED
-from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity, Need, Reached
 from dragchain.report.findings import (
     FILE,
     AheadBehind,
@@ -25,6 +23,7 @@ from dragchain.report.findings import (
     Peaks,
     ProcessFindings,
 )
+from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity, Need, Reached
 from dragchain.run.basis import QUANTITIES
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, EstimateColumns

@@ -9,7 +9,7 @@ from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
 from dragdeck.errors import InputError, choices
 from dragdeck.outlook.measured import Tradeoff
-from dragdeck.outlook.stable_step import check_timestep
+from dragdeck.outlook.timestep import check_timestep
 from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, with_leads
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.registry import SCENES

@@ -3,11 +3,10 @@
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, JsonValue, PositiveFloat, PositiveInt, model_validator
 
-from dragchain.documents import Document, Part
 from dragchain.errors import TableError
 from dragchain.run.paths.circle import Circle
 from dragchain.run.paths.line import Line
@@ -15,6 +14,7 @@ from dragchain.run.paths.rest import Rest
 from dragchain.run.paths.waypoints import Waypoints
 from dragchain.run.superposed.oscillation import Oscillation
 from dragchain.run.superposed.spin import Spin
+from dragdeck.documents import Document, Part
 
 Scene = Literal["drop_test", "filling", "process"]
 OutputKind = Literal["print", "custom", "local"]
@@ -150,7 +150,7 @@ class Case(Document):
     are models of the contact law that add a normal force, such as cohesion.
     """
 
-    made_by: ClassVar[str] = "dragdeck step render"
+    remedy = "make it with: dragdeck step render"
 
     study: str
     title: str | None = None
@@ -298,7 +298,7 @@ class Output(Part):
 class Columns(Document):
     """The content of ``columns.json``."""
 
-    made_by: ClassVar[str] = "dragdeck step render"
+    remedy = "make it with: dragdeck step render"
 
     outputs: Mapping[str, Output]
 

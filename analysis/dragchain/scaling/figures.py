@@ -8,8 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.figures.marks import log_ticks
-from dragchain.figures.panels import legend_below, new_panels
+from dragchain.figures.panels import legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN
 from dragchain.scaling.document import CurvePoint, ScaledRun, ScalingFile
 

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from dragchain.figures.style import drawing, png
-from dragchain.files import write_bytes, write_text
 from dragchain.report.page import page_environment
 from dragchain.run.completeness import RunRecord
 from dragchain.scaling import document
@@ -19,6 +18,7 @@ from dragchain.scaling.runs import Run, read_runs
 from dragchain.statistics import power_law
 from dragchain.statistics.estimate import Estimate, flattened
 from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
+from dragdeck.files import write_bytes, write_text
 
 _STORED = Path(__file__).parent / "data"
 """The scalings that were measured for the documentation."""

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from dragchain.arrays import Floats, Ints, wrap_angle
-from dragchain.errors import RejectedRunError, TableError
+from dragchain.errors import TableError
 from dragchain.run.case import Case, Scene, friction_with
 from dragchain.run.kinematics import (
     counted_mask,
@@ -36,13 +36,19 @@ from dragchain.tables.columns import (
     WORKPIECE_CONTACTS,
     WORKPIECE_FORCE,
 )
-from dragchain.tables.corrections import Corrections, count_corrections
 from dragchain.tables.impacts import find_impacts
-from dragchain.tables.network_contacts import KINDS, ContactRows, contact_rows
+from dragchain.tables.network_contacts import (
+    KINDS,
+    ContactRows,
+    Corrections,
+    contact_rows,
+    count_corrections,
+)
 from dragchain.tables.parquet import Rows, category, table_writer
 from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WallContacts
 from dragdeck.dumps.frame import Columns
+from dragdeck.errors import RejectedRunError
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import matplotlib
 
-from dragchain.errors import DragchainError
 from dragchain.figures.style import drawing, true_minus
+from dragdeck.errors import DragdeckError
 from figures.pictures import PICTURES, picture, run_of_study
 
 IMAGES = Path(__file__).resolve().parents[2] / "images"
@@ -52,5 +52,5 @@ def draw_all() -> None:
     for name in PICTURES:
         try:
             (IMAGES / f"{name}.png").write_bytes(picture(name, run_of_study()))
-        except DragchainError as error:
+        except DragdeckError as error:
             print(f"{name}.png was not drawn: {error}")

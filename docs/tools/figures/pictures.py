@@ -12,7 +12,6 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 from tables import ROOT
 
-from dragchain.errors import DragchainError
 from dragchain.export.frames import Selection
 from dragchain.export.write import write_export
 from dragchain.figures.rendering import Camera, new_plotter, photograph
@@ -22,6 +21,7 @@ from dragchain.report.run_data import RunData
 from dragchain.report.run_figures import network_xz
 from dragchain.run.case import load_case
 from dragchain.run.kinematics import needed
+from dragdeck.errors import DragdeckError
 
 STUDY = "half_minute"
 """Its results are needed: ``./run all --config study=half_minute``."""
@@ -97,7 +97,7 @@ def _paraview(run: Path) -> bytes:
 def _program(name: str) -> str:
     path = shutil.which(name)
     if path is None:
-        raise DragchainError(f"{name} is not installed")
+        raise DragdeckError(f"{name} is not installed")
     return path
 
 
@@ -128,10 +128,10 @@ def run_of_study() -> Path:
 
     Raises
     ------
-    DragchainError
+    DragdeckError
         If it has not been run.
     """
     for file in sorted((ROOT / "results" / STUDY / "process").glob("*/run.json")):
         if json.loads(file.read_text())["state"] == "complete":
             return file.parent
-    raise DragchainError(f"{STUDY} has no results: ./run all --config study={STUDY}")
+    raise DragdeckError(f"{STUDY} has no results: ./run all --config study={STUDY}")

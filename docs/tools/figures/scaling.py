@@ -4,7 +4,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from tables import STORE
 
-from dragchain.figures.marks import log_ticks
+from dragchain.figures.panels import log_ticks
 from dragchain.figures.style import COLOURS, GREY, LIGHT
 
 LABELS = {

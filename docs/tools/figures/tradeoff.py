@@ -5,7 +5,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from tables import table
 
-from dragchain.figures.marks import log_ticks
+from dragchain.figures.panels import log_ticks
 from dragchain.figures.style import GREY, INK, LIGHT, MARKERS
 
 TOLERANCE = 0.1

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dragchain import TableError, load_case
-from dragchain.errors import DocumentError
 from dragchain.run.case import Case, Phase, Statistics
 from dragchain.run.kinematics import (
     counted_mask,
@@ -27,6 +26,7 @@ from dragchain.run.paths.waypoints import Waypoints, WaypointStage
 from dragchain.run.superposed.oscillation import Oscillation
 from dragchain.run.superposed.spin import Spin, SpinStage
 from dragchain.run.workpiece import turned
+from dragdeck.errors import DocumentError
 
 PHASES = (
     Phase(name="plunge", start_step=0, end_step=10),

@@ -11,13 +11,14 @@ import pytest
 from tiny_run_files import DENSITY_KG_M3, GRAVITY_M_S2, RADIUS_M, WORKPIECE_RADIUS_M, case_json
 
 from dragchain.cli import main
-from dragchain.errors import DocumentError, TableError
+from dragchain.errors import TableError
 from dragchain.scaling.document import Expectation, ScalingFile
 from dragchain.scaling.figures import draw_scalings
 from dragchain.scaling.fit import find, read_scalings, said, table, write_scaling
 from dragchain.scaling.runs import read_runs
 from dragchain.statistics.estimate import Estimate
 from dragchain.statistics.power_law import Runs, fit_power_law
+from dragdeck.errors import DocumentError
 
 DEPTH = "motion.immersion_depth_m"
 LEVELS = (0.01, 0.02, 0.04)
@@ -152,7 +153,9 @@ def test_a_document_without_a_number_is_refused(quadratic: list[Path], tmp_path:
     content = json.loads(file.read_text())
     del content["levels"][1]["drag_n"]["ci95_low"]
     file.write_text(json.dumps(content))
-    with pytest.raises(DocumentError, match=r"levels\[1\]\.drag_n\.ci95_low: is missing"):
+    with pytest.raises(
+        DocumentError, match=r"levels\[1\]\.drag_n\.ci95_low: a required key is missing"
+    ):
         ScalingFile.read(file)
 
 

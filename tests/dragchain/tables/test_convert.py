@@ -30,7 +30,7 @@ def test_a_table_of_the_frames_before_damage(tmp_path: Path) -> None:
     _, damaged, _ = SPOILT["a word"]
     (tmp_path / "a.dump").write_bytes(text([0, 7]) + damaged)
     table = tmp_path / "a.parquet"
-    with pytest.raises(DumpError, match=f"row 0.*\n.*\n  kept: 2 frames, which are in {table}"):
+    with pytest.raises(DumpError, match=f"row 0.*\n.*\n  kept:   2 frames, which are in {table}"):
         dump_to_parquet(tmp_path / "a.dump", table)
     assert pq.read_table(table)["step"].to_pylist() == [0, 0, 0]
 

@@ -149,7 +149,7 @@ def test_what_is_spoilt_is_named_and_what_came_before_kept(
     assert isinstance(caught.value, TruncatedDumpError) == ("the file ends" in str(caught.value))
     assert (caught.value.file, caught.value.frame, caught.value.offset) == (file, 2, len(before))
     assert f"{file}, frame 2, byte {len(before)}: " in str(caught.value)
-    assert "kept: the 2 frames before it" in str(caught.value)
+    assert "kept:   the 2 frames before it" in str(caught.value)
 
 
 SHORT = "ended before the end|Truncated compressed"

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
-from dragdeck.outlook.bed import notes
+from dragdeck.outlook.process import bed_notes
 from dragdeck.project import Project
 from dragdeck.scenes.filling import expected_surface, filling_scene, first_particles
 from dragdeck.scenes.process import process_scene
@@ -55,7 +55,7 @@ def test_the_decks_are_written_without_a_warning(pilot: Case) -> None:
     assert f"\n{COUNT} atoms\n" in filling.files["particles.data"]()
     assert "processors * * 1" in deck_text(filling, templates)
     assert "fix move_drag" in deck_text(process, templates)
-    assert "within" in dict(notes(pilot))["overlap"]
+    assert "within" in dict(bed_notes(pilot))["overlap"]
 
 
 def test_what_is_assumed_is_marked(pilot: Case) -> None:

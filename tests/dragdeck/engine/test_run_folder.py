@@ -260,7 +260,7 @@ def test_a_truncated_output_fails_its_check(filling: Path) -> None:
             "packing.restart",
         ),
     )
-    damage = r"frame \d+, byte \d+: the file ends within"
+    damage = r"frame \d+, byte \d+: the file ends after \d+ bytes, inside"
     with pytest.raises(EngineError, match=rf"(?s)particles\.1\.bin, {damage}.*disk has space"):
         run(filling, silent)
     assert not (filling / "run.json").exists()

@@ -11,13 +11,13 @@ import pytest
 from changed import changed
 from scipy import stats
 
-from dragchain.errors import DocumentError, SeriesError
-from dragchain.report.notation import MINUS
-from dragchain.report.page import page_environment
+from dragchain.errors import SeriesError
+from dragchain.report.page import MINUS, page_environment
 from dragchain.run.case import PublishedDrag, Reference, load_case
 from dragchain.scaling.fit import read_scalings
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import Measures, RunCost
+from dragdeck.errors import DocumentError
 from evidence.validation import force
 from evidence.validation.around_workpiece import contacts_of
 from evidence.validation.claims import verdict

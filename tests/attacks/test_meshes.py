@@ -1,18 +1,19 @@
 """Hostile meshes of a workpiece."""
 
 import re
-from collections.abc import Iterator
-from functools import partial
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 import trimesh
+from attack.calls import main_of, refused
+from attack.checked import ACCEPTED, REFUSED, WARNED, checked
+from attack.ground import STUDY, new_project, tiny_study, write_study
 from paths import ROOT
 
-from attack.calls import REFUSED
-from attack.case import Attack, Got
-from attack.ground import STUDY, new_project, tiny_study, write_study
-from attack.studies import WARNED, checked
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
+Mesh = tuple[str, Callable[[], bytes], tuple[str, ...]]
 
 
 def _rod(sections: int = 12) -> trimesh.Trimesh:
@@ -92,7 +93,7 @@ def _face_of(entity: bytes) -> bytes:
 
 
 _FILE = r"hostile\.\w+"
-_HOSTILE = {
+_HOSTILE: dict[str, Mesh] = {
     "inverted normals": ("stl", lambda: _stl(_inverted()), (_FILE, "normal|inward|inside")),
     "one facet turned round": ("stl", lambda: _stl(_one_turned()), (_FILE,)),
     "two bodies": ("stl", lambda: _joined(_rod(), _moved((12, 0, 0))), (_FILE, "bod|parts")),
@@ -179,19 +180,27 @@ def _smaller() -> trimesh.Trimesh:
     return rod
 
 
-_HARMLESS = ("a material from /etc/passwd",)
+_HARMLESS = _HOSTILE["a material from /etc/passwd"]
 
 
-def mesh_attacks(seed: int) -> Iterator[Attack]:
-    """Every hostile mesh; the seed changes nothing."""
-    for what, (suffix, content, named) in _HOSTILE.items():
-        act = partial(_mesh, suffix, content, named)
-        wanted = (REFUSED, WARNED, "accepted") if what in _HARMLESS else (REFUSED, WARNED)
-        yield Attack("mesh", what, act, wanted, 1.5)
-    yield Attack("mesh", "1,000,000 facets in 10 s", _million, ("answered in time",), 20.0)
+@pytest.mark.attack(rows=_HOSTILE, sample=2)
+def test_a_hostile_mesh_is_refused(attack: Mesh, tmp_path: Path) -> None:
+    suffix, content, named = attack
+    project = _project(suffix, content(), tmp_path)
+    wanted = (REFUSED, WARNED, *([ACCEPTED] if attack is _HARMLESS else []))
+    assert checked(project, named) in wanted
 
 
-def _place(suffix: str, content: bytes, folder: Path) -> Path:
+_FINE = {"1,000,000 facets in 10 s": 1_000_000}
+
+
+@pytest.mark.attack(rows=_FINE, sample=0)
+def test_a_fine_mesh_is_answered_in_10_s_of_processor_time(attack: int, tmp_path: Path) -> None:
+    project = _project("stl", _fine(attack), tmp_path)
+    refused(main_of("dragdeck", ["check", STUDY], project, 10.0))  # or accepted: it answers
+
+
+def _project(suffix: str, content: bytes, folder: Path) -> Path:
     project = new_project(folder / "project")
     data = tiny_study()
     name = f"hostile.{suffix}" if suffix else "hostile"
@@ -200,15 +209,3 @@ def _place(suffix: str, content: bytes, folder: Path) -> Path:
     write_study(project, data)
     (project / "studies" / STUDY / name).write_bytes(content)
     return project
-
-
-def _mesh(suffix: str, content, named: tuple[str, ...], folder: Path, whole: bool) -> Got:  # type: ignore[no-untyped-def]
-    return checked(_place(suffix, content(), folder), named)
-
-
-def _million(folder: Path, whole: bool) -> Got:
-    """Whether it is answered in 10 s of processor time, whatever the answer."""
-    project = _place("stl", _fine(1_000_000), folder)
-    got = checked(project, (), patience_s=10.0)
-    late = got.outcome.startswith(("no answer", "traceback", "died"))
-    return got if late else Got("answered in time", got.seen)

@@ -1,10 +1,17 @@
-"""What to expect of the workpiece in its bowl before anything is run: clearances, speed, ratios."""
+"""What to expect of a process before it is run: its bed, its workpiece, its modulus."""
 
 import math
 
 from dragdeck.cases.case import Case, of_each_workpiece
+from dragdeck.cases.ranks import cores_here
 from dragdeck.scenes.dimensionless import describe
-from dragdeck.scenes.filling import expected_bed, expected_surface
+from dragdeck.scenes.filling import (
+    MOST_OVERLAP,
+    expected_bed,
+    expected_surface,
+    floor_overlap,
+    rank_split,
+)
 from dragdeck.scenes.fit import clearances, closest
 from dragdeck.scenes.workpiece import fastest_surface
 from dragdeck.study.contact_law import compared_labels
@@ -19,7 +26,7 @@ _RATIOS = {
 }
 
 
-def notes(case: Case) -> list[tuple[str, str]]:
+def workpiece_notes(case: Case) -> list[tuple[str, str]]:
     """What ``check``, ``explain`` and ``preview`` say of a process: a heading and a text each."""
     surface = expected_surface(case.study)
     gaps = clearances(case, surface)
@@ -66,3 +73,44 @@ def _speed(case: Case) -> str:
     speed, factor = fastest_surface(case), case.study.chosen_fidelity().speed_factor
     faster = "" if factor == 1 else f", {factor * speed:.3g} m/s in the run (speed_factor)"
     return f"{speed:.3g} m/s{faster}"
+
+
+def bed_notes(case: Case) -> list[tuple[str, str]]:
+    """What ``check`` and ``explain`` say of a fill and a process: a heading and a text each."""
+    return [("overlap", _overlap(case)), ("ranks", _ranks(case))]
+
+
+def _overlap(case: Case) -> str:
+    overlap = floor_overlap(case.study)
+    verdict = "within" if overlap <= MOST_OVERLAP else "ABOVE"
+    return (
+        f"{100 * overlap:.2g} % of a diameter between particles at the floor, by the weight above: "
+        f"{verdict} {100 * MOST_OVERLAP:g} % (an assumption)"
+    )
+
+
+def _ranks(case: Case) -> str:
+    parts = rank_split(case)
+    if case.study.chosen_fidelity().ranks != "auto":
+        return f"{case.ranks}, {parts}"
+    cases = f"{case.beside} case{'s' if case.beside > 1 else ''}"
+    return f"{case.ranks} (auto: {cases} on {cores_here()} cores), {parts}"
+
+
+def not_corrected(case: Case) -> str:
+    """What the results of a process with a reduced modulus lack; empty if nothing."""
+    chosen = case.study.chosen_fidelity()
+    if chosen.youngs_modulus_scale == 1 or chosen.windows is not None:
+        return ""
+    return (
+        f"E x {chosen.youngs_modulus_scale:g} gives more and smaller contact forces than the "
+        "physical modulus, by amounts that differ from scene to scene, and the report does not "
+        "correct them: fidelity: {tolerance: 0.1} measures them in this scene"
+    )
+
+
+def modulus_note(case: Case) -> tuple[str, str]:
+    """What ``check`` and ``explain`` say of a process: a heading and a text."""
+    windows = case.study.chosen_fidelity().windows
+    measured = "windows at the physical modulus correct the results" if windows else "physical"
+    return "Young's modulus", not_corrected(case) or measured

@@ -1,13 +1,12 @@
 """Hostile templates: a template is data, not a program."""
 
-from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 
-from attack.calls import REFUSED
-from attack.case import Attack, Got
+import pytest
+from attack.checked import REFUSED, WARNED, checked
 from attack.ground import STUDY, new_project, tiny_study, write_study
-from attack.studies import WARNED, checked
+
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
 _BASE = '{% extends "base/process.in.j2" %}\n'
 
@@ -64,97 +63,86 @@ _EXPRESSIONS = {
 
 _NAMED = {"it includes a study": r"study\.yaml", "it includes the password file": "passwd"}
 
-_FILES: dict[str, tuple[str, str | bytes, tuple[str, ...]]] = {
+_FILES: dict[str, tuple[str, str | bytes, str]] = {
     "it extends itself": (
         "process.in.j2",
         '{% extends "process.in.j2" %}',
-        (r"process\.in\.j2",),
+        r"process\.in\.j2",
     ),
     "two extend each other": (
         "process.in.j2",
         '{% extends "filling.in.j2" %}',
-        (r"(process|filling)\.in\.j2",),
+        r"(process|filling)\.in\.j2",
     ),
     "a misspelt block": (
         "process.in.j2",
         _BASE + "{% block extras %}\nprint 1\n{% endblock %}\n",
-        ("extras",),
+        "extras",
     ),
     "a block twice": (
         "process.in.j2",
         _BASE + "{% block extra %}{% endblock %}{% block extra %}{% endblock %}",
-        ("extra",),
+        "extra",
     ),
     "a macro in place of another": (
         "walls.j2",
         '{% extends "base/walls.j2" %}{% macro bowl(script) %}{% endmacro %}',
-        ("walls.j2.*bowl",),
+        "walls.j2.*bowl",
     ),
-    "text outside of the blocks": ("process.in.j2", _BASE + "run 1\n", ("outside of the blocks",)),
+    "text outside of the blocks": ("process.in.j2", _BASE + "run 1\n", "outside of the blocks"),
     "a block that no script contains": (
         "base.in.j2",
         '{% extends "base/base.in.j2" %}{% block run %}{% endblock %}',
-        ("changes no input script",),
+        "changes no input script",
     ),
     "no outputs": (
         "process.in.j2",
         _BASE + "{% block outputs %}{% endblock %}",
-        ("would not write the output files",),
+        "would not write the output files",
     ),
     "an endless loop": (
         "process.in.j2",
         _in_extra("label again\njump SELF again"),
-        ("run for ever",),
+        "run for ever",
     ),
-    "a file of no scene": ("proces.in.j2", _BASE, (r"proces\.in\.j2",)),
-    "a file in capitals": ("Process.in.j2", _BASE, (r"Process\.in\.j2",)),
-    "an empty one": ("process.in.j2", "", (r"process\.in\.j2|DRAGDECK END",)),
-    "one without its end": ("process.in.j2", "run 1\n", (r"process\.in\.j2|DRAGDECK END",)),
-    "random bytes": ("process.in.j2", bytes(range(256)) * 9, (r"process\.in\.j2",)),
-    "UTF-16": ("process.in.j2", _BASE.encode("utf-16"), (r"process\.in\.j2",)),
-    "a NUL": ("process.in.j2", _in_extra("a\x00b"), (r"process\.in\.j2",)),
+    "a file of no scene": ("proces.in.j2", _BASE, r"proces\.in\.j2"),
+    "a file in capitals": ("Process.in.j2", _BASE, r"Process\.in\.j2"),
+    "an empty one": ("process.in.j2", "", r"process\.in\.j2|DRAGDECK END"),
+    "one without its end": ("process.in.j2", "run 1\n", r"process\.in\.j2|DRAGDECK END"),
+    "random bytes": ("process.in.j2", bytes(range(256)) * 9, r"process\.in\.j2"),
+    "UTF-16": ("process.in.j2", _BASE.encode("utf-16"), r"process\.in\.j2"),
+    "a NUL": ("process.in.j2", _in_extra("a\x00b"), r"process\.in\.j2"),
 }
 
 
-def template_attacks(seed: int) -> Iterator[Attack]:
-    """Every hostile template; the seed changes nothing."""
-    for what, text in _EXPRESSIONS.items():
-        named = _NAMED.get(what, r"\.j2")
-        act = partial(_template, "process.in.j2", _in_extra(text), (named,))
-        yield Attack("template", what, act, (REFUSED,), 1.5)
-    for what, (name, content, named) in _FILES.items():
-        act = partial(_template, name, content, named)
-        unused = what.startswith("a file")
-        yield Attack("template", what, act, (REFUSED, WARNED) if unused else (REFUSED,), 1.5)
-    for what, target in (("a symlink to itself", "process.in.j2"), ("a symlink to nothing", "no")):
-        act = partial(_linked, target)
-        yield Attack("template", what, act, (REFUSED, WARNED), 1.5)
-    yield Attack("template", "a folder in its place", _folder, (REFUSED, WARNED), 1.5)
+Template = tuple[str, str | bytes | Path | None, str]
+"""A file's name, its content, or where it links to, or None for a folder, and what is named."""
+
+_TEMPLATES: dict[str, Template] = {
+    **{what: ("process.in.j2", _in_extra(text), _NAMED.get(what, r"\.j2"))
+       for what, text in _EXPRESSIONS.items()},
+    **{what: (name, content, named) for what, (name, content, named) in _FILES.items()},
+    "a symlink to itself": ("process.in.j2", Path("process.in.j2"), r"process\.in\.j2"),
+    "a symlink to nothing": ("process.in.j2", Path("no"), r"process\.in\.j2"),
+    "a folder in its place": ("process.in.j2", None, r"process\.in\.j2"),
+}  # fmt: skip
+_UNUSED = ("proces.in.j2", "Process.in.j2")
 
 
-def _place(folder: Path, name: str) -> tuple[Path, Path]:
-    project = new_project(folder / "project")
+@pytest.mark.attack(rows=_TEMPLATES, sample=2)
+def test_a_hostile_template_is_refused(attack: Template, tmp_path: Path) -> None:
+    name, content, named = attack
+    project = new_project(tmp_path / "project")
     write_study(project, tiny_study())
     file = project / "studies" / STUDY / "templates" / name
     file.parent.mkdir()
-    return project, file
-
-
-def _template(name: str, content: str | bytes, named: tuple[str, ...], folder: Path) -> Got:
-    project, file = _place(folder, name)
-    file.write_bytes(content.encode() if isinstance(content, str) else content)
-    if name == "process.in.j2" and b"filling.in.j2" in file.read_bytes():
-        (file.parent / "filling.in.j2").write_text('{% extends "process.in.j2" %}')
-    return checked(project, named)
-
-
-def _linked(target: str, folder: Path) -> Got:
-    project, file = _place(folder, "process.in.j2")
-    file.symlink_to(target)
-    return checked(project, (r"process\.in\.j2",))
-
-
-def _folder(folder: Path) -> Got:
-    project, file = _place(folder, "process.in.j2")
-    file.mkdir()
-    return checked(project, (r"process\.in\.j2",))
+    if content is None:
+        file.mkdir()
+    elif isinstance(content, Path):
+        file.symlink_to(content)
+    else:
+        file.write_bytes(content.encode() if isinstance(content, str) else content)
+        if name == "process.in.j2" and b"filling.in.j2" in file.read_bytes():
+            (file.parent / "filling.in.j2").write_text('{% extends "process.in.j2" %}')
+    warning_will_do = name in _UNUSED or content is None or isinstance(content, Path)
+    assert checked(project, (named,)) in ((REFUSED, WARNED) if warning_will_do else (REFUSED,))

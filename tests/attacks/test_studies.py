@@ -1,21 +1,16 @@
 """Hostile studies: no input becomes code, and a mistake is named as what it is."""
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from attack.calls import REFUSED, UNNAMED, Said, judged, main_of
-from attack.case import Attack, Got
-from attack.ground import STUDY, new_project, tiny_study, write_study
+import pytest
+from attack.calls import main_of, refused
+from attack.checked import ACCEPTED, ANSWERED_IN_S, HARMLESS, REFUSED, WARNED, checked
+from attack.ground import STUDY, TINY_STUDY, new_project, tiny_study, write_study
 
-HARMLESS = "harmless: the same commands"
-WARNED = "warned, and named"
-CODE = "an input became code"
-ANSWERED_IN_S = 5.0
-"""A study is answered in 5 s; processor time that is allowed."""
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
 _SHELL = "shell touch pwned"
 _INJECTIONS = {
@@ -36,17 +31,6 @@ _INJECTIONS = {
 Change = Callable[[dict[str, Any]], None]
 
 
-@dataclass(frozen=True)
-class Hostile:
-    """A change of the tiny study, and what a message must name."""
-
-    name: str
-    change: Change | str | bytes
-    named: tuple[str, ...]
-    expected: tuple[str, ...] = (REFUSED,)
-    study: str = STUDY
-
-
 def put(**values: object) -> Change:
     """Set fields: dots are double underscores."""
 
@@ -57,14 +41,6 @@ def put(**values: object) -> Change:
             for part in above:
                 place = place.setdefault(part, {})
             place[name] = value
-
-    return change
-
-
-def _text(old: str, new: str) -> Callable[[str], str]:
-    def change(text: str) -> str:
-        assert old in text, old
-        return text.replace(old, new, 1)
 
     return change
 
@@ -85,36 +61,31 @@ def _renamed(old: str, new: str) -> Change:
     return change
 
 
-def _injections() -> Iterator[Hostile]:
-    for what, text in _INJECTIONS.items():
-        expected = (REFUSED, HARMLESS)
-        yield Hostile(f"title with {what}", put(title=text), ("title",), expected)
-        yield Hostile(f"material with {what}", _renamed("steel", text), ("material",))
-        fidelity = {"youngs_modulus_scale": 1e-3, "timestep_fraction": 0.6, "ranks": 1}
-        named = put(fidelities={text: fidelity}, fidelity=text)
-        yield Hostile(f"fidelity with {what}", named, ("fidelit",))
-        swept = put(sweep={"title": ["b", text]})
-        yield Hostile(f"swept title with {what}", swept, ("title",), expected)
-        if "\x00" not in text and len(text) < 250:
-            yield Hostile(
-                f"study folder with {what}", put(), ("name|study",), study=text.replace("/", "")
-            )
-    for name in (
-        "a material",
-        "a/b",
-        "../b",
-        "-",
-        "a;b",
-        "#",
-        "!include",
-        "\N{GREEK SMALL LETTER MU}",
-    ):
-        yield Hostile(f"material {name!a}", _renamed("steel", name), ("material",))
-    for name in ("../studies/tiny", "tiny/../tiny", "./tiny", "tiny/", "tiny/.", ".", ""):
-        yield Hostile(f"study name {name!a}", put(), ("name|study",), study=name)
-    for name in ("a b", "--help-me", "x" * 250, "#", ".hidden"):
-        yield Hostile(f"study folder {name[:20]!a}", put(), ("name|study|usage",), study=name)
+Study = tuple[Change, tuple[str, ...], tuple[str, ...], str]
+"""A change of the tiny study, what a message must name, what is wanted, and the study's name."""
 
+_SETTINGS = {"youngs_modulus_scale": 1e-3, "timestep_fraction": 0.6, "ranks": 1}
+
+
+def _injected(what: str, text: str) -> dict[str, Study]:
+    """Text in every place of a study that takes some."""
+    chosen = put(fidelities={text: _SETTINGS}, fidelity=text)
+    swept = put(sweep={"title": ["b", text]})
+    found: dict[str, Study] = {
+        f"title with {what}": (put(title=text), ("title",), (REFUSED, HARMLESS), STUDY),
+        f"material with {what}": (_renamed("steel", text), ("material",), (REFUSED,), STUDY),
+        f"fidelity with {what}": (chosen, ("fidelit",), (REFUSED,), STUDY),
+        f"swept title with {what}": (swept, ("title",), (REFUSED, HARMLESS), STUDY),
+    }
+    if "\x00" not in text and len(text) < 250:
+        folder = text.replace("/", "")
+        found[f"study folder with {what}"] = (put(), ("name|study",), (REFUSED,), folder)
+    return found
+
+
+_MATERIALS = ("a material", "a/b", "../b", "-", "a;b", "#", "!include", "\N{GREEK SMALL LETTER MU}")
+_NAMES = ("../studies/tiny", "tiny/../tiny", "./tiny", "tiny/", "tiny/.", ".", "")
+_FOLDERS = ("a b", "--help-me", "x" * 250, "#", ".hidden")
 
 _LEAVES = {
     "a list": "[1, 2]",
@@ -144,15 +115,7 @@ _FIELDS = {
 }
 
 
-def _leaves() -> Iterator[Hostile | tuple[str, Callable[[str], str], str]]:
-    for field, stands in _FIELDS.items():
-        key = stands.partition(":")[0]
-        for what, value in _LEAVES.items():
-            named = rf"{re.escape(key)}|line \d|yaml:\d"
-            yield f"{field} is {what}", _text(stands, f"{key}: {value}"), named
-
-
-_TEXTS: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
+_TEXTS: dict[str, tuple[bytes, tuple[str, ...]]] = {
     "empty file": (b"", ("study.yaml",)),
     "only a remark": (b"# nothing\n", ("study.yaml",)),
     "random bytes": (bytes(range(256)) * 20, ("study.yaml",)),
@@ -256,107 +219,73 @@ _SLIPS: tuple[tuple[str, Change, tuple[str, ...]], ...] = (
 )  # fmt: skip
 
 
-def study_attacks(seed: int) -> Iterator[Attack]:
-    """Every hostile study; the seed changes nothing."""
-    for hostile in _injections():
-        act = partial(_study, hostile)
-        yield Attack("study", hostile.name, act, hostile.expected, 1.5)
-    for what, change, named in _REFUSED_FIELDS:
-        act = partial(_study, Hostile(what, change, named))
-        yield Attack("study", what, act, (REFUSED,), 1.5)
-    for what, change, named in _SLIPS:
-        act = partial(_study, Hostile(what, change, named))
-        yield Attack("study", f"unit slip: {what}", act, (REFUSED, WARNED), 1.5)
-    for what, change_text, key in _leaves():
-        act = partial(_text_study, change_text, key)
-        plain = what.endswith((" is 0x10", " is 1_000"))
-        numbers = (REFUSED, UNNAMED, WARNED, "accepted")  # they are numbers, if odd ones
-        yield Attack("study", what, act, numbers if plain else (REFUSED,), 1.5)
-    for what, (content, named) in _TEXTS.items():
-        yield Attack("study", what, partial(_bytes_study, content, named), (REFUSED,), 1.5)
-    for encoding in ("utf-16", "utf-32", "latin-1", "cp037"):
-        act = partial(_encoded, encoding)
-        yield Attack("study", f"in {encoding}", act, (REFUSED,), 1.5)
-    for encoding in ("utf-8-sig", "utf-8"):
-        act = partial(_encoded, encoding)
-        yield Attack("study", f"in {encoding}", act, ("accepted",), 1.5)
+_CHANGED: dict[str, Study] = {
+    **{name: row for item in _INJECTIONS.items() for name, row in _injected(*item).items()},
+    **{f"material {name!a}": (_renamed("steel", name), ("material",), (REFUSED,), STUDY)
+       for name in _MATERIALS},
+    **{f"study name {name!a}": (put(), ("name|study",), (REFUSED,), name) for name in _NAMES},
+    **{f"study folder {name[:20]!a}": (put(), ("name|study|usage",), (REFUSED,), name)
+       for name in _FOLDERS},
+    **{what: (change, named, (REFUSED,), STUDY) for what, change, named in _REFUSED_FIELDS},
+    **{f"unit slip: {what}": (change, named, (REFUSED, WARNED), STUDY)
+       for what, change, named in _SLIPS},
+}  # fmt: skip
 
 
-def _study(hostile: Hostile, folder: Path) -> Got:
-    project = new_project(folder / "project")
+@pytest.mark.attack(rows=_CHANGED, sample=2)
+def test_a_hostile_study_is_refused(attack: Study, tmp_path: Path) -> None:
+    change, named, wanted, name = attack
+    project = new_project(tmp_path / "project")
     data = tiny_study()
-    assert callable(hostile.change)
-    hostile.change(data)
+    change(data)
     write_study(project, data)
-    if hostile.study not in ("", ".") and "/" not in hostile.study:
-        (project / "studies" / STUDY).rename(project / "studies" / hostile.study)
-    return checked(project, hostile.named, hostile.study)
+    if name not in ("", ".") and "/" not in name:
+        (project / "studies" / STUDY).rename(project / "studies" / name)
+    assert checked(project, named, name) in wanted
 
 
-def _text_study(change: Callable[[str], str], key: str, folder: Path) -> Got:
-    project = new_project(folder / "project")
-    text = change((Path(__file__).parents[2] / "data/tiny_study.yaml").read_text(encoding="utf-8"))
-    write_study(project, text)
-    return checked(project, (key,))
+_SPELT = {
+    f"{field} is {what}": (stands, value)
+    for field, stands in _FIELDS.items()
+    for what, value in _LEAVES.items()
+}
 
 
-def _bytes_study(content: bytes, named: tuple[str, ...], folder: Path) -> Got:
-    project = new_project(folder / "project")
+@pytest.mark.attack(rows=_SPELT, sample=1)
+def test_a_value_of_another_kind_is_refused(attack: tuple[str, str], tmp_path: Path) -> None:
+    stands, value = attack
+    key = stands.partition(":")[0]
+    text = TINY_STUDY.read_text(encoding="utf-8")
+    assert stands in text
+    project = new_project(tmp_path / "project")
+    write_study(project, text.replace(stands, f"{key}: {value}", 1))
+    if value in ("0x10", "1_000"):  # they are numbers, if odd ones
+        refused(main_of("dragdeck", ["check", STUDY], project, ANSWERED_IN_S))
+    else:
+        assert checked(project, (rf"{re.escape(key)}|line \d|yaml:\d",)) == REFUSED
+
+
+@pytest.mark.attack(rows=_TEXTS, sample=1)
+def test_a_file_that_is_no_study_is_refused(
+    attack: tuple[bytes, tuple[str, ...]], tmp_path: Path
+) -> None:
+    content, named = attack
+    project = new_project(tmp_path / "project")
     write_study(project, "").write_bytes(content)
-    return checked(project, named)
+    assert checked(project, named) == REFUSED
 
 
-def _encoded(encoding: str, folder: Path) -> Got:
-    project = new_project(folder / "project")
-    data = {**tiny_study(), "title": "Gef\u00e4\u00df"}
-    file = write_study(project, data)
+_ENCODINGS = {
+    **{f"in {name}": (name, REFUSED) for name in ("utf-16", "utf-32", "latin-1", "cp037")},
+    **{f"in {name}": (name, ACCEPTED) for name in ("utf-8-sig", "utf-8")},
+}
+
+
+@pytest.mark.attack(rows=_ENCODINGS, sample=1)
+def test_another_encoding_is_refused(attack: tuple[str, str], tmp_path: Path) -> None:
+    encoding, wanted = attack
+    project = new_project(tmp_path / "project")
+    file = write_study(project, {**tiny_study(), "title": "Gef\u00e4\u00df"})
     text = "\n".join(["# Gef\u00e4\u00df", file.read_text(encoding="utf-8")])
     file.write_bytes(text.encode(encoding))
-    return checked(project, ("study.yaml", "utf-8|encoding"))
-
-
-def checked(
-    project: Path, named: tuple[str, ...], study: str = STUDY, patience_s: float = ANSWERED_IN_S
-) -> Got:
-    """What `dragdeck check` says of a study, and what becomes of its input scripts."""
-    said = main_of("dragdeck", ["check", study], project, patience_s)
-    if list(project.rglob("pwned")):
-        return Got(CODE, said.tail)
-    if said.status == 0:
-        return _decks_of(project, study) or _warned(said, named)
-    if said.status == 2 and "usage:" in said.text:  # argparse refuses what looks like an option
-        return Got(REFUSED, said.tail)
-    return judged(said, *named)
-
-
-def _warned(said: Said, named: tuple[str, ...]) -> Got:
-    warnings = " ".join(re.findall(r"(?ims)^warning:.*", said.text))
-    if warnings and all(re.search(name, warnings, re.IGNORECASE) for name in named):
-        return Got(WARNED, said.tail)
-    return Got("accepted", said.tail)
-
-
-def _decks_of(project: Path, study: str) -> Got | None:
-    """Whether the input scripts hold the commands of the harmless study; None: nothing to tell."""
-    data = project / "studies" / study / "study.yaml"
-    text = data.read_text(encoding="utf-8", errors="replace") if data.is_file() else ""
-    if "pwned" not in text and "{{" not in text and "a &" not in text and "aaaaaaaa" not in text:
-        return None
-    unknown = main_of("dragdeck", ["step", "render", study, "drop_test", "?"], project)
-    for run in sorted(set(re.findall(r"[A-Za-z0-9._-]{4,}", unknown.text))):
-        main_of("dragdeck", ["step", "render", study, "drop_test", run], project)
-    decks = list(project.rglob("in.liggghts"))
-    if not decks:
-        return Got(UNNAMED, unknown.tail)
-    for deck in decks:
-        for line in commands(deck.read_text(encoding="utf-8")):
-            if "pwned" in line or "49" in line.split()[:1] or line.split()[:1] == ["b"]:
-                return Got(CODE, line)
-    return Got(HARMLESS)
-
-
-def commands(deck: str) -> list[str]:
-    """Commands of an input script as LIGGGHTS reads them: lines joined, then remarks removed."""
-    joined = re.sub(r"&[ \t]*\n", "", deck.replace("\r", "\n"))
-    lines = [re.sub(r"#.*", "", line).strip() for line in joined.split("\n")]
-    return [line for line in lines if line]
+    assert checked(project, ("study.yaml", "utf-8|encoding")) == wanted
