@@ -11,6 +11,10 @@ Cells = NDArray[np.float64]
 """Numbers of M columns and N rows, (M, N)."""
 
 
+_SHORT_BYTES = 8192
+"""Of a shorter text pyarrow takes longer to begin than Python to read it."""
+
+
 class WrongRow(Exception):
     """A row that is not what it should be: its number from 0, what is wrong, what was expected."""
 
@@ -27,9 +31,7 @@ def cells_of_text(text: bytes, width: int) -> Cells:
     WrongRow
         At the first line that is not so many numbers.
     """
-    if not text:
-        return np.empty((width, 0))
-    cells = _quickly(text, width)
+    cells = _quickly(text, width) if len(text) > _SHORT_BYTES else None
     return _one_by_one(text, width) if cells is None else cells
 
 
@@ -70,7 +72,7 @@ def _one_by_one(text: bytes, width: int) -> Cells:
             found = line[:120] + b"\n"
             raise WrongRow(row, f"found {found!r}", f"{width} numbers")
         rows.append(numbers)
-    return np.ascontiguousarray(np.array(rows).T)
+    return np.ascontiguousarray(np.array(rows, dtype=np.float64).reshape(-1, width).T)
 
 
 def first_rows(text: bytes, count: int) -> bytes:
