@@ -29,7 +29,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.documents import Part
-from dragdeck.engine.decomposition import decomposition
+from dragdeck.engine.log import decomposition
 from dragdeck.engine.process import Ending, command, execute, find_engine
 from dragdeck.engine.record import ParticlesPerRank, RunRecord
 from dragdeck.engine.run_folder import run

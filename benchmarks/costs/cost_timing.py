@@ -37,9 +37,9 @@ from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import deck_text, write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.log import engine_errors, loops
 from dragdeck.engine.process import Engine, command, execute, find_engine
+from dragdeck.engine.record import RunInputs
 from dragdeck.engine.reports import Report
 from dragdeck.engine.run_folder import fingerprint
 from dragdeck.errors import EngineError, InputError

@@ -11,8 +11,7 @@ from dragdeck.decks.case_file import CountOfRun, RanksOfRun, SettlingCriterion, 
 from dragdeck.decks.outputs import Kind, OutputOfRun
 from dragdeck.dumps.grammar import whole_frames
 from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.inputs import RunInputs
-from dragdeck.engine.record import RunPart
+from dragdeck.engine.record import RunInputs, RunPart
 
 
 def written(kind: Kind, name: str, columns: Sequence[str], last_step: int | None) -> OutputOfRun:

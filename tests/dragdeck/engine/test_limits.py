@@ -11,7 +11,7 @@ from run_files import rewrite
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
-from dragdeck.engine.limits import breach, within
+from dragdeck.engine.acceptance import breach, within
 from dragdeck.engine.log import Sample, read_samples
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.run_folder import run

@@ -19,8 +19,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
-from dragdeck.engine.inputs import RunInputs
-from dragdeck.engine.record import RunRecord
+from dragdeck.engine.record import RunInputs, RunRecord
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import fingerprint, run
 from dragdeck.engine.watch import EngineEnded, Watcher, cut_screen

@@ -1,4 +1,4 @@
-"""The acceptance checks that a finished run must pass before it counts as a result."""
+"""The checks that a run must pass: those of its limits on the way, all of them at its end."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,11 +12,16 @@ from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
 from dragdeck.engine.completeness import coverage, part_files, some_frames
-from dragdeck.engine.decomposition import decomposition, ranks_check
-from dragdeck.engine.inputs import RunInputs
-from dragdeck.engine.limits import breach, within
-from dragdeck.engine.record import AcceptanceCheck, CheckCode, CheckReason, RunPart
+from dragdeck.engine.record import (
+    AcceptanceCheck,
+    CheckCode,
+    CheckReason,
+    Decomposition,
+    RunInputs,
+    RunPart,
+)
 from dragdeck.physics.contact_network import Floats, stability_number
+from dragdeck.physics.run_limits import SPEED_FACTOR, RunLimits
 
 _FRAMES = 20
 """Frames whose contacts are evaluated. An assumption: the median of so many frames scatters little
@@ -66,7 +71,7 @@ def check_run(
         if inputs.steady is not None:
             checks.append(_steady(samples, inputs.steady))
     checks += [_complete(folder, name, output, parts) for name, output in outputs.items()]
-    checks.append(ranks_check(decomposition(screens[-1]), ranks))
+    checks.append(ranks_check(log.decomposition(screens[-1]), ranks))
     if inputs.scene in ("filling", "process") and "particles" in outputs:
         checks.append(_stable_timestep(folder, outputs["particles"], parts))
     if inputs.limits is not None and "thermo" in outputs:
@@ -223,3 +228,58 @@ def _stability_number(case: CaseOfStudy, rows: Floats) -> float:
     constants = [case.contact_moduli[name] for name in ("particle", "bowl")]
     of_case = case.media.density_kg_m3, case.bowl.radius_m, constants, case.timestep_s
     return stability_number(rows[:, :3], rows[:, 3], *of_case)
+
+
+def ranks_check(split: Decomposition | None, ranks: int) -> AcceptanceCheck:
+    """Whether LIGGGHTS ran on the ranks that were asked for.
+
+    A LIGGGHTS that was built for another MPI than its launcher's runs once per rank, each
+    with all particles, and all write the same files.
+    """
+    seen, passed = "LIGGGHTS printed no processor grid", False
+    if split is not None:
+        seen, passed = " by ".join(map(str, split.grid)), math.prod(split.grid) == ranks
+        if split.particles:
+            least, most = split.particles.least, split.particles.most
+            seen += f", {least:,} to {most:,} particles per rank"
+    limit = f"{ranks} rank{'s' if ranks > 1 else ''}"
+    return _check("ranks", "MPI ranks as requested", passed, seen, limit)
+
+
+def breach(samples: Sequence[log.Sample], limits: RunLimits) -> AcceptanceCheck | None:
+    """The first sample past a limit, as an acceptance check that did not pass; None without."""
+    for sample in samples:
+        past = _past(sample, limits)
+        if past is not None:
+            reason, seen, limit = past
+            return _within_limits(False, f"{seen} at step {sample.step:,}", limit, reason)
+    return None
+
+
+def _past(sample: log.Sample, limits: RunLimits) -> tuple[CheckReason, str, str] | None:
+    """Reason, what was seen and the limit of a sample that is past one."""
+    energy, most = sample.mean_energy_j, limits.mean_kinetic_energy_j
+    if sample.n_particles < limits.n_particles:
+        return "particles", f"{sample.n_particles} particles", f"{limits.n_particles} particles"
+    if not math.isfinite(energy):
+        return "finite_numbers", f"a kinetic energy of {energy}", "finite numbers"
+    if energy > most:
+        seen = f"a mean kinetic energy of {energy:.3g} J per particle"
+        return "energy", seen, f"{most:.3g} J, {limits.why}"
+    if sample.fastest_particle_m_s > limits.speed_m_s:
+        limit = f"{limits.speed_m_s:.3g} m/s, {SPEED_FACTOR:g} times the speed of that energy"
+        return "speed", f"a particle at {sample.fastest_particle_m_s:.3g} m/s", limit
+    return None
+
+
+def within(limits: RunLimits) -> AcceptanceCheck:
+    """The acceptance check of a run that passed no limit."""
+    most = limits.mean_kinetic_energy_j
+    return _within_limits(True, "no limit exceeded", f"{most:.3g} J per particle, {limits.why}")
+
+
+def _within_limits(
+    passed: bool, seen: str, limit: str, reason: CheckReason | None = None
+) -> AcceptanceCheck:
+    name = "energy and speed within limits"
+    return _check("within_limits", name, passed, seen, limit, reason)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dragdeck.decks import END
+from dragdeck.engine.record import Decomposition, ParticlesPerRank
 
 
 def engine_errors(screen: str) -> list[str]:
@@ -61,6 +62,20 @@ def loops(screen: str) -> list[Loop]:
     """The ``run`` commands that ended, in order."""
     found = re.findall(r"^Loop time of (\S+) on \d+ procs for (\d+) steps", screen, re.MULTILINE)
     return [Loop(float(seconds), int(steps)) for seconds, steps in found]
+
+
+def decomposition(screen: str) -> Decomposition | None:
+    """The split that LIGGGHTS printed; None where it printed none."""
+    grids = re.findall(r"^ *(\d+) by (\d+) by (\d+) MPI processor grid$", screen, re.MULTILINE)
+    if not grids:
+        return None
+    loads = re.findall(r"^Nlocal: +(\S+) ave (\d+) max (\d+) min$", screen, re.MULTILINE)
+    particles = None
+    if loads:
+        mean, most, least = loads[-1]
+        particles = ParticlesPerRank(mean=float(mean), most=int(most), least=int(least))
+    x, y, z = (int(count) for count in grids[-1])
+    return Decomposition(grid=(x, y, z), particles=particles)
 
 
 @dataclass(frozen=True)
