@@ -176,7 +176,7 @@ class Cursor:
             self.cut_short(what)
         if not data.isascii():
             self.fail(f"found bytes that are not text: {data[:40]!r}", what)
-        return data.decode().strip()
+        return data.decode().rstrip()
 
     def item(self, what: str) -> str:
         """The next line, which must begin so."""
