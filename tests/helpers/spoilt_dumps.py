@@ -3,7 +3,7 @@
 import math
 import struct
 
-from tiny_run_files import Raw
+from made_run import Raw
 
 NAMES = ("id", "x", "c_f[1]")
 ROWS = {

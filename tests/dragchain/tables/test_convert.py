@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from made_run import Raw
 from spoilt_dumps import NAMES, ROWS, SPOILT, text
-from tiny_run_files import Raw
 
 from dragchain.tables.convert import dump_to_parquet
 from dragdeck.errors import DumpError

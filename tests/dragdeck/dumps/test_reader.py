@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
+from made_run import Raw
 from spoilt_dumps import NAMES, ROWS, SPOILT, binary, text
-from tiny_run_files import Raw
 
 from dragdeck.dumps import content
 from dragdeck.dumps.reader import dump_files, read_dump

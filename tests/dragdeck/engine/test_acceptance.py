@@ -5,13 +5,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from tiny_run_files import Raw
+from made_run import Raw
 
-from dragdeck.decks.case_file import CountOfRun, RanksOfRun, SettlingCriterion, SteadyCriterion
+from dragdeck.decks.case_file import (
+    CountOfRun,
+    RanksOfRun,
+    RunInputs,
+    SettlingCriterion,
+    SteadyCriterion,
+)
 from dragdeck.decks.outputs import Kind, OutputOfRun
 from dragdeck.dumps.grammar import whole_frames
 from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.record import RunInputs, RunPart
+from dragdeck.engine.record import RunPart
 
 
 def written(kind: Kind, name: str, columns: Sequence[str], last_step: int | None) -> OutputOfRun:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_run import Raw
 from spoilt_dumps import NAMES, ROWS, SPOILT, binary, text
-from tiny_run_files import Raw
 
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.dumps.grammar import whole_frames

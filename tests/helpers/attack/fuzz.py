@@ -11,7 +11,7 @@ import numpy as np
 import trimesh
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
-from tiny_run_files import Raw
+from made_run import Raw
 
 from dragchain.run.case import Output
 from dragdeck.dumps.reader import read_dump, read_prints

@@ -1,4 +1,4 @@
-"""The checks that a run must pass: those of its limits on the way, all of them at its end."""
+"""The acceptance checks that a finished run must pass before it counts as a result."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dragdeck.decks import CASE_FILE, PACKING_FILE
-from dragdeck.decks.case_file import CaseOfStudy, SteadyCriterion
+from dragdeck.decks.case_file import CaseOfStudy, RunInputs, SteadyCriterion
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
@@ -17,11 +17,9 @@ from dragdeck.engine.record import (
     CheckCode,
     CheckReason,
     Decomposition,
-    RunInputs,
     RunPart,
 )
 from dragdeck.physics.contact_network import Floats, stability_number
-from dragdeck.physics.run_limits import SPEED_FACTOR, RunLimits
 
 _FRAMES = 20
 """Frames whose contacts are evaluated. An assumption: the median of so many frames scatters little
@@ -76,7 +74,7 @@ def check_run(
         checks.append(_stable_timestep(folder, outputs["particles"], parts))
     if inputs.limits is not None and "thermo" in outputs:
         # once more on all rows: the watch may not have looked at the last ones
-        checks.append(breach(samples, inputs.limits) or within(inputs.limits))
+        checks.append(log.breach(samples, inputs.limits) or log.within(inputs.limits))
     return checks
 
 
@@ -244,42 +242,3 @@ def ranks_check(split: Decomposition | None, ranks: int) -> AcceptanceCheck:
             seen += f", {least:,} to {most:,} particles per rank"
     limit = f"{ranks} rank{'s' if ranks > 1 else ''}"
     return _check("ranks", "MPI ranks as requested", passed, seen, limit)
-
-
-def breach(samples: Sequence[log.Sample], limits: RunLimits) -> AcceptanceCheck | None:
-    """The first sample past a limit, as an acceptance check that did not pass; None without."""
-    for sample in samples:
-        past = _past(sample, limits)
-        if past is not None:
-            reason, seen, limit = past
-            return _within_limits(False, f"{seen} at step {sample.step:,}", limit, reason)
-    return None
-
-
-def _past(sample: log.Sample, limits: RunLimits) -> tuple[CheckReason, str, str] | None:
-    """Reason, what was seen and the limit of a sample that is past one."""
-    energy, most = sample.mean_energy_j, limits.mean_kinetic_energy_j
-    if sample.n_particles < limits.n_particles:
-        return "particles", f"{sample.n_particles} particles", f"{limits.n_particles} particles"
-    if not math.isfinite(energy):
-        return "finite_numbers", f"a kinetic energy of {energy}", "finite numbers"
-    if energy > most:
-        seen = f"a mean kinetic energy of {energy:.3g} J per particle"
-        return "energy", seen, f"{most:.3g} J, {limits.why}"
-    if sample.fastest_particle_m_s > limits.speed_m_s:
-        limit = f"{limits.speed_m_s:.3g} m/s, {SPEED_FACTOR:g} times the speed of that energy"
-        return "speed", f"a particle at {sample.fastest_particle_m_s:.3g} m/s", limit
-    return None
-
-
-def within(limits: RunLimits) -> AcceptanceCheck:
-    """The acceptance check of a run that passed no limit."""
-    most = limits.mean_kinetic_energy_j
-    return _within_limits(True, "no limit exceeded", f"{most:.3g} J per particle, {limits.why}")
-
-
-def _within_limits(
-    passed: bool, seen: str, limit: str, reason: CheckReason | None = None
-) -> AcceptanceCheck:
-    name = "energy and speed within limits"
-    return _check("within_limits", name, passed, seen, limit, reason)

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from dragdeck.decks import DECK_FILE
+from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.engine import log
 from dragdeck.engine.acceptance import check_run
@@ -21,7 +22,6 @@ from dragdeck.engine.record import (
     REMEDIES,
     AcceptanceCheck,
     CheckCode,
-    RunInputs,
     RunPart,
     RunRecord,
 )
