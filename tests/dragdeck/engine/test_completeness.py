@@ -3,6 +3,7 @@
 import math
 import re
 import struct
+import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -195,3 +196,18 @@ def test_frames_in_a_tilted_box_are_whole(tmp_path: Path) -> None:
     first, last = some_frames(tmp_path, dump("a.bin"), parts(0), 20)
     assert sorted(first.tolist()) == sorted(ROWS[0])
     np.testing.assert_array_equal(last, ROWS[14])
+
+
+@pytest.mark.parametrize("name", ["a.bin", "a.dump"])
+def test_the_size_of_a_dump_needs_no_memory(tmp_path: Path, name: str) -> None:
+    rows = [[n, 0.5, -0.25] for n in range(1, 20_001)]
+    binary = name.endswith(".bin")
+    frame = Raw.binary(7, rows, 3) if binary else Raw.text(7, rows, NAMES, "custom")
+    (tmp_path / name).write_bytes(frame * 20)
+    tracemalloc.start()
+    try:
+        found = whole_frames(tmp_path / name, dump(name))
+        assert tracemalloc.get_traced_memory()[1] < 4e6
+    finally:
+        tracemalloc.stop()
+    assert [end for _, end in found.ends] == [len(frame) * n for n in range(1, 21)]
