@@ -31,7 +31,6 @@ from dragdeck.source_hash import source_hash
 from dragdeck.study.check import warnings
 from dragdeck.study.yaml import read_yaml
 from evidence.stability.points import bed_settings
-from evidence.verification.suite import suite_of
 
 
 def locking_call():
@@ -92,12 +91,3 @@ def tell_numbers():
     said = shell("dragchain step numbers results/{STUDY}/report 2> /dev/null || true", read=True)
     if said.strip():
         logger.info(said.rstrip(), extra={"shown": True})
-
-
-templates_of, page_templates = WORK.templates_of, WORK.page_templates
-fidelity_option = WORK.fidelity_option
-
-
-def of_experiment(run, file):
-    """Path of a file of a run of the verification suite."""
-    return f"{run_path('verification', 'collide', run)}/{file}"

@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from chain_runs import FRAMES, INTERVAL_S, found_of, wander
-from figure_files import save, workpiece_force_table, write_process_run
+from figure_files import workpiece_force_table, write_process_run
+from made_run import save
 from networks import R, make_frame, row
 from scipy.stats import binom, false_discovery_control
 
