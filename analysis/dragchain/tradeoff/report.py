@@ -22,7 +22,7 @@ from dragchain.tradeoff.figures import draw
 from dragchain.tradeoff.measure_run import LONG_WAVE, SHORT_WAVE
 from dragchain.tradeoff.measures import MAIN
 from dragchain.tradeoff.outcome import TOLERANCES, Tradeoff, choose, compare, error_table, run_table
-from dragchain.tradeoff.path_length import TRIALS, Reach, along, chance, reaches
+from dragchain.tradeoff.path_length import Reach, along, chance, reaches
 from dragchain.tradeoff.record import record_of
 
 _FOLD = 2.0
@@ -178,7 +178,6 @@ def render(
         gains=gains(tradeoff),
         paths=[(reach, along(tradeoff, reach.quantity)) for reach in known],
         chance=chance(tradeoff),
-        trials=TRIALS,
         figures={name: data_uri(picture) for name, picture in figures.items()},
         tolerances=TOLERANCES,
         confidence=CONFIDENCE,
