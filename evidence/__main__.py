@@ -21,7 +21,7 @@ COMMANDS = (
                  help="folder of the report on the verification suite"),)),
     Command("run-map", "run all points of one regime of the stability map",
             "Run all points of one regime of the stability map.",
-            "stability.map_runs:stability_command", (
+            "stability.runs:stability_command", (
         Argument("regime", metavar="REGIME",
                  help="impact, settle, column or drag; beds: only the packings from which drags "
                  "start"),

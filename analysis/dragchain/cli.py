@@ -150,7 +150,7 @@ STEPS = (
     Command("scaling", "fit a power law to the mean drag",
             "Fit a power law of the mean drag as a function of one field of the study. It reads "
             "the tables of the runs and writes scaling.json, .csv and .png to the folder.",
-            "scaling.fit:scaling_command", (
+            "scaling.fit:write_scaling", (
         OUT_DIR, RUN_DIRS, MADE_BY,
         Argument("--field", required=True, metavar="FIELD",
                   help="dotted name of the field, for example motion.immersion_depth_m; required"),

@@ -11,8 +11,7 @@ import pandas as pd
 from dragchain.figures.style import drawing, png
 from dragchain.report.page import data_uri, render_page, write_bundle
 from dragchain.scaling.document import ScalingFile
-from dragchain.scaling.figures import draw_scalings
-from dragchain.scaling.fit import read_scalings
+from dragchain.scaling.fit import draw_scalings, read_scalings
 from dragchain.statistics.estimate import EstimateColumns
 from dragdeck.documents import Document
 from evidence.validation import chain_peaks, figures

@@ -15,7 +15,7 @@ WRITERS = {
     "drops": "dragdeck.campaigns.restitution_drops:DropsFile",
     "costs": "cost_file:CostsFile",
     "packing": "dragchain.tables.bed:Packing",
-    "stability": "evidence.stability.document:StabilityFile",
+    "stability": "evidence.stability.judge:StabilityFile",
     "scaling": "dragchain.scaling.document:ScalingFile",
     "calibration": "dragchain.calibration.results:CalibrationFile",
     "measures": "dragchain.tradeoff.measures:Measures",

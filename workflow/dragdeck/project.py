@@ -18,7 +18,7 @@ from dragdeck.study.base import NAME, NAME_LIMIT
 from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import located, study_folders
 from dragdeck.sweep.cases import load_cases, study_file
-from dragdeck.sweep.plan import Points, plan_points, read_plan
+from dragdeck.sweep.plan import Plan, Points, plan_points
 
 POINTS = "points"
 """Folder of the process runs of a plan."""
@@ -107,7 +107,7 @@ class Project:
             There is no such plan or study, or they do not fit together.
         """
         file = self.plan_file(plan)
-        return plan_points(read_plan(file), file, self.cases(study)[0], resolve)
+        return plan_points(Plan.read(file), file, self.cases(study)[0], resolve)
 
     def results(self, study: str) -> Path:
         """The results of a study."""

@@ -38,7 +38,7 @@ from dragdeck.snakemake_lock import hold_lock
 from dragdeck.source_hash import source_hash
 from dragdeck.study.check import warnings
 from dragdeck.study.yaml import read_yaml
-from evidence.stability.map import bed_names
+from evidence.stability.points import bed_settings
 from evidence.verification.suite import suite_of
 
 
@@ -416,7 +416,7 @@ def stability_templates():
 def stability_beds():
     """Folders of the fillings that columns and drags start from; none without a map."""
     file = PROJECT.root / STABILITY_MAP
-    names = explained(bed_names, file) if file.is_file() else []
+    names = explained(bed_settings, file) if file.is_file() else []
     return [run_path("stability", "filling", name) for name in names]
 
 

@@ -7,8 +7,7 @@ rule measure_costs:
         templates_of("drop_test"),
         templates_of("filling"),
         templates_of("process"),
-        overrides=sorted(str(relative(file)) for file in PROJECT.templates.glob("costs/*.j2")),
-        script=sorted(str(relative(file)) for file in PROJECT.root.glob("benchmarks/costs/*.py")),
+        script=sorted(str(relative(file)) for file in PROJECT.root.glob("benchmarks/costs/*.*")),
     output:
         of_tradeoff("costs.json"),
     log:

@@ -75,6 +75,11 @@ def fraction(value: float | None) -> str:
     return percent(None if value is None else 100 * value)
 
 
+def in_percent(value: float | None, digits: int = 3) -> str:
+    """A fraction of 1 as a number of hundredths without its sign of percent, a dash for none."""
+    return DASH if value is None else number(100 * value, digits)
+
+
 def with_interval(estimate: Estimate, unit: str = "") -> str:
     """A value with its 95 % interval, all three to the second digit of the half-width."""
     after = f" {unit}" if unit else ""
@@ -164,10 +169,20 @@ def page_environment(
     )
     shared = (
         *(number, measured, fixed, percent, fraction, interval, with_interval, mean_interval, ends),
-        *(slug, sections),
+        *(in_percent, slug, sections, cell),
     )
     environment.filters |= {one.__name__: one for one in shared} | dict(filters or {})
     return environment
+
+
+@jinja2.pass_environment
+def cell(environment: jinja2.Environment, row: object, key: str, form: str = "") -> object:
+    """A value of a row by its dotted key, written by a filter: ``number``, ``measured:2``."""
+    value = row
+    for part in key.split("."):
+        value = environment.getitem(value, part)
+    name, _, digits = form.partition(":")
+    return environment.filters[name](value, *map(int, digits.split())) if name else value
 
 
 def slug(title: str) -> str:

@@ -13,6 +13,7 @@ from PIL import Image
 import dragchain
 import evidence
 from dragchain.report.page import (
+    DASH,
     LARGE_PICTURE,
     MINUS,
     data_uri,
@@ -82,6 +83,16 @@ def test_the_head_of_a_page_points_to_its_sections() -> None:
     links = [link for link in read.references if link.startswith("#")]
     assert links == ["#force-on-the-workpiece", "#run-1"]
     assert read.words.count("Force on the workpiece") == 2
+
+
+def test_a_listing_writes_each_column_in_its_form() -> None:
+    rows = [{"name": "a & b", "drag": {"mean": 0.25}}, {"name": "c", "drag": {"mean": None}}]
+    text = """{% from "report/macros.html.j2" import listing %}
+{{ listing(rows, [("case", "name", ""), ("drag (N)", "drag.mean", "measured:3")]) }}"""
+    found = page_environment().from_string(text).render(rows=rows)
+    assert '<th>case</th><th class="n">drag (N)</th>' in found
+    assert '<td>a &amp; b</td><td class="n">0.250</td>' in found
+    assert f'<td>c</td><td class="n">{DASH}</td>' in found
 
 
 def test_what_is_not_given_is_an_error() -> None:
