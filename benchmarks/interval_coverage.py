@@ -39,14 +39,17 @@ from dragchain.loading.samples import (  # noqa: E402
     standard_errors,
 )
 from dragchain.statistics.bed_effects import Factors, fit_effects  # noqa: E402
-from dragchain.statistics.correlated import SLOW_WAVES, estimate_mean  # noqa: E402
+from dragchain.statistics.correlated import (  # noqa: E402
+    SLOW_WAVES,
+    estimate_mean,
+    estimates,
+)
 from dragchain.statistics.estimate import (  # noqa: E402
     NORMAL_QUANTILE,
     Estimate,
     mean_of,
     t_interval,
 )
-from dragchain.statistics.frame_means import estimates  # noqa: E402
 from dragchain.statistics.power_law import Runs, fit_power_law  # noqa: E402
 from dragchain.tradeoff.measures import PathQuantities  # noqa: E402
 from dragchain.windows.estimate import WindowOfRun, WindowsRecord  # noqa: E402

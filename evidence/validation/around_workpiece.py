@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.drag.around import AZIMUTH_BINS, DEPTH_BINS
-from dragchain.drag.azimuth import circumference, parts, to_the_left, within
+from dragchain.drag import AZIMUTH_BINS, DEPTH_BINS, circumference, parts, to_the_left, within
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
 from dragchain.run.paths.circle import Circle

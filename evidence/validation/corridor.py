@@ -12,7 +12,7 @@ import pandas as pd
 from scipy.stats import binned_statistic
 
 from dragchain.arrays import Floats
-from dragchain.drag.force import read_counted
+from dragchain.drag import read_counted
 from dragchain.errors import TableError
 from dragchain.run.kinematics import needed
 from dragchain.run.paths.circle import Circle

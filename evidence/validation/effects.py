@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from pydantic import JsonValue
 
-from dragchain.drag.force import read_counted
+from dragchain.drag import read_counted
 from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.estimate import Estimate
 from dragdeck.documents import Part

@@ -7,8 +7,7 @@ import numpy as np
 from scipy import signal, stats
 
 from dragchain.arrays import Floats
-from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
+from dragchain.drag import find_drag_peaks, peak_separation_s, read_counted
 from dragchain.run.case import Case
 from dragchain.run.kinematics import drag_start_s
 from dragchain.run.reference import reference_drags

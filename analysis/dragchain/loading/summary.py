@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.azimuth import circumference, parts, within
+from dragchain.drag import circumference, parts, within
 from dragchain.loading.contact_events import (
     AMOUNTS,
     TYPES,
@@ -28,8 +28,8 @@ from dragchain.loading.document import (
 )
 from dragchain.loading.samples import WORKPIECE, Sampled
 from dragchain.run.case import Case
+from dragchain.statistics.correlated import estimates
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
-from dragchain.statistics.frame_means import estimates
 
 DEPTH_BINS, AZIMUTH_BINS = 20, 24
 

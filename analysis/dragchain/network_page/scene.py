@@ -15,8 +15,7 @@ from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import Peaks, drag_peaks, peak_separation_s
+from dragchain.drag import Peaks, drag_peaks, peak_separation_s, read_counted
 from dragchain.errors import TableError
 from dragchain.export.frames import FrameData, FrameSeries
 from dragchain.figures.style import force_map

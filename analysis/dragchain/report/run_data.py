@@ -10,9 +10,17 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.around import ahead_behind, azimuth_profile, depth_profile, depth_slope
-from dragchain.drag.force import FORCES, read_counted, summarise_forces
-from dragchain.drag.peaks import drag_peaks, peak_separation_s
+from dragchain.drag import (
+    FORCES,
+    ahead_behind,
+    azimuth_profile,
+    depth_profile,
+    depth_slope,
+    drag_peaks,
+    peak_separation_s,
+    read_counted,
+    summarise_forces,
+)
 from dragchain.errors import SeriesError
 from dragchain.figures.network_picture import Scene, load_scene
 from dragchain.figures.rendering import check_rendering

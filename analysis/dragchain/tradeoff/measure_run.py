@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.azimuth import parts
-from dragchain.drag.force import read_counted
+from dragchain.drag import parts, read_counted
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.samples import Sampled, sample

@@ -5,8 +5,7 @@ import pytest
 from scipy import stats
 
 from dragchain.errors import SeriesError
-from dragchain.statistics.power_law import Runs, fit_power_law
-from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
+from dragchain.statistics.power_law import Runs, fit_power_law, fit_shifted, fit_two_terms
 
 DEPTHS = (10.0, 20.0, 30.0, 40.0, 50.0)
 SWEEPS = 300

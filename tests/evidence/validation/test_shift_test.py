@@ -7,7 +7,7 @@ import pytest
 from chain_runs import FRAMES, INTERVAL_S, wander
 from scipy.stats import binom, false_discovery_control
 
-from dragchain.drag.peaks import find_drag_peaks
+from dragchain.drag import find_drag_peaks
 from evidence.validation.shift_test import (
     draw_shifts,
     holm,
