@@ -64,7 +64,7 @@ def summarise_forces(samples: pd.DataFrame) -> dict[str, MeanEstimate]:
 
 
 @dataclass(frozen=True)
-class Peaks:
+class DragPeaks:
     """Peaks of the resistance to the drag.
 
     Attributes
@@ -82,7 +82,7 @@ class Peaks:
     prominence_n: Floats
 
 
-def drag_peaks(samples: pd.DataFrame, case: Case) -> Peaks:
+def drag_peaks(samples: pd.DataFrame, case: Case) -> DragPeaks:
     """The peaks of counted samples with ``time_s`` and ``drag_n``; see `find_drag_peaks`."""
     time_s, drag_n = (samples[name].to_numpy(np.float64) for name in ("time_s", "drag_n"))
     return find_drag_peaks(time_s, drag_n, min_separation_s=peak_separation_s(case))
@@ -94,7 +94,7 @@ def find_drag_peaks(
     *,
     min_separation_s: float,
     min_prominence_n: float | None = None,
-) -> Peaks:
+) -> DragPeaks:
     """Find the peaks of the resistance ``-drag_n``.
 
     A peak is a local maximum that stands out by `min_prominence_n` and from
@@ -116,7 +116,7 @@ def find_drag_peaks(
 
     Returns
     -------
-    Peaks
+    DragPeaks
         In order of time; none if the series is constant.
 
     Raises
@@ -135,7 +135,7 @@ def find_drag_peaks(
     prominence = float(np.std(drag_n, ddof=1)) if min_prominence_n is None else min_prominence_n
     distance = max(1.0, min_separation_s / interval)
     index, found = find_peaks(-drag_n, prominence=prominence, distance=distance)
-    return Peaks(index.astype(np.int64), time_s[index], drag_n[index], found["prominences"])
+    return DragPeaks(index.astype(np.int64), time_s[index], drag_n[index], found["prominences"])
 
 
 def peak_separation_s(case: Case) -> float:
@@ -158,7 +158,7 @@ def beyond(angle_rad: Floats) -> Floats:
     return np.heaviside(np.where(np.abs(angle_rad) < _ON_LIMIT_RAD, 0.0, angle_rad), 0.5)
 
 
-def within(azimuth_rad: Floats, limit_rad: float) -> Floats:
+def within_angle(azimuth_rad: Floats, limit_rad: float) -> Floats:
     """Share of each contact that lies within an angle of the direction of motion.
 
     Parameters
@@ -226,7 +226,7 @@ def ahead_behind(
         of motion and beyond, mean over the frames; ``ratio`` of the two; ``fraction_ahead`` of all.
         A contact abeam counts half on either side.
     """
-    ahead = within(azimuth_rad, np.pi / 2)
+    ahead = within_angle(azimuth_rad, np.pi / 2)
     weights = np.stack([normal_force_n * ahead, normal_force_n * (1.0 - ahead)], axis=1)
 
     def statistic(sums: Floats) -> Floats:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.drag import AZIMUTH_BINS, DEPTH_BINS, circumference, parts, to_the_left, within
+from dragchain.drag import AZIMUTH_BINS, DEPTH_BINS, circumference, parts, to_the_left, within_angle
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
 from dragchain.run.paths.circle import Circle
@@ -142,9 +142,9 @@ def contacts_of(point: Point) -> Contacts:
     azimuth, depth, force = (
         table[name].to_numpy(np.float64) for name in ("azimuth_rad", "depth_m", "normal_force_n")
     )
-    ahead = float((force * within(azimuth, np.pi / 2)).sum() / force.sum())
-    front = within(azimuth, _FRONT)
-    flank = within(azimuth, 2 * _FRONT) - front
+    ahead = float((force * within_angle(azimuth, np.pi / 2)).sum() / force.sum())
+    front = within_angle(azimuth, _FRONT)
+    flank = within_angle(azimuth, 2 * _FRONT) - front
     in_front, at_flanks = float((force * front).sum()), float((force * flank).sum())
     immersion = needed(point.case.workpiece, "workpiece").immersion_depth_m
     levels = np.linspace(0.0, immersion, DEPTH_BINS + 1)

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from tradeoff_files import measures, write
 
-from dragchain.tradeoff.compare import read_runs
-from dragchain.tradeoff.outcome import Tradeoff, compare
+from dragchain.tradeoff.compare import read_plan_runs
+from dragchain.tradeoff.outcome import Tradeoff, compare_settings
 
 REFERENCE, SOFT, COARSE, FAST = (1.0, 0.2, 1.0), (0.01, 0.2, 1.0), (1.0, 0.5, 1.0), (1.0, 0.2, 5.0)
 BOTH = (0.01, 0.5, 1.0)
@@ -39,7 +39,7 @@ def contents(**changes: Any) -> list[dict[str, Any]]:
 def made(folder: Path, found: list[dict[str, Any]]) -> Tradeoff:
     """The trade-off of runs with these measures, the first at the reference."""
     files = write(folder, found)
-    return compare(*read_runs(files, files[0].parent))
+    return compare_settings(*read_plan_runs(files, files[0].parent))
 
 
 def point_of(content: dict[str, Any]) -> tuple[float, ...]:

@@ -19,7 +19,7 @@ from dragchain.network.chains import (
     particle_stress,
     path_rows,
     peters_rows,
-    split,
+    split_chains,
 )
 from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame, read_frames
 from dragchain.network.statistics import cluster_rows, frame_clusters, frame_statistics
@@ -124,7 +124,7 @@ def _columns(
 ) -> dict[str, Any]:
     """The columns of chains of one definition, none of them dominant."""
     forces, count = frame.normal_force[rows.contacts], len(rows)
-    ids = split(frame.particle_id[rows.particles], rows.particle_starts)
+    ids = split_chains(frame.particle_id[rows.particles], rows.particle_starts)
     height = frame.centre[rows.particles, 2]
     return {
         "step": np.full(count, frame.step),

@@ -22,7 +22,7 @@ from dragchain.drag import (
     summarise_forces,
 )
 from dragchain.errors import SeriesError
-from dragchain.figures.network_picture import Scene, load_scene
+from dragchain.figures.network_picture import NetworkScene, load_scene
 from dragchain.figures.rendering import check_rendering
 from dragchain.report.findings import (
     FILE,
@@ -116,7 +116,7 @@ class RunData:
         return dominant_bottlenecks(self.network, self.chains)
 
     @cached_property
-    def scene(self) -> Scene:
+    def scene(self) -> NetworkScene:
         """What the pictures of the contact network show, if pictures can be rendered here."""
         check_rendering()
         return load_scene(self.folder, self.case)

@@ -194,11 +194,11 @@ def find(
     )
 
 
-def _sample(runs: Sequence[Run]) -> power_law.Runs:
+def _sample(runs: Sequence[Run]) -> power_law.RunMeans:
     rows = [run.row for run in runs]
     drag = np.array([row.drag_n for row in rows])
     errors = np.array([row.standard_error_n for row in rows]) / drag
-    return power_law.Runs(
+    return power_law.RunMeans(
         np.array([row.level for row in rows]), drag, errors, [row.bed for row in rows]
     )
 

@@ -45,7 +45,7 @@ def free_degrees(beds: Sequence[Hashable], effects: int) -> int:
     return len(beds) - effects - (len(set(beds)) - 1 if shares_beds(beds) else 0)
 
 
-def alike(same_bed: Floats, fraction: float) -> Floats:
+def correlation(same_bed: Floats, fraction: float) -> Floats:
     """Covariance of runs of which those from the same bed share a part, over the variance."""
     return np.asarray((1.0 - fraction) * np.eye(len(same_bed)) + fraction * same_bed)
 
@@ -150,7 +150,7 @@ _LARGEST_FRACTION = 0.98
 
 
 @dataclass(frozen=True)
-class Fit(Effects):
+class EffectsFit(Effects):
     """Effects of settings.
 
     Attributes
@@ -167,7 +167,7 @@ class Fit(Effects):
 
 def fit_effects(
     design: Floats, values: Floats, beds: Sequence[Hashable], bed_fraction: float | None = None
-) -> Fit:
+) -> EffectsFit:
     """Generalised least squares with a random effect of the bed.
 
     The covariance of two runs is ``s^2`` for a run with itself, ``r s^2`` for
@@ -199,17 +199,17 @@ def fit_effects(
         bed_fraction, left = 0.0, free_degrees(beds, number)
         if shares_beds(beds) and left >= 1:
             bed_fraction, degrees = _best_fraction(design, values, same_bed), left
-    model = Whitened.of(design, values, alike(same_bed, bed_fraction))
+    model = Whitened.of(design, values, correlation(same_bed, bed_fraction))
     variance = model.square / model.degrees
     covariance = np.asarray(variance * model.covariance)
-    return Fit(model.effects, covariance, degrees, math.sqrt(variance), bed_fraction)
+    return EffectsFit(model.effects, covariance, degrees, math.sqrt(variance), bed_fraction)
 
 
 def _best_fraction(design: Floats, values: Floats, same_bed: Floats) -> float:
     """The fraction of the beds that maximises the restricted likelihood at the best variance."""
 
     def loss(fraction: float) -> float:
-        model = Whitened.of(design, values, alike(same_bed, fraction))
+        model = Whitened.of(design, values, correlation(same_bed, fraction))
         return model.log_determinants + 0.5 * model.degrees * math.log(max(model.square, 1e-300))
 
     found = minimize_scalar(loss, bounds=(0.0, _LARGEST_FRACTION), method="bounded")

@@ -20,7 +20,7 @@ from dragchain.errors import SeriesError
 from dragchain.statistics.bed_effects import (
     Effects,
     Whitened,
-    alike,
+    correlation,
     free_degrees,
     same,
     shares_beds,
@@ -67,7 +67,7 @@ class Scatter:
 
 
 @dataclass(frozen=True)
-class Runs:
+class RunMeans:
     """What a fit is made from: N runs.
 
     Attributes
@@ -140,17 +140,17 @@ class Runs:
 
     def covariance(self, scatter: Scatter) -> Floats:
         """Covariance of the logarithms, (N, N)."""
-        between = alike(self.same_bed, scatter.bed_fraction)
+        between = correlation(self.same_bed, scatter.bed_fraction)
         return np.asarray(scatter.spread**2 * between + np.diag(self.errors**2))
 
-    def within(self, low: float, high: float) -> "Runs":
+    def within(self, low: float, high: float) -> "RunMeans":
         """The runs whose level is from `low` to `high`."""
         inside = (self.x >= low) & (self.x <= high)
         beds = [bed for bed, one in zip(self.beds, inside, strict=True) if one]
-        return Runs(self.x[inside], self.values[inside], self.errors[inside], beds)
+        return RunMeans(self.x[inside], self.values[inside], self.errors[inside], beds)
 
 
-def estimate_scatter(runs: Runs, design: Floats) -> Scatter:
+def estimate_scatter(runs: RunMeans, design: Floats) -> Scatter:
     """Scatter about a linear model by restricted likelihood.
 
     Patterson and Thompson 1971, Biometrika 58, 545; with known errors of the
@@ -198,7 +198,7 @@ class PowerLaw:
 
     Attributes
     ----------
-    runs : Runs
+    runs : RunMeans
     line : Linear
         Effects: logarithm of the value at the centre of the levels, and n.
     means : Linear
@@ -211,7 +211,7 @@ class PowerLaw:
         None if no level has runs enough to tell.
     """
 
-    runs: Runs
+    runs: RunMeans
     line: Linear
     means: Linear
     scatter: Scatter
@@ -250,7 +250,7 @@ class PowerLaw:
         return found.estimate([0.0, 0.0, 1.0]).exp(minus=1.0)
 
 
-def fit_power_law(runs: Runs) -> PowerLaw:
+def fit_power_law(runs: RunMeans) -> PowerLaw:
     """Fit a power law to runs, and test whether it holds.
 
     The test compares the residuals of the law with those of a mean for every
@@ -286,13 +286,13 @@ class AgainstLevels:
 
 
 def compare_with_levels(
-    runs: Runs, design: Floats, values: Floats, scale: float = 1.0
+    runs: RunMeans, design: Floats, values: Floats, scale: float = 1.0
 ) -> AgainstLevels | None:
     """Test a law of two effects by the means of the levels; None if too few runs repeat a level.
 
     Parameters
     ----------
-    runs : Runs
+    runs : RunMeans
     design : (N, 2) ndarray
         Of the law.
     values : (N,) ndarray
@@ -310,14 +310,14 @@ def compare_with_levels(
     return AgainstLevels(means, _lack_of_fit(straight, means, runs))
 
 
-def _level_means(runs: Runs, scatter: Scatter, line: Linear) -> Linear:
+def _level_means(runs: RunMeans, scatter: Scatter, line: Linear) -> Linear:
     """Means of levels without repetition, with the scatter about the line."""
     model = Whitened.of(runs.each_level(), runs.logarithms, runs.covariance(scatter))
     scale = max(1.0, line.square / (len(runs.x) - 2))
     return Linear(model.effects, np.asarray(scale * model.covariance), line.degrees, 0.0)
 
 
-def _lack_of_fit(straight: Linear, means: Linear, runs: Runs) -> float:
+def _lack_of_fit(straight: Linear, means: Linear, runs: RunMeans) -> float:
     more = len(runs.levels) - 2
     left = means.square / (len(runs.x) - len(runs.levels))
     if left == 0.0:

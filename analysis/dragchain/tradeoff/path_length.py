@@ -9,7 +9,7 @@ from scipy import stats
 from dragchain.arrays import Floats
 from dragchain.statistics.correlated import autocovariance
 from dragchain.statistics.estimate import CONFIDENCE, NORMAL_QUANTILE, student_quantile
-from dragchain.tradeoff.measures import QUANTITIES, Quantity
+from dragchain.tradeoff.measures import QUANTITIES, Measurand
 from dragchain.tradeoff.outcome import Tradeoff
 
 
@@ -19,7 +19,7 @@ class Reach:
 
     Attributes
     ----------
-    quantity : Quantity
+    quantity : Measurand
     halfwidth : float
         Relative half-width of the 95 % interval of one run over the common path.
     arc_m : float
@@ -28,7 +28,7 @@ class Reach:
         Length of a block: nothing is known of shorter paths, m.
     """
 
-    quantity: Quantity
+    quantity: Measurand
     halfwidth: float
     arc_m: float
     block_m: float
@@ -87,7 +87,7 @@ class Along:
     drift_halfwidth: float
 
 
-def along(tradeoff: Tradeoff, quantity: Quantity) -> Along | None:
+def along(tradeoff: Tradeoff, quantity: Measurand) -> Along | None:
     """How a quantity changes along the path; None if runs are too short for that."""
     complete = [run.measures for run in tradeoff.runs if run.complete]
     longest = max(measures.arc_m for measures in complete)
@@ -111,7 +111,7 @@ def along(tradeoff: Tradeoff, quantity: Quantity) -> Along | None:
     )
 
 
-def _drift(quantity: Quantity, blocks: Floats, drag: Floats) -> float:
+def _drift(quantity: Measurand, blocks: Floats, drag: Floats) -> float:
     half = len(blocks) // 2
     scale = drag.mean() if quantity.signed else quantity.of_blocks(blocks)
     change = quantity.of_blocks(blocks[-half:]) - quantity.of_blocks(blocks[:half])

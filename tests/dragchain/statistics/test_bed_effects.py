@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from dragchain.errors import SeriesError
-from dragchain.statistics.bed_effects import Factors, Whitened, alike, fit_effects, same
+from dragchain.statistics.bed_effects import Factors, Whitened, correlation, fit_effects, same
 
 REFERENCE = {"modulus": 1.0, "step": 0.2}
 SEEDS = range(4)
@@ -132,12 +132,12 @@ def problem() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(3)
     design = np.column_stack([np.ones(6), np.arange(6.0)])
     errors = np.diag(rng.uniform(0.1, 1.0, 6))
-    return design, rng.normal(size=6), alike(same(OWN_BEDS), 0.4) + errors
+    return design, rng.normal(size=6), correlation(same(OWN_BEDS), 0.4) + errors
 
 
 def test_runs_from_one_bed_share_a_part_of_their_variance() -> None:
     assert same(OWN_BEDS)[0].tolist() == [1, 0, 1, 0, 0, 1]
-    covariance = alike(same(OWN_BEDS), 0.25)
+    covariance = correlation(same(OWN_BEDS), 0.25)
     assert np.diag(covariance).tolist() == [1.0] * 6
     assert (covariance[0, 2], covariance[0, 1]) == (0.25, 0.0)
 
