@@ -32,7 +32,6 @@ localrules:
     filling,
     pass_verdict,
     process,
-    render_verification,
     report,
     scaling,
     stability,

@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.contact_law.hertz import Elastic, effective_modulus, effective_shear, sphere_mass
 from dragchain.dumps.run_parts import iter_frames
 from dragchain.errors import TableError
 from dragchain.run.case import load_outputs
 from dragchain.run.completeness import read_accepted
-from evidence.contact_law.impact import Contact, Motion, Particle, sliding_impact
-from evidence.contact_law.integrated_impact import integrated_impact
-from evidence.verification.collide import CollideCase, ContactFacts
+from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear, particle_mass
+from evidence.verification.experiment import CollideCase, ContactFacts
+from evidence.verification.law import Contact, Motion, Particle, integrated_impact, sliding_impact
 
 _VECTORS = {
     "position_m": ("x_m", "y_m", "z_m"),
@@ -50,8 +49,8 @@ class Recording:
     def particle(self, number: int) -> Particle:
         """Mass and radius of a particle by its id."""
         body = self.case.bodies[number - 1]
-        density = self.case.types[body.type - 1].density_kg_m3
-        return Particle(sphere_mass(body.radius_m, density), body.radius_m)
+        material = self.case.types[body.type - 1]
+        return Particle(particle_mass(material, body.radius_m), body.radius_m)
 
     @cached_property
     def contacts(self) -> "tuple[RecordedContact, ...]":
@@ -100,8 +99,7 @@ class RecordedContact:
         """What the law knows of the contact, from its two materials."""
         case, partner = self.run.case, self.partner_at
         kinds = [case.type_of(body) for body in (self.meeting.particle, self.meeting.partner)]
-        types = (case.types[kind - 1] for kind in kinds)
-        own, other = (Elastic(kind.youngs_modulus_pa, kind.poissons_ratio) for kind in types)
+        own, other = (case.types[kind - 1] for kind in kinds)
         pair = next(pair for pair in case.pairs if list(pair.types) == sorted(kinds))
         return Contact(
             particle=self.run.particle(self.meeting.particle),

@@ -39,7 +39,6 @@ from dragdeck.source_hash import source_hash
 from dragdeck.study.check import warnings
 from dragdeck.study.yaml import read_yaml
 from evidence.stability.points import bed_settings
-from evidence.verification.suite import suite_of
 
 
 def locking_call():
@@ -394,14 +393,6 @@ def fall_time(wildcards):
 def calibration_inputs():
     """What the drops of a calibration are made from: the study and the drop's templates."""
     return [str(relative(CASES[0].file)), *templates_of("drop_test")]
-
-
-# --- verification -----------------------------------------------------------------
-
-
-def of_experiment(run, file):
-    """Path of a file of a run of the verification suite."""
-    return f"{run_path('verification', 'collide', run)}/{file}"
 
 
 # --- stability map ----------------------------------------------------------------

@@ -1,30 +1,20 @@
 """Effective moduli, masses and the contact time of Hertz."""
 
-import math
-
 import pytest
 
 from dragchain.contact_law.hertz import (
     Elastic,
     contact_time,
     effective_modulus,
-    effective_shear,
     sphere_mass,
-    tangential_damping_ratio,
 )
-from evidence.contact_law.impact import CONTACT_TIME, Contact, Particle, largest_overlap
+from evidence.verification.law import CONTACT_TIME, Contact, Particle, largest_overlap
 
 STEEL = Elastic(2e11, 0.3)
 
 
 def test_moduli_of_two_equal_bodies() -> None:
     assert effective_modulus(STEEL, STEEL) == pytest.approx(2e11 / 0.91 / 2)
-    assert effective_shear(STEEL, STEEL) == pytest.approx(2e11 / (4 * 1.7 * 1.3))
-
-
-def test_the_tangential_damping_follows_from_the_two_stiffnesses() -> None:
-    ratio = 4 * effective_shear(STEEL, STEEL) / effective_modulus(STEEL, STEEL)
-    assert tangential_damping_ratio(0.3) == pytest.approx(math.sqrt(ratio))
 
 
 def test_the_contact_time_is_that_of_the_largest_overlap() -> None:

@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from made_run import Raw
 from spoilt_dumps import NAMES, ROWS, SPOILT, binary, spoilt, text
-from tiny_run_files import Raw
 
 from dragchain.dumps.any_dump import dump_files, layout_of, read_dump
 from dragchain.dumps.careful_reader import read_carefully

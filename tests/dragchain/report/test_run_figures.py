@@ -13,14 +13,12 @@ from figure_files import (
     STEP_S,
     R,
     case_json,
-    columns_json,
-    printed,
     resistance,
-    save,
     workpiece_contacts_table,
     workpiece_force_table,
     write_process_run,
 )
+from made_run import output, save, write_documents
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -298,10 +296,9 @@ def test_a_machine_that_cannot_render_is_told_what_to_install(
 
 @pytest.fixture
 def filling(tmp_path: Path) -> Path:
-    content = case_json("filling")
-    content["phases"] = [{"name": "settle", "start_step": 0, "end_step": LAST}]
-    content["settled"] = {"energy_ratio": 1e-5}
-    (tmp_path / "case.json").write_text(json.dumps(content))
+    settle = [{"name": "settle", "start_step": 0, "end_step": LAST}]
+    case = case_json("filling", phases=settle, settled={"energy_ratio": 1e-5})
+    write_documents(tmp_path, case)
     bed = {
         "schema": 2,
         "bed_height_m": 0.07,
@@ -312,7 +309,6 @@ def filling(tmp_path: Path) -> Path:
         "radius_std_m": 0.0,
         "kinetic_energy_ratio": 1e-7,
     }
-    (tmp_path / "tables").mkdir()
     (tmp_path / "tables" / "packing.json").write_text(json.dumps(bed))
     return tmp_path
 
@@ -341,11 +337,9 @@ def test_energy_ratio_of_particles_that_fell_their_diameter_is_one(filling: Path
 
 
 def test_a_drop_is_drawn_with_its_restitution(tmp_path: Path) -> None:
-    content = case_json("drop_test")
-    content["phases"] = []
-    (tmp_path / "case.json").write_text(json.dumps(content))
     columns = ["step", "time_s", "z_m", "vz_m_s", "force_n"]
-    columns_json(tmp_path, {"impacts": printed(columns, 1, None)})
+    outputs = {"impacts": output("print", columns, 1, 0, None, pattern="out.{part}.txt")}
+    write_documents(tmp_path, case_json("drop_test", phases=[]), outputs)
     lines = [" ".join(columns)]
     for first in (10, 200, 300):
         lines += [

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tradeoff_files import measures
-from tradeoff_runs import REFERENCE, SOFT, contents, made
+from tradeoff_files import REFERENCE, SOFT, contents, made, measures
 
 from dragchain.tradeoff.compare import compare_quantity
 from dragchain.tradeoff.outcome import Tradeoff

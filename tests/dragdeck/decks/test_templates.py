@@ -2,12 +2,11 @@
 
 import re
 import signal
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
+from made_study import Made
 from markupsafe import Markup
 
 from dragdeck.cases.case import Case
@@ -15,8 +14,6 @@ from dragdeck.decks.render import deck_text, effective, idle, overriding
 from dragdeck.decks.templates import (
     comment,
     environment,
-    explained,
-    number,
     quoted,
     template_files,
 )
@@ -24,7 +21,6 @@ from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.process import process_scene
-from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)
 
@@ -44,19 +40,8 @@ def test_what_is_neither_text_nor_number_is_refused(value: object) -> None:
         quoted(value)
 
 
-def test_plain_values_stay_as_they_are() -> None:
-    assert quoted("hertz tangential history") == "hertz tangential history"
-    assert quoted(0.1) == "0.1"
-    assert quoted(3) == "3"
-    assert quoted(Markup("${part}")) == "${part}"
-    assert number(1e-300) == "1e-300"
-
-
-def test_a_title_stays_in_its_comment(
-    project: Project, small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
-    small["title"] = 'R&D of "Müller" # $x &'
-    (case,) = load_cases(write_study(small))
+def test_a_title_stays_in_its_comment(project: Project, made: Made) -> None:
+    case = made({"title": 'R&D of "Müller" # $x &'})
     text = deck_text(process_scene(case, BED), environment(project.templates))
     assert text.splitlines()[0] == "# RD of Müller  x "
     assert comment("a\nb") == "ab"
@@ -106,12 +91,6 @@ def test_a_template_that_extends_itself_is_explained(case: Case, project: Projec
     with pytest.raises(InputError, match="extends or calls itself") as caught:
         render(case, project)
     assert 'extend "base/' in str(caught.value.remedy)
-
-
-def test_a_macro_that_calls_itself_is_explained(case: Case, project: Project) -> None:
-    own(case, in_block("{% macro again() %}{{ again() }}{% endmacro %}{{ again() }}"))
-    with pytest.raises(InputError, match="calls itself"):
-        render(case, project)
 
 
 def test_a_template_without_end_is_stopped(case: Case, project: Project) -> None:
@@ -310,9 +289,3 @@ def test_a_missing_template_is_named_where_it_is_used(
     with pytest.raises(InputError, match=r"no such template: 'base/proces\.in\.j2'") as caught:
         environment(project.templates, file.parent)
     assert (caught.value.file, caught.value.field) == (file, "line 2")
-
-
-def test_an_error_without_a_place_names_the_template() -> None:
-    with pytest.raises(InputError) as caught, explained("process.in.j2"):
-        raise MemoryError
-    assert (caught.value.file, caught.value.field) == ("process.in.j2", None)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from tiny_run_files import Raw
+from made_run import Raw
 
 from dragdeck.decks.case_file import CountOfRun, RanksOfRun, SettlingCriterion, SteadyCriterion
 from dragdeck.decks.outputs import Kind, OutputOfRun

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_run import Raw
 from spoilt_dumps import NAMES, ROWS, SPOILT, binary, spoilt, text
-from tiny_run_files import Raw
 
 from dragchain.dumps.careful_reader import read_carefully
 from dragchain.errors import DumpError

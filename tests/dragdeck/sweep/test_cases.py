@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from made_study import Load, Made
 
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
@@ -14,7 +15,7 @@ from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.registry import SCENES
-from dragdeck.sweep.cases import load_cases, new_study, study_file
+from dragdeck.sweep.cases import load_cases, study_file
 
 
 @pytest.fixture
@@ -74,11 +75,8 @@ def test_the_order_of_keys_does_not_matter(ids: Callable[..., dict[str, str]]) -
     assert ids(reverse) == ids()
 
 
-def test_a_matrix_makes_every_combination(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
-    small["sweep"] = {"motion.speed_m_s": [0.01, 0.02], "seed": [1, 2, 3]}
-    cases = load_cases(write_study(small))
+def test_a_matrix_makes_every_combination(load: Load) -> None:
+    cases = load({"sweep": {"motion.speed_m_s": [0.01, 0.02], "seed": [1, 2, 3]}})
     assert len(cases) == len({PROCESS.run_id(case) for case in cases}) == 6
     assert cases[3].name == "quick_speed_m_s-0.02_seed-1"
     assert cases[3].study.motion.speed_m_s == 0.02
@@ -104,29 +102,20 @@ def test_a_matrix_makes_every_combination(
         ({"seed": list(range(9999)), "media.count": list(range(9999))}, "makes 99980001 cases"),
     ],
 )
-def test_a_wrong_matrix_is_explained(
-    small: dict[str, Any], write_study: Callable[..., Path], sweep: dict[str, Any], words: str
-) -> None:
-    small["sweep"] = sweep
+def test_a_wrong_matrix_is_explained(sweep: dict[str, Any], words: str, load: Load) -> None:
     with pytest.raises(InputError) as caught:
-        load_cases(write_study(small))
+        load({"sweep": sweep})
     assert words in str(caught.value)
 
 
-def test_many_cases_need_a_confirmation(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
+def test_many_cases_need_a_confirmation(small: dict[str, Any], load: Load) -> None:
     small["sweep"] = {"seed": list(range(201))}
-    small["accepted"] = {"cases": 201}
-    assert len(load_cases(write_study(small))) == 201
+    assert len(load({"accepted": {"cases": 201}})) == 201
 
 
-def test_problems_of_all_cases_are_named_together(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
-    small["sweep"] = {"motion.speed_m_s": [0.01, -1, -2], "seed": [1, -3]}
+def test_problems_of_all_cases_are_named_together(load: Load) -> None:
     with pytest.raises(InputError) as caught:
-        load_cases(write_study(small))
+        load({"sweep": {"motion.speed_m_s": [0.01, -1, -2], "seed": [1, -3]}})
     values = [error.value for error in (caught.value, *caught.value.more)]
     assert sorted(map(str, values)) == ["-1", "-2", "-3"]
 
@@ -143,11 +132,6 @@ def test_the_fidelity_of_the_command_line_goes_first(
     (case,) = load_cases(write_study(small), "draft")
     assert case.study.fidelity == "draft"
     assert PROCESS.run_id(case).startswith("draft-")
-
-
-def test_an_unknown_study_lists_the_known(project: Project, case: Case) -> None:
-    with pytest.raises(InputError, match="one of: small"):
-        study_file(project.studies, "large")
 
 
 def test_an_edited_mesh_names_another_run(
@@ -225,12 +209,9 @@ def test_a_scaling_that_the_matrix_cannot_tell_is_refused(
 
 
 @pytest.mark.parametrize("field", ["media.cuont", "path", "motion.path.lenght_m", "media."])
-def test_an_assumption_about_no_field_is_refused(
-    small: dict[str, Any], write_study: Callable[..., Path], field: str
-) -> None:
-    small["assumptions"] = [{"field": "media", "why": "any"}, {"field": field, "why": "any"}]
+def test_an_assumption_about_no_field_is_refused(field: str, load: Load) -> None:
     with pytest.raises(InputError, match="no such field") as caught:
-        load_cases(write_study(small))
+        load({"assumptions": [{"field": "media", "why": "any"}, {"field": field, "why": "any"}]})
     assert (caught.value.field, repr(field) in caught.value.problem) == (
         "assumptions.1.field",
         True,
@@ -238,27 +219,12 @@ def test_an_assumption_about_no_field_is_refused(
 
 
 @pytest.mark.parametrize("field", ["media.count", "pairs", "motion.tilt_deg", "reference"])
-def test_an_assumption_may_be_about_a_field_or_a_block(
-    small: dict[str, Any], write_study: Callable[..., Path], field: str
-) -> None:
-    small["assumptions"] = [{"field": field, "why": "any"}]
-    assert load_cases(write_study(small))
+def test_an_assumption_may_be_about_a_field_or_a_block(field: str, load: Load) -> None:
+    assert load({"assumptions": [{"field": field, "why": "any"}]})
 
 
-@pytest.mark.parametrize("name", [".", "..", "", "a/b"])
-def test_a_name_that_can_be_none_is_not_called_taken(
-    write_study: Any, small: Any, name: str
-) -> None:
-    with pytest.raises(InputError, match="this name cannot be used for a study"):
-        new_study(write_study(small).parent.parent, name, "small")
-
-
-def test_an_assumption_about_another_kind_of_path_is_left_out(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
-    small["assumptions"] = [{"field": "motion.path.radius_m", "why": "a guess"}]
-    (circle,) = load_cases(write_study(small))
-    small["motion"]["path"] = {"kind": "line", "start_m": [-0.01, 0.0], "length_m": 0.02}
-    (line,) = load_cases(write_study(small))
+def test_an_assumption_about_another_kind_of_path_is_left_out(made: Made) -> None:
+    circle = made({"assumptions": [{"field": "motion.path.radius_m", "why": "a guess"}]})
+    line = made({"motion.path": {"kind": "line", "start_m": [-0.01, 0.0], "length_m": 0.02}})
     assumed = [process_scene(one).case.assumptions for one in (circle, line)]
     assert [len(one) for one in assumed] == [1, 0]

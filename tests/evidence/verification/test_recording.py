@@ -4,7 +4,7 @@ import pytest
 from recordings import ON_PARTICLE, ON_PLANE, recording
 
 from dragchain.errors import TableError
-from evidence.contact_law.impact import Motion
+from evidence.verification.law import Motion
 
 
 def test_overlap_is_measured_to_a_plane_and_to_a_particle() -> None:

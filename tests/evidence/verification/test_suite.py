@@ -13,11 +13,9 @@ from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
 from dragdeck.project import Project
 from dragdeck.study.model import Study
-from evidence.__main__ import main
-from evidence.verification.collide import Experiment, collide_scene, frame_period
-from evidence.verification.impacts import Impacts
-from evidence.verification.lab import contact_time
-from evidence.verification.suite import suite_file, suite_of
+from evidence.verification.checks import CHECKS
+from evidence.verification.experiment import Experiment, collide_scene, frame_period
+from evidence.verification.suite import Impacts, contact_time, suite_file, suite_of
 
 
 @pytest.fixture
@@ -144,8 +142,8 @@ def test_no_particle_of_the_suite_can_leave_its_box(experiments: dict[str, Exper
 
 def test_two_equal_particles_touch_shorter_than_one_on_its_like(case: Case) -> None:
     steel = case.study.materials["steel"]
-    plane = contact_time(steel, 0.01, None, None, steel, 1.0)
-    pair = contact_time(steel, 0.01, steel, 0.01, steel, 1.0)
+    plane = contact_time(steel, 0.01, steel, None, 1.0)
+    pair = contact_time(steel, 0.01, steel, 0.01, 1.0)
     assert pair / plane == pytest.approx((0.5**2 / 0.5) ** 0.2)
 
 
@@ -167,19 +165,14 @@ def test_a_rigid_partner_is_stiff(case: Case) -> None:
 def test_a_test_varies_one_thing() -> None:
     with pytest.raises(ValidationError, match="exactly one"):
         Impacts.model_validate(
-            {"number": 1, "title": "t", "partner": "plane", "radius_m": 1, "speed_m_s": 1,
-             "vary": {"spin_m_s": [1], "angle_deg": [1]}, "series": []}
+            {"number": 1, "title": "t", "text": [], "partner": "plane", "radius_m": 1,
+             "speed_m_s": 1, "vary": {"spin_m_s": [1], "angle_deg": [1]}, "series": []}
         )  # fmt: skip
 
 
-def test_the_command_writes_every_deck(
-    case: Case, project: Project, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(project.root)
-    assert main(["render-suite", "small"]) == 0
-    runs = list(suite_of(case.study))
-    for run in runs:
-        folder = project.results("verification") / "collide" / run
-        assert {file.name for file in folder.iterdir()} == {
-            "in.liggghts", "case.json", "columns.json", "bodies.data",
-        }  # fmt: skip
+def test_the_page_has_checks_and_words_of_every_test() -> None:
+    suite = suite_file()
+    assert list(suite.tests()) == list(CHECKS)
+    for name, test in suite.tests().items():
+        assert test.text, name
+        assert all(" " in words or words in suite.notes for words in test.text), name

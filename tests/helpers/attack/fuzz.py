@@ -11,7 +11,7 @@ import numpy as np
 import trimesh
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
-from tiny_run_files import Raw
+from made_run import Raw
 
 from dragchain.dumps.any_dump import read_dump
 from dragchain.dumps.careful_reader import read_print_file

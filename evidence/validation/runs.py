@@ -20,7 +20,7 @@ _FEWEST = 2
 
 
 @dataclass(frozen=True)
-class Point:
+class MeasuredRun:
     """A process run of a validation.
 
     Attributes
@@ -38,7 +38,7 @@ class Point:
     changed: Mapping[str, JsonValue]
 
     @property
-    def fidelity(self) -> Setting:
+    def settings(self) -> Setting:
         """Modulus scale, time step over the Rayleigh time, and speed factor."""
         return Setting.of(self.measures.fidelity)
 
@@ -48,33 +48,33 @@ class Point:
         return self.measures.seed
 
     @property
-    def setting(self) -> tuple[object, ...]:
+    def but_for_bed(self) -> tuple[object, ...]:
         """What runs that differ in their bed alone have in common."""
-        return (self.fidelity, json.dumps(self.changed, sort_keys=True))
+        return (self.settings, json.dumps(self.changed, sort_keys=True))
 
 
 @dataclass(frozen=True)
-class Points:
+class RunsByBed:
     """All runs of a validation.
 
     Attributes
     ----------
-    packings : list of Point
+    packings : list of MeasuredRun
         At the reference's settings, one per bed, by seed.
-    others : list of Point
+    others : list of MeasuredRun
         At other settings, in the order given.
     """
 
-    packings: list[Point]
-    others: list[Point]
+    packings: list[MeasuredRun]
+    others: list[MeasuredRun]
 
     @property
-    def all(self) -> list[Point]:
+    def all(self) -> list[MeasuredRun]:
         """The packings first."""
         return [*self.packings, *self.others]
 
 
-def read_points(folders: Sequence[Path]) -> Points:
+def read_runs(folders: Sequence[Path]) -> RunsByBed:
     """Read the runs of a validation; the first is the reference.
 
     Parameters
@@ -93,19 +93,19 @@ def read_points(folders: Sequence[Path]) -> Points:
     standard = measures[folders[0]]
     if not standard.complete:
         raise TableError(f"{folders[0]}: the reference run is not complete, so nothing is known")
-    first, *points = (
-        Point(folder, load_case(folder), own, differing_inputs(own, standard))
+    first, *runs = (
+        MeasuredRun(folder, load_case(folder), own, differing_inputs(own, standard))
         for folder, own in measures.items()
         if own.complete
     )
-    packings = [first, *(point for point in points if point.setting == first.setting)]
+    packings = [first, *(run for run in runs if run.but_for_bed == first.but_for_bed)]
     if len(packings) < _FEWEST:
         raise TableError(
             f"{len(packings)} complete run at the reference's settings: the differences between "
             f"packings need {_FEWEST} at least; give the plan's reference more seeds"
         )
-    others = [point for point in points if point.setting != first.setting]
-    return Points(sorted(packings, key=lambda point: point.seed), others)
+    others = [run for run in runs if run.but_for_bed != first.but_for_bed]
+    return RunsByBed(sorted(packings, key=lambda run: run.seed), others)
 
 
 def over_packings(values: Sequence[float], *, ratio: bool = False) -> Estimate:

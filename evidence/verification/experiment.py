@@ -1,17 +1,20 @@
-"""A few particles and plane walls, placed and set in motion one by one."""
+"""A few particles and plane walls, placed and set in motion one by one: a run of the suite."""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from pydantic.dataclasses import dataclass as checked
+
 from dragdeck import __version__
+from dragdeck.cases.case import digest
 from dragdeck.decks import outputs
 from dragdeck.decks.case_file import CaseFile, CountOfRun, RanksOfRun
 from dragdeck.decks.data_file import Body as DataBody
 from dragdeck.decks.data_file import Vector, data_file
 from dragdeck.decks.deck import Deck, LeftOut, Materials, Scene, contact_law
-from dragdeck.documents import Part
+from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.rounding import round_to
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.material import Material
@@ -39,7 +42,8 @@ class Wall:
     shape: str
 
 
-class Body(Part):
+@checked(frozen=True)
+class Body:
     """A particle: material type from 1, radius m, place m, velocity m/s and spin rad/s."""
 
     type: int
@@ -49,7 +53,8 @@ class Body(Part):
     spin_rad_s: Vector = (0.0, 0.0, 0.0)
 
 
-class ContactFacts(Part):
+@checked(frozen=True)
+class ContactFacts:
     """A contact of an experiment: particles by number, or ``plane``; the value that is varied."""
 
     particle: int
@@ -57,8 +62,20 @@ class ContactFacts(Part):
     value: float
 
 
-class ExperimentFacts(Part):
-    """What an experiment tests.
+class NamedMaterial(Material):
+    """A type's material."""
+
+    name: str
+
+
+class MeetingPair(Pair):
+    """What two types do to each other."""
+
+    types: tuple[int, int]
+
+
+class CollideCase(CaseFile):
+    """A few particles and walls, one by one, and what they test.
 
     Attributes
     ----------
@@ -74,6 +91,12 @@ class ExperimentFacts(Part):
         Of a bouncing particle and of an incline alone.
     """
 
+    remedy = "run `snakemake verify`"
+
+    study: str = "verification"
+    scene: Literal["collide"] = "collide"
+    run: str = ""
+    versions: Mapping[str, str] = {"dragdeck": __version__}
     test: str
     number: int
     heading: str
@@ -83,69 +106,20 @@ class ExperimentFacts(Part):
     contacts: Sequence[ContactFacts]
     impacts: int | None = None
     angle_deg: float | None = None
-
-
-class NamedMaterial(Material):
-    """A type's material."""
-
-    name: str
-
-
-class MeetingPair(Pair):
-    """What two types do to each other."""
-
-    types: tuple[int, int]
-
-
-class CollideCase(CaseFile, ExperimentFacts):
-    """A few particles and walls, one by one."""
-
-    remedy = "run `snakemake verify`"
-
-    scene: Literal["collide"] = "collide"
-    gravity_m_s2: Vector
-    limit_force: bool
-    fidelity: RanksOfRun
+    gravity_m_s2: Vector = (0.0, 0.0, 0.0)
+    limit_force: bool = True
+    fidelity: RanksOfRun = RanksOfRun(ranks=1)
     media: CountOfRun
     types: Sequence[NamedMaterial]
     pairs: Sequence[MeetingPair]
     bodies: Sequence[Body]
-    walls: Sequence[Wall]
+    walls: Sequence[Wall] = ()
 
     def type_of(self, body: int | str) -> int:
         """Type of a particle, by its number, or of a wall, by its name."""
         if isinstance(body, int):
             return self.bodies[body - 1].type
         return next(wall.type for wall in self.walls if wall.name == body)
-
-
-def collide_case(
-    types: Sequence[tuple[str, Material]],
-    pairs: Mapping[tuple[int, int], Pair],
-    bodies: Sequence[Body],
-    **own: Any,
-) -> CollideCase:
-    """The case of a few particles and walls.
-
-    Parameters
-    ----------
-    types : sequence of (str, Material)
-        A name and a material for each type.
-    pairs : mapping of (int, int) to Pair
-        Types (from 1, the smaller first) that meet, and what they do to each other.
-    bodies : sequence of Body
-    **own
-        The other fields of `CollideCase`; without gravity and walls there are none.
-    """
-    return CollideCase(
-        **{"gravity_m_s2": (0.0, 0.0, 0.0), "limit_force": True, "walls": (), **own},
-        versions={"dragdeck": __version__},
-        fidelity=RanksOfRun(ranks=1),
-        media=CountOfRun(count=len(bodies)),
-        types=[NamedMaterial(name=name, **material.model_dump()) for name, material in types],
-        pairs=[MeetingPair(types=met, **pair.model_dump()) for met, pair in pairs.items()],
-        bodies=bodies,
-    )
 
 
 @dataclass(frozen=True)
@@ -155,6 +129,53 @@ class Experiment:
     case: CollideCase
     steps: int
     period: int | None = None
+
+
+def experiment(
+    test: str,
+    number: int,
+    heading: str,
+    slug: Sequence[str],
+    *,
+    types: Sequence[tuple[str, Material]],
+    pairs: Mapping[tuple[int, int], Pair],
+    bodies: Sequence[Body],
+    steps: int,
+    period: int | None = None,
+    **more: Any,
+) -> Experiment:
+    """An experiment with its run id: a slug and 8 hex digits of all it depends on.
+
+    Parameters
+    ----------
+    test, number, heading
+        Of the test.
+    slug : sequence of str
+        The readable part of the run id, after the name.
+    types : sequence of (str, Material)
+        A name and a material for each type.
+    pairs : mapping of (int, int) to Pair
+        Types (from 1, the smaller first) that meet, and what they do to each other.
+    bodies : sequence of Body
+        The first sets the Rayleigh time.
+    steps, period : int
+    **more
+        Further fields of `CollideCase`.
+    """
+    case = CollideCase(
+        **{"title": heading, **more},
+        test=test,
+        number=number,
+        heading=heading,
+        rayleigh_time_s=rayleigh_time(types[0][1], bodies[0].radius_m),
+        media=CountOfRun(count=len(bodies)),
+        types=[NamedMaterial(name=name, **material.model_dump()) for name, material in types],
+        pairs=[MeetingPair(types=met, **pair.model_dump()) for met, pair in pairs.items()],
+        bodies=bodies,
+    )
+    content = case.model_dump(mode="json", by_alias=True, exclude={"title", "heading", "versions"})
+    run = "-".join([test, *slug, digest({**content, "steps": steps})])
+    return Experiment(case.model_copy(update={"run": run}), steps, period)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,7 +252,7 @@ def _bodies_data(case: CollideCase, duration_s: float) -> str:
     """The data file, with a box that no particle can leave."""
     x, y, z = (_side(case, axis, duration_s) for axis in range(3))
     bodies = [
-        DataBody(density_kg_m3=case.types[body.type - 1].density_kg_m3, **dict(body))
+        DataBody(density_kg_m3=case.types[body.type - 1].density_kg_m3, **vars(body))
         for body in case.bodies
     ]
     return data_file(case.title, len(case.types), (x, y, z), bodies)

@@ -4,6 +4,12 @@ Uhlmann et al. (2015, section 5) say that the peaks are caused by contact chains
 and bowl. The force of a chain on the workpiece is a part of the drag, so it is high at a peak by
 construction. The chain of a frame is therefore the dominant path to the bowl that is found, and
 measured, without the forces on the workpiece.
+
+A series of frames is tested against the peaks by circular shifts. A shift moves all events of a run
+by the same number of frames, round the end to the beginning. It keeps the autocorrelation of the
+series and the spacing of the events and breaks only what ties the one to the other. Runs are
+shifted independently of each other, so their joint null distribution is that of the mean over runs
+of one shift each.
 """
 
 import math
@@ -14,7 +20,7 @@ from typing import Literal, get_args
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.signal import find_peaks
 
 from dragchain.arrays import Floats, Ints
@@ -23,10 +29,134 @@ from dragchain.errors import TableError
 from dragchain.network.chains import dominant_path, widest_paths
 from dragchain.network.frame import WORKPIECE, NetworkFrame, read_frames
 from dragchain.run.case import load_case
-from dragchain.statistics.estimate import Real, Verdict
+from dragchain.statistics.estimate import Estimate, Real, Verdict, mean_of
 from dragdeck.documents import Document, Part
-from evidence.validation import shift_test
-from evidence.validation.shift_test import ShiftTest
+
+# --- tests by circular shifts ------------------------------------------------------------------
+
+SHIFTS = 19_999
+"""Random shifts of the joint null distribution: the smallest p-value is 1 in 20,000."""
+
+_SEED = 20150101
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShiftTest(Estimate):
+    """A statistic at the events against its null distribution.
+
+    Its value is the mean over the runs, NaN if no run has one; its interval comes from the spread
+    over the runs (`mean_of`).
+
+    Attributes
+    ----------
+    p_greater : float
+        Share of shifts, the true position included, whose statistic is at least as large.
+    """
+
+    p_greater: float
+
+
+def shifted_means(series: Floats, events: Ints, reach: int) -> Floats:
+    """Mean of a series around the events, for every circular shift of the events.
+
+    Parameters
+    ----------
+    series : (N,) ndarray
+        One value a frame; NaN where there is none. Such frames count in no mean.
+    events : (K,) ndarray of int
+        Frames of the events.
+    reach : int
+        Frames before and after each event that count for it.
+
+    Returns
+    -------
+    (N,) ndarray
+        Element s: events moved s frames later; NaN where no frame has a value.
+    """
+    count = len(series)
+    near = np.zeros(count)
+    offsets = np.arange(-reach, reach + 1)
+    np.add.at(near, (events[:, None] + offsets).ravel() % count, 1.0)
+    there = np.isfinite(series)
+    sums = _correlate(near, np.where(there, series, 0.0))
+    weights = np.rint(_correlate(near, there.astype(np.float64)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(weights > 0, sums / weights, np.nan))
+
+
+def _correlate(near: Floats, series: Floats) -> Floats:
+    spectrum = np.conj(np.fft.rfft(near)) * np.fft.rfft(series)
+    return np.asarray(np.fft.irfft(spectrum, len(series)))
+
+
+def standardised(series: Floats, means: Floats) -> Floats:
+    """Return means less the series' mean over its standard deviation (divisor N - 1)."""
+    known = series[np.isfinite(series)]
+    spread = float(known.std(ddof=1)) if len(known) > 1 else 0.0
+    if spread == 0.0:
+        return np.full(len(means), np.nan)
+    return np.asarray((means - known.mean()) / spread)
+
+
+def draw_shifts(lengths: Sequence[int], count: int = SHIFTS, seed: int = _SEED) -> Ints:
+    """Draw shifts for runs of these numbers of frames, (count, runs); the same every time."""
+    parts = np.random.default_rng(seed).random((count, len(lengths)))
+    return np.asarray(np.floor(parts * np.asarray(lengths)), dtype=np.int64)
+
+
+def joint(by_shift: Sequence[Floats], shifts: Ints) -> Floats:
+    """The mean over runs for each row of `shifts`, runs without a value left out.
+
+    Parameters
+    ----------
+    by_shift : sequence of (N_r,) ndarray
+        A run's statistic for each of its circular shifts.
+    shifts : (S, R) ndarray of int
+        A shift for each run, modulo its number of frames.
+    """
+    drawn = np.stack([run[shifts[:, at] % len(run)] for at, run in enumerate(by_shift)])
+    there = np.isfinite(drawn)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(there, drawn, 0.0).sum(axis=0) / there.sum(axis=0))
+
+
+def shift_test(by_shift: Sequence[Floats], shifts: Ints) -> ShiftTest:
+    """Test the true position, shift 0 of every run, against joint shifts.
+
+    Parameters
+    ----------
+    by_shift : sequence of (N_r,) ndarray
+        As for `joint`.
+    shifts : (S, R) ndarray of int
+        As drawn by `draw_shifts`.
+    """
+    zero = np.zeros((1, len(by_shift)), dtype=np.int64)
+    value = float(joint(by_shift, zero)[0])
+    if not np.isfinite(value):
+        return ShiftTest(np.nan, np.nan, np.nan, p_greater=np.nan)
+    over_runs = mean_of([float(run[0]) for run in by_shift])
+    null = joint(by_shift, shifts)
+    reached = null[np.isfinite(null)] >= value - _ROUNDING
+    return ShiftTest(value, over_runs.ci95_low, over_runs.ci95_high, p_greater=_p_value(reached))
+
+
+def _p_value(reached: NDArray[np.bool_]) -> float:
+    return float((1 + reached.sum()) / (1 + len(reached)))
+
+
+def holm(p_values: ArrayLike) -> Floats:
+    """Adjust p-values for their number (Holm 1979, Scand. J. Statist. 6, 65-70); NaN stays NaN."""
+    given = np.asarray(p_values, dtype=np.float64)
+    adjusted = np.full(given.shape, np.nan)
+    known = np.flatnonzero(np.isfinite(given))
+    order = known[np.argsort(given[known], kind="stable")]
+    factors = np.arange(len(order), 0, -1)
+    adjusted[order] = np.minimum(np.maximum.accumulate(factors * given[order]), 1.0)
+    return adjusted
+
+
+# --- chains and peaks --------------------------------------------------------------------------
 
 REACH_S = 0.02
 """Frames within this time of a peak count as at the peak."""
@@ -188,15 +318,15 @@ def of_runs(run_dirs: Sequence[Path]) -> Findings:
     return findings([read_run(folder) for folder in run_dirs])
 
 
-def findings(runs: Sequence[ChainSeries], count: int = shift_test.SHIFTS) -> Findings:
+def findings(runs: Sequence[ChainSeries], count: int = SHIFTS) -> Findings:
     """Make all tests, each with so many shifts, and judge the statements."""
-    shifts = shift_test.draw_shifts([len(run.time_s) for run in runs], count)
+    shifts = draw_shifts([len(run.time_s) for run in runs], count)
     tests = [_difference(runs, shifts, name) for name in DESCRIPTORS]
     tests += [
         _fraction("coverage", [(run, run.peaks, run.strong_frames()) for run in runs], shifts),
         _fraction("reverse", [(run, run.strongest_frames(), run.peaks) for run in runs], shifts),
     ]
-    adjusted = shift_test.holm([test.p for test in tests]).tolist()
+    adjusted = holm([test.p for test in tests]).tolist()
     tests = [test.model_copy(update={"p_holm": p}) for test, p in zip(tests, adjusted, strict=True)]
     return Findings(
         runs=tuple(
@@ -287,12 +417,12 @@ def _difference(runs: Sequence[ChainSeries], shifts: Ints, name: str) -> PeakTes
     """Whether a descriptor is higher around the peaks than at other times."""
     series = [run.chains[name] for run in runs]
     means = [
-        shift_test.shifted_means(one, run.peaks, round(REACH_S / run.interval_s))
+        shifted_means(one, run.peaks, round(REACH_S / run.interval_s))
         for run, one in zip(runs, series, strict=True)
     ]
-    by_shift = [shift_test.standardised(one, mean) for one, mean in zip(series, means, strict=True)]
+    by_shift = [standardised(one, mean) for one, mean in zip(series, means, strict=True)]
     at_peaks, expected = _mean([mean[:1] for mean in means]), _mean(series)
-    found = shift_test.shift_test(by_shift, shifts)
+    found = shift_test(by_shift, shifts)
     return _test(name, DESCRIPTORS[name], at_peaks, expected, found)
 
 
@@ -301,12 +431,10 @@ def _fraction(
 ) -> PeakTest:
     """Whether events of each run have one of the others near more often than by chance."""
     by_shift = [
-        shift_test.shifted_means(
-            near_any(run.time_s, run.time_s[others], NEAR_S).astype(float), own, 0
-        )
+        shifted_means(near_any(run.time_s, run.time_s[others], NEAR_S).astype(float), own, 0)
         for run, own, others in events
     ]
-    found = shift_test.shift_test(by_shift, shifts)
+    found = shift_test(by_shift, shifts)
     return _test(statement, statement, found.value, _mean(by_shift), found)
 
 
