@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import polygamma
 
-from dragchain.tradeoff.measures import QUANTITIES, Quantity
+from dragchain.tradeoff.measures import QUANTITIES, Measurand
 from dragchain.windows.estimate import Known, WindowsRecord
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -46,7 +46,7 @@ class Run:
     blocks: int
 
 
-def runs(quantity: Quantity) -> Iterator[Run]:
+def runs(quantity: Measurand) -> Iterator[Run]:
     """The quantity in every complete run at the speed of its scene."""
     for archive in ARCHIVES:
         with tarfile.open(archive) as files:
@@ -71,7 +71,7 @@ def runs(quantity: Quantity) -> Iterator[Run]:
                 )
 
 
-def known(quantity: Quantity) -> Known | None:
+def known(quantity: Measurand) -> Known | None:
     """What the runs say of a quantity; None if too few scenes have it."""
     scenes = defaultdict[str, list[Run]](list)
     for run in runs(quantity):

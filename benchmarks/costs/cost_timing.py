@@ -17,11 +17,11 @@ from dragchain.tradeoff.tradeoff_document import Machine
 from dragdeck import __version__
 from dragdeck.cases.case import Case
 from dragdeck.decks import CASE_FILE, DECK_FILE
+from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import deck_text, write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.log import engine_errors, loops, reached_end
 from dragdeck.engine.process import Engine, command, execute, find_engine
 from dragdeck.engine.reports import Report

@@ -24,8 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.signal import find_peaks
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import drag_peaks, peak_separation_s
+from dragchain.drag import drag_peaks, peak_separation_s, read_counted
 from dragchain.errors import TableError
 from dragchain.network.chains import dominant_path, widest_paths
 from dragchain.network.frame import WORKPIECE, NetworkFrame, read_frames

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.dumps.run_parts import iter_frames
 from dragchain.errors import TableError
 from dragchain.run.case import load_outputs
 from dragchain.run.completeness import read_accepted
+from dragchain.run.run_parts import iter_frames
 from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear, particle_mass
 from evidence.verification.experiment import CollideCase, ContactFacts
 from evidence.verification.law import (

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.drag.force import FORCES, read_counted, summarise_forces
+from dragchain.drag import FORCES, read_counted, summarise_forces
 from dragchain.errors import TableError
 from dragchain.figures.panels import legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN, drawing, png
@@ -33,7 +33,7 @@ from dragchain.scaling.document import (
 )
 from dragchain.statistics import power_law
 from dragchain.statistics.estimate import Estimate, flattened
-from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
+from dragchain.statistics.power_law import fit_shifted, fit_two_terms
 from dragdeck.files import write_bytes, write_text
 
 _STORED = Path(__file__).parent / "data"
@@ -194,11 +194,11 @@ def find(
     )
 
 
-def _sample(runs: Sequence[Run]) -> power_law.Runs:
+def _sample(runs: Sequence[Run]) -> power_law.RunMeans:
     rows = [run.row for run in runs]
     drag = np.array([row.drag_n for row in rows])
     errors = np.array([row.standard_error_n for row in rows]) / drag
-    return power_law.Runs(
+    return power_law.RunMeans(
         np.array([row.level for row in rows]), drag, errors, [row.bed for row in rows]
     )
 

@@ -25,7 +25,6 @@ from dragchain.cli import main
 from dragchain.errors import ExportError, TableError
 from dragchain.export.frames import FrameSeries, Membership, Selection, chain_membership
 from dragchain.export.write import fresh_folder, write_export
-from dragchain.network.chain_table import chain_table
 from dragchain.network.chains import (
     WidestPath,
     dominant_path,
@@ -34,6 +33,7 @@ from dragchain.network.chains import (
 )
 from dragchain.network.frame import NetworkFrame, read_frames
 from dragchain.network.statistics import contact_counts
+from dragchain.network.write import chain_table
 from dragchain.tables.run_folder import Run
 
 STEPS = range(0, LAST + 1, 20)

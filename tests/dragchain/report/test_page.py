@@ -20,13 +20,13 @@ from dragchain.report.page import (
     file_uri,
     fixed,
     fraction,
+    heading_key,
     interval,
     measured,
     number,
     page_environment,
     percent,
     sections,
-    slug,
     with_interval,
 )
 from dragchain.statistics.estimate import Estimate
@@ -127,7 +127,7 @@ def test_one_style_sheet_is_enough(name: str) -> None:
 
 
 def test_names_of_sections() -> None:
-    assert slug("Do chains explain the peaks?") == "do-chains-explain-the-peaks"
+    assert heading_key("Do chains explain the peaks?") == "do-chains-explain-the-peaks"
     body = '<h2 id="a">Load &amp; wear</h2><h2>no name</h2>\n<h2 id="b">B</h2>'
     assert sections(body) == [("a", "Load &amp; wear"), ("b", "B")]
 

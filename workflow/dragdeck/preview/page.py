@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 import numpy as np
 
-from dragdeck.preview.layout import COLOURS, Floats, Layout, MovingWorkpiece, views
+from dragdeck.preview.layout import COLOURS, CaseLayout, Floats, MovingWorkpiece, views
 from dragdeck.preview.swept import drawn
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Words:
         return "\n".join([f"{self.study}, case {self.case}", *gaps, *refused])
 
 
-def page(layout: Layout, swept: Sequence["Trimesh"], words: Words, png: bytes) -> str:
+def page(layout: CaseLayout, swept: Sequence["Trimesh"], words: Words, png: bytes) -> str:
     """The page of a layout and the volumes that its workpieces sweep, as HTML."""
     loader = jinja2.PackageLoader("dragdeck", "preview")
     environment = jinja2.Environment(
@@ -59,7 +59,7 @@ def page(layout: Layout, swept: Sequence["Trimesh"], words: Words, png: bytes) -
     )
 
 
-def _scene(layout: Layout, swept: Sequence["Trimesh"]) -> dict[str, Any]:
+def _scene(layout: CaseLayout, swept: Sequence["Trimesh"]) -> dict[str, Any]:
     """What the viewer draws, as plain data; lengths in mm."""
     fixed = [*(_surface(one, "swept", 0.35) for one in swept)]
     fixed += [_surface(layout.bed, "bed", 0.3), _surface(layout.bowl, "bowl", 0.35)]

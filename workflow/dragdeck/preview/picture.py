@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dragdeck.preview.layout import COLOURS, Floats, Layout, View, views
+from dragdeck.preview.layout import COLOURS, CaseLayout, Floats, Projection, views
 from dragdeck.preview.swept import below_and_above, drawn
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class _Layer(NamedTuple):
     opacity: float
 
 
-def picture(layout: Layout, swept: Sequence["Trimesh"], title: str, refused: bool) -> bytes:
+def picture(layout: CaseLayout, swept: Sequence["Trimesh"], title: str, refused: bool) -> bytes:
     """Draw a layout and the volumes that its workpieces sweep, as PNG; the title is plain text."""
     from matplotlib.figure import Figure
 
@@ -50,7 +50,7 @@ def picture(layout: Layout, swept: Sequence["Trimesh"], title: str, refused: boo
     return _png(figure)
 
 
-def small_picture(layout: Layout, swept: Sequence["Trimesh"]) -> bytes:
+def small_picture(layout: CaseLayout, swept: Sequence["Trimesh"]) -> bytes:
     """Draw a layout obliquely from above, without words, as PNG: for the report on its runs."""
     from matplotlib.figure import Figure
 
@@ -64,7 +64,7 @@ def small_picture(layout: Layout, swept: Sequence["Trimesh"]) -> bytes:
     return _png(figure)
 
 
-def _views(layout: Layout) -> list[View]:
+def _views(layout: CaseLayout) -> list[Projection]:
     return views(layout.workpieces[0].direction_rad)
 
 
@@ -74,7 +74,7 @@ def _png(figure: "Figure") -> bytes:
     return content.getvalue()
 
 
-def _layers(layout: Layout, swept: Sequence["Trimesh"]) -> Iterator[_Layer]:
+def _layers(layout: CaseLayout, swept: Sequence["Trimesh"]) -> Iterator[_Layer]:
     """Surfaces in the order of painting: below the surface of the bed, the surface, and above."""
     bodies = [_Layer(volume, "swept", 0.7) for volume in swept]
     bodies += [_Layer(drawn(body.at_start), "workpiece", 1.0) for body in layout.workpieces]
@@ -85,7 +85,7 @@ def _layers(layout: Layout, swept: Sequence["Trimesh"]) -> Iterator[_Layer]:
     yield from (body._replace(mesh=above) for body, (_, above) in zip(bodies, parts, strict=True))
 
 
-def _draw(axes: "Axes", view: View, layout: Layout, layers: Sequence[_Layer]) -> None:
+def _draw(axes: "Axes", view: Projection, layout: CaseLayout, layers: Sequence[_Layer]) -> None:
     for layer in layers:
         _paint(axes, view, layer)
     for name in _WORDS:
@@ -108,7 +108,7 @@ def _draw(axes: "Axes", view: View, layout: Layout, layers: Sequence[_Layer]) ->
         axes.set_axis_off()
 
 
-def _paint(axes: "Axes", view: View, layer: _Layer) -> None:
+def _paint(axes: "Axes", view: Projection, layer: _Layer) -> None:
     """Paint the triangles that face the viewer, all of them together as transparent as asked."""
     from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
@@ -132,14 +132,14 @@ def _faded(opacity: float, image: Any, _dpi: float) -> tuple[Any, float, float]:
     return image * np.array([1.0, 1.0, 1.0, opacity]), 0, 0
 
 
-def _arrow(axes: "Axes", view: View, start_m: Floats, along_m: Floats) -> None:
+def _arrow(axes: "Axes", view: Projection, start_m: Floats, along_m: Floats) -> None:
     points = 1e3 * view.basis[:2] @ np.array([start_m, along_m]).T
     (x, across), (y, along) = points
     scale: Any = {"angles": "xy", "scale_units": "xy", "scale": 1}
     axes.quiver(x, y, across, along, color=COLOURS["drag"], width=0.008, zorder=3, **scale)
 
 
-def _turn(axes: "Axes", view: View, centre_m: Floats, radius_m: float, sense: int) -> None:
+def _turn(axes: "Axes", view: Projection, centre_m: Floats, radius_m: float, sense: int) -> None:
     """A third of a circle with an arrowhead where something turns, as seen by this view."""
     if not sense:
         return
@@ -150,7 +150,7 @@ def _turn(axes: "Axes", view: View, centre_m: Floats, radius_m: float, sense: in
     _arrow(axes, view, centre_m + ring[-1], 0.3 * ahead)
 
 
-def _line(axes: "Axes", view: View, points: Floats, colour: Any, **style: Any) -> None:
+def _line(axes: "Axes", view: Projection, points: Floats, colour: Any, **style: Any) -> None:
     across, along, _ = 1e3 * view.basis @ points.T
     axes.plot(across, along, color=colour, **style)
 
