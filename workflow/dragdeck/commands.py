@@ -14,8 +14,7 @@ import jinja2
 from pydantic import ValidationError
 from rich.table import Table
 
-from dragdeck.advice.advise import Advice
-from dragdeck.advice.advise import advise as advised_settings
+from dragdeck.advice.advise import Advice, advised_settings
 from dragdeck.advice.forecast import (
     AdviceFile,
     advice_file,
