@@ -1,7 +1,6 @@
 """The drops of a calibration, and the recovery of a known restitution on the real engine."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +33,6 @@ from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import hertz_contact_time, rayleigh_time
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DROP_TEST, DropFidelity, drop_scene
-
-WriteStudy = Callable[..., Path]
 
 
 @pytest.fixture
