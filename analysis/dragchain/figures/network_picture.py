@@ -25,7 +25,7 @@ from dragchain.errors import TableError
 from dragchain.figures.rendering import Camera, Image, new_plotter, photograph
 from dragchain.figures.style import COLOURS, force_map
 from dragchain.network.chains import WidestPath, dominant_path, widest_paths
-from dragchain.network.frame import NetworkFrame, read_frames
+from dragchain.network.frame import NetworkFrame, network_frames
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed, process_time
 from dragchain.run.workpiece import placed, workpiece_mesh
@@ -121,7 +121,7 @@ def load_scene(run_dir: Path, case: Case) -> NetworkScene:
     network = read_table(run_dir / "tables" / "network.parquet", ["step", "time_s"])
     times = process_time(network["time_s"].to_numpy(np.float64), case)
     step = picture_step(network["step"].to_numpy(np.float64), times)
-    frame = next(read_frames(run_dir, (step, step)), None)
+    frame = next(network_frames(run_dir, (step, step)), None)
     if frame is None:
         raise TableError(f"particles.parquet lacks step {step}, which network.parquet has")
     path = dominant_path(frame, widest_paths(frame))
