@@ -15,10 +15,10 @@ from dragchain.documents import Part
 from dragchain.drag.around import AZIMUTH_BINS, DEPTH_BINS
 from dragchain.drag.azimuth import circumference, parts, to_the_left, within
 from dragchain.run.case import Case
-from dragchain.run.kinematics import needed
-from dragchain.run.paths.circle import Circle
+from dragchain.run.kinematics import motion_of, needed
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 from dragchain.tables.by_step import read_table
+from dragdeck.study.paths.circle import CirclePath
 from evidence.validation.corridor import Network, bin_by_bin, corridor, network
 from evidence.validation.runs_by_bed import Point, over_packings
 
@@ -183,8 +183,9 @@ def _around(azimuth: Floats, force: Floats) -> Floats:
 
 
 def _outer_over_inner(case: Case, azimuth: Floats, force: Floats) -> float | None:
-    if not isinstance(case.motion, Circle):
+    path = motion_of(case).motion.path
+    if not isinstance(path, CirclePath):
         return None
     left = float((force * to_the_left(azimuth)).sum() / force.sum())
-    outer = left if case.motion.sign < 0 else 1.0 - left
+    outer = left if path.sign < 0 else 1.0 - left
     return _ratio(outer, 1.0 - outer)

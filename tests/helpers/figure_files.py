@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pyvista as pv
+from made_motion import with_motion
 
 from dragchain.network.write import write_chains
 
@@ -15,10 +16,11 @@ STEP_S = 1e-3
 DRAG_START = 100
 LAST = 500
 PERIOD = 20
+LINE = {"kind": "line", "start_m": [-0.01, 0.0]}
 
 
 def case_json(scene_name: str) -> dict[str, Any]:
-    return {
+    case = {
         "schema": 2, "study": "made", "scene": scene_name, "run": f"made-{scene_name}",
         "case": "made case", "upstream": {}, "timestep_s": STEP_S, "rayleigh_time_s": 2e-3,
         "gravity_m_s2": 10.0,
@@ -34,10 +36,6 @@ def case_json(scene_name: str) -> dict[str, Any]:
                  "immersion_depth_m": 0.02},
 
                "surface_m": 0.03,
-        "motion": {
-            "kind": "line", "axis_speed_m_s": 0.1, "start_m": [-0.01, 0.0], "direction_rad": 0.0,
-            "start_direction_rad": 0.0,
-        },
         "phases": [
             {"name": "plunge", "start_step": 0, "end_step": DRAG_START},
             {"name": "drag", "start_step": DRAG_START, "end_step": LAST},
@@ -46,6 +44,7 @@ def case_json(scene_name: str) -> dict[str, Any]:
         "reference": {"source": "a paper", "experiment": {"drag_mean_n": -4.0}},
         "versions": {"dragdeck": "0.1.0"},
     }  # fmt: skip
+    return with_motion(case, LINE, 0.1)
 
 
 def columns_json(run_dir: Path, outputs: dict[str, Any]) -> None:

@@ -2,11 +2,13 @@
 rests."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from made_motion import with_motion
 
 STEP_S = 1e-4
 PERIOD = 10
@@ -39,9 +41,12 @@ endsolid plate
 """A square of 20 mm that looks along +x; its diagonal runs up to the left."""
 
 
-def case_json(**motion: Any) -> dict[str, Any]:
+LINE = {"kind": "line", "start_m": [0.0, 0.0]}
+
+
+def case_json(path: Mapping[str, Any] = LINE, **motion: Any) -> dict[str, Any]:
     steel = {"youngs_modulus_pa": 2e11, "poissons_ratio": 0.3}
-    return {
+    case = {
         "schema": 2, "study": "made", "scene": "process", "run": "made-process",
         "case": "made case", "upstream": {}, "timestep_s": STEP_S, "rayleigh_time_s": 2e-4,
         "gravity_m_s2": 9.81,
@@ -59,8 +64,6 @@ def case_json(**motion: Any) -> dict[str, Any]:
         "workpiece": {"kind": "mesh", "radius_m": 0.01, "length_m": SIZE, "mesh": "workpiece.stl",
                  "immersion_depth_m": SIZE},
         "surface_m": SURFACE,
-        "motion": {"kind": "line", "axis_speed_m_s": SPEED, "start_m": [0.0, 0.0],
-                   "direction_rad": 0.0, "start_direction_rad": 0.0} | motion,
         "phases": [
             {"name": "plunge", "start_step": 0, "end_step": START},
             {"name": "drag", "start_step": START, "end_step": LAST},
@@ -68,6 +71,7 @@ def case_json(**motion: Any) -> dict[str, Any]:
         "statistics": {"transient_s": 0.0}, "assumptions": [], "reference": None,
         "versions": {"dragdeck": "0.1.0"},
     }  # fmt: skip
+    return with_motion(case, path, SPEED, **motion)
 
 
 def contact(

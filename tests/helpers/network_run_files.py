@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pyvista as pv
-from figure_files import DRAG_START, LAST, PERIOD, STEP_S, case_json, columns_json, save
+from figure_files import DRAG_START, LAST, LINE, PERIOD, STEP_S, case_json, columns_json, save
+from made_motion import with_motion
 from networks import RADIUS_M, random_frame
 
 from dragchain.figures.style import drawing
@@ -22,14 +23,17 @@ PEAK_N = (6.0, 5.0, 4.0)
 KIND = {body: f"particle-{name}" for body, name in KINDS.items()}
 
 
-def write_network_run(folder: Path, kind: str = "cylinder", **changes: Any) -> Path:
+def write_network_run(
+    folder: Path, kind: str = "cylinder", heading_deg: float = 0.0, **changes: Any
+) -> Path:
     """Write a run of 216 particles; `changes` are of its ``case.json``.
 
     The forces of each network frame are those of one random network times a factor, and the
     particles move by as much as 0.2 radii. The drag has three peaks.
     """
     (folder / "tables").mkdir(parents=True)
-    case = case_json("process") | changes
+    path = LINE | {"direction_deg": heading_deg}
+    case = with_motion(case_json("process") | changes, path, 0.1)
     case["workpiece"] = case["workpiece"] | {"kind": kind}
     (folder / "case.json").write_text(json.dumps(case))
     network = {"first_step": DRAG_START, "last_step": LAST, "period_steps": PERIOD}

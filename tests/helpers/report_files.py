@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from made_motion import with_motion
 from pages import Page
 
 from dragchain.report.extrapolated import FILE as EXTRAPOLATED
@@ -48,14 +49,14 @@ ASKED = {
 
 
 def case_json(scene: str, run: str, **more: Any) -> dict[str, Any]:
-    return {
+    case = {
         "schema": 2, "study": "small", "scene": scene, "run": run, "case": "10 mm <workpiece>",
         "upstream": {}, "timestep_s": 2.5e-5, "rayleigh_time_s": 3.2e-5, "gravity_m_s2": 9.81,
         "fidelity": {
             "name": "draft", "youngs_modulus_scale": 0.01, "timestep_fraction": 0.77,
             "speed_factor": 1.0, "skin_m": 0.0003, "ranks": 2,
         },
-        "inputs": {"media.count": 1422, "motion.speed_m_s": 0.01, "seeds": [1, 2]},
+        "inputs": {"media.count": 1422, "seeds": [1, 2]},
         "media": {"count": 1422, "radius_mean_m": 0.00327, "radius_std_m": 0.0,
                   "density_kg_m3": 2656.0},
         "bowl": {"radius_m": 0.04, "walls": "primitive"},
@@ -63,8 +64,6 @@ def case_json(scene: str, run: str, **more: Any) -> dict[str, Any]:
         "mesh": "workpiece.stl",
                  "immersion_depth_m": 0.05},
         "surface_m": 0.07,
-        "motion": {"kind": "circle", "axis_speed_m_s": 0.01, "radius_m": 0.02, "direction": "ccw",
-                   "orientation": "follow_path", "start_direction_rad": 1.57},
         "phases": [{"name": "drag", "start_step": 4000, "end_step": 64000}],
         "statistics": {"transient_s": 0.5}, "restitution": 0.68,
         "assumptions": [{"field": "bowl.radius_m", "value": 0.04, "why": "a plausible fraction"}],
@@ -72,6 +71,8 @@ def case_json(scene: str, run: str, **more: Any) -> dict[str, Any]:
                       "experiment": {"drag_mean_n": -2.59, "drag_std_n": 0.66}},
         "versions": {"dragdeck": "0.1.0"},
     } | more  # fmt: skip
+    path = {"kind": "circle", "radius_m": 0.02}
+    return with_motion(case, path, 0.01, orientation="follow_path")
 
 
 def run_json(**more: Any) -> dict[str, Any]:

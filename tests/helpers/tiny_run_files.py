@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from made_motion import with_motion
 
 BOX = "ITEM: BOX BOUNDS ff ff ff\n-0.05 0.05\n-0.05 0.05\n0 0.4\n"
 
@@ -175,7 +176,7 @@ def outputs_json() -> dict[str, Any]:
 
 def case_json() -> dict[str, Any]:
     """Content of ``case.json``."""
-    return {
+    case = {
         "schema": 2,
         "study": "tiny",
         "scene": "process",
@@ -195,7 +196,6 @@ def case_json() -> dict[str, Any]:
         },
         "inputs": {
             "media.count": 4,
-            "motion.speed_m_s": SPEED_M_S,
             "media.material": "stone",
             **dict.fromkeys(("bowl.material", "workpiece.material"), "steel"),
             **dict.fromkeys(("pairs.stone-stone.friction", "pairs.steel-stone.friction"), FRICTION),
@@ -217,13 +217,6 @@ def case_json() -> dict[str, Any]:
             "immersion_depth_m": 0.03,
         },
         "surface_m": SURFACE_M,
-        "motion": {
-            "kind": "line",
-            "axis_speed_m_s": SPEED_M_S,
-            "start_m": [0.0, 0.0],
-            "direction_rad": 0.0,
-            "start_direction_rad": 0.0,
-        },
         "phases": [
             {"name": "plunge", "start_step": 0, "end_step": DRAG_START},
             {"name": "drag", "start_step": DRAG_START, "end_step": LAST},
@@ -233,6 +226,7 @@ def case_json() -> dict[str, Any]:
         "reference": None,
         "versions": {"dragdeck": "0.1.0"},
     }
+    return with_motion(case, {"kind": "line", "start_m": [0.0, 0.0]}, SPEED_M_S)
 
 
 def raw_files() -> Mapping[str, bytes]:

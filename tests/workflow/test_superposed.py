@@ -10,7 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from loading_files import LINE as STRAIGHT
 from loading_files import STEP_S, case_json
+from made_motion import with_motion
 from paths import ROOT, SMALL_STUDY
 from plate import PLATE
 
@@ -19,13 +21,12 @@ from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.write import compute_loading
 from dragchain.run.case import Case
 from dragchain.run.kinematics import (
+    axis_speed,
     directions,
     drag_phase,
-    motion_of,
-    workpiece_turn,
+    workpiece_rotation,
 )
-from dragchain.run.superposed.spin import Spin as SpinRead
-from dragchain.run.workpiece import read_surface, turned
+from dragchain.run.workpiece import read_surface
 from dragdeck.decks import outputs
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.decks.render import write_run
@@ -37,7 +38,9 @@ from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import read_bed
-from dragdeck.study.superposed.kind import DragSteps, SuperposedOfRun
+from dragdeck.study.drive import Drive
+from dragdeck.study.rotation import rotated
+from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin
 from dragdeck.sweep.cases import load_cases
@@ -148,8 +151,8 @@ def asked_speed(motion: dict[str, Any]) -> float:
 def analytic(case: Case, motion: dict[str, Any], steps: np.ndarray) -> np.ndarray:
     """Where the reference point has to be, its height from that of the immersion."""
     time = (steps - drag_phase(case).start_step) * case.timestep_s
-    path, way = motion["path"], motion_of(case).axis_speed_m_s * time
-    faster = motion_of(case).axis_speed_m_s / asked_speed(motion)
+    path, way = motion["path"], axis_speed(case) * time
+    faster = axis_speed(case) / asked_speed(motion)
     found = np.zeros((len(steps), 3))
     if path["kind"] == "circle":
         angle = (-1 if path.get("direction") == "cw" else 1) * way / path["radius_m"]
@@ -181,9 +184,10 @@ def farthest_corner(folder: Path, steps: np.ndarray, ref_m: np.ndarray) -> float
         if file.is_file():
             mesh, frames = meshio.stl.read(file), frames + 1
             at = np.array([step])
-            turn = workpiece_turn(at, directions(at, place[None, :2], case), case)[0]
+            heading = directions(at, place[None, :2], case)
+            turn = workpiece_rotation(at, heading, case).matrices[0]
             corners = mesh.points[mesh.cells_dict["triangle"]]
-            off = max(off, float(np.abs(corners - turned(surface.corners, turn) - place).max()))
+            off = max(off, float(np.abs(corners - surface.corners @ turn.T - place).max()))
     assert frames > 1
     return off
 
@@ -245,9 +249,8 @@ def test_a_resumed_run_continues_the_motion(runs: Runs, path: dict[str, Any]) ->
     folder = runs.shallow(**motion)
     engine(folder)
     case, checkpoints = load_case(folder), sorted(folder.glob("checkpoint.*.restart"))
-    stage = case.superposed[-1]
-    assert isinstance(stage, SpinRead)
-    begun = drag_phase(case).start_step + stage.stages[0].steps
+    stages = case.superposed[-1].model_dump()["stages"]
+    begun = drag_phase(case).start_step + stages[0]["steps"]
     checkpoint = next(
         file
         for file in sorted(checkpoints, key=lambda file: int(file.name.split(".")[1]))
@@ -277,7 +280,8 @@ def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
     case = load_case(folder)
     force = pd.read_parquet(folder / "tables/workpiece_force.parquet")
     force = force[force["in_statistics"]]
-    middle = drag_phase(case).start_step + case.superposed[0].stages[0].steps
+    stages = case.superposed[0].model_dump()["stages"]
+    middle = drag_phase(case).start_step + stages[0]["steps"]
     first = force["step"].to_numpy() <= middle
     torque = force["torque_z_n_m"].to_numpy()
     assert torque[first].mean() < 0 < torque[~first].mean()
@@ -286,7 +290,7 @@ def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
 
     world, body = (force[[f"{name}_{axis}_n" for axis in "xyz"]] for name in ("force", "body"))
     turn = force["turn_rad"].to_numpy()
-    np.testing.assert_allclose(turned(body.to_numpy(), turn), world, atol=1e-12)
+    np.testing.assert_allclose(rotated(body.to_numpy(), turn), world, atol=1e-12)
 
     found = compute_loading(folder, Thresholds())
     contacts = pd.read_parquet(folder / "tables/workpiece_contacts.parquet", columns=["step"])
@@ -298,8 +302,8 @@ def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
     assert found.summary.closure.point_off_facet_max_m < 1e-6
 
     rate = np.where(sampled["step"] <= middle, 1, -1) * 300 * 2 * np.pi / 60
-    rate += motion_of(case).axis_speed_m_s / path["radius_m"]
-    power = -(sampled["drag_n"] * motion_of(case).axis_speed_m_s + sampled["torque_z_n_m"] * rate)
+    rate += axis_speed(case) / path["radius_m"]
+    power = -(sampled["drag_n"] * axis_speed(case) + sampled["torque_z_n_m"] * rate)
     work = found.summary.totals["workpiece_work_j"]
     assert work == pytest.approx(power.sum() * interval, rel=0.05)
 
@@ -338,7 +342,7 @@ fix drag all move/mesh mesh workpiece linear {{ speed }} 0. 0.
 {% for name, formula in superposed.variables | items %}
 variable {{ name }} equal {{ formula }}
 {% endfor %}
-fix superposed all move/mesh mesh workpiece {{ superposed.mover }}
+fix superposed all move/mesh mesh workpiece {{ superposed.movers[""] }}
 {% from "outputs.j2" import write %}
 {% for output in outputs %}
 {{ write(output) }}
@@ -354,12 +358,12 @@ def static_overlap(mass: float) -> float:
 
 
 def write_plate(
-    folder: Path, motion: SuperposedOfRun, drag: DragSteps, speed_m_s: float, written: Any
+    folder: Path, motion: SuperposedMotion, drag: Drive, speed_m_s: float, written: Any
 ) -> None:
     """Input script, plate and a particle that rests on it."""
     deck = environment(ROOT / "templates").from_string(DECK)
     text = deck.render(
-        superposed=motion.on_engine(drag.start), outputs=written, steps=drag.end,
+        superposed=motion.on_engine(drag, 0.0), outputs=written, steps=drag.end,
         timestep=drag.timestep_s, modulus=MODULUS, friction=FRICTION, gravity=GRAVITY,
         speed=speed_m_s, law="hertz tangential history",
     )  # fmt: skip
@@ -378,14 +382,13 @@ def test_an_oscillation_below_gravity_throws_no_particle_off(
     tmp_path: Path, ramp_s: float, thrown: bool
 ) -> None:
     """0.1 mm at 30 Hz accelerates with 0.36 g at most: only a start at full speed throws it off."""
-    oscillation = Oscillation(amplitude_m=1e-4, frequency_hz=30, ramp_s=ramp_s)
-    drag = DragSteps(0, 17_000, 1e-5)
+    motion = Oscillation(amplitude_m=1e-4, frequency_hz=30, ramp_s=ramp_s)
+    drag = Drive(0, 17_000, 1e-5, length_m=1.0)
     force = outputs.workpiece_force(20, drag.end, "workpiece")
-    motion = oscillation.of_run(drag)
     write_plate(tmp_path, motion, drag, 0.0, [force])
     engine(tmp_path)
     rows = np.loadtxt(tmp_path / "workpiece_force.1.txt", skiprows=1)
-    lifts = [motion.lift_m(step, drag.timestep_s) for step in rows[:, 0]]
+    lifts = motion.shift(drag, rows[:, 0])[:, 2]
     np.testing.assert_allclose(rows[:, 10], lifts, atol=1e-9)
     assert (rows[:, 4] == 0.0).any() == thrown
 
@@ -395,7 +398,8 @@ def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: 
 
     Friction then accelerates its centre by mu g, and its surface by another 5/2 mu g.
     """
-    drag, mass = DragSteps(0, STEPS, STEP_S / 10), DENSITY * 4 / 3 * np.pi * RADIUS**3
+    mass = DENSITY * 4 / 3 * np.pi * RADIUS**3
+    drag = Drive(0, STEPS, STEP_S / 10, length_m=SPEED * STEPS * STEP_S / 10)
     written = outputs.in_writing_order(
         [
             outputs.workpiece_force(20, STEPS, "workpiece"),
@@ -404,16 +408,15 @@ def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: 
         ]
     )
     spin = Spin(rpm=RPM, ramp_s=0.0)
-    write_plate(tmp_path, spin.of_run(drag), drag, SPEED, written)
+    write_plate(tmp_path, spin, drag, SPEED, written)
     ColumnsFile(outputs={each.name: each.as_part() for each in written}).write(
         tmp_path / "columns.json"
     )
-    superposed = [spin.of_run(drag).model_dump()]
-    made = case_json(axis_speed_m_s=SPEED, direction_rad=0.0) | {
-        "superposed": superposed,
+    made = case_json() | {
         "timestep_s": drag.timestep_s,
         "phases": [{"name": "drag", "start_step": 0, "end_step": STEPS}],
-    }  # fmt: skip
+    }
+    made = with_motion(made, STRAIGHT, SPEED, spin={"rpm": RPM, "ramp_s": 0})
     made["inputs"] |= {"bowl.material": "steel", "pairs.ceramic-steel.friction": FRICTION}
     (tmp_path / "case.json").write_text(json.dumps(made))
     engine(tmp_path)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
 from dragchain.run.case import Case
-from dragchain.run.kinematics import motion_of
+from dragchain.run.kinematics import axis_speed
 
 
 @dataclass(frozen=True)
@@ -89,4 +89,4 @@ def find_drag_peaks(
 
 def peak_separation_s(case: Case) -> float:
     """The time in which the workpiece travels one mean particle radius, s."""
-    return case.media.radius_mean_m / motion_of(case).axis_speed_m_s
+    return case.media.radius_mean_m / axis_speed(case)

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from dragchain.arrays import Floats, Ints, wrap_angle
+from dragchain.arrays import Floats, Ints
 from dragchain.network.chains import (
     ALPHA_RAD,
     STRESS_FACTOR,
@@ -20,6 +20,7 @@ from dragchain.network.chains import (
     split,
 )
 from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame
+from dragdeck.study.rotation import wrap_angle
 
 
 def chain_table(

@@ -211,8 +211,8 @@ def _workpiece(columns: Columns, run: Run, frames: list[ShownFrame]) -> dict[str
     poses = []
     for frame in frames:
         assert frame.data.workpiece is not None
-        place, turn = frame.data.workpiece
-        poses.append([*(1e3 * place).tolist(), turn])
+        place, rotation = frame.data.workpiece
+        poses.append([*(1e3 * place).tolist(), float(rotation.front_rad[0])])
     return {
         "poses": poses,
         "headings": _headings(run, frames),

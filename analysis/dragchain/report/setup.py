@@ -2,20 +2,13 @@
 
 from collections.abc import Iterator
 
+import numpy as np
 from pydantic import JsonValue
 
 from dragchain.report.findings import FillingFindings
 from dragchain.report.notation import TIMES, number
 from dragchain.run.case import Case
-from dragchain.run.kinematics import drag_phase, motion_of, needed
-
-_PATHS = {
-    "": "path",
-    "circle": "circle of radius {radius} mm",
-    "line": "straight line",
-    "rest": "at rest at {radius} mm from the axis of a rotating bowl",
-    "waypoints": "waypoints",
-}
+from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
 
 
 def set_up(case: Case, packings: int, filling: FillingFindings | None) -> list[tuple[str, str]]:
@@ -58,17 +51,15 @@ def _workpiece(case: Case) -> Iterator[str]:
 
 
 def _path(case: Case) -> Iterator[str]:
-    motion, drag = motion_of(case), drag_phase(case)
-    radius = 1e3 * float(getattr(motion, "radius_m", 0.0))
-    yield _PATHS[_text(case.inputs.get("motion.path.kind"))].format(radius=number(radius))
-    time_s = (drag.end_step - drag.start_step) * case.timestep_s
-    yield f"{_mm(time_s * motion.axis_speed_m_s)} long"
+    yield motion_of(case).motion.path.words(number)
+    end_s = np.array([drag_phase(case).end_step * case.timestep_s])
+    yield f"{_mm(float(path_passed(end_s, case)[0]))} long"
     yield f"immersed {_mm(needed(case.workpiece, 'workpiece').immersion_depth_m)}"
     yield from (f"with {one.kind}" for one in case.superposed)
 
 
 def _speed(case: Case) -> Iterator[str]:
-    simulated, factor = motion_of(case).axis_speed_m_s, case.fidelity.speed_factor
+    simulated, factor = axis_speed(case), case.fidelity.speed_factor
     yield f"{number(1e3 * simulated / factor)} mm/s"
     if factor != 1.0:
         yield f"simulated at {number(1e3 * simulated)} mm/s"

@@ -7,9 +7,9 @@ from pathlib import Path
 from dragchain.drag.force import FORCES, read_counted, summarise_forces
 from dragchain.errors import TableError
 from dragchain.run.case import Case, load_case
-from dragchain.run.kinematics import needed
-from dragchain.run.paths.circle import Circle
+from dragchain.run.kinematics import motion_of, needed
 from dragchain.scaling.document import ScaledRun
+from dragdeck.study.paths.circle import CirclePath
 
 _UNLIKE = frozenset({"seed"})
 """Inputs that runs of one scaling may differ in, beside its field."""
@@ -25,10 +25,11 @@ class Run:
     @property
     def gap_particles(self) -> float | None:
         """Gap between workpiece and bowl wall in mean particle diameters; None off a circle."""
-        if not isinstance(self.case.motion, Circle):
+        path = motion_of(self.case).motion.path
+        if not isinstance(path, CirclePath):
             return None
         bowl, workpiece = needed(self.case.bowl, "bowl"), needed(self.case.workpiece, "workpiece")
-        gap = bowl.radius_m - self.case.motion.radius_m - workpiece.radius_m
+        gap = bowl.radius_m - path.radius_m - workpiece.radius_m
         return gap / (2.0 * self.case.media.radius_mean_m)
 
     @property

@@ -8,17 +8,18 @@ import pandas as pd
 
 from dragchain.arrays import Floats
 from dragchain.run.case import Case
-from dragchain.run.kinematics import workpiece_turn
+from dragchain.run.kinematics import workpiece_rotation
 from dragchain.tables.by_step import read_table
+from dragdeck.study.rotation import Rotation
 
-WorkpiecePlaces = Callable[[int], tuple[Floats, float]]
+WorkpiecePlaces = Callable[[int], tuple[Floats, Rotation]]
 
 WORKPIECE_COLUMNS = ("step", "ref_x_m", "ref_y_m", "ref_z_m", "direction_rad")
 """Columns of ``workpiece_force.parquet`` that say where the workpiece is."""
 
 
 def workpiece_places(run_dir: Path, case: Case) -> WorkpiecePlaces:
-    """A function of a step: the workpiece's reference point in m, and its turn in rad.
+    """A function of a step: the workpiece's reference point in m, and its orientation.
 
     Raises
     ------
@@ -29,8 +30,8 @@ def workpiece_places(run_dir: Path, case: Case) -> WorkpiecePlaces:
     return lambda step: workpiece_place(workpiece, step, case)
 
 
-def workpiece_place(workpiece: pd.DataFrame, step: int, case: Case) -> tuple[Floats, float]:
-    """The workpiece's reference point at a step in m, (3,), and its turn in rad.
+def workpiece_place(workpiece: pd.DataFrame, step: int, case: Case) -> tuple[Floats, Rotation]:
+    """The workpiece's reference point at a step in m, (3,), and its orientation.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def workpiece_place(workpiece: pd.DataFrame, step: int, case: Case) -> tuple[Flo
     case : Case
         The case, of a process.
     """
-    return _reference_point(workpiece, step), _workpiece_turn(workpiece, step, case)
+    return _reference_point(workpiece, step), _workpiece_rotation(workpiece, step, case)
 
 
 def _reference_point(workpiece: pd.DataFrame, step: int) -> Floats:
@@ -52,8 +53,8 @@ def _reference_point(workpiece: pd.DataFrame, step: int) -> Floats:
     return np.array([np.interp(step, at, column) for column in point.T])
 
 
-def _workpiece_turn(workpiece: pd.DataFrame, step: int, case: Case) -> float:
-    """The workpiece's angle at a step, its direction of motion that of the nearest sample."""
+def _workpiece_rotation(workpiece: pd.DataFrame, step: int, case: Case) -> Rotation:
+    """The workpiece's orientation at a step, its direction of motion that of the nearest sample."""
     nearest = [int(np.abs(workpiece["step"].to_numpy(np.int64) - step).argmin())]
     direction = workpiece["direction_rad"].to_numpy(np.float64)[nearest]
-    return float(workpiece_turn(np.array([step]), direction, case)[0])
+    return workpiece_rotation(np.array([step]), direction, case)

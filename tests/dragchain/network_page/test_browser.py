@@ -2,6 +2,7 @@
 
 import base64
 import json
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +12,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from browser import MISSING, NO_WEBGL, Browser
-from figure_files import case_json
 from matplotlib.colors import to_hex
 from network_run_files import PEAK_N, PEAKS_S, accept, draw, write_network_run
 from PIL import Image
@@ -34,9 +34,8 @@ HOSTILE = '</script><script>document.title="taken"</script>'
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A workpiece from an STL file, with contacts on its end face; the study has a hostile name."""
-    motion = case_json("process")["motion"] | {"direction_rad": 2.5, "start_direction_rad": 2.5}
     folder = tmp_path_factory.mktemp("made") / "run"
-    write_network_run(folder, "mesh", motion=motion, study=HOSTILE)
+    write_network_run(folder, "mesh", heading_deg=math.degrees(2.5), study=HOSTILE)
     contacts = pd.read_parquet(folder / "tables/contacts.parquet")
     touching = contacts["kind"] == "particle-workpiece"
     height_m = contacts["point_z_m"].clip(lower=surface_m(folder) - 0.03)

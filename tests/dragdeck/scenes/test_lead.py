@@ -7,6 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from dragdeck.cases.case import Case, of_each_workpiece
@@ -65,10 +66,10 @@ def script(scene: StudyScene, project: Project) -> str:
 def test_a_run_begins_where_its_course_is(path: str, more: Json, made: Make) -> None:
     case = led(made(STIFF, path=PATHS[path], **more))
     scene, way = process_scene(case, BED), course(case.study, BED)
-    *_, (drag, begun) = way.begun()
     (body,), entry = scene.deck.workpieces, scene.deck.entry_step
-    place = way.pose(drag, begun, entry - way.drag.start)
-    assert (*body.start_m, math.radians(body.turn_deg)) == pytest.approx(place, abs=1e-12)
+    place, rotation = way.poses(way.legs[-1], np.array([entry - way.drag.start]))
+    assert body.start_m == pytest.approx(place[0], abs=1e-12)
+    assert math.radians(body.turn_deg) == pytest.approx(rotation.turn_rad[0], abs=1e-12)
     assert [leg.name for leg in body.legs] == ["drag"]
     assert scene.steps == way.drag.end - entry
 

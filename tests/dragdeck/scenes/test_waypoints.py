@@ -23,10 +23,11 @@ from dragdeck.project import Project
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.fit import clearances, fastest_motion
 from dragdeck.scenes.legs import path_heights, surface_speed
-from dragdeck.scenes.motion import drag_leg
+from dragdeck.scenes.motion import driven
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.check import warnings
+from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.stages import in_steps
 from dragdeck.sweep.cases import load_cases
 
@@ -304,13 +305,15 @@ def test_rounded_stages_reach_the_waypoints(made: Made, modulus: float) -> None:
     """Whatever the step: places after whole steps are the waypoints, also the last one."""
     study = made().study
     quick = study.chosen_fidelity().model_copy(update={"youngs_modulus_scale": modulus})
-    leg = drag_leg(study.model_copy(update={"fidelity": quick}))
-    dt = leg.duration_s / leg.steps
+    way = driven(study.model_copy(update={"fidelity": quick}))
+    dt, path = way.drive.timestep_s, way.motion.path
+    assert isinstance(path, WaypointsPath)
+    stages = path.stages(way.drive)
     at = np.diff([[0, 0, *point[1:], *[0] * (4 - len(point))][-3:] for point in POINTS], axis=0)
-    moved = np.array([one.steps * dt * np.array(one.velocity_m_s) for one in leg.stages])
+    moved = np.array([one.steps * dt * np.array(one.velocity_m_s) for one in stages])
     np.testing.assert_allclose(moved, at, atol=1e-15)
-    ends = np.cumsum([stage.steps for stage in leg.stages])
-    assert ends[-1] == leg.steps
+    ends = np.cumsum([stage.steps for stage in stages])
+    assert ends[-1] == way.drive.steps
     np.testing.assert_allclose(ends * dt, [0.2, 0.3, 0.5, 0.7], atol=dt)
 
 

@@ -145,10 +145,8 @@ def closest(each: Sequence[Case], bed: Bed) -> tuple[float, int, int] | None:
 def _way(case: Case, bed: Bed) -> NDArray[np.float64]:
     """X and y, (N, 2), of the workpiece's axis along all its legs."""
     fractions = np.linspace(0.0, 1.0, _PLACES_PER_LEG + 1)
-    begun = course(case.study, bed).begun()
-    return np.array(
-        [leg.pose(start, part * leg.steps)[:2] for leg, start in begun for part in fractions]
-    )
+    way = course(case.study, bed)
+    return np.concatenate([way.poses(leg, fractions * leg.steps)[0][:, :2] for leg in way.legs])
 
 
 def process_cautions(case: Case) -> Iterator[Caution]:

@@ -43,7 +43,7 @@ from dragdeck.scenes.fit import (
     process_cautions,
 )
 from dragdeck.scenes.lead import Covered, covered, led, mark_file, stops
-from dragdeck.scenes.motion import Course, course, driven_speed
+from dragdeck.scenes.motion import Course, course
 from dragdeck.scenes.moved_workpiece import ProcessDeck, moved_workpiece
 from dragdeck.scenes.periods import Periods, output_periods
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
@@ -118,7 +118,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         bowl_type=types.index(study.bowl.material) + 1,
         bowl_radius_m=study.bowl.radius_m,
         bowl_facets=facets,
-        bowl_rad_s=study.motion.path.bowl_rad_s(driven_speed(study)),
+        bowl_rad_s=courses[0].driven.bowl_rad_s,
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpieces=moved,
         stops=list(stops(whole, drag, steps, materials.youngs_moduli_pa)),
@@ -208,8 +208,8 @@ def _process_case(
     steps: Covered,
 ) -> ProcessCase:
     case, drag = each[number], way.drag
-    study, motion, speed = case.study, case.study.motion, driven_speed(case.study)
-    transient_s = motion.uncounted_m / speed
+    study, motion = case.study, case.study.motion
+    transient_s = motion.uncounted_m / drag.speed_m_s
     if steps.entry:
         transient_s = (steps.counted - drag.start) * drag.timestep_s
     return case_of_study(
@@ -240,8 +240,8 @@ def _process_case(
             wake_from_m=_wake_from(each, number),
         ),
         output_of=PROCESS.run_id(case.all_workpieces) if case.number > 1 else None,
-        motion=motion.path.of_run(speed, motion.orientation, way.legs[-1].stages),
-        superposed=list(way.superposed.values()),
+        motion=way.driven.path_entry(),
+        superposed=way.driven.superposed_entries(),
         phases=[
             Phase(name=leg.name, start_step=leg.start_step, end_step=min(leg.end_step, steps.end))
             for leg in way.legs

@@ -5,10 +5,8 @@ run.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from functools import reduce
-from operator import or_
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     Discriminator,
@@ -30,13 +28,13 @@ from dragdeck.study.base import (
 from dragdeck.study.contact_law import Contact, Pair
 from dragdeck.study.material import Material
 from dragdeck.study.paths.circle import CirclePath
-from dragdeck.study.paths.kind import PathOfRun, turned
 from dragdeck.study.paths.line import LinePath
+from dragdeck.study.paths.path import turned
 from dragdeck.study.paths.rest import RestPath
 from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.reference import Reference
 from dragdeck.study.remarks import Accepted, Assumption
-from dragdeck.study.superposed.kind import SuperposedMotion, SuperposedOfRun
+from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin, SpinStage
 from dragdeck.study.workpiece import Carousel, Station, Workpiece
@@ -100,21 +98,6 @@ AnyPath = CirclePath | LinePath | RestPath | WaypointsPath
 """The registry of paths."""
 
 
-if TYPE_CHECKING:
-    AnyPathOfRun = PathOfRun
-    AnySuperposedOfRun = SuperposedOfRun
-else:
-
-    def _of_run(kinds: Iterable[type]) -> object:
-        """The models in ``case.json`` of some kinds of motion; an entry is told by its kind."""
-        return Annotated[reduce(or_, [one.part for one in kinds]), Field(discriminator="kind")]
-
-    AnyPathOfRun = _of_run(get_args(AnyPath))
-    AnySuperposedOfRun = _of_run(
-        get_args(field.annotation)[0] for field in Superposed.model_fields.values()
-    )
-
-
 class Motion(Superposed):
     """Immersion and path of the workpiece."""
 
@@ -123,6 +106,13 @@ class Motion(Superposed):
         default=None,
         description="speed of the workpiece's axis along the path, m/s; required, but not for the "
         "paths `rest`, whose `bowl_rpm` gives it, and `waypoints`, whose times do",
+    )
+    ramp_s: NonNegative = Field(
+        default=0.0,
+        exclude_if=lambda value: value == 0,
+        description="time in which the workpiece starts smoothly from rest along its path, in "
+        "seconds at the study's own speed; no statistic includes it; not for the paths `rest` and "
+        "`waypoints`",
     )
     immersion_depth_m: Positive = Field(description="depth of the tip below the settled surface, m")
     orientation: Literal["follow_path", "fixed"] = Field(

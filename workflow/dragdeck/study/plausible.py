@@ -73,7 +73,7 @@ _RANGES = {
     "motion.counted_from_revolution": _Range(1, 1, 1e3, 1e5, {}),
     "motion.spin.*rpm": _Range(-1e5, -3e3, 3e3, 1e5, {"rad/s": 30 / math.pi}),
     "motion.spin.*until_s": _Range(1e-4, 0.01, 1e4, 1e6, {"ms": 1e-3}),
-    "motion.*.ramp_s": _Range(0, 0.01, 10, 1e4, {"ms": 1e-3}),
+    "motion.*ramp_s": _Range(0, 0.01, 10, 1e4, {"ms": 1e-3}),
     "motion.oscillation.amplitude_m": _Range(1e-7, 1e-5, 0.2, 1, _LENGTH),
     "motion.oscillation.frequency_hz": _Range(1e-4, 0.01, 100, 1e4, {"1/min": 1 / 60}),
     "motion.*speed_m_s": _Range(1e-6, 1e-4, 3, 30, _SPEED),

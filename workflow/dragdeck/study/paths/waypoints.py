@@ -2,24 +2,25 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, ValidationError, field_validator, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from dragdeck.study.base import Line, Model, Number
-from dragdeck.study.paths.kind import (
-    Leg,
-    Orientation,
-    PathOfRun,
-    Point,
-    Stages,
-    WorkpiecePath,
-    turned,
-)
+from dragdeck.study.base import Json, Line, Number
+from dragdeck.study.drive import Drive, EngineMotion, Orientation
+from dragdeck.study.paths.path import Point, Vector, WorkpiecePath, columns, turned
+from dragdeck.study.rotation import Floats, Steps, wrap_angle
+from dragdeck.study.stages import chain, in_steps, integral, stage_at
 
 MOST_POINTS = 100
+
+_STAGES_PER_FORMULA = 10
+"""Formulas of one stage each take three times as long."""
 
 
 class Waypoint(NamedTuple):
@@ -32,17 +33,17 @@ class Waypoint(NamedTuple):
     turn_deg: Number = 0.0
 
 
-class WaypointsOfRun(PathOfRun):
-    """Waypoints as simulated: consecutive stages from the start of the drag."""
+@dataclass(frozen=True)
+class Stage:
+    """A stage of constant velocity: its number of steps, and the velocity."""
 
-    kind: Literal["waypoints"] = "waypoints"
-    stages: Stages
+    steps: int
+    velocity_m_s: Vector
 
 
-class WaypointsPath(WorkpiecePath, Model):
+class WaypointsPath(WorkpiecePath):
     """A recorded path; lengths are those at its mean speed, pauses included."""
 
-    part: ClassVar[type[PathOfRun]] = WaypointsOfRun
     length_field: ClassVar[str] = "fraction"
 
     kind: Literal["waypoints"] = Field(
@@ -154,19 +155,106 @@ class WaypointsPath(WorkpiecePath, Model):
         """The fraction that has this length at the mean speed."""
         return self.model_copy(update={"fraction": self.fraction * length_m / self.path_length_m})
 
-    def drag(self, speed_m_s: float, orientation: Orientation) -> Leg:
-        """One stage per stretch."""
-        pace = speed_m_s / self.own_speed_m_s
-        ends = [(point.time_s - self.points[0].time_s) / pace for point in self.points[1:]]
-        rates = [(pace * x / s, pace * y / s, pace * z / s) for s, x, y, z in self._stretches()]
-        stages = list(zip(ends, rates, strict=True))
-        return Leg("drag", "stages", self.path_length_m / speed_m_s, rates[0], stages=stages)
+    # --- as a run drives it --------------------------------------------------------------------
 
-    def of_run(self, speed_m_s: float, orientation: Orientation, stages: Stages) -> PathOfRun:
-        """The stages, and a workpiece that keeps its orientation."""
-        return WaypointsOfRun(
-            axis_speed_m_s=speed_m_s,
-            start_direction_rad=self.direction_rad,
-            orientation="fixed",
-            stages=stages,
+    def place(self, share: Any) -> tuple[Any, Any, Any]:
+        """Straight from waypoint to waypoint."""
+        at, points = self._passed()
+        x, y, z = (np.interp(share, at, points[:, axis]) for axis in (1, 2, 3))
+        return x, y, z
+
+    def tangent(self, share: Any) -> tuple[Any, Any, Any]:
+        """That of the stretch."""
+        at, points = self._passed()
+        stretch = np.clip(np.searchsorted(at, share, side="left") - 1, 0, len(at) - 2)
+        x, y, z = (np.diff(points[:, 1:4], axis=0) / np.diff(at)[:, None])[stretch].T
+        return x, y, z
+
+    def _passed(self) -> tuple[Floats, Floats]:
+        """Part of the simulated time at each waypoint, (N,), and the waypoints, (N, 5)."""
+        points = np.array(self.points)
+        time = points[:, 0] - points[0, 0]
+        return time / time[-1] / self.fraction, points
+
+    @property
+    def corners(self) -> Floats:
+        """The waypoints that it reaches, and its end."""
+        at, points = self._passed()
+        return np.concatenate([points[at < 1.0, 1:4], columns(self.place(np.ones(1)))])
+
+    def stages(self, drive: Drive) -> Sequence[Stage]:
+        """The stretches in whole steps; each ends where it should."""
+        pace = drive.full_speed_m_s / self.own_speed_m_s
+        ends = [(point.time_s - self.points[0].time_s) / pace for point in self.points[1:]]
+        rates = [
+            [(end, pace * shift / s) for end, (s, shift) in zip(ends, axis, strict=True)]
+            for axis in ([(s, one[axis]) for s, *one in self._stretches()] for axis in range(3))
+        ]
+        found = []
+        for count, begin, end in in_steps(ends, drive.steps, drive.timestep_s):
+            moved = (integral(rate, end) - integral(rate, begin) for rate in rates)
+            x, y, z = (shift / (count * drive.timestep_s) for shift in moved)
+            found.append(Stage(count, (x, y, z)))
+        return found
+
+    def turns(self, orientation: Orientation) -> bool:
+        """Never with its direction: the waypoints say how."""
+        return False
+
+    def fastest_m_s(self, drive: Drive) -> float:
+        """The fastest stage."""
+        return max(math.hypot(*stage.velocity_m_s) for stage in self.stages(drive))
+
+    def places(self, drive: Drive, since: Steps, begun: Floats) -> Floats:
+        """As far as its stages take it."""
+        timestep, stages = drive.full_duration_s / drive.steps, self.stages(drive)
+        ends = [end * timestep for end in accumulate(stage.steps for stage in stages)]
+        moved = (
+            integral(
+                [(end, one.velocity_m_s[axis]) for end, one in zip(ends, stages, strict=True)], time
+            )
+            for time in drive.time_s(since)
+            for axis in range(3)
         )
+        return np.asarray(begun + np.array(list(moved)).reshape(-1, 3))
+
+    def directions(self, drive: Drive, since: Steps, ref_xy_m: Floats) -> Floats:
+        """That of the stage; in a vertical one or a pause, the last direction before."""
+        found, last, stages = [], self.direction_rad, self.stages(drive)
+        for x, y, _ in (stage.velocity_m_s for stage in stages):
+            last = float(np.arctan2(y, x)) if x or y else last
+            found.append(last)
+        return wrap_angle(np.array(found)[_at(stages, since)])
+
+    def velocity(self, drive: Drive, since: Steps, point_m: Floats, ref_m: Floats) -> Floats:
+        """That of the stage."""
+        stages = self.stages(drive)
+        return np.array([stage.velocity_m_s for stage in stages])[_at(stages, since)]
+
+    def on_engine(self, drive: Drive) -> EngineMotion:
+        """Velocities that depend on the step only, so that a resumed run goes on."""
+        variables, last, stages = dict[str, str](), [], self.stages(drive)
+        for axis, name in enumerate("xyz"):
+            values = [(stage.steps, stage.velocity_m_s[axis]) for stage in stages]
+            formulas = chain(f"stage_v{name}", drive.start, values, _STAGES_PER_FORMULA)
+            variables |= formulas
+            last.append(f"v_{[*formulas][-1]}")
+        return EngineMotion(
+            {"": f"linear/variable {' '.join(last)}"},
+            variables,
+            "velocity along the path, as nested conditions on the step",
+        )
+
+    def entry(self, drive: Drive) -> Json:
+        """Its stages from the start of the drag; its direction never turns the workpiece."""
+        return {
+            "orientation": "fixed",
+            "stages": [
+                {"steps": stage.steps, "velocity_m_s": list(stage.velocity_m_s)}
+                for stage in self.stages(drive)
+            ],
+        }
+
+
+def _at(stages: Sequence[Stage], since: Steps) -> NDArray[np.int64]:
+    return stage_at(since, [stage.steps for stage in stages])
