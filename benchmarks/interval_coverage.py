@@ -32,9 +32,12 @@ from paper_drops import FALL_S, HEIGHT, paper_drop, paper_drops  # noqa: E402
 from dragchain.arrays import Floats  # noqa: E402
 from dragchain.calibration.fit import calibrate  # noqa: E402
 from dragchain.calibration.measured_impacts import measure  # noqa: E402
-from dragchain.calibration.sweep import Sweep, prepare  # noqa: E402
-from dragchain.loading.facets import LEAST_EVENTS, standard_errors  # noqa: E402
-from dragchain.loading.samples import Sampled  # noqa: E402
+from dragchain.calibration.simulated_drops import Sweep, prepare  # noqa: E402
+from dragchain.loading.samples import (  # noqa: E402
+    LEAST_EVENTS,
+    Sampled,
+    standard_errors,
+)
 from dragchain.statistics.bed_effects import Factors, fit_effects  # noqa: E402
 from dragchain.statistics.correlated import SLOW_WAVES, estimate_mean  # noqa: E402
 from dragchain.statistics.estimate import (  # noqa: E402
@@ -46,7 +49,7 @@ from dragchain.statistics.estimate import (  # noqa: E402
 from dragchain.statistics.frame_means import estimates  # noqa: E402
 from dragchain.statistics.power_law import Runs, fit_power_law  # noqa: E402
 from dragchain.tradeoff.measures import PathQuantities  # noqa: E402
-from dragchain.windows.document import WindowOfRun, WindowsRecord  # noqa: E402
+from dragchain.windows.estimate import WindowOfRun, WindowsRecord  # noqa: E402
 from dragchain.windows.rounds import judged  # noqa: E402
 
 RECORD = ROOT / "docs" / "data" / "benchmarks" / "coverage.csv"

@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 import yaml
 
-from dragchain.report.extrapolated import Extrapolated
+from dragchain.report.values import Extrapolated
 from dragchain.run.case import load_case
 from dragchain.run.completeness import RunRecord
-from dragchain.tradeoff.path_blocks import quantities_along
-from dragchain.windows.document import Round, WindowsRecord
+from dragchain.tradeoff.measure_run import quantities_along
+from dragchain.windows.estimate import Round, WindowsRecord
 from dragchain.windows.rounds import judged
 from dragdeck.advice.options import Work, plain_option, stiff_settings
 from dragdeck.cases.case import Case

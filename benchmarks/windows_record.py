@@ -21,8 +21,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import polygamma
 
-from dragchain.tradeoff.quantities import QUANTITIES, Quantity
-from dragchain.windows.document import Known, WindowsRecord
+from dragchain.tradeoff.measures import QUANTITIES, Quantity
+from dragchain.windows.estimate import Known, WindowsRecord
 
 ROOT = Path(__file__).resolve().parent.parent
 ARCHIVES = [ROOT / f"docs/data/scenes/{name}.tar.xz" for name in ("measures", "fresh")]

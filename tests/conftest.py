@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 import yaml
-from attack.table import AttackTable, add_options
 from hypothesis import settings
 from paths import ROOT, SMALL_STUDY
 
@@ -31,11 +30,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     for name, what in ON_DEMAND.items():
         parser.addoption(f"--{name}", action="store_true", help=f"run the tests that {what} too")
     parser.addoption("--long-commands", action="store_true", help="run the pages' long commands")
-    add_options(parser)
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    config.pluginmanager.register(AttackTable(config), "attacks")
+    parser.addoption("--attacks", action="store_true", help="all attacks instead of a sample")
+    parser.addoption("--attack-seed", type=int, default=13, help="of their random choices")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -37,23 +37,12 @@ def test_a_cycle_is_found() -> None:
 
 @pytest.mark.parametrize(
     ("package", "modules", "most"),
-    [("dragdeck", 80, 10), ("dragchain", 140, 11), ("evidence", 40, 7)],
+    [("dragdeck", 80, 10), ("dragchain", 80, 11), ("evidence", 40, 7)],
 )
 def test_no_cycle_and_few_levels(package: str, modules: int, most: int) -> None:
     levels = levels_of(imports_of(package))
     assert len(levels) > modules
     assert max(levels.values()) <= most
-
-
-@pytest.mark.parametrize(
-    ("package", "others"),
-    [("dragdeck", {"dragchain", "evidence"}), ("dragchain", {"dragdeck", "evidence"})],
-)
-def test_a_study_needs_neither_evidence_nor_the_other_package(
-    package: str, others: set[str]
-) -> None:
-    graph = grimp.build_graph(package, include_external_packages=True, cache_dir=None)
-    assert not others & graph.modules
 
 
 def test_no_module_imports_upward() -> None:

@@ -39,11 +39,11 @@ class Shown:
         vars(record).update(values)
         self.handler.emit(record)
 
-    def start(self, number: int, rule: str, output: str, command: str = "") -> None:
+    def start(self, number: int, rule: str, output: str, **resources: int) -> None:
         self.log(
             f"Rule: {rule}", event=LogEvent.JOB_INFO, jobid=number, rule_name=rule, rule_msg="",
-            output=[output], shellcmd=command, local=False, is_checkpoint=False, input=[], log=[],
-            benchmark=None, reason="", wildcards={}, priority=0, threads=1, resources={},
+            output=[output], shellcmd="", local=False, is_checkpoint=False, input=[], log=[],
+            benchmark=None, reason="", wildcards={}, priority=0, threads=1, resources=resources,
         )  # fmt: skip
 
     @property
@@ -59,7 +59,7 @@ def test_control_characters_and_markup_stay_text() -> None:
     shown = Shown(terminal=True)
     shown.log("a \x1b[2Jtitle [bold]of[/bold] \x07[link=x]", level=logging.WARNING)
     assert shown.text == "a [2Jtitle [bold]of[/bold] [link=x]\n"
-    shown.start(1, "run_process", f"{RUN}/run.json")
+    shown.start(1, "run_process", f"{RUN}/run.json", engine=1)
     shown.log("", event=LogEvent.JOB_FINISHED, job_id=1)
     shown.handler.close()
     assert "process a[bold]b-12345678: waiting" in shown.text
@@ -90,7 +90,7 @@ def test_messages_of_a_workflow_that_runs_are_left_to_the_log() -> None:
 def test_whoever_asks_for_more_gets_everything(flag: str) -> None:
     shown = Shown(**{flag: True})
     shown.log("Building DAG of jobs...")
-    shown.start(1, "run_process", f"{RUN}/run.json")
+    shown.start(1, "run_process", f"{RUN}/run.json", engine=1)
     assert "Building DAG" in shown.text and "rule run_process:" in shown.text
     assert ": started" not in shown.text
 
@@ -99,7 +99,7 @@ def test_live_lines_stop_while_a_job_prints_itself() -> None:
     shown = Shown(terminal=True)
     shown.start(1, "draw_process", "results/forces.png")
     assert shown.handler._live is not None
-    shown.start(2, "advise", "results/advice.json", "dragdeck advise 2>&1 | tee -i log")
+    shown.start(2, "sweep_drops", "results/drops.json", prints=1)
     assert shown.handler._live is None
     shown.log("", event=LogEvent.JOB_FINISHED, job_id=2)
     assert shown.handler._live is not None
@@ -143,7 +143,7 @@ def test_runs_of_no_study_do_not_end_the_display(
     )  # fmt: skip
     record.write(tmp_path / "results/verification/collide/single/state.json")
     shown = Shown()
-    shown.start(1, "run_verification", "results/verification/collide/single/run.json")
+    shown.start(1, "run_verification", "results/verification/collide/single/run.json", engine=1)
     shown.log("", event=LogEvent.JOB_FINISHED, job_id=1)
     assert shown.text.splitlines()[-1] == "collide single: complete, 50 steps/s"
     shown.log("", event=LogEvent.PROGRESS, done=13, total=52)

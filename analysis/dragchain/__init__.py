@@ -14,11 +14,8 @@ if TYPE_CHECKING:
     from dragchain.dumps.frame import Frame
     from dragchain.dumps.run_parts import iter_frames, iter_prints
     from dragchain.errors import (
-        DocumentError,
-        DragchainError,
         DumpError,
         RecordError,
-        RejectedRunError,
         SeriesError,
         TableError,
         TruncatedDumpError,
@@ -29,11 +26,12 @@ if TYPE_CHECKING:
     from dragchain.statistics.correlated import MeanEstimate, estimate_mean
     from dragchain.tables.convert import dump_to_parquet
     from dragchain.tables.write import write_tables
+    from dragdeck.errors import DocumentError, DragdeckError, RejectedRunError
 
 __all__ = [
     "Case",
     "DocumentError",
-    "DragchainError",
+    "DragdeckError",
     "DumpError",
     "FinishedRun",
     "Frame",
@@ -59,14 +57,15 @@ __all__ = [
 ]
 
 _MODULES = {
-    "dumps.any_dump": ("read_dump",),
-    "dumps.frame": ("Frame",),
-    "dumps.run_parts": ("iter_frames", "iter_prints"),
-    "results": ("FinishedRun", "Study", "load"),
-    "run.case": ("Case", "Output", "load_case", "load_outputs"),
-    "statistics.correlated": ("MeanEstimate", "estimate_mean"),
-    "tables.convert": ("dump_to_parquet",),
-    "tables.write": ("write_tables",),
+    "dragchain.dumps.any_dump": ("read_dump",),
+    "dragchain.dumps.frame": ("Frame",),
+    "dragchain.dumps.run_parts": ("iter_frames", "iter_prints"),
+    "dragchain.results": ("FinishedRun", "Study", "load"),
+    "dragchain.run.case": ("Case", "Output", "load_case", "load_outputs"),
+    "dragchain.statistics.correlated": ("MeanEstimate", "estimate_mean"),
+    "dragchain.tables.convert": ("dump_to_parquet",),
+    "dragchain.tables.write": ("write_tables",),
+    "dragdeck.errors": ("DocumentError", "DragdeckError", "RejectedRunError"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
 
@@ -76,7 +75,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     if name == "plot":
         return import_module(f"{__name__}.plot")
-    return getattr(import_module(f"{__name__}.{_HOMES.get(name, 'errors')}"), name)
+    return getattr(import_module(_HOMES.get(name, "dragchain.errors")), name)
 
 
 def __dir__() -> list[str]:

@@ -4,44 +4,10 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
-
-class DragchainError(Exception):
-    """Base of every error that dragchain raises on purpose."""
+from dragdeck.errors import DragdeckError, rendered
 
 
-def _joined(lines: list[str], remedy: str | None) -> str:
-    if remedy is not None:
-        lines.append(f"remedy: {remedy}")
-    return "\n  ".join(lines)
-
-
-class DocumentError(DragchainError):
-    """A ``case.json`` or ``columns.json`` that cannot be used.
-
-    Parameters
-    ----------
-    file : Path
-        The file.
-    field : str or None
-        Dotted name of the offending key, None for the file as a whole.
-    problem : str
-        What is wrong, without a full stop.
-    remedy : str, optional
-        What the user can do.
-    """
-
-    def __init__(
-        self, file: Path, field: str | None, problem: str, *, remedy: str | None = None
-    ) -> None:
-        self.file = file
-        self.field = field
-        self.problem = problem
-        self.remedy = remedy
-        where = f"{file}: {field}" if field is not None else f"{file}"
-        super().__init__(_joined([f"{where}: {problem}"], remedy))
-
-
-class DumpError(DragchainError):
+class DumpError(DragdeckError):
     """A raw output whose content is not that announced in ``columns.json``.
 
     Parameters
@@ -89,19 +55,15 @@ class DumpError(DragchainError):
             place.append(f"frame {self.frame}")
         if self.offset is not None:
             place.append(f"byte {self.offset}")
-        lines = [f"{', '.join(place)}: {self.problem}"]
-        if self.expected is not None:
-            lines.append(f"expected: {self.expected}")
-        if self.kept is not None:
-            lines.append(f"kept: {self.kept}")
-        return _joined(lines, self.remedy)
+        problem = f"{', '.join(place)}: {self.problem}"
+        return rendered(problem, expected=self.expected, kept=self.kept, remedy=self.remedy)
 
 
 class TruncatedDumpError(DumpError):
     """A raw output that ends inside a frame; the frames before it are intact."""
 
 
-class TableError(DragchainError):
+class TableError(DragdeckError):
     """Raw outputs or tables that are missing, damaged or inconsistent with each other."""
 
 
@@ -109,7 +71,7 @@ _MOST = 30
 """More known names are listed only if none of them resembles the wrong one."""
 
 
-class UnknownNameError(DragchainError):
+class UnknownNameError(DragdeckError):
     """An unknown name of a study, run, table or column.
 
     Parameters
@@ -128,28 +90,25 @@ class UnknownNameError(DragchainError):
         self, problem: str, name: str, known: Iterable[str], *, remedy: str | None = None
     ) -> None:
         self.known = tuple(known)
-        near = [f"did you mean {one!r}?" for one in get_close_matches(name, self.known, 1)]
-        every = [] if near and len(self.known) > _MOST else [f"known: {', '.join(self.known)}"]
-        super().__init__(_joined([problem, *near, *every], remedy))
+        near = get_close_matches(name, self.known, 1)
+        every = None if near and len(self.known) > _MOST else ", ".join(self.known)
+        asked = f"{problem}: did you mean {near[0]!r}?" if near else problem
+        super().__init__(rendered(asked, known=every, remedy=remedy))
 
 
-class ExportError(DragchainError):
+class ExportError(DragdeckError):
     """An export that cannot be made, or not in this place."""
 
 
-class SeriesError(DragchainError):
+class SeriesError(DragdeckError):
     """A series of samples without usable statistics."""
 
 
-class RejectedRunError(DragchainError):
-    """A run that did not pass the acceptance checks, or is not complete."""
-
-
-class MissingRunsError(DragchainError):
+class MissingRunsError(DragdeckError):
     """Runs of a study that have no result; the report shows the others."""
 
 
-class RecordError(DragchainError):
+class RecordError(DragdeckError):
     """A measured record that cannot be used.
 
     Parameters
@@ -176,7 +135,5 @@ class RecordError(DragchainError):
         self.value = value
         self.limit = limit
         self.remedy = remedy
-        lines = [f"the record cannot be used ({reason}): {problem}"]
-        lines += [f"value:  {value}"] if value is not None else []
-        lines += [f"limit:  {limit}"] if limit is not None else []
-        super().__init__(_joined(lines, remedy))
+        said = f"the record cannot be used ({reason}): {problem}"
+        super().__init__(rendered(said, value=value, limit=limit, remedy=remedy))

@@ -11,9 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from dragchain.errors import UnknownNameError
-from dragchain.figures.marks import as_compass, compass_bars
+from dragchain.figures.panels import as_compass, compass_bars
 from dragchain.figures.style import COLOURS, true_minus
-from dragchain.report import run_panels
+from dragchain.report import run_figures
 from dragchain.results import FinishedRun
 
 _BIN = 0.25
@@ -37,7 +37,7 @@ def drag(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) -> Axe
     Axes
     """
     found, ax = run.findings, _axes(ax)
-    run_panels.forces(ax, run, found)
+    run_figures.forces_panel(ax, run, found)
     if peaks:
         times_s, label = found.peaks.process_time_s, f"{found.peaks.count} peaks"
         ax.plot(times_s, found.peaks.drag_n, "v", color=COLOURS["peak"], label=label)
@@ -65,9 +65,9 @@ def bottleneck(run: FinishedRun, ax: Axes | None = None, *, peaks: bool = True) 
     Axes
     """
     found, ax = run.findings, _axes(ax)
-    run_panels.bottlenecks(ax, run, found)
+    run_figures.bottlenecks_panel(ax, run, found)
     if peaks:
-        run_panels.peak_times(ax, found)
+        run_figures.peak_times(ax, found)
     return ax
 
 
@@ -116,7 +116,7 @@ def force_over_depth(run: FinishedRun, ax: Axes | None = None, *, total: bool = 
     Axes
     """
     found, ax = run.findings, _axes(ax)
-    draw = run_panels.load_over_depth if total else run_panels.force_over_depth
+    draw = run_figures.load_depth_panel if total else run_figures.force_depth_panel
     draw(ax, found)
     return ax
 

@@ -10,17 +10,17 @@ from typing import Any, Literal, SupportsIndex
 import pandas as pd
 import pyarrow.parquet as pq
 
-from dragchain.errors import RejectedRunError, TableError, UnknownNameError
-from dragchain.report.collect import process_findings
+from dragchain.errors import TableError, UnknownNameError
+from dragchain.report.cases import read_optional, upstream_folders
 from dragchain.report.findings import FILE, ProcessFindings
-from dragchain.report.run_data import RunData
-from dragchain.report.runs import read_optional, upstream_folders
+from dragchain.report.run_data import RunData, process_findings
 from dragchain.report.values import Values, values_of
 from dragchain.run.basis import Basis, notes
 from dragchain.run.case import Scene, load_case
 from dragchain.run.completeness import read_accepted
 from dragchain.tables.by_step import intact, read_table
-from dragchain.tables.meanings import descriptions, unit_of
+from dragchain.tables.columns import descriptions, unit_of
+from dragdeck.errors import RejectedRunError
 
 _ON_WORKPIECE = ("workpiece_force", "workpiece_contacts", "facets", "contact_events")
 _NETWORK = ("particles", "contacts", "network", "clusters", "chains")

@@ -1,27 +1,36 @@
-"""The input scripts of the cost variants: what is timed, and the beds that it starts from.
+"""The decks of the cost variants, and the beds that they start from, each made once.
 
-What no study field can say is said by the templates in ``templates/costs/`` and by the
-decks here.
+What no study field can say is said by blocks of templates, in ``variants.yaml``.
 """
 
+import hashlib
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
-from cost_variants import Change
+import jinja2
+
+from cost_variants import BASES, BEDS, Variant, bed_case, variant_case
+from dragchain.tables.write import write_tables
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.outputs import Column
+from dragdeck.decks.outputs import Column, Output
+from dragdeck.decks.render import deck_text
+from dragdeck.engine.batch import Batch
 from dragdeck.physics.contact_mechanics import particle_mass
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import timestep
 from dragdeck.scenes.drop_test import DropDeck, drop_scene
-from dragdeck.scenes.filling import FillingDeck, filling_scene
+from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.legs import Stop
 from dragdeck.scenes.moved_workpiece import MovedWorkpiece, ProcessDeck
 from dragdeck.scenes.process import process_scene
+from dragdeck.scenes.scene import read_bed
 from dragdeck.study.model import Study
+from dragdeck.study.workpiece import Workpiece
 
 DAMPED_S, DAMPING_TIME_S, FREE_S = 0.005, 0.001, 0.05
 """How a bed comes to rest with another modulus or other facets: damped for the
@@ -30,124 +39,122 @@ first time, speeds falling with the second, then free for the third, s."""
 _FRAME_FRACTION = 0.05
 """Fraction of a frame's steps by which a drag may be shorter than asked, to end with a frame."""
 
-CONTACT_COLUMNS = (
-    "pos vel id force force_normal force_tangential torque torque_normal torque_tangential "
-    "history contactArea delta contactPoint"
-)
-"""All that LIGGGHTS's contact computes give in these scenes."""
 
-CONTACT_WIDTH = 41
-"""Numbers of a contact with `CONTACT_COLUMNS`."""
-
-_CONTACT_COMPUTES = {"contacts": "particle_contacts", "workpiece_contacts": "workpiece_contacts"}
-"""The compute that each output of contacts writes."""
+# --- templates ------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, kw_only=True)
-class _ColumnsDeck(ProcessDeck):
-    """A process that writes all columns of its contacts."""
-
-    contact_columns: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class _RestDeck(ProcessDeck):
-    """A bed that comes to rest: damping of a particle, kg/s, and steps with and without it."""
-
-    damping_kg_s: float
-    damped_steps: int
-    free_steps: int
+def with_own_blocks(templates: jinja2.Environment) -> "CostTemplates":
+    """Templates to which those of the variants are added as they are made."""
+    texts: dict[str, str] = {}
+    assert templates.loader is not None
+    own = jinja2.ChoiceLoader([templates.loader, jinja2.DictLoader(texts)])
+    return CostTemplates(templates.overlay(loader=own), texts)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _TimedDropDeck(DropDeck):
-    """A drop test whose first flight may be cut short."""
+@dataclass(frozen=True)
+class CostTemplates:
+    """The templates of a study, and those that extend them for a variant."""
 
-    flight_steps: int | None
+    environment: jinja2.Environment
+    _texts: dict[str, str]
+
+    def extended(
+        self, scene: AnyScene, name: str, blocks: Mapping[str, str], **values: float
+    ) -> AnyScene:
+        """The scene with blocks of its template overridden, in which these values are known."""
+        if not blocks:
+            return scene
+        known = [f"{{% set {key} = {value!r} %}}" for key, value in values.items()]
+        own = [f"{{% block {key} %}}\n{text}{{% endblock %}}" for key, text in blocks.items()]
+        lines = [f'{{% extends "{scene.template}" %}}', *known, *own, ""]
+        file = f"costs/{name}.in.j2"
+        self._texts[file] = "\n".join(lines)
+        return replace(scene, override=file)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _TimedFillingDeck(FillingDeck):
-    """A settled bed that goes on: steps, and steps between frames of contacts."""
-
-    timed_steps: int
-    frame_steps: int
+# --- what is timed --------------------------------------------------------------------------
 
 
-def changed(scene: AnyScene, change: Change) -> AnyScene:
-    """The scene of a variant with what no study field can say."""
-    if change == "none":
+@dataclass(frozen=True)
+class Settled:
+    """A settled bed, and its restart file as a deck sees it."""
+
+    bed: Bed
+    source: str
+
+
+@dataclass(frozen=True)
+class TimedDecks:
+    """The timed deck of each variant: whole, or cut short after its start.
+
+    Attributes
+    ----------
+    base : Case
+        The standard case.
+    templates : CostTemplates
+    steps : int
+        About so many are timed of a drag and of a filling.
+    """
+
+    base: Case
+    templates: CostTemplates
+    steps: int
+
+    def scene(self, variant: Variant, settled: Settled | None, start: bool) -> AnyScene:
+        """The scene of a variant; a drop test starts from no bed."""
+        case = variant_case(self.base, variant)
+        if settled is None:
+            scene, steps, period = _timed_drop(case, start), 0, 0
+        elif variant.scene == "filling":
+            period = _filling_period(case.study)
+            steps = 1 if start else _whole_frames(self.steps, period)
+            scene = filling_scene(case)
+            deck = replace(scene.deck, source=settled.source, checkpoint_steps=0)
+            scene = replace(scene, deck=deck, files={})
+        else:
+            scene = process_scene(case, settled.bed)
+            period = scene.deck.thermo_steps
+            steps = 1 if start else _whole_frames(self.steps, period)
+            scene = _begun(scene, settled.source, steps)
+        scene = _written(scene, variant)
+        values = {"start": start, "steps": steps, "frame_steps": period}
+        for one in dict.fromkeys((variant.base, variant.name)):
+            name, own = f"{one}-start" if start else one, BASES.get(one, variant)
+            scene = self.templates.extended(scene, name, own.blocks, **values)
         return scene
-    if change in _IN_DECK:
-        return _IN_DECK[change](scene)
-    return replace(scene, override=f"costs/{change}.in.j2")
 
 
-def _early_outputs(scene: AnyScene) -> AnyScene:
-    """A process that writes only what it writes before the drag."""
-    early = [
-        output for output in scene.deck.outputs if output.name in ("thermo", "workpiece_force")
-    ]
-    return replace(scene, deck=replace(scene.deck, outputs=early))
-
-
-def _restart_points(scene: AnyScene) -> AnyScene:
-    """A process with a restart point at every frame of the network."""
-    return replace(scene, deck=replace(scene.deck, checkpoint_steps=scene.deck.thermo_steps))
-
-
-def _with_all_columns(scene: AnyScene) -> AnyScene:
-    """A process that writes every column of a contact instead of those that are read."""
-    wide = [
-        replace(output, columns=_all_columns(_CONTACT_COMPUTES[output.name]))
-        if output.name in _CONTACT_COMPUTES
-        else output
+def _written(scene: AnyScene, variant: Variant) -> AnyScene:
+    """A scene with the outputs and the columns of contacts that a variant writes."""
+    outputs = [
+        _all_columns(output, variant.contact_columns)
         for output in scene.deck.outputs
+        if not variant.outputs or output.name in variant.outputs
     ]
-    own = vars(scene.deck) | {"outputs": wide}
-    deck = _ColumnsDeck(**own, contact_columns=CONTACT_COLUMNS)
-    return replace(scene, deck=deck, override="costs/contact_columns.in.j2")
+    return replace(scene, deck=replace(scene.deck, outputs=outputs))
 
 
-def _all_columns(compute: str) -> tuple[Column, ...]:
-    return tuple(Column(f"column{at}", f"c_{compute}[{at}]") for at in range(1, CONTACT_WIDTH + 1))
+def _all_columns(output: Output, width: int) -> Output:
+    """An output of contacts with so many columns of its compute; any other as it is."""
+    if not width or output.kind != "local":
+        return output
+    compute = output.columns[0].engine.partition("[")[0]
+    columns = tuple(Column(f"column{at}", f"{compute}[{at}]") for at in range(1, width + 1))
+    return replace(output, columns=columns)
 
 
-_IN_DECK: Mapping[Change, Callable[[AnyScene], AnyScene]] = {
-    "early_outputs": _early_outputs,
-    "restart_points": _restart_points,
-    "all_columns": _with_all_columns,
-}
-"""Changes of the deck's values; the others are templates of that name."""
-
-
-def timed_drop(case: Case, start: bool) -> AnyScene:
+def _timed_drop(case: Case, start: bool) -> AnyScene:
     """The drop test to its first impact, or its first steps."""
     scene = drop_scene(case)
-    deck = _TimedDropDeck(**vars(scene.deck), flight_steps=1 if start else None)
-    deck = replace(deck, impact_steps=1) if start else deck
-    return replace(scene, deck=deck, override="costs/drop_test.in.j2")
-
-
-def timed_filling(case: Case, steps: int, source: str, start: bool) -> AnyScene:
-    """The fill once its bed is at rest, for about so many steps, or its first step."""
-    scene, period = filling_scene(case), _filling_period(case.study)
-    own = vars(scene.deck) | {"source": source, "checkpoint_steps": 0}
-    timed = 1 if start else _whole_frames(steps, period)
-    deck = _TimedFillingDeck(**own, timed_steps=timed, frame_steps=period)
-    return replace(scene, deck=deck, files={}, override="costs/filling.in.j2")
+    deck = scene.deck
+    assert isinstance(deck, DropDeck)
+    return replace(scene, deck=replace(deck, impact_steps=1)) if start else scene
 
 
 def _filling_period(study: Study) -> int:
     """Steps of the fill between frames at the rate of the network."""
     dt = timestep(bed_rayleigh_time(study), study.chosen_fidelity().filling_timestep_fraction)
     return max(1, math.floor(1 / (study.outputs.network_hz * dt)))
-
-
-def timed_drag(case: Case, steps: int, bed: Bed, source: str, start: bool) -> AnyScene:
-    """The drag for about so many steps, or its first step."""
-    scene = process_scene(case, bed)
-    return _begun(scene, source, 1 if start else _whole_frames(steps, scene.deck.thermo_steps))
 
 
 def _whole_frames(steps: int, period: int) -> int:
@@ -182,27 +189,103 @@ def _in_its_drag(workpiece: MovedWorkpiece, steps: int) -> MovedWorkpiece:
     return replace(workpiece, start_m=(x, y, z), legs=(drag,), driven=way)
 
 
-def workpiece_in(case: Case, bed: Bed, source: str) -> AnyScene:
+# --- beds -----------------------------------------------------------------------------------
+
+
+def workpiece_in(case: Case, settled: Settled, templates: CostTemplates) -> AnyScene:
     """A run that brings the workpiece into a settled bed and keeps the particles."""
-    scene = process_scene(case, bed)
+    scene = process_scene(case, settled.bed)
     assert isinstance(scene.deck, ProcessDeck)
     workpieces = [replace(one, legs=one.legs[:-1]) for one in scene.deck.workpieces]
     stops = [Stop(workpieces[0].legs[-1].end_step)]
-    deck = replace(scene.deck, source=source, workpieces=workpieces, stops=stops, outputs=())
+    deck = replace(
+        scene.deck, source=settled.source, workpieces=workpieces, stops=stops, outputs=()
+    )
     phases = scene.case.model_copy(update={"phases": scene.case.phases[:-1]})
-    return replace(scene, deck=deck, case=phases, override="costs/keep_particles.in.j2")
+    name = "workpiece_in"
+    return templates.extended(replace(scene, deck=deck, case=phases), name, BEDS[name])
 
 
-def at_rest(case: Case, bed: Bed, source: str) -> AnyScene:
+def at_rest(case: Case, settled: Settled, templates: CostTemplates) -> AnyScene:
     """A run that brings a bed with the workpiece in it to rest with a case's modulus and facets."""
-    scene, study = process_scene(case, bed), case.study
-    begun, dt = _begun(scene, source, 0).deck, scene.deck.timestep_s
-    mass = particle_mass(particle_material(study), study.media.radius_mean_m)
-    deck = _RestDeck(
-        **vars(begun) | {"outputs": ()},
-        damping_kg_s=mass / DAMPING_TIME_S,
+    scene, study = process_scene(case, settled.bed), case.study
+    begun, dt = _begun(scene, settled.source, 0), scene.deck.timestep_s
+    no_phases = scene.case.model_copy(update={"phases": ()})
+    begun = replace(begun, deck=replace(begun.deck, outputs=()), case=no_phases)
+    return templates.extended(
+        begun,
+        "at_rest",
+        {**BEDS["workpiece_in"], **BEDS["at_rest"]},
+        damping_kg_s=particle_mass(particle_material(study), study.media.radius_mean_m)
+        / DAMPING_TIME_S,
         damped_steps=math.ceil(DAMPED_S / dt),
         free_steps=math.ceil(FREE_S / dt),
     )
-    no_phases = scene.case.model_copy(update={"phases": ()})
-    return replace(scene, deck=deck, case=no_phases, override="costs/bed_at_rest.in.j2")
+
+
+@dataclass(frozen=True)
+class Beds:
+    """Beds that timed decks start from.
+
+    Attributes
+    ----------
+    batch : Batch
+        Runs that fill a bed, bring the workpiece in or let a bed come to rest.
+    templates : CostTemplates
+        Those of the batch.
+    """
+
+    batch: Batch
+    templates: CostTemplates
+    _filled: dict[str, Settled] = field(default_factory=dict, init=False)
+
+    def of(self, base: Case, variant: Variant) -> Settled:
+        """The bed of a variant, made if it is not there yet.
+
+        Raises
+        ------
+        InputError, EngineError, RejectedRunError
+            As `Batch.result`.
+        DumpError, TableError
+            Its tables could not be made.
+        """
+        owner = bed_case(base, variant)
+        settled = self._settled(owner)
+        if variant.scene == "filling":
+            return settled
+        begun = self._kept("workpiece-in", workpiece_in(owner, settled, self.templates))
+        inside, case = Settled(settled.bed, begun), variant_case(base, variant)
+        if _walls(case) == _walls(owner):
+            return inside
+        return Settled(settled.bed, self._kept("at-rest", at_rest(case, inside, self.templates)))
+
+    def _settled(self, owner: Case) -> Settled:
+        run = FILLING.run_id(owner)
+        if run not in self._filled:
+            self.batch.result(run, FILLING.build(owner, None))
+            folder = self.batch.folder / run
+            write_tables(folder)
+            bed = read_bed(folder / "tables" / "packing.json")
+            self._filled[run] = Settled(bed, self._seen(folder / "packing.restart"))
+        return self._filled[run]
+
+    def _kept(self, name: str, scene: AnyScene) -> str:
+        run = f"{name}-{digest(deck_text(scene, self.batch.templates))}"
+        self.batch.result(run, scene)
+        return self._seen(self.batch.folder / run / "bed.restart")
+
+    def _seen(self, file: Path) -> str:
+        """Path of a file as a deck sees it, from a folder two below that of the costs."""
+        return os.path.relpath(file.resolve(), self.batch.folder.resolve().parent / "any" / "any")
+
+
+def _walls(case: Case) -> tuple[float, float | None, Workpiece]:
+    """What a bed with a workpiece in it has to come to rest with: stiffness and facets."""
+    study = case.study
+    scale = study.chosen_fidelity().youngs_modulus_scale
+    return scale, study.bowl.facet_size_m, study.workpiece
+
+
+def digest(text: str) -> str:
+    """The start of a text's hash."""
+    return hashlib.sha256(text.encode()).hexdigest()[:8]

@@ -1,12 +1,11 @@
 """What was timed and what it says: ``rounds.json`` and ``costs.json``, and their statistics."""
 
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy import stats
 
 from cost_variants import BASES, SceneName, Variant
+from dragchain.statistics.estimate import Estimate, finite, mean_of
 from dragdeck.documents import Document, Part
 from dragdeck.outlook.measured import MeasuredCost
 from dragdeck.study.model import Fidelity
@@ -59,19 +58,6 @@ class RoundsFile(Document):
     remedy = "move it away to time everything again"
 
     rows: Sequence[TimedVariant] = ()
-
-
-class Ratio(Part):
-    """A ratio and its 95 % interval; None where one round says nothing of it."""
-
-    ratio: float
-    ci95_low: float | None
-    ci95_high: float | None
-
-    def times(self, factor: float) -> "Ratio":
-        """The ratio in another unit."""
-        values = {name: value and value * factor for name, value in dict(self).items()}
-        return Ratio(**values)
 
 
 class Cost(MeasuredCost):
@@ -130,23 +116,9 @@ class CostsFile(Document):
     costs: Sequence[Cost]
 
 
-def geometric(ratios: Sequence[float]) -> Ratio:
-    """Geometric mean of ratios, with the 95 % interval of Student's t on their logarithms.
-
-    Parameters
-    ----------
-    ratios : sequence of float
-        One for each round.
-    """
-    logs = np.log(np.asarray(ratios, dtype=float))
-    mean = float(logs.mean())
-    if len(logs) < 2:
-        return Ratio(ratio=math.exp(mean), ci95_low=None, ci95_high=None)
-    error = float(logs.std(ddof=1)) / math.sqrt(len(logs))
-    half = float(stats.t.ppf(0.975, len(logs) - 1)) * error
-    return Ratio(
-        ratio=math.exp(mean), ci95_low=math.exp(mean - half), ci95_high=math.exp(mean + half)
-    )
+def geometric(ratios: Sequence[float]) -> Estimate:
+    """Geometric mean of ratios, one for each round, with its interval; NaN for one round."""
+    return mean_of(np.log(ratios)).exp()
 
 
 def cost(variant: Variant, rows: Sequence[TimedVariant], steps_s: Mapping[str, float]) -> Cost:
@@ -165,7 +137,9 @@ def cost(variant: Variant, rows: Sequence[TimedVariant], steps_s: Mapping[str, f
     factor = steps_per_second if variant.unit == "per_second" else 1.0
     cpu, wall = map(geometric, zip(*(row.over(row.base) for row in own), strict=True))
     return Cost(
-        **dict(cpu.times(factor)),
+        ratio=cpu.value * factor,
+        ci95_low=finite(cpu.ci95_low * factor),
+        ci95_high=finite(cpu.ci95_high * factor),
         name=variant.name,
         scene=variant.scene,
         what=variant.what,
@@ -173,9 +147,9 @@ def cost(variant: Variant, rows: Sequence[TimedVariant], steps_s: Mapping[str, f
         unit=variant.unit,
         parameter=variant.parameter,
         level=variant.level,
-        per_step=cpu.ratio,
-        per_second=cpu.ratio * steps_per_second,
-        wall_ratio=wall.ratio * factor,
+        per_step=cpu.value,
+        per_second=cpu.value * steps_per_second,
+        wall_ratio=wall.value * factor,
         rounds=len(own),
         steps=own[0].steps,
         timestep_s=steps_s[variant.name],
@@ -184,8 +158,8 @@ def cost(variant: Variant, rows: Sequence[TimedVariant], steps_s: Mapping[str, f
 
 def base_cost(base: Variant, times: Sequence[Timing], timestep_s: float) -> BaseCost:
     """How fast a base is, from all its timings."""
-    cpu = geometric([time.cpu_time_s / time.steps for time in times]).ratio
-    wall = geometric([time.wall_time_s / time.steps for time in times]).ratio
+    cpu = geometric([time.cpu_time_s / time.steps for time in times]).value
+    wall = geometric([time.wall_time_s / time.steps for time in times]).value
     return BaseCost(
         name=base.name,
         scene=base.scene,

@@ -5,31 +5,15 @@ import platform
 import re
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 
-from cost_beds import Beds, digest
-from cost_decks import changed, timed_drag, timed_drop, timed_filling
-from cost_file import (
-    CostsFile,
-    Machine,
-    RoundsFile,
-    TimedVariant,
-    Timing,
-    base_cost,
-    cost,
-)
-from cost_variants import (
-    BASES,
-    Variant,
-    bed_case,
-    standard_case,
-    variant_case,
-    variants,
-)
+from cost_decks import Beds, CostTemplates, TimedDecks, digest, with_own_blocks
+from cost_file import CostsFile, Machine, RoundsFile, TimedVariant, Timing, base_cost, cost
+from cost_variants import BASES, Variant, standard_case, variant_case, variants
 from dragdeck import __version__
 from dragdeck.cases.case import Case
 from dragdeck.decks import CASE_FILE, DECK_FILE
@@ -38,12 +22,12 @@ from dragdeck.decks.render import deck_text, write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
 from dragdeck.engine.inputs import RunInputs
-from dragdeck.engine.log import engine_errors, loops
+from dragdeck.engine.log import engine_errors, loops, reached_end
 from dragdeck.engine.process import Engine, command, execute, find_engine
 from dragdeck.engine.reports import Report
 from dragdeck.engine.run_folder import fingerprint
-from dragdeck.errors import EngineError, InputError
-from dragdeck.files import replace_text
+from dragdeck.errors import EngineError, InputError, choices
+from dragdeck.files import write_text
 from dragdeck.project import study_templates
 from dragdeck.scenes.process import process_scene
 
@@ -102,7 +86,7 @@ def measure(
         The result is there already, or a deck cannot be made.
     EngineError, RejectedRunError
         A run failed or was interrupted.
-    DragdeckError
+    DumpError, TableError
         The tables of a settled bed could not be made.
     """
     if out.exists():
@@ -118,11 +102,16 @@ def measure(
     if load > _QUIET:
         report(f"warning: the machine is busy (load average {load:.2f}); CPU times will scatter")
     base = standard_case(case)
-    chosen = _chosen(variants(base), only)
-    folder = out.resolve().parent / "costs"
-    decks = environment(templates, study_templates(case))
-    beds = Beds(Batch(folder / "beds", decks, report))
-    bench = _Bench(base, beds, find_engine(), folder, seconds, chosen, load, report)
+    bench = _Bench(
+        base=base,
+        variants=_chosen(variants(base), only),
+        templates=with_own_blocks(environment(templates, study_templates(case))),
+        engine=find_engine(),
+        folder=out.resolve().parent / "costs",
+        seconds=seconds,
+        load=load,
+        report=report,
+    )
     _result(bench, bench.rounds(rounds)).write(out)
     return out
 
@@ -135,24 +124,27 @@ def _chosen(known: Sequence[Variant], names: Sequence[str]) -> list[Variant]:
                 "no such variant",
                 field="--only",
                 value=name,
-                limit=f"one of: {', '.join(by_name)}",
-                remedy="choose among these",
+                limit=choices(name, by_name),
             )
     return [by_name[name] for name in names] or list(known)
 
 
 def _time(engine: Engine, folder: Path, deck: str, ranks: int) -> Timing:
-    """Run a deck to its end.
+    """Run a deck to its end and remove what it wrote but its screen.
 
     Raises
     ------
     EngineError
         It did not get there.
     """
-    screen = folder / f"screen.{deck.partition('.')[0]}.txt"
-    ending = execute(command(engine, deck, ranks, 1, None), folder, screen, lambda seconds: None)
+    screen, before = folder / f"screen.{deck.partition('.')[0]}.txt", set(folder.iterdir())
+    try:
+        ending = execute(command(engine, deck, ranks, 1, None), folder, screen, lambda _: None)
+    finally:
+        for file in set(folder.iterdir()) - before - {screen}:
+            file.unlink()
     text = screen.read_text(errors="replace")
-    if ending.exit_status != 0 or "DRAGDECK END" not in text:
+    if ending.exit_status != 0 or not reached_end(text):
         why = "; ".join(engine_errors(text)) or f"exit status {ending.exit_status}"
         raise EngineError(
             f"{folder / deck}: did not run to its end: {why}\n  log:    {screen}\n"
@@ -164,17 +156,6 @@ def _time(engine: Engine, folder: Path, deck: str, ranks: int) -> Timing:
         wall_time_s=sum(loop.wall_time_s for loop in timed),
         steps=sum(loop.steps for loop in timed),
     )
-
-
-def _time_once(engine: Engine, folder: Path, deck: str, ranks: int) -> Timing:
-    """Time a deck and remove what it wrote but its screen."""
-    before = set(folder.iterdir())
-    try:
-        return _time(engine, folder, deck, ranks)
-    finally:
-        for file in set(folder.iterdir()) - before:
-            if not file.name.startswith("screen."):
-                file.unlink()
 
 
 @dataclass(frozen=True)
@@ -191,11 +172,11 @@ class _Bench:
     """Times decks in rounds, each block of variants beside its base."""
 
     base: Case
-    beds: Beds
+    variants: Sequence[Variant]
+    templates: CostTemplates
     engine: Engine
     folder: Path
     seconds: float
-    variants: Sequence[Variant]
     load: float
     report: Report
 
@@ -207,30 +188,22 @@ class _Bench:
     @cached_property
     def decks(self) -> Mapping[str, _Deck]:
         """Every deck by the name of its variant, with its bed."""
-        return {variant.name: self._deck(variant) for variant in [*self.bases, *self.variants]}
+        batch = Batch(self.folder / "beds", self.templates.environment, self.report)
+        beds = Beds(batch, self.templates)
+        steps = round(self.seconds / process_scene(self.base).deck.timestep_s)
+        timed = TimedDecks(self.base, self.templates, steps)
+        found = {}
+        for variant in [*self.bases, *self.variants]:
+            bed = None if variant.scene == "drop_test" else beds.of(self.base, variant)
+            whole, start = (timed.scene(variant, bed, start=cut) for cut in (False, True))
+            ranks = variant_case(self.base, variant).ranks if variant.scene == "process" else 1
+            found[variant.name] = _Deck(whole, start, ranks)
+        return found
 
     @property
     def timesteps_s(self) -> Mapping[str, float]:
         """Time step of every deck, s."""
         return {name: deck.whole.deck.timestep_s for name, deck in self.decks.items()}
-
-    def _deck(self, variant: Variant) -> _Deck:
-        case = variant_case(self.base, variant)
-        timed = self._timed(variant, case)
-        whole, start = (changed(timed(cut), variant.change) for cut in (False, True))
-        return _Deck(whole, start, case.ranks if variant.scene == "process" else 1)
-
-    def _timed(self, variant: Variant, case: Case) -> Callable[[bool], AnyScene]:
-        """What makes the scene of a variant: whole, or cut short."""
-        if variant.scene == "drop_test":
-            return partial(timed_drop, case)
-        steps = round(self.seconds / process_scene(self.base).deck.timestep_s)
-        owner = bed_case(self.base, variant)
-        settled = self.beds.settled(owner)
-        if variant.scene == "filling":
-            return partial(timed_filling, case, steps, settled.source)
-        source = self.beds.with_workpiece(case, owner)
-        return partial(timed_drag, case, steps, settled.bed, source)
 
     @cached_property
     def inputs(self) -> Mapping[str, str]:
@@ -244,12 +217,12 @@ class _Bench:
 
     def _write(self, name: str, deck: _Deck) -> str:
         """Write the files of a deck in place of older ones; their hash."""
-        place, templates = self._place(name), self.beds.batch.templates
+        place, templates = self._place(name), self.templates.environment
         place.mkdir(parents=True, exist_ok=True)
         for old in place.iterdir():
             old.unlink()
         write_run(deck.whole, place, templates)
-        replace_text(place / _START_FILE, deck_text(deck.start, templates))
+        write_text(place / _START_FILE, deck_text(deck.start, templates))
         return fingerprint(place, RunInputs.read(place / CASE_FILE))
 
     def rounds(self, count: int) -> list[TimedVariant]:
@@ -290,9 +263,7 @@ class _Bench:
     def _timing(self, name: str) -> Timing:
         """Time of a deck's steps, its start taken out."""
         place, ranks = self._place(name), self.decks[name].ranks
-        whole, start = (
-            _time_once(self.engine, place, file, ranks) for file in (DECK_FILE, _START_FILE)
-        )
+        whole, start = (_time(self.engine, place, file, ranks) for file in (DECK_FILE, _START_FILE))
         return whole - start
 
     def _place(self, name: str) -> Path:
@@ -325,8 +296,9 @@ def _known_rows(file: Path, inputs: Mapping[str, str], report: Report) -> list[T
 def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> CostsFile:
     """Content of ``costs.json``."""
     study, steps_s = bench.base.study, bench.timesteps_s
+    base_of = {variant.name: variant.base for variant in bench.variants}
     of_base = {
-        base.name: [row.base for row in rows if _base_of(bench.variants, row.name) == base.name]
+        base.name: [row.base for row in rows if base_of.get(row.name) == base.name]
         for base in bench.bases
     }
     return CostsFile(
@@ -342,10 +314,6 @@ def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> CostsFile:
         bases=[base_cost(base, of_base[base.name], steps_s[base.name]) for base in bench.bases],
         costs=[cost(variant, rows, steps_s) for variant in bench.variants],
     )
-
-
-def _base_of(chosen: Sequence[Variant], name: str) -> str | None:
-    return next((variant.base for variant in chosen if variant.name == name), None)
 
 
 def processor() -> str:

@@ -1,36 +1,46 @@
 """Make what the pages take from records, and draw the figures: python docs/tools [OPTION].
 
-Without options, every block of every page is made anew (see `blocks`). ``--check`` only says which
-pages would change.
+Without options, ``docs/values.csv`` and every page are made anew (`page_parts`). ``--check`` only
+says which files would change.
 """
 
 import argparse
 import sys
 
+import nbformat
 from figures import draw_all
-from notebooks import store_outputs
-from page_files import changed_pages
+from nbclient import NotebookClient
+from page_parts import stale_files
+from records import ROOT
 
 
 def main() -> int:
-    """Do what the options ask for; 1 if a check found a page that is not up to date."""
+    """Do what the options ask for; 1 if a check found a file that is not up to date."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="change nothing, list stale pages")
+    parser.add_argument("--check", action="store_true", help="change nothing, list stale files")
     parser.add_argument("--figures", action="store_true", help="draw the figures, too")
     parser.add_argument("--notebooks", action="store_true", help="run examples/, keep their output")
-    parser.add_argument("page", nargs="*", help="only pages whose path contains this")
     options = parser.parse_args()
-    stale = False
-    for page, text in changed_pages(options.page):
-        stale = True
-        print(page)
+    stale = list(stale_files())
+    for file, text in stale:
+        print(file)
         if not options.check:
-            page.write_text(text, encoding="utf-8")
+            file.write_text(text, encoding="utf-8")
     if options.figures:
         draw_all()
     if options.notebooks:
         store_outputs()
-    return int(options.check and stale)
+    return int(options.check and bool(stale))
+
+
+def store_outputs() -> None:
+    """Run the notebooks on the results here and store what they show, without times and places."""
+    for file in sorted((ROOT / "examples").glob("*.ipynb")):
+        notebook = nbformat.read(file, as_version=4)
+        folder = {"metadata": {"path": str(ROOT / "studies")}}
+        NotebookClient(notebook, record_timing=False, resources=folder).execute()
+        notebook.metadata = {"kernelspec": notebook.metadata["kernelspec"]}
+        nbformat.write(notebook, file)
 
 
 if __name__ == "__main__":

@@ -1,32 +1,42 @@
 """Texts of the reference pages that are made from the code."""
 
 import argparse
-import csv
-import json
 import re
-from collections.abc import Callable, Iterator
-from fnmatch import fnmatchcase
-from functools import cache
-from pathlib import Path
-from typing import Any
+import types
+from collections.abc import Callable, Iterator, Sequence
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from blocks import markdown_table
+import pandas as pd
+from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pybtex.database import parse_file
 from pybtex.plugin import find_plugin
-from study_fields import fidelities, fields, plausible_ranges
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+from records import ROOT
 
-from dragchain import cli as dragchain_cli
-from dragchain.tables.meanings import _UNITS as UNITS
-from dragchain.tables.meanings import _rows, columns_of, descriptions, unit_end
-from dragdeck import cli as dragdeck_cli
+from dragchain.cli import PROGRAM as DRAGCHAIN
+from dragchain.tables.columns import _UNITS as UNITS
+from dragchain.tables.columns import unit_end
+from dragdeck.cli import PROGRAM as DRAGDECK
+from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
+from dragdeck.study.plausible import _RANGES as RANGES
 
-ROOT = Path(__file__).resolve().parents[2]
+NUMBERS = re.compile(r"[-+x ]*\d[\d., %]*( \(.*\))?|")
+
+
+def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown; columns of numbers are aligned to the right."""
+    columns = list(zip(*rows, strict=True))
+    right = [all(map(NUMBERS.fullmatch, cells)) and any(cells) for cells in columns]
+    rules = ["---:" if numbers else "---" for numbers in right] or ["---"] * len(heads)
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in (heads, rules, *rows))
 
 
 # --- command line --------------------------------------------------------------------
 
 
-def commands(parser: argparse.ArgumentParser) -> str:
+def command_sections(parser: argparse.ArgumentParser) -> str:
     """Every command of a program with its arguments."""
     return "\n\n".join(_commands(parser))
 
@@ -37,14 +47,11 @@ def _commands(parser: argparse.ArgumentParser) -> Iterator[str]:
             for command in action.choices.values():
                 yield from _commands(command)
             return
-    program = parser.prog
-    usage = " ".join(parser.format_usage().split()).removeprefix("usage: ")
-    yield f"### `{program}`\n\n{_sentence(parser.description or '')}\n\n```text\n{usage}\n```"
+    about, usage = parser.description or "", " ".join(parser.format_usage().split()[1:])
+    sentence = about[:1].upper() + about[1:].removesuffix(".") + "."
+    yield f"### `{parser.prog}`\n\n{sentence}\n\n```text\n{usage}\n```"
     rows = [
-        [
-            f"`{_names(action)}`",
-            (action.help or "").replace("%(default)s", str(action.default)).replace("|", "\\|"),
-        ]
+        [f"`{_names(action)}`", _help(action)]
         for action in parser._actions
         if "--help" not in action.option_strings
     ]
@@ -52,115 +59,138 @@ def _commands(parser: argparse.ArgumentParser) -> Iterator[str]:
         yield markdown_table(["argument", "meaning"], rows)
 
 
+def _help(action: argparse.Action) -> str:
+    return (action.help or "").replace("%(default)s", str(action.default)).replace("|", "\\|")
+
+
 def _names(action: argparse.Action) -> str:
+    value = str(action.metavar or action.dest.upper())
     if not action.option_strings:
         return str(action.metavar or action.dest)
-    value = "" if action.nargs == 0 else f" {action.metavar or action.dest.upper()}"
-    return ", ".join(action.option_strings) + value
+    return ", ".join(action.option_strings) + ("" if action.nargs == 0 else f" {value}")
 
 
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+# --- tables of results -----------------------------------------------------------------
 
 
-# --- results --------------------------------------------------------------------------
+def columns() -> str:
+    """A section for each table: the columns with unit, type and meaning."""
+    rows = pd.read_csv(ROOT / "analysis/dragchain/tables/columns.csv", dtype=str)
+    rows = rows.assign(table=rows["tables"].str.split()).explode("table")
+    sections = []
+    for table, own in rows.groupby("table", sort=False):
+        cells = [
+            [f"`{row.column}`", UNITS.get(unit_end(row.column.removesuffix("*")), ""),
+             row.type, row.description]
+            for row in own.itertuples()
+        ]  # fmt: skip
+        table_of = markdown_table(["column", "unit", "type", "meaning"], cells)
+        sections.append(f"### `{table}`\n\n{table_of}")
+    return "\n\n".join(sections)
 
 
-def columns(table: str) -> str:
-    """The columns of a table: name, unit, type, meaning."""
-    rows = []
-    for name in columns_of(table):
-        text = descriptions(name).get(table, "")
-        rows.append([f"`{name}`", _unit(name), column_type(name, table), text])
-    return markdown_table(["column", "unit", "type", "meaning"], rows)
+# --- study file --------------------------------------------------------------------------
 
 
-def column_type(column: str, table: str) -> str:
-    """The type of a column: number, integer, flag, text, list of integers, or any."""
-    return next(
-        row["type"]
-        for row in _column_rows()
-        if fnmatchcase(column, row["column"]) and table in row["tables"].split()
-    )
+def fields() -> str:
+    """One row per field, in one table per top-level key that has fields of its own."""
+    groups: dict[str, list[list[str]]] = {}
+    for name, *cells in _fields(Study, ""):
+        head = re.match(r"(\w+)[.\[]", name)
+        groups.setdefault(head[1] if head else "", []).append([f"`{name}`", *cells])
+    heads = ["field", "limits", "default", "meaning"]
+    parts = [markdown_table(heads, groups.pop("", []))]
+    parts += [f"### `{name}`\n\n{markdown_table(heads, rows)}" for name, rows in groups.items()]
+    return "\n\n".join(parts)
 
 
-@cache
-def _column_rows() -> list[dict[str, str]]:
-    with (ROOT / "analysis/dragchain/tables/columns.csv").open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+def _fields(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, str]]:
+    """Name, limits, default and meaning of every field, depth first."""
+    for name, field in model.model_fields.items():
+        path = f"{prefix}{name}"
+        inner = list(_models(field.annotation))
+        if not inner or any(get_args(part)[:1] == (str,) for part in _parts(field.annotation)):
+            yield path, _limits(field), _default(field), field.description or ""
+        for part, many in inner:
+            kind = f"[{_kind(part)}]" if len(inner) > 1 else ""
+            yield from _fields(part, f"{path}{kind}.{'*.' if many else ''}")
 
 
-def _unit(name: str) -> str:
-    return UNITS.get(unit_end(name.removesuffix("*")), "")
+def _parts(annotation: Any) -> tuple[Any, ...]:
+    """The alternatives of a union, nothing of any other type."""
+    return get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else ()
 
 
-def all_columns() -> str:
-    """A section for each table."""
-    tables = dict.fromkeys(table for _, tables, _ in _rows() for table in tables)
-    return "\n\n".join(f"### `{table}`\n\n{columns(table)}" for table in tables)
+def _kind(model: type[BaseModel]) -> str:
+    """The word by which a model is told from its alternatives."""
+    if model is Fidelity:
+        return "settings"
+    kind = model.model_fields.get("kind")
+    return str(get_args(kind.annotation)[0]) if kind else model.__name__.lower()
 
 
-# --- documents -------------------------------------------------------------------------
+def _models(annotation: Any, many: bool = False) -> Iterator[tuple[type[BaseModel], bool]]:
+    """The models within a type, and whether there can be several of each."""
+    origin = get_origin(annotation)
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation, many
+    elif origin is Annotated:
+        yield from _models(get_args(annotation)[0], many)
+    elif origin in (list, dict):
+        yield from _models(get_args(annotation)[-1], True)
+    for part in _parts(annotation):
+        yield from _models(part, many)
 
 
-def contracts() -> str:
-    """A section for each document, made from its schema."""
-    files = sorted((ROOT / "contract").glob("*.schema.json"))
-    return "\n\n".join(_document(file) for file in files)
+_SIGNS = {Gt: ("above", "gt"), Ge: ("at least", "ge"), Lt: ("below", "lt"), Le: ("at most", "le")}
 
 
-def _document(file: Path) -> str:
-    schema = json.loads(file.read_text())
-    name = file.name.removesuffix(".schema.json")
-    parts = [f"## `{name}`", _first(schema), _keys(schema)]
-    for part, inner in schema.get("$defs", {}).items():
-        if said := _first(inner):
-            parts += [f"**{part}**: {said}", _keys(inner)]
-    return "\n\n".join(part for part in parts if part)
-
-
-def _first(schema: dict[str, Any]) -> str:
-    """The first paragraph of what a schema says of itself."""
-    return " ".join(str(schema.get("description", "")).partition("\n\n")[0].split())
-
-
-def _keys(schema: dict[str, Any]) -> str:
-    required = schema.get("required", [])
-    said = _attributes(str(schema.get("description", "")))
-    rows = [
-        [f"`{key}`", _type(inner), "yes" if key in required else "no", said.get(key, "")]
-        for key, inner in schema.get("properties", {}).items()
+def _limits(field: FieldInfo) -> str:
+    """Limits of a field in words; those of a model stand with its own fields."""
+    if get_origin(field.annotation) is Literal:
+        return " or ".join(f"`{value}`" for value in get_args(field.annotation))
+    parts = [part for part in _parts(field.annotation) if part is not types.NoneType]
+    if parts and all(get_origin(part) is Annotated for part in parts):
+        plain = [part for part in parts if not list(_models(get_args(part)[0]))]
+        return " or ".join(filter(None, (_limits(FieldInfo.from_annotation(one)) for one in plain)))
+    found = [
+        f"{words} {getattr(item, name):.10g}"
+        for item in field.metadata
+        for words, name in [_SIGNS.get(type(item), ("", ""))]
+        if name
     ]
-    return markdown_table(["key", "type", "required", "meaning"], rows) if rows else ""
+    lengths = [item.min_length for item in field.metadata if isinstance(item, MinLen)]
+    lengths += [item.max_length for item in field.metadata if isinstance(item, MaxLen)]
+    return ", ".join([*found, *([f"{' to '.join(map(str, lengths))} entries"] if lengths else [])])
 
 
-def _type(schema: dict[str, Any]) -> str:
-    """The type of a value in words."""
-    if "$ref" in schema:
-        return schema["$ref"].rsplit("/", 1)[-1]
-    if "const" in schema:
-        return f"`{schema['const']}`"
-    if "enum" in schema:
-        return " or ".join(f"`{value}`" for value in schema["enum"])
-    if "anyOf" in schema or "oneOf" in schema:
-        return " or ".join(_type(one) for one in schema.get("anyOf", schema.get("oneOf")))
-    kind = str(schema.get("type", "any"))
-    if kind == "array":
-        return f"list of {_type(schema['items'])}" if "items" in schema else "list"
-    if kind == "object":
-        inner = schema.get("additionalProperties")
-        return f"mapping to {_type(inner)}" if isinstance(inner, dict) else "mapping"
-    return kind
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    if field.default is PydanticUndefined or field.default is None:
+        return "none"
+    return f"`{field.default}`" if isinstance(field.default, str) else f"{field.default!r}"
 
 
-def _attributes(text: str) -> dict[str, str]:
-    """What a docstring says of each attribute."""
-    _, found, text = text.partition("Attributes\n----------\n")
-    said = {}
-    for names, body in re.findall(r"^(\S[^:\n]*?) : [^\n]*\n((?:[ ]+[^\n]*\n?)*)", text, re.M):
-        for name in names.split(", "):
-            said[name] = " ".join(body.split())
-    return said if found else {}
+def fidelities() -> str:
+    """The built-in fidelities and their settings."""
+    names = list(Fidelity.model_fields)
+    rows = []
+    for name, fidelity in BUILT_IN_FIDELITIES.items():
+        settings = [getattr(fidelity, field) for field in names]
+        rows.append([f"`{name}`", *("none" if one is None else f"{one:g}" for one in settings)])
+    return markdown_table(["name", *names], rows)
+
+
+def plausible_ranges() -> str:
+    """The values that give a warning, those that are refused, and the units that are tried."""
+    heads = ["field", "warning outside", "refused outside", "other units tried"]
+    rows = [
+        [f"`{name}`", f"{one.low:g} to {one.high:g}", f"{one.least:g} to {one.most:g}",
+         ", ".join(one.slips)]
+        for name, one in RANGES.items()
+    ]  # fmt: skip
+    return markdown_table(heads, rows)
 
 
 # --- bibliography ------------------------------------------------------------------------
@@ -176,13 +206,12 @@ def bibliography() -> str:
 
 
 TEXTS: dict[str, Callable[[], str]] = {
-    "study_fields": fields,
-    "built_in_fidelities": fidelities,
-    "plausible_ranges": plausible_ranges,
-    "dragdeck_commands": lambda: commands(dragdeck_cli._parser()),
-    "dragchain_commands": lambda: commands(dragchain_cli._parser()),
-    "columns": all_columns,
-    "contracts": contracts,
+    "fields": fields,
+    "fidelities": fidelities,
+    "ranges": plausible_ranges,
+    "dragdeck": lambda: command_sections(DRAGDECK.parser()),
+    "dragchain": lambda: command_sections(DRAGCHAIN.parser()),
+    "columns": columns,
     "bibliography": bibliography,
 }
-"""What a block ``text`` can name."""
+"""What a page can enclose by two comments."""

@@ -5,7 +5,7 @@ Needs the results of ``./run all --config study=uhlmann2015``.
 
 import numpy as np
 import pandas as pd
-from tables import DATA, ROOT
+from records import DATA, ROOT
 
 import dragchain
 

@@ -1,96 +1,200 @@
-"""The points of a stability map with their runs."""
+"""The points of a stability map: a design for each regime, and the beds that some start from."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any, get_args
 
-from dragchain.dumps.frame import Columns, Frame
-from dragchain.dumps.run_parts import iter_frames, iter_prints
-from dragchain.errors import TableError
-from dragchain.run.case import load_outputs
-from dragchain.run.completeness import RunRecord
-from dragdeck.decks import CASE_FILE
-from dragdeck.decks.case_file import CaseOfStudy
-from evidence.stability.impact import ImpactCase, ImpactOfRun
-from evidence.stability.map import PointOfMap, PointsFile
+from pydantic import TypeAdapter, ValidationError, model_validator
+
+from dragdeck.documents import Document, Part
+from dragdeck.scenes.scene import Regime
+from dragdeck.study.base import Number
+from dragdeck.study.check import explained
+from dragdeck.study.yaml import read_yaml
+from dragdeck.sweep.design import Design, Variation
+from evidence.stability.scenes import Packing
+
+REGIMES: tuple[Regime, ...] = get_args(Regime)
+"""What a point models: single impacts; a bed that settles; a bed or a stack at
+rest under a load; a bed with a workpiece dragged through it."""
+
+_STEP = "timestep_fraction"
+"""Time step over the Rayleigh time of the smallest particle: what every condition is run at."""
+
+_MOST_ELASTIC_BED = 0.86
+"""Restitution of the beds of more elastic particles while they settle."""
+
+_SHOWN: Mapping[str, str] = {
+    "youngs_modulus_pa": "E {:g} Pa",
+    "speed_m_s": "{:g} m/s",
+    "restitution": "e {:g}",
+    "friction": "friction {:g}",
+    "size_ratio": "size ratio {:g}",
+    "angle_deg": "{:g} degrees",
+    "packing": "{}",
+    "load_factor": "load {:g} g",
+    "workpiece_speed_m_s": "workpiece {:g} m/s",
+}
+
+Settings = Mapping[str, Packing | Number]
+
+_SETTINGS: TypeAdapter[Settings] = TypeAdapter(Settings)
 
 
-@dataclass(frozen=True)
-class PointRun:
-    """A point with its run."""
+class _Regime(Design[Variation]):
+    """The conditions of a regime, each run at the step of the reference and at others."""
 
-    point: PointOfMap
-    folder: Path
+    vary: dict[str, list[Number]]
 
-    @cached_property
-    def case(self) -> CaseOfStudy | None:
-        """What it models; None of a point that no deck could be written for."""
-        file = self.folder / CASE_FILE
-        return CaseOfStudy.read(file) if file.is_file() else None
+    @model_validator(mode="after")
+    def _known(self) -> "_Regime":
+        blocks = [*(point.values for block in self.points for point in block.points())]
+        unknown = {key for values in blocks for key in values} - set(self.base)
+        steps = [*self.reference.vary, *self.reference.others, *self.vary]
+        unknown |= set(steps) - {_STEP}
+        if unknown:
+            raise ValueError(f"{', '.join(sorted(unknown))} is not among the base point's settings")
+        return self
 
-    @cached_property
-    def impact(self) -> ImpactOfRun | None:
-        """How its bodies meet; None outside single impacts."""
-        if self.point.regime != "impact" or self.case is None:
-            return None
-        return ImpactCase.read(self.folder / CASE_FILE).impact
+    def conditions(self) -> Iterator[tuple[str, Settings]]:
+        """The settings of each condition, and the axis that they lie on."""
+        yield "base", _SETTINGS.validate_python(self.base)
+        for block in self.points:
+            for axis, values in block.points():
+                yield axis or "more", _SETTINGS.validate_python({**self.base, **values})
 
-    def frames(self, name: str) -> Iterator[Frame]:
-        """Frames of a dump."""
-        return iter_frames(self.folder, load_outputs(self.folder)[name])
+    def steps(self) -> list[tuple[float, bool]]:
+        """The steps of each condition, and whether it is the reference."""
+        (fine,) = self.reference.points()
+        return [(fine.values[_STEP], True), *((step, False) for step in self.vary[_STEP])]
 
-    def prints(self, name: str) -> Iterator[Columns]:
-        """Blocks of rows of a ``fix print`` output."""
-        return iter_prints(self.folder, load_outputs(self.folder)[name])
 
-    @cached_property
-    def record(self) -> RunRecord | None:
-        """How the run ended; None of a point that was not run.
+class Point(Part):
+    """One run of the map.
 
-        Raises
-        ------
-        TableError
-            The run was interrupted.
-        """
-        file = self.folder / "state.json"
-        if not file.is_file():
-            return None
-        record = RunRecord.read(file)
-        if record.state in ("running", "stopped"):
-            raise TableError(
-                f"{self.folder}: this run was interrupted; `snakemake stability` goes on with it"
-            )
-        return record
+    Attributes
+    ----------
+    regime : str
+        One of `REGIMES`.
+    axis : str
+        The setting that differs from the base point: ``base``, its name, or ``more``.
+    condition : str
+        Name of all but the step: 8 hex digits.
+    settings : mapping
+        All settings but the step.
+    fraction : float
+        Time step over the Rayleigh time of the smallest particle.
+    reference : bool
+        Whether it is the fine-step run that the others are compared with.
+    refused : str or None
+        Why no deck could be made.
+    """
+
+    regime: Regime
+    axis: str
+    condition: str
+    settings: Settings
+    fraction: float
+    reference: bool
+    refused: str | None = None
 
     @property
-    def sticks(self) -> bool:
-        """Whether its contacts have friction, and so a tangential stiffness."""
-        return self.point.number("friction") > 0.0
+    def name(self) -> str:
+        """Name of the run's folder."""
+        return f"{self.axis}-{self.condition}-dt-{self.fraction:g}"
 
     @property
-    def measurable(self) -> bool:
-        """Whether the run came to its end.
+    def folder(self) -> str:
+        """The run's folder in the results."""
+        return f"{self.regime}/{self.name}"
 
-        One that only built its neighbour lists too late, or whose contacts gain energy by the
-        step, counts: its energy says something.
-        """
-        if self.record is None:
-            return False
-        failed = {check.code for check in self.record.failed_checks}
-        return self.record.complete or set() < failed <= {"neighbour_builds", "stable_timestep"}
+    @property
+    def packing(self) -> str:
+        """What a column or a drag starts from."""
+        return str(self.settings.get("packing", "bed"))
+
+    def number(self, name: str) -> float:
+        """A setting that is a number."""
+        return float(self.settings[name])
+
+    def label(self, base: Settings) -> str:
+        """What sets the condition apart from the base point, in words."""
+        shown = [
+            words.format(self.settings[name])
+            for name, words in _SHOWN.items()
+            if name in self.settings
+            and (self.settings[name] != base.get(name) or name == self.axis)
+        ]
+        return ", ".join(shown) or "base point"
 
 
-def read_points(lists: Sequence[Path]) -> list[PointRun]:
-    """The points of lists.
+class PointsFile(Document):
+    """``points/<regime>.json``: the points of a regime, once they were run."""
+
+    remedy = "run `snakemake stability`"
+
+    points: Sequence[Point]
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    text = json.dumps(content, sort_keys=True, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+
+def load_points(file: Path, regime: str) -> list[Point]:
+    """The points of a regime, each condition's reference first.
 
     Raises
     ------
     InputError
-        A list cannot be used.
+        The file is no such map, or lacks the regime.
     """
-    return [
-        PointRun(point, file.parent.parent / point.folder)
-        for file in lists
-        for point in PointsFile.read(file).points
+    design = _Regime.read(file, regime)
+    try:
+        return list(_points(design, regime))
+    except ValidationError as error:
+        raise explained(error, file) from None
+
+
+def _points(design: _Regime, regime: str) -> Iterator[Point]:
+    known: dict[str, Point] = {}
+    for axis, settings in design.conditions():
+        if axis != "base" and settings == design.base:
+            continue
+        for fraction, reference in design.steps():
+            own = {"settings": settings, "fraction": fraction, "reference": reference}
+            condition = _digest({"regime": regime, **settings})
+            point = Point.model_validate(
+                {"regime": regime, "axis": axis, "condition": condition, **own}
+            )
+            known.setdefault(point.name, point)
+    yield from known.values()
+
+
+# --- the beds that columns and drags start from ----------------------------------------------
+
+
+def bed_settings(map_file: Path) -> dict[str, Settings]:
+    """Every bed that a point of the map starts from, by its run id in ``filling/``."""
+    known = read_yaml(map_file)
+    points = [
+        point
+        for regime in ("column", "drag")
+        if regime in known
+        for point in load_points(map_file, regime)
+        if point.packing == "bed"
     ]
+    return {bed_name(point.settings): _bed(point.settings) for point in points}
+
+
+def bed_name(settings: Settings) -> str:
+    """Run id of the bed that a point with these settings starts from."""
+    return f"bed-{_digest(_bed(settings))}"
+
+
+def _bed(settings: Settings) -> dict[str, float]:
+    """What a bed depends on; one of elastic particles would never rest, so it is damped."""
+    own = {key: float(settings[key]) for key in ("youngs_modulus_pa", "restitution", "friction")}
+    return {**own, "restitution": min(own["restitution"], _MOST_ELASTIC_BED)}

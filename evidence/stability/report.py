@@ -1,30 +1,37 @@
-"""Tables, figures and page of the stability map."""
+"""The report on a stability map: figures and page."""
 
+import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from dragchain.figures.style import drawing, png
-from dragchain.report.bundle import write_bundle
-from dragchain.report.page import data_uri, render_page
-from evidence.stability import safe_steps
-from evidence.stability.classes import CLASSES, ENERGY_LIMITS, OVERLAP_LIMIT, REFUSED, TOLERANCE
-from evidence.stability.document import Criteria, StabilityFile
-from evidence.stability.figures import draw
-from evidence.stability.map import REGIMES
-from evidence.stability.measured import REST_FLOOR
-from evidence.stability.point_table import ClassifiedPoint, classify_points, point_table
-from evidence.stability.points import PointRun, read_points
-
-_CRITERIA = Criteria(
-    tolerance=TOLERANCE,
-    overlap_limit=OVERLAP_LIMIT,
-    energy_limits=ENERGY_LIMITS,
-    rest_floor=REST_FLOOR,
+from dragchain.arrays import Floats
+from dragchain.figures.panels import head, key, legend_below, log_ticks, new_panels, row_names
+from dragchain.figures.style import BLUE, GREEN, GREY, INK, ORANGE, RED
+from dragchain.report.campaign import write_report
+from evidence.stability.judge import (
+    CLASSES,
+    ENERGY,
+    INACCURATE,
+    LOST,
+    OVERLAP,
+    REFUSED,
+    RULE,
+    STABLE,
+    TOLERANCE,
+    RestitutionErrors,
+    conditions,
+    head_on_impacts,
+    judge,
+    summarise,
 )
+from evidence.stability.measures import PointRun, read_points
+from evidence.stability.points import REGIMES
 
 
 def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
@@ -36,7 +43,7 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
         Gets ``points.csv``, ``points.parquet``, ``conditions.csv``, ``conditions.parquet``,
         ``stability.json``, ``figures/*.png`` and ``report.html``.
     lists : sequence of Path
-        ``points/<regime>.json``, as ``python -m evidence stability`` wrote them.
+        ``points/<regime>.json``, as ``python -m evidence run-map`` wrote them.
 
     Raises
     ------
@@ -46,42 +53,47 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
         A run was interrupted.
     """
     runs = read_points(lists)
-    classified = classify_points(runs)
-    points = point_table(classified)
-    by_condition = safe_steps.conditions(points)
-    document = _summarise(points, by_condition, runs)
-    sizes = _run_sizes(runs)
-    with drawing():
-        drawn = draw(points, by_condition, document.restitution_error, sizes)
-        pictures = {name: png(figure) for name, figure in drawn.items()}
-    write_bundle(
+    points, verdicts = judge(runs)
+    found = conditions(points)
+    summary, sizes = summarise(points, found, runs), _run_sizes(runs)
+    tested = points[~points["reference"]]
+    axes = points.groupby(["regime", "axis"], sort=False)["label"]
+    write_report(
         out_dir,
-        tables={"points": points, "conditions": by_condition},
-        figures=pictures,
-        documents={"stability": document},
-        pages={"report": render(classified, points, by_condition, document, pictures, sizes)},
+        "stability/stability.html.j2",
+        draw=lambda: draw(points, found, summary.restitution_error, sizes),
+        tables={"points": points, "conditions": found},
+        documents={"stability": summary},
+        package="evidence",
+        summary=summary,
+        sizes=sizes,
+        regimes=[{"regime": name, **dict(row)} for name, row in summary.regimes.items()],
+        class_names=CLASSES,
+        classes=[
+            {"regime": regime, **Counter(dict.fromkeys(CLASSES, 0)), **Counter(own["class"])}
+            for regime, own in tested.groupby("regime", sort=False)
+        ],
+        axes=[
+            {
+                **dict(zip(("regime", "axis"), names, strict=True)),
+                "conditions": group.nunique(),
+                "runs": len(group),
+                "values": "" if names[1] == "more" else "; ".join(dict.fromkeys(group)),
+            }
+            for names, group in axes
+        ],
+        errors=pd.DataFrame(dict(summary.restitution_error)).to_dict("records"),
+        conditions=[_with_reference(row) for row in found.to_dict("records")],
+        refusals=list(dict.fromkeys(points.loc[points["class"] == REFUSED, "why"])),
+        past_limits=sum(verdict.check == "within_limits" for verdict in verdicts),
+        rule=RULE,
     )
 
 
-def _summarise(
-    points: pd.DataFrame, by_condition: pd.DataFrame, runs: Sequence[PointRun]
-) -> StabilityFile:
-    """What ``dragdeck check`` uses: safe steps, errors of impacts, and where they come from."""
-    records = [run.record for run in runs if run.record]
-    cases = [run.case for run in runs if run.record and run.case]
-    started = max((record.started for record in records), default=datetime.now(UTC).isoformat())
-    return StabilityFile(
-        commands=("snakemake stability",),
-        engine_versions=tuple(sorted({record.engine_version for record in records})),
-        dragdeck_versions=tuple(sorted({case.versions["dragdeck"] for case in cases})),
-        measured=started[:10],
-        points=len(points),
-        engine_wall_time_s=round(sum(record.wall_time_s for record in records), 1),
-        safety_factor=safe_steps.SAFETY_FACTOR,
-        criteria=_CRITERIA,
-        regimes=safe_steps.regimes(by_condition),
-        restitution_error=safe_steps.error_table(points),
-    )
+def _with_reference(row: Mapping[Hashable, object]) -> dict[Hashable, object]:
+    """A condition with its reference in words: its class, and why if it is not stable."""
+    why = "" if row["usable"] else f": {row['reference_why']}"
+    return {**row, "reference": f"{row['reference_class']}{why}"}
 
 
 def _run_sizes(runs: Sequence[PointRun]) -> dict[str, int]:
@@ -94,33 +106,144 @@ def _run_sizes(runs: Sequence[PointRun]) -> dict[str, int]:
     return sizes
 
 
-def render(
-    classified: Sequence[ClassifiedPoint],
+# --- figures -----------------------------------------------------------------------------------
+
+COLOURS = {
+    STABLE: GREEN,
+    INACCURATE: "#F0E442",
+    OVERLAP: "#56B4E9",
+    ENERGY: ORANGE,
+    LOST: RED,
+    REFUSED: GREY,
+}
+"""Of the classes."""
+
+_LETTERS = {STABLE: "", INACCURATE: "i", OVERLAP: "o", ENERGY: "e", LOST: "L", REFUSED: "x"}
+_TITLES = {
+    "impact": "Single impacts ({} per run, at different phases within a time step)",
+    "settle": "Settling of {} particles in a bowl",
+    "column": "At rest under load: settled packing or column of particles in a tube",
+    "drag": "Slow drag: workpiece plunges in and is dragged through the packing",
+}
+
+
+def draw(
     points: pd.DataFrame,
-    by_condition: pd.DataFrame,
-    document: StabilityFile,
-    pictures: Mapping[str, bytes],
+    conditions: pd.DataFrame,
+    errors: RestitutionErrors,
     sizes: Mapping[str, int],
-) -> str:
-    """The page: HTML that needs no other file and no network."""
+) -> dict[str, Figure]:
+    """All figures by name.
+
+    Parameters
+    ----------
+    points, conditions : DataFrame
+        One row per point, and per condition.
+    errors : RestitutionErrors
+    sizes : mapping of str to int
+        Impacts or particles of a run, by regime.
+    """
     tested = points[~points["reference"]]
-    axes = points.groupby(["regime", "axis"], sort=False)["label"]
-    return render_page(
-        "stability/stability.html.j2",
-        None,
-        "evidence",
-        summary=document,
-        sizes=sizes,
-        class_names=CLASSES,
-        classes={
-            regime: Counter(tested.loc[tested["regime"] == regime, "class"])
-            for regime in REGIMES
-            if (tested["regime"] == regime).any()
-        },
-        axes=[(*names, list(dict.fromkeys(group)), len(group)) for names, group in axes],
-        conditions=by_condition.to_dict("records"),
-        refusals=list(dict.fromkeys(points.loc[points["class"] == REFUSED, "why"])),
-        past_limits=sum(point.verdict.check == "within_limits" for point in classified),
-        pictures={name: data_uri(picture) for name, picture in pictures.items()},
-        rule=safe_steps.RULE,
+    drawn = {}
+    for regime in (one for one in REGIMES if (points["regime"] == one).any()):
+        own, rows = (table[table["regime"] == regime] for table in (tested, conditions))
+        drawn[f"map_{regime}"] = _map(own, rows, _TITLES[regime].format(sizes.get(regime)))
+    if errors.steps_per_contact:
+        drawn["restitution_error"] = _errors(head_on_impacts(points), errors)
+    drawn["fraction_of_critical"] = _fractions(tested)
+    return drawn
+
+
+def _map(points: pd.DataFrame, conditions: pd.DataFrame, title: str) -> Figure:
+    """Conditions down, steps across, a colour and a letter per class."""
+    steps = np.sort(points["fraction"].unique())
+    figure, (axes,) = new_panels(1.5 + 0.24 * len(conditions))
+    lines = conditions["condition"].tolist()
+    for point in points.to_dict("records"):
+        column = int(np.searchsorted(steps, point["fraction"]))
+        _cell(axes, column, lines.index(point["condition"]), point["class"])
+    for line, condition in enumerate(conditions.to_dict("records")):
+        for fraction, style in ((1.0, "-"), (condition["damped_fraction"], ":")):
+            _mark(axes, line, condition["critical_over_rayleigh"] * fraction, steps, style)
+    axes.set(xlim=(-0.5, len(steps) - 0.5))
+    axes.set_xticks(range(len(steps)), [f"{100 * step:g}" for step in steps])
+    row_names(axes, conditions["label"].tolist())
+    axes.set_xlabel("time step (% of Rayleigh time of the smallest particle)")
+    head(figure, title)
+    axes.grid(False)
+    axes.tick_params(length=0)
+    axes.tick_params("y", labelsize=7.5)
+    _class_keys(axes, points, _LETTERS)
+    for name, style in (
+        ("critical step of the contact network", "-"),
+        ("critical step, damped", ":"),
+    ):
+        key(axes, name, marker="", ls=style, color=INK, lw=1.6)
+    return legend_below(figure)
+
+
+def _class_keys(axes: Axes, points: pd.DataFrame, letters: Mapping[str, str]) -> None:
+    """Name the colours of the classes that occur."""
+    for kind in (one for one in CLASSES if (points["class"] == one).any()):
+        name = f"{letters.get(kind, '')} {kind}".strip()
+        key(axes, name, color=COLOURS[kind], marker="s", ms=8)
+
+
+def _cell(axes: Axes, column: int, line: int, kind: str) -> None:
+    axes.barh(line, 0.96, 0.88, column - 0.48, color=COLOURS[kind])
+    axes.text(column, line, _LETTERS[kind], ha="center", va="center", fontsize=7, color=INK)
+
+
+def _mark(axes: Axes, line: int, at: float, steps: Floats, style: str) -> None:
+    """Mark a step, over the Rayleigh time, in the line of a condition."""
+    if math.isfinite(at) and steps[0] <= at <= steps[-1]:
+        x = float(np.interp(math.log(at), np.log(steps), np.arange(len(steps))))
+        axes.plot([x, x], [line - 0.44, line + 0.44], style, color=INK, lw=1.6)
+
+
+def _errors(impacts: pd.DataFrame, table: RestitutionErrors) -> Figure:
+    figure, (axes,) = new_panels(3.6)
+    own = impacts[impacts["restitution_error"].notna()]
+    error, shades = own["restitution_error"].abs().clip(lower=1e-6), own["setting_restitution"]
+    dots = axes.scatter(own["steps_per_contact"], error, 16, shades, vmin=0.0, vmax=1.0)
+    for label, values, colour in (
+        ("largest, any restitution", table.worst, RED),
+        ("largest, e ≥ 0.5", table.ordinary_worst, BLUE),
+        ("median", table.median, INK),
+    ):
+        axes.plot(table.steps_per_contact, values, color=colour, label=label)
+    axes.axhline(TOLERANCE, color=GREY, ls="--", lw=1, label="tolerance")
+    axes.set(xscale="log", yscale="log", ylim=(5e-6, 10))
+    axes.set_xlabel("time steps per contact (elastic Hertz contact time / time step)")
+    axes.set_ylabel("largest error of restitution per run")
+    axes.set_title("Single impacts: error of restitution relative to the reference step")
+    axes.legend(loc="upper right")
+    figure.colorbar(dots, label="input restitution")
+    return figure
+
+
+def _fractions(points: pd.DataFrame) -> Figure:
+    """Every point over its step as a fraction of the Rayleigh time and of the critical step."""
+    figure, panels = new_panels(4.2, 2, sharey=True)
+    columns = (
+        ("fraction", "time step / Rayleigh time", RULE),
+        ("fraction_of_critical", "time step / critical step", 1.0),
     )
+    for axes, (column, label, limit) in zip(panels, columns, strict=True):
+        known = points[np.isfinite(points[column])]
+        for line, regime in enumerate(REGIMES):
+            own = known[known["regime"] == regime]
+            axes.scatter(own[column], line + _offsets(own), 9, own["class"].map(COLOURS), lw=0)
+        axes.axvline(limit, color=INK, ls="--", lw=1)
+        axes.set(xscale="log", xlabel=label)
+        log_ticks(axes.xaxis, steps=(1.0, 2.0, 5.0))
+    row_names(panels[0], REGIMES)
+    _class_keys(panels[0], points, {})
+    return legend_below(figure)
+
+
+def _offsets(points: pd.DataFrame) -> Floats:
+    """Place of each point's condition within the line of its regime, (N,)."""
+    codes, names = pd.factorize(points["condition"])
+    spread = np.linspace(-0.36, 0.36, len(names)) if len(names) > 1 else np.zeros(1)
+    return np.asarray(spread[codes])

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.documents import Part
 from dragchain.drag.around import AZIMUTH_BINS, DEPTH_BINS
 from dragchain.drag.azimuth import circumference, parts, to_the_left, within
 from dragchain.run.case import Case
 from dragchain.run.kinematics import motion_of, needed
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 from dragchain.tables.by_step import read_table
+from dragdeck.documents import Part
 from dragdeck.study.paths.circle import CirclePath
 from evidence.validation.corridor import Network, bin_by_bin, corridor, network
 from evidence.validation.runs_by_bed import Point, over_packings

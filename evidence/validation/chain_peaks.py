@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
 from dragchain.arrays import Floats, Ints
-from dragchain.documents import Document, Part
 from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import drag_peaks, peak_separation_s
 from dragchain.errors import TableError
@@ -26,6 +25,7 @@ from dragchain.network.chains import dominant_path, widest_paths
 from dragchain.network.frame import WORKPIECE, NetworkFrame, read_frames
 from dragchain.run.case import load_case
 from dragchain.statistics.estimate import Real, Verdict
+from dragdeck.documents import Document, Part
 from evidence.validation import shift_test
 from evidence.validation.shift_test import ShiftTest
 

@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from dragchain.documents import Part
 from dragchain.statistics.estimate import Estimate, Verdict
+from dragdeck.documents import Part
 from evidence.validation.around_workpiece import Statements
 
 
@@ -18,7 +18,7 @@ class Claim(Part):
         The value of no effect; the statement says that the number is above it.
     unit : str
     verdict : str
-        See `verdict`.
+        See `Estimate.exceeds`.
     estimate : Estimate
         The number over the packings.
     """
@@ -29,15 +29,6 @@ class Claim(Part):
     unit: str
     verdict: Verdict
     estimate: Estimate
-
-
-def verdict(estimate: Estimate, null: float) -> Verdict:
-    """Confirmed if the whole interval lies above the null, contradicted if it lies below."""
-    if not estimate.known:
-        return "not confirmed"
-    if estimate.ci95_low > null:
-        return "confirmed"
-    return "contradicted" if estimate.ci95_high < null else "not confirmed"
 
 
 def claims(found: Statements) -> tuple[Claim, ...]:
@@ -58,7 +49,7 @@ def claims(found: Statements) -> tuple[Claim, ...]:
             number=number,
             null=null,
             unit=unit,
-            verdict=verdict(estimate, null),
+            verdict=estimate.exceeds(null),
             estimate=estimate,
         )
         for statement, number, estimate, null, unit in rows

@@ -12,12 +12,12 @@ import pandas as pd
 from scipy.stats import binned_statistic
 
 from dragchain.arrays import Floats
-from dragchain.documents import Part
 from dragchain.drag.force import read_counted
 from dragchain.errors import TableError
 from dragchain.run.kinematics import motion_of, needed
 from dragchain.statistics.estimate import Estimate, EstimateColumns
 from dragchain.tables.by_step import read_groups
+from dragdeck.documents import Part
 from dragdeck.study.paths.circle import CirclePath
 from evidence.validation.runs_by_bed import Point, over_packings
 

@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 from pydantic import JsonValue
 
-from dragchain.documents import Part
 from dragchain.drag.force import read_counted
 from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.estimate import Estimate
+from dragdeck.documents import Part
 from evidence.validation.runs_by_bed import Point, Points
 
 

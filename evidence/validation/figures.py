@@ -8,8 +8,17 @@ from matplotlib.figure import Figure
 
 from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import drag_peaks
-from dragchain.figures.marks import band, compass, compass_bars, depth_bars, row, row_names
-from dragchain.figures.panels import legend_below, new_figure, new_panels
+from dragchain.figures.panels import (
+    band,
+    compass,
+    compass_bars,
+    depth_bars,
+    legend_below,
+    new_figure,
+    new_panels,
+    row,
+    row_names,
+)
 from dragchain.figures.style import BLUE, COLOURS, GREY, RED
 from dragchain.run.kinematics import drag_start_s
 from dragchain.statistics.estimate import Estimate

@@ -7,7 +7,6 @@ import numpy as np
 from scipy import signal, stats
 
 from dragchain.arrays import Floats
-from dragchain.documents import Part
 from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
 from dragchain.run.case import Case
@@ -15,6 +14,7 @@ from dragchain.run.kinematics import drag_start_s
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.statistics.estimate import Estimate, Real
+from dragdeck.documents import Part
 from evidence.validation.runs_by_bed import Point, over_packings
 
 _COMPONENTS = ("drag_n", "lateral_n", "vertical_n")

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
-from dragchain.documents import Part
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.document import FILE, ContactType, Loading
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
+from dragdeck.documents import Part
 from evidence.validation.runs_by_bed import Point, over_packings
 
 _PER_METRE = {

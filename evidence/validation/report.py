@@ -8,14 +8,12 @@ from typing import Any
 
 import pandas as pd
 
-from dragchain.documents import Document
 from dragchain.figures.style import drawing, png
-from dragchain.report.bundle import write_bundle
-from dragchain.report.page import data_uri, render_page
+from dragchain.report.page import data_uri, render_page, write_bundle
 from dragchain.scaling.document import ScalingFile
-from dragchain.scaling.figures import draw_scalings
-from dragchain.scaling.fit import read_scalings
+from dragchain.scaling.fit import draw_scalings, read_scalings
 from dragchain.statistics.estimate import EstimateColumns
+from dragdeck.documents import Document
 from evidence.validation import chain_peaks, figures
 from evidence.validation import loading_over_packings as loading
 from evidence.validation.around_workpiece import Profile, Statements, of_packings

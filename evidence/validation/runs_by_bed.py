@@ -12,8 +12,8 @@ from pydantic import JsonValue
 from dragchain.errors import SeriesError, TableError
 from dragchain.run.case import Case, load_case
 from dragchain.statistics.estimate import Estimate, mean_of
+from dragchain.tradeoff.compare import Setting, changed_settings
 from dragchain.tradeoff.measures import FILE, Measures
-from dragchain.tradeoff.runs import Setting, changed_settings
 
 _FEWEST = 2
 """Packings below which nothing is known of the differences between them."""

@@ -1,21 +1,43 @@
-"""What the attacks share: the study that is attacked, and how a result is noted."""
+"""What the attacks share: their parameters, the sample of them, and the study that is attacked."""
 
-from collections.abc import Callable
+import random
 from pathlib import Path
 
 import pytest
-from attack.case import Attack, Got, Row
+from attack.arena import Arena
 from attack.ground import CleanRuns, Ground, shared_ground
-from attack.kills import Arena
-from attack.table import note
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Parametrise a test by the attacks that its module makes from the seed."""
-    if "attack" in metafunc.fixturenames:
-        attacks = metafunc.module.attacks(metafunc.config.getoption("--attack-seed"))
-        ids = [f"{attack.kind}-{number}" for number, attack in enumerate(attacks)]
-        metafunc.parametrize("attack", attacks, ids=ids)
+    """Parametrise a test by the rows of its marker, which may be made from the seed."""
+    if marker := metafunc.definition.get_closest_marker("attack"):
+        rows = marker.kwargs["rows"]
+        if callable(rows):
+            rows = rows(metafunc.config.getoption("--attack-seed"))
+        metafunc.parametrize("attack", rows.values(), ids=rows.keys())
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep a sample of each test's attacks, unless all are wanted or one is named."""
+    tests: dict[object, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("attack"):
+            tests.setdefault(item.function, []).append(item)  # type: ignore[attr-defined]
+    if config.getoption("--attacks") or sum(map(len, tests.values())) < 2:
+        return
+    chance = random.Random(config.getoption("--attack-seed"))
+    gone = set()
+    for found in tests.values():
+        kept = min(len(found), found[0].get_closest_marker("attack").kwargs["sample"])
+        gone |= set(found) - set(chance.sample(found, kept))
+    config.hook.pytest_deselected(items=list(gone))
+    items[:] = [item for item in items if item not in gone]
+
+
+@pytest.fixture(scope="session")
+def seed(request: pytest.FixtureRequest) -> int:
+    """The seed of every random choice."""
+    return request.config.getoption("--attack-seed")
 
 
 @pytest.fixture(scope="session")
@@ -35,22 +57,3 @@ def clean(ground: Ground) -> CleanRuns:
 @pytest.fixture
 def arena(tmp_path: Path, ground: Ground, clean: CleanRuns) -> Arena:
     return Arena(tmp_path, ground, clean)
-
-
-Judge = Callable[[Attack, Got], None]
-
-
-@pytest.fixture
-def judge(request: pytest.FixtureRequest) -> Judge:
-    """Note what came of an attack; anything unexpected fails the test."""
-
-    def judged(attack: Attack, got: Got) -> None:
-        row = Row.of(attack, got)
-        note(row, request)
-        if row.state == "not run":
-            pytest.skip(got.outcome)
-        assert row.state == "as expected", (
-            f"{attack}\nexpected: {row.expected}\ngot: {got.outcome}\n{got.seen}"
-        )
-
-    return judged

@@ -1,16 +1,435 @@
 """Damaged checkpoints, inputs and results: named, or made good; never taken for whole."""
 
+import json
+import os
+import random
+import re
+import shutil
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
-from attack.case import Attack
-from attack.damage import checkpoint_attacks, input_attacks, result_attacks
-from attack.kills import Arena
+from attack.arena import MOST_TRIES, Arena, assert_bounded, assert_no_engine
+from attack.calls import Call, Said, call, engines, kill, main_of, refused
+from attack.ground import STUDY, Phase, differences, locked
 
-pytestmark = [pytest.mark.attack, pytest.mark.engine, pytest.mark.slow]
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
-
-def attacks(seed: int) -> list[Attack]:
-    return [*checkpoint_attacks(seed), *input_attacks(seed), *result_attacks(seed)]
+Damage = Callable[[Path, random.Random], None]
 
 
-def test_damage_is_found(attack: Attack, arena: Arena, judge) -> None:
-    judge(attack, attack.act(arena))
+def _cut(file: Path, chance: random.Random) -> None:
+    os.truncate(file, int(file.stat().st_size * chance.uniform(0.05, 0.95)))
+
+
+def _empty(file: Path, chance: random.Random) -> None:
+    os.truncate(file, 0)
+
+
+def _flipped(file: Path, chance: random.Random, count: int = 1) -> None:
+    content = bytearray(file.read_bytes())
+    for _ in range(count):
+        content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+    file.write_bytes(content)
+
+
+def _zeroed(file: Path, chance: random.Random) -> None:
+    file.write_bytes(bytes(file.stat().st_size))
+
+
+def _garbled(file: Path, chance: random.Random) -> None:
+    file.write_bytes(chance.randbytes(max(64, file.stat().st_size)))
+
+
+def _missing(file: Path, chance: random.Random) -> None:
+    file.unlink()
+
+
+def _in_the_way(file: Path, chance: random.Random) -> None:
+    file.unlink()
+    file.mkdir()
+
+
+# --- checkpoints ----------------------------------------------------------------------
+
+_CHECKPOINT_DAMAGE: dict[str, Damage] = {
+    "cut": _cut,
+    "empty": _empty,
+    "a bit flipped": _flipped,
+    "100 bits flipped": partial(_flipped, count=100),
+    "zeros": _zeroed,
+    "random bytes": _garbled,
+    "missing": _missing,
+}
+_WHICH = {"newest": slice(-1, None), "older": slice(0, -1), "both": slice(None)}
+Spoil = Callable[[Path, int], None]
+
+
+def checkpoints(folder: Path) -> list[Path]:
+    """Checkpoints of a run folder, oldest first."""
+    found = [file for file in folder.glob("checkpoint.*.restart") if file.is_file()]
+    return sorted(found, key=lambda file: int(file.name.split(".")[1]))
+
+
+def _damaged(damage: Damage, chosen: slice) -> Spoil:
+    def spoil(folder: Path, seed: int) -> None:
+        chance = random.Random(f"checkpoints {seed} {folder.parent.name}")
+        for file in checkpoints(folder)[chosen]:
+            damage(file, chance)
+
+    return spoil
+
+
+def _clock_back(folder: Path, seed: int) -> None:
+    for file in folder.iterdir():
+        os.utime(file, (1, 1))
+
+
+def _newest_looks_old(folder: Path, seed: int) -> None:
+    os.utime(checkpoints(folder)[-1], (1, 1))
+
+
+def _newest_looks_last(folder: Path, seed: int) -> None:
+    os.utime(checkpoints(folder)[-1], (4e9, 4e9))
+
+
+def _one_of_the_future(folder: Path, seed: int) -> None:
+    """What an engine that was killed while it wrote may leave, later than any other."""
+    last = checkpoints(folder)[-1]
+    step = 2 * int(last.name.split(".")[1])
+    (folder / f"checkpoint.{step}.restart").write_bytes(last.read_bytes()[:1000])
+
+
+def _half_a_state(folder: Path, seed: int) -> None:
+    for file in folder.glob("*checkpoint*"):
+        if file.suffix != ".restart" and file.is_file():
+            os.truncate(file, file.stat().st_size // 2)
+
+
+_SPOILED_FOLDERS: dict[str, Spoil] = {
+    **{
+        f"{which} {what}": _damaged(damage, chosen)
+        for what, damage in _CHECKPOINT_DAMAGE.items()
+        for which, chosen in _WHICH.items()
+    },
+    "all files of 1970": _clock_back,
+    "newest of 1970": _newest_looks_old,
+    "newest of 2096": _newest_looks_last,
+    "a cut one of a later step": _one_of_the_future,
+    "what lists the checkpoints is cut": _half_a_state,
+}
+_CHECKPOINTS = {
+    f"{place}: {what}": (place, spoil)
+    for place in ("filling", "process")
+    for what, spoil in _SPOILED_FOLDERS.items()
+}
+
+
+@pytest.mark.attack(rows=_CHECKPOINTS, sample=1)
+def test_a_damaged_checkpoint_costs_nothing_but_time(
+    attack: tuple[str, Spoil], arena: Arena, seed: int
+) -> None:
+    place, spoil = attack
+    with stopped(arena, place) as (phase, project):
+        spoil(project / phase.run, seed)
+        arena.finish(phase, project)
+
+
+@contextmanager
+def stopped(arena: Arena, place: str) -> Iterator[tuple[Phase, Path]]:
+    """A copy of a run that was stopped half-way, on a small disk where one can be mounted."""
+    phase = arena.phase(place)
+    source = _stopped_once(arena, place, phase)
+    with arena.bounded() as project:
+        shutil.copytree(source, project, symlinks=True)
+        yield phase, project
+
+
+def _stopped_once(arena: Arena, place: str, phase: Phase) -> Path:
+    source = arena.clean.cache / f"{place}-stopped"
+    with locked(arena.clean.cache / f"{place}-stopped.lock"):
+        if not (source / "done").is_file():
+            said = [_stop(source, arena, phase, 0.6)]
+            while said[-1].status == 0:  # it was quicker than it was undisturbed: earlier, then
+                assert len(said) < MOST_TRIES, said[-1].text
+                said.append(_stop(source, arena, phase, 0.6 * 0.5 ** len(said)))
+            assert said[-1].status is not None, said[-1].text
+            assert len(checkpoints(source / phase.run)) > 1
+            (source / "done").touch()
+    return source
+
+
+def _stop(source: Path, arena: Arena, phase: Phase, share: float) -> Said:
+    """What a run said that was asked to stop after a share of its time."""
+    shutil.rmtree(source, ignore_errors=True)
+    project = arena.ground.copy_before(phase, source)
+    running = Call(phase.words, project, source.with_suffix(".log"))
+    folder = project / phase.run
+    running.wait_until(
+        lambda: len(checkpoints(folder)) > 2 and running.spent_s() > share * phase.cpu_s
+    )
+    running.process.send_signal(signal.SIGTERM)
+    return running.wait()
+
+
+# --- inputs ---------------------------------------------------------------------------
+
+
+def _cut_to_a_tenth(file: Path, chance: random.Random) -> None:
+    os.truncate(file, file.stat().st_size // 10)
+
+
+def _one_digit(file: Path, chance: random.Random) -> None:
+    """Another digit after a decimal point, past the first 40 % of the file."""
+    text = file.read_text(encoding="ascii")
+    start = int(0.4 * len(text))
+    place = re.compile(r"(?<=\d\.\d)\d").search(text, start)
+    assert place is not None
+    digit = str((int(place.group()) + 5) % 10)
+    file.write_text(text[: place.start()] + digit + text[place.end() :], encoding="ascii")
+
+
+_INPUT_DAMAGE: dict[str, Damage] = {
+    "cut to a tenth": _cut_to_a_tenth,
+    "empty": _empty,
+    "another digit": _one_digit,
+    "missing": _missing,
+}
+
+
+_OF_BED = {what: _CHECKPOINT_DAMAGE[what] for what in ("cut", "empty", "a bit flipped", "missing")}
+_OF_SCRIPT = {what: _INPUT_DAMAGE[what] for what in ("cut to a tenth", "empty", "missing")}
+_INPUTS = {
+    f"{name} {what} before a {when}": (place, name, damage, when)
+    for place, name, damages, moments in (
+        ("filling", "particles.data", _INPUT_DAMAGE, ("start", "resume")),
+        ("process", "workpiece.stl", _INPUT_DAMAGE, ("start", "resume")),
+        ("process", "packing.restart", _OF_BED, ("start", "resume")),
+        ("drop_test", "in.liggghts", _OF_SCRIPT, ("start",)),
+    )
+    for what, damage in damages.items()
+    for when in moments
+}
+
+
+@pytest.mark.attack(rows=_INPUTS, sample=1)
+def test_an_input_that_changed_is_refused(
+    attack: tuple[str, str, Damage, str], arena: Arena, seed: int
+) -> None:
+    place, name, damage, when = attack
+    with _rendered(arena, place) if when == "start" else stopped(arena, place) as (phase, project):
+        file = project / phase.run / name
+        if name == "packing.restart":  # it stays in the folder of the filling
+            (folder,) = (project / "results" / STUDY / "filling").iterdir()
+            file = folder / name
+        damage(file, random.Random(f"inputs {seed} {name}"))
+        said = call(phase.words, project, arena.folder / "run.log", 60.0)
+        assert_no_engine(project, 1.0)
+        assert_bounded(project)
+        script = r"in\.liggghts|input script"
+        named = script if name == "in.liggghts" else re.escape(name)
+        assert refused(said, named), f"a complete run: {said.tail}"
+
+
+@contextmanager
+def _rendered(arena: Arena, place: str) -> Iterator[tuple[Phase, Path]]:
+    phase = arena.phase(place)
+    with arena.bounded() as project:
+        yield phase, arena.ground.copy_before(phase, project)
+
+
+# --- results --------------------------------------------------------------------------
+
+
+def _json(change: Callable[[Any], Any]) -> Damage:
+    def damage(file: Path, chance: random.Random) -> None:
+        file.write_text(json.dumps(change(json.loads(file.read_text()))), encoding="utf-8")
+
+    return damage
+
+
+def _text(text: str | bytes) -> Damage:
+    content = text.encode() if isinstance(text, str) else text
+
+    def damage(file: Path, chance: random.Random) -> None:
+        file.write_bytes(content)
+
+    return damage
+
+
+def _spoilt_leaf(value: Any, leaf: object, depth: int = 0) -> Any:
+    """The same document with its numbers replaced."""
+    if isinstance(value, dict):
+        kept = {"schema"} if depth == 0 else set()
+        return {
+            name: item if name in kept else _spoilt_leaf(item, leaf, depth + 1)
+            for name, item in value.items()
+        }
+    if isinstance(value, list):
+        return [_spoilt_leaf(item, leaf, depth + 1) for item in value]
+    return leaf if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+_ANY: dict[str, Damage] = {
+    "cut": _cut,
+    "empty": _empty,
+    "random bytes": _garbled,
+    "zeros": _zeroed,
+    "a folder in its place": _in_the_way,
+    "missing": _missing,
+}
+_JSON: dict[str, Damage] = {
+    **_ANY,
+    "a list": _text("[]"),
+    "no keys": _text("{}"),
+    "null": _text("null"),
+    "of another version": _json(lambda value: {**value, "schema": 99}),
+    "100,000 brackets": _text("[" * 100_000),
+    "UTF-16": _text("{}".encode("utf-16")),
+    "its numbers are text": _json(lambda value: _spoilt_leaf(value, "text")),
+    "its numbers are NaN": _json(lambda value: _spoilt_leaf(value, float("nan"))),
+    "its numbers are 1e300": _json(lambda value: _spoilt_leaf(value, 1e300)),
+    "its numbers have 5000 digits": _text(b'{"schema": ' + b"9" * 5000 + b"}"),
+}
+
+
+def _fewer_columns(file: Path, chance: random.Random) -> None:
+    table = pq.read_table(file)
+    pq.write_table(table.select(table.schema.names[: table.num_columns // 2]), file)
+
+
+def _no_rows(file: Path, chance: random.Random) -> None:
+    pq.write_table(pq.read_table(file).slice(0, 0), file)
+
+
+def _words_for_numbers(file: Path, chance: random.Random) -> None:
+    table = pq.read_table(file)
+    words = pa.array(["word"] * table.num_rows)
+    names = table.schema.names
+    pq.write_table(pa.table([words] * len(names), names=names), file)
+
+
+_PARQUET: dict[str, Damage] = {
+    **_ANY,
+    "half its columns": _fewer_columns,
+    "no rows": _no_rows,
+    "words for numbers": _words_for_numbers,
+}
+
+
+def _absurd_count(file: Path, chance: random.Random) -> None:
+    content = file.read_bytes()
+    changed = re.sub(rb"(NUMBER OF \w+\n)\d+", rb"\g<1>99999999999999", content, count=1)
+    if changed == content:  # a binary dump: the number of rows stands after the step
+        changed = content[:8] + (2**62).to_bytes(8, "little") + content[16:]
+    file.write_bytes(changed)
+
+
+def _doubled(file: Path, chance: random.Random) -> None:
+    content = file.read_bytes()
+    file.write_bytes(content + content)
+
+
+_RAW: dict[str, Damage] = {**_ANY, "written twice": _doubled, "an absurd count": _absurd_count}
+
+_OF_RUN = ("state.json", "case.json", "columns.json", "run.json")
+_READERS: dict[str, tuple[str, ...]] = {
+    "state.json": ("run",),
+    "case.json": ("run", "tables", "chains", "loading", "figures", "report"),
+    "columns.json": ("run", "tables"),
+    "run.json": ("run", "tables", "chains", "loading", "figures", "report"),
+    "tables/workpiece_force.parquet": ("figures", "report"),
+    "tables/workpiece_contacts.parquet": ("chains", "loading", "figures"),
+    "tables/particles.parquet": ("chains", "figures"),
+    "tables/contacts.parquet": ("chains", "figures"),
+    "tables/network.parquet": ("figures", "report"),
+    "tables/chains.parquet": ("figures", "report"),
+    "tables/clusters.parquet": ("figures", "report"),
+    "tables/closure.json": ("figures", "report"),
+    "tables/loading.json": ("report",),
+    "tables/figures.json": ("report",),
+}
+"""Results of the process, and who reads them, or might."""
+
+
+_RAW_NAMES = {
+    "drop_test": ("impacts.1.txt",),
+    "filling": ("thermo.1.txt", "particles.1.bin"),
+    "process": (
+        *("thermo.1.txt", "workpiece_force.1.txt", "workpiece_particles.1.bin"),
+        *("workpiece_contacts.1.dump", "contacts.1.dump", "particles.1.bin"),
+    ),
+}
+
+
+def _is_damage(name: str, what: str) -> bool:
+    """There may be no chains, and a print file holds no count."""
+    allowed = what == "an absurd count" and name.endswith(".txt")
+    return not allowed and (name, what) != ("tables/chains.parquet", "no rows")
+
+
+Result = tuple[str, str, Damage, str]
+
+
+def results(seed: int) -> dict[str, Result]:
+    """Every damage to every result, each read by one of its readers."""
+    chance = random.Random(f"results {seed}")
+    made: list[tuple[str, str, str, Damage, str]] = []
+    for name, readers in _READERS.items():
+        kinds = _JSON if name.endswith(".json") else _PARQUET
+        made += [("process", name, *item, chance.choice(readers)) for item in kinds.items()]
+    for place, names in _RAW_NAMES.items():
+        made += [(place, name, *item, "tables") for name in names for item in _RAW.items()]
+    few = ("cut", "empty", "random bytes", "100,000 brackets", "a list")
+    readers_of = {name: "run" if name == "state.json" else "tables" for name in _OF_RUN}
+    for place, files in {
+        "drop_test": readers_of,
+        "filling": {**readers_of, "tables/packing.json": "render"},
+    }.items():
+        made += [(place, name, what, _JSON[what], reader)
+                 for name, reader in files.items() for what in few]  # fmt: skip
+    return {
+        f"{place} {name}: {what}, then {reader}": (place, name, damage, reader)
+        for place, name, what, damage, reader in made
+        if _is_damage(name, what)
+    }
+
+
+@pytest.mark.attack(rows=results, sample=3)
+def test_a_damaged_result_is_refused_or_harmless(attack: Result, arena: Arena, seed: int) -> None:
+    place, name, damage, reader = attack
+    project = arena.ground.copy(arena.folder / "project")
+    run = arena.ground.run(place)
+    damage(project / run / name, random.Random(f"results {seed} {name}"))
+    said = _call_reader(arena, reader, place, project)
+    kill(engines(project))
+    assert_bounded(project)
+    named = re.escape(Path(name).name).replace(r"\.1\.", r"\.(1|\{part\})\.")
+    if refused(said, named):
+        return
+    if reader == "run":
+        arena.assert_same_tables(arena.phase(place), project)
+    else:
+        problems = differences(project / run, arena.ground.root / run, but=name)
+        assert not problems, f"accepted: {problems}"
+
+
+def _call_reader(arena: Arena, reader: str, place: str, project: Path) -> Said:
+    run = arena.ground.run(place)
+    if reader == "run":
+        return call(arena.phase(place).words, project, arena.folder / "run.log", 60.0)
+    if reader == "render":
+        packing = f"{run}/tables/packing.json"
+        process = Path(arena.ground.run("process")).name
+        words = ["step", "render", STUDY, "process", process, "--packing", packing]
+        return main_of("dragdeck", words, project)
+    if reader == "report":
+        out = ["--out", f"results/{STUDY}/report"]
+        return main_of("dragchain", ["report", *out, run], project)
+    return main_of("dragchain", [reader, run], project)

@@ -1,20 +1,21 @@
-"""Fuzzed dumps and meshes, and meshes that are made to break something."""
+"""Fuzzed dumps and meshes: the right values, or an error that names the file."""
 
 from pathlib import Path
 
 import pytest
-from attack.case import Attack
-from attack.fuzz import fuzz_attacks
-from attack.meshes import mesh_attacks
+from attack.calls import run_function
+from attack.fuzz import FUZZES, fuzzed
 
-pytestmark = [pytest.mark.attack, pytest.mark.engine, pytest.mark.slow]
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
-
-def attacks(seed: int) -> list[Attack]:
-    return [*fuzz_attacks(seed), *mesh_attacks(seed)]
+FEW, MANY = 150, 3000
+"""Examples of each fuzz in the sample, and in the whole suite."""
 
 
+@pytest.mark.attack(rows={f"fuzzed {name}": name for name in FUZZES}, sample=3)
 def test_it_is_read_rightly_or_refused(
-    attack: Attack, tmp_path: Path, request: pytest.FixtureRequest, judge
+    attack: str, tmp_path: Path, seed: int, request: pytest.FixtureRequest
 ) -> None:
-    judge(attack, attack.act(tmp_path, request.config.getoption("--attacks")))
+    examples = MANY if request.config.getoption("--attacks") else FEW
+    said = run_function(fuzzed, (attack, seed, examples), tmp_path, 300.0)
+    assert said.status == 0, said.tail

@@ -1,15 +1,55 @@
 """Kill -9 in every phase: the same call goes on, and gives the same tables."""
 
+import random
+from functools import partial
+
 import pytest
-from attack.case import Attack
-from attack.kills import Arena, kill_attacks
+from attack.arena import ENDS_WITHIN_S, ENGINE_PHASES, MOST_TRIES, PHASES, Arena, assert_no_engine
+from attack.calls import Call, is_engine, kill
 
-pytestmark = [pytest.mark.attack, pytest.mark.engine, pytest.mark.slow]
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+VICTIMS = ("runner", "engine", "everything")
+Kill = tuple[str, str, float, bool]
 
 
-def attacks(seed: int) -> list[Attack]:
-    return list(kill_attacks(seed))
+def kills(seed: int) -> dict[str, Kill]:
+    """Kills at seeded random times: a fraction of the processor time that a phase takes."""
+    chance = random.Random(f"kills {seed}")
+    made = {}
+    for phase in PHASES:
+        for number in range(15 if phase in ENGINE_PHASES else 5):
+            victim = VICTIMS[number % 3] if phase in ENGINE_PHASES else "runner"
+            fraction, at_once = round(chance.uniform(0.05, 0.95), 3), bool(number // 3 % 2)
+            again = "called again at once" if at_once else "called again"
+            name = f"{phase}: {victim} killed at {fraction:.1%} of its time, {again}"
+            made[name] = (phase, victim, fraction, at_once)
+    return made
 
 
-def test_a_kill_costs_nothing_but_time(attack: Attack, arena: Arena, judge) -> None:
-    judge(attack, attack.act(arena))
+@pytest.mark.attack(rows=kills, sample=2)
+def test_a_kill_costs_nothing_but_time(attack: Kill, arena: Arena) -> None:
+    name, victim, fraction, at_once = attack
+    phase = arena.ground.phases[name]
+    for number in range(MOST_TRIES):
+        project = arena.ground.copy_before(phase, arena.folder / f"project-{number}")
+        running = Call(phase.words, project, arena.folder / "first.log")
+        moment = fraction * 0.8**number * phase.cpu_s
+        if running.wait_until(partial(_is_due, running, moment, victim)):
+            break
+        running.wait()  # it was quicker than it was undisturbed: earlier, then
+    else:
+        pytest.fail("not killed in time")
+    tree = running.tree()
+    hit = {"runner": tree[:1], "engine": [each for each in tree if is_engine(each)]}
+    kill(hit.get(victim, tree))
+    first = running.wait()
+    if not at_once:
+        assert_no_engine(project, ENDS_WITHIN_S)
+    arena.finish(phase, project, said_before=first.tail)
+
+
+def _is_due(running: Call, moment_s: float, victim: str) -> bool:
+    if running.spent_s() < moment_s:
+        return False
+    return victim != "engine" or any(is_engine(each) for each in running.tree())

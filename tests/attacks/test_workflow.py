@@ -1,16 +1,318 @@
-"""Attacks on the whole: ./run killed, locked, called wrongly, on disks that cannot be written."""
+"""Attacks on the whole: ./run killed, called twice or wrongly, on disks that cannot be written."""
 
+import json
+import os
+import random
+import re
+import shutil
+import signal
+import stat
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
 import pytest
-from attack.case import Attack
-from attack.kills import Arena
-from attack.workflow import workflow_attacks
+from attack.arena import ENDS_WITHIN_S, Arena, assert_no_engine
+from attack.calls import PACKAGES, Call, Said, call, kill, main_of, refused
+from attack.ground import (
+    PLACES,
+    STUDY,
+    CleanRuns,
+    Ground,
+    differences,
+    files_of,
+    new_project,
+    resumed_at,
+    tiny_study,
+    write_study,
+)
+from paths import ROOT
 
-pytestmark = [pytest.mark.attack, pytest.mark.engine, pytest.mark.slow]
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+_PATIENCE_S = 600.0
+_TOOLS = {
+    "python": "{python}",
+    "snakemake": "{python} -m snakemake",
+    "dragdeck": "{python} -m dragdeck.cli",
+    "dragchain": "{python} -m dragchain.cli",
+}
 
 
-def attacks(seed: int) -> list[Attack]:
-    return list(workflow_attacks(seed))
+def entry(folder: Path) -> Path:
+    """A project with the script ``run`` and an environment that it takes for its own."""
+    project = new_project(folder, whole=True)
+    for name in ("run", "pyproject.toml", "constraints.txt"):
+        shutil.copy2(ROOT / name, project / name)
+    (project / ".venv/bin").mkdir(parents=True)
+    for name, words in _TOOLS.items():
+        tool = project / ".venv/bin" / name
+        command = words.format(python=sys.executable)
+        tool.write_text(f'#!/bin/sh\nPYTHONPATH="{PACKAGES}" exec {command} "$@"\n')
+        tool.chmod(0o755)
+    sums = subprocess.run(
+        "cat pyproject.toml constraints.txt | cksum",
+        shell=True, cwd=project, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    (project / ".venv/dragdeck-stamp").write_text(f"{project.resolve()}\n{sums.stdout}")
+    write_study(project, tiny_study())
+    return project
 
 
-def test_the_workflow_goes_on_or_says_why(attack: Attack, arena: Arena, judge) -> None:
-    judge(attack, attack.act(arena))
+def words_of(project: Path, target: str = "all", *options: str) -> list[str]:
+    """``./run``, with the tiny study."""
+    return [str(project / "run"), target, "--config", f"study={STUDY}", *options]
+
+
+def whole(project: Path, log: Path, target: str = "all") -> Said:
+    """What ``./run`` says in the end."""
+    return call(words_of(project, target), project, log, _PATIENCE_S)
+
+
+# --- kills of the whole ---------------------------------------------------------------
+
+
+def kills(seed: int, number: int = 6) -> dict[str, tuple[str, float]]:
+    """SIGKILL to Snakemake's process group, or to all that it started, at seeded times."""
+    chance = random.Random(f"workflow {seed}")
+    made = {}
+    for place in range(number):
+        fraction = round((place + chance.random()) / number, 3)
+        victim = ("group", "everything")[place % 2]
+        made[f"./run all: {victim} killed at {fraction:.1%} of its time"] = victim, fraction
+    return made
+
+
+@pytest.mark.attack(rows=kills, sample=0)
+def test_a_killed_workflow_goes_on(attack: tuple[str, float], arena: Arena) -> None:
+    victim, fraction = attack
+    project = entry(arena.folder / "project")
+    running = Call(words_of(project), project, arena.folder / "first.log")
+    moment = 2.0 + fraction * 1.1 * sum(phase.cpu_s for phase in arena.ground.phases.values())
+    assert running.wait_until(lambda: running.spent_s() > moment), "not killed in time"
+    tree = running.tree()
+    if victim == "group":
+        os.killpg(running.process.pid, signal.SIGKILL)
+    else:
+        kill(tree)
+    running.wait()
+    assert_no_engine(project, ENDS_WITHIN_S)
+    said = whole(project, arena.folder / "again.log")
+    assert said.status == 0, said.tail
+    problems = _unlike_undisturbed(arena, project)
+    report = project / "results" / STUDY / "report"
+    for name in ("summary.csv", "summary.parquet", "report.html"):
+        assert (report / name).is_file(), f"{name} is missing"
+    assert not problems, problems
+
+
+_OF_NETWORK = r"(chains|network|clusters|facets|contact_events|loading|figures)"
+
+
+def _unlike_undisturbed(arena: Arena, project: Path) -> list[str]:
+    """Every table of the study against what its inputs give when nobody disturbs the engine.
+
+    A filling that was resumed is another bed, from which another process follows: the tables
+    of such a process are made again from its inputs.
+    """
+    problems = []
+    bed: list[int] = []
+    for place in PLACES:
+        (run,) = (project / "results" / STUDY / place).iterdir()
+        steps = resumed_at(run)
+        bed = steps if place == "filling" else bed
+        clean = arena.clean
+        if place == "process" and bed:
+            clean = CleanRuns(_with_this_bed(arena, project), arena.folder / "clean")
+            clean.cache.mkdir()
+        found = differences(run / "tables", clean.tables(place, steps))
+        problems += [
+            f"{place} resumed at {steps}: {problem}"
+            for problem in found
+            if not re.match(_OF_NETWORK, problem)
+        ]
+    return problems
+
+
+def _with_this_bed(arena: Arena, project: Path) -> Ground:
+    """The ground with the attacked project in place of the undisturbed one."""
+    (run,) = (project / "results" / STUDY / "process").iterdir()
+    process = arena.ground.phases["process"]
+    own = [
+        name
+        for name in files_of(project)
+        if "/process/" not in name
+        or Path(name).name in ("in.liggghts", "case.json", "columns.json")
+        or Path(name).suffix == ".stl"
+    ]
+    phase = replace(process, run=str(run.relative_to(project)), cpu_s=0.0, bytes=0, before=own)
+    return Ground(project, {**arena.ground.phases, "process": phase})
+
+
+# --- other attacks ---------------------------------------------------------------------
+
+
+def _two_at_once(arena: Arena) -> None:
+    """A second call while the first runs: a live lock is respected."""
+    project = entry(arena.folder / "project")
+    first = Call(words_of(project), project, arena.folder / "first.log")
+    locks = project / ".snakemake/locks"
+    assert first.wait_until(lambda: bool(list(locks.glob("*")))), first.wait().tail
+    second = whole(project, arena.folder / "second.log")
+    said = first.wait(_PATIENCE_S)
+    assert refused(second, "lock|another|already runs|running"), f"both ran: {second.tail}"
+    assert said.status == 0, said.tail
+
+
+_FAILS = """\
+{% extends "base/process.in.j2" %}
+{% block extra %}
+{% if "0.006" in deck.run %}
+quit
+{% endif %}
+{% endblock %}
+"""
+
+
+def _one_fails(arena: Arena) -> None:
+    """A sweep of which one case fails: the report shows the other, and names this one."""
+    project = entry(arena.folder / "project")
+    data = tiny_study()
+    data["sweep"] = {"motion.immersion_depth_m": [0.006, 0.007]}
+    file = write_study(project, data).parent / "templates/process.in.j2"
+    file.parent.mkdir()
+    file.write_text(_FAILS)
+    said = whole(project, arena.folder / "first.log")
+    assert said.status not in (0, None), f"the failed case was not told: {said.tail}"
+    report = project / "results" / STUDY / "report"
+    assert len(pd.read_parquet(report / "summary.parquet")), said.tail
+    page = (report / "report.html").read_text(encoding="utf-8")
+    assert "0.006" in page
+    assert re.search("LIGGGHTS ended normally|failed|rejected", page)
+
+
+def _read_only(arena: Arena) -> None:
+    """A repository on a disk that is mounted read-only."""
+    with arena.disk() as disk:
+        project = entry(disk.folder / "project")
+        subprocess.run(["mount", "-o", "remount,ro", str(disk.folder)], check=True)
+        said = whole(project, arena.folder / "first.log")
+        assert refused(said, "read-only|cannot be written|permission|write"), said.tail
+
+
+def _full(arena: Arena) -> None:
+    """A repository on a disk without a byte left."""
+    with arena.disk() as disk:
+        project = entry(disk.folder / "project")
+        disk.hold(0)
+        said = whole(project, arena.folder / "first.log")
+        assert refused(said, "no space left|disk"), said.tail
+
+
+def _of_another_user(arena: Arena) -> None:
+    """Results that may be read but not written."""
+    project = arena.ground.copy(arena.folder / "project")
+    _open_way(project)
+    said = main_of("dragchain", ["tables", arena.ground.run("process")], project, user=_NOBODY)
+    assert refused(said, "permission|write"), said.tail
+
+
+def _unreadable(arena: Arena) -> None:
+    """A study that may not be read."""
+    project = new_project(arena.folder / "project")
+    file = write_study(project, tiny_study())
+    _open_way(project)
+    file.chmod(0)
+    said = main_of("dragdeck", ["check", STUDY], project, user=_NOBODY)
+    assert refused(said, r"study\.yaml"), said.tail
+
+
+_NOBODY = 65534
+
+
+def _open_way(project: Path) -> None:
+    """Let others come to a folder and look at it."""
+    for folder in [project, *project.parents]:
+        if folder.stat().st_uid == os.geteuid() and folder != Path("/"):
+            folder.chmod(folder.stat().st_mode | stat.S_IXOTH | stat.S_IROTH | stat.S_IXGRP)
+
+
+def _by_symlink(arena: Arena) -> None:
+    """The script called by a symlink that stands elsewhere: it runs there, or says why not."""
+    project = entry(arena.folder / "project")
+    link = arena.folder / "elsewhere" / "go"
+    link.parent.mkdir()
+    link.symlink_to(project / "run")
+    words = [str(link), *words_of(project, "all", "--dry-run")[1:]]
+    said = call(words, link.parent, arena.folder / "first.log", 60.0)
+    if said.status != 0 or "run_process" not in said.text:
+        assert refused(said, "symlink|symbolic link"), f"it runs elsewhere: {said.tail}"
+
+
+def _emptied_state(arena: Arena) -> None:
+    """What Snakemake keeps of a study is lost or damaged: nothing is run again for nothing."""
+    project = entry(arena.folder / "project")
+    first = whole(project, arena.folder / "first.log", "drop_test")
+    assert first.status == 0, first.tail
+    for file in (project / ".snakemake").rglob("*"):
+        if file.is_file():
+            os.truncate(file, 0)
+    said = whole(project, arena.folder / "again.log", "drop_test")
+    assert said.status == 0, said.tail
+    assert not said.has_traceback, said.tail
+    (run,) = (project / "results" / STUDY / "drop_test").iterdir()
+    assert len(json.loads((run / "run.json").read_text())["parts"]) == 1, "it runs again"
+
+
+_PLACES = {
+    "two calls at once": _two_at_once,
+    "one case of a sweep fails": _one_fails,
+    "a read-only repository": _read_only,
+    "a repository on a full disk": _full,
+    "results of another user": _of_another_user,
+    "a study that may not be read": _unreadable,
+    "a symlink to run": _by_symlink,
+    "what Snakemake keeps is emptied": _emptied_state,
+}
+
+
+@pytest.mark.attack(rows=_PLACES, sample=0)
+def test_the_workflow_goes_on_or_says_why(attack: Callable[[Arena], None], arena: Arena) -> None:
+    if attack in (_of_another_user, _unreadable) and os.geteuid() != 0:
+        pytest.skip("only root can be another user")
+    attack(arena)
+
+
+_WRONG_CALLS = {
+    "an unknown key of --config": ((f"study={STUDY}", "fidelty=quick"), ("fidelty", "fidelity")),
+    "an unknown fidelity": ((f"study={STUDY}", "fidelity=quik"), ("quik", "quick")),
+    "an unknown study": (("study=tny",), ("tny", STUDY)),
+    "a study out of the folder": (("study=../studies/tiny",), (r"\.\./studies/tiny",)),
+    "a study that is a command": (("study=tiny; touch pwned",), ("tiny; touch pwned",)),
+    "a study with a newline": (("study=tiny\ntouch pwned",), ("study",)),
+    "a study of 5000 letters": (("study=" + "a" * 5000,), ("study",)),
+    "a study that is a number": (("study=17",), ("17", STUDY)),
+    "a study that is nothing": (("study=",), ("study",)),
+    "an unknown plan": ((f"study={STUDY}", "plan=nothing"), ("nothing",)),
+    "a record out of the project": ((f"study={STUDY}", "record"), ("passwd|record",)),
+    "a plan that is no plan": ((f"study={STUDY}", "plan=/etc/passwd"), ("passwd|plan",)),
+}
+
+
+@pytest.mark.attack(rows=_WRONG_CALLS, sample=0)
+def test_a_wrong_call_is_refused(
+    attack: tuple[tuple[str, ...], tuple[str, ...]], arena: Arena
+) -> None:
+    config, named = attack
+    project = entry(arena.folder / "project")
+    target = "tradeoff" if "plan=" in config[-1] else "all"
+    if config[-1] == "record":
+        write_study(project, {**tiny_study(), "calibration": {"record": "/etc/passwd"}})
+        config, target = config[:-1], "calibrate"
+    words = [str(project / "run"), target, "--dry-run", "--config", *config]
+    said = call(words, project, arena.folder / "first.log", 60.0)
+    assert not list(project.rglob("pwned")), f"an input became code: {said.tail}"
+    assert refused(said, *named), said.tail

@@ -7,8 +7,8 @@ from typing import get_args
 
 import dragchain
 import evidence
-from dragchain.documents import Part
 from dragchain.statistics.estimate import Verdict
+from dragdeck.documents import Part
 
 WORDS = {"confirmed", "not confirmed", "contradicted"}
 CHECKS = {"pass", "fail"}

@@ -1,6 +1,5 @@
 """The reference is that of the code: nothing is missing, and nothing is made up."""
 
-import json
 import re
 from pathlib import Path
 from typing import get_args
@@ -8,14 +7,13 @@ from typing import get_args
 import nbformat
 import pytest
 import reference
-import study_fields
 import yaml
 from doc_pages import PAGES, template_examples
 from paths import ROOT
 from pybtex.database import parse_file
 
 import dragchain
-from dragchain.report.notation import MINUS
+from dragchain.report.page import MINUS
 from dragchain.scaling.document import ScalingFile
 from dragchain.scaling.fit import read_scalings, said
 from dragdeck.cases.case import Case
@@ -29,7 +27,6 @@ from dragdeck.scenes.process import PROCESS, ProcessDeck
 
 DOCS = ROOT / "docs"
 NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
-CONFIG = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())["properties"]
 INSIDE = {"pass_verdict", "render_verification"}
 """Rules without outputs of their own that are no targets."""
 
@@ -44,58 +41,46 @@ def first_cells(text: str) -> set[str]:
     return {name for cell in cells for name in re.findall(r"`([^`]+)`", cell)}
 
 
-def test_every_field_has_a_meaning() -> None:
-    rows = re.findall(r"^\| `(.*?)` \|(.*?)\|(.*?)\| (.*?) \|$", study_fields.fields(), re.M)
-    assert len(rows) > 50
-    assert [row[0] for row in rows if not row[3].strip()] == []
+@pytest.mark.parametrize("name", ["fields", "columns", "dragdeck", "dragchain"])
+def test_every_field_column_and_option_has_a_meaning(name: str) -> None:
+    rows = re.findall(r"^\| `(.*?)` (?:\|.*)?\| ?(.*?) \|$", reference.TEXTS[name](), re.M)
+    assert len(rows) > 20
+    assert [field for field, meaning in rows if not meaning.strip()] == []
 
 
-def test_every_command_and_option_says_what_it_does() -> None:
-    for made in (reference.TEXTS["dragdeck_commands"](), reference.TEXTS["dragchain_commands"]()):
-        rows = re.findall(r"^\| `(.*?)` \|(.*)\|$", made, re.M)
-        assert rows and all(words.strip() for _, words in rows)
+def section(page: str, start: str, end: str) -> str:
+    return (ROOT / page).read_text(encoding="utf-8").partition(start)[2].partition(end)[0]
 
 
-def test_every_target_is_on_the_page() -> None:
-    snakefile = (ROOT / "Snakefile").read_text()
+def test_every_target_is_on_the_page_and_in_the_usage() -> None:
+    snakefile, usage = (ROOT / "Snakefile").read_text(), (ROOT / "run").read_text()
     targets = set(re.findall(r"^rule (\w+):", snakefile, re.M)) - INSIDE
-    section = text_of("reference/snakemake.md").partition("## Targets")[2].partition("\n## ")[0]
-    assert first_cells(section) == targets
-    usage = (ROOT / "run").read_text()
+    assert first_cells(section("docs/reference/snakemake.md", "## Targets", "\n## ")) == targets
     assert all(re.search(rf"\b{target}\b", usage) for target in targets)
 
 
-@pytest.mark.parametrize("page", ["docs/reference/snakemake.md", "config/README.md"])
-def test_every_key_of_the_configuration_is_on_the_page(page: str) -> None:
-    section = (ROOT / page).read_text().partition("| key | default |")[2].partition("\n\n")[0]
-    assert first_cells(section) == set(CONFIG)
-
-
-def test_the_configuration_has_every_key_of_its_schema() -> None:
-    assert set(yaml.safe_load((ROOT / "config/config.yaml").read_text())) == set(CONFIG)
+def test_every_key_of_the_configuration_is_in_its_file_and_on_the_pages() -> None:
+    config = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+    keys = set(config["properties"])
+    assert set(yaml.safe_load((ROOT / "config/config.yaml").read_text())) == keys
+    for page in ("docs/reference/snakemake.md", "config/README.md"):
+        assert first_cells(section(page, "| key | default |", "\n\n")) == keys
 
 
 def test_every_check_and_warning_is_on_the_page() -> None:
-    text = text_of("reference/checks.md")
-    checks, _, rest = text.partition("## Warnings")
-    codes = {code for code in first_cells(checks.partition("`within_limits` is also")[0])}
-    assert codes == set(get_args(CheckCode))
-    assert first_cells(rest) >= set(get_args(CautionCode))
-    known = {*get_args(CautionCode), *get_args(CheckCode)}
-    assert {name for name in first_cells(rest) if re.fullmatch("[a-z_]+", name)} <= known
+    checks, _, rest = text_of("reference/checks.md").partition("## Warnings")
+    codes, cautions = set(get_args(CheckCode)), set(get_args(CautionCode))
+    assert first_cells(checks.partition("`within_limits` is also")[0]) == codes
+    named = {name for name in first_cells(rest) if re.fullmatch("[a-z_]+", name)}
+    assert cautions <= named <= cautions | codes
 
 
-@pytest.mark.parametrize("deck", [DropDeck, FillingDeck, ProcessDeck])
-def test_every_value_of_a_deck_is_on_the_page(deck: type) -> None:
-    names = set(re.findall(r"[`.](\w+)`", text_of("reference/templates.md")))
-    assert set(deck.__dataclass_fields__) - {"materials"} <= names
-
-
-def test_every_block_of_the_templates_is_on_the_page() -> None:
-    text = text_of("reference/templates.md")
+def test_every_value_and_block_of_the_templates_is_on_the_page() -> None:
+    named = set(re.findall(r"[`.](\w+)`", text_of("reference/templates.md")))
+    for deck in (DropDeck, FillingDeck, ProcessDeck):
+        assert set(deck.__dataclass_fields__) - {"materials"} <= named
     for template in (ROOT / "templates").glob("*.in.j2"):
-        for block in re.findall(r"{% block (\w+) %}", template.read_text()):
-            assert f"`{block}`" in text, f"{template.name}: block {block}"
+        assert set(re.findall(r"{% block (\w+) %}", template.read_text())) <= named, template
 
 
 @pytest.mark.engine
@@ -121,26 +106,16 @@ def test_every_public_name_of_dragchain_is_on_the_page() -> None:
     assert [name for name in dragchain.__all__ if name not in text] == []
 
 
-def test_every_source_that_a_page_cites_is_known() -> None:
-    keys = set(re.findall(r"^@\w+{(\w+),", text_of("references.bib"), re.M))
-    cited = {
-        key for page in PAGES for key in re.findall(r"bibliography\.md#(\w+)", page.read_text())
-    }
-    assert cited and cited <= keys
-
-
-def test_every_source_is_named_in_a_page_or_in_the_code() -> None:
-    folders = ("analysis", "workflow", "evidence", "benchmarks", "studies", "tests")
-    code = [file for name in folders for file in (ROOT / name).rglob("*.*")]
-    code = [file for file in code if file.suffix in (".py", ".yaml", ".csv", ".j2")]
-    pages = [page for page in PAGES if page.name != "bibliography.md"]
-    text = "".join(file.read_text(encoding="utf-8") for file in (*code, *pages))
+def test_every_source_is_cited_and_every_cited_one_known() -> None:
     entries = parse_file(str(DOCS / "references.bib")).entries
-    first = {
-        key: str(entry.persons["author"][0].last_names[-1]).strip("{}")
-        for key, entry in entries.items()
-    }
-    assert [key for key, name in first.items() if name not in text] == []
+    pages = "".join(page.read_text() for page in PAGES if page.name != "bibliography.md")
+    assert set(re.findall(r"bibliography\.md#(\w+)", pages)) <= set(entries)
+    folders = ("analysis", "workflow", "evidence", "benchmarks", "studies", "tests")
+    code = (file for name in folders for file in (ROOT / name).rglob("*.*"))
+    texts = [file.read_text() for file in code if file.suffix in (".py", ".yaml", ".csv", ".j2")]
+    text = "".join([pages, *texts])
+    authors = {key: entry.persons["author"][0].last_names[-1] for key, entry in entries.items()}
+    assert [key for key, name in authors.items() if str(name).strip("{}") not in text] == []
 
 
 @pytest.mark.parametrize("found", read_scalings(), ids=lambda found: found.study)
@@ -157,27 +132,16 @@ def test_the_scalings_are_those_of_the_studies_and_on_the_page(found: ScalingFil
 
 
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
-def test_a_notebook_names_its_study_first(file) -> None:
-    notebook = json.loads(file.read_text())
-    code = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
-    study = re.fullmatch(r'study_name = "([\w-]+)"', "".join(code[0]["source"]))
-    assert study is not None and Project(ROOT).cases(study[1])
-    assert not any(study[1] in "".join(cell["source"]) for cell in code[1:])
-    links = re.findall(r"\]\(([^)#:]+)", file.read_text())
-    assert all((file.parent / link).exists() for link in links)
-
-
-def test_the_notebooks_are_on_a_page() -> None:
-    text = text_of("howto/results.md")
-    assert NOTEBOOKS and all(f"examples/{file.name}" in text for file in NOTEBOOKS)
-
-
-@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
-def test_a_notebook_is_stored_with_its_output_but_no_place_or_time(file: Path) -> None:
+def test_a_notebook_names_its_study_first_and_is_stored_with_its_output(file: Path) -> None:
     notebook = nbformat.read(file, as_version=4)
-    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    assert [cell.source for cell in cells[1:] if not cell.outputs] == []
+    first, *cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    study = re.fullmatch(r'study_name = "([\w-]+)"', first.source)
+    assert study is not None and Project(ROOT).cases(study[1])
+    assert not any(study[1] in cell.source or not cell.outputs for cell in cells)
     texts = [one.get("text", "") + one.get("data", {}).get("text/plain", "")
              for cell in cells for one in cell.outputs]  # fmt: skip
     assert not re.search(r"(^|[\s'\"(])/\w+/", "\n".join(texts))
     assert not any("execution" in cell.metadata for cell in cells)
+    links = re.findall(r"\]\(([^)#:]+)", file.read_text())
+    assert all((file.parent / link).exists() for link in links)
+    assert f"examples/{file.name}" in text_of("howto/results.md")

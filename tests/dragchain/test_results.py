@@ -20,8 +20,8 @@ from dragchain import (
     UnknownNameError,
     load,
 )
-from dragchain.report.collect import write_findings
 from dragchain.report.findings import FILE
+from dragchain.report.run_data import write_findings
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def test_one_run_folder_is_a_study_of_one_run(project: Path) -> None:
 def test_an_unknown_study_is_told_from_those_that_there_are(project: Path) -> None:
     with pytest.raises(UnknownNameError, match=r"(?s)'smal'.*did you mean 'small'.*\./run all"):
         load("smal")
-    with pytest.raises(UnknownNameError, match="known: small"):
+    with pytest.raises(UnknownNameError, match="known:  small"):
         load(project / "examples")
 
 

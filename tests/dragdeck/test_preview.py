@@ -18,10 +18,9 @@ from dragdeck.cases.case import Case
 from dragdeck.cli import main
 from dragdeck.errors import InputError
 from dragdeck.mesh import cylinder, prism, write_stl
-from dragdeck.preview.layout import Layout, layout
+from dragdeck.preview.layout import COLOURS, Layout, layout
 from dragdeck.preview.page import Words, page
 from dragdeck.preview.swept import swept_volume
-from dragdeck.preview.views import COLOURS
 from dragdeck.project import Project
 from dragdeck.scenes.filling import expected_surface
 from dragdeck.scenes.fit import check_fit, clearances

@@ -4,8 +4,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from blocks import without_blocks
-from page_files import pages
+from page_parts import pages, typed
 from paths import ROOT
 
 HISTORY = {"CHANGELOG.md"}
@@ -26,8 +25,8 @@ def fences(page: Path) -> Iterator[tuple[str, str]]:
 
 
 def prose(page: Path) -> str:
-    """What is typed as text: no blocks from records, no code, no comments, no targets of links."""
-    text = without_blocks(page.read_text(encoding="utf-8"))
+    """What is typed as text: nothing from records, no code, no comments, no targets of links."""
+    text = typed(page.read_text(encoding="utf-8"))
     text = FENCE.sub("\n", text)
     text = re.sub(r"<!--.*?-->", " ", text, flags=re.S)
     text = re.sub(r"\$\$.*?\$\$|\$[^$\n]+\$", " ", text, flags=re.S)

@@ -9,8 +9,6 @@ from typing import Any
 from made_motion import with_motion
 from pages import Page
 
-from dragchain.report.extrapolated import FILE as EXTRAPOLATED
-from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity, Need, Reached
 from dragchain.report.findings import (
     FILE,
     AheadBehind,
@@ -26,6 +24,7 @@ from dragchain.report.findings import (
     Peaks,
     ProcessFindings,
 )
+from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity, Need, Reached
 from dragchain.run.basis import QUANTITIES
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, EstimateColumns

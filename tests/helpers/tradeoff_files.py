@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from dragchain.documents import SCHEMA
-from dragchain.tradeoff.path_blocks import FORCE_BINS
-from dragchain.tradeoff.quantities import QUANTITIES
+from dragchain.tradeoff.measure_run import FORCE_BINS
+from dragchain.tradeoff.measures import QUANTITIES
+from dragdeck.documents import SCHEMA
 
 BLOCK_M = 0.0065
 VALUES = {

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from tradeoff_files import measures, write
 
+from dragchain.tradeoff.compare import read_runs
 from dragchain.tradeoff.outcome import Tradeoff, compare
-from dragchain.tradeoff.runs import read_runs
 
 REFERENCE, SOFT, COARSE, FAST = (1.0, 0.2, 1.0), (0.01, 0.2, 1.0), (1.0, 0.5, 1.0), (1.0, 0.2, 5.0)
 BOTH = (0.01, 0.5, 1.0)

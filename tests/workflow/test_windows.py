@@ -12,10 +12,10 @@ import yaml
 from paths import SMALL_STUDY
 from snakemake_calls import copy_of_project, jobs, snakemake
 
-from dragchain.report.extrapolated import Extrapolated
+from dragchain.report.values import Extrapolated
 from dragchain.run.case import load_case
 from dragchain.run.kinematics import drag_phase
-from dragchain.windows.document import Round
+from dragchain.windows.estimate import Round
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 

@@ -1,4 +1,4 @@
-// Columns of numbers, as dragchain/network_page/columns.py writes them: the first bytes of all
+// Columns of numbers, as dragchain/network_page/scene.py writes them: the first bytes of all
 // numbers of a column, then all second bytes, and so on.
 
 const BYTES = { u8: 1, u16: 2, u32: 4, f24: 3 };

@@ -2,7 +2,7 @@
 
 export const QUASI_LINEAR = 1,
   PATH = 2,
-  DOMINANT = 4; // flags of a contact, as frames.py sets them
+  DOMINANT = 4; // flags of a contact, as scene.py sets them
 const FIRST_BODY = 0xfff0; // numbers from here on stand for bodies that are no particle
 
 export const CLASSES = ["particle-particle", "particle-workpiece", "particle-bowl"];

@@ -24,8 +24,7 @@ from dragdeck.advice.forecast import (
     roles,
     tables,
 )
-from dragdeck.advice.options import with_option
-from dragdeck.advice.speed import Speed
+from dragdeck.advice.options import Speed, with_option
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
@@ -43,16 +42,19 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.process import LAUNCHER_VARIABLE, find_engine
 from dragdeck.engine.reports import say
 from dragdeck.errors import DragdeckError, InputError, choices, together
-from dragdeck.files import replace_bytes, replace_text
-from dragdeck.outlook import bed as bed_outlook
-from dragdeck.outlook import fit as fit_outlook
-from dragdeck.outlook import timestep as timestep_outlook
+from dragdeck.files import write_bytes, write_text
 from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, show
 from dragdeck.outlook.explain import page as page_of_scene
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_measured
-from dragdeck.outlook.reduced_modulus import modulus_note, not_corrected
+from dragdeck.outlook.process import (
+    bed_notes,
+    dimensionless,
+    modulus_note,
+    not_corrected,
+    workpiece_notes,
+)
 from dragdeck.outlook.runs import expected_runs, plan_in_words
-from dragdeck.outlook.stable_step import stable_step_cautions, stable_step_note
+from dragdeck.outlook.timestep import stable_step_cautions, stable_step_note, timestep_notes
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import Layout, layout
 from dragdeck.preview.page import Words, page
@@ -209,10 +211,10 @@ def explain(study: str, fidelity: str | None, scene: str | None, verbose: bool) 
 
 def _expectations(case: Case, kind: SceneType, scene: StudyScene) -> list[tuple[str, str]]:
     """What is known of a scene's time step and bed before it is run."""
-    notes = timestep_outlook.notes(case, kind, scene)
+    notes = timestep_notes(case, kind, scene)
     if kind.needs_bed:
-        notes += [stable_step_note(case), *fit_outlook.notes(case), modulus_note(case)]
-    return [*notes, *([] if kind.single_particle else bed_outlook.notes(case))]
+        notes += [stable_step_note(case), *workpiece_notes(case), modulus_note(case)]
+    return [*notes, *([] if kind.single_particle else bed_notes(case))]
 
 
 def preview(study: str, fidelity: str | None, case: str | None) -> None:
@@ -242,8 +244,8 @@ def _numbers(case: Case) -> dict[str, list[tuple[str, str]]]:
     """The tables of a preview by their headings."""
     count = ("particles", str(case.study.media.count))
     return {
-        "Expected": [*fit_outlook.notes(case), count],
-        "Dimensionless numbers": fit_outlook.dimensionless(case),
+        "Expected": [*workpiece_notes(case), count],
+        "Dimensionless numbers": dimensionless(case),
     }
 
 
@@ -253,9 +255,9 @@ def _drawn(found: Layout, words: Words, folder: Path) -> list[Path]:
     png = picture(found, swept, words.heading, refused=bool(words.refusal))
     folder.mkdir(parents=True, exist_ok=True)
     files = [folder / name for name in ("preview.png", "preview.html", "set_up.png")]
-    replace_bytes(files[0], png)
-    replace_text(files[1], page(found, swept, words, png))
-    replace_bytes(files[2], small_picture(found, swept))
+    write_bytes(files[0], png)
+    write_text(files[1], page(found, swept, words, png))
+    write_bytes(files[2], small_picture(found, swept))
     return files
 
 

@@ -1,16 +1,23 @@
 """JSON documents: each is a model, checked when it is written and when it is read."""
 
 import json
+from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
 
-from dragdeck.errors import InputError
-from dragdeck.files import replace_text
+from dragdeck.errors import DocumentError
+from dragdeck.files import write_text
 
 SCHEMA = 2
 """Version of the form of every document; 1 had other names (CHANGELOG.md)."""
+
+
+_MOST = 200
+"""Characters of a wrong value in a message."""
 
 
 class Part(BaseModel):
@@ -20,13 +27,10 @@ class Part(BaseModel):
 
 
 class Document(Part):
-    """A JSON document.
-
-    A key that a model does not name is left unread: the reading side names what it reads.
-    """
+    """A JSON document. A key that its model does not name is left unread."""
 
     remedy: ClassVar[str] = "make it again"
-    """What to do where the file is missing or another version's."""
+    """What to do where the file is missing, damaged, or another version's."""
 
     version: int = Field(default=SCHEMA, alias="schema")
 
@@ -36,47 +40,54 @@ class Document(Part):
 
         Raises
         ------
-        InputError
+        DocumentError
             The file is missing, is not JSON, has another schema number, or a key is missing or
             has a value that cannot be: it names file, key and value.
         """
+        refused = partial(DocumentError, file=file, remedy=cls.remedy)
         try:
             text = file.read_text(encoding="utf-8")
             version = json.loads(text).get("schema")
         except FileNotFoundError:
-            raise InputError("there is no such file", file=file, remedy=cls.remedy) from None
-        except (ValueError, AttributeError, RecursionError):
-            raise InputError(
-                "the file is not a JSON object", file=file, remedy=cls.remedy
-            ) from None
+            raise refused("there is no such file") from None
+        except (ValueError, AttributeError, RecursionError) as error:
+            raise refused(f"the file is not a JSON object: {error}") from None
         if version != SCHEMA:
-            raise InputError(
+            raise DocumentError(
                 "the file was written by another version of dragdeck",
                 file=file,
                 field="schema",
                 value=version,
                 limit=str(SCHEMA),
-                remedy=cls.remedy,
+                remedy=f"{cls.remedy}; or read it with the version that wrote it: CHANGELOG.md "
+                "lists names that have changed",
             )
         try:
             return cls.model_validate_json(text, strict=True)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
-            field = ".".join(map(str, first["loc"]))
-            missing = first["type"] == "missing"
-            raise InputError(
-                "a required key is missing" if missing else first["msg"],
-                file=file,
-                field=field or None,
-                value=None if missing else first["input"],
-                remedy=cls.remedy,
-            ) from None
+            problem, value = _said_of(first)
+            raise refused(problem, field=_field(first["loc"]), value=value) from None
 
     def write(self, file: Path) -> None:
         """Write the document; it appears under its name only once it is whole."""
-        file.parent.mkdir(parents=True, exist_ok=True)
-        replace_text(file, self.as_text())
+        write_text(file, self.as_text())
 
     def as_text(self) -> str:
         """The document as the text of its file."""
         return self.model_dump_json(indent=1, by_alias=True) + "\n"
+
+
+def _said_of(error: ErrorDetails) -> tuple[str, str | None]:
+    """What is wrong, and with what value."""
+    if error["type"] == "missing":
+        return "a required key is missing", None
+    value = repr(error["input"])
+    said = error["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    return said, value if len(value) <= _MOST else f"{value[:_MOST]}..."
+
+
+def _field(place: Iterable[int | str]) -> str | None:
+    """The dotted name of a place in a document; None: the document as a whole."""
+    name = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in place)
+    return name.removeprefix(".") or None

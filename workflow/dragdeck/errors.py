@@ -8,7 +8,13 @@ from typing import Literal
 
 
 class DragdeckError(Exception):
-    """Base of every error that dragdeck raises on purpose."""
+    """Base of every error that is raised on purpose."""
+
+
+def rendered(problem: str, **details: object) -> str:
+    """A problem, and below it what is known of it: a line for each detail that is not None."""
+    known = {f"{name}:": detail for name, detail in details.items() if detail is not None}
+    return "\n".join([problem, *(f"  {name:<7} {detail}" for name, detail in known.items())])
 
 
 class InputError(DragdeckError):
@@ -63,14 +69,12 @@ class InputError(DragdeckError):
     def _message(self) -> str:
         file = self.file if self.line is None else f"{self.file}:{self.line}"
         where = ": ".join(str(part) for part in (file, self.field) if part is not None)
-        lines = [f"{where}: {self.problem}" if where else self.problem]
-        if self.value is not None:
-            lines.append(f"  value:  {self.value}")
-        if self.limit is not None:
-            lines.append(f"  limit:  {self.limit}")
-        if self.remedy is not None:
-            lines.append(f"  remedy: {self.remedy}")
-        return "\n".join(lines)
+        problem = f"{where}: {self.problem}" if where else self.problem
+        return rendered(problem, value=self.value, limit=self.limit, remedy=self.remedy)
+
+
+class DocumentError(InputError):
+    """A JSON document that is missing, damaged, or of another version."""
 
 
 def together(errors: Iterable[InputError]) -> InputError:
@@ -99,7 +103,7 @@ class EngineError(DragdeckError):
 
 
 class RejectedRunError(DragdeckError):
-    """A run ended but did not pass the acceptance checks."""
+    """A run that did not pass the acceptance checks, or is not complete."""
 
 
 CautionCode = Literal[

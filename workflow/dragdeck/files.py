@@ -1,9 +1,12 @@
-"""Files that are replaced in one step."""
+"""Files that are either whole or not there."""
 
 import errno
 import hashlib
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 FULL_DISK = {errno.ENOSPC, errno.EDQUOT}
 """Numbers of the errors of a full disk, and of a user who may not write more."""
@@ -15,26 +18,54 @@ def file_checksum(file: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def replace_text(file: Path, text: str) -> None:
-    """Write a text file in one step: readers see the old version or the new one."""
-    replace_bytes(file, text.encode())
+@contextmanager
+def draft_of(file: Path) -> Iterator[Path]:
+    """A path to write to; what was written takes the file's place when the block ends.
 
-
-def replace_bytes(file: Path, content: bytes) -> None:
-    """Write a file in one step: readers see the old version or the new one.
+    If the block ends in an exception, nothing is left behind, and an older file of that name
+    stays as it was.
 
     Raises
     ------
     OSError
         It cannot be written; the error names the file.
     """
-    waiting = file.with_name(f".{file.name}.{os.getpid()}")
+    draft = file.with_name(f".{file.name}.{os.getpid()}")
+    file.parent.mkdir(parents=True, exist_ok=True)
     try:
-        waiting.write_bytes(content)
-        waiting.replace(file)
+        yield draft
+        draft.replace(file)
     except OSError as error:
-        if error.errno is not None:
+        if error.errno is not None and error.filename in (None, str(draft)):
             error.filename = str(file)  # a full disk says so of a stream, which has no name
         raise
     finally:
-        waiting.unlink(missing_ok=True)
+        draft.unlink(missing_ok=True)
+
+
+def write_text(file: Path, text: str) -> None:
+    """Write a text file in one step: readers see the old version or the new one."""
+    write_bytes(file, text.encode())
+
+
+def write_bytes(file: Path, content: bytes) -> None:
+    """Write a file in one step: readers see the old version or the new one."""
+    with draft_of(file) as draft:
+        draft.write_bytes(content)
+
+
+def write_vtp(file: Path, mesh: Any, *, compressed: bool = True) -> None:
+    """Write a PyVista mesh as a VTP file that appears under its name only once it is whole.
+
+    On a full disk, VTK itself truncates a file without raising an error: it writes to memory.
+    """
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(mesh)
+    writer.SetDataModeToBinary()
+    if not compressed:
+        writer.SetCompressorTypeToNone()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    write_text(file, writer.GetOutputString())

@@ -9,7 +9,7 @@ from dragdeck.advice.advise import resolve
 from dragdeck.cases.case import Case, mesh_file, of_each_workpiece
 from dragdeck.errors import InputError, choices
 from dragdeck.outlook.measured import Tradeoff
-from dragdeck.outlook.stable_step import check_timestep
+from dragdeck.outlook.timestep import check_timestep
 from dragdeck.scenes.lead import FIRST_WINDOWS, LEAD, with_leads
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.registry import SCENES
@@ -18,7 +18,7 @@ from dragdeck.study.base import NAME, NAME_LIMIT
 from dragdeck.study.workpiece import MeshShape
 from dragdeck.study.yaml import located, study_folders
 from dragdeck.sweep.cases import load_cases, study_file
-from dragdeck.sweep.plan import Points, plan_points, read_plan
+from dragdeck.sweep.plan import Plan, Points, plan_points
 
 POINTS = "points"
 """Folder of the process runs of a plan."""
@@ -107,7 +107,7 @@ class Project:
             There is no such plan or study, or they do not fit together.
         """
         file = self.plan_file(plan)
-        return plan_points(read_plan(file), file, self.cases(study)[0], resolve)
+        return plan_points(Plan.read(file), file, self.cases(study)[0], resolve)
 
     def results(self, study: str) -> Path:
         """The results of a study."""

@@ -13,6 +13,8 @@ rule read_drop_record:
         of_study("calibration", "benchmarks/record.tsv")
     conda:
         "../envs/python.yaml"
+    resources:
+        prints=1,
     params:
         fall_time=fall_time,
         source=source_hash("dragchain.calibration.measured_impacts"),
@@ -32,6 +34,8 @@ rule sweep_drops:
         of_study("calibration", "benchmarks/sweep.tsv")
     conda:
         "../envs/python.yaml"
+    resources:
+        prints=1,
     params:
         study=STUDY,
         fidelity=fidelity_option,
@@ -55,6 +59,8 @@ rule fit_restitution:
         of_study("calibration", "benchmarks/fit.tsv")
     conda:
         "../envs/python.yaml"
+    resources:
+        prints=1,
     params:
         source=source_hash("dragchain.calibration.results"),
     shell:
@@ -74,6 +80,8 @@ rule confirm_restitution:
         of_study("calibration", "benchmarks/confirm.tsv")
     conda:
         "../envs/python.yaml"
+    resources:
+        prints=1,
     params:
         study=STUDY,
         fidelity=fidelity_option,
@@ -106,6 +114,8 @@ rule write_calibration_report:
         of_study("calibration", "benchmarks/report.tsv")
     conda:
         "../envs/python.yaml"
+    resources:
+        prints=1,
     params:
         source=source_hash("dragchain.calibration.report"),
     shell:

@@ -2,6 +2,7 @@
 import json
 import os
 import re
+import signal
 import sys
 from functools import cache
 from pathlib import Path
@@ -37,7 +38,7 @@ from dragdeck.snakemake_lock import hold_lock
 from dragdeck.source_hash import source_hash
 from dragdeck.study.check import warnings
 from dragdeck.study.yaml import read_yaml
-from evidence.stability.map import bed_names
+from evidence.stability.points import bed_settings
 from evidence.verification.suite import suite_of
 
 
@@ -236,10 +237,9 @@ def every_packing(file):
 
 def planned_runs(jobs):
     """The engine runs of jobs: what is expected of each, and how far it is."""
-    found = {}
+    found, places = {}, {f"run_{place}": place for place in PLACES}
     for job in jobs:
-        place = job.rule.name.removeprefix("run_")
-        if place in PLACES and place != job.rule.name:
+        if place := places.get(job.rule.name):
             folder = PROJECT.root / Path(job.output[0]).parent
             found.setdefault(place, {})[folder] = case_of(place, job.wildcards.run)
     runs = (expected_runs(PLACES[place], folders) for place, folders in found.items())
@@ -416,7 +416,7 @@ def stability_templates():
 def stability_beds():
     """Folders of the fillings that columns and drags start from; none without a map."""
     file = PROJECT.root / STABILITY_MAP
-    names = explained(bed_names, file) if file.is_file() else []
+    names = explained(bed_settings, file) if file.is_file() else []
     return [run_path("stability", "filling", name) for name in names]
 
 

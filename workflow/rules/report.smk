@@ -58,8 +58,18 @@ rule write_report:
         " --preview {input.set_up} > {log} 2>&1"
 
 
+INTERRUPTED = []
+
+
+def interrupted(number, frame):
+    """Note that the user stopped the workflow, and stop it as ever."""
+    INTERRUPTED.append(number)
+    signal.default_int_handler(number, frame)
+
+
 # What will be run: as text, and as data for `--logger dragdeck`.
 onstart:
+    signal.signal(signal.SIGINT, interrupted)
     jobs, cores = list(workflow.dag.needrun_jobs()), workflow.cores or 1
     runs = planned_runs(jobs)
     plan = plan_in_words(runs, cores)
@@ -78,10 +88,8 @@ onsuccess:
 
 onerror:
     # Not after Ctrl-C. The mark that the report is whole goes, so that the next call makes it anew.
-    file = Path(log[0] if isinstance(log, list) else log)
-    stopped = "user request" in file.read_text(errors="replace")
     wanted = any(job.rule.name == "write_report" for job in workflow.dag.needrun_jobs())
-    if wanted and not stopped:
+    if wanted and not INTERRUPTED:
         runs = " ".join(folder for name in SCENES for folder in every_folder(name))
         advice = f"--advice {ADVICE}" if Path(ADVICE).is_file() else ""
         picture = f"results/{STUDY}/set_up.png"

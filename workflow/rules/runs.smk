@@ -58,6 +58,8 @@ for PLACE, SCENE in PLACES.items():
         conda:
             "../envs/python.yaml"
         threads: ranks_of(PLACE)
+        resources:
+            engine=1,
         params:
             outcome="--outcome" if PLACE in OUTCOMES else "",
             file=of_run(PLACE, RECORD[PLACE]) if PLACE in OUTCOMES else "",

@@ -18,6 +18,8 @@ rule write_scaling:
         of_study("scaling", "benchmarks/scaling.tsv")
     conda:
         "../envs/python.yaml"
+    resources:
+        prints=1,
     params:
         runs=every_folder("process"),
         options=scaling_options,

@@ -16,7 +16,6 @@ rule settle_beds:
         study="studies/stability/study.yaml",
         templates=stability_templates(),
     output:
-        "results/stability/points/beds.json",
         [f"{bed}/run.json" for bed in STABILITY_BEDS],
     log:
         "results/stability/logs/beds.log",
@@ -24,8 +23,10 @@ rule settle_beds:
         "results/stability/benchmarks/beds.tsv"
     conda:
         "../envs/python.yaml"
+    resources:
+        prints=1,
     params:
-        source=source_hash("evidence.stability.map_runs"),
+        source=source_hash("evidence.stability.runs"),
     shell:
         "python -m evidence run-map beds --map {input.points:q} 2>&1 | tee -i {log}"
 
@@ -46,8 +47,10 @@ rule run_regime:
         regime="impact|settle|column|drag",
     conda:
         "../envs/python.yaml"
+    resources:
+        prints=1,
     params:
-        source=source_hash("evidence.stability.map_runs"),
+        source=source_hash("evidence.stability.runs"),
     shell:
         "python -m evidence run-map {wildcards.regime} --map {input.points:q} 2>&1 | tee -i {log}"
 

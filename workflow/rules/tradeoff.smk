@@ -7,8 +7,7 @@ rule measure_costs:
         templates_of("drop_test"),
         templates_of("filling"),
         templates_of("process"),
-        overrides=sorted(str(relative(file)) for file in PROJECT.templates.glob("costs/*.j2")),
-        script=sorted(str(relative(file)) for file in PROJECT.root.glob("benchmarks/costs/*.py")),
+        script=sorted(str(relative(file)) for file in PROJECT.root.glob("benchmarks/costs/*.*")),
     output:
         of_tradeoff("costs.json"),
     log:
@@ -18,6 +17,8 @@ rule measure_costs:
     conda:
         "../envs/python.yaml"
     threads: workflow.cores
+    resources:
+        prints=1,
     params:
         study=STUDY,
         fidelity=fidelity_option,

@@ -41,6 +41,8 @@ rule run_verification:
         of_experiment("{run}", "benchmarks/run.tsv")
     conda:
         "../envs/python.yaml"
+    resources:
+        engine=1,
     params:
         source=source_hash("dragdeck.engine.run_folder"),
     shell:

@@ -24,9 +24,6 @@ from dragdeck.outlook.explain import Cost
 from dragdeck.outlook.runs import StudyRun, by_their_speeds, done_fraction, time_left
 from dragdeck.snakemake_lock import why_locked
 
-_RECORDS = ("run.json", "outcome.json")
-"""Outputs of jobs that run LIGGGHTS in a folder."""
-
 _BAR, _SHORTEST_NAME = 20, 12
 """Characters of the bar, and of a run's name that is cut to make room for its numbers."""
 
@@ -43,7 +40,11 @@ class LogHandlerSettings(LogHandlerSettingsBase):
 
 @dataclass(frozen=True)
 class _Job:
-    """A job that Snakemake has started."""
+    """A job that Snakemake has started.
+
+    Its rule says with the resource ``engine`` that it runs LIGGGHTS in the folder of its output,
+    and with ``prints`` that it writes to the terminal itself.
+    """
 
     rule: str
     folder: Path | None
@@ -52,11 +53,9 @@ class _Job:
     @classmethod
     def of(cls, record: logging.LogRecord) -> "_Job":
         values = vars(record)
-        files = [Path(file) for file in values["output"][:1]]
-        folders = [file.parent for file in files if file.name in _RECORDS]
-        runs = values["rule_name"].startswith("run_")
-        folder = Path.cwd() / folders[0] if runs and folders else None
-        return cls(values["rule_name"], folder, "| tee " in (values["shellcmd"] or ""))
+        resources = values["resources"]
+        folder = Path.cwd() / Path(values["output"][0]).parent if resources.get("engine") else None
+        return cls(values["rule_name"], folder, bool(resources.get("prints")))
 
 
 class LogHandler(LogHandlerBase):

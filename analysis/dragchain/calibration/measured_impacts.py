@@ -11,8 +11,8 @@ from pydantic.json_schema import SkipJsonSchema
 
 from dragchain.arrays import Floats
 from dragchain.calibration.force_record import Note, Record, quiet_line
-from dragchain.documents import Document, Part
 from dragchain.errors import RecordError
+from dragdeck.documents import Document, Part
 
 IMPACTS = 3
 """Impacts compared at the most (Uhlmann et al. 2015, section 4)."""

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -12,12 +12,18 @@ import pandas as pd
 from dragchain.calibration.fit import Calibration, Fit, calibrate_file
 from dragchain.calibration.force_record import read_record
 from dragchain.calibration.measured_impacts import Measured, measure
-from dragchain.calibration.simulated_drops import Drops, DropTest, Settings, read_drops
-from dragchain.calibration.sweep import Emulator, emulator_of
-from dragchain.documents import Document, Part
+from dragchain.calibration.simulated_drops import (
+    Drops,
+    DropTest,
+    Emulator,
+    Settings,
+    emulator_of,
+    read_drops,
+)
 from dragchain.errors import TableError
-from dragchain.files import write_text
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
+from dragdeck.documents import Document, Part
+from dragdeck.files import write_text
 
 SweepPurpose = Literal["production", "reference"]
 PURPOSES: tuple[SweepPurpose, ...] = ("production", "reference")
@@ -113,7 +119,7 @@ class CalibrationFile(Document):
         Impacts of the measured record.
     """
 
-    made_by: ClassVar[str] = "snakemake calibrate"
+    remedy = "make it with: snakemake calibrate"
 
     known: DropTest
     put: Put
@@ -156,7 +162,7 @@ def write_calibration(record: Path, drops_file: Path, out: Path) -> CalibrationF
 
     Raises
     ------
-    DragchainError
+    DragdeckError
         The record or the sweep cannot be used.
     """
     drops = read_drops(drops_file)

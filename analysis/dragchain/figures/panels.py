@@ -1,13 +1,18 @@
-"""Figures, their panels, legends and headings."""
+"""The axes of a figure, and the marks that figures have in common."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import ArrayLike
 
-from dragchain.arrays import Ints
-from dragchain.figures.style import WIDTH_IN
+from dragchain.arrays import Floats, Ints
+from dragchain.figures.style import BLUE, COLOURS, GREY, WIDTH_IN
+from dragchain.statistics.estimate import EstimateColumns
 
 
 def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
@@ -51,3 +56,97 @@ def _columns(letters: Ints, width_in: float) -> int:
 def head(figure: Figure, text: str) -> None:
     """Write the heading of a figure with several axes, at its left edge."""
     figure.suptitle(text, x=0.02, ha="left")
+
+
+class _Interval(Protocol):
+    """One estimate, or columns of estimates."""
+
+    @property
+    def ci95_low(self) -> Any: ...
+
+    @property
+    def ci95_high(self) -> Any: ...
+
+
+def _with_reach(columns: EstimateColumns, unit: float) -> tuple[Floats, Floats]:
+    """Values times a unit, (n,), and how far their intervals reach below and above, (2, n)."""
+    value, low, high = (
+        np.array(getattr(columns, name)) * unit for name in ("value", "ci95_low", "ci95_high")
+    )
+    return value, np.clip([value - low, high - value], 0.0, None)
+
+
+def depth_bars(
+    axes: Axes, edges_m: Sequence[float], columns: EstimateColumns, unit: float = 1.0
+) -> None:
+    """Draw values in bins of depth (mm on the vertical axis, downwards) with their intervals."""
+    edges, (value, reach) = np.asarray(edges_m) * 1e3, _with_reach(columns, unit)
+    middle = (edges[:-1] + edges[1:]) / 2
+    axes.barh(middle, value, height=0.9 * np.diff(edges), color=BLUE, alpha=0.75)
+    axes.errorbar(value, middle, xerr=reach, fmt="none", ecolor="black")
+    axes.set_ylim(edges[-1], edges[0])
+
+
+def band(axes: Axes, x: ArrayLike, interval: _Interval, colour: str, label: str = "") -> None:
+    """Fill the interval about a curve."""
+    low, high = interval.ci95_low, interval.ci95_high
+    axes.fill_between(x, low, high, color=colour, alpha=0.17, lw=0, label=label)
+
+
+def compass(figure: Figure, *place: int) -> Any:
+    """Polar axes, ahead up and left at the left; `place` as for `Figure.add_subplot`."""
+    return as_compass(figure.add_subplot(*place, projection="polar"))
+
+
+def as_compass(axes: Any) -> Any:
+    """Turn polar axes so that ahead is up and left at the left."""
+    axes.set_theta_zero_location("N")
+    axes.set_thetagrids(np.arange(0, 360, 45), ["ahead", "", "left", "", "behind", "", "right", ""])
+    axes.set_rlabel_position(157.5)
+    return axes
+
+
+def compass_bars(
+    axes: Any,
+    edges_rad: Sequence[float],
+    columns: EstimateColumns,
+    unit: float = 1.0,
+    symbol: str = "N",
+) -> None:
+    """Draw mean normal forces by azimuth with their intervals; ahead and behind differ in colour.
+
+    The radial axis is in so many `unit`, of this symbol, per bin.
+    """
+    edges, (value, reach) = np.array(edges_rad), _with_reach(columns, unit)
+    middle = (edges[:-1] + edges[1:]) / 2
+    colours = np.where(np.abs(middle) < np.pi / 2, COLOURS["ahead"], COLOURS["behind"])
+    axes.bar(middle, value, np.diff(edges), color=colours, edgecolor="white", linewidth=0.6)
+    reach[0] = np.minimum(reach[0], value)
+    axes.errorbar(middle, value, reach, fmt="none", ecolor="black", elinewidth=0.8)
+    axes.set_rmin(0.0)
+    axes.set_xlabel(f"mean normal force ({symbol} per {np.degrees(edges[1] - edges[0]):.0f}°)")
+
+
+def row(axes: Axes, place: float, value: float, interval: _Interval, colour: str) -> None:
+    """Draw a value with its interval in a row."""
+    span = [interval.ci95_low, interval.ci95_high]
+    axes.plot(span, [place, place], color=colour, linewidth=1.8, alpha=0.6)
+    axes.plot(value, place, "o", color=colour)
+
+
+def row_names(axes: Axes, names: Sequence[str]) -> None:
+    """Name rows, the first at the top; they lie at 0, 1, ..."""
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+
+
+def key(axes: Axes, label: str, **style: Any) -> None:
+    """An entry of the legend that nothing drawn has: a grey dot, or another style of a line."""
+    axes.plot([], [], label=label, **{"color": GREY, "ls": "", "marker": "o", **style})
+
+
+def log_ticks(axis: Axis, unit: float = 1.0, steps: Sequence[float] = (1.0,)) -> None:
+    """Label decades, or these steps of each, in plain numbers times a unit."""
+    axis.set_major_locator(LogLocator(10.0, subs=tuple(steps), numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{unit * value:g}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dragchain.errors import DragchainError
+from dragdeck.errors import DragdeckError
 
 Image = NDArray[np.uint8]
 """A picture, (H, W, 3)."""
 
 
-class RenderError(DragchainError):
+class RenderError(DragdeckError):
     """Off-screen rendering does not work on this machine."""
 
 

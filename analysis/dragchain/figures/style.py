@@ -16,7 +16,7 @@ from matplotlib.text import Text
 from matplotlib.typing import RcKeyType
 from PIL import Image
 
-from dragchain.files import write_bytes
+from dragdeck.files import write_bytes
 
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#6b7480"
 """After Okabe and Ito (2008): told apart with any kind of colour vision."""

@@ -2,11 +2,10 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import ClassVar
 
-from dragchain.documents import Document, Part
 from dragchain.loading.contact_events import Thresholds
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
+from dragdeck.documents import Document, Part
 
 FILE = Path("tables") / "loading.json"
 
@@ -151,7 +150,7 @@ class Loading(Totals, Document):
         Check of the sums.
     """
 
-    made_by: ClassVar[str] = "dragchain loading"
+    remedy = "make it with: dragchain loading"
 
     run: str
     confidence: float

@@ -14,13 +14,11 @@ from matplotlib.ticker import MaxNLocator
 from dragchain.arrays import Floats
 from dragchain.drag.around import AZIMUTH_BINS
 from dragchain.drag.azimuth import circumference, parts
-from dragchain.figures.marks import depth_bars
-from dragchain.figures.panels import head, new_panels
+from dragchain.figures.panels import depth_bars, head, new_panels
 from dragchain.figures.rendering import Camera, Image, check_rendering, new_plotter, photograph
 from dragchain.figures.style import GREY, WIDTH_IN, force_map
 from dragchain.loading.document import Loading, Profile
-from dragchain.loading.facets import as_polydata
-from dragchain.loading.samples import Sampled
+from dragchain.loading.samples import Sampled, as_polydata
 from dragchain.loading.summary import DEPTH_BINS
 from dragchain.run.case import Case
 from dragchain.run.kinematics import motion_of, needed, spins

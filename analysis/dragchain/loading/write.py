@@ -8,16 +8,15 @@ from matplotlib.figure import Figure
 
 from dragchain.errors import TableError
 from dragchain.figures.style import drawing, save
-from dragchain.files import write_vtp
 from dragchain.loading.contact_events import Thresholds, event_types, find_events
 from dragchain.loading.document import Loading
-from dragchain.loading.facets import as_polydata, check_facets, facet_table
 from dragchain.loading.figure import workpiece_figure
-from dragchain.loading.samples import DRAWN, Sampled, sample
+from dragchain.loading.samples import DRAWN, Sampled, as_polydata, check_facets, facet_table, sample
 from dragchain.loading.summary import summarise
 from dragchain.run.case import Case, load_case
 from dragchain.run.workpiece import Surface, read_surface
 from dragchain.tables.parquet import write_parquet
+from dragdeck.files import write_vtp
 
 
 @dataclass(frozen=True)

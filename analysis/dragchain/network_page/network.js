@@ -1,4 +1,4 @@
-/*! sources: 697fb7de5a038000c74e467860498e66dc50d53dd138f96d9dc8884d236e5992
+/*! sources: e614c1781ee65d377f916b109d62325b2010a90fbf1514a366fcd64ccdae2230
 Made by ./run web from web/; do not edit. It contains three.js:
 
 The MIT License

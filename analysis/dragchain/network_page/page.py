@@ -4,15 +4,14 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from dragchain.errors import RejectedRunError
-from dragchain.files import write_text
-from dragchain.network_page.columns import ROUNDING
-from dragchain.network_page.scene import Scene, load_scene
+from dragchain.network_page.scene import ROUNDING, Scene, load_scene
 from dragchain.report.page import NETWORK_PAGE, file_uri, page_environment
 from dragchain.run.basis import changed_settings, effects
 from dragchain.run.case import Case
 from dragchain.run.completeness import read_accepted
 from dragchain.tables.run_folder import Run
+from dragdeck.errors import RejectedRunError
+from dragdeck.files import write_text
 
 _PICTURES = ("network_xz", "forces")
 """Figures of a run that stand for scene and curve where these cannot be drawn."""

@@ -1,14 +1,233 @@
-"""The cases of a report: process runs that differ in the packing (seed) alone are one case."""
+"""The runs that a report is of, read once, and its cases.
+
+Process runs that differ in the packing (seed) alone are one case.
+"""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from typing import Generic, TypeVar
 
-from dragchain.report.runs import StudyRuns
-from dragchain.report.setup import set_up
-from dragchain.report.values import Values, over_packings
-from dragchain.run.case import changed_inputs
+import numpy as np
+from pydantic import JsonValue
+
+from dragchain.loading.document import FILE as LOADING
+from dragchain.loading.document import Loading
+from dragchain.report.findings import (
+    FILE,
+    DropFindings,
+    FillingFindings,
+    Findings,
+    ProcessFindings,
+)
+from dragchain.report.page import TIMES, number
+from dragchain.report.values import (
+    EXTRAPOLATED,
+    Extrapolated,
+    ExtrapolatedQuantity,
+    Values,
+    over_packings,
+    values_of,
+)
+from dragchain.run.case import Case, changed_inputs, load_case
+from dragchain.run.completeness import RunRecord, read_accepted
+from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
+from dragdeck.errors import DocumentError, RejectedRunError
+
+
+def set_up(case: Case, packings: int, filling: FillingFindings | None) -> list[tuple[str, str]]:
+    """Workpiece, path, speed, media, bowl and settings of a case.
+
+    Parameters
+    ----------
+    case : Case
+        A process run.
+    packings : int
+        Number of packings (seeds) that are averaged.
+    filling : FillingFindings or None
+        Of its packing.
+
+    Returns
+    -------
+    list of (str, str)
+        Name and text of each line.
+    """
+    return [
+        ("Workpiece", "; ".join(_workpiece(case))),
+        ("Path and depth", "; ".join(_path(case))),
+        ("Speed", "; ".join(_speed(case))),
+        ("Media", "; ".join(_media(case))),
+        ("Bowl", "; ".join(_bowl(case, filling))),
+        ("Settings", "; ".join(_settings(case, packings))),
+    ]
+
+
+def _workpiece(case: Case) -> Iterator[str]:
+    own, inputs = needed(case.workpiece, "workpiece"), case.inputs
+    material = _text(inputs.get("workpiece.material"))
+    if inputs.get("workpiece.shape.kind", own.kind) == "cylinder":
+        yield f"{material} cylinder, diameter {_mm(2 * own.radius_m)}".strip()
+    else:
+        file = _text(inputs.get("workpiece.shape.file")) or own.mesh
+        yield f"{material} part {file}, up to {_mm(own.radius_m)} from its axis".strip()
+    if own.count > 1:
+        yield f"number {own.number} of {own.count}"
+
+
+def _path(case: Case) -> Iterator[str]:
+    yield motion_of(case).motion.path.words(number)
+    end_s = np.array([drag_phase(case).end_step * case.timestep_s])
+    yield f"{_mm(float(path_passed(end_s, case)[0]))} long"
+    yield f"immersed {_mm(needed(case.workpiece, 'workpiece').immersion_depth_m)}"
+    yield from (f"with {one.kind}" for one in case.superposed)
+
+
+def _speed(case: Case) -> Iterator[str]:
+    simulated, factor = axis_speed(case), case.fidelity.speed_factor
+    yield f"{number(1e3 * simulated / factor)} mm/s"
+    if factor != 1.0:
+        yield f"simulated at {number(1e3 * simulated)} mm/s"
+
+
+def _media(case: Case) -> Iterator[str]:
+    media, material = case.media, _text(case.inputs.get("media.material"))
+    yield " ".join(filter(None, (number(media.count), material, "spheres")))
+    spread = (
+        f" \N{PLUS-MINUS SIGN} {_mm(2 * media.radius_std_m)} (standard deviation)"
+        if media.radius_std_m
+        else ""
+    )
+    yield f"diameter {_mm(2 * media.radius_mean_m)}{spread}"
+
+
+def _bowl(case: Case, filling: FillingFindings | None) -> Iterator[str]:
+    bowl, material = needed(case.bowl, "bowl"), _text(case.inputs.get("bowl.material"))
+    yield f"{material} cylinder, radius {_mm(bowl.radius_m)}".strip()
+    if filling is not None and "bed_height_m" in filling.bed:
+        fraction = filling.bed.get("solid_fraction")
+        solid = f", solid fraction {number(fraction)}" if fraction is not None else ""
+        yield f"filled to {_mm(float(filling.bed['bed_height_m']))}{solid}"
+
+
+def _settings(case: Case, packings: int) -> Iterator[str]:
+    own = case.fidelity
+    yield (
+        f"{own.name}: Young's modulus {TIMES} {number(own.youngs_modulus_scale)}, time step "
+        f"{number(100 * own.timestep_fraction)} % of the Rayleigh time, "
+        f"speed {TIMES} {number(own.speed_factor)}"
+    )
+    yield f"{packings} packings (seeds)" if packings > 1 else "one packing (seed)"
+
+
+def _mm(length_m: float) -> str:
+    return f"{number(1e3 * length_m)} mm"
+
+
+def _text(value: JsonValue) -> str:
+    return value if isinstance(value, str) else ""
+
+
+F = TypeVar("F", bound=Findings, covariant=True)
+
+
+@dataclass(frozen=True)
+class ReportedRun(Generic[F]):
+    """A run that counts: its folder, case, findings and ``run.json``."""
+
+    folder: Path
+    case: Case
+    findings: F
+    record: RunRecord
+
+
+@dataclass(frozen=True)
+class StudyRuns:
+    """A process run with the filling and the drop test it belongs to, None where it names none.
+
+    `loading`: load, sliding and friction work on the workpiece; `extrapolated`: its quantities at
+    the physical Young's modulus. Both are None where they were not computed.
+    """
+
+    process: ReportedRun[ProcessFindings]
+    filling: ReportedRun[FillingFindings] | None
+    drop_test: ReportedRun[DropFindings] | None
+    loading: Loading | None = None
+    extrapolated: Extrapolated | None = None
+
+    @cached_property
+    def values(self) -> Values:
+        """The quantities of the process run, each with what it says of the process."""
+        process = self.process
+        return values_of(process.case, process.findings, self.loading, self.extrapolated)
+
+    def physical(self, name: str) -> ExtrapolatedQuantity | None:
+        """A quantity with its value at the physical modulus, None if that is not known."""
+        one = self.extrapolated.of(name) if self.extrapolated else None
+        return one if one and one.value else None
+
+    @property
+    def runs(self) -> list[ReportedRun[Findings]]:
+        """The runs that there are, the process first."""
+        runs: list[ReportedRun[Findings] | None] = [self.process, self.filling, self.drop_test]
+        return [run for run in runs if run is not None]
+
+
+def read_study(run_dir: Path) -> StudyRuns:
+    """Read a process run with its filling and drop test.
+
+    A drop test without a result is left out: the process does not start from it.
+
+    Raises
+    ------
+    RejectedRunError
+        If the process or its filling is not complete, or did not pass an acceptance check.
+    DocumentError
+        If a document of one of them is missing or cannot be used.
+    """
+    process = _read(run_dir, ProcessFindings)
+    upstream = upstream_folders(run_dir, process.case)
+    filling = drop_test = None
+    if "filling" in upstream:
+        filling = _read(upstream["filling"], FillingFindings)
+    with suppress(RejectedRunError, DocumentError):
+        if "drop_test" in upstream:
+            drop_test = _read(upstream["drop_test"], DropFindings)
+    return StudyRuns(process, filling, drop_test, *read_optional(run_dir))
+
+
+def read_optional(run_dir: Path) -> tuple[Loading | None, Extrapolated | None]:
+    """Read ``loading.json`` and ``extrapolated.json`` of a process run, None where there is none.
+
+    Raises
+    ------
+    DocumentError
+        If one of them cannot be used.
+    """
+    loading, extrapolated = run_dir / LOADING, run_dir / EXTRAPOLATED
+    return (
+        Loading.read(loading) if loading.is_file() else None,
+        Extrapolated.read(extrapolated) if extrapolated.is_file() else None,
+    )
+
+
+def read_upstream(run_dir: Path) -> ReportedRun[Findings]:
+    """Read a filling or a drop test; errors are those of `read_study`."""
+    return _read(run_dir, Findings)
+
+
+def upstream_folders(run_dir: Path, case: Case) -> dict[str, Path]:
+    """Folders of the filling and the drop test that a process run names, by scene."""
+    results = run_dir.resolve().parent.parent
+    return {scene: results / scene / run for scene, run in case.upstream.items()}
+
+
+def _read(run_dir: Path, findings: type[F]) -> ReportedRun[F]:
+    record = read_accepted(run_dir)
+    return ReportedRun(run_dir, load_case(run_dir), findings.read(run_dir / FILE), record)
+
 
 _SEED = "seed"
 _IN_NAME = re.compile(rf"_?{_SEED}-[0-9]+")

@@ -8,16 +8,15 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
 from pydantic import JsonValue
 
-from dragchain.documents import Document, Part
 from dragchain.report.cases import ReportedCase
 from dragchain.report.values import mean_over_packings
 from dragchain.run.case import AdvisedSettings, Case, changed_inputs
 from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
+from dragdeck.documents import Document, Part
 
 _RESTITUTION = "restitution"
 """The quantity of the drop test."""
@@ -52,7 +51,7 @@ class AdvisedCase(Part):
 class Advice(Document):
     """The content of ``advice.json`` that is set beside the runs."""
 
-    made_by: ClassVar[str] = "dragdeck advise"
+    remedy = "make it with: dragdeck advise"
 
     cases: tuple[AdvisedCase, ...]
 

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from dragchain.errors import ExportError
-from dragchain.files import write_text
-from dragchain.report.runs import read_study
+from dragchain.report.cases import read_study
 from dragchain.run.case import Case, load_case
 from dragchain.run.completeness import read_accepted
+from dragdeck.files import write_text
 
 METADATA = "ro-crate-metadata.json"
 LEFT_OUT = "left_out.csv"

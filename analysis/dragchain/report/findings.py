@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Literal
 
-from dragchain.documents import Document, Part
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
+from dragdeck.documents import Document, Part
 
 FILE = Path("tables") / "figures.json"
 
@@ -177,7 +177,7 @@ class Wake(Part):
 class Findings(Document):
     """What the findings of every scene have."""
 
-    made_by: ClassVar[str] = "dragchain figures"
+    remedy = "make it with: dragchain figures"
 
     run: str
 

@@ -15,13 +15,13 @@ from matplotlib.typing import RcKeyType
 from PIL import Image
 
 from dragchain.figures.style import PAPER_COLOURS, drawing, few_colours, true_minus
-from dragchain.files import write_bytes
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.write import compute_loading, figure_of
 from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData
 from dragchain.report.run_figures import DRAW_PROCESS
 from dragchain.run.case import load_case
+from dragdeck.files import write_bytes
 
 COLUMN_MM, PAGE_MM = 85, 180
 _ONE_COLUMN = ("force_around_workpiece",)
@@ -62,7 +62,7 @@ def write_journal_figures(run_dir: Path, paper_colours: bool = False) -> list[Pa
 
     Raises
     ------
-    DragchainError
+    DragdeckError
         If it is no process run, a table is missing, or pictures cannot be rendered here.
     """
     case = load_case(run_dir)

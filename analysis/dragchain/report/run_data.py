@@ -1,6 +1,6 @@
-"""What findings and figures need of a run: each table is read once, and only if it is needed."""
+"""A run with its tables, each read once and only if it is needed, and its findings from them."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -9,12 +9,37 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from dragchain.arrays import Floats
+from dragchain.arrays import Floats, Ints
+from dragchain.drag.around import ahead_behind, azimuth_profile, depth_profile, depth_slope
+from dragchain.drag.force import FORCES, read_counted, summarise_forces
+from dragchain.drag.peaks import drag_peaks, peak_separation_s
+from dragchain.errors import SeriesError
 from dragchain.figures.network_picture import Scene, load_scene
 from dragchain.figures.rendering import check_rendering
-from dragchain.run.case import Case
-from dragchain.run.kinematics import process_time
+from dragchain.report.findings import (
+    FILE,
+    AheadBehind,
+    AzimuthProfile,
+    Chains,
+    Comparison,
+    DepthProfile,
+    DropFindings,
+    DropImpacts,
+    DropRestitution,
+    FillingFindings,
+    Findings,
+    Peaks,
+    ProcessFindings,
+    Wake,
+)
+from dragchain.run.case import Case, load_outputs
+from dragchain.run.kinematics import drag_start_s, needed, path_passed, process_time
+from dragchain.run.reference import reference_drags
+from dragchain.statistics.correlated import estimate_mean
+from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
+from dragchain.tables.bed import Packing
 from dragchain.tables.by_step import read_table
+from dragchain.tables.impacts import effective_restitution
 
 
 class DragTrace(NamedTuple):
@@ -93,3 +118,149 @@ def dominant_bottlenecks(network: pd.DataFrame, chains: pd.DataFrame) -> Floats:
     """The dominant workpiece path's bottleneck in each network frame in N, 0 without a path."""
     dominant = chains[chains["dominant"]].set_index("step")["bottleneck_n"]
     return dominant.reindex(network["step"]).fillna(0.0).to_numpy(np.float64)
+
+
+def write_findings(run: RunData) -> Findings:
+    """Compute the findings of a run, write them to ``tables/figures.json`` and return them.
+
+    Raises
+    ------
+    TableError
+        If a table that the run's scene has is missing.
+    SeriesError
+        If the run is too short for its statistics.
+    """
+    collect = {"process": process_findings, "filling": _filling, "drop_test": _drop}[run.case.scene]
+    findings = collect(run)
+    findings.write(run.folder / FILE)
+    return findings
+
+
+# --- process ---------------------------------------------------------------------------------
+
+
+def process_findings(run: RunData) -> ProcessFindings:
+    """Compute the findings of a process run; errors are those of `write_findings`."""
+    samples = read_counted(run.folder, ("step", "time_s", *FORCES))
+    forces = summarise_forces(samples)
+    frame, frames, contacts = _workpiece_contacts(run, samples)
+    azimuth, depth, force = (
+        contacts[name].to_numpy(np.float64) for name in ("azimuth_rad", "depth_m", "normal_force_n")
+    )
+    edges, around = azimuth_profile(frame, frames, azimuth, force)
+    levels, contact, line = depth_profile(frame, frames, depth, force)
+    return ProcessFindings(
+        run=run.case.run,
+        process_time_zero_s=drag_start_s(run.case),
+        forces=forces,
+        comparison=tuple(
+            Comparison(**vars(reference)) for reference in reference_drags(run.case.reference)
+        ),
+        peaks=_peaks(samples, run),
+        network={"frames": len(run.network)} | _means(run.network),
+        chains=_chains(run.chains, len(run.network)),
+        confidence=CONFIDENCE,
+        workpiece_frames=frames,
+        ahead_behind=AheadBehind(**ahead_behind(frame, frames, azimuth, force)),
+        azimuth=AzimuthProfile(edges_rad=tuple(edges.tolist()), force_n=EstimateColumns.of(around)),
+        depth=DepthProfile(
+            edges_m=tuple(levels.tolist()),
+            contact_n=EstimateColumns.of(contact),
+            line_load_n_per_m=EstimateColumns.of(line),
+            slope_n_per_m=depth_slope(frame, frames, depth, force),
+        ),
+        wake=_wake(samples, run.case),
+    )
+
+
+def _wake(samples: pd.DataFrame, case: Case) -> Wake | None:
+    workpiece = needed(case.workpiece, "workpiece")
+    if workpiece.wake_from_m is None:
+        return None
+    path = path_passed(samples["time_s"].to_numpy(), case)
+    fresh = path <= workpiece.wake_from_m - 2 * workpiece.radius_m
+    try:
+        before, after = (
+            estimate_mean(samples["drag_n"][which].to_numpy())
+            for which in (fresh, path > workpiece.wake_from_m)
+        )
+    except SeriesError:
+        return None
+    return Wake(fresh_n=before, wake_n=after, ratio=after.over(before))
+
+
+def _peaks(samples: pd.DataFrame, run: RunData) -> Peaks:
+    peaks = drag_peaks(samples, run.case)
+    process_s = process_time(peaks.time_s, run.case)
+    return Peaks(
+        count=len(peaks.index),
+        process_time_s=tuple(process_s.tolist()),
+        drag_n=tuple(peaks.drag_n.tolist()),
+        largest_n=peaks.drag_n.min(initial=np.inf),
+        separation_s=run.case.fidelity.speed_factor * peak_separation_s(run.case),
+    )
+
+
+def _means(network: pd.DataFrame) -> dict[str, float]:
+    means = network.drop(columns=["step", "time_s"]).mean()
+    return {str(name): float(mean) for name, mean in means.items()}
+
+
+def _chains(chains: pd.DataFrame, frames: int) -> Chains:
+    peters = chains[chains["definition"] == "peters"]
+    paths = chains[chains["definition"] == "widest_path"]
+    dominant = paths[paths["dominant"]]
+    whole = paths[paths["reaches_bowl"]]
+    azimuth = np.exp(1j * dominant["azimuth_rad"].to_numpy(np.float64))
+    mean_azimuth = azimuth.mean() if len(azimuth) else np.nan
+    return Chains(
+        peters_per_frame=len(peters) / frames,
+        peters_particles_mean=peters["n_particles"].mean(),
+        widest_paths_per_frame=len(whole) / frames,
+        workpiece_contacts_without_path_per_frame=(len(paths) - len(whole)) / frames,
+        widest_paths_to_side_fraction=(whole["end_kind"] == "side").mean(),
+        dominant_frames=len(dominant),
+        dominant_bottleneck_mean_n=dominant["bottleneck_n"].mean(),
+        dominant_bottleneck_max_n=dominant["bottleneck_n"].max(),
+        dominant_particles_mean=dominant["n_particles"].mean(),
+        dominant_altitude_mean_m=dominant["altitude_m"].mean(),
+        dominant_altitude_std_m=dominant["altitude_m"].std(),
+        dominant_azimuth_mean_rad=np.angle(mean_azimuth),
+        dominant_azimuth_resultant=np.abs(mean_azimuth),
+    )
+
+
+def _workpiece_contacts(run: RunData, samples: pd.DataFrame) -> tuple[Ints, int, pd.DataFrame]:
+    """Frame of each counted contact, number of frames (those without contact too), contacts."""
+    columns = ["step", "azimuth_rad", "depth_m", "normal_force_n", "in_statistics"]
+    contacts = run.table("workpiece_contacts", columns)
+    contacts = contacts[contacts["in_statistics"]]
+    output = load_outputs(run.folder)["workpiece_contacts"]
+    counted = samples["step"].to_numpy(np.int64)
+    written = np.arange(output.first_step, counted[-1] + 1, output.period_steps)
+    written = written[written >= counted[0]]
+    frame = np.searchsorted(written, contacts["step"].to_numpy(np.int64))
+    return frame, len(written), contacts
+
+
+# --- filling and drop ------------------------------------------------------------------------
+
+
+def _filling(run: RunData) -> FillingFindings:
+    bed = Packing.read(run.folder / "tables" / "packing.json")
+    settled = run.case.settled
+    return FillingFindings(
+        run=run.case.run,
+        bed=bed.model_dump(exclude={"version"}),
+        rest_energy_ratio=settled.energy_ratio if settled else None,
+    )
+
+
+def _drop(run: RunData) -> DropFindings:
+    impacts = run.table("impacts")
+    ratio = effective_restitution(run.folder)
+    return DropFindings(
+        run=run.case.run,
+        restitution=DropRestitution(**asdict(ratio), input=run.case.restitution),
+        impacts=DropImpacts(**{name: impacts[name].tolist() for name in DropImpacts.model_fields}),
+    )

@@ -1,4 +1,7 @@
-"""The figures of a run, as PNG files, and that of all cases."""
+"""The figures of a run, as PNG files, and that of all cases.
+
+The panels of a process run's figures are functions of their own, each drawn on given axes.
+"""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -11,29 +14,107 @@ from matplotlib.figure import Figure
 from dragchain.arrays import Floats
 from dragchain.dumps.run_parts import iter_prints
 from dragchain.figures import network_picture
-from dragchain.figures.marks import compass, compass_bars, row, row_names
-from dragchain.figures.network_overlay import force_bar, show_network
-from dragchain.figures.panels import head, legend_below, new_figure, new_panels
+from dragchain.figures.network_picture import force_bar, show_network
+from dragchain.figures.panels import (
+    compass,
+    compass_bars,
+    depth_bars,
+    head,
+    legend_below,
+    new_figure,
+    new_panels,
+    row,
+    row_names,
+)
 from dragchain.figures.style import BLUE, COLOURS, HALF_IN, RED, drawing, save
-from dragchain.report import run_panels
-from dragchain.report.collect import write_findings
 from dragchain.report.findings import (
     FIGURES,
+    Comparison,
     DropFindings,
     DropImpacts,
     FillingFindings,
     ProcessFindings,
 )
-from dragchain.report.run_data import RunData
+from dragchain.report.run_data import RunData, write_findings
 from dragchain.run.case import Case, load_case, load_outputs
+from dragchain.run.kinematics import process_time
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
+
+_DEPTH = "depth below the surface (mm)"
+
+
+def forces_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
+    """Drag and lateral force over process time with the mean drag, as Uhlmann et al. (2015)."""
+    trace, ours = run.drag, found.forces["drag_n"]
+    time_s = trace.process_time_s
+    span = [float(time_s[trace.counted][0]), float(time_s[-1])]
+    drag, lateral, transient = (COLOURS[name] for name in ("drag", "lateral", "transient"))
+    axes.plot(
+        time_s, trace.lateral_n, color=lateral, lw=0.7, label="lateral force (left of motion)"
+    )
+    axes.plot(time_s, trace.drag_n, color=drag, lw=0.8, label="drag force (along motion)")
+    axes.axvspan(float(time_s[0]), span[0], color=transient, alpha=0.6, lw=0, label="transient")
+    axes.fill_between(span, ours.ci95_low, ours.ci95_high, color="black", alpha=0.15, lw=0)
+    interval = f"{ours.ci95_low:.2f} to {ours.ci95_high:.2f}"
+    label = f"mean drag {ours.mean:.2f} N (95 % CI {interval} N)"
+    axes.plot(span, [ours.mean] * 2, color="black", label=label)
+    for one in found.comparison:
+        published(axes, one)
+    axes.set(xlabel="process time (s)", ylabel="force on the workpiece (N)", xlim=(0, time_s[-1]))
+
+
+def published(axes: Axes, one: Comparison) -> None:
+    """A published mean, dashed over what was drawn before it, with its standard deviation."""
+    colour, text = COLOURS[one.label], f"{one.label} mean {one.mean_n:.2f} N"
+    if one.std_n is not None:
+        text += f" ± {one.std_n:.2f} N"
+        ends = one.mean_n - one.std_n, one.mean_n + one.std_n
+        axes.axhspan(*ends, color=colour, alpha=0.12, lw=0, zorder=0.5)
+    text += f" ({one.source})" if one.source else ""
+    axes.axhline(one.mean_n, ls="--", lw=1.8, color=colour, label=text)
+
+
+def peaks_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
+    """Magnitude of the drag over process time with its peaks."""
+    trace, peaks, counted = run.drag, found.peaks, run.drag.counted
+    axes.plot(
+        trace.process_time_s[counted], -trace.drag_n[counted], color=COLOURS["drag"], linewidth=0.8
+    )
+    axes.plot(peaks.process_time_s, -np.array(peaks.drag_n), "v", color=COLOURS["peak"], ms=6)
+    axes.set(ylabel="drag force\n(magnitude, N)")
+
+
+def bottlenecks_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
+    """Bottleneck of the dominant workpiece path over process time."""
+    frame_s = process_time(run.network["time_s"].to_numpy(np.float64), run.case)
+    axes.plot(frame_s, run.bottlenecks_n, ".-", color=COLOURS["dominant_path"])
+    axes.set(xlabel="process time (s)", ylabel="bottleneck force of the\ndominant path (N)")
+    axes.set_ylim(bottom=0)
+
+
+def peak_times(axes: Axes, found: ProcessFindings) -> None:
+    """A line at the time of each peak of the drag."""
+    for moment in found.peaks.process_time_s:
+        axes.axvline(moment, color=COLOURS["peak"], linewidth=0.7, linestyle=":")
+
+
+def force_depth_panel(axes: Axes, found: ProcessFindings) -> None:
+    """Mean normal force of a contact in bins of depth."""
+    depth_bars(axes, found.depth.edges_m, found.depth.contact_n)
+    axes.set(xlabel="mean normal force per contact (N)", ylabel=_DEPTH)
+
+
+def load_depth_panel(axes: Axes, found: ProcessFindings) -> None:
+    """Sum of the normal forces per depth in bins of depth."""
+    depth_bars(axes, found.depth.edges_m, found.depth.line_load_n_per_m, 1e-3)
+    axes.set(xlabel="total normal force per depth (N/mm)", ylabel=_DEPTH)
 
 
 def forces(run: RunData, found: ProcessFindings) -> Figure:
     """Drag and lateral force over process time, as Fig. 4a of Uhlmann et al. (2015)."""
     figure, (axes,) = new_panels(3.6)
-    run_panels.forces(axes, run, found)
+    forces_panel(axes, run, found)
     axes.set_title(_reliability(found.forces["drag_n"]))
     return legend_below(figure)
 
@@ -73,10 +154,10 @@ def force_depth(run: RunData, found: ProcessFindings) -> Figure:
     """The normal force of a contact, and of all contacts together, against depth."""
     slope = found.depth.slope_n_per_m.over(1e3)
     figure, (left, right) = new_panels(3.3, 2, HALF_IN, sharey=True)
-    run_panels.force_over_depth(left, found)
+    force_depth_panel(left, found)
     interval = f"95 % CI {slope.ci95_low:.4f} to {slope.ci95_high:.4f}"
     left.set_title(f"slope {slope.value:.4f} N/mm\n({interval}){_doubt(slope)}")
-    run_panels.load_over_depth(right, found)
+    load_depth_panel(right, found)
     right.set(ylabel="", title="deepest bin includes the contacts\non edge and end face")
     return figure
 
@@ -85,11 +166,11 @@ def chains_peaks(run: RunData, found: ProcessFindings) -> Figure:
     """Resistance with its peaks over the bottleneck of the dominant workpiece path."""
     peaks = found.peaks
     figure, (upper, lower) = new_panels(3.8, 2, HALF_IN, 1, sharex=True)
-    run_panels.peaks(upper, run, found)
+    peaks_panel(upper, run, found)
     upper.set_title(f"{peaks.count} peaks (marked), at least {peaks.separation_s:.2f} s apart")
-    run_panels.bottlenecks(lower, run, found)
+    bottlenecks_panel(lower, run, found)
     for axes in (upper, lower):
-        run_panels.peak_times(axes, found)
+        peak_times(axes, found)
     return figure
 
 
@@ -245,7 +326,7 @@ def write_figures(run_dir: Path) -> list[Path]:
 
     Raises
     ------
-    DragchainError
+    DragdeckError
         If a table is missing, a series is too short, or pictures cannot be rendered here.
     """
     run = RunData(run_dir, load_case(run_dir))

@@ -13,7 +13,7 @@ import pyarrow as pa
 from dragchain.report.cases import ReportedCase
 from dragchain.run.basis import Standing
 from dragchain.run.case import Assumption
-from dragchain.tables.meanings import descriptions, unit_end, unit_of
+from dragchain.tables.columns import descriptions, unit_end, unit_of
 
 if TYPE_CHECKING:
     from xlsxwriter.format import Format
@@ -26,7 +26,7 @@ _WORDS = {
 
 
 def definitions(table: pd.DataFrame, name: str = "summary") -> pd.DataFrame:
-    """What the columns of a table mean, by `dragchain.tables.meanings`.
+    """What the columns of a table mean, by `dragchain.tables.columns`.
 
     Parameters
     ----------

@@ -1,5 +1,6 @@
-"""The report on a study's runs: a table and one self-contained page."""
+"""The report on a study's runs, and on those without a result: a table and one page."""
 
+import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -7,10 +8,16 @@ from pathlib import Path
 
 import pandas as pd
 
-from dragchain.errors import DragchainError, MissingRunsError, TableError
-from dragchain.files import write_bytes
-from dragchain.report.bundle import write_bundle
-from dragchain.report.cases import ReportedCase, cases_of
+from dragchain.errors import MissingRunsError, TableError
+from dragchain.report.cases import (
+    ReportedCase,
+    ReportedRun,
+    StudyRuns,
+    cases_of,
+    read_study,
+    read_upstream,
+    upstream_folders,
+)
 from dragchain.report.cost_check import (
     CostRow,
     Option,
@@ -20,21 +27,133 @@ from dragchain.report.cost_check import (
     read_advice,
 )
 from dragchain.report.findings import FIGURES, FillingFindings, Findings, ProcessFindings
-from dragchain.report.missing import MissingRun, missing_run, scene_of
-from dragchain.report.notation import number
-from dragchain.report.page import NETWORK_PAGE, data_uri, file_uri, render_page
-from dragchain.report.runs import (
-    ReportedRun,
-    StudyRuns,
-    read_study,
-    read_upstream,
-    upstream_folders,
+from dragchain.report.page import (
+    NETWORK_PAGE,
+    data_uri,
+    file_uri,
+    number,
+    render_page,
+    write_bundle,
 )
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
 from dragchain.run.case import Assumption, load_case
+from dragchain.run.completeness import RunRecord
 from dragchain.statistics.correlated import RELIABLE_TIMES
-from dragchain.tables.corrections import Corrections
+from dragchain.tables.network_contacts import Corrections
+from dragdeck.errors import DragdeckError
+from dragdeck.files import write_bytes
+
+_STEPS = ("render", "run", "tables", "chains", "loading", "figures")
+"""The steps of a run that have a log, in order: the first that failed is to blame."""
+
+_LOG_BYTES = 20_000
+_SAID = re.compile(r"^(?:dragdeck|dragchain): (.*)", re.MULTILINE | re.DOTALL)
+
+_READ_SCREEN = "read the end of its last screen.*.txt"
+
+
+@dataclass(frozen=True)
+class MissingRun:
+    """A run without a result.
+
+    Attributes
+    ----------
+    scene : str
+    name : str
+        The case, or the run id where nothing is known of the case.
+    folder : Path
+    problem, remedy : str
+        For readers: what was found, and what to do.
+    """
+
+    scene: str
+    name: str
+    folder: Path
+    problem: str
+    remedy: str
+
+    def __str__(self) -> str:
+        """A paragraph of a message."""
+        return f"{self.scene} {self.name}: {self.problem}\n    remedy: {self.remedy}"
+
+
+def scene_of(run_dir: Path) -> str:
+    """The scene of a run by its case, or by the path of its folder where that has none."""
+    try:
+        return load_case(run_dir).scene
+    except DragdeckError:
+        return run_dir.resolve().parent.name
+
+
+def missing_run(run_dir: Path, error: DragdeckError) -> MissingRun:
+    """Say why a run has no result.
+
+    Parameters
+    ----------
+    run_dir : Path
+        Its folder, which need not exist.
+    error : DragdeckError
+        What reading it ended in; it counts only if the run's logs and records say nothing.
+    """
+    try:
+        case = load_case(run_dir)
+        name = case.case or case.run
+    except DragdeckError:
+        name = run_dir.name
+    problem, remedy = _reason(run_dir, error)
+    return MissingRun(scene_of(run_dir), name, run_dir, problem, remedy)
+
+
+def _reason(run_dir: Path, error: DragdeckError) -> tuple[str, str]:
+    for step in _STEPS:
+        if step == "run" and (found := _of_records(run_dir)):
+            return found
+        if found := _of_log(run_dir / "logs" / f"{step}.log"):
+            return found
+    if not (run_dir / "case.json").is_file():
+        return "not run, since a run before it has no result", "see that run"
+    return _split(str(error))
+
+
+def _of_records(run_dir: Path) -> tuple[str, str] | None:
+    """What is recorded of a run that did not come to its end, or failed a check."""
+    for name in ("state.json", "run.json"):
+        with suppress(DragdeckError):
+            if found := _of_record(RunRecord.read(run_dir / name)):
+                return found
+    return None
+
+
+def _of_record(record: RunRecord) -> tuple[str, str] | None:
+    if record.state in ("running", "stopped"):
+        return (
+            f"interrupted, or still running; last known step {record.last_step:,}",
+            "run the study again: it goes on from the last checkpoint",
+        )
+    if not record.failed_checks:
+        return None
+    first, *others = record.failed_checks
+    more = f"; and {len(others)} more" if others else ""
+    seen = f"failed check: {first.name}: {first.seen} (limit: {first.limit}){more}"
+    return seen, first.remedy or _READ_SCREEN
+
+
+def _of_log(log: Path) -> tuple[str, str] | None:
+    """The message with which a step ended."""
+    if not log.is_file():
+        return None
+    with log.open("rb") as stream:
+        stream.seek(max(0, log.stat().st_size - _LOG_BYTES))
+        said = _SAID.search(stream.read().decode("utf-8", "replace"))
+    return _split(said.group(1)) if said else None
+
+
+def _split(message: str) -> tuple[str, str]:
+    """The problem and the remedy of a message, each in one line."""
+    problem, _, remedy = message.partition("remedy:")
+    return " ".join(problem.split()), " ".join(remedy.split()) or "see the logs in its folder"
+
 
 _SHOWN = 6
 """Cases that the head of the page names; more are in its first table alone."""
@@ -133,7 +252,7 @@ def _with_upstream(run_dirs: Sequence[Path]) -> list[Path]:
     """The folders of runs and of the runs that these name, each once, in the order of scenes."""
     folders = [folder.resolve() for folder in run_dirs]
     for folder in tuple(folders):
-        with suppress(DragchainError):
+        with suppress(DragdeckError):
             folders += upstream_folders(folder, load_case(folder)).values()
     return sorted(dict.fromkeys(folders), key=lambda folder: scene_of(folder) == "process")
 
@@ -149,7 +268,7 @@ def _read(
                 sections.append(_section(read_study(folder), options))
             else:
                 read_upstream(folder)
-        except DragchainError as error:
+        except DragdeckError as error:
             missing.append(missing_run(folder, error))
     return sections, missing
 

@@ -1,14 +1,15 @@
-"""The summary of a study's runs: one row per process run, with what belongs to it."""
+"""The summary of a study's runs, one row per process run, and its main numbers in a few lines."""
 
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 
 import pandas as pd
 
-from dragchain.report.cases import cases_of
+from dragchain.errors import TableError
+from dragchain.report.cases import StudyRuns, cases_of
 from dragchain.report.findings import ProcessFindings
-from dragchain.report.runs import StudyRuns
 from dragchain.report.values import Against
 from dragchain.run.basis import Standing
 from dragchain.statistics.correlated import MeanEstimate
@@ -194,3 +195,25 @@ def _upstream(study: StudyRuns) -> Row:
         "restitution_effective": ratio.mean if ratio else math.nan,
         "restitution_input": ratio.input if ratio else math.nan,
     }
+
+
+_SHOWN = 10
+"""Cases that are listed; all are in the summary."""
+
+
+def main_numbers(report_dir: Path) -> str:
+    """Where the report is, and the main numbers of each case as the report states them.
+
+    Raises
+    ------
+    TableError
+        There is no summary.
+    """
+    file = report_dir / "summary.parquet"
+    if not file.is_file():
+        raise TableError(f"{file}: there is no such file; run `dragchain report` first")
+    lines = pd.read_parquet(file, columns=["headline"])["headline"].drop_duplicates().tolist()
+    more = f"  and {len(lines) - _SHOWN} more: {report_dir / 'summary.csv'}"
+    shown = [f"  {line}" for line in lines[:_SHOWN]]
+    head = f"report: {report_dir / 'report.html'}"
+    return "\n".join([head, *shown, *([more] if len(lines) > _SHOWN else [])])

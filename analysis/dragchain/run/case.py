@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import ClassVar, Literal, Self
+from typing import Literal, Self
 
 from pydantic import JsonValue, PositiveFloat, PositiveInt, model_validator
 
-from dragchain.documents import Document, Part
 from dragchain.errors import TableError
+from dragdeck.documents import Document, Part
 from dragdeck.study.driven import PathEntry, SuperposedEntry
 
 Scene = Literal["drop_test", "filling", "process"]
@@ -138,7 +138,7 @@ class Case(Document):
     are models of the contact law that add a normal force, such as cohesion.
     """
 
-    made_by: ClassVar[str] = "dragdeck step render"
+    remedy = "make it with: dragdeck step render"
 
     study: str
     title: str | None = None
@@ -286,7 +286,7 @@ class Output(Part):
 class Columns(Document):
     """The content of ``columns.json``."""
 
-    made_by: ClassVar[str] = "dragdeck step render"
+    remedy = "make it with: dragdeck step render"
 
     outputs: Mapping[str, Output]
 

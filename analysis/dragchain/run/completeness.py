@@ -1,12 +1,12 @@
 """How a run ended, and whether it counts as a result: ``run.json`` and its like."""
 
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Literal
 
 from pydantic import Field
 
-from dragchain.documents import Document, Part
-from dragchain.errors import RejectedRunError
+from dragdeck.documents import Document, Part
+from dragdeck.errors import RejectedRunError
 
 State = Literal["running", "stopped", "failed", "complete"]
 CheckCode = Literal[
@@ -81,7 +81,7 @@ class RunRecord(Document):
         Of all parts; processor time is 0 where the machine does not tell it.
     """
 
-    made_by: ClassVar[str] = "dragdeck run"
+    remedy = "make it with: dragdeck run"
 
     state: State
     started: str

@@ -1,14 +1,14 @@
 """The document of a scaling, ``scaling.json``: what the runs say of one field."""
 
 from collections.abc import Mapping
-from typing import ClassVar, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from pydantic import Field
 
-from dragchain.documents import Document, Part
 from dragchain.run.case import Fidelity
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, Verdict
 from dragchain.statistics.power_law_forms import TwoTerms
+from dragdeck.documents import Document, Part
 
 Judged = Literal[Verdict, "no expectation"]
 
@@ -228,7 +228,7 @@ class ScalingFile(Document):
         Date and time of the first start.
     """
 
-    made_by: ClassVar[str] = "snakemake scaling"
+    remedy = "make it with: snakemake scaling"
 
     study: str
     field: str

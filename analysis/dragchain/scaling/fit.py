@@ -1,24 +1,40 @@
-"""How the mean drag depends on one field of a study: a power law and its test."""
+"""How the mean drag depends on one field of a study: runs, power law, its test and its figure."""
 
 import html
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from dragchain.figures.style import drawing, png
-from dragchain.files import write_bytes, write_text
+from dragchain.arrays import Floats
+from dragchain.drag.force import FORCES, read_counted, summarise_forces
+from dragchain.errors import TableError
+from dragchain.figures.panels import legend_below, log_ticks, new_panels
+from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN, drawing, png
 from dragchain.report.page import page_environment
+from dragchain.run.case import Case, load_case
 from dragchain.run.completeness import RunRecord
-from dragchain.scaling import document
-from dragchain.scaling.figures import draw_scaling
-from dragchain.scaling.runs import Run, read_runs
+from dragchain.run.kinematics import motion_of, needed
+from dragchain.scaling.document import (
+    BandPoint,
+    CurvePoint,
+    Expectation,
+    FittedLaw,
+    Level,
+    ScaledRun,
+    ScalingFile,
+    ShiftedLaw,
+)
 from dragchain.statistics import power_law
 from dragchain.statistics.estimate import Estimate, flattened
 from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
+from dragdeck.files import write_bytes, write_text
+from dragdeck.study.paths.circle import CirclePath
 
 _STORED = Path(__file__).parent / "data"
 """The scalings that were measured for the documentation."""
@@ -31,13 +47,96 @@ SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particl
 
 _CURVE_POINTS = 41
 
+# --- the runs --------------------------------------------------------------------------------
+
+_UNLIKE = frozenset({"seed"})
+"""Inputs that runs of one scaling may differ in, beside its field."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a scaling: its row in ``scaling.json``, and its case."""
+
+    row: ScaledRun
+    case: Case
+
+    @property
+    def gap_particles(self) -> float | None:
+        """Gap between workpiece and bowl wall in mean particle diameters; None off a circle."""
+        path = motion_of(self.case).motion.path
+        if not isinstance(path, CirclePath):
+            return None
+        bowl, workpiece = needed(self.case.bowl, "bowl"), needed(self.case.workpiece, "workpiece")
+        gap = bowl.radius_m - path.radius_m - workpiece.radius_m
+        return gap / (2.0 * self.case.media.radius_mean_m)
+
+    @property
+    def floor_particles(self) -> float:
+        """Gap between tip and floor in mean particle diameters."""
+        depth = needed(self.case.workpiece, "workpiece").immersion_depth_m
+        gap = needed(self.case.surface_m, "surface_m") - depth
+        return gap / (2.0 * self.case.media.radius_mean_m)
+
+
+def read_runs(run_dirs: Sequence[Path], field: str) -> list[Run]:
+    """Read the runs of a scaling from their tables, ordered by level and bed.
+
+    Raises
+    ------
+    TableError
+        If a run has no such field or no number there, the mean drag does not
+        point against the motion, or runs differ in more than the field and the seed.
+    """
+    runs = [_read_run(folder, field) for folder in run_dirs]
+    _check_alike([run.case for run in runs], field)
+    return sorted(runs, key=lambda run: (run.row.level, run.row.bed))
+
+
+def _read_run(folder: Path, field: str) -> Run:
+    case = load_case(folder)
+    level = case.inputs.get(field)
+    if isinstance(level, bool) or not isinstance(level, int | float) or level <= 0:
+        raise TableError(f"{folder}: field {field} is {level!r}, a power law needs numbers above 0")
+    drag = summarise_forces(read_counted(folder, FORCES))["drag_n"]
+    if drag.mean >= 0.0:
+        raise TableError(f"{folder}: the mean drag is {drag.mean:+.3g} N, along the motion")
+    workpiece = needed(case.workpiece, "workpiece")
+    weight = case.media.density_kg_m3 * case.gravity_m_s2 * 2.0 * workpiece.radius_m
+    row = ScaledRun(
+        run=case.run,
+        seed=case.inputs.get("seed"),
+        level=float(level),
+        drag_n=-drag.mean,
+        standard_error_n=drag.se,
+        reliable=drag.reliable,
+        eta=-drag.mean / (weight * workpiece.immersion_depth_m**2),
+        bed=case.upstream.get("filling", case.run),
+    )
+    return Run(row, case)
+
+
+def _check_alike(cases: Sequence[Case], field: str) -> None:
+    first, *others = cases
+    wanted = {**first.inputs, "fidelity": first.fidelity}
+    for case in others:
+        same = {**case.inputs, "fidelity": case.fidelity}
+        for name, value in wanted.items():
+            if name not in (field, *_UNLIKE) and same.get(name) != value:
+                raise TableError(
+                    f"{case.run}: {name} is {same.get(name)!r}, in {first.run} it is {value!r}; "
+                    f"the runs of a scaling differ in {field} and seed only"
+                )
+
+
+# --- the law ---------------------------------------------------------------------------------
+
 
 def find(
     run_dirs: Sequence[Path],
     field: str,
-    expected: document.Expectation,
+    expected: Expectation,
     commands: Sequence[str] = (),
-) -> document.ScalingFile:
+) -> ScalingFile:
     """Everything that runs say of a field.
 
     Parameters
@@ -66,11 +165,15 @@ def find(
     first = runs[0].case
     files = [folder / "run.json" for folder in run_dirs]
     records = [RunRecord.read(file) for file in files if file.is_file()]
-    return document.ScalingFile(
+    return ScalingFile(
         study=first.study,
         field=field,
         expected=expected,
-        verdict=_verdict(judged.exponent, expected.exponent),
+        verdict=(
+            "no expectation"
+            if expected.exponent is None
+            else judged.exponent.agrees_with(expected.exponent)
+        ),
         fit=_fitted(law),
         fit_within=None if inner is None else _fitted(inner),
         two_terms=fit_two_terms(judged, power) if shaped else None,
@@ -101,15 +204,9 @@ def _sample(runs: Sequence[Run]) -> power_law.Runs:
     )
 
 
-def _verdict(exponent: Estimate, expected: float | None) -> document.Judged:
-    if expected is None:
-        return "no expectation"
-    return "confirmed" if exponent.contains(expected) else "contradicted"
-
-
-def _fitted(law: power_law.PowerLaw) -> document.FittedLaw:
+def _fitted(law: power_law.PowerLaw) -> FittedLaw:
     levels = law.runs.levels
-    return document.FittedLaw(
+    return FittedLaw(
         exponent=law.exponent,
         change_per_decade=law.exponent.exp(factor=math.log(10.0), minus=1.0),
         centre=law.runs.centre,
@@ -120,7 +217,7 @@ def _fitted(law: power_law.PowerLaw) -> document.FittedLaw:
         degrees=law.line.degrees,
         **vars(law.scatter),
         lack_of_fit=law.lack_of_fit,
-        curve=tuple(document.BandPoint(x=x, **asdict(law.at(x))) for x in _curve(law)),
+        curve=tuple(BandPoint(x=x, **asdict(law.at(x))) for x in _curve(law)),
     )
 
 
@@ -130,11 +227,11 @@ def _curve(law: power_law.PowerLaw) -> list[float]:
     return [float(x) for x in np.geomspace(levels[0], levels[-1], _CURVE_POINTS)]
 
 
-def _shifted(law: power_law.PowerLaw, power: float) -> document.ShiftedLaw:
+def _shifted(law: power_law.PowerLaw, power: float) -> ShiftedLaw:
     """The expected power of a shifted level."""
     found = fit_shifted(law, power)
-    curve = tuple(document.CurvePoint(x=x, value=found.at(x)) for x in _curve(law))
-    return document.ShiftedLaw(**vars(found), curve=curve)
+    curve = tuple(CurvePoint(x=x, value=found.at(x)) for x in _curve(law))
+    return ShiftedLaw(**vars(found), curve=curve)
 
 
 def _mean_eta(runs: Sequence[Run], law: power_law.PowerLaw) -> Estimate:
@@ -147,10 +244,10 @@ def _mean_eta(runs: Sequence[Run], law: power_law.PowerLaw) -> Estimate:
     return fit.estimate([1.0]).exp()
 
 
-def _level(law: power_law.PowerLaw, number: int, runs: Sequence[Run]) -> document.Level:
+def _level(law: power_law.PowerLaw, number: int, runs: Sequence[Run]) -> Level:
     x = float(law.runs.levels[number])
     here = [run for run in runs if run.row.level == x]
-    return document.Level(
+    return Level(
         x=x,
         runs=len(here),
         eta=float(np.exp(np.mean([math.log(run.row.eta) for run in here]))),
@@ -167,27 +264,45 @@ def write_scaling(
     out_dir: Path,
     run_dirs: Sequence[Path],
     field: str,
-    expected: document.Expectation,
-    commands: Sequence[str] = (),
-) -> document.ScalingFile:
+    expected: float | None = None,
+    source: str | None = None,
+    fit_range: Sequence[float] | None = None,
+    command: str | None = None,
+) -> str:
     """Write ``scaling.json``, ``scaling.csv`` (one row per level) and ``scaling.png``.
+
+    Parameters
+    ----------
+    out_dir, run_dirs, field
+        As of `find`.
+    expected, source, fit_range
+        See `Expectation`.
+    command : str, optional
+        What made the runs, for the record.
+
+    Returns
+    -------
+    str
+        What the scaling says in words.
 
     Raises
     ------
     TableError, SeriesError
         If the runs do not make a scaling.
     """
-    found = find(run_dirs, field, expected, commands)
+    within = (fit_range[0], fit_range[1]) if fit_range else None
+    asked = Expectation(exponent=expected, source=source, within=within)
+    found = find(run_dirs, field, asked, [command] if command else [])
     with drawing():
-        picture = png(draw_scaling(found))
+        picture = png(draw_scalings([found]))
     found.write(out_dir / "scaling.json")
     rows = table(found).to_csv(index=False, float_format="%.6g", lineterminator="\n")
     write_text(out_dir / "scaling.csv", rows)
     write_bytes(out_dir / "scaling.png", picture)
-    return found
+    return said(found)
 
 
-def table(found: document.ScalingFile) -> pd.DataFrame:
+def table(found: ScalingFile) -> pd.DataFrame:
     """The levels of a scaling, one row each, intervals as ``*_ci95_low`` and ``*_ci95_high``."""
     exponents = (*found.local_exponents, None)
     rows = [
@@ -197,29 +312,108 @@ def table(found: document.ScalingFile) -> pd.DataFrame:
     return pd.DataFrame(rows).rename(columns={"x": found.field})
 
 
-def read_scalings() -> list[document.ScalingFile]:
+def read_scalings() -> list[ScalingFile]:
     """The scalings that come with the package, those of slow drag first."""
-    found = [document.ScalingFile.read(file) for file in _STORED.glob("*.json")]
+    found = [ScalingFile.read(file) for file in _STORED.glob("*.json")]
     place = {name: number for number, name in enumerate(_ORDER)}
     return sorted(found, key=lambda one: (place.get(one.study, len(_ORDER)), one.study))
 
 
-def scaling_command(
-    out_dir: Path,
-    run_dirs: Sequence[Path],
-    field: str,
-    expected: float | None,
-    source: str | None,
-    fit_range: Sequence[float] | None,
-    command: str | None,
-) -> str:
-    """Fit a scaling as the command line asks for; what it says, in words."""
-    within = (fit_range[0], fit_range[1]) if fit_range else None
-    asked = document.Expectation(exponent=expected, source=source, within=within)
-    return said(write_scaling(out_dir, run_dirs, field, asked, [command] if command else []))
-
-
-def said(found: document.ScalingFile) -> str:
+def said(found: ScalingFile) -> str:
     """What a scaling says in words, one remark per line."""
-    template = page_environment().get_template("scaling/said.txt.j2")
-    return html.unescape(template.render(found=found)).rstrip()
+    words = page_environment().get_template("scaling/words.html.j2").module
+    statement, remarks = (str(getattr(words, name)(found)) for name in ("statement", "remarks"))
+    lines = [f"{found.field}: {statement.strip()}"]
+    lines += [f"  {line}" for line in remarks.splitlines() if line]
+    return html.unescape("\n".join(lines))
+
+
+# --- the figure ------------------------------------------------------------------------------
+
+_LEAST_SPAN = 2.5
+"""An axis of drag spans at least this factor, so that chance does not look like a trend."""
+
+_PAD = 1.12
+_SIDEWAYS = 0.015
+"""Runs of a level stand side by side, this part of the level apart."""
+
+_TICKS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+
+
+def draw_scalings(scalings: Sequence[ScalingFile]) -> Figure:
+    """Runs, means of the levels, the law with its band and the expected slope of each scaling."""
+    width = (0.72 if len(scalings) == 1 else 1.2) * WIDTH_IN
+    height = 3.35 * math.ceil(len(scalings) / 2) + 0.55
+    figure, panels = new_panels(height, len(scalings), width, 2)
+    for axes, found in zip(panels, scalings, strict=True):
+        label, unit, factor = found.axis
+        axes.set(xscale="log", yscale="log", ylabel="mean drag force magnitude (N)")
+        axes.set(xlabel=f"{label} ({unit})" if unit else label, title=_title(found))
+        _law(axes, found, factor)
+        _points(axes, found, factor)
+        _ticks(axes, found, factor)
+    return legend_below(figure)
+
+
+def _title(found: ScalingFile) -> str:
+    exponent, expected = found.judged.exponent, found.expected.exponent
+    value, low, high = (
+        f"{round(number, 2) + 0.0:.2f}"
+        for number in (exponent.value, exponent.ci95_low, exponent.ci95_high)
+    )
+    words = f"exponent {value} ({low} to {high})"
+    return words if expected is None else f"{words}, expected {expected:g}: {found.verdict}"
+
+
+def _law(axes: Axes, found: ScalingFile, factor: float) -> None:
+    judged = found.judged
+    x, drag = _line(judged.curve, factor)
+    low, high = ([getattr(p, end) for p in judged.curve] for end in ("ci95_low", "ci95_high"))
+    axes.fill_between(x, low, high, color=BLUE, alpha=0.15, lw=0, label="95 % confidence band")
+    axes.plot(x, drag, color=BLUE, lw=1.8, label="fitted power law")
+    whole, full_fit = _line(found.fit.curve, factor)
+    if found.fit_within:
+        axes.plot(whole, full_fit, ":", color=BLUE, label="power law, full range")
+    if found.expected.exponent is not None:
+        slope = (whole / (factor * judged.centre)) ** found.expected.exponent
+        slope *= judged.drag_at_centre_n.value
+        axes.plot(whole, slope, "--", color=ORANGE, lw=1.4, label="expected slope")
+    if found.shifted:
+        label = "expected power law with offset"
+        axes.plot(*_line(found.shifted.curve, factor), "-.", color=GREEN, label=label)
+
+
+def _line(curve: Sequence[CurvePoint], factor: float) -> tuple[Floats, list[float]]:
+    """Levels in the unit of the axis, and drag."""
+    return factor * np.array([point.x for point in curve]), [point.value for point in curve]
+
+
+def _points(axes: Axes, found: ScalingFile, factor: float) -> None:
+    levels = [level for level in found.levels if level.runs > 1]
+    x = [factor * level.x for level in levels]
+    means = [level.drag_n.value for level in levels]
+    axes.plot(x, means, "_", ms=17, mew=2.0, color=INK, label="mean per level")
+    x = [factor * place for place in _beside(found.runs)]
+    drag, error = zip(*((run.drag_n, run.standard_error_n) for run in found.runs), strict=True)
+    label = "run, ± standard error"
+    axes.errorbar(x, drag, error, color=INK, fmt="o", mfc="white", zorder=3, label=label)
+
+
+def _beside(runs: Sequence[ScaledRun]) -> list[float]:
+    """Levels of runs, those of beds side by side."""
+    beds = sorted({run.bed for run in runs})
+    middle = 0.5 * (len(beds) - 1)
+    return [run.level * (1.0 + _SIDEWAYS * (beds.index(run.bed) - middle)) for run in runs]
+
+
+def _ticks(axes: Axes, found: ScalingFile, factor: float) -> None:
+    """Every level on the horizontal axis, round numbers on the vertical."""
+    levels = [factor * level.x for level in found.levels]
+    axes.set_xlim(levels[0] / _PAD, levels[-1] * _PAD)
+    low, high = axes.get_ylim()
+    stretch = max(1.0, math.sqrt(_LEAST_SPAN * low / high))
+    low, high = low / stretch, high * stretch
+    axes.set_ylim(low, high)
+    log_ticks(axes.yaxis, steps=(1.0, 2.0, 5.0) if high > 12.0 * low else _TICKS)
+    axes.set_xticks(levels, [f"{level:g}" for level in levels])
+    axes.minorticks_off()

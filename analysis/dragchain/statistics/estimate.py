@@ -63,6 +63,18 @@ class Estimate:
         """Whether a value is within the interval."""
         return self.ci95_low <= value <= self.ci95_high
 
+    def agrees_with(self, expected: float) -> Verdict:
+        """Whether it is what was expected: contradicted if its interval excludes that."""
+        return "confirmed" if self.contains(expected) else "contradicted"
+
+    def exceeds(self, null: float) -> Verdict:
+        """Whether it is above the value of no effect: so, or below, with its whole interval."""
+        if not self.known:
+            return "not confirmed"
+        if self.ci95_low > null:
+            return "confirmed"
+        return "contradicted" if self.ci95_high < null else "not confirmed"
+
     def over(self, size: float) -> "Estimate":
         """The estimate divided by a number, which may be negative."""
         low, high = sorted((self.ci95_low / size, self.ci95_high / size))

@@ -1,15 +1,13 @@
 """The settled bed: how high it stands and how dense it is."""
 
-from typing import ClassVar
-
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.documents import Document
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
+from dragdeck.documents import Document
 
 
 class Packing(Document):
@@ -34,7 +32,7 @@ class Packing(Document):
         Mean radius, m.
     """
 
-    made_by: ClassVar[str] = "dragchain tables"
+    remedy = "make it with: dragchain tables"
 
     bed_height_m: float
     top_m: float

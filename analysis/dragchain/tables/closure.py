@@ -2,14 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats
-from dragchain.documents import Document
 from dragchain.tables.workpiece_contacts import WorkpieceFrames, sums
+from dragdeck.documents import Document
 
 LIMIT = 1e-6
 """Largest relative error that passes: far above rounding, far below physics."""
@@ -41,7 +41,7 @@ class ClosureRecord(Document):
         statistics use, None without any.
     """
 
-    made_by: ClassVar[str] = "dragchain tables"
+    remedy = "make it with: dragchain tables"
 
     verdict: Literal["pass", "fail"]
     problem: str | None

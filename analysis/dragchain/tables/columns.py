@@ -1,4 +1,15 @@
-"""Names of the columns that several tables and raw outputs share."""
+"""Columns of the tables: names that several share, and what they mean and in which units.
+
+``columns.csv`` beside this module describes them; the end of a column's name is its unit.
+"""
+
+import csv
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from functools import cache
+from pathlib import Path
+
+import pyarrow as pa
 
 
 def vector(name: str, unit: str) -> tuple[str, str, str]:
@@ -38,3 +49,60 @@ IMPACTS = (
     "impact", "start_time_s", "duration_s", "peak_force_n", "speed_in_m_s", "speed_out_m_s",
     "restitution", "time_since_first_s",
 )  # fmt: skip
+
+
+_UNITS: Mapping[str, str] = {
+    "n_m_per_m": "N m/m", "n_s_per_m": "N s/m", "m_per_m": "m/m", "n_per_m": "N/m",
+    "j_per_m": "J/m", "per_m": "1/m", "per_s": "1/s", "kg_m3": "kg/m3", "m_s2": "m/s2",
+    "m_s": "m/s", "rad_s": "rad/s", "n_m": "N m", "n_s": "N s", "m2": "m2", "n": "N", "m": "m",
+    "s": "s", "j": "J", "pa": "Pa", "rad": "rad", "deg": "degree", "hz": "Hz", "rpm": "1/min",
+    "percent": "%",
+}  # fmt: skip
+"""Units by the ends of names, longer ends before those that they end with."""
+
+
+@cache
+def _rows() -> list[tuple[str, tuple[str, ...], str]]:
+    """Column, tables and description; ``*`` in a column stands for any text."""
+    with Path(__file__).with_name("columns.csv").open(newline="", encoding="utf-8") as file:
+        rows = csv.DictReader(file)
+        return [(row["column"], tuple(row["tables"].split()), row["description"]) for row in rows]
+
+
+def columns_of(table: str) -> list[str]:
+    """The columns that a table may have, as ``columns.csv`` lists them."""
+    return [column for column, tables, _ in _rows() if table in tables]
+
+
+def descriptions(column: str) -> dict[str, str]:
+    """What a column means in each table that may have it, by the table's name."""
+    found: dict[str, str] = {}
+    for pattern, tables, text in _rows():
+        if fnmatchcase(column, pattern):
+            found = dict.fromkeys(tables, text) | found
+    return found
+
+
+def unit_end(column: str) -> str:
+    """The end of a column's name that is its unit, empty if there is none."""
+    name = column.removesuffix("_se")
+    return next((end for end in _UNITS if name.endswith(f"_{end}")), "")
+
+
+def unit_of(field: pa.Field) -> str:
+    """The unit of a column: ``1`` for plain numbers, empty for ids, text and flags."""
+    if end := unit_end(field.name):
+        return _UNITS[end]
+    name = field.name.removesuffix("_se")
+    number = pa.types.is_integer(field.type) or pa.types.is_floating(field.type)
+    return "1" if number and not name.endswith("_id") else ""
+
+
+def described(schema: pa.Schema, table: str) -> pa.Schema:
+    """The schema with the keys ``unit`` and ``description`` in the metadata of known columns."""
+    fields = []
+    for field in schema:
+        if text := descriptions(field.name).get(table):
+            field = field.with_metadata({"unit": unit_of(field), "description": text})
+        fields.append(field)
+    return pa.schema(fields, metadata=schema.metadata)

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from dragchain.arrays import Floats, Ints
 from dragchain.dumps.frame import Columns
-from dragchain.errors import RejectedRunError, TableError
+from dragchain.errors import TableError
 from dragchain.run.case import Case, Scene, friction_with
 from dragchain.run.kinematics import (
     counted_mask,
@@ -37,12 +37,18 @@ from dragchain.tables.columns import (
     WORKPIECE_CONTACTS,
     WORKPIECE_FORCE,
 )
-from dragchain.tables.corrections import Corrections, count_corrections
 from dragchain.tables.impacts import find_impacts
-from dragchain.tables.network_contacts import KINDS, ContactRows, contact_rows
+from dragchain.tables.network_contacts import (
+    KINDS,
+    ContactRows,
+    Corrections,
+    contact_rows,
+    count_corrections,
+)
 from dragchain.tables.parquet import Rows, category, table_writer
 from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WallContacts
+from dragdeck.errors import RejectedRunError
 from dragdeck.study.rotation import wrap_angle
 
 

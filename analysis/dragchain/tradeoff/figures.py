@@ -11,17 +11,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.figures.marks import key, log_ticks
-from dragchain.figures.panels import legend_below, new_panels
+from dragchain.figures.panels import key, legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, INK, LIGHT, MARKERS, SERIES, WIDE_IN
 from dragchain.tradeoff.changes import differing, hub, modulus_levels
-from dragchain.tradeoff.compare import Error
+from dragchain.tradeoff.compare import Error, Run, Setting
 from dragchain.tradeoff.drops import Drop
+from dragchain.tradeoff.measure_run import FORCE_BINS
+from dragchain.tradeoff.measures import MAIN
 from dragchain.tradeoff.outcome import TOLERANCES, Tradeoff
-from dragchain.tradeoff.path_blocks import FORCE_BINS
 from dragchain.tradeoff.path_length import Reach
-from dragchain.tradeoff.quantities import MAIN
-from dragchain.tradeoff.runs import Run, Setting
 
 FLOOR = 1e-3
 """Errors below this are drawn here."""

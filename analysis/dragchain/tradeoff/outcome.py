@@ -8,9 +8,8 @@ import numpy as np
 import pandas as pd
 
 from dragchain.errors import SeriesError
-from dragchain.tradeoff.compare import Comparison, Error, compare_quantity
-from dragchain.tradeoff.quantities import QUANTITIES
-from dragchain.tradeoff.runs import Run, Setting
+from dragchain.tradeoff.compare import Comparison, Error, Run, Setting, compare_quantity
+from dragchain.tradeoff.measures import QUANTITIES
 
 BROKEN = 0.1
 """A step is broken if it changes the mean drag by more than this, beyond doubt."""

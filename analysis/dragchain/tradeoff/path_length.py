@@ -10,8 +10,8 @@ from dragchain.arrays import Floats
 from dragchain.statistics.correlated import autocovariance
 from dragchain.statistics.estimate import CONFIDENCE, NORMAL_QUANTILE, student_quantile
 from dragchain.tradeoff.compare import compare_quantity
+from dragchain.tradeoff.measures import MAIN, QUANTITIES, Quantity
 from dragchain.tradeoff.outcome import Tradeoff
-from dragchain.tradeoff.quantities import MAIN, QUANTITIES, Quantity
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from dragchain.tradeoff.costs import Costs
+from dragchain.tradeoff.changes import Costs
+from dragchain.tradeoff.compare import Setting
 from dragchain.tradeoff.drops import Drop
 from dragchain.tradeoff.outcome import Tradeoff, breaks
-from dragchain.tradeoff.runs import Setting
 from dragchain.tradeoff.tradeoff_document import (
     DropEntry,
     ErrorEntry,

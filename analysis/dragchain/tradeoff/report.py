@@ -1,24 +1,87 @@
 """Tables, figures, ``tradeoff.json`` and page of the trade-off of speed against accuracy."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from dragchain.figures.style import drawing, png
-from dragchain.report.bundle import write_bundle
-from dragchain.report.page import data_uri, render_page
-from dragchain.statistics.estimate import CONFIDENCE
-from dragchain.tradeoff.changes import RUINED, effects, gains, modulus_levels, softness
-from dragchain.tradeoff.costs import read_costs, step_costs
+from dragchain.report.page import DASH, MINUS, data_uri, number, render_page, write_bundle
+from dragchain.statistics.estimate import CONFIDENCE, Estimate
+from dragchain.tradeoff.changes import (
+    RUINED,
+    effects,
+    gains,
+    modulus_levels,
+    read_costs,
+    softness,
+    step_costs,
+)
+from dragchain.tradeoff.compare import Error, read_runs
 from dragchain.tradeoff.drops import Drop, choose_drop, read_drops
 from dragchain.tradeoff.figures import draw
-from dragchain.tradeoff.notation import FILTERS
+from dragchain.tradeoff.measure_run import LONG_WAVE, SHORT_WAVE
+from dragchain.tradeoff.measures import MAIN
 from dragchain.tradeoff.outcome import TOLERANCES, Tradeoff, choose, compare, error_table, run_table
-from dragchain.tradeoff.path_blocks import LONG_WAVE, SHORT_WAVE
 from dragchain.tradeoff.path_length import TRIALS, Reach, along, chance, reaches
-from dragchain.tradeoff.quantities import MAIN
 from dragchain.tradeoff.record import record_of
-from dragchain.tradeoff.runs import read_runs
+
+_FOLD = 2.0
+"""Relative errors from this on are told as multiples."""
+
+
+def in_percent(value: float, sign: bool = True) -> str:
+    """A share in per cent with as many digits as matter."""
+    size = abs(100.0 * value)
+    digits = 0 if size >= 9.95 else 1 if size >= 0.095 else 2 if size >= 0.0095 else 3
+    text = f"{100.0 * value:{'+' if sign else ''}.{digits}f}"
+    text = text if float(text) else "0"
+    return text.replace("-", MINUS)
+
+
+def plainly(fraction: float) -> str:
+    """A round share, such as a tolerance, in per cent."""
+    return f"{100.0 * fraction:g}"
+
+
+def error_size(error: Error) -> str:
+    """An error in per cent; a large one as a multiple."""
+    if error.value >= _FOLD:
+        return f"{number(1.0 + error.value, 2)}-fold"
+    return f"{in_percent(error.value)} %"
+
+
+def error_interval(error: Error) -> str:
+    """The interval of an error, in per cent; that of a large one in multiples."""
+    if error.value >= _FOLD:
+        return f"{number(1.0 + error.ci95_low, 2)} to {number(1.0 + error.ci95_high, 2)}"
+    return f"{in_percent(error.ci95_low)} to {in_percent(error.ci95_high)} %"
+
+
+def times(ratio: float) -> str:
+    """A ratio of costs with two digits."""
+    return DASH if not math.isfinite(ratio) else number(float(f"{ratio:.2g}"), 2)
+
+
+def cheaper(ratio: float) -> str:
+    """A ratio of costs in words."""
+    if ratio >= 1.0:
+        return f"{times(ratio)} times cheaper"
+    return f"{times(1.0 / ratio)} times more expensive"
+
+
+def span(gain: Estimate) -> str:
+    """The interval of a ratio of costs; "one run" where there is none."""
+    if math.isnan(gain.ci95_low):
+        return "one run"
+    return f"{times(gain.ci95_low)} to {times(gain.ci95_high)}"
+
+
+FILTERS: Mapping[str, Callable[..., str]] = {
+    function.__name__: function
+    for function in (in_percent, plainly, error_size, error_interval, times, cheaper, span)
+}
+"""Filters of the page."""
+
 
 _TOGETHER = ("contact_force_mean", "contact_force_p90")
 """What the distribution of contact forces is judged by."""

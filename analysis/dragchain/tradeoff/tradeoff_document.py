@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Literal
 
-from dragchain.documents import Document, Part
 from dragchain.tradeoff.six_digits import Number, SixDigits
+from dragdeck.documents import Document, Part
 
 
 class Machine(Part):

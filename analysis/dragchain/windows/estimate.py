@@ -1,5 +1,8 @@
 """A quantity at physical stiffness from windows and the soft run, and how many windows it takes.
 
+`Round` is the document of a round, ``round-<number>.json``; `WindowsRecord` what is known
+beforehand.
+
 Two estimates are joined by precision: the mean of the windows, and the value of the soft run times
 the ratio that other scenes had, if they agree. The variance of the windows is joined with that of
 stretches of the soft run as a moderated variance (Smyth, Stat. Appl. Genet. Mol. Biol. 3, 2004,
@@ -7,13 +10,15 @@ article 3).
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import AllowInfNan, BeforeValidator
 
 from dragchain.arrays import Floats
-from dragchain.report.extrapolated import Need
+from dragchain.report.values import LoadMap, Need
 from dragchain.statistics.correlated import MIN_SAMPLES, estimate_mean
 from dragchain.statistics.estimate import (
     NORMAL_QUANTILE,
@@ -21,7 +26,146 @@ from dragchain.statistics.estimate import (
     mean_of,
     student_quantile,
 )
-from dragchain.windows.document import Known
+from dragdeck.documents import Document, Part
+
+
+def _infinite(number: object) -> object:
+    return math.inf if number is None else number
+
+
+class Known(Part):
+    """What windows of other scenes say of a quantity before there are any.
+
+    Attributes
+    ----------
+    ratio_log, ratio_log_std : float
+        Logarithm of the value at the physical modulus over that of the soft run: its mean, and its
+        standard deviation from scene to scene; infinite if they say nothing.
+    variance_ratio, degrees : float
+        Relative variance of windows over that of the soft run's stretches of their length, and how
+        many windows' worth of evidence that is.
+    packing_std : float
+        Relative standard deviation of the mean from packing to packing.
+    """
+
+    ratio_log: float
+    ratio_log_std: Annotated[float, AllowInfNan(True), BeforeValidator(_infinite)]
+    variance_ratio: float
+    degrees: float
+    packing_std: float
+
+
+class WindowsRecord(Document):
+    """The content of ``windows.json``: measured in development scenes.
+
+    Attributes
+    ----------
+    measured : str
+        Date.
+    source : str
+    quantities : mapping
+    """
+
+    remedy = "make it with: benchmarks/windows.py"
+
+    measured: str
+    source: str
+    quantities: Mapping[str, Known]
+
+
+class WindowOfRun(Part):
+    """A window of a run.
+
+    Attributes
+    ----------
+    run : str
+    refused : str
+        Why it does not enter; empty if it does.
+    arc_m : float
+        Path of the sample, m.
+    values : mapping
+        Quantities of the sample.
+    load_map : tuple of float
+        As in `PathQuantities`.
+    cpu_time_s : float
+    stability_number : float or None
+    """
+
+    run: str
+    refused: str = ""
+    arc_m: float = 0.0
+    values: Mapping[str, float] = {}
+    load_map: tuple[float, ...] = ()
+    cpu_time_s: float
+    stability_number: float | None = None
+
+
+class WindowedQuantity(Part):
+    """A quantity of a run, and its value at physical stiffness from the windows.
+
+    Attributes
+    ----------
+    name, label, unit : str
+    asked : bool
+        Whether the tolerance applies to it.
+    soft : float
+        Value of the run with reduced moduli.
+    value : Estimate
+        At physical stiffness; NaN if too few windows have it.
+    """
+
+    name: str
+    label: str
+    unit: str
+    asked: bool
+    soft: float
+    value: Estimate
+
+    @property
+    def half_width(self) -> float:
+        """Half-width of the interval, relative."""
+        return abs((self.value.ci95_high - self.value.ci95_low) / 2 / self.value.value)
+
+
+class Round(Document):
+    """The content of ``round-<number>.json``.
+
+    Attributes
+    ----------
+    tolerance : float
+    asked : sequence of str
+        Quantities to which it applies, whether the run has them or not.
+    windows : sequence of WindowOfRun
+        So far, in the order in which they were run.
+    wanted : int
+        How many windows to run in all; as many as there were if this round is the last.
+    last : bool
+    reached : bool
+        Whether every asked quantity is inside the tolerance.
+    needed : Need
+        Windows of this run, and packings, that are expected to do.
+    quantities : sequence of WindowedQuantity
+    load_map : LoadMap or None
+        At physical stiffness; None if fewer than two windows have one.
+    """
+
+    remedy = "make it with: dragchain step windows"
+
+    tolerance: float
+    asked: tuple[str, ...]
+    windows: tuple[WindowOfRun, ...]
+    wanted: int
+    last: bool
+    reached: bool
+    needed: Need
+    quantities: tuple[WindowedQuantity, ...]
+    load_map: LoadMap | None = None
+
+    @property
+    def entering(self) -> list[WindowOfRun]:
+        """The windows that were not refused."""
+        return [one for one in self.windows if not one.refused]
+
 
 UNKNOWN = Known(
     ratio_log=0.0, ratio_log_std=math.inf, variance_ratio=0.0, degrees=0.0, packing_std=0.0

@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from dragchain.report.extrapolated import (
-    FILE,
+from dragchain.report.values import (
+    EXTRAPOLATED,
     Extrapolated,
     ExtrapolatedQuantity,
     Need,
@@ -13,10 +13,9 @@ from dragchain.report.extrapolated import (
 )
 from dragchain.run.case import Case, load_case
 from dragchain.statistics.estimate import Estimate
-from dragchain.tradeoff.path_blocks import quantities_along
-from dragchain.tradeoff.quantities import QUANTITIES
-from dragchain.windows.document import Round, WindowsRecord
-from dragchain.windows.estimate import UNKNOWN, of_one_run
+from dragchain.tradeoff.measure_run import quantities_along
+from dragchain.tradeoff.measures import QUANTITIES
+from dragchain.windows.estimate import UNKNOWN, Round, WindowsRecord, of_one_run
 
 
 def extrapolate_run(run_dir: Path, record: Path, round_file: Path | None = None) -> None:
@@ -42,7 +41,7 @@ def extrapolate_run(run_dir: Path, record: Path, round_file: Path | None = None)
         found = _windowed(Round.read(round_file))
     else:
         found = _alone(run_dir, load_case(run_dir), WindowsRecord.read(record))
-    found.write(run_dir / FILE)
+    found.write(run_dir / EXTRAPOLATED)
 
 
 def _alone(run_dir: Path, case: Case, record: WindowsRecord) -> Extrapolated:
@@ -104,4 +103,5 @@ def _windowed(found: Round) -> Extrapolated:
             )
             for one in found.quantities
         ),
+        load_map=found.load_map,
     )

@@ -9,22 +9,25 @@ import numpy as np
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.network.write import write_chains
-from dragchain.report.extrapolated import Need
+from dragchain.report.values import LoadMap, Need
 from dragchain.run.case import load_case
 from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.tables.write import write_tables
-from dragchain.tradeoff.measures import PathQuantities
-from dragchain.tradeoff.path_blocks import quantities_along
-from dragchain.tradeoff.quantities import QUANTITIES, Quantity
-from dragchain.windows.document import (
+from dragchain.tradeoff.measure_run import quantities_along
+from dragchain.tradeoff.measures import QUANTITIES, PathQuantities, Quantity
+from dragchain.windows.estimate import (
+    UNKNOWN,
+    Joined,
     Round,
     WindowedQuantity,
     WindowOfRun,
     WindowsRecord,
+    joined,
+    needed,
 )
-from dragchain.windows.estimate import UNKNOWN, Joined, joined, needed
+from dragchain.windows.load_map import corrected
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""
@@ -122,7 +125,16 @@ def judged(
         reached=reached,
         needed=need,
         quantities=tuple(rows),
+        load_map=_load_map(soft, good, rows),
     )
+
+
+def _load_map(
+    soft: PathQuantities, windows: Sequence[WindowOfRun], rows: Sequence[WindowedQuantity]
+) -> LoadMap | None:
+    total = next((one.value for one in rows if one.name == "normal_load"), _NONE)
+    runs = soft.arc_m / windows[0].arc_m if windows else math.nan
+    return corrected(soft.load_map, [one.load_map for one in windows], total, runs)
 
 
 def _joined(
@@ -173,7 +185,7 @@ def _measured(folder: Path) -> WindowOfRun:
     write_chains(folder)
     along = quantities_along(folder, case)
     found = {"arc_m": along.arc_m, "values": along.values(), "refused": unsettled(folder)}
-    return window.model_copy(update=found)
+    return window.model_copy(update={**found, "load_map": along.load_map})
 
 
 def unsettled(folder: Path) -> str:

@@ -1,42 +1,29 @@
 """The figures of the documentation: python docs/tools --figures.
 
-A figure is a module with a function ``draw`` that returns it from records; `FIGURES` names it.
-`pictures` has those that show a run.
+`charts` and `drawings` are drawn from records, the rest of `PICTURES` shows a run.
 """
 
-from importlib import import_module
 from io import StringIO
 from pathlib import Path
 
 import matplotlib
 
-from dragchain.errors import DragchainError
 from dragchain.figures.style import drawing, true_minus
-from figures.pictures import PICTURES, picture, run_of_study
+from dragdeck.errors import DragdeckError
+from figures.charts import CHARTS
+from figures.drawings import draw_geometry, draw_workflow
+from figures.pictures import PICTURES, drawn_picture, run_of_study
 
 IMAGES = Path(__file__).resolve().parents[2] / "images"
 
-FIGURES = (
-    "architecture",
-    "calibration",
-    "forces",
-    "geometry",
-    "load_map",
-    "scaling",
-    "spin",
-    "stability",
-    "tradeoff",
-    "validation",
-    "verification",
-    "workflow",
-)
-"""Names of modules, which are also those of the files."""
+FIGURES = {**CHARTS, "geometry": draw_geometry, "workflow": draw_workflow}
+"""What draws a figure, by the name of its file."""
 
 
 def svg(name: str) -> str:
     """A figure as SVG; the same figure gives the same text."""
     with drawing(), matplotlib.rc_context({"svg.hashsalt": "dragdeck", "svg.fonttype": "path"}):
-        figure = import_module(f"figures.{name}").draw()
+        figure = FIGURES[name]()
         true_minus(figure)
         text = StringIO()
         figure.savefig(
@@ -51,6 +38,6 @@ def draw_all() -> None:
         (IMAGES / f"{name}.svg").write_text(svg(name), encoding="utf-8")
     for name in PICTURES:
         try:
-            (IMAGES / f"{name}.png").write_bytes(picture(name, run_of_study()))
-        except DragchainError as error:
+            (IMAGES / f"{name}.png").write_bytes(drawn_picture(name, run_of_study()))
+        except DragdeckError as error:
             print(f"{name}.png was not drawn: {error}")

@@ -9,15 +9,17 @@ from hypothesis import strategies as st
 from make_record import Sensor, record_of
 from paper_drops import BIAS, FALL_S, HEIGHT, G, paper_drop, paper_drops, rebound
 
-from dragchain.calibration.fit import WIDTH_LIMIT, calibrate
+from dragchain.calibration.fit import WIDTH_LIMIT, calibrate, observe, sample_impact
 from dragchain.calibration.measured_impacts import Measured, measure
 from dragchain.calibration.results import bias_table, read_off, result
-from dragchain.calibration.sampling import observe, sample_impact
 from dragchain.calibration.simulated_drops import (
     Purpose,
+    Sweep,
+    emulate,
+    emulator_of,
+    prepare,
     waveform,
 )
-from dragchain.calibration.sweep import Sweep, emulate, emulator_of, prepare
 from dragchain.errors import RecordError, TableError
 from dragchain.statistics.estimate import Estimate
 

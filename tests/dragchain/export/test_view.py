@@ -20,13 +20,13 @@ from analysed_run import analysed_tiny_run
 from PIL import Image
 from tiny_run_files import BOWL_RADIUS_M, LAST, TIMESTEP_S, workpiece_x_m
 
-from dragchain.export import view_data
-from dragchain.export.view_data import View
+from dragchain.export import paraview as paraview_export
+from dragchain.export.paraview import View
 from dragchain.export.write import write_export
 from dragchain.run.case import load_case
 from dragchain.run.workpiece import read_surface
 
-PACKAGED = Path(view_data.__file__).with_name("view.py")
+PACKAGED = Path(paraview_export.__file__).with_name("view.py")
 HOSTILE = "'\"}}; import os; os._exit(7) #\\"
 
 

@@ -25,10 +25,8 @@ from tiny_run_files import (
 
 from dragchain.cli import main
 from dragchain.errors import ExportError, TableError
-from dragchain.export.chain_membership import Membership, chain_membership
-from dragchain.export.folder import fresh_folder
-from dragchain.export.frames import FrameSeries, Selection
-from dragchain.export.write import write_export
+from dragchain.export.frames import FrameSeries, Membership, Selection, chain_membership
+from dragchain.export.write import fresh_folder, write_export
 from dragchain.network.chain_table import chain_table
 from dragchain.network.chains import (
     WidestPath,

@@ -2,16 +2,17 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from dragchain.figures.marks import (
+from dragchain.figures.panels import (
     compass,
     compass_bars,
     depth_bars,
     key,
     log_ticks,
+    new_figure,
+    new_panels,
     row,
     row_names,
 )
-from dragchain.figures.panels import new_figure, new_panels
 from dragchain.statistics.estimate import Estimate, EstimateColumns
 
 

@@ -20,7 +20,7 @@ from selenium.webdriver.support.ui import Select
 
 from dragchain.figures.style import COLOURS
 from dragchain.network_page.page import write_page
-from dragchain.report.notation import MINUS, TIMES
+from dragchain.report.page import MINUS, TIMES
 
 pytestmark = [
     pytest.mark.slow,

@@ -19,11 +19,10 @@ from pages import Page
 
 from dragchain.cli import main
 from dragchain.errors import SeriesError, TableError
-from dragchain.network_page import frames as frames_module
-from dragchain.network_page.columns import ROUNDING, Columns
-from dragchain.network_page.frames import BODIES, DOMINANT, PATH, QUASI_LINEAR
+from dragchain.network_page import scene as scene_module
 from dragchain.network_page.page import write_page
-from dragchain.report.notation import TIMES
+from dragchain.network_page.scene import BODIES, DOMINANT, PATH, QUASI_LINEAR, ROUNDING, Columns
+from dragchain.report.page import TIMES
 
 _BYTES = {"u8": 1, "u16": 2, "u32": 4, "f24": 3}
 
@@ -164,7 +163,7 @@ def test_the_curve_is_the_drag_over_its_phase(run: Path, page: Written) -> None:
 def test_frames_are_equally_spaced_and_hold_the_peaks(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(frames_module, "FRAMES", 4)
+    monkeypatch.setattr(scene_module, "FRAMES", 4)
     even = {200, 300, 400, 500}
     page = shown_again(run, tmp_path)
     shown = [page.head["steps"][peak["frame"]] for peak in page.head["peaks"]]
@@ -184,7 +183,7 @@ def shown_again(run: Path, folder: Path) -> Written:
 def test_a_wide_bowl_shows_the_surroundings_and_says_so(
     run: Path, page: Written, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dragchain.network_page.frames.MOST_PARTICLES", 80)
+    monkeypatch.setattr("dragchain.network_page.scene.MOST_PARTICLES", 80)
     monkeypatch.setattr("dragchain.network_page.scene.MOST_PARTICLES", 80)
     part = shown_again(run, tmp_path)
     assert "216 particles" in part.text and "only the 80 that are nearest" in part.text

@@ -20,17 +20,15 @@ from report_files import (
     write_quantities,
 )
 
-from dragchain.errors import DocumentError
-from dragchain.report.cases import cases_of
+from dragchain.report.cases import cases_of, read_study
 from dragchain.report.cost_check import Option, answers, cost_rows, prediction_for, read_advice
-from dragchain.report.extrapolated import FILE as EXTRAPOLATED
-from dragchain.report.extrapolated import Extrapolated, ExtrapolatedQuantity
-from dragchain.report.runs import read_study
 from dragchain.report.study_report import write_report
+from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity
 from dragchain.run.basis import QUANTITIES
 from dragchain.run.case import Case
 from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
+from dragdeck.errors import DocumentError
 
 RECORD = RunRecord.model_validate(run_json())
 
@@ -158,7 +156,7 @@ def test_a_case_of_several_packings_is_judged_by_its_mean(tmp_path: Path) -> Non
 def test_a_missing_or_foreign_advice_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match="dragdeck advise"):
         read_advice(tmp_path / "advice.json")
-    with pytest.raises(DocumentError, match="schema: is 1"):
+    with pytest.raises(DocumentError, match=r"schema: .*another version"):
         read_advice(advice_file(tmp_path, schema=1))
 
 

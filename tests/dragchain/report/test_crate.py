@@ -13,9 +13,10 @@ import pytest
 from report_files import DROP, FILLING, case_json, make_run, process_findings
 
 from dragchain.cli import main
-from dragchain.errors import ExportError, RejectedRunError
+from dragchain.errors import ExportError
 from dragchain.report import crate
 from dragchain.report.crate import write_crate
+from dragdeck.errors import RejectedRunError
 
 rocrate = pytest.importorskip("rocrate.rocrate")
 RUNS = [Path(f"results/small/{run}") for run in ("filling/f-1", "drop_test/d-1", "process/p-1")]

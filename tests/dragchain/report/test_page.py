@@ -13,14 +13,24 @@ from PIL import Image
 import dragchain
 import evidence
 from dragchain.report.page import (
+    DASH,
     LARGE_PICTURE,
+    MINUS,
     data_uri,
     file_uri,
+    fixed,
+    fraction,
+    interval,
+    measured,
+    number,
     page_environment,
+    percent,
     sections,
     slug,
+    with_interval,
 )
-from dragchain.tradeoff.notation import FILTERS
+from dragchain.statistics.estimate import Estimate
+from dragchain.tradeoff.report import FILTERS
 
 FOLDERS = [Path(package.__path__[0]) for package in (dragchain, evidence)]
 TEMPLATES = {
@@ -73,6 +83,16 @@ def test_the_head_of_a_page_points_to_its_sections() -> None:
     links = [link for link in read.references if link.startswith("#")]
     assert links == ["#force-on-the-workpiece", "#run-1"]
     assert read.words.count("Force on the workpiece") == 2
+
+
+def test_a_listing_writes_each_column_in_its_form() -> None:
+    rows = [{"name": "a & b", "drag": {"mean": 0.25}}, {"name": "c", "drag": {"mean": None}}]
+    text = """{% from "report/macros.html.j2" import listing %}
+{{ listing(rows, [("case", "name", ""), ("drag (N)", "drag.mean", "measured:3")]) }}"""
+    found = page_environment().from_string(text).render(rows=rows)
+    assert '<th>case</th><th class="n">drag (N)</th>' in found
+    assert '<td>a &amp; b</td><td class="n">0.250</td>' in found
+    assert f'<td>c</td><td class="n">{DASH}</td>' in found
 
 
 def test_what_is_not_given_is_an_error() -> None:
@@ -131,3 +151,64 @@ def test_a_large_picture_is_made_smaller_but_not_another() -> None:
     with Image.open(io.BytesIO(small)) as shown:
         change = np.abs(np.asarray(shown.convert("L"), int) - np.asarray(drawn.convert("L"), int))
     assert change.mean() < 4
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (-2.626, "\N{MINUS SIGN}2.63"), (0.0, "0"), (1234.5, "1234"),
+        (160000, "160\N{NARROW NO-BREAK SPACE}000"),
+        (2727567.0, "2\N{NARROW NO-BREAK SPACE}727\N{NARROW NO-BREAK SPACE}567"),
+        (1.66e-5, "1.66 \N{MULTIPLICATION SIGN} 10⁻⁵"), (None, "\N{EN DASH}"),
+        (float("nan"), "\N{EN DASH}"),
+        (float("inf"), "\N{EN DASH}"), ("draft", "draft"), (True, "True"),
+    ],
+)  # fmt: skip
+def test_numbers_read_well(value: object, text: str) -> None:
+    assert number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.7, "0.700"), (18.0, "18.0"), (-2.5, "\N{MINUS SIGN}2.50"), (345.6, "346"),
+        (4321.0, "4321"), (0.0, "0"), (4, "4"), (None, "\N{EN DASH}"),
+    ],
+)  # fmt: skip
+def test_measured_numbers_keep_their_zeros(value: object, text: str) -> None:
+    assert measured(value) == text
+
+
+@pytest.mark.parametrize(
+    ("ends", "text"),
+    [
+        ((-2.641, -2.784, -2.502), f"{MINUS}2.64 N ({MINUS}2.78 to {MINUS}2.50)"),
+        ((23.31, 18.5, 29.36), "23.3 N (18.5 to 29.4)"),
+        ((0.0231234, 0.0231233, 0.0231235), "0.02312 N (0.02312 to 0.02312)"),
+        ((1.713e-5, 1.288e-5, 2.279e-5), "1.71 (1.29 to 2.28) \N{MULTIPLICATION SIGN} 10⁻⁵ N"),
+        ((38094.5, 33627.0, 42455.0), "38\u202f094 N (33\u202f627 to 42\u202f455)"),
+        ((0.7, float("nan"), float("nan")), "0.700 N"), ((4.0, 4.0, 4.0), "4.00 N"),
+    ],
+)  # fmt: skip
+def test_a_value_has_the_decimals_of_its_interval(
+    ends: tuple[float, float, float], text: str
+) -> None:
+    assert with_interval(Estimate(*ends), "N") == text
+
+
+def test_percent_carries_its_sign() -> None:
+    assert percent(1.26) == "+1.3 %"
+    assert percent(-23.17) == "\N{MINUS SIGN}23.2 %"
+    assert percent(None) == "\N{EN DASH}"
+    assert fraction(-0.034) == "\N{MINUS SIGN}3.4 %"
+
+
+def test_fixed_decimals_may_carry_their_sign() -> None:
+    assert fixed(-0.25, 1) == "\N{MINUS SIGN}0.2"
+    assert fixed(0.0146, 4) == "0.0146" and fixed(0.5, 2, sign=True) == "+0.50"
+    assert fixed(None, 2) == "\N{EN DASH}"
+
+
+def test_an_estimate_shows_its_interval() -> None:
+    estimate = {"value": 2.0, "ci95_low": 1.5, "ci95_high": None}
+    assert interval(estimate, 2) == "2.0 (1.5 to \N{EN DASH})"

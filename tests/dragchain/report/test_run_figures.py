@@ -31,7 +31,6 @@ from dragchain.figures import network_picture as scene
 from dragchain.figures.rendering import RenderError, check_rendering
 from dragchain.figures.style import COLOURS, drawing
 from dragchain.network.frame import NetworkFrame
-from dragchain.report.collect import process_findings
 from dragchain.report.findings import (
     FIGURES,
     FILE,
@@ -40,7 +39,7 @@ from dragchain.report.findings import (
     FillingFindings,
     ProcessFindings,
 )
-from dragchain.report.run_data import RunData, dominant_bottlenecks
+from dragchain.report.run_data import RunData, dominant_bottlenecks, process_findings
 from dragchain.report.run_figures import (
     DRAW_PROCESS,
     drag_of_cases,

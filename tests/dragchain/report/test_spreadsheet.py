@@ -9,8 +9,7 @@ import pandas as pd
 import pytest
 from report_files import PICTURES, case_json, make_run, process_findings, write_quantities
 
-from dragchain.report.cases import cases_of
-from dragchain.report.runs import read_study
+from dragchain.report.cases import cases_of, read_study
 from dragchain.report.spreadsheet import definitions, summary_workbook, workbook
 from dragchain.run.case import Assumption
 

@@ -29,13 +29,12 @@ from report_files import (
 
 from dragchain.errors import MissingRunsError, TableError
 from dragchain.loading.write import write_loading
-from dragchain.report.extrapolated import Need
 from dragchain.report.findings import FIGURES, FILE
-from dragchain.report.numbers import main_numbers
 from dragchain.report.study_report import write_report
-from dragchain.report.summary import input_column
+from dragchain.report.summary import input_column, main_numbers
+from dragchain.report.values import Need
 from dragchain.run.completeness import RunRecord, refusal
-from dragchain.tables.corrections import Corrections
+from dragchain.tables.network_contacts import Corrections
 
 
 @pytest.fixture

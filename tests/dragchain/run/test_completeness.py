@@ -5,9 +5,9 @@ from typing import Any, get_args
 
 import pytest
 
-from dragchain.errors import DocumentError, RejectedRunError
 from dragchain.run.completeness import CheckCode, CheckReason, RunRecord, State, read_accepted
 from dragdeck.engine import record as written
+from dragdeck.errors import DocumentError, RejectedRunError
 
 KEPT = written.AcceptanceCheck(
     code="particles_kept", name="no particle lost", passed=True, seen="4", limit="4"
@@ -66,7 +66,7 @@ def test_a_run_without_record_is_refused(tmp_path: Path) -> None:
 def test_a_check_without_code_is_named(tmp_path: Path) -> None:
     file = write(tmp_path) / "run.json"
     file.write_text(file.read_text().replace('"code"', '"kode"'))
-    with pytest.raises(DocumentError, match=r"checks\[0\]\.code: is missing"):
+    with pytest.raises(DocumentError, match=r"checks\[0\]\.code: a required key is missing"):
         RunRecord.read(file)
 
 

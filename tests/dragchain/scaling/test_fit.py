@@ -12,13 +12,20 @@ from made_motion import with_motion
 from tiny_run_files import DENSITY_KG_M3, GRAVITY_M_S2, RADIUS_M, WORKPIECE_RADIUS_M, case_json
 
 from dragchain.cli import main
-from dragchain.errors import DocumentError, TableError
+from dragchain.errors import TableError
 from dragchain.scaling.document import Expectation, ScalingFile
-from dragchain.scaling.figures import draw_scalings
-from dragchain.scaling.fit import find, read_scalings, said, table, write_scaling
-from dragchain.scaling.runs import read_runs
+from dragchain.scaling.fit import (
+    draw_scalings,
+    find,
+    read_runs,
+    read_scalings,
+    said,
+    table,
+    write_scaling,
+)
 from dragchain.statistics.estimate import Estimate
 from dragchain.statistics.power_law import Runs, fit_power_law
+from dragdeck.errors import DocumentError
 
 DEPTH = "motion.immersion_depth_m"
 LEVELS = (0.01, 0.02, 0.04)
@@ -137,17 +144,20 @@ def test_a_field_without_a_number_is_refused(write_run: Writer, value: Any) -> N
 def test_a_drag_along_the_motion_is_refused(write_run: Writer, tmp_path: Path) -> None:
     folder = write_run(-1.0, **{DEPTH: 0.01})
     with pytest.raises(TableError, match="along the motion"):
-        write_scaling(tmp_path / "out", [folder], DEPTH, Expectation())
+        write_scaling(tmp_path / "out", [folder], DEPTH)
 
 
 def test_a_document_without_a_number_is_refused(quadratic: list[Path], tmp_path: Path) -> None:
-    found = write_scaling(tmp_path / "out", quadratic, DEPTH, Expectation(exponent=2.0))
+    assert write_scaling(tmp_path / "out", quadratic, DEPTH, 2.0).startswith(f"{DEPTH}: confirmed")
+    found = find(quadratic, DEPTH, Expectation(exponent=2.0))
     file = tmp_path / "out" / "scaling.json"
     assert ScalingFile.read(file) == found
     content = json.loads(file.read_text())
     del content["levels"][1]["drag_n"]["ci95_low"]
     file.write_text(json.dumps(content))
-    with pytest.raises(DocumentError, match=r"levels\[1\]\.drag_n\.ci95_low: is missing"):
+    with pytest.raises(
+        DocumentError, match=r"levels\[1\]\.drag_n\.ci95_low: a required key is missing"
+    ):
         ScalingFile.read(file)
 
 

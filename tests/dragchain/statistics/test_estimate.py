@@ -17,3 +17,21 @@ def test_the_mean_leaves_out_what_is_no_number() -> None:
 
 def test_an_estimate_over_a_negative_number_keeps_its_ends_in_order() -> None:
     assert Estimate(2.0, 1.0, 4.0).over(-2.0) == Estimate(-1.0, -2.0, -0.5)
+
+
+def test_what_was_expected_is_confirmed_if_the_interval_contains_it() -> None:
+    assert Estimate(1.5, 1.0, 2.0).agrees_with(2.0) == "confirmed"
+    assert Estimate(1.5, 1.0, 2.0).agrees_with(2.1) == "contradicted"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "verdict"),
+    [
+        (1.1, 1.5, "confirmed"),
+        (0.5, 0.9, "contradicted"),
+        (0.9, 1.5, "not confirmed"),
+        (math.nan, math.nan, "not confirmed"),
+    ],
+)
+def test_an_excess_is_the_interval_against_no_effect(low: float, high: float, verdict: str) -> None:
+    assert Estimate((low + high) / 2, low, high).exceeds(1.0) == verdict

@@ -27,8 +27,7 @@ from dragchain.loading.samples import BODY as BODY_IMPULSE
 from dragchain.loading.write import write_loading
 from dragchain.report.study_report import write_report
 from dragchain.tables import parquet
-from dragchain.tables.columns import BODY
-from dragchain.tables.meanings import columns_of, descriptions, unit_of
+from dragchain.tables.columns import BODY, columns_of, descriptions, unit_of
 
 TABLES = (
     *("workpiece_force", "workpiece_contacts", "particles", "contacts", "network", "chains"),

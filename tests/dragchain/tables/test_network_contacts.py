@@ -3,8 +3,7 @@ import pytest
 
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
-from dragchain.tables.corrections import Corrections, count_corrections
-from dragchain.tables.network_contacts import KINDS, contact_rows
+from dragchain.tables.network_contacts import KINDS, Corrections, contact_rows, count_corrections
 from dragchain.tables.workpiece_contacts import WallContacts
 
 PARTICLES = (

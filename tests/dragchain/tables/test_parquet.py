@@ -5,8 +5,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from dragchain.documents import Document
 from dragchain.tables.parquet import GROUP_ROWS, category, column_type, table_writer
+from dragdeck.documents import Document
 
 
 def test_a_columns_name_tells_its_type() -> None:

@@ -19,8 +19,8 @@ from tradeoff_runs import (
 )
 
 from dragchain.tradeoff.changes import effects, gains, hub, softness, speed_up
+from dragchain.tradeoff.compare import Setting
 from dragchain.tradeoff.outcome import Tradeoff
-from dragchain.tradeoff.runs import Setting
 
 
 @pytest.fixture

@@ -11,10 +11,8 @@ import pytest
 from dragchain.errors import TableError
 from dragchain.run.completeness import AcceptanceCheck
 from dragchain.tables.bed import Packing
-from dragchain.tradeoff.measure_run import write_measures
-from dragchain.tradeoff.measures import Measures
-from dragchain.tradeoff.path_blocks import CountedPath, band
-from dragchain.tradeoff.quantities import QUANTITIES
+from dragchain.tradeoff.measure_run import CountedPath, band, write_measures
+from dragchain.tradeoff.measures import QUANTITIES, Measures
 
 SPACING, COUNT = 0.1, 600
 BED = Packing(

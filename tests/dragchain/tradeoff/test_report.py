@@ -14,10 +14,10 @@ from tradeoff_files import measures, write, write_drop
 from tradeoff_runs import BOTH, FAILURE, contents
 
 from dragchain.cli import main as dragchain
-from dragchain.errors import DocumentError
-from dragchain.tradeoff.costs import read_costs
+from dragchain.tradeoff.changes import read_costs
 from dragchain.tradeoff.drops import choose_drop, read_drops
-from dragchain.tradeoff.notation import in_percent, plainly, times
+from dragchain.tradeoff.report import in_percent, plainly, times
+from dragdeck.errors import DocumentError
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
 
@@ -175,7 +175,7 @@ def test_a_page_of_a_single_setting(tmp_path: Path) -> None:
 def test_costs_without_a_key_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "costs.json"
     file.write_text(json.dumps({"schema": 2, "costs": [{"name": "plain"}]}))
-    with pytest.raises(DocumentError, match=r"costs\[0\]\.scene: is missing"):
+    with pytest.raises(DocumentError, match=r"costs\[0\]\.scene: a required key is missing"):
         read_costs(file)
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from dragchain.statistics.estimate import student_quantile
-from dragchain.windows.document import Known
-from dragchain.windows.estimate import UNKNOWN, joined, needed
+from dragchain.windows.estimate import UNKNOWN, Known, joined, needed
 
 DRAG = Known(ratio_log=0.1, ratio_log_std=0.05, variance_ratio=1.0, degrees=10.0, packing_std=0.0)
 

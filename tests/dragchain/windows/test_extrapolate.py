@@ -9,11 +9,11 @@ from figure_files import case_json
 from paths import WINDOWS_RECORD
 from report_files import ASKED
 
-from dragchain.report.extrapolated import FILE, Extrapolated, Need
+from dragchain.report.values import EXTRAPOLATED, Extrapolated, Need
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import PathQuantities
 from dragchain.windows import extrapolate
-from dragchain.windows.document import Round, WindowedQuantity, WindowOfRun
+from dragchain.windows.estimate import Round, WindowedQuantity, WindowOfRun
 from dragchain.windows.extrapolate import extrapolate_run
 
 
@@ -28,7 +28,7 @@ def test_a_run_without_windows_is_measured_and_not_corrected(
         case["fidelity"]["youngs_modulus_scale"] = scale
         (tmp_path / "case.json").write_text(json.dumps(case))
         extrapolate_run(tmp_path, WINDOWS_RECORD)
-        (contacts,) = Extrapolated.read(tmp_path / FILE).quantities
+        (contacts,) = Extrapolated.read(tmp_path / EXTRAPOLATED).quantities
         assert contacts.measured.value == pytest.approx(30.0)
         assert contacts.measured.ci95_low < 29.8 < 30.2 < contacts.measured.ci95_high
         assert contacts.value == (contacts.measured if scale == 1.0 else None)
@@ -50,14 +50,14 @@ def test_a_stiff_run_says_whether_it_is_inside_the_tolerance(
         case["asked"]["tolerance"] = tolerance
         (tmp_path / "case.json").write_text(json.dumps(case))
         extrapolate_run(tmp_path, WINDOWS_RECORD)
-        found = Extrapolated.read(tmp_path / FILE)
+        found = Extrapolated.read(tmp_path / EXTRAPOLATED)
         assert found.tolerance is not None and found.tolerance.reached == reached
         assert (found.tolerance.needed.packings > 1) == (not reached)
         assert ("does not give" in found.said) == (not reached)
     case["asked"]["quantities"] = ["workpiece_contacts", "drag_mean"]
     (tmp_path / "case.json").write_text(json.dumps(case))
     extrapolate_run(tmp_path, WINDOWS_RECORD)
-    found = Extrapolated.read(tmp_path / FILE)
+    found = Extrapolated.read(tmp_path / EXTRAPOLATED)
     assert found.tolerance is not None and not found.tolerance.reached  # no drag is known
 
 
@@ -68,7 +68,7 @@ def test_a_tolerance_of_the_restitution_says_nothing_of_the_process(
     case = case_json("process") | {"asked": {**ASKED, "quantities": ["restitution"], "error": 0.1}}
     (tmp_path / "case.json").write_text(json.dumps(case))
     extrapolate_run(tmp_path, WINDOWS_RECORD)
-    assert Extrapolated.read(tmp_path / FILE).tolerance is None
+    assert Extrapolated.read(tmp_path / EXTRAPOLATED).tolerance is None
 
 
 def test_windows_give_the_values_they_have_and_say_which_they_are(tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ def test_windows_give_the_values_they_have_and_say_which_they_are(tmp_path: Path
         quantities=(drag, peaks),
     ).write(tmp_path / "round-1.json")  # fmt: skip
     extrapolate_run(tmp_path, WINDOWS_RECORD, tmp_path / "round-1.json")
-    found = Extrapolated.read(tmp_path / FILE)
+    found = Extrapolated.read(tmp_path / EXTRAPOLATED)
     one, other = found.quantities
     assert one.value == Estimate(1.8, 1.62, 1.98)
     assert other.value is None and other.measured.value == 2.0

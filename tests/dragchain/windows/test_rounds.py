@@ -9,7 +9,7 @@ import pytest
 from paths import WINDOWS_RECORD
 
 from dragchain.tradeoff.measures import PathQuantities
-from dragchain.windows.document import Round, WindowOfRun, WindowsRecord
+from dragchain.windows.estimate import Round, WindowOfRun, WindowsRecord
 from dragchain.windows.rounds import judged, unsettled
 
 RECORD = WindowsRecord.read(WINDOWS_RECORD)

@@ -13,8 +13,7 @@ from dragdeck.advice.options import consistent
 from dragdeck.cases.bed import bed_timestep, skin
 from dragdeck.cases.case import Case
 from dragdeck.errors import Caution
-from dragdeck.outlook.stable_step import check_timestep, stable_step_cautions
-from dragdeck.outlook.timestep import largest_of_case
+from dragdeck.outlook.timestep import check_timestep, largest_of_case, stable_step_cautions
 from dragdeck.scenes.filling import filling_cautions
 from dragdeck.scenes.fit import process_cautions
 from dragdeck.scenes.lead import with_leads

@@ -12,8 +12,7 @@ from scipy.integrate import solve_ivp
 from dragchain.calibration.fit import calibrate_file
 from dragchain.calibration.report import write_report
 from dragchain.calibration.results import confirmed, write_calibration
-from dragchain.calibration.simulated_drops import read_drops
-from dragchain.calibration.sweep import prepare
+from dragchain.calibration.simulated_drops import prepare, read_drops
 from dragdeck.campaigns.restitution_drops import (
     Drop,
     confirmation,

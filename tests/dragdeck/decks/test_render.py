@@ -279,3 +279,16 @@ def test_a_particle_may_have_each_facet_as_its_neighbour(
     text = deck_text(scene, environment(project.templates))
     room = f" one {facets} page {10 * facets}" if many else ""
     assert f"\nneigh_modify delay 0{room}\n\n# ---" in text
+
+
+@pytest.mark.parametrize(("size_m", "room"), [(5e-3, False), (5e-4, True)])
+def test_a_particle_may_touch_many_facets_of_the_bowl(
+    small: dict[str, Any],
+    write_study: Callable[..., Path],
+    project: Project,
+    size_m: float,
+    room: bool,
+) -> None:
+    small["bowl"]["facet_size_m"] = size_m
+    (case,) = load_cases(write_study(small))
+    assert process_scene(case, BED).deck.crowded == room

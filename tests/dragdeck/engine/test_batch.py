@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from dragdeck.cases.case import Case
+from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
-from dragdeck.errors import RejectedRunError
+from dragdeck.errors import InputError, RejectedRunError
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import drop_scene
 
@@ -38,3 +39,13 @@ def test_a_rejected_run_has_a_record_but_is_no_result(case: Case, batch: Batch) 
     with pytest.raises(RejectedRunError):
         batch.result("two", wrong)
     assert not (batch.folder / "two" / "run.json").exists()
+
+
+def test_a_run_of_many_that_cannot_be_written_is_a_finding(case: Case, batch: Batch) -> None:
+    def refuse() -> AnyScene:
+        raise InputError("too soft")
+
+    lines: list[str] = []
+    refused = batch.each({"one": lambda: drop_scene(case), "two": refuse}, lines.append)
+    assert list(refused) == ["two"] and "too soft" in refused["two"]
+    assert lines == ["runs 1 of 2: one: complete", "runs 2 of 2: two: refused"]

@@ -13,7 +13,7 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.decomposition import decomposition, ranks_check
 from dragdeck.engine.record import Decomposition, ParticlesPerRank
 from dragdeck.errors import InputError
-from dragdeck.outlook.bed import notes
+from dragdeck.outlook.process import bed_notes
 from dragdeck.physics.domain_split import FilledBowl, split, warnings
 from dragdeck.physics.packing import pour, radii
 from dragdeck.project import Project
@@ -133,7 +133,7 @@ def test_auto_depends_on_the_study_and_the_machine_but_run_ids_do_not(
         (case,) = load_cases(file)
         assert case.ranks == cores
         assert filling_scene(case).case.fidelity.ranks == cores
-        assert f"{cores} (auto: 1 case on {cores} cores)" in dict(notes(case))["ranks"]
+        assert f"{cores} (auto: 1 case on {cores} cores)" in dict(bed_notes(case))["ranks"]
         ids.add(PROCESS.run_id(case))
     assert len(ids) == 1
     monkeypatch.setenv(CORES_VARIABLE, "4")
@@ -202,7 +202,7 @@ def test_particles_too_soft_for_their_bed_get_a_warning_with_a_way_out(
     small["fidelity"] = {"youngs_modulus_scale": 1e-4}
     (case,) = load_cases(write_study(small))
     (caution,) = [one for one in filling_scene(case).warnings if one.code == "overlap"]
-    assert "ABOVE" in dict(notes(case))["overlap"]
+    assert "ABOVE" in dict(bed_notes(case))["overlap"]
     small["fidelity"] |= caution.settings
     assert f"at least {small['fidelity']['youngs_modulus_scale']:g}" in caution.text
     (case,) = load_cases(write_study(small))

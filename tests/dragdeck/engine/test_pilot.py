@@ -1,10 +1,5 @@
 """The study of 100,000 particles: all that can be said of it without running it."""
 
-import importlib.util
-import sys
-from pathlib import Path
-from types import ModuleType
-
 import numpy as np
 import pytest
 from paths import ROOT
@@ -13,7 +8,7 @@ from scipy.spatial import cKDTree
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
-from dragdeck.outlook.bed import notes
+from dragdeck.outlook.process import bed_notes
 from dragdeck.project import Project
 from dragdeck.scenes.filling import expected_surface, filling_scene, first_particles
 from dragdeck.scenes.process import process_scene
@@ -55,46 +50,10 @@ def test_the_decks_are_written_without_a_warning(pilot: Case) -> None:
     assert f"\n{COUNT} atoms\n" in filling.files["particles.data"]()
     assert "processors * * 1" in deck_text(filling, templates)
     assert "fix move_drag" in deck_text(process, templates)
-    assert "within" in dict(notes(pilot))["overlap"]
+    assert "within" in dict(bed_notes(pilot))["overlap"]
 
 
 def test_what_is_assumed_is_marked(pilot: Case) -> None:
     marked = {entry.field for entry in pilot.study.assumptions}
     sizes = {"media.count", "bowl.radius_m", "bowl.height_m", "motion.path.radius_m"}
     assert sizes | {"workpiece.shape.radius_m", "motion.speed_m_s"} <= marked
-
-
-@pytest.fixture(scope="module")
-def benchmark() -> ModuleType:
-    folder = Path(ROOT, "benchmarks")
-    sys.path.append(str(folder))  # as `python benchmarks/pilot.py` does
-    spec = importlib.util.spec_from_file_location("pilot_benchmark", folder / "pilot.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look for it there
-    spec.loader.exec_module(module)
-    sys.path.remove(str(folder))
-    return module
-
-
-@pytest.mark.parametrize("particles", [1422, 10_000, COUNT])
-def test_the_benchmark_keeps_arc_and_depth(
-    pilot: Case, benchmark: ModuleType, particles: int
-) -> None:
-    case = benchmark.case_of(Project(ROOT), particles)
-    ours, theirs = case.study.motion, pilot.study.motion
-    arc = [2 * np.pi * m.path.radius_m * m.path.revolutions for m in (ours, theirs)]
-    assert arc[0] == pytest.approx(arc[1], rel=0.01)
-    assert expected_surface(case.study) == pytest.approx(expected_surface(pilot.study), rel=0.25)
-    assert case.study.media.count == particles
-    assert list(process_scene(case).warnings) == []
-
-
-def test_the_timed_deck_is_the_process_without_its_motion(
-    pilot: Case, benchmark: ModuleType
-) -> None:
-    whole = deck_text(process_scene(pilot), environment(Project(ROOT).templates))
-    cut = benchmark.at_rest(whole, 7)
-    head = cut.removesuffix('\nrun 7\nprint "DRAGDECK END"\n')
-    assert head != cut and whole.startswith(head)
-    assert "fix workpiece_wall" in head and "fix move" not in cut and "upto" not in cut

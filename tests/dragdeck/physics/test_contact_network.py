@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dragdeck.physics.contact_network import ContactConstants, Floats, stability_number
-from evidence.stability.critical_timestep import hertz_stiffness, largest_frequency
+from evidence.stability.measures import hertz_stiffness, largest_frequency
 
 RADIUS, DENSITY, BOWL, OVERLAP = 3e-3, 2500.0, 0.05, 1e-5
 MASS = 4 / 3 * math.pi * RADIUS**3 * DENSITY

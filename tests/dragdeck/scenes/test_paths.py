@@ -11,7 +11,7 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
 from dragdeck.errors import InputError
-from dragdeck.outlook.fit import notes
+from dragdeck.outlook.process import workpiece_notes
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.dimensionless import describe
@@ -78,7 +78,7 @@ def test_the_froude_number_is_that_of_the_wall(at_rest: Callable[..., Case]) -> 
     case = at_rest()
     wall = RATE**2 * case.study.bowl.radius_m / case.study.gravity_m_s2
     assert describe(case)["bowl_froude_number"] == pytest.approx(wall)
-    assert "30 1/min, clockwise" in dict(notes(case))["rotation of the bowl"]
+    assert "30 1/min, clockwise" in dict(workpiece_notes(case))["rotation of the bowl"]
 
 
 @pytest.mark.parametrize(

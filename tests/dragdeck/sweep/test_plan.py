@@ -14,7 +14,7 @@ from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.study.model import Fidelity
 from dragdeck.sweep.cases import load_cases
-from dragdeck.sweep.plan import Points, plan_points, read_plan
+from dragdeck.sweep.plan import Plan, Points, plan_points
 
 WriteStudy = Callable[[dict[str, Any]], Path]
 PLAN: dict[str, Any] = {
@@ -36,7 +36,7 @@ def make(tmp_path: Path, write_study: WriteStudy, small: dict[str, Any]) -> Call
         file = tmp_path / "plan.yaml"
         file.write_text(yaml.safe_dump({**PLAN, **changes}, sort_keys=False))
         (case,) = load_cases(write_study(small))
-        return plan_points(read_plan(file), file, case)
+        return plan_points(Plan.read(file), file, case)
 
     return points
 

@@ -12,11 +12,17 @@ from paths import DATA, ROOT
 
 from dragchain.cli import main as dragchain
 from evidence.__main__ import main as evidence
-from evidence.stability.classes import ENERGY, REFUSED, STABLE, TOLERANCE, UNSTABLE
-from evidence.stability.document import StabilityFile
-from evidence.stability.map import bed_names
-from evidence.stability.map_runs import map_runs
-from evidence.stability.safe_steps import error_table
+from evidence.stability.judge import (
+    ENERGY,
+    REFUSED,
+    STABLE,
+    TOLERANCE,
+    UNSTABLE,
+    StabilityFile,
+    error_table,
+)
+from evidence.stability.points import bed_settings
+from evidence.stability.runs import map_runs
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -32,7 +38,7 @@ def coarse(tmp_path_factory: pytest.TempPathFactory) -> Path:
     runs = map_runs(study / "study.yaml", results, ROOT / "templates", lambda line: None)
     points = DATA / "coarse_map.yaml"
     runs.settle_beds(points)
-    for bed in bed_names(points):
+    for bed in bed_settings(points):
         assert dragchain(["tables", str(results / "filling" / bed)]) == 0
     kept = [
         str(runs.run_points(points, regime)) for regime in ("impact", "settle", "column", "drag")

@@ -11,16 +11,15 @@ import pytest
 from changed import changed
 from scipy import stats
 
-from dragchain.errors import DocumentError, SeriesError
-from dragchain.report.notation import MINUS
-from dragchain.report.page import page_environment
+from dragchain.errors import SeriesError
+from dragchain.report.page import MINUS, page_environment
 from dragchain.run.case import PublishedDrag, Reference, load_case
 from dragchain.scaling.fit import read_scalings
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import Measures, RunCost
+from dragdeck.errors import DocumentError
 from evidence.validation import force
 from evidence.validation.around_workpiece import contacts_of
-from evidence.validation.claims import verdict
 from evidence.validation.corridor import Corridor, relative_places
 from evidence.validation.effects import effect_table, effects
 from evidence.validation.runs_by_bed import (
@@ -199,21 +198,6 @@ def test_a_shorter_run_counts_less(points: Points) -> None:
 
     whole = points.packings[0].measures.arc_m
     assert half_width(whole / 4.0) > 1.4 * half_width(whole)
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "expected"),
-    [
-        (1.1, 1.5, "confirmed"),
-        (0.5, 0.9, "contradicted"),
-        (0.9, 1.5, "not confirmed"),
-        (math.nan, math.nan, "not confirmed"),
-    ],
-)
-def test_a_verdict_is_the_interval_against_no_effect(
-    low: float, high: float, expected: str
-) -> None:
-    assert verdict(Estimate((low + high) / 2, low, high), 1.0) == expected
 
 
 # --- statements --------------------------------------------------------------------------------

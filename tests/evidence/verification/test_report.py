@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from recordings import recording
 
-from dragchain.errors import RejectedRunError
+from dragdeck.errors import RejectedRunError
 from evidence.verification import checks
 from evidence.verification.report import published_spins, quantity, summarise, verdict
 

@@ -10,16 +10,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from multiprocessing.context import ForkServerContext
 from pathlib import Path
 
 import psutil
 from paths import ROOT
-
-from attack.case import Got
 
 LARGEST_FILE = 64 * 2**20
 """No command that is attacked may write a file beyond this, bytes."""
@@ -33,6 +30,7 @@ PATIENCE_S = 240.0
 HUNG_S = 3600.0
 """After this time a command that uses no processor time has no answer either, s."""
 
+PACKAGES = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis"), str(ROOT)])
 _POLL_S = 0.02
 
 
@@ -42,7 +40,6 @@ class Said:
 
     status: int | None
     text: str
-    seconds: float
 
     @property
     def has_traceback(self) -> bool:
@@ -50,21 +47,28 @@ class Said:
 
     @property
     def tail(self) -> str:
-        return self.text[-1500:]
+        return self.text[-2500:]
 
 
-def environment() -> dict[str, str]:
-    """Of a command: this project's packages, whatever is installed."""
-    paths = os.pathsep.join([str(ROOT / "workflow"), str(ROOT / "analysis"), str(ROOT)])
-    scripts = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    seen = {**os.environ, "PYTHONPATH": paths, "PATH": scripts, "PYTHONUNBUFFERED": "1"}
-    seen.pop("DISPLAY", None)
-    return seen
+def refused(said: Said, *names: str) -> bool:
+    """Whether a command refused what it was given, rather than accept it.
+
+    Nothing else is allowed: it must answer by itself, without a traceback, and a message that
+    refuses matches all `names`, which are regular expressions of what is wrong.
+    """
+    assert said.status is not None, f"no answer: {said.tail}"
+    assert not said.has_traceback, said.tail
+    assert said.status >= 0, f"died of signal {-said.status}: {said.tail}"
+    if said.status == 0:
+        return False
+    missing = [name for name in names if not re.search(name, said.text, re.IGNORECASE)]
+    assert not missing, f"not in the message: {missing}\n{said.tail}"
+    return True
 
 
-def limit_files(largest: int = LARGEST_FILE) -> None:
-    """For this process and all it starts: no larger file than this."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
+def limit_files() -> None:
+    """For this process and all it starts: no file that is larger than allowed."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
@@ -80,13 +84,16 @@ class Call:
     """A command in a session of its own, which can be attacked while it runs."""
 
     def __init__(self, words: Sequence[str], folder: Path, log: Path) -> None:
-        self.folder, self.log = folder, log
+        self.log = log
         self._begun = time.monotonic()
+        scripts = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+        seen = {**os.environ, "PYTHONPATH": PACKAGES, "PATH": scripts, "PYTHONUNBUFFERED": "1"}
+        seen.pop("DISPLAY", None)
         with log.open("wb") as sink:
             self.process = subprocess.Popen(
                 words,
                 cwd=folder,
-                env=environment(),
+                env=seen,
                 stdin=subprocess.DEVNULL,
                 stdout=sink,
                 stderr=subprocess.STDOUT,
@@ -94,17 +101,12 @@ class Call:
                 preexec_fn=limit_files,
             )
 
-    @property
-    def running(self) -> bool:
-        return self.process.poll() is None
-
     def tree(self) -> list[psutil.Process]:
         """The command and all that it started and that still runs."""
-        found = []
-        for number in [self.process.pid, *_below(self.process.pid)]:
-            with contextlib.suppress(psutil.NoSuchProcess):
-                found.append(psutil.Process(number))
-        return found
+        with contextlib.suppress(psutil.NoSuchProcess):
+            first = psutil.Process(self.process.pid)
+            return [first, *first.children(recursive=True)]
+        return []
 
     def spent_s(self) -> float:
         """Processor time of the command and all that it started, s."""
@@ -112,11 +114,9 @@ class Call:
 
     def wait_until(self, condition: Callable[[], bool], poll_s: float = _POLL_S) -> bool:
         """Wait until something is so while the command runs; whether it came to that."""
-        while self.running:
+        while self.process.poll() is None and not self._is_beyond(PATIENCE_S):
             if condition():
                 return True
-            if self._is_beyond(PATIENCE_S):
-                return False
             time.sleep(poll_s)
         return False
 
@@ -125,15 +125,13 @@ class Call:
 
     def wait(self, patience_s: float = PATIENCE_S) -> Said:
         """Wait for the end; beyond this processor time everything is killed."""
-        status: int | None = None
         while (status := self.process.poll()) is None:
             if self._is_beyond(patience_s):
                 kill(self.tree())
                 self.process.wait()
                 break
             time.sleep(_POLL_S)
-        text = self.log.read_text(encoding="utf-8", errors="replace")
-        return Said(status, text, time.monotonic() - self._begun)
+        return Said(status, self.log.read_text(encoding="utf-8", errors="replace"))
 
 
 def call(words: Sequence[str], folder: Path, log: Path, patience_s: float = PATIENCE_S) -> Said:
@@ -148,16 +146,6 @@ def kill(processes: Sequence[psutil.Process]) -> None:
             process.send_signal(signal.SIGKILL)
 
 
-def _below(number: int) -> Iterator[int]:
-    """Numbers of all processes that a process started, and that those did."""
-    with contextlib.suppress(OSError):
-        for task in os.listdir(f"/proc/{number}/task"):
-            children = Path(f"/proc/{number}/task/{task}/children").read_text().split()
-            for child in map(int, children):
-                yield child
-                yield from _below(child)
-
-
 def _spent_s(process: psutil.Process) -> float:
     with contextlib.suppress(psutil.NoSuchProcess):
         times = process.cpu_times()
@@ -165,33 +153,24 @@ def _spent_s(process: psutil.Process) -> float:
     return 0.0
 
 
-def engines(folder: Path) -> list[psutil.Process]:
-    """Engines that run in a folder or below it, whoever started them."""
-    return list(_engines(str(folder.resolve())))
-
-
-def _engines(folder: str) -> Iterator[psutil.Process]:
-    for number in filter(str.isdigit, os.listdir("/proc")):
-        with contextlib.suppress(psutil.Error, OSError):
-            if not _is_engine(int(number)):
-                continue
-            process = psutil.Process(int(number))
-            if process.status() == psutil.STATUS_ZOMBIE:
-                continue
-            below = (process.cwd() + os.sep).startswith(folder + os.sep)
-            if below and "-in" in process.cmdline():  # and not one that is asked for its version
-                yield process
-
-
 def is_engine(process: psutil.Process) -> bool:
     """Whether a process is LIGGGHTS itself, and no launcher or supervisor of one."""
-    return _is_engine(process.pid)
-
-
-def _is_engine(number: int) -> bool:
-    with contextlib.suppress(OSError):
-        return Path(f"/proc/{number}/comm").read_text().startswith("liggghts")
+    with contextlib.suppress(psutil.Error):
+        return process.name().startswith("liggghts")
     return False
+
+
+def engines(folder: Path) -> list[psutil.Process]:
+    """Engines that run in a folder or below it, whoever started them."""
+    found = []
+    for process in filter(is_engine, psutil.process_iter()):
+        with contextlib.suppress(psutil.Error, OSError):
+            below = Path(process.cwd()).is_relative_to(folder.resolve())
+            asked_for_its_version = "-in" not in process.cmdline()
+            ended = process.status() == psutil.STATUS_ZOMBIE
+            if below and not ended and not asked_for_its_version:
+                found.append(process)
+    return found
 
 
 def gone_within(folder: Path, seconds: float) -> bool:
@@ -199,8 +178,8 @@ def gone_within(folder: Path, seconds: float) -> bool:
     begun: dict[int, float] = {}
     deadline = time.monotonic() + HUNG_S
     while left := engines(folder):
-        spent = ((each.pid, _spent_s(each)) for each in left)
-        if any(now - begun.setdefault(number, now) > seconds for number, now in spent):
+        spent = {each.pid: _spent_s(each) for each in left}
+        if any(now - begun.setdefault(number, now) > seconds for number, now in spent.items()):
             return False
         if time.monotonic() > deadline:
             return False
@@ -210,18 +189,11 @@ def gone_within(folder: Path, seconds: float) -> bool:
 
 # --- commands as functions, in a process that has imported them -------------------------
 
-
 _PRELOADED = (
     *("attack.calls", "dragdeck.commands", "dragdeck.engine.run_folder", "dragchain.tables.write"),
     *("dragchain.network.write", "dragchain.loading.write", "dragchain.report.run_figures"),
     *("dragchain.report.study_report", "pyvista", "meshio", "trimesh", "hypothesis"),
 )
-
-
-def _server() -> ForkServerContext:
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(list(_PRELOADED))
-    return context
 
 
 def main_of(
@@ -246,9 +218,10 @@ def run_function(
 
     The patience is processor time: the machine may be shared.
     """
+    server = multiprocessing.get_context("forkserver")
+    server.set_forkserver_preload(list(_PRELOADED))
     log = folder / f"said.{time.monotonic_ns()}.log"
-    begun = time.monotonic()
-    process = _server().Process(target=_inside, args=(log, folder, patience_s, function, arguments))
+    process = server.Process(target=_inside, args=(log, folder, patience_s, function, arguments))
     process.start()
     process.join(HUNG_S)
     status = None if process.exitcode == -signal.SIGXCPU else process.exitcode
@@ -257,7 +230,7 @@ def run_function(
         process.join()
     text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
     log.unlink(missing_ok=True)
-    return Said(status, text, time.monotonic() - begun)
+    return Said(status, text)
 
 
 def _inside(
@@ -285,36 +258,3 @@ def _main(name: str, words: list[str], user: int | None) -> None:
         os.setgid(user)
         os.setuid(user)
     sys.exit(import_module(f"{name}.cli").main(words))
-
-
-# --- what was said --------------------------------------------------------------------
-
-REFUSED = "refused, and named"
-"""The outcome that most attacks want: an error message that names what is wrong."""
-
-UNNAMED = "refused, but not named"
-
-
-def judged(said: Said, *names: str, accepted: str = "accepted") -> Got:
-    """What came of a command that was given something it should refuse.
-
-    Parameters
-    ----------
-    said : Said
-    names : str
-        Regular expressions: a message that names what is wrong matches all of them.
-    accepted : str
-        The outcome if it was not refused.
-    """
-    if said.status is None:
-        return Got(f"no answer in {said.seconds:.0f} s", said.tail)
-    if said.has_traceback:
-        return Got("traceback", said.tail)
-    if said.status < 0:
-        return Got(f"died of signal {-said.status}", said.tail)
-    if said.status == 0:
-        return Got(accepted, said.tail)
-    missing = [name for name in names if not re.search(name, said.text, re.IGNORECASE)]
-    if missing:
-        return Got(UNNAMED, f"not in the message: {', '.join(missing)}\n{said.tail}")
-    return Got(REFUSED, said.tail)

@@ -1,8 +1,6 @@
 """Fuzzed dumps and meshes: the right values, or an error that names the file."""
 
-import json
 import struct
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -10,23 +8,17 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import trimesh
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
-from hypothesis.errors import HypothesisException
+from tiny_run_files import Raw
 
-from attack.calls import run_function
-from attack.case import Attack, Got
 from dragchain.dumps.any_dump import read_dump
 from dragchain.dumps.careful_reader import read_print_file
-from dragchain.errors import DragchainError
 from dragchain.run.case import Output
 from dragdeck.errors import DragdeckError
 from dragdeck.mesh.checks import findings
 from dragdeck.mesh.files import read
-
-RIGHT = "right values, or refused"
-FEW, MANY = 150, 3000
-"""Examples of each fuzz in the sample, and in the whole suite."""
 
 _TOKENS = [
     *(b"nan", b"-1", b"1e999", b"-0", b"9" * 40, b"0x10", b"1_000", b"1.5", b"--1", b"+", b"e5"),
@@ -145,8 +137,6 @@ _ROWS = {0: [[3, 0.5, -1e-30], [1, 1 / 3, 2e8], [2, -0.25, 5e-324]], 7: [], 14: 
 
 
 def _text_dumps() -> list[bytes]:
-    from tiny_run_files import Raw
-
     return [
         b"".join(Raw.text(step, rows, _NAMES, kind) for step, rows in _ROWS.items())
         for kind in ("custom", "local")
@@ -154,8 +144,6 @@ def _text_dumps() -> list[bytes]:
 
 
 def _binary_dumps() -> list[bytes]:
-    from tiny_run_files import Raw
-
     return [
         b"".join(Raw.binary(step, rows, 3, ranks) for step, rows in _ROWS.items())
         for ranks in (1, 2)
@@ -181,7 +169,7 @@ def _compare(reader: Callable, oracle: Callable) -> None:  # type: ignore[type-a
         for frame in reader():
             columns = {name: values.tolist() for name, values in frame.columns.items()}
             found.append((frame.step, columns))
-    except DragchainError as error:
+    except DragdeckError as error:
         assert "a." in str(error), "the message does not name the file"
         whole = False
     wanted, wanted_whole = prefix(oracle())
@@ -192,8 +180,6 @@ _PRINTED = ("step", "time_s", "force_n")
 
 
 def _printed() -> list[bytes]:
-    from tiny_run_files import Raw
-
     rows = [[10 * n, 1e-3 * n, -0.5 * n] for n in range(8)]
     return [Raw.prints(rows, _PRINTED)]
 
@@ -209,7 +195,7 @@ def _try_print_file(folder: Path, content: bytes) -> None:
         for block in read_print_file(file, layout):
             steps += block["step"].tolist()
             values += block["force_n"].tolist()
-    except DragchainError as error:
+    except DragdeckError as error:
         assert "a.1.txt" in str(error), "the message does not name the file"
     lines = content.decode("latin-1").split("\n")
     rows = [line.split() for line in lines if line.split() != list(_PRINTED)]
@@ -220,8 +206,6 @@ def _try_print_file(folder: Path, content: bytes) -> None:
 
 
 def _meshes(kind: str) -> list[bytes]:
-    import trimesh
-
     box = trimesh.creation.cylinder(radius=4.0, height=30.0, sections=6)
     found = box.export(file_type={"ascii.stl": "stl_ascii", "stl": "stl"}.get(kind, kind))
     return [found if isinstance(found, bytes) else found.encode()]
@@ -244,39 +228,21 @@ def _try_mesh(suffix: str, folder: Path, content: bytes) -> None:
     assert mesh.is_watertight, "an open body"
 
 
-_FUZZES: dict[str, tuple[str, Callable[[], list[bytes]], Callable[[Path, bytes], None]]] = {
-    "text dumps": ("dump", _text_dumps, _try_text_dump),
-    "binary dumps": ("dump", _binary_dumps, _try_binary_dump),
-    "print files": ("dump", _printed, _try_print_file),
-    "STL of text": ("mesh", partial(_meshes, "ascii.stl"), partial(_try_mesh, "stl")),
-    "binary STL": ("mesh", partial(_meshes, "stl"), partial(_try_mesh, "stl")),
-    "OBJ": ("mesh", partial(_meshes, "obj"), partial(_try_mesh, "obj")),
-    "PLY": ("mesh", partial(_meshes, "ply"), partial(_try_mesh, "ply")),
+FUZZES: dict[str, tuple[Callable[[], list[bytes]], Callable[[Path, bytes], None]]] = {
+    "text dumps": (_text_dumps, _try_text_dump),
+    "binary dumps": (_binary_dumps, _try_binary_dump),
+    "print files": (_printed, _try_print_file),
+    "STL of text": (partial(_meshes, "ascii.stl"), partial(_try_mesh, "stl")),
+    "binary STL": (partial(_meshes, "stl"), partial(_try_mesh, "stl")),
+    "OBJ": (partial(_meshes, "obj"), partial(_try_mesh, "obj")),
+    "PLY": (partial(_meshes, "ply"), partial(_try_mesh, "ply")),
 }
 
 
-def fuzz_attacks(number: int) -> Iterator[Attack]:
-    """One attack for each kind of file."""
-    for name, (kind, _, _) in _FUZZES.items():
-        yield Attack(kind, f"fuzzed {name}", partial(_fuzz, name, number), (RIGHT,), 2.0)
-
-
-def _fuzz(name: str, number: int, folder: Path, whole: bool) -> Got:
-    """In a process of its own: what ends the interpreter is seen too."""
-    examples = MANY if whole else FEW
-    said = run_function(fuzzed, (name, number, examples), folder, 300.0)
-    results = [line for line in said.text.splitlines() if line.startswith('{"outcome"')]
-    if said.status == 0 and results:
-        return Got(**json.loads(results[-1]))
-    ended = "no answer" if said.status is None else f"died: status {said.status}"
-    return Got(ended, said.tail)
-
-
 def fuzzed(name: str, number: int, examples: int) -> None:
-    """Try many spoilt files, and print what came of them."""
-    _, wholes, act = _FUZZES[name]
-    known = wholes()
-    tried = 0
+    """Try many spoilt files of a kind, and first those that are whole."""
+    make, attempt = FUZZES[name]
+    known = make()
 
     @seed(number)
     @settings(
@@ -288,32 +254,10 @@ def fuzzed(name: str, number: int, examples: int) -> None:
     )
     @given(content=spoilt(known))
     def each(content: bytes) -> None:
-        nonlocal tried
-        tried += 1
         with tempfile.TemporaryDirectory() as folder:
-            try:
-                act(Path(folder), content)
-            except Exception as error:
-                error.add_note(f"content: {content!r}")
-                raise
+            attempt(Path(folder), content)
 
     with tempfile.TemporaryDirectory() as folder:
         for content in known:
-            act(Path(folder), content)
-    got = Got(RIGHT, f"{tried} files")
-    try:
-        each()
-        got = Got(RIGHT, f"{tried} files")
-    except AssertionError as error:
-        got = Got("a wrong value", _shown(error))
-    except HypothesisException as error:
-        got = Got("not reproducible", _shown(error))
-    except Exception as error:
-        got = Got(f"traceback: {type(error).__name__}", _shown(error))
-    sys.stdout.write("\n" + json.dumps({"outcome": got.outcome, "seen": got.seen}) + "\n")
-    sys.stdout.flush()
-
-
-def _shown(error: BaseException) -> str:
-    notes = [note for note in getattr(error, "__notes__", []) if note.startswith("content")]
-    return "\n".join([repr(error)[:800], *(note[:1500] for note in notes[-1:])])
+            attempt(Path(folder), content)
+    each()

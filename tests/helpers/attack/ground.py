@@ -7,11 +7,10 @@ import resource
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import yaml
@@ -193,14 +192,8 @@ def _made(root: Path, phase: Phase) -> Phase:
     spent = _children_s()
     said = call(phase.words, root, root / "said.log")
     assert said.status == 0, f"{phase.name}: {said.text}"
-    return Phase(
-        **{
-            **asdict(phase),
-            "cpu_s": _children_s() - spent,
-            "bytes": size_of(root) - size,
-            "before": before,
-        }
-    )
+    written, cpu_s = size_of(root) - size, _children_s() - spent
+    return replace(phase, cpu_s=cpu_s, bytes=written, before=before)
 
 
 def _children_s() -> float:
@@ -223,69 +216,39 @@ def differences(found: Path, wanted: Path, but: str = "") -> list[str]:
 
     `but`: a file that is left out, from the folder.
     """
+    names = [str(file.relative_to(wanted)) for file in sorted(wanted.rglob("*"))]
+    kept = (".parquet", ".json", ".csv")
     problems = []
-    for file in sorted(wanted.rglob("*")):
-        name = file.relative_to(wanted)
-        other = found / name
-        if str(name) == but:
-            continue
-        if file.suffix in (".parquet", ".json", ".csv") and not other.is_file():
+    for name in (name for name in names if name.endswith(kept) and name != but):
+        if not (found / name).is_file():
             problems.append(f"{name} is missing")
-        elif file.suffix == ".parquet":
-            problems += [f"{name}: {problem}" for problem in _of_tables(other, file)]
-        elif file.suffix == ".json":
-            problems += [f"{name}: {problem}" for problem in _of_documents(other, file)]
+        elif not name.endswith(".csv"):
+            try:
+                problems += [f"{name}{at} differs" for at in _unlike(found / name, wanted / name)]
+            except (ValueError, OSError, pa.ArrowException) as error:
+                problems.append(f"{name} cannot be read: {error}")
     return problems
 
 
-def _of_tables(found: Path, wanted: Path) -> list[str]:
-    try:
-        one, other = pq.read_table(found), pq.read_table(wanted)
-    except (pa.ArrowException, OSError) as error:
-        return [f"cannot be read: {error}"]
-    if one.schema.names != other.schema.names:
-        return ["other columns"]
-    if one.num_rows != other.num_rows:
-        return [f"{one.num_rows} rows instead of {other.num_rows}"]
-    return [
-        f"column {name} differs"
-        for name in one.schema.names
-        if name not in _VOLATILE and _bits(one[name]) != _bits(other[name])
-    ]
+def _unlike(found: Path, wanted: Path) -> list[str]:
+    """Names of columns or keys whose values differ; one without a name if those differ."""
+    one, other = _content(found), _content(wanted)
+    if isinstance(one, dict) and isinstance(other, dict) and list(one) == list(other):
+        return [f": {name}" for name in other if repr(one[name]) != repr(other[name])]
+    return [] if repr(one) == repr(other) else [""]
 
 
-def _of_documents(found: Path, wanted: Path) -> list[str]:
-    try:
-        one = json.loads(found.read_text(encoding="utf-8"))
-    except (ValueError, OSError) as error:
-        return [f"cannot be read: {error}"]
-    return list(_of_values(_lasting(one), _lasting(json.loads(wanted.read_text()))))
-
-
-def _bits(column: pa.ChunkedArray) -> object:
-    if pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
-        mask = column.is_null().to_numpy().tobytes()
-        filled = column.fill_null(0) if column.null_count else column
-        return mask, np.ascontiguousarray(filled.to_numpy()).tobytes()
-    return repr(column.to_pylist())
+def _content(file: Path) -> Any:
+    """What a table or a document says, without what is never the same twice."""
+    if file.suffix == ".parquet":
+        return _lasting(pq.read_table(file).to_pydict())
+    return _lasting(json.loads(file.read_text(encoding="utf-8")))
 
 
 def _lasting(value: Any) -> Any:
-    """A document without what is never the same twice."""
     if isinstance(value, dict):
         return {name: _lasting(item) for name, item in value.items() if name not in _VOLATILE}
     return [_lasting(item) for item in value] if isinstance(value, list) else value
-
-
-def _of_values(one: Any, other: Any, where: str = "") -> Iterator[str]:
-    if isinstance(one, dict) and isinstance(other, dict) and one.keys() == other.keys():
-        for name in one:
-            yield from _of_values(one[name], other[name], f"{where}.{name}")
-    elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
-        for place, pair in enumerate(zip(one, other, strict=True)):
-            yield from _of_values(*pair, f"{where}[{place}]")
-    elif repr(one) != repr(other):
-        yield f"{where or 'value'} differs"
 
 
 # --- what a resumed run must give -----------------------------------------------------

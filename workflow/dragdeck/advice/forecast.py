@@ -9,8 +9,7 @@ from rich.table import Table
 
 from dragdeck import __version__
 from dragdeck.advice.advise import Advice, percent
-from dragdeck.advice.options import Option, step_cost, with_option
-from dragdeck.advice.speed import SCALE, Speed
+from dragdeck.advice.options import SCALE, Option, Speed, step_cost, with_option
 from dragdeck.cases.case import Case
 from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.decks.deck import StudyScene

@@ -9,9 +9,9 @@ import numpy as np
 
 from dragdeck.cases.bed import bed_timestep, full_stiffness_number, widest_skin
 from dragdeck.cases.case import Case, of_each_workpiece
+from dragdeck.documents import Part
 from dragdeck.outlook.measured import MeasuredDrop, Tradeoff
-from dragdeck.outlook.stable_step import stable_fraction, stable_step_cautions
-from dragdeck.outlook.timestep import largest_fraction
+from dragdeck.outlook.timestep import largest_fraction, stable_fraction, stable_step_cautions
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.similarity import softest_scale
 from dragdeck.scenes.dimensionless import describe
@@ -317,3 +317,36 @@ def _drop_option(process: Fidelity, drop: MeasuredDrop, fraction: float) -> Opti
     """A step of the drop test, whose error has no scatter."""
     cost = drop.relative_cost
     return Option(process, cost, cost, abs(drop.restitution_error), fraction)
+
+
+SCALE = 1e-3
+"""On the modulus of the short run; more where the engine refuses so soft a particle."""
+
+
+class Speed(Part):
+    """Speed of LIGGGHTS measured on this machine.
+
+    Attributes
+    ----------
+    filling_steps_per_s, drag_steps_per_s : float
+    particles, ranks : int
+    engine_version : str
+    """
+
+    filling_steps_per_s: float
+    drag_steps_per_s: float
+    particles: int
+    ranks: int
+    engine_version: str
+
+    def of(self, particles: int) -> "Speed":
+        """The speed with another number of particles: a step takes a time a particle."""
+        ratio = self.particles / particles
+        filling, drag = ratio * self.filling_steps_per_s, ratio * self.drag_steps_per_s
+        return Speed(
+            filling_steps_per_s=filling,
+            drag_steps_per_s=drag,
+            particles=particles,
+            ranks=self.ranks,
+            engine_version=self.engine_version,
+        )

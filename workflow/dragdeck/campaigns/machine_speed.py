@@ -11,8 +11,7 @@ from pathlib import Path
 
 import jinja2
 
-from dragdeck.advice.options import consistent
-from dragdeck.advice.speed import SCALE, Speed
+from dragdeck.advice.options import SCALE, Speed, consistent
 from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case
 from dragdeck.engine.batch import Batch

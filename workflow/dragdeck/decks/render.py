@@ -20,7 +20,7 @@ from dragdeck.decks.engine_commands import (
 from dragdeck.decks.outputs import WORKPIECE_FORCE, ColumnsFile, in_writing_order
 from dragdeck.decks.templates import explained, file_of, replaced, used, without
 from dragdeck.errors import InputError
-from dragdeck.files import file_checksum, replace_text
+from dragdeck.files import file_checksum, write_text
 from dragdeck.study import contact_law
 
 
@@ -169,7 +169,7 @@ def write_workpiece(
         },
     }
     for name, text in texts.items():
-        replace_text(folder / name, text)
+        write_text(folder / name, text)
 
 
 def write_run(scene: AnyScene, folder: Path, templates: jinja2.Environment) -> list[Path]:
@@ -197,5 +197,5 @@ def write_run(scene: AnyScene, folder: Path, templates: jinja2.Environment) -> l
     own = {"files": checksums, **_of_its_law(scene, templates)}
     texts[CASE_FILE] = scene.case.model_copy(update=own).as_text()
     for name, text in texts.items():
-        replace_text(folder / name, text)
+        write_text(folder / name, text)
     return [folder / name for name in texts]

@@ -1,5 +1,6 @@
 """Many runs in one folder: written, run, and not run again."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from dragdeck.engine.part import STATE_FILE
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import Report, silent
 from dragdeck.engine.run_folder import run
-from dragdeck.errors import RejectedRunError
+from dragdeck.errors import InputError, RejectedRunError
 
 
 @dataclass(frozen=True)
@@ -67,3 +68,34 @@ class Batch:
         case = scene.case.model_copy(update={"run": name})
         write_run(replace(scene, deck=deck, case=case), self.folder / name, self.templates)
         return run(self.folder / name, self.report)
+
+    def each(self, scenes: Mapping[str, Callable[[], AnyScene]], report: Report) -> dict[str, str]:
+        """Bring many runs to their ends; a run that fails or cannot be written is a finding.
+
+        Parameters
+        ----------
+        scenes : mapping of str to callable
+            Name of a run: what makes its scene.
+        report : callable
+            Gets a line for each run.
+
+        Returns
+        -------
+        dict of str to str
+            Why a run could not be written, by its name.
+
+        Raises
+        ------
+        EngineError
+            No LIGGGHTS, or it was interrupted.
+        """
+        refused = {}
+        for number, (name, make) in enumerate(scenes.items(), 1):
+            try:
+                scene = make()
+            except InputError as error:
+                state, refused[name] = "refused", str(error)
+            else:
+                state = self.run(name, scene).state
+            report(f"{self.folder.name} {number} of {len(scenes)}: {name}: {state}")
+        return refused

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dragdeck.errors import InputError
-from dragdeck.files import replace_text
+from dragdeck.files import write_text
 from dragdeck.mesh.step import mesh_step
 from dragdeck.mesh.surface import CAD_VOLUME, MERGED, Floats, Integers, surface, weld
 
@@ -209,7 +209,7 @@ def write_stl(mesh: Trimesh, path: Path | str) -> None:
     path : Path or str
         The file; an existing one is replaced.
     """
-    replace_text(Path(path), stl_text(mesh))
+    write_text(Path(path), stl_text(mesh))
 
 
 def stl_text(mesh: Trimesh, factor: float = 1.0) -> str:

@@ -71,7 +71,7 @@ def price_of(name: str, tradeoff: Tradeoff | None) -> str:
     Parameters
     ----------
     name : str
-        A variant of ``benchmarks/costs/cost_variants.py``.
+        A variant of ``benchmarks/costs/variants.yaml``.
     tradeoff : Tradeoff or None
         Its costs give for each variant the ratio of processor times, with a
         95 % interval if there were rounds enough for one.

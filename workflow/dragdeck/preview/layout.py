@@ -1,11 +1,13 @@
-"""The geometry of a case: bowl, bed, and each workpiece with its poses along its path.
+"""The geometry of a case, bowl, bed and moving workpieces, and from where it is seen.
 
 Picture and page draw what stands here and know nothing of studies.
 """
 
+import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib import resources
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +21,7 @@ from dragdeck.scenes.workpiece import workpiece_mesh, workpiece_radius
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
+
 
 Floats = NDArray[np.float64]
 
@@ -169,3 +172,43 @@ def _stages(case: Case, way: Course) -> Iterator[Stage]:
         poses = np.tile(np.eye(4), (count, 1, 1))
         poses[:, :3, :3], poses[:, :3, 3] = rotation.matrices, places
         yield Stage(leg.name, poses, factor * leg.duration_s)
+
+
+# --- views ----------------------------------------------------------------------------------------
+
+
+COLOURS: dict[str, str] = json.loads(
+    resources.files("dragdeck").joinpath("data/colours.json").read_text(encoding="utf-8")
+)
+"""Those of all figures, of which ``data/colours.json`` is a copy."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A parallel projection: what points right and up in it, as unit vectors."""
+
+    title: str
+    right: Floats
+    up: Floats
+    across: str
+    along: str
+
+    @property
+    def basis(self) -> Floats:
+        """(3, 3): right, up, and towards the viewer."""
+        return np.array([self.right, self.up, np.cross(self.right, self.up)])
+
+
+def views(direction_rad: float) -> list[View]:
+    """From above, along the motion at the start of the drag, from its right, and obliquely."""
+    c, s = math.cos(direction_rad), math.sin(direction_rad)
+    x, y, z = np.eye(3)
+    ahead, beside = np.array([c, s, 0.0]), np.array([s, -c, 0.0])
+    right, back = (beside + ahead) / math.sqrt(2), (beside - ahead) / math.sqrt(2)
+    low = math.radians(28)
+    return [
+        View("From above", x, y, "x (mm)", "y (mm)"),
+        View("In the direction of motion", beside, z, "to the right of the axis (mm)", "z (mm)"),
+        View("From the right of the motion", ahead, z, "along the motion (mm)", "z (mm)"),
+        View("Oblique", right, math.cos(low) * z - math.sin(low) * back, "", ""),
+    ]

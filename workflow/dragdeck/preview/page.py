@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 import numpy as np
 
-from dragdeck.preview.layout import Floats, Layout, MovingWorkpiece
+from dragdeck.preview.layout import COLOURS, Floats, Layout, MovingWorkpiece, views
 from dragdeck.preview.swept import drawn
-from dragdeck.preview.views import COLOURS, views
 
 if TYPE_CHECKING:
     from trimesh import Trimesh

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from dragdeck.preview.layout import Floats, Layout
+from dragdeck.preview.layout import COLOURS, Floats, Layout, View, views
 from dragdeck.preview.swept import below_and_above, drawn
-from dragdeck.preview.views import COLOURS, View, views
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 
-from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, skin
+from dragdeck.cases.bed import bed_radii, bed_rayleigh_time, bed_timestep, skin
 from dragdeck.cases.case import Case, Stretch, materials_content, mesh_file, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
 from dragdeck.decks.case_file import Phase, SteadyCriterion
@@ -110,7 +110,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         skin_m=skin(study),
         timestep_s=dt,
         rayleigh_time_s=bed_rayleigh_time(study),
-        neighbours=max(ENGINE_NEIGHBOURS, *counts),
+        neighbours=max(ENGINE_NEIGHBOURS, _bowl_neighbours(study), *counts),
         outputs=_outputs(periods, drag.start, steps, [one.name for one in moved], facets),
         thermo_steps=periods.network,
         checkpoint_steps=_checkpoint_steps(study, steps.end - steps.entry),
@@ -281,6 +281,15 @@ def _fastest(case: Case, way: Course) -> float:
     if motion.superposed() or motion.bowl_rad_s or motion.path.peak_speed_ratio > 1:
         speeds.append(fastest_motion(case))
     return max(speeds)
+
+
+def _bowl_neighbours(study: Study) -> int:
+    """More facets of the bowl, at least 0.4 size^2 each, than a particle in a corner reaches."""
+    size = study.bowl_facet_size_m
+    if size is None:
+        return 0
+    reach_m = float(bed_radii(study).max()) + skin(study) + 2 * size
+    return math.ceil(3 * math.pi * reach_m**2 / (0.4 * size**2))
 
 
 def _bowl_files(study: Study, top_m: float) -> dict[str, Callable[[], str]]:

@@ -481,7 +481,7 @@ BUILT_IN_FIDELITIES: Mapping[str, Fidelity] = {
     "draft": Fidelity(youngs_modulus_scale=1e-3, timestep_fraction=0.6),
     "standard": Fidelity(youngs_modulus_scale=1e-2, timestep_fraction=0.5),
     "fine": Fidelity(youngs_modulus_scale=0.1, timestep_fraction=0.5),
-    "full": Fidelity(youngs_modulus_scale=1.0, timestep_fraction=0.5),
+    "full": Fidelity(youngs_modulus_scale=1.0, timestep_fraction=0.64),
     "reference": Fidelity(youngs_modulus_scale=1.0, timestep_fraction=0.2),
 }
 

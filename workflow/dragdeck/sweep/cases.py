@@ -1,8 +1,7 @@
 """The cases of a study file: one per combination of its sweep."""
 
 import copy
-import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from dragdeck.study.base import NAME, NAME_LIMIT, STUDY_FILE
 from dragdeck.study.check import validate
 from dragdeck.study.model import Tolerance
 from dragdeck.study.yaml import read_study
+from dragdeck.sweep.design import combinations
 
 Resolve = Callable[[Case, Tolerance], Case]
 """Finds the settings of a case for a tolerance: `dragdeck.advice.advise.resolve`."""
@@ -41,7 +41,7 @@ def load_cases(
     if fidelity is not None:
         data["fidelity"] = fidelity
     plain, found, errors = {**data, "sweep": {}}, [], []
-    for settings in _combinations(validate(data, file, whole=True).sweep):
+    for settings in combinations(validate(data, file, whole=True).sweep):
         try:
             found.append(settle_case(file, plain, settings, resolve=resolve))
         except InputError as error:
@@ -180,11 +180,6 @@ def new_study(studies: Path, name: str, base: str) -> Path:
     file = folder / STUDY_FILE
     file.write_text(_NEW_STUDY.format(name=name, base=base), encoding="utf-8")
     return file
-
-
-def _combinations(sweep: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
-    for combination in itertools.product(*sweep.values()):
-        yield dict(zip(sweep, combination, strict=True))
 
 
 def _set(data: dict[str, Any], field: str, value: Any, file: Path) -> None:

@@ -12,41 +12,29 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from dragdeck.cases.case import SAID_BY_NAME, Case
 from dragdeck.errors import InputError
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import SceneType
-from dragdeck.study.base import Model, Positive, Whole
-from dragdeck.study.check import explained
+from dragdeck.study.base import Positive, Whole
 from dragdeck.study.model import Study
-from dragdeck.study.yaml import read_yaml
 from dragdeck.sweep.cases import Resolve, beside_each_other, settle_case
-
-Settings = Mapping[str, Any]
+from dragdeck.sweep.design import Design, Settings, Variation
 
 _LEAST_COUNTED = 0.5
 """Smallest fraction of a point's path that the statistics use."""
 
 
-class Block(Model):
-    """Points that belong together: every combination of the values that vary."""
+class PlannedPoints(Variation):
+    """Points that belong together, their packings and their path."""
 
-    vary: dict[str, list[Any]] = Field(
-        description="dotted field name: list of values; every combination is a design point"
-    )
-    one_by_one: dict[str, list[Any]] = Field(
-        default_factory=dict,
-        description="dotted field name: list of values that are varied one at a time, at every "
-        "combination of `vary`",
-    )
     seeds: Annotated[Whole, Field(ge=1)] | None = Field(
         default=None,
         description="number of seeds per point, starting with that of the study or scene; "
-        "none: that "
-        "of the plan",
+        "none: that of the plan",
     )
     arc: Positive | None = Field(
         default=None,
@@ -54,20 +42,13 @@ class Block(Model):
     )
 
 
-class Plan(Model):
+class Plan(Design[PlannedPoints]):
     """The design points of a trade-off."""
 
-    base: dict[str, Any] = Field(
-        description="dotted field name: value at all points that do not set it"
-    )
-    reference: Block = Field(
-        description="reference settings, to which errors are relative; a single point"
-    )
     arc: Positive = Field(default=1.0, description="fraction of the study's path that is dragged")
     seeds: Annotated[Whole, Field(ge=1)] = Field(
         default=2, description="number of seeds (packings) per point"
     )
-    points: list[Block] = Field(default_factory=list)
     scenes: dict[str, dict[str, Any]] = Field(
         default={"as it is": {}},
         description="name of a scene: dotted field names and values that change the "
@@ -106,21 +87,6 @@ class Points:
         return self.drops if scene.single_particle else self.processes
 
 
-def read_plan(file: Path) -> Plan:
-    """Read a plan.
-
-    Raises
-    ------
-    InputError
-        The file cannot be used; the message names field, value and limit.
-    """
-    data = read_yaml(file)
-    try:
-        return Plan.model_validate(data)
-    except ValidationError as error:
-        raise explained(error, file) from None
-
-
 def plan_points(plan: Plan, plan_file: Path, base: Case, resolve: Resolve | None = None) -> Points:
     """The cases that a plan makes of a study.
 
@@ -139,10 +105,6 @@ def plan_points(plan: Plan, plan_file: Path, base: Case, resolve: Resolve | None
     InputError
         A point names no field of a study, or one beyond its limits.
     """
-    if _size(plan.reference) != 1:
-        raise InputError(
-            "the reference must be a single point", file=plan_file, field="reference.vary"
-        )
     blocks = [plan.reference, *plan.points]
     found: dict[str, Case] = {}
     for scene, block in itertools.product(plan.scenes.values(), blocks):
@@ -176,24 +138,13 @@ def _check_counted(case: Case, plan_file: Path) -> None:
         )
 
 
-def _size(block: Block) -> int:
-    return sum(1 for _ in _combinations(block))
-
-
-def _combinations(block: Block) -> Iterator[dict[str, Any]]:
-    single = [{field: value} for field, values in block.one_by_one.items() for value in values]
-    for values in itertools.product(*block.vary.values()):
-        for alone in single or [{}]:
-            yield {**dict(zip(block.vary, values, strict=True)), **alone}
-
-
 def _settings(
-    plan: Plan, block: Block, study: Study, scene: Mapping[str, Any]
+    plan: Plan, block: PlannedPoints, study: Study, scene: Mapping[str, Any]
 ) -> Iterator[dict[str, Any]]:
     """The fields that each point of a block sets in a scene, path and seed included."""
     field, length = _path_length(study)
     arc = {field: scene.get(field, length) * (block.arc or plan.arc)}
-    for values in _combinations(block):
+    for _, values in block.points():
         for number in range(block.seeds or plan.seeds):
             yield {**values, **arc, "seed": scene.get("seed", study.seed) + number}
 

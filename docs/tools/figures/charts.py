@@ -1,0 +1,297 @@
+"""Figures of numbers: each is a function that draws it from records."""
+
+import matplotlib
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import NullFormatter
+from records import chosen, document, record_table
+
+from dragchain.figures.panels import log_ticks
+from dragchain.figures.style import (
+    BLUE,
+    COLOURS,
+    GREEN,
+    GREY,
+    INK,
+    LIGHT,
+    MARKERS,
+    ORANGE,
+    RED,
+    force_map,
+)
+from evidence.stability.report import COLOURS as CLASSES
+
+
+def _figure(width: float, height: float) -> Figure:
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _draw_calibration() -> Figure:
+    """Effective minus entered restitution by fidelity and limitForce; range of single impacts."""
+    kinds = {
+        "standard": ("production", "standard", BLUE),
+        "draft": ("production", "draft", ORANGE),
+        "physical modulus, small step": ("reference", "standard", GREY),
+    }
+    figure = _figure(7.6, 3.1)
+    for axes, limited in zip(figure.subplots(1, 2, sharey=True), (True, False), strict=True):
+        for label, (purpose, fidelity, colour) in kinds.items():
+            rows = f"limit_force == {limited} and purpose == {purpose!r} and fidelity == "
+            part = chosen("calibration/bias", f"{rows}{fidelity!r}")
+            part = part.sort_values("restitution_entered")
+            entered, effective = part["restitution_entered"], part["restitution_effective"]
+            sides = [effective - part["lowest"], part["highest"] - effective]
+            axes.errorbar(
+                entered, effective - entered, sides,
+                fmt="o-", color=colour, lw=1, ms=3, capsize=2, label=label,
+            )  # fmt: skip
+        axes.axhline(0, color="black", lw=0.7)
+        axes.set(xlabel="entered restitution", title=f"limitForce {'on' if limited else 'off'}")
+    figure.axes[0].set_ylabel("effective minus entered restitution")
+    figure.axes[0].legend()
+    return figure
+
+
+def _draw_forces() -> Figure:
+    """Force on the workpiece over one revolution, with the experiment as a band."""
+    force, run = record_table("validation/run_force"), record_table("validation/run").iloc[0]
+    paper, colour = record_table("study/uhlmann2015").iloc[0], COLOURS["experiment"]
+    mean, std = paper["reference_experiment_drag_mean_n"], paper["reference_experiment_drag_std_n"]
+    figure = _figure(7.6, 3.2)
+    axes = figure.subplots()
+    label = "experiment, mean ± standard deviation"
+    axes.axhspan(mean - std, mean + std, color=colour, alpha=0.15, lw=0, label=label)
+    axes.axhline(mean, color=colour, ls="--", lw=1.6, zorder=3)
+    label = "simulation of Uhlmann et al. (2015), mean"
+    published = paper["reference_simulation_drag_mean_n"]
+    axes.axhline(published, color=COLOURS["simulation"], ls=":", label=label)
+    for name, width, label in (
+        ("lateral", 0.7, "lateral force"),
+        ("drag", 0.8, "drag force, 20 ms means"),
+    ):
+        axes.plot(force["time_s"], force[f"{name}_n"], color=COLOURS[name], lw=width, label=label)
+    axes.axhline(run["drag_mean_n"], color=COLOURS["drag"], lw=1.2)
+    axes.set(
+        xlabel="time since the start of the drag (s)",
+        ylabel="force on the workpiece (N)",
+        xlim=(0, force["time_s"].max()),
+    )
+    figure.legend(loc="outside lower left", ncols=2)
+    return figure
+
+
+def _draw_load_map() -> Figure:
+    """Load-distance integral per area and path length on the unrolled lateral surface."""
+    facets, study = record_table("validation/run_facets"), record_table("study/uhlmann2015").iloc[0]
+    side = facets[facets["centre_z_m"] > 1e-6]
+    depth_m = study["motion_immersion_depth_m"]
+    turn = np.degrees(np.arctan2(side["centre_y_m"], side["centre_x_m"]))
+    edges = (np.linspace(-180, 180, 22), np.arange(-0.02, depth_m + 1e-9, 0.01))
+    load, area = (
+        np.histogram2d(turn, depth_m - side["centre_z_m"], edges, weights=weights)[0]
+        for weights in (side["force_slide_pa"] * side["area_m2"], side["area_m2"])
+    )
+    figure = _figure(7.6, 3.4)
+    axes = figure.subplots()
+    values = np.divide(load, area, out=np.zeros_like(load), where=area > 0)
+    shown = axes.pcolormesh(edges[0], 1e3 * edges[1], values.T, cmap=force_map())
+    axes.axhline(0, color="black", lw=0.8, ls="--")
+    axes.text(-176, -1, "bed surface", fontsize=8, va="bottom")
+    axes.set(
+        xlabel="azimuth from the direction of motion, counter-clockwise (degrees)",
+        ylabel="depth (mm)",
+        xticks=range(-180, 181, 45),
+    )
+    axes.invert_yaxis()
+    axes.grid(visible=False)
+    figure.colorbar(shown, label="load-distance integral per area\nand path length (N/m²)")
+    return figure
+
+
+def _draw_scaling() -> Figure:
+    """Mean drag over depth, diameter, friction and speed, with the fitted power laws."""
+    labels = {
+        "drag-depth": ("immersion depth (mm)", 1e3),
+        "drag-diameter": ("diameter of the workpiece (mm)", 2e3),
+        "drag-friction": ("friction of particle on workpiece", 1.0),
+        "drag-speed": ("speed of the workpiece (mm/s)", 1e3),
+    }
+    figure = _figure(7.6, 5.4)
+    for axes, (name, (label, factor)) in zip(
+        figure.subplots(2, 2).flat, labels.items(), strict=True
+    ):
+        found = document(f"scaling/{name}")
+        curve, runs = pd.DataFrame(found["fit"]["curve"]), pd.DataFrame(found["runs"])
+        x = factor * curve["x"]
+        axes.fill_between(x, curve["ci95_low"], curve["ci95_high"], color=LIGHT, lw=0)
+        axes.plot(x, curve["value"], color=GREY)
+        axes.plot(factor * runs["level"], runs["drag_n"].abs(), "o", color=COLOURS["drag"])
+        words = "exponent {value:.2f} ({ci95_low:.2f} to {ci95_high:.2f})"
+        words = words.format(**found["fit"]["exponent"])
+        axes.set(xscale="log", yscale="log", xlabel=label, ylabel="mean drag (N)", title=words)
+        for axis in (axes.xaxis, axes.yaxis):
+            log_ticks(axis, steps=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0))
+            axis.set_minor_formatter(NullFormatter())
+    return figure
+
+
+def _draw_spin() -> Figure:
+    """Mean drag and torque over the spin ratio, with 95 % confidence intervals."""
+    rows = record_table("motion/spin")
+    figure = _figure(7.6, 2.8)
+    panels = (
+        ("drag_n", "drag_half_n", "mean drag (N)", COLOURS["drag"]),
+        ("torque_mn_m", "torque_half_mn_m", "mean torque (mN m)", GREEN),
+    )
+    for axes, (name, half, label, colour) in zip(figure.subplots(1, 2), panels, strict=True):
+        axes.errorbar(rows["spin_ratio"], rows[name], rows[half], fmt="o-", color=colour, capsize=3)
+        axes.set(xlabel="surface speed of the spin / speed along the path", ylabel=label)
+        axes.set_xscale("symlog", linthresh=1)
+        axes.set_xticks(rows["spin_ratio"], [f"{ratio:g}" for ratio in rows["spin_ratio"]])
+        axes.axhline(0, color="black", lw=0.6)
+    return figure
+
+
+def _draw_stability() -> Figure:
+    """Stable and unstable time steps: a panel per regime, a row per condition."""
+    titles = {"impact": "Single impacts", "column": "Packing at rest under a load"}
+    points = chosen("stability/points", "not reference").rename(columns={"class": "kind"})
+    figure = _figure(9.2, 6.2)
+    panels = figure.subplots(1, len(titles))
+    rows = points.groupby("regime")["condition"].nunique()[list(titles)].max()
+    for axes, (regime, title) in zip(panels, titles.items(), strict=True):
+        _regime(axes, points[points["regime"] == regime])
+        axes.set(title=title, ylim=(rows - 0.5, -0.5))
+    handles = [
+        Patch(color=colour, label=name.replace("engine", "LIGGGHTS"))
+        for name, colour in CLASSES.items()
+    ]
+    handles.append(Patch(fill=False, ec=INK, label="line: critical time step of the contacts"))
+    panels[-1].legend(handles=handles, loc="lower left")
+    return figure
+
+
+def _regime(axes: Axes, points: pd.DataFrame) -> None:
+    steps = np.sort(points["fraction"].unique())
+    rows = list(dict.fromkeys(points["condition"]))
+    for point in points.itertuples():
+        column, row = int(np.searchsorted(steps, point.fraction)), rows.index(point.condition)
+        axes.barh(row, 0.94, 0.86, column - 0.47, color=CLASSES[point.kind])
+    for row, condition in enumerate(rows):
+        own = points[points["condition"] == condition]
+        critical = (own["critical_step_s"] / own["rayleigh_time_s"]).median()
+        if steps[0] <= critical <= steps[-1]:
+            x = np.interp(np.log(critical), np.log(steps), np.arange(len(steps)))
+            axes.plot([x, x], [row - 0.45, row + 0.45], color=INK, lw=1.8)
+    names = points.drop_duplicates("condition").set_index("condition")["label"]
+    axes.set_yticks(range(len(rows)), [names[condition] for condition in rows], fontsize=7.5)
+    axes.set_xticks(range(len(steps)), [f"{100 * step:g}" for step in steps], fontsize=7)
+    axes.set_xlabel("time step (% of the Rayleigh time)")
+    axes.grid(visible=False)
+
+
+def _draw_tradeoff(tolerance: float = 0.1) -> Figure:
+    """Signed error of the mean drag against CPU time; Pareto-optimal settings are numbered."""
+    rows = chosen("tradeoff/settings/errors", "name == 'drag_mean' and not breaks")
+    rows = rows[(rows["failed"] == 0) & (rows["runs"] > 1)].sort_values("relative_cost")
+    figure = _figure(7.2, 4.2)
+    axes = figure.subplots()
+    axes.axhspan(-100 * tolerance, 100 * tolerance, color=LIGHT, alpha=0.35, lw=0)
+    axes.axhline(0, color="black", lw=0.7)
+    levels = sorted(rows["youngs_modulus_scale"].unique(), reverse=True)
+    shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.85, len(levels)))
+    for level, shade, mark in zip(levels, shades, MARKERS, strict=False):
+        own = rows[rows["youngs_modulus_scale"] == level]
+        sides = [own["value"] - own["ci95_low"], own["ci95_high"] - own["value"]]
+        axes.errorbar(
+            1 / own["relative_cost"], 100 * own["value"], [100 * side for side in sides],
+            fmt=mark, color=shade, capsize=2, lw=1, label=f"Young's modulus x {level:g}",
+        )  # fmt: skip
+    best = rows[rows["bound"] < rows["bound"].cummin().shift(fill_value=np.inf)]
+    words = ["Pareto-optimal by cost and\n95 % bound of the error:"]
+    for count, row in enumerate(best.itertuples(), start=1):
+        speed = f", speed x {row.speed_factor:g}" if row.speed_factor != 1 else ""
+        step = f"{row.timestep_fraction:.0%}{speed}"
+        words.append(f"{count}  E x {row.youngs_modulus_scale:g}, {step}")
+        axes.annotate(
+            str(count), (1 / row.relative_cost, 100 * row.ci95_high), (0, 3),
+            textcoords="offset points", fontsize=8.5, weight="bold", color=INK, ha="center",
+        )  # fmt: skip
+    figure.text(1.0, 0.93, "\n".join(words), fontsize=8, va="top", color=INK)
+    axes.text(
+        0.01, 100 * tolerance - 0.4, "within 10 %",
+        fontsize=8, color=GREY, va="top", transform=axes.get_yaxis_transform(),
+    )  # fmt: skip
+    axes.set(
+        xscale="log",
+        xlabel="CPU time of the reference / CPU time of the setting",
+        ylabel="error of the mean drag (%), 95 % CI",
+        ylim=(-17, 22),
+    )
+    log_ticks(axes.xaxis, steps=(1.0, 3.0))
+    axes.legend(loc="lower left", ncols=3)
+    return figure
+
+
+def _draw_validation() -> Figure:
+    """Mean drag by packing, setting and changed input, beside measured and published values."""
+    effects = chosen("validation/effects", "quantity == 'drag_mean'")
+    mean, low, high = record_table("validation/force").iloc[0][["mean_value", *_ENDS]]
+    rows = [("all packings, physical E", mean, low, high, COLOURS["drag"])]
+    for row in record_table("validation/packings").itertuples():
+        ends = row.drag_n_ci95_low, row.drag_n_ci95_high
+        rows.append((f"packing {row.seed}", row.drag_n_mean, *ends, COLOURS["drag"]))
+    for row in effects.itertuples():
+        name, colour = f"E x {row.youngs_modulus_scale:g}, {row.timestep_fraction:.0%}", ORANGE
+        if isinstance(row.field, str):
+            words = row.field.removeprefix("motion.").replace(".shape", "").replace("_m", "")
+            name, colour = f"{words.replace('.', ' ')} {1e3 * row.value:g} mm", GREY
+        values = [mean * (1 + x) for x in (row.change, row.ci95_high, row.ci95_low)]
+        rows.append((name, *values, colour))
+    figure = _figure(7.6, 0.26 * len(rows) + 1.1)
+    axes = figure.subplots()
+    compared = record_table("validation/comparison").set_index("label")["mean_n"]
+    for label, style in (("experiment", "--"), ("simulation", ":")):
+        source = f"Uhlmann et al. (2015), {label}"
+        axes.axvline(compared[label], color=COLOURS[label], ls=style, label=source)
+    for place, (_, value, low, high, colour) in enumerate(rows):
+        sides = [[value - low], [high - value]]
+        axes.errorbar(value, -place, xerr=sides, fmt="o", color=colour, capsize=2)
+    axes.set_yticks([-place for place in range(len(rows))], [row[0] for row in rows])
+    axes.set_xlabel("mean drag force (N), 95 % CI")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+    axes.grid(axis="y", visible=False)
+    return figure
+
+
+_ENDS = ("mean_ci95_low", "mean_ci95_high")
+
+
+def _draw_verification(smallest: float = 1e-12) -> Figure:
+    """Largest error relative to its tolerance, where that is a number."""
+    rows = record_table("verification/results")
+    rows = rows.assign(tolerance=pd.to_numeric(rows["tolerance"], errors="coerce"))
+    rows = rows.dropna(subset=["tolerance"])
+    ratio = (rows["largest_error"] / rows["tolerance"]).clip(lower=smallest)
+    names = [f"{row.test} {row.subject}: {row.quantity}" for row in rows.itertuples()]
+    figure = _figure(8.6, 0.21 * len(rows) + 0.9)
+    axes = figure.subplots()
+    places = range(len(rows), 0, -1)
+    axes.hlines(places, smallest, ratio, color=BLUE, lw=1)
+    axes.plot(ratio, places, "o", color=BLUE)
+    axes.axvline(1.0, color=RED, ls="--")
+    axes.set_yticks(list(places), names, fontsize=7.5)
+    axes.set(xscale="log", xlabel="largest error / tolerance", xlim=(0.5 * smallest, 10))
+    axes.grid(axis="y", visible=False)
+    return figure
+
+
+CHARTS = {
+    name.removeprefix("_draw_"): draw
+    for name, draw in list(globals().items())
+    if name.startswith("_draw_")
+}
+"""What draws a chart, by the name of its file."""

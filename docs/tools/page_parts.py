@@ -1,0 +1,167 @@
+"""Parts of pages that are made from records and code.
+
+A page is plain Markdown that reads without any tool. A comment after a value names it, a comment
+above a table names that, and two comments enclose text that is made from the code::
+
+    The mean drag is -2.64 N<!--drag-->.
+
+    <!--spin-->
+    | spin ratio | mean drag (N) |
+    ...
+
+    <!--begin columns-->
+    ...
+    <!--end-->
+
+Names are those of ``docs/values.csv``, of ``docs/tables.yaml`` and of `reference.TEXTS`.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import yaml
+from records import ROOT, chosen, pivoted, texts
+from reference import TEXTS, markdown_table
+
+VALUES, TABLES = ROOT / "docs/values.csv", ROOT / "docs/tables.yaml"
+PLACES = ("*.md", "docs/**/*.md", "studies/**/*.md", "config/*.md")
+
+CODE = r"(?P<code>^(?P<indent> *)(?P<ticks>```+).*?^(?P=indent)(?P=ticks) *$|`[^`\n]*`)"
+PART = re.compile(
+    r"^<!--begin (?P<text>\w+)-->\n.*?^<!--end-->$|"
+    rf"{CODE}|"
+    r"^<!--(?P<table>\w+)-->\n(?:\|[^\n]*\n)*|"
+    r"<!--(?P<value>\w+)-->",
+    re.M | re.S,
+)
+"""What is made, or code, in which nothing is."""
+
+
+class PageError(Exception):
+    """A part of a page that cannot be made."""
+
+
+def pages() -> list[Path]:
+    """Every page of the repository."""
+    return sorted({page for place in PLACES for page in ROOT.glob(place)})
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What pages contain: values by name as they stand there, and functions for the rest.
+
+    Attributes
+    ----------
+    old : mapping of str to str
+        Values as the pages have them.
+    new : mapping of str to str
+        Values as the records have them.
+    table : callable
+        Markdown of a table.
+    text : callable
+        Markdown from the code.
+    """
+
+    old: Mapping[str, str]
+    new: Mapping[str, str]
+    table: Callable[[str], str]
+    text: Callable[[str], str]
+
+    def renewed(self, page: str) -> str:
+        """A page with all its parts made anew; PageError if the value before a name is unknown."""
+        made, place = "", 0
+        for part in PART.finditer(page):
+            made += page[place : part.start()]
+            place = part.end()
+            if name := part["text"]:
+                made += f"<!--begin {name}-->\n{self.text(name).strip()}\n<!--end-->"
+            elif name := part["table"]:
+                made += f"<!--{name}-->\n{self.table(name)}\n"
+            elif name := part["value"]:
+                made = f"{self._valued(made, name)}<!--{name}-->"
+            else:
+                made += part[0]
+        return made + page[place:]
+
+    def _valued(self, before: str, name: str) -> str:
+        """The text before the name of a value, which ends with the value or with a space."""
+        if name not in self.new:
+            raise PageError(f"no value {name!r}")
+        for value in (self.new[name], self.old.get(name, "")):
+            words = r"\s+".join(map(re.escape, value.split()))
+            if found := value and re.search(rf"(?<![\w.+-]){words}$", before[-400:]):
+                return before.removesuffix(found[0]) + (
+                    found[0] if value == self.new[name] else self.new[name]
+                )
+        if before[-1:] not in (" ", "\n", "("):
+            raise PageError(f"not {self.new[name]!r} before <!--{name}-->: ...{before[-60:]!r}")
+        return before + self.new[name]
+
+
+# --- from the files ----------------------------------------------------------------------
+
+
+@cache
+def values() -> pd.DataFrame:
+    """The values as committed: name, value, record, rows, format."""
+    return pd.read_csv(VALUES, dtype=str, keep_default_na=False)
+
+
+def typed(page: str) -> str:
+    """A page without what is made."""
+    old = dict(values()[["name", "value"]].to_numpy())
+    return Parts(old, dict.fromkeys(old, ""), lambda _: "", lambda _: "").renewed(page)
+
+
+def _value(row: Mapping[str, str]) -> str:
+    try:
+        shown = set(texts(chosen(row["record"], row["rows"]), row["format"]))
+    except Exception as error:
+        raise PageError(f"value {row['name']!r}: {type(error).__name__}: {error}") from error
+    if len(shown) != 1:
+        raise PageError(f"value {row['name']!r}: {len(shown)} values instead of one")
+    return shown.pop()
+
+
+def table_recipes() -> dict[str, dict[str, Any]]:
+    """The recipe of each table."""
+    return yaml.safe_load(TABLES.read_text(encoding="utf-8"))
+
+
+def made_table(recipe: Mapping[str, Any]) -> str:
+    """A table in Markdown from its recipe: record, join, rows, pivot, columns."""
+    found = chosen(recipe["record"], recipe.get("rows", ""), recipe.get("join"))
+    if "pivot" in recipe:
+        found = pivoted(found, **recipe["pivot"])
+    cells = [texts(found, form) for form in recipe["columns"].values()]
+    return markdown_table(list(recipe["columns"]), list(zip(*cells, strict=True)))
+
+
+def stale_files() -> Iterator[tuple[Path, str]]:
+    """Every file that is not up to date, the values first, with its text as it should be."""
+    old, recipes = values(), table_recipes()
+    new = old.assign(value=[_value(row) for row in old.to_dict("records")])
+    yield from _if_changed(VALUES, new.to_csv(index=False))
+    parts = Parts(
+        dict(old[["name", "value"]].to_numpy()),
+        dict(new[["name", "value"]].to_numpy()),
+        table=lambda name: made_table(recipes[name]),
+        text=lambda name: TEXTS[name](),
+    )
+    for page in pages():
+        try:
+            text = parts.renewed(page.read_text(encoding="utf-8"))
+        except Exception as error:
+            message = f"{page.relative_to(ROOT)}: {type(error).__name__}: {error}"
+            raise PageError(message) from error
+        yield from _if_changed(page, text)
+
+
+def _if_changed(file: Path, text: str) -> Iterator[tuple[Path, str]]:
+    if text != file.read_text(encoding="utf-8"):
+        yield file, text

@@ -1,0 +1,192 @@
+"""The committed records as tables, and what pages show of them.
+
+A record has the name of its file in ``docs/data`` without the ending (``motion/spin``), one of
+`RECORDS`, or ``study/<name>`` for the fields of a study. For JSON, keys lead to a part of it
+(``tradeoff/settings/errors``). What is shown is a recipe: a record, its rows and a format. Rows are
+an expression of pandas or a single word, the name of a row; every field of the format is an
+expression over the columns::
+
+    validation/packings, seed == 1: "{drag_n_mean:.2f} N in {1e3 * arc_m:.0f} mm"
+"""
+
+import json
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from string import Formatter
+from typing import Any
+
+import pandas as pd
+import paper_study
+
+from dragchain.tradeoff.measures import QUANTITIES
+from dragdeck.project import Project
+
+ROOT = Path(__file__).resolve().parents[2]
+DATA = ROOT / "docs/data"
+
+RECORDS = {
+    **{name: ROOT / f"workflow/dragdeck/data/{name}.json" for name in ("tradeoff", "stability")},
+    "stable_step": ROOT / "workflow/dragdeck/data/stable_step.json",
+    **{
+        f"scaling/{file.stem}": file
+        for file in (ROOT / "analysis/dragchain/scaling/data").glob("*.json")
+    },
+    **{
+        str(file.relative_to(DATA).with_suffix("")): file
+        for ending in ("csv", "json")
+        for file in DATA.rglob(f"*.{ending}")
+    },
+}
+"""File of each record."""
+
+COMPUTED: dict[str, Callable[[], pd.DataFrame]] = {
+    "paper/contacts": paper_study.paper_contacts,
+    "paper/presets": paper_study.paper_presets,
+    "quantities": lambda: pd.DataFrame({"name": x.name, "label": x.label} for x in QUANTITIES),
+}
+"""Tables that the code contains."""
+
+
+# --- tables ------------------------------------------------------------------------------
+
+
+@cache
+def record_table(name: str) -> pd.DataFrame:
+    """A record, or a part of one, as a table; KeyError if there is none."""
+    if name in COMPUTED:
+        return COMPUTED[name]()
+    if name.startswith("study/"):
+        study = Project(ROOT).cases(name.removeprefix("study/"))[0].study
+        return pd.DataFrame(_rows(study.model_dump(mode="json")))
+    record = max((one for one in RECORDS if f"{name}/".startswith(f"{one}/")), key=len)
+    if RECORDS[record].suffix == ".csv":
+        return pd.read_csv(RECORDS[record])
+    keys = name.removeprefix(record).strip("/")
+    return pd.DataFrame(_rows(document(record), keys.split("/") if keys else ()))
+
+
+@cache
+def document(name: str) -> Any:
+    """The objects of a JSON record."""
+    return json.loads(RECORDS[name].read_text(encoding="utf-8"))
+
+
+def _rows(part: Any, keys: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
+    """One row per object of a list or mapping (column ``name``), with what stands above it."""
+    if isinstance(part, list):
+        for one in part:
+            yield from _rows(one, keys)
+    elif part and all(isinstance(one, dict) for one in part.values()):
+        for name, one in part.items():
+            yield from ({"name": name, **row} for row in _rows(one, keys))
+    elif keys:
+        above = {key: one for key, one in part.items() if key != keys[0]}
+        for row in _rows(part[keys[0]], keys[1:]):
+            yield {**_flat(above, lists=False), **row}
+    elif part and all(isinstance(one, list) for one in part.values()):
+        yield from pd.DataFrame(part).to_dict("records")
+    else:
+        yield _flat(part)
+
+
+def _flat(part: Mapping[str, Any], lists: bool = True) -> dict[str, Any]:
+    """The values of nested objects, their keys joined by ``_``."""
+    flat: dict[str, Any] = {}
+    for key, one in part.items():
+        if isinstance(one, dict):
+            flat |= {f"{key}_{inner}": value for inner, value in _flat(one, lists).items()}
+        elif lists or not isinstance(one, list):
+            flat[key] = one
+    return flat
+
+
+def chosen(
+    records: str | Sequence[str], rows: str = "", join: Mapping[str, Any] | None = None
+) -> pd.DataFrame:
+    """Rows of a record, or of several below each other; ValueError if there is none.
+
+    `join` names another record, and the column by which its columns are added.
+    """
+    several = [records] if isinstance(records, str) else records
+    found = pd.concat([record_table(one) for one in several], ignore_index=True)
+    if join is not None:
+        other = chosen(join["record"])
+        found = found.merge(other, on=join["by"], suffixes=("", "_joined"))
+    if re.fullmatch(r"[\w.-]+", rows) and rows not in found:
+        names = found["name"] if "name" in found else found.iloc[:, 0]
+        found = found[names.astype(str) == rows]
+    elif rows:
+        found = found.query(rows, engine="python")
+    if found.empty:
+        raise ValueError(f"no row {rows!r}")
+    return found.reset_index(drop=True)
+
+
+def pivoted(found: pd.DataFrame, index: list[str], by: list[str]) -> pd.DataFrame:
+    """Values of the columns `by` side by side: ``value_0_01`` for ``value`` where it is 0.01."""
+    wide = found.set_index([*index, *by]).unstack(by, sort=False)
+    wide.columns = pd.Index(["_".join(map(str, names)).replace(".", "_") for names in wide])
+    return wide.reset_index()
+
+
+# --- texts -------------------------------------------------------------------------------
+
+
+def texts(found: pd.DataFrame, form: str) -> list[str]:
+    """What a format shows of each row; every field is an expression over the columns."""
+    shown = [""] * len(found)
+    for literal, field, spec, _ in Formatter().parse(form):
+        values = [""] * len(found) if field is None else _field(found, field, spec or "")
+        shown = [f"{text}{literal}{value}" for text, value in zip(shown, values, strict=True)]
+    return shown
+
+
+def _field(found: pd.DataFrame, field: str, spec: str) -> list[str]:
+    if spec.startswith("change"):
+        ends = [found[field.replace("value", end)] for end in ("ci95_low", "ci95_high")]
+        form = spec.removeprefix("change")
+        return [change(*numbers, form) for numbers in zip(found[field], *ends, strict=True)]
+    values = found[field] if field in found else found.eval(field, engine="python")
+    if not isinstance(values, pd.Series):
+        values = pd.Series([values] * len(found))
+    return [shown_value(value, spec) for value in values.tolist()]
+
+
+def shown_value(value: Any, spec: str) -> str:
+    """A value by a format of Python; ``on|off`` are words for a truth value.
+
+    ``%`` has a space before it, a zero no minus, and a number that is missing shows nothing.
+    """
+    if isinstance(value, bool):
+        yes, _, no = spec.partition("|")
+        return yes if value else no
+    if value is None or value != value:
+        return ""
+    if spec.endswith("%"):
+        text = f"{100 * value:{spec[:-1]}f} %"
+    elif spec.endswith("d"):
+        text = f"{round(value):{spec}}"
+    else:
+        text = f"{value:g}" if spec == "" and isinstance(value, float) else f"{value:{spec}}"
+    return re.sub(r"^-(?=0(\.0*)?( %)?$)", "", text)
+
+
+LARGE = 2
+"""Relative changes from this on are shown as multiples."""
+
+
+def change(value: float, low: float, high: float, form: str = "") -> str:
+    """A relative change and its interval in per cent; n.s. if that includes zero."""
+
+    def percent(one: float) -> str:
+        text = f"{100 * one:+{form or ('.0f' if abs(one) >= 0.0995 else '.1f')}}"
+        return text if float(text) else text[1:]
+
+    if pd.isna(low):
+        return ""
+    interval = f"({percent(low)} to {percent(high)})"
+    if pd.isna(value) or low < 0 < high:
+        return f"n.s. {interval}"
+    return f"{1 + value:.0f}-fold" if value >= LARGE else f"{percent(value)} {interval}"

@@ -1,0 +1,608 @@
+"""The judgement of a map: class of every point, safe step of every condition and regime."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from pydantic import BeforeValidator
+
+from dragchain.run.completeness import AcceptanceCheck, CheckCode, CheckReason
+from dragchain.statistics.estimate import Estimate, flattened
+from dragdeck.documents import Document, Part
+from evidence.stability.measures import (
+    COLUMNS,
+    MEASURES,
+    REST_FLOOR,
+    PointRun,
+    Row,
+    critical_step,
+    damped_fraction,
+)
+from evidence.stability.points import REGIMES, Settings
+
+# --- classes of points -------------------------------------------------------------------------
+
+STABLE, INACCURATE, ENERGY = "stable", "inaccurate", "energy gained"
+LOST, OVERLAP, REFUSED = "particles lost", "overlap too large", "engine refused"
+CLASSES = (STABLE, INACCURATE, OVERLAP, ENERGY, LOST, REFUSED)
+"""Classes of a point, the harmless ones first."""
+
+UNSTABLE = (ENERGY, LOST)
+
+OVERLAP_LIMIT = 0.1
+"""Largest overlap over the smaller particle's radius. Hertz takes the radius a of the contact to be
+small beside R (Johnson 1985, section 4.2); the overlap is a^2/R, so 0.1 is a/R = 0.32. An
+assumption: no sharp limit is known."""
+
+ENERGY_LIMITS: Mapping[str, float] = {"impact": 1.01, "settle": 1.2, "column": 10.0, "drag": 10.0}
+"""Largest ratio of energies of a run that gains none: after an impact over before, or over
+what the reference has after it where the contact law itself gains; the settling
+bed's largest over the reference's; the resting bed's at the end over the reference's (or over
+`REST_FLOOR`); the dragged bed's median over what it has if all particles move as
+the workpiece and one as in a fall through its diameter. Assumptions, above the scatter that
+runs with small steps show."""
+
+TOLERANCE = 0.05
+"""Largest error against the fine step: of the restitution and the tangential speed over the speed
+of the impact (absolute), of peak force, bed height and mean drag (relative)."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is known of a point.
+
+    Attributes
+    ----------
+    regime, state : str
+        State: ``complete``, ``failed`` or ``refused``.
+    steps : int
+        Steps that the engine made.
+    failed : sequence of AcceptanceCheck
+        The acceptance checks that did not pass.
+    refused : str, optional
+        Why no deck could be written.
+    energy_ratio, overlap_ratio : float, optional
+        See `ENERGY_LIMITS` and `OVERLAP_LIMIT`.
+    errors : mapping of str to Estimate
+        Deviations from the fine-step reference, signed; the ends of the interval are equal where
+        nothing scatters.
+    """
+
+    regime: str
+    state: str
+    steps: int = 0
+    failed: Sequence[AcceptanceCheck] = ()
+    refused: str | None = None
+    energy_ratio: float | None = None
+    overlap_ratio: float | None = None
+    errors: Mapping[str, Estimate] = field(default_factory=dict)
+
+    def failed_check(
+        self, code: CheckCode, reason: CheckReason | None = None
+    ) -> AcceptanceCheck | None:
+        """The check of this code, if it did not pass for this reason; any reason if None."""
+        found = (check for check in self.failed if check.code == code)
+        return next((check for check in found if reason in (None, check.reason)), None)
+
+
+class Verdict(NamedTuple):
+    """Class of a point and why; the acceptance check that decided it, if one did."""
+
+    kind: str
+    why: str
+    check: CheckCode | None = None
+
+
+class _Rule(NamedTuple):
+    """The class of a run whose check of this code did not pass, and the words for it."""
+
+    kind: str
+    code: CheckCode
+    reason: CheckReason | None = None
+    why: str = "{}"
+
+
+_RULES = (
+    _Rule(LOST, "no_engine_error", "lost_particles"),
+    _Rule(LOST, "within_limits", "particles", "stopped early: {}"),
+    _Rule(LOST, "particles_kept"),
+    _Rule(ENERGY, "within_limits", why="stopped early: {}"),
+    _Rule(ENERGY, "finite_numbers", why="numbers that are not finite"),
+    _Rule(ENERGY, "at_rest", why="the bed does not come to rest: {}"),
+)
+"""In the order in which they count."""
+
+
+def classify(seen: Seen) -> Verdict:
+    """Class of a point, and why.
+
+    A run that ended is no proof of a stable step: its energy counts too.
+    """
+    judges: tuple[Callable[[Seen], Verdict | None], ...] = (
+        _refused,
+        _failed_check,
+        _energy_gained,
+        _overlap_too_large,
+        _inaccurate,
+    )
+    verdicts = (judge(seen) for judge in judges)
+    stable = Verdict(STABLE, "no criterion of the others met")
+    return next((verdict for verdict in verdicts if verdict is not None), stable)
+
+
+def _refused(seen: Seen) -> Verdict | None:
+    if seen.refused is not None:
+        return Verdict(REFUSED, seen.refused.replace("\n", " "))
+    error = seen.failed_check("no_engine_error", "other")
+    return None if error is None or seen.steps else Verdict(REFUSED, error.seen, error.code)
+
+
+def _failed_check(seen: Seen) -> Verdict | None:
+    for kind, code, reason, why in _RULES:
+        check = seen.failed_check(code, reason)
+        if check is not None:
+            return Verdict(kind, why.format(check.seen), code)
+    return None
+
+
+def _energy_gained(seen: Seen) -> Verdict | None:
+    limit = ENERGY_LIMITS[seen.regime]
+    if seen.energy_ratio is None or seen.energy_ratio <= limit:
+        return None
+    why = f"energy {seen.energy_ratio:.3g} times what it should be at most (limit {limit:g})"
+    return Verdict(ENERGY, why)
+
+
+def _overlap_too_large(seen: Seen) -> Verdict | None:
+    if seen.overlap_ratio is None or seen.overlap_ratio <= OVERLAP_LIMIT:
+        return None
+    why = f"overlap {seen.overlap_ratio:.3g} of the radius (limit {OVERLAP_LIMIT:g})"
+    return Verdict(OVERLAP, why)
+
+
+def _inaccurate(seen: Seen) -> Verdict | None:
+    if seen.failed:
+        why = "; ".join(f"{check.name}: {check.seen}" for check in seen.failed)
+        return Verdict(INACCURATE, why, seen.failed[0].code)
+    for name, error in seen.errors.items():
+        if _at_least(error) > TOLERANCE:
+            why = f"error of the {name} {error.value:+.3g} (tolerance {TOLERANCE:g})"
+            return Verdict(INACCURATE, why)
+    return None
+
+
+def _at_least(error: Estimate) -> float:
+    """The smallest size within the interval: what the deviation has at the least."""
+    return 0.0 if error.contains(0.0) else min(abs(error.ci95_low), abs(error.ci95_high))
+
+
+# --- the table of points -----------------------------------------------------------------------
+
+_SMALL_STEP = 0.4
+"""Steps over the Rayleigh time up to which the heights of settled beds differ by chance."""
+
+_ERRORS = (
+    *("restitution_error", "peak_force_error", "tangential_speed_error", "height_error"),
+    *("mean_drag_error", "mean_drag_error_ci95_low", "mean_drag_error_ci95_high"),
+)
+
+
+def judge(runs: Sequence[PointRun]) -> tuple[pd.DataFrame, list[Verdict]]:
+    """Measure and classify all points, condition by condition.
+
+    Returns
+    -------
+    DataFrame, list of Verdict
+        One row per point, and what decided its class.
+    """
+    conditions: dict[str, list[PointRun]] = {}
+    for run in runs:
+        conditions.setdefault(run.point.condition, []).append(run)
+    bases = {run.point.regime: run.point.settings for run in runs if run.point.axis == "base"}
+    judged = [
+        one
+        for group in conditions.values()
+        for one in _condition(group, bases.get(group[0].point.regime, {}))
+    ]
+    return pd.DataFrame([row for row, _ in judged]), [verdict for _, verdict in judged]
+
+
+def _condition(
+    group: Sequence[PointRun], base: Settings
+) -> Iterator[tuple[dict[str, object], Verdict]]:
+    """The points of one condition; its reference comes first."""
+    runs = sorted(group, key=lambda run: not run.point.reference)
+    regime, case = runs[0].point.regime, runs[0].case
+    measured = [_measured(run) for run in runs]
+    fine = measured[0]
+    if fine and regime == "settle":
+        fine = {**fine, "height_scatter": _height_scatter(runs, measured)}
+    step = critical_step(fine["frequency_rad_s"]) if fine else math.inf
+    critical_s = step if math.isfinite(step) and case else math.nan
+    rayleigh_s = case.rayleigh_time_s if case else math.nan
+    for run, own in zip(runs, measured, strict=True):
+        point, seen = run.point, _seen(run, own, fine)
+        verdict = classify(seen)
+        step_s = run.case.timestep_s if run.case else math.nan
+        contact_s = run.impact.contact_time_s if run.impact else math.nan
+        errors = {f"{name.replace(' ', '_')}_error": error for name, error in seen.errors.items()}
+        row = {
+            "regime": regime,
+            "condition": point.condition,
+            "axis": point.axis,
+            "label": point.label(base),
+            "fraction": point.fraction,
+            "reference": point.reference,
+            "state": seen.state,
+            "class": verdict.kind,
+            "why": verdict.why,
+            "timestep_s": step_s,
+            "rayleigh_time_s": rayleigh_s,
+            "critical_step_s": critical_s,
+            "fraction_of_critical": step_s / critical_s,
+            "damped_fraction": damped_fraction(point.number("restitution")),
+            "steps_per_contact": contact_s / step_s,
+            "steps": seen.steps,
+            "energy_ratio": math.nan if seen.energy_ratio is None else seen.energy_ratio,
+            "overlap_ratio": math.nan if seen.overlap_ratio is None else seen.overlap_ratio,
+            **_columns(_ERRORS, flattened(errors)),
+            **_columns(COLUMNS, own or {}),
+            **{f"setting_{name}": value for name, value in point.settings.items()},
+            "folder": point.folder,
+        }
+        yield row, verdict
+
+
+def _columns(names: Sequence[str], found: Mapping[str, object]) -> dict[str, object]:
+    return {name: found.get(name, math.nan) for name in names}
+
+
+def _measured(run: PointRun) -> Row | None:
+    if run.case is None or not run.measurable:
+        return None
+    return MEASURES[run.point.regime].row(run, run.case)
+
+
+def _height_scatter(runs: Sequence[PointRun], measured: Sequence[Row | None]) -> float:
+    """Relative standard deviation of bed heights that differ by chance, from the small steps."""
+    heights = [
+        own["height_m"]
+        for run, own in zip(runs, measured, strict=True)
+        if own and run.point.fraction <= _SMALL_STEP
+    ]
+    return float(np.std(heights, ddof=1) / np.mean(heights)) if len(heights) > 2 else math.inf
+
+
+def _seen(run: PointRun, own: Row | None, fine: Row | None) -> Seen:
+    """What classifies a point."""
+    record, measure = run.record, MEASURES[run.point.regime]
+    return Seen(
+        regime=run.point.regime,
+        state=record.state if record else "refused",
+        steps=record.last_step if record else 0,
+        failed=record.failed_checks if record else (),
+        refused=run.point.refused,
+        energy_ratio=measure.energy_ratio(own, fine) if own else None,
+        overlap_ratio=own["overlap_ratio"] if own else None,
+        errors=measure.errors(own, fine) if own and fine else {},
+    )
+
+
+# --- the document ------------------------------------------------------------------------------
+
+
+def _to_digits(digits: int) -> BeforeValidator:
+    def rounded(value: object) -> object:
+        if not isinstance(value, float):
+            return value
+        return None if math.isnan(value) else float(f"{value:.{digits}g}")
+
+    return BeforeValidator(rounded)
+
+
+Step = Annotated[float | None, _to_digits(4)]
+"""A step over another, to four digits; NaN becomes None."""
+
+KnownStep = Annotated[float, _to_digits(4)]
+"""The same of a step that is always known."""
+
+Rounded = Annotated[float, _to_digits(3)]
+"""A number to three digits."""
+
+
+class SafeSteps(Part):
+    """The largest safe step of a regime: the smallest of its usable conditions.
+
+    ``..._fraction`` is over the Rayleigh time, ``..._critical`` over the critical step.
+
+    Attributes
+    ----------
+    conditions, usable : int
+        How many there are, and how many of them have a stable reference.
+    base : float or None
+        Safe at the base point.
+    safe, recommended : float
+        Safe in all usable conditions, and that times the safety factor.
+    over_rule : float
+        The safe step over the 20 % rule.
+    stable : float
+        No energy gained and no particle lost in any usable condition.
+    limited_by : str
+        The condition with the smallest safe step.
+    ordinary : float or None
+        Safe without the strongly damped conditions, those below `ORDINARY_RESTITUTION`.
+    """
+
+    conditions: int
+    usable: int
+    base_fraction: Step
+    base_critical: Step
+    safe_fraction: KnownStep
+    recommended_fraction: KnownStep
+    over_rule: KnownStep
+    stable_fraction: Step
+    safe_critical: Step
+    recommended_critical: Step
+    stable_critical: Step
+    limited_by: str
+    ordinary_fraction: Step
+    ordinary_critical: Step
+
+
+class RestitutionErrors(Part):
+    """Errors of head-on impacts in bins of steps per contact, fewest steps first.
+
+    Attributes
+    ----------
+    steps_per_contact : (B,) tuple of float
+        Geometric mean of a bin.
+    median : (B,) tuple of float
+        Of the largest restitution error among a run's impacts.
+    worst, ordinary_worst : (B,) tuple of float
+        Largest of the bin and of all with more steps; ordinary: where the restitution is at least
+        `ORDINARY_RESTITUTION`.
+    peak_force_worst : (B,) tuple of float
+        The same of the relative error of the peak force.
+    runs : (B,) tuple of int
+    """
+
+    steps_per_contact: tuple[Rounded, ...]
+    median: tuple[Rounded, ...]
+    ordinary_worst: tuple[Rounded, ...]
+    worst: tuple[Rounded, ...]
+    peak_force_worst: tuple[Rounded, ...]
+    runs: tuple[int, ...]
+
+
+class Criteria(Part):
+    """The limits that points were classified with; see `ENERGY_LIMITS` and `OVERLAP_LIMIT`."""
+
+    tolerance: float
+    overlap_limit: float
+    energy_limits: Mapping[str, float]
+    rest_floor: float
+
+
+class StabilityFile(Document):
+    """The content of ``stability.json``.
+
+    Attributes
+    ----------
+    measured : str
+        Date of the last run.
+    points : int
+    engine_wall_time_s : float
+        Of all runs.
+    safety_factor : float
+        Recommended over safe step.
+    regimes : mapping of str to SafeSteps
+    """
+
+    remedy = "make it with: snakemake stability"
+
+    commands: tuple[str, ...]
+    engine_versions: tuple[str, ...]
+    dragdeck_versions: tuple[str, ...]
+    measured: str
+    points: int
+    engine_wall_time_s: float
+    safety_factor: float
+    criteria: Criteria
+    regimes: Mapping[str, SafeSteps]
+    restitution_error: RestitutionErrors
+
+
+# --- the largest safe steps --------------------------------------------------------------------
+
+SAFETY_FACTOR = 0.8
+"""On the largest step that was seen to be safe: about one step of the map's grid."""
+
+_ORDINARY_RESTITUTION = 0.5
+"""Below this the damping of the contacts makes the safe step much smaller."""
+
+RULE = 0.2
+"""The common rule: a fifth of the Rayleigh time."""
+
+_ERROR_BINS_PER_DECADE = 6
+"""Resolution of the table of errors against steps per contact."""
+
+_NOT_SAFE = (INACCURATE, *UNSTABLE, REFUSED)
+"""A large overlap comes from load and stiffness, not from the step: it limits no step."""
+
+
+def safe_fraction(points: pd.DataFrame, bad: Sequence[str]) -> float:
+    """Largest step below which no point of a condition is of a bad class.
+
+    Parameters
+    ----------
+    points : DataFrame
+        ``fraction`` and ``class`` of one condition.
+    bad : sequence of str
+        Classes.
+
+    Returns
+    -------
+    float
+        One of the fractions that were run; NaN if even the smallest is bad.
+    """
+    rising = points.sort_values("fraction")
+    past = np.logical_or.accumulate(rising["class"].isin(bad).to_numpy())
+    return float(rising.loc[~past, "fraction"].max())
+
+
+def conditions(points: pd.DataFrame) -> pd.DataFrame:
+    """One row per condition: its largest safe and its largest stable step.
+
+    Returns
+    -------
+    DataFrame
+        ``regime condition axis label usable`` (whether its reference is stable, so that a safe
+        step can be asked for), ``safe_fraction`` (no class of ``NOT_SAFE`` up to it),
+        ``stable_fraction`` (no energy gained and no particles lost up to it), both over the
+        Rayleigh time, the same over the critical step (``..._critical``), ``grid_end`` (whether
+        the largest step of the grid is the safe one, so the limit lies above), ``restitution``.
+    """
+    groups = points.groupby(["regime", "condition"], sort=False)
+    return pd.DataFrame([_safe_steps(group) for _, group in groups])
+
+
+def _safe_steps(points: pd.DataFrame) -> dict[str, object]:
+    reference = points[points["reference"]].iloc[0]
+    usable = reference["class"] == STABLE
+    safe = safe_fraction(points, _NOT_SAFE) if usable else math.nan
+    stable = safe_fraction(points, (*UNSTABLE, REFUSED))
+    per_rayleigh = reference["rayleigh_time_s"] / reference["critical_step_s"]
+    return {
+        **{name: reference[name] for name in ("regime", "condition", "axis", "label")},
+        "usable": usable,
+        "reference_class": reference["class"],
+        "reference_why": reference["why"],
+        "safe_fraction": safe,
+        "stable_fraction": stable,
+        "safe_critical": safe * per_rayleigh,
+        "stable_critical": stable * per_rayleigh,
+        "damped_fraction": reference["damped_fraction"],
+        "critical_over_rayleigh": 1.0 / per_rayleigh,
+        "grid_end": safe == points["fraction"].max(),
+        "restitution": reference["setting_restitution"],
+    }
+
+
+def regimes(found: pd.DataFrame) -> dict[str, SafeSteps]:
+    """The largest safe step of each regime that has one.
+
+    Parameters
+    ----------
+    found : DataFrame
+        As `conditions` makes it.
+    """
+    groups = {name: found[found["regime"] == name] for name in REGIMES}
+    return {
+        name: _regime(group)
+        for name, group in groups.items()
+        if group.loc[group["usable"], "safe_fraction"].notna().any()
+    }
+
+
+def _regime(found: pd.DataFrame) -> SafeSteps:
+    usable = found[found["usable"]]
+    base = usable[usable["axis"] == "base"]
+    ordinary = usable[usable["restitution"] >= _ORDINARY_RESTITUTION]
+    worst = usable.sort_values("safe_fraction", kind="stable").iloc[0]
+    safe, safe_critical = float(worst["safe_fraction"]), float(usable["safe_critical"].min())
+    return SafeSteps(
+        conditions=len(found),
+        usable=len(usable),
+        base_fraction=_least(base["safe_fraction"]),
+        base_critical=_least(base["safe_critical"]),
+        safe_fraction=safe,
+        recommended_fraction=SAFETY_FACTOR * safe,
+        over_rule=safe / RULE,
+        stable_fraction=_least(usable["stable_fraction"]),
+        safe_critical=safe_critical,
+        recommended_critical=SAFETY_FACTOR * safe_critical,
+        stable_critical=_least(usable["stable_critical"]),
+        limited_by=str(worst["label"]),
+        ordinary_fraction=_least(ordinary["safe_fraction"]),
+        ordinary_critical=_least(ordinary["safe_critical"]),
+    )
+
+
+def _least(values: "pd.Series[float]") -> float:
+    """The smallest value; NaN for none."""
+    return float(values.min())
+
+
+def head_on_impacts(points: pd.DataFrame) -> pd.DataFrame:
+    """Impacts along the normal of conditions whose reference is stable, without references."""
+    usable = points.loc[points["reference"] & (points["class"] == STABLE), "condition"]
+    return points[
+        (points["regime"] == "impact")
+        & ~points["reference"]
+        & points["condition"].isin(usable)
+        & (points["setting_angle_deg"] == 0.0)
+    ]
+
+
+def error_table(points: pd.DataFrame) -> RestitutionErrors:
+    """Restitution error against steps per contact, over all head-on impacts that ended."""
+    impacts = head_on_impacts(points)
+    impacts = impacts[impacts["state"] == "complete"]
+    steps = impacts["steps_per_contact"].to_numpy()
+    bins = np.floor(np.log10(steps) * _ERROR_BINS_PER_DECADE).astype(int)
+    ordinary = (impacts["setting_restitution"] >= _ORDINARY_RESTITUTION).to_numpy()
+    groups = [bins == number for number in np.unique(bins)]
+    errors = impacts["restitution_error"].abs().to_numpy()
+    forces = impacts["peak_force_error"].abs().to_numpy()
+    return RestitutionErrors(
+        steps_per_contact=tuple(float(np.exp(np.log(steps[own]).mean())) for own in groups),
+        median=tuple(float(np.median(errors[own])) for own in groups),
+        ordinary_worst=_envelope(errors, [own & ordinary for own in groups]),
+        worst=_envelope(errors, groups),
+        peak_force_worst=_envelope(forces, groups),
+        runs=tuple(int(own.sum()) for own in groups),
+    )
+
+
+def _envelope(
+    values: NDArray[np.float64], groups: Sequence[NDArray[np.bool_]]
+) -> tuple[float, ...]:
+    """Largest value of each group and of all after it: more steps never make it larger."""
+    largest = [values[own].max(initial=0.0) for own in groups]
+    return tuple(np.maximum.accumulate(largest[::-1])[::-1].tolist())
+
+
+def summarise(points: pd.DataFrame, found: pd.DataFrame, runs: Sequence[PointRun]) -> StabilityFile:
+    """What ``dragdeck check`` uses: safe steps, errors of impacts, and where they come from.
+
+    Parameters
+    ----------
+    points, found : DataFrame
+        As `judge` and `conditions` make them.
+    runs : sequence of PointRun
+    """
+    records = [run.record for run in runs if run.record]
+    cases = [run.case for run in runs if run.record and run.case]
+    started = max((record.started for record in records), default=datetime.now(UTC).isoformat())
+    return StabilityFile(
+        commands=("snakemake stability",),
+        engine_versions=tuple(sorted({record.engine_version for record in records})),
+        dragdeck_versions=tuple(sorted({case.versions["dragdeck"] for case in cases})),
+        measured=started[:10],
+        points=len(points),
+        engine_wall_time_s=round(sum(record.wall_time_s for record in records), 1),
+        safety_factor=SAFETY_FACTOR,
+        criteria=Criteria(
+            tolerance=TOLERANCE,
+            overlap_limit=OVERLAP_LIMIT,
+            energy_limits=ENERGY_LIMITS,
+            rest_floor=REST_FLOOR,
+        ),
+        regimes=regimes(found),
+        restitution_error=error_table(points),
+    )

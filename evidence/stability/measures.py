@@ -1,0 +1,607 @@
+"""What is measured of a run of the map: contacts, energy, and deviations from the fine step."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from dragchain.arrays import Floats, Ints
+from dragchain.contact_law.hertz import sphere_mass
+from dragchain.dumps.frame import Columns, Frame
+from dragchain.dumps.run_parts import iter_frames, iter_prints
+from dragchain.errors import TableError
+from dragchain.run.case import Case, friction_with, load_outputs
+from dragchain.run.completeness import RunRecord
+from dragchain.run.kinematics import drag_phase, needed
+from dragchain.statistics.correlated import estimate_mean
+from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
+from dragchain.tables.network_contacts import KINDS, contact_rows
+from dragchain.tables.run_folder import Run
+from dragchain.tables.workpiece_contacts import WorkpieceFrames
+from dragchain.tables.write import workpiece_force_rows
+from dragdeck.decks import CASE_FILE
+from dragdeck.decks.case_file import CaseOfStudy
+from dragdeck.physics.contact_network import largest_eigenvalue
+from dragdeck.physics.damping import damping_ratio
+from evidence.stability.points import Point, PointsFile
+from evidence.stability.scenes import ImpactCase, ImpactOfRun
+
+Row = Mapping[str, float]
+"""What a run showed. Every regime has ``overlap_ratio``, the largest overlap over the radius, and
+``frequency_rad_s``, the largest eigenfrequency of its contact network; and names of `COLUMNS`."""
+
+COLUMNS = (
+    "restitution_mean",
+    "restitution_low",
+    "restitution_high",
+    "peak_force_n",
+    "height_m",
+    "peak_energy_j",
+    "rest_energy_ratio",
+    "drag_mean_n",
+    "drag_half_width_n",
+    "energy_after_over_before",
+    "frequency_rad_s",
+)
+"""Columns of the table of points with what was measured; each regime has some of them."""
+
+# --- points with their runs --------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class PointRun:
+    """A point with its run."""
+
+    point: Point
+    folder: Path
+
+    @cached_property
+    def case(self) -> CaseOfStudy | None:
+        """What it models; None of a point that no deck could be written for."""
+        file = self.folder / CASE_FILE
+        return CaseOfStudy.read(file) if file.is_file() else None
+
+    @cached_property
+    def impact(self) -> ImpactOfRun | None:
+        """How its bodies meet; None outside single impacts."""
+        if self.point.regime != "impact" or self.case is None:
+            return None
+        return ImpactCase.read(self.folder / CASE_FILE).impact
+
+    def frames(self, name: str) -> Iterator[Frame]:
+        """Frames of a dump."""
+        return iter_frames(self.folder, load_outputs(self.folder)[name])
+
+    def prints(self, name: str) -> Iterator[Columns]:
+        """Blocks of rows of a ``fix print`` output."""
+        return iter_prints(self.folder, load_outputs(self.folder)[name])
+
+    @cached_property
+    def record(self) -> RunRecord | None:
+        """How the run ended; None of a point that was not run.
+
+        Raises
+        ------
+        TableError
+            The run was interrupted.
+        """
+        file = self.folder / "state.json"
+        if not file.is_file():
+            return None
+        record = RunRecord.read(file)
+        if record.state in ("running", "stopped"):
+            raise TableError(
+                f"{self.folder}: this run was interrupted; `snakemake stability` goes on with it"
+            )
+        return record
+
+    @property
+    def sticks(self) -> bool:
+        """Whether its contacts have friction, and so a tangential stiffness."""
+        return self.point.number("friction") > 0.0
+
+    @property
+    def measurable(self) -> bool:
+        """Whether the run came to its end.
+
+        One that only built its neighbour lists too late, or whose contacts gain energy by the
+        step, counts: its energy says something.
+        """
+        if self.record is None:
+            return False
+        failed = {check.code for check in self.record.failed_checks}
+        return self.record.complete or set() < failed <= {"neighbour_builds", "stable_timestep"}
+
+
+def read_points(lists: Sequence[Path]) -> list[PointRun]:
+    """The points of lists.
+
+    Raises
+    ------
+    InputError
+        A list cannot be used.
+    """
+    return [
+        PointRun(point, file.parent.parent / point.folder)
+        for file in lists
+        for point in PointsFile.read(file).points
+    ]
+
+
+# --- the critical time step of a loaded contact network ----------------------------------------
+
+
+def hertz_stiffness(
+    overlap_m: Floats, radius_m: Floats, modulus_pa: Floats, shear_pa: Floats
+) -> tuple[Floats, Floats]:
+    """Tangent stiffnesses of Hertzian contacts.
+
+    ``k_n = 2 E* sqrt(R* d)`` (the derivative of Johnson 1985, eq. 4.23, by the overlap d) and
+    ``k_t = 8 G* sqrt(R* d)`` (Mindlin 1949, no slip).
+
+    Parameters
+    ----------
+    overlap_m, radius_m : (M,) ndarray
+        Overlaps and effective radii.
+    modulus_pa, shear_pa : (M,) ndarray
+        Effective moduli E* and G*.
+
+    Returns
+    -------
+    (M,) ndarray, (M,) ndarray
+        k_n and k_t, N/m; zero where bodies do not overlap.
+    """
+    contact_radius = np.sqrt(radius_m * np.maximum(overlap_m, 0.0))
+    return 2.0 * modulus_pa * contact_radius, 8.0 * shear_pa * contact_radius
+
+
+def largest_frequency(
+    mass_kg: Floats, a: Ints, b: Ints, normal: Floats, stiffness_n_m: tuple[Floats, Floats]
+) -> float:
+    """Largest eigenfrequency of a contact network, rotations included.
+
+    The largest eigenvalue of ``M^-1/2 K M^-1/2`` by Lanczos iteration, K being the sum over all
+    contacts of ``G^T (k_n n n^T + k_t (1 - n n^T)) G`` with G the relative displacement at the
+    contact for unit displacements and rotations of its two bodies. Every contact sticks (a sliding
+    one is softer, so the frequency is an upper bound) and nothing is damped.
+
+    Parameters
+    ----------
+    mass_kg : (N,) ndarray
+        Of the particles.
+    a, b : (M,) ndarray of int
+        The bodies of a contact as rows of the particles; ``b`` is -1 for a wall, which does not
+        move.
+    normal : (M, 3) ndarray
+        Unit vectors from ``a`` to ``b``.
+    stiffness_n_m : (M,) ndarray, (M,) ndarray
+        Normal and tangential tangent stiffness.
+
+    Returns
+    -------
+    float
+        rad/s; 0 where there are no contacts.
+
+    References
+    ----------
+    Otsubo, O'Sullivan and Shire (2017), Empirical assessment of the critical time increment in
+    explicit particulate discrete element method simulations, Computers and Geotechnics 86, 67-79.
+    """
+    if not len(a):
+        return 0.0
+    # a wall is the last body, row -1, and has no inverse mass
+    inverse_mass = np.append(1.0 / mass_kg, 0.0)
+    stiffness = np.stack(stiffness_n_m)
+    largest = largest_eigenvalue(np.stack([a, b]), normal, stiffness, inverse_mass)
+    return float(np.sqrt(max(largest, 0.0)))
+
+
+def critical_step(frequency_rad_s: float) -> float:
+    """Largest stable step of central differences without damping, ``2 / omega``, s.
+
+    Belytschko 1983, in Computational Methods for Transient Analysis; infinite for no contact.
+    """
+    return np.inf if frequency_rad_s == 0.0 else 2.0 / frequency_rad_s
+
+
+def damped_fraction(restitution: float) -> float:
+    """Critical step with the contact's damping over that without.
+
+    ``sqrt(1 + z^2) - z`` for velocities that lag half a step (Belytschko 1983), with the damping
+    ratio z of LIGGGHTS's Hertz law, ``sqrt(5/6)`` times `damping_ratio`, taken for every mode.
+    """
+    ratio = math.sqrt(5.0 / 6.0) * damping_ratio(restitution)
+    return float(np.hypot(1.0, ratio) - ratio)
+
+
+# --- contacts of particles with each other, the bowl and the workpiece -------------------------
+
+PARTNERS = ("particle", "bowl", "workpiece")
+"""Names of the partners in ``contact_moduli`` of ``case.json``."""
+
+PARTICLE, BOWL, WORKPIECE = range(len(PARTNERS))
+
+_PARTNER = {
+    "particle-particle": PARTICLE,
+    "particle-workpiece": WORKPIECE,
+    "particle-floor": BOWL,
+    "particle-side": BOWL,
+}
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """N contacts.
+
+    Attributes
+    ----------
+    a, b : (N,) ndarray of int
+        Rows of the particles; ``b`` is -1 for another body.
+    partner : (N,) ndarray of int
+        Index of body b into `PARTNERS`.
+    normal : (N, 3) ndarray
+        Unit vectors from a to b.
+    overlap_m : (N,) ndarray
+    """
+
+    a: Ints
+    b: Ints
+    partner: Ints
+    normal: Floats
+    overlap_m: Floats
+
+    def overlap_ratio(self, radius_m: Floats) -> float:
+        """Largest overlap over the radius of body a; 0 without a contact."""
+        return float((self.overlap_m / radius_m[self.a]).max(initial=0.0))
+
+    def effective_radius_m(self, radius_m: Floats) -> Floats:
+        """Effective radii; bowl and workpiece count as planes."""
+        own, other = radius_m[self.a], radius_m[np.where(self.b < 0, 0, self.b)]
+        return np.where(self.b < 0, own, own * other / (own + other))
+
+
+def _in_id_order(frame: Frame) -> Frame:
+    return frame.take(np.argsort(frame.columns["particle_id"]))
+
+
+def _centres(frame: Frame) -> Floats:
+    return frame.vectors("x_m", "y_m", "z_m")
+
+
+def _radii(frame: Frame) -> Floats:
+    return frame.vectors("radius_m")[:, 0]
+
+
+def touching(centre_m: Floats, radius_m: Floats, bowl_radius_m: float) -> Contacts:
+    """Contacts of particles with each other, the floor and the side, from where they are."""
+    pairs = KDTree(centre_m).query_pairs(2.0 * float(radius_m.max()), output_type="ndarray")
+    pairs = pairs.astype(np.int64)
+    away = centre_m[pairs[:, 1]] - centre_m[pairs[:, 0]]
+    distance = np.linalg.norm(away, axis=1)
+    overlap = radius_m[pairs].sum(axis=1) - distance
+    hit = overlap > 0.0
+    across = np.linalg.norm(centre_m[:, :2], axis=1)
+    side, floor = radius_m - (bowl_radius_m - across), radius_m - centre_m[:, 2]
+    at_side, at_floor = np.flatnonzero(side > 0.0), np.flatnonzero(floor > 0.0)
+    outward = np.zeros((len(at_side), 3))
+    outward[:, :2] = centre_m[at_side, :2] / across[at_side, None]
+    down = np.tile([0.0, 0.0, -1.0], (len(at_floor), 1))
+    particles, walls = int(hit.sum()), len(at_side) + len(at_floor)
+    return Contacts(
+        a=np.concatenate([pairs[hit, 0], at_side, at_floor]),
+        b=np.concatenate([pairs[hit, 1], np.full(walls, -1)]),
+        partner=np.repeat([PARTICLE, BOWL], [particles, walls]),
+        normal=np.concatenate([away[hit] / distance[hit, None], outward, down]),
+        overlap_m=np.concatenate([overlap[hit], side[at_side], floor[at_floor]]),
+    )
+
+
+def network_frequency(
+    case: CaseOfStudy,
+    sticks: bool,
+    radius_m: Floats,
+    contacts: Contacts,
+    effective_radius_m: Floats | None = None,
+) -> float:
+    """Largest eigenfrequency of the contacts' network, rad/s.
+
+    Parameters
+    ----------
+    case : CaseOfStudy
+        Gives density and effective moduli.
+    sticks : bool
+        Whether there is friction, and so a tangential stiffness.
+    radius_m : (N,) ndarray
+        Of the particles.
+    contacts : Contacts
+    effective_radius_m : (M,) ndarray, optional
+        Of the contacts; from the radii if not given.
+    """
+    effective = (
+        contacts.effective_radius_m(radius_m) if effective_radius_m is None else effective_radius_m
+    )
+    moduli = [case.contact_moduli[name] for name in PARTNERS]
+    modulus = np.array([pair.modulus_pa for pair in moduli])[contacts.partner]
+    shear = np.array([pair.shear_pa for pair in moduli])[contacts.partner]
+    normal, tangential = hertz_stiffness(contacts.overlap_m, effective, modulus, shear)
+    mass = sphere_mass(radius_m, case.media.density_kg_m3)
+    stiffness = normal, tangential if sticks else 0.0 * tangential
+    return largest_frequency(mass, contacts.a, contacts.b, contacts.normal, stiffness)
+
+
+# --- beds: one that settles, and one at rest under a load --------------------------------------
+
+REST_FLOOR = 1e-7
+"""Kinetic energy over N m g d below which a loaded bed is at rest whatever it did before."""
+
+_LAST_SAMPLES = 50
+"""Samples at the end of a resting bed's run whose mean energy counts: a quarter of them."""
+
+
+def _measure_settled(point: PointRun, case: CaseOfStudy) -> Row:
+    """A bed that settled, and its largest kinetic energy while it did."""
+    *_, last = point.frames("particles")
+    return {
+        **_bed(point, case, last),
+        "height_m": float(last.columns["z_m"].mean()),
+        "peak_energy_j": float(_bed_energy(point).max()),
+    }
+
+
+def _measure_resting(point: PointRun, case: CaseOfStudy) -> Row:
+    """A bed at rest, and its kinetic energy at the end over N m g d.
+
+    Its contacts are those before the step under test begins.
+    """
+    first, *_, last = point.frames("particles")
+    media = case.media
+    mass = sphere_mass(media.radius_mean_m, media.density_kg_m3)
+    unit = media.count * mass * case.gravity_m_s2 * 2.0 * media.radius_mean_m
+    return {
+        **_bed(point, case, first),
+        "height_m": float(last.columns["z_m"].mean()),
+        "rest_energy_ratio": float(_bed_energy(point)[-_LAST_SAMPLES:].mean()) / unit,
+    }
+
+
+def _bed(point: PointRun, case: CaseOfStudy, frame: Frame) -> Row:
+    radius = _radii(frame)
+    contacts = touching(_centres(frame), radius, case.bowl.radius_m)
+    return {
+        "overlap_ratio": contacts.overlap_ratio(radius),
+        "frequency_rad_s": network_frequency(case, point.sticks, radius, contacts),
+    }
+
+
+def _bed_energy(point: PointRun) -> Floats:
+    """Kinetic energy with that of the spins over time, J."""
+    blocks = point.prints("thermo")
+    return np.concatenate(
+        [rows["kinetic_energy_j"] + rows["rotational_energy_j"] for rows in blocks]
+    )
+
+
+def _bed_errors(own: Row, fine: Row) -> dict[str, Estimate]:
+    """The relative error of the height; a settled bed's reference knows how heights scatter."""
+    half_width = NORMAL_QUANTILE * math.sqrt(2.0) * fine.get("height_scatter", 0.0)
+    return {"height": Estimate.around(own["height_m"] / fine["height_m"] - 1.0, half_width)}
+
+
+def _settled_energy(own: Row, fine: Row | None) -> float | None:
+    return None if fine is None else own["peak_energy_j"] / fine["peak_energy_j"]
+
+
+def _resting_energy(own: Row, fine: Row | None) -> float | None:
+    if fine is None:
+        return None
+    return own["rest_energy_ratio"] / max(fine["rest_energy_ratio"], REST_FLOOR)
+
+
+# --- impacts, met at different moments within a step -------------------------------------------
+
+
+def _measure_impacts(point: PointRun, case: CaseOfStudy) -> Row:
+    """Mean, smallest and largest of the impacts of a run; speeds are over that of the impact."""
+    impact = needed(point.impact, "impact")
+    plate = impact.size_ratio == 0.0
+    frames = [_in_id_order(frame) for frame in point.frames("particles")]
+    first, last = frames[0], frames[-1]
+    striking = slice(None) if plate else slice(0, None, 2)
+    velocity = last.vectors("vx_m_s", "vy_m_s", "vz_m_s")
+    speed = velocity if plate else velocity[0::2] - velocity[1::2]
+    forces = (frame.vectors("force_x_n", "force_y_n", "force_z_n")[striking] for frame in frames)
+    force = np.stack([np.linalg.norm(vectors, axis=1) for vectors in forces])
+    overlap = max(float(_overlap(frame, plate).max()) for frame in frames)
+    before, after = (
+        _energy(frame, case.media.density_kg_m3).reshape(-1, 1 if plate else 2).sum(axis=1)
+        for frame in (first, last)
+    )
+    deepest = Contacts(
+        a=np.array([0]),
+        b=np.array([-1 if plate else 1]),
+        partner=np.array([PARTICLE]),  # a plate is of the particles' material
+        normal=np.array([[0.0, 0.0, -1.0]]),
+        overlap_m=np.array([overlap]),
+    )
+    effective, bodies = np.array([impact.effective_radius_m]), _radii(first)[: 1 if plate else 2]
+    peaks = _spread("peak_force", force.max(axis=0))
+    return {
+        "overlap_ratio": overlap / float(_radii(first).min()),
+        "frequency_rad_s": network_frequency(case, point.sticks, bodies, deepest, effective),
+        **_spread("restitution", speed[:, 2] / impact.normal_speed_m_s),
+        **peaks,
+        "peak_force_n": peaks["peak_force_mean"],
+        **_spread("tangential", speed[:, 0] / impact.speed_m_s),
+        "energy_after_over_before": float((after / before).max()),
+    }
+
+
+def _spread(name: str, values: Floats) -> dict[str, float]:
+    ends = {"mean": values.mean(), "low": values.min(), "high": values.max()}
+    return {f"{name}_{end}": float(value) for end, value in ends.items()}
+
+
+def _overlap(frame: Frame, plate: bool) -> Floats:
+    centre, radius = _centres(frame), _radii(frame)
+    if plate:
+        return np.asarray(radius - centre[:, 2])
+    distance = np.linalg.norm(centre[0::2] - centre[1::2], axis=1)
+    return np.asarray(radius[0::2] + radius[1::2] - distance)
+
+
+def _energy(frame: Frame, density_kg_m3: float) -> Floats:
+    """Kinetic energy of each particle, spin included, J."""
+    radius = _radii(frame)
+    mass = sphere_mass(radius, density_kg_m3)
+    speed = (frame.vectors("vx_m_s", "vy_m_s", "vz_m_s") ** 2).sum(axis=1)
+    spin = (frame.vectors("wx_rad_s", "wy_rad_s", "wz_rad_s") ** 2).sum(axis=1)
+    return np.asarray(0.5 * mass * (speed + 0.4 * radius**2 * spin))
+
+
+def _impact_errors(own: Row, fine: Row) -> dict[str, Estimate]:
+    """Of all impacts the worst counts."""
+
+    def worst(name: str, scale: float = 1.0) -> Estimate:
+        ends = [(own[f"{name}_{end}"] - fine[f"{name}_mean"]) / scale for end in ("low", "high")]
+        return Estimate.around(max(ends, key=abs), 0.0)
+
+    return {
+        "restitution": worst("restitution"),
+        "peak force": worst("peak_force", fine["peak_force_mean"]),
+        "tangential speed": worst("tangential"),
+    }
+
+
+def _impact_energy(own: Row, fine: Row | None) -> float:
+    """Energy after over before, over what the reference has where its law itself gains."""
+    gained = fine["energy_after_over_before"] if fine else 1.0
+    return own["energy_after_over_before"] / max(1.0, gained)
+
+
+# --- a workpiece that is dragged through a bed -------------------------------------------------
+
+_NETWORK_FRAMES = 8
+"""Frames of a reference whose networks are looked at; the stiffest counts."""
+
+
+def _measure_drag(point: PointRun, case: CaseOfStudy) -> Row:
+    """Mean force along the motion with the half-width of its interval, and the energy.
+
+    The half-width is infinite if it is not to be relied on. ``motion_ratio`` is the median kinetic
+    energy without spin, over that of all particles moving as the workpiece and one as after a
+    fall through its diameter.
+    """
+    run = Run.open(point.folder)
+    blocks = [workpiece_force_rows(rows, run.case) for rows in run.prints("workpiece_force")]
+    drag, counted = (
+        np.concatenate([np.asarray(block[name]) for block in blocks])
+        for name in ("drag_n", "in_statistics")
+    )
+    mean = estimate_mean(drag[counted])
+    speed = point.point.number("workpiece_speed_m_s")
+    return {
+        **_drag_contacts(point, run, case),
+        "drag_mean_n": mean.mean,
+        "drag_half_width_n": mean.ci95_high - mean.mean if mean.reliable else math.inf,
+        "motion_ratio": _median_motion_j(run) / _usual_motion_j(run.case, speed),
+    }
+
+
+def _median_motion_j(run: Run) -> float:
+    """Median kinetic energy in the drag, without spin: nothing damps one about a normal."""
+    blocks = list(run.prints("thermo"))
+    step, motion = (
+        np.concatenate([block[name] for block in blocks]) for name in ("step", "kinetic_energy_j")
+    )
+    return float(np.median(motion[step > drag_phase(run.case).start_step]))
+
+
+def _usual_motion_j(case: Case, speed_m_s: float) -> float:
+    media = case.media
+    mass = sphere_mass(media.radius_mean_m, media.density_kg_m3)
+    thrown = mass * case.gravity_m_s2 * 2.0 * media.radius_mean_m
+    return media.count * 0.5 * mass * speed_m_s**2 + thrown
+
+
+def _drag_contacts(point: PointRun, run: Run, case: CaseOfStudy) -> Row:
+    """Largest overlap of the drag, and frequency of the stiffest of some frames."""
+    particles = {frame.step: frame for frame in run.frames("particles")}
+    pairs = {frame.step: frame for frame in run.frames("contacts")}
+    steps = np.array(sorted(pairs))
+    every = steps[np.linspace(0, len(steps) - 1, min(len(steps), _NETWORK_FRAMES)).astype(int)]
+    some = set(every.tolist() if point.point.reference else every[:1].tolist())
+    largest = frequency = 0.0
+    for on_workpiece in run.workpiece_pairs():
+        if on_workpiece.step not in pairs:
+            continue
+        workpiece = on_workpiece.join(merge=False)  # both stiffnesses of an edge act
+        frame = _in_id_order(particles[on_workpiece.step])
+        contacts = _engine_contacts(frame, pairs[on_workpiece.step], workpiece, run.case)
+        largest = max(largest, contacts.overlap_ratio(_radii(frame)))
+        if on_workpiece.step in some:
+            own = network_frequency(case, point.sticks, _radii(frame), contacts)
+            frequency = max(frequency, own)
+    return {"overlap_ratio": largest, "frequency_rad_s": frequency}
+
+
+def _engine_contacts(
+    frame: Frame, pairs: Frame, workpiece: WorkpieceFrames, case: Case
+) -> Contacts:
+    """The contacts of one frame as the engine wrote them, with bowl and workpiece."""
+    bowl_radius = needed(case.bowl, "bowl").radius_m
+    walls = workpiece.workpiece, workpiece.bowl
+    rows = contact_rows(frame, pairs, *walls, bowl_radius, friction_with(case, "media"))
+    ids = np.asarray(frame.columns["particle_id"], dtype=np.int64)
+    a = np.searchsorted(ids, rows.a_id)
+    b = np.where(rows.b_id > 0, np.searchsorted(ids, rows.b_id), -1)
+    partner = np.array([_PARTNER[kind] for kind in KINDS])[rows.kind]
+    towards = rows.point_m - _centres(frame)[a]
+    normal = towards / np.linalg.norm(towards, axis=1, keepdims=True)
+    hit = rows.overlap_m > 0.0
+    return Contacts(a[hit], b[hit], partner[hit], normal[hit], rows.overlap_m[hit])
+
+
+def _drag_errors(own: Row, fine: Row) -> dict[str, Estimate]:
+    """The relative error of the mean drag, positive where it is stronger."""
+    size = abs(fine["drag_mean_n"])
+    error = (own["drag_mean_n"] - fine["drag_mean_n"]) / -size
+    half_width = math.hypot(own["drag_half_width_n"], fine["drag_half_width_n"])
+    return {"mean drag": Estimate.around(error, half_width / size)}
+
+
+def _drag_energy(own: Row, _: Row | None) -> float:
+    return own["motion_ratio"]
+
+
+# --- by regime ---------------------------------------------------------------------------------
+
+
+class Measure(NamedTuple):
+    """How a regime is measured.
+
+    Attributes
+    ----------
+    row : callable
+        Measures a run that came to its end.
+    errors : callable
+        Deviations of a row from that of the fine step, by the quantity's name.
+    energy_ratio : callable
+        Ratio of energies of a row and that of the fine step; None where that is needed.
+    """
+
+    row: Callable[[PointRun, CaseOfStudy], Row]
+    errors: Callable[[Row, Row], dict[str, Estimate]]
+    energy_ratio: Callable[[Row, Row | None], float | None]
+
+
+MEASURES: Mapping[str, Measure] = {
+    "impact": Measure(_measure_impacts, _impact_errors, _impact_energy),
+    "settle": Measure(_measure_settled, _bed_errors, _settled_energy),
+    "column": Measure(_measure_resting, _bed_errors, _resting_energy),
+    "drag": Measure(_measure_drag, _drag_errors, _drag_energy),
+}

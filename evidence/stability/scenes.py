@@ -1,0 +1,336 @@
+"""Scenes that only the stability map has: single impacts, and particles at rest under a load."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from dragdeck.cases.bed import bed_rayleigh_time, particle_material, skin
+from dragdeck.cases.case import Case
+from dragdeck.decks import PACKING_FILE, outputs
+from dragdeck.decks.case_file import BowlOfRun, CaseOfStudy, MediaOfRun, Phase
+from dragdeck.decks.data_file import Body, data_file
+from dragdeck.decks.deck import Deck, Scene
+from dragdeck.documents import Part
+from dragdeck.physics.contact_mechanics import (
+    effective_modulus,
+    hertz_contact_time,
+    particle_mass,
+    rayleigh_time,
+)
+from dragdeck.physics.rounding import timestep
+from dragdeck.physics.run_limits import RunLimits, run_limits
+from dragdeck.scenes.filling import box_top, filling_content
+from dragdeck.scenes.scene import case_of_study, material_table
+
+# --- single impacts, many at once: particles on a plate, or small particles on large ones ------
+
+_PHASES = 16
+"""Impacts in one run, each begun at another sixteenth of a step."""
+
+_FRAMES_PER_CONTACT = 200
+"""Frames written over a contact where the step is small enough."""
+
+_CONTACT_TIMES = 4
+"""Length of the run in elastic contact times: room for the slowest rebound."""
+
+
+@dataclass(frozen=True)
+class Impact:
+    """How two bodies meet.
+
+    Attributes
+    ----------
+    speed_m_s : float
+        Relative speed.
+    angle_deg : float
+        Between the motion and the normal.
+    size_ratio : float
+        Radius of the struck particle over that of the striking one; 0 for a plate.
+    """
+
+    speed_m_s: float
+    angle_deg: float
+    size_ratio: float
+
+    @property
+    def normal_speed_m_s(self) -> float:
+        """Speed along the normal."""
+        return self.speed_m_s * math.cos(math.radians(self.angle_deg))
+
+    def effective_body(self, radius_m: float, mass_kg: float) -> tuple[float, float]:
+        """Effective radius, m, and mass, kg, of a particle and what it strikes (same density)."""
+        ratio, mass = self.size_ratio, self.size_ratio**3
+        if ratio == 0.0:
+            return radius_m, mass_kg
+        return radius_m * ratio / (1 + ratio), mass_kg * mass / (1 + mass)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ImpactDeck(Deck):
+    """What the impact template sees."""
+
+    plate: bool
+    steps: int
+
+
+class ImpactOfRun(Part):
+    """How the bodies meet; the contact time is the elastic one (Hertz)."""
+
+    speed_m_s: float
+    normal_speed_m_s: float
+    size_ratio: float
+    effective_radius_m: float
+    effective_mass_kg: float
+    effective_modulus_pa: float
+    contact_time_s: float
+
+
+class ImpactCase(CaseOfStudy):
+    """Single impacts."""
+
+    scene: Literal["impact"] = "impact"
+    impact: ImpactOfRun
+    limits: RunLimits
+
+
+def impact_scene(case: Case, run: str, impact: Impact, fraction: float) -> Scene[ImpactCase]:
+    """Impacts of the mean particle at a time step.
+
+    Parameters
+    ----------
+    case : Case
+        Gives the particle, its material and its pair with itself.
+    run : str
+        The run id.
+    impact : Impact
+    fraction : float
+        Time step over the Rayleigh time of the striking particle, the smaller one.
+
+    Raises
+    ------
+    InputError
+        A modulus that the engine refuses.
+    """
+    study = case.study
+    scale = study.chosen_fidelity().youngs_modulus_scale
+    material, radius = particle_material(study), study.media.radius_mean_m
+    mass, rayleigh = particle_mass(material, radius), rayleigh_time(material, radius, scale)
+    dt = timestep(rayleigh, fraction)
+    body_radius, body_mass = impact.effective_body(radius, mass)
+    modulus = effective_modulus(material, material, scale)
+    contact = hertz_contact_time(body_mass, body_radius, modulus, impact.normal_speed_m_s)
+    period = max(1, math.floor(contact / dt / _FRAMES_PER_CONTACT))
+    steps = math.ceil((_CONTACT_TIMES * contact / dt + 10) / period) * period
+    travel = impact.speed_m_s * steps * dt
+    bodies = _bodies(radius, material.density_kg_m3, impact, dt)
+    side = 6 * radius * max(1.0, impact.size_ratio) * _PHASES + travel
+    height = 2 * radius * (2 + 2 * impact.size_ratio) + 2 * travel
+    largest = max(1.0, impact.size_ratio) ** 3
+    deck = _ImpactDeck(
+        title="Single impacts",
+        study=case.study_name,
+        scene="impact",
+        run=run,
+        source="particles.data",
+        materials=material_table(study, [study.media.material], scale, case),
+        limit_force=study.contact.limit_force,
+        gravity_m_s2=0.0,
+        skin_m=radius,
+        timestep_s=dt,
+        outputs=(outputs.thermo(steps, steps), outputs.particles_and_forces(period, steps)),
+        thermo_steps=steps,
+        plate=impact.size_ratio == 0.0,
+        steps=steps,
+    )
+    content = case_of_study(
+        ImpactCase,
+        case,
+        run,
+        {},
+        dt,
+        rayleigh,
+        media=MediaOfRun(
+            count=len(bodies),
+            radius_mean_m=radius,
+            radius_std_m=0.0,
+            density_kg_m3=material.density_kg_m3,
+        ),
+        impact=ImpactOfRun(
+            speed_m_s=impact.speed_m_s,
+            normal_speed_m_s=impact.normal_speed_m_s,
+            size_ratio=impact.size_ratio,
+            effective_radius_m=body_radius,
+            effective_mass_kg=body_mass,
+            effective_modulus_pa=modulus,
+            contact_time_s=contact,
+        ),
+        limits=run_limits(len(bodies), largest * mass, 0.0, height, impact.speed_m_s),
+    )
+    box = ((-side, side), (-side, side), (-height, height))
+    files = {"particles.data": lambda: data_file("impacts", 1, box, bodies)}
+    return Scene(deck=deck, case=content, steps=steps, files=files)
+
+
+def _bodies(radius_m: float, density_kg_m3: float, impact: Impact, dt: float) -> list[Body]:
+    """A striking particle for each phase, and the particle it strikes if it is no plate."""
+    normal = impact.normal_speed_m_s
+    along = impact.speed_m_s * math.sin(math.radians(impact.angle_deg))
+    struck_m = impact.size_ratio * radius_m
+    pitch = 6 * max(radius_m, struck_m)
+    bodies = []
+    for phase in range(_PHASES):
+        y = pitch * (phase - 0.5 * (_PHASES - 1))
+        gap = normal * dt * (1 + (phase + 0.5) / _PHASES)
+        place, velocity = (0.0, y, radius_m + gap), (along, 0.0, -normal)
+        bodies.append(Body(1, radius_m, density_kg_m3, place, velocity))
+        if struck_m > 0.0:
+            bodies.append(Body(1, struck_m, density_kg_m3, (0.0, y, -struck_m)))
+    return bodies
+
+
+# --- particles at rest under a load: a straight stack in a tube, or a settled bed --------------
+
+_STACK = 12
+"""Particles of a stack."""
+
+_TUBE_CLEARANCE = 0.02
+"""Gap between a stack's particles and its tube, as a fraction of the radius: the stack
+leans and has about two contacts with particles and one with the tube a particle."""
+
+_LOAD_FRACTION = 0.1
+"""Step over the Rayleigh time while the particles come to rest under the load."""
+
+_LOAD_S = 0.15
+"""Time they get for that, s."""
+
+_DRAG_S = 0.004
+"""Time in which the drag takes a particle's speed to 1/e, s."""
+
+_TEST_STEPS = 4000
+_FRAME_STEPS = 20
+
+Packing = Literal["stack", "bed"]
+
+
+class LoadedPacking(Part):
+    """Particles at rest under gravity times a factor."""
+
+    packing: Packing
+    load_factor: float
+
+
+class ColumnCase(CaseOfStudy):
+    """Particles at rest."""
+
+    scene: Literal["column"] = "column"
+    column: LoadedPacking
+    limits: RunLimits
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ColumnDeck(Deck):
+    """What the column template sees."""
+
+    stack: bool
+    bowl_type: int
+    bowl_radius_m: float
+    load_timestep_s: float
+    load_steps: int
+    test_steps: int
+    drag_kg_s: float
+
+
+def column_scene(
+    case: Case, run: str, load: LoadedPacking, fraction: float, filling_run: str
+) -> Scene[ColumnCase]:
+    """Particles at rest under gravity times a factor, at a time step.
+
+    Parameters
+    ----------
+    case : Case
+    run : str
+        The run id.
+    load : LoadedPacking
+        A stack, or the settled bed of a fill.
+    fraction : float
+        Time step over the Rayleigh time of the smallest particle.
+    filling_run : str
+        Folder name of the fill, beside the columns'; not used by a stack.
+
+    Raises
+    ------
+    InputError
+        A modulus that the engine refuses.
+    """
+    study, media = case.study, case.study.media
+    scale, radius = study.chosen_fidelity().youngs_modulus_scale, media.radius_mean_m
+    stack, material = load.packing == "stack", particle_material(study)
+    rayleigh = rayleigh_time(material, radius, scale) if stack else bed_rayleigh_time(study)
+    dt, load_dt = timestep(rayleigh, fraction), timestep(rayleigh, _LOAD_FRACTION)
+    load_steps = math.ceil(_LOAD_S / load_dt)
+    count = _STACK if stack else media.count
+    tube = (1 + _TUBE_CLEARANCE) * radius if stack else study.bowl.radius_m
+    top = 2 * radius * (_STACK + 4) if stack else box_top(study)
+    types = study.type_names()
+    gravity, mass = load.load_factor * study.gravity_m_s2, particle_mass(material, radius)
+    deck = _ColumnDeck(
+        title="Particles at rest under a load",
+        study=case.study_name,
+        scene="column",
+        run=run,
+        source="particles.data" if stack else f"../../filling/{filling_run}/{PACKING_FILE}",
+        materials=material_table(study, types, scale, case),
+        limit_force=study.contact.limit_force,
+        gravity_m_s2=gravity,
+        skin_m=skin(study),
+        timestep_s=dt,
+        outputs=(
+            outputs.thermo(_FRAME_STEPS, _TEST_STEPS),
+            outputs.particles(_TEST_STEPS, 0, _TEST_STEPS, False),
+            outputs.contacts(_TEST_STEPS, 0, _TEST_STEPS),
+        ),
+        thermo_steps=_FRAME_STEPS,
+        stack=stack,
+        bowl_type=types.index(study.bowl.material) + 1,
+        bowl_radius_m=tube,
+        load_timestep_s=load_dt,
+        load_steps=load_steps,
+        test_steps=_TEST_STEPS,
+        drag_kg_s=mass / _DRAG_S,
+    )
+    content = case_of_study(
+        ColumnCase,
+        case,
+        run,
+        filling_content(case),
+        dt,
+        rayleigh,
+        phases=[Phase(name="test", start_step=0, end_step=_TEST_STEPS)],
+        gravity_m_s2=gravity,
+        media=MediaOfRun(
+            count=count,
+            radius_mean_m=radius,
+            radius_std_m=media.radius_std_m,
+            density_kg_m3=material.density_kg_m3,
+        ),
+        bowl=BowlOfRun(radius_m=tube, walls="primitive"),
+        column=load,
+        limits=run_limits(count, mass, gravity, top, 0.0),
+    )
+    files = {"particles.data": lambda: _stack(case, radius, tube, top, len(types))}
+    steps = load_steps + _TEST_STEPS
+    return Scene(deck=deck, case=content, steps=steps, files=files if stack else {})
+
+
+def _stack(case: Case, radius: float, tube: float, top: float, types: int) -> str:
+    """The particles of a stack, leaning to and fro within the tube, just touching."""
+    density = particle_material(case.study).density_kg_m3
+    lean = 0.9 * (tube - radius)
+    rise = math.sqrt((2 * radius) ** 2 - (2 * lean) ** 2)
+    bodies = [
+        Body(1, radius, density,
+             (lean * (-1) ** i, 0.1 * lean * (i % 3 - 1), radius + i * rise * 1.0001))
+        for i in range(_STACK)
+    ]  # fmt: skip
+    side = 2 * tube
+    return data_file("a stack", types, ((-side, side), (-side, side), (-radius, top)), bodies)

@@ -1,0 +1,148 @@
+"""Hostile templates: a template is data, not a program."""
+
+from pathlib import Path
+
+import pytest
+from attack.checked import REFUSED, WARNED, checked
+from attack.ground import STUDY, new_project, tiny_study, write_study
+
+pytestmark = [pytest.mark.engine, pytest.mark.slow]
+
+_BASE = '{% extends "base/process.in.j2" %}\n'
+
+
+def _in_extra(text: str) -> str:
+    return f"{_BASE}{{% block extra %}}\n{text}\n{{% endblock %}}\n"
+
+
+_POPEN = ".os.popen('touch pwned').read()"
+_EXPRESSIONS = {
+    "the class of the deck": "{{ deck.__class__ }}",
+    "all classes": "{{ ''.__class__.__mro__[1].__subclasses__() }}",
+    "the globals of a function": "{{ deck.__init__.__globals__ }}",
+    "a shell by cycler": "{{ cycler.__init__.__globals__" + _POPEN + " }}",
+    "a shell by lipsum": "{{ lipsum.__globals__" + _POPEN + " }}",
+    "a shell by joiner": "{{ joiner.__init__.__globals__" + _POPEN + " }}",
+    "a shell by namespace": "{{ namespace.__init__.__globals__" + _POPEN + " }}",
+    "a shell by self": "{{ self.__init__.__globals__.__builtins__.__import__('os')"
+    ".popen('touch pwned').read() }}",
+    "a shell by attr": "{{ (cycler|attr('__init__')|attr('__globals__'))['os']"
+    ".popen('touch pwned').read() }}",
+    "a class by format": "{{ '{0.__class__.__mro__}'.format(deck) }}",
+    "a class by format_map": "{{ '{a.__class__}'.format_map({'a': deck}) }}",
+    "a class by map": "{{ [deck]|map(attribute='__class__')|list }}",
+    "a file by the deck's path": "{{ deck.__module__ }}",
+    "a name that is unknown": "{{ deck.speeed }}",
+    "a filter that is unknown": "{{ 1|speeed }}",
+    "a test that is unknown": "{{ 1 is speeed }}",
+    "a division by zero": "{{ 1 / 0 }}",
+    "an index beyond": "{{ deck.outputs[99].name }}",
+    "text as number": "{{ 'a'|num }}",
+    "a sum of text and number": "{{ 'a' + 1 }}",
+    "a loop of 1e10": "{% for i in range(10000000000) %}{% endfor %}",
+    "a loop of loops": "{% for i in range(90000) %}{% for j in range(90000) %}{% endfor %}"
+    "{% endfor %}",
+    "text of 1e11 letters": "{{ 'a' * 100000000000 }}",
+    "text that doubles": "{% set n = namespace(x='aaaaaaaaaa') %}{% for i in range(40) %}"
+    "{% set n.x = n.x ~ n.x %}{% endfor %}{{ n.x }}",
+    "a number of 1e10 digits": "{{ 10 ** (10 ** 10) }}",
+    "padding of 1e11": "{{ 'a'.rjust(100000000000) }}",
+    "lorem ipsum for ever": "{{ lipsum(n=100000000) }}",
+    "a macro that calls itself": "{% macro m() %}{{ m() }}{% endmacro %}{{ m() }}",
+    "it includes itself": '{% include "process.in.j2" %}',
+    "it includes a study": '{% include "../study.yaml" %}',
+    "it includes the password file": '{% include "/etc/passwd" %}',
+    "it imports what is missing": '{% import "missing.j2" as m %}',
+    "a block without an end": "{% if true %}",
+    "a tag that is unknown": "{% do deck.title %}",
+    "it changes the deck": "{% set deck.title = 'b' %}",
+    "it clears the outputs": "{{ deck.outputs.clear() }}",
+    "deeply nested brackets": "{{ " + "(" * 3000 + "1" + ")" * 3000 + " }}",
+    "deeply nested tags": "{% if true %}" * 2000 + "{% endif %}" * 2000,
+}
+
+_NAMED = {"it includes a study": r"study\.yaml", "it includes the password file": "passwd"}
+
+_FILES: dict[str, tuple[str, str | bytes, str]] = {
+    "it extends itself": (
+        "process.in.j2",
+        '{% extends "process.in.j2" %}',
+        r"process\.in\.j2",
+    ),
+    "two extend each other": (
+        "process.in.j2",
+        '{% extends "filling.in.j2" %}',
+        r"(process|filling)\.in\.j2",
+    ),
+    "a misspelt block": (
+        "process.in.j2",
+        _BASE + "{% block extras %}\nprint 1\n{% endblock %}\n",
+        "extras",
+    ),
+    "a block twice": (
+        "process.in.j2",
+        _BASE + "{% block extra %}{% endblock %}{% block extra %}{% endblock %}",
+        "extra",
+    ),
+    "a macro in place of another": (
+        "walls.j2",
+        '{% extends "base/walls.j2" %}{% macro bowl(script) %}{% endmacro %}',
+        "walls.j2.*bowl",
+    ),
+    "text outside of the blocks": ("process.in.j2", _BASE + "run 1\n", "outside of the blocks"),
+    "a block that no script contains": (
+        "base.in.j2",
+        '{% extends "base/base.in.j2" %}{% block run %}{% endblock %}',
+        "changes no input script",
+    ),
+    "no outputs": (
+        "process.in.j2",
+        _BASE + "{% block outputs %}{% endblock %}",
+        "would not write the output files",
+    ),
+    "an endless loop": (
+        "process.in.j2",
+        _in_extra("label again\njump SELF again"),
+        "run for ever",
+    ),
+    "a file of no scene": ("proces.in.j2", _BASE, r"proces\.in\.j2"),
+    "a file in capitals": ("Process.in.j2", _BASE, r"Process\.in\.j2"),
+    "an empty one": ("process.in.j2", "", r"process\.in\.j2|DRAGDECK END"),
+    "one without its end": ("process.in.j2", "run 1\n", r"process\.in\.j2|DRAGDECK END"),
+    "random bytes": ("process.in.j2", bytes(range(256)) * 9, r"process\.in\.j2"),
+    "UTF-16": ("process.in.j2", _BASE.encode("utf-16"), r"process\.in\.j2"),
+    "a NUL": ("process.in.j2", _in_extra("a\x00b"), r"process\.in\.j2"),
+}
+
+
+Template = tuple[str, str | bytes | Path | None, str]
+"""A file's name, its content, or where it links to, or None for a folder, and what is named."""
+
+_TEMPLATES: dict[str, Template] = {
+    **{what: ("process.in.j2", _in_extra(text), _NAMED.get(what, r"\.j2"))
+       for what, text in _EXPRESSIONS.items()},
+    **{what: (name, content, named) for what, (name, content, named) in _FILES.items()},
+    "a symlink to itself": ("process.in.j2", Path("process.in.j2"), r"process\.in\.j2"),
+    "a symlink to nothing": ("process.in.j2", Path("no"), r"process\.in\.j2"),
+    "a folder in its place": ("process.in.j2", None, r"process\.in\.j2"),
+}  # fmt: skip
+_UNUSED = ("proces.in.j2", "Process.in.j2")
+
+
+@pytest.mark.attack(rows=_TEMPLATES, sample=2)
+def test_a_hostile_template_is_refused(attack: Template, tmp_path: Path) -> None:
+    name, content, named = attack
+    project = new_project(tmp_path / "project")
+    write_study(project, tiny_study())
+    file = project / "studies" / STUDY / "templates" / name
+    file.parent.mkdir()
+    if content is None:
+        file.mkdir()
+    elif isinstance(content, Path):
+        file.symlink_to(content)
+    else:
+        file.write_bytes(content.encode() if isinstance(content, str) else content)
+        if name == "process.in.j2" and b"filling.in.j2" in file.read_bytes():
+            (file.parent / "filling.in.j2").write_text('{% extends "process.in.j2" %}')
+    warning_will_do = name in _UNUSED or content is None or isinstance(content, Path)
+    assert checked(project, (named,)) in ((REFUSED, WARNED) if warning_will_do else (REFUSED,))

@@ -1,0 +1,175 @@
+"""Commands as a table: each names the function that it calls, and that function's parameters."""
+
+import argparse
+import contextlib
+import os
+import platform
+import shlex
+import shutil
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from dragdeck import __version__
+from dragdeck.errors import DragdeckError
+from dragdeck.files import FULL_DISK
+
+
+class Argument:
+    """An argument as argparse takes it; its name is that of the function's parameter."""
+
+    def __init__(self, *names: str, **options: Any) -> None:
+        self.names = names
+        self.options = options
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command: the function that it calls, and that function's parameters.
+
+    `help` is for the list of commands, `about` for the command's own help. What the function
+    returns is printed if it is text.
+    """
+
+    name: str
+    help: str
+    about: str
+    function: str
+    arguments: tuple[Argument, ...]
+    example: str = ""
+
+    def run(self, package: str, options: Mapping[str, object]) -> None:
+        """Import the function, which is named within a package, and call it."""
+        module, _, name = self.function.partition(":")
+        said = getattr(import_module(f"{package}.{module}"), name)(**options)
+        if isinstance(said, str):
+            print(said)
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program: the commands of a package.
+
+    Attributes
+    ----------
+    package : str
+        Its package, whose name messages begin with.
+    about : str
+        For its help.
+    commands, steps : sequence of Command
+        What a user calls, and what the rules call: ``PROGRAM step NAME``.
+    call : str
+        How it is called; like its package if empty.
+    """
+
+    package: str
+    about: str
+    commands: Sequence[Command]
+    steps: Sequence[Command] = ()
+    call: str = ""
+
+    def main(self, arguments: Sequence[str] | None = None) -> int:
+        """Run a command and return its exit status; see `guarded`.
+
+        Parameters
+        ----------
+        arguments : sequence of str, optional
+            The arguments, without the program's name; those of the process if None. A wrong use
+            of the program exits with 2.
+        """
+        options = vars(self.parser().parse_args(arguments))
+        command = options.pop("_command")
+        return guarded(self.package, lambda: command.run(self.package, options))
+
+    def parser(self) -> argparse.ArgumentParser:
+        """What understands the arguments."""
+        name = self.call or self.package
+        parser = argparse.ArgumentParser(
+            prog=name,
+            description=self.about,
+            epilog=f"Each command has its own help: {name} COMMAND --help",
+        )
+        parser.add_argument("--version", action="version", version=f"{name} {__version__}")
+        commands = parser.add_subparsers(required=True, metavar="COMMAND")
+        _add(commands, self.commands)
+        if self.steps:
+            step = commands.add_parser(
+                "step", help=f"run a step of the workflow: {name} step --help"
+            )
+            _add(step.add_subparsers(required=True, metavar="STEP"), self.steps)
+        return parser
+
+
+def _add(parsers: Any, commands: Sequence[Command]) -> None:
+    for command in commands:
+        example = f"example: {command.example}" if command.example else None
+        parser = parsers.add_parser(
+            command.name, help=command.help, description=command.about, epilog=example
+        )
+        for argument in command.arguments:
+            parser.add_argument(*argument.names, **argument.options)
+        parser.set_defaults(_command=command)
+
+
+def guarded(program: str, call: Callable[[], None]) -> int:
+    """Call a function; whatever goes wrong becomes one message on standard error.
+
+    An unexpected error is written to a log file with its traceback; the message names the file.
+
+    Returns
+    -------
+    int
+        The exit status: 0, 1 after an error, 130 if the user interrupted it.
+    """
+    try:
+        call()
+        sys.stdout.flush()
+    except BrokenPipeError:  # who reads the output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except KeyboardInterrupt:
+        print(f"{program}: interrupted", file=sys.stderr)
+        return 130
+    except Exception as error:
+        print(f"{program}: {_message(error, program)}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _message(error: Exception, program: str) -> str:
+    """The message of an error."""
+    if isinstance(error, DragdeckError):
+        return str(error)
+    if isinstance(error, OSError) and error.strerror:
+        where = f"{error.filename}: " if error.filename else ""
+        remedy = "check that the path exists, its permissions, and the free space on the disk"
+        if error.errno in FULL_DISK:
+            place = Path(error.filename or ".").resolve().parent
+            free = shutil.disk_usage(place if place.is_dir() else ".").free
+            where, remedy = f"{where}{free:,} bytes free: ", "free disk space, then try again"
+        return f"{where}{error.strerror}\n  remedy: {remedy}"
+    if isinstance(error, MemoryError):
+        return f"not enough memory: {error}\n  remedy: use a machine with more memory"
+    return (
+        f"unexpected error: {type(error).__name__}: {str(error)[:300]}\n"
+        f"  log:    {_kept(error, program)}\n"
+        "  remedy: if an input file is damaged, create it again; otherwise report the problem with "
+        "the log: README.md, section Reporting a problem"
+    )
+
+
+def _kept(error: Exception, program: str) -> str:
+    """Write an error with its traceback to a new file here, or where temporary files go."""
+    said = "".join(traceback.format_exception(error))
+    about = f"{program} {__version__}, Python {sys.version}, {platform.platform()}"
+    for folder in (".", tempfile.gettempdir()):
+        with contextlib.suppress(OSError):
+            number, name = tempfile.mkstemp(".log", f"{program}-error-", folder)
+            with open(number, "w", encoding="utf-8", errors="replace") as stream:
+                stream.write(f"{about}\n{shlex.join(sys.argv)}\n\n{said}")
+            return name
+    return f"none could be written\n{said}"

@@ -1,0 +1,116 @@
+"""What to expect of a process before it is run: its bed, its workpiece, its modulus."""
+
+import math
+
+from dragdeck.cases.case import Case, of_each_workpiece
+from dragdeck.cases.ranks import cores_here
+from dragdeck.scenes.dimensionless import describe
+from dragdeck.scenes.filling import (
+    MOST_OVERLAP,
+    expected_bed,
+    expected_surface,
+    floor_overlap,
+    rank_split,
+)
+from dragdeck.scenes.fit import clearances, closest
+from dragdeck.scenes.workpiece import fastest_surface
+from dragdeck.study.contact_law import compared_labels
+
+_RATIOS = {
+    "workpiece_to_particle": "diameter of the workpiece / mean particle diameter",
+    "depth_to_particle": "immersion depth / mean particle diameter",
+    "bowl_to_particle": "diameter of the bowl / mean particle diameter",
+    "superposed_speed": "(highest surface speed - speed along the path) / speed along the path",
+    "bowl_froude_number": "Froude number of the bowl's rotation",
+    "tilt_deg": "tilt of the workpiece (degrees)",
+}
+
+
+def workpiece_notes(case: Case) -> list[tuple[str, str]]:
+    """What ``check``, ``explain`` and ``preview`` say of a process: a heading and a text each."""
+    surface = expected_surface(case.study)
+    gaps = clearances(case, surface)
+    return [
+        ("gap between workpiece and wall", _gap(case, gaps.wall_m)),
+        ("gap between workpiece and floor", _gap(case, gaps.floor_m)),
+        *_between(case),
+        ("highest surface speed of the workpiece", _speed(case)),
+        ("bed height", f"{1e3 * surface:.3g} mm, an estimate"),
+        *_rotation(case),
+    ]
+
+
+def dimensionless(case: Case) -> list[tuple[str, str]]:
+    """The dimensionless numbers of a process and their values."""
+    words = {**compared_labels(), **_RATIOS}
+    return [
+        (words.get(name, name.replace("_", " ")), f"{value:.4g}")
+        for name, value in describe(case).items()
+        if name != "particles"
+    ]
+
+
+def _gap(case: Case, gap_m: float) -> str:
+    diameters = gap_m / (2 * case.study.media.radius_mean_m)
+    return f"{diameters:.3g} particle diameters, {1e3 * gap_m:.3g} mm"
+
+
+def _between(case: Case) -> list[tuple[str, str]]:
+    """The least gap between two of several workpieces."""
+    found = closest(of_each_workpiece(case), expected_bed(case.study))
+    return [("gap between workpieces", _gap(case, found[0]))] if found else []
+
+
+def _rotation(case: Case) -> list[tuple[str, str]]:
+    """How the bowl rotates, if it does."""
+    rpm = case.study.motion.bowl_rad_s * 60 / math.tau
+    sense = "counter-clockwise" if rpm > 0 else "clockwise"
+    text = f"{abs(rpm):.4g} 1/min, {sense} seen from above; the workpiece stands still"
+    return [("rotation of the bowl", text)] if rpm else []
+
+
+def _speed(case: Case) -> str:
+    speed, factor = fastest_surface(case), case.study.chosen_fidelity().speed_factor
+    faster = "" if factor == 1 else f", {factor * speed:.3g} m/s in the run (speed_factor)"
+    return f"{speed:.3g} m/s{faster}"
+
+
+def bed_notes(case: Case) -> list[tuple[str, str]]:
+    """What ``check`` and ``explain`` say of a fill and a process: a heading and a text each."""
+    return [("overlap", _overlap(case)), ("ranks", _ranks(case))]
+
+
+def _overlap(case: Case) -> str:
+    overlap = floor_overlap(case.study)
+    verdict = "within" if overlap <= MOST_OVERLAP else "ABOVE"
+    return (
+        f"{100 * overlap:.2g} % of a diameter between particles at the floor, by the weight above: "
+        f"{verdict} {100 * MOST_OVERLAP:g} % (an assumption)"
+    )
+
+
+def _ranks(case: Case) -> str:
+    parts = rank_split(case)
+    if case.study.chosen_fidelity().ranks != "auto":
+        return f"{case.ranks}, {parts}"
+    cases = f"{case.beside} case{'s' if case.beside > 1 else ''}"
+    return f"{case.ranks} (auto: {cases} on {cores_here()} cores), {parts}"
+
+
+def not_corrected(case: Case) -> str:
+    """What the results of a process with a reduced modulus lack; empty if nothing."""
+    chosen = case.study.chosen_fidelity()
+    if chosen.youngs_modulus_scale == 1 or chosen.windows is not None:
+        return ""
+    return (
+        f"E x {chosen.youngs_modulus_scale:g} gives more and smaller contact forces than the "
+        "physical modulus, by amounts that differ from scene to scene, and the report does not "
+        "correct them: fidelity: {tolerance: 0.1} measures them in this scene"
+    )
+
+
+def modulus_note(case: Case) -> tuple[str, str]:
+    """What ``check`` and ``explain`` say of a process: a heading and a text."""
+    windows = case.study.chosen_fidelity().windows
+    measured = "windows at the physical modulus correct the results" if windows else "physical"
+    return "Young's modulus", not_corrected(case) or measured
