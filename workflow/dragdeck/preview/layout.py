@@ -17,7 +17,7 @@ from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.mesh import bowl, surface
 from dragdeck.scenes.filling import expected_bed
 from dragdeck.scenes.motion import Course, course, driven_surface_speed
-from dragdeck.scenes.workpiece import workpiece_mesh, workpiece_radius
+from dragdeck.scenes.workpiece import reference_height, workpiece_mesh, workpiece_radius
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -136,7 +136,7 @@ def layout(case: Case) -> Layout:
 
 
 def _moving(case: Case) -> MovingWorkpiece:
-    way = course(case.study, expected_bed(case.study))
+    way = course(case.study, expected_bed(case.study), reference_height(case))
     moving = way.driven.superposed.values()
     turn = sum(float(one.turn(way.drag, np.ones(1))[0]) for one in moving)
     return MovingWorkpiece(

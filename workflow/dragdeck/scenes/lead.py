@@ -156,7 +156,7 @@ def covered(case: Case, drag: Drive) -> Covered:
     """
     study, stretch = case.study, case.stretch
     end = drag.end if stretch.end == 1 else step_at(stretch.end, drag)
-    uncounted = _seconds(study.motion.uncounted_m, study)
+    uncounted = _until_counted(study)
     own = drag.start + math.ceil(uncounted / drag.timestep_s)
     if not stretch.begin:
         return Covered(0, end, 0, own)
@@ -208,8 +208,14 @@ def _before_counted(study: Study) -> tuple[float, float]:
 
 
 def _seconds(path_m: float, study: Study) -> float:
-    """Time in which the workpiece is driven along a path, s."""
-    return float(path_m / study.motion.path_length_m * driven(study).drive.duration_s)
+    """Time in which the workpiece is driven along a path at full speed, s."""
+    return float(path_m / study.motion.path_length_m * driven(study).drive.full_duration_s)
+
+
+def _until_counted(study: Study) -> float:
+    """Time from the start of the drag until the statistics may begin, s."""
+    drive = driven(study).drive
+    return _seconds(study.motion.uncounted_m, study) + drive.begin.steps / 2 * drive.timestep_s
 
 
 def _frame(study: Study) -> float:
@@ -221,7 +227,7 @@ def _frame(study: Study) -> float:
 def _entry_fraction(study: Study) -> float:
     """Where a run with a soft start enters its drag: at a frame of the network."""
     frame = _frame(study)
-    before_s = max(0.0, _seconds(study.motion.uncounted_m, study) - _before_s(study))
+    before_s = max(0.0, _until_counted(study) - _before_s(study))
     return float(max(1, math.floor(before_s / driven(study).drive.duration_s / frame)) * frame)
 
 
@@ -277,7 +283,7 @@ def _marks(study: Study) -> tuple[float, ...]:
     stiff, windows = _window_study(study), study.chosen_fidelity().windows
     assert windows is not None
     drag, frame, sample = driven(stiff).drive.duration_s, _frame(stiff), _sample_s(stiff)
-    first = max(_seconds(study.motion.uncounted_m, stiff), _before_s(stiff) + frame * drag)
+    first = max(_until_counted(stiff), _before_s(stiff) + frame * drag)
     places = math.floor((drag - first) / sample + 1e-9)
     chosen = sorted(_spread_out(places)[: windows.most])
     starts = ((first + number * sample - _before_s(stiff)) / drag for number in chosen)

@@ -101,8 +101,25 @@ def surface_speed(motion: Motion, radius_m: float) -> float:
     radius_m : float
         Of the workpiece.
     """
-    added = (one.surface_speed_m_s(radius_m) for one in motion.superposed().values())
-    return motion.axis_speed_m_s * motion.path.peak_speed_ratio + sum(added)
+    axis = motion.axis_speed_m_s * motion.path.peak_speed_ratio
+    return axis + added_speed(motion, radius_m, 1.0)
+
+
+def added_speed(motion: Motion, radius_m: float, factor: float) -> float:
+    """What turning and superposed motions add to the speed of the axis at most, m/s.
+
+    Parameters
+    ----------
+    motion : Motion
+    radius_m : float
+        Of the workpiece.
+    factor : float
+        On the study's own speeds.
+    """
+    turning = motion.path.turning_rad_s if motion.leans else 0.0
+    arm = math.hypot(radius_m, deepest(motion))
+    moving = motion.superposed(factor).values()
+    return turning * factor * arm + sum(one.surface_speed_m_s(radius_m) for one in moving)
 
 
 def path_heights(motion: Motion) -> tuple[float, float]:

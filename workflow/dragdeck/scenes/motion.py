@@ -16,7 +16,7 @@ import numpy as np
 from dragdeck.cases.bed import bed_timestep
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
-from dragdeck.scenes.legs import Leg, plunge_point
+from dragdeck.scenes.legs import Leg, added_speed, plunge_point
 from dragdeck.scenes.periods import output_periods
 from dragdeck.study.drive import Drive, EngineMotion
 from dragdeck.study.driven import DrivenMotion
@@ -72,19 +72,26 @@ def driven(study: Study, start: int = 0) -> DrivenMotion:
 def driven_surface_speed(study: Study, radius_m: float) -> float:
     """The highest speed of the workpiece's surface as it is driven, m/s; see `surface_speed`."""
     way = driven(study)
-    moving = way.superposed.values()
-    return way.fastest_m_s + sum(one.surface_speed_m_s(radius_m) for one in moving)
+    return way.fastest_m_s + added_speed(study.motion, radius_m, way.factor)
 
 
 def workpiece_turn(study: Study) -> float:
     """A mesh looks along +x in its own file: turn it into the direction of motion, rad."""
-    if not isinstance(study.workpiece.shape, MeshShape) and not study.motion.tilt_deg:
+    if not isinstance(study.workpiece.shape, MeshShape) and not study.motion.leans:
         return 0.0
     return study.motion.path.direction_rad
 
 
-def course(study: Study, bed: Bed) -> Course:
-    """The motion of a workpiece in a bed."""
+def course(study: Study, bed: Bed, reference_m: float = 0.0) -> Course:
+    """The motion of a workpiece in a bed.
+
+    Parameters
+    ----------
+    study : Study
+    bed : Bed
+    reference_m : float
+        Height of the workpiece's reference point above its lowest point.
+    """
     motion, timestep = study.motion, bed_timestep(study, "timestep_fraction")
     clear = round_to(bed.top_m + study.media.radius_mean_m, 6)
     dive = clear - (bed.surface_m - motion.immersion_depth_m + motion.path.start_height_m)
@@ -104,7 +111,7 @@ def course(study: Study, bed: Bed) -> Course:
             motion=path.on_engine(drive),
         )
     )
-    start = (*plunge_point(motion), clear)
+    start = (*plunge_point(motion), clear + reference_m)
     return Course(start_m=start, turn_rad=workpiece_turn(study), legs=found, driven=way)
 
 

@@ -12,6 +12,7 @@ from dragdeck.scenes.legs import Leg, Stop
 from dragdeck.scenes.motion import Course
 from dragdeck.study.drive import EngineMotion
 from dragdeck.study.driven import DrivenMotion
+from dragdeck.study.rotation import Floats, rotation_vector
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class MovedWorkpiece:
         Its reference point as it starts.
     turn_deg : float
         About +z, as it starts.
+    own_turn : sequence of float
+        Before that, in its own frame: axis, and angle in degrees; empty for none.
     legs : sequence of Leg
         Those that the run moves it along.
     driven : DrivenMotion
@@ -40,6 +43,7 @@ class MovedWorkpiece:
     mesh: str
     start_m: tuple[float, float, float]
     turn_deg: float
+    own_turn: Sequence[float]
     legs: Sequence[Leg]
     driven: DrivenMotion
     superposed: Mapping[str, EngineMotion]
@@ -74,6 +78,12 @@ class ProcessDeck(Deck):
         return self.workpieces[0].legs
 
 
+def _axis_and_angle(matrix: Floats) -> Sequence[float]:
+    vector = rotation_vector(matrix)
+    angle = float(np.linalg.norm(vector))
+    return [*(vector / angle).tolist(), math.degrees(angle)] if angle else ()
+
+
 def moved_workpiece(case: Case, motion: Course, mesh: str, entry_step: int) -> MovedWorkpiece:
     """A workpiece of a case on its course.
 
@@ -88,18 +98,20 @@ def moved_workpiece(case: Case, motion: Course, mesh: str, entry_step: int) -> M
         Step of the drag at which it starts; 0: it starts with the plunge.
     """
     ending = f"_{case.number}" if case.number > 1 else ""
-    place, turn = motion.start_m, motion.turn_rad
+    place, turn, own = motion.start_m, motion.turn_rad, None
     legs = motion.legs[-1:] if entry_step else motion.legs
     if entry_step:
         places, rotation = motion.poses(legs[-1], np.array([entry_step - motion.drag.start]))
         x, y, z = places[0].tolist()
         place, turn = (x, y, z), float(rotation.turn_rad[0])
+        own = rotation.own
     moving = motion.driven.superposed_on_engine()
     return MovedWorkpiece(
         ending=ending,
         mesh=mesh,
         start_m=place,
         turn_deg=math.degrees(turn),
+        own_turn=() if own is None else _axis_and_angle(own[0]),
         legs=[replace(leg, motion=leg.motion.ending(ending)) for leg in legs],
         driven=motion.driven,
         superposed={name: one.ending(ending) for name, one in moving.items()},

@@ -49,6 +49,7 @@ from dragdeck.scenes.periods import Periods, output_periods
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.scenes.workpiece import (
     PARTICLE_STEPS_PER_S,
+    reference_height,
     workpiece_facets,
     workpiece_length,
     workpiece_mesh,
@@ -88,13 +89,13 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
     periods, meshes = output_periods(study, dt), _mesh_files(each)
     check_apart(each, bed)
-    courses, moved = [course(one.study, bed) for one in each], []
+    courses, moved = [course(one.study, bed, reference_height(one)) for one in each], []
     drag = courses[0].drag
     steps = covered(whole, drag)
     for one, way in zip(each, courses, strict=True):
         check_fit(one, bed.surface_m, dt)
         moved.append(moved_workpiece(one, way, meshes[one.study.workpiece.shape], steps.entry))
-        check_headroom(one, way.start_m[2], top)
+        check_headroom(one, way.start_m[2] - reference_height(one), top)
     types, parts = study.type_names(), rank_split(whole)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
     deck = ProcessDeck(
@@ -209,7 +210,7 @@ def _process_case(
 ) -> ProcessCase:
     case, drag = each[number], way.drag
     study, motion = case.study, case.study.motion
-    transient_s = motion.uncounted_m / drag.speed_m_s
+    transient_s = drag.time_to(motion.uncounted_m)
     if steps.entry:
         transient_s = (steps.counted - drag.start) * drag.timestep_s
     return case_of_study(
@@ -230,7 +231,7 @@ def _process_case(
         numbers=describe(case),
         surface_m=surface_m,
         workpiece=WorkpieceOfRun(
-            kind="mesh" if motion.tilt_deg else study.workpiece.shape.kind,
+            kind="mesh" if motion.leans else study.workpiece.shape.kind,
             radius_m=workpiece_reach(case),
             length_m=workpiece_length(case),
             mesh=WORKPIECE_MESH,

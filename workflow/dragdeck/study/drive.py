@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -105,6 +105,10 @@ class Drive:
         """The same speed as ``case.json`` has it."""
         return self.length_m / self.full_duration_s
 
+    def time_to(self, path_m: float) -> float:
+        """Time after which the workpiece is so far along its path, and no longer starts, s."""
+        return path_m / self.speed_m_s + self.begin.steps / 2 * self.timestep_s
+
     def time_s(self, since: ArrayLike) -> Floats:
         """Time that the way of so many steps takes at full speed."""
         return np.asarray(self.begin.advance(since) * self.full_duration_s / self.full_steps)
@@ -151,6 +155,9 @@ class Formula:
 
     def __truediv__(self, other: Any) -> "Formula":
         return self._joined("/", other)
+
+    def __ge__(self, other: Any) -> "Formula":
+        return self._joined(">=", other)
 
     def sin(self) -> "Formula":
         """What ``np.sin`` calls."""
@@ -216,11 +223,19 @@ def rotating(omega: str, axis: str = "0. 0. 1.") -> Markup:
     return mover.format(LIVE_REFERENCE, axis, omega)
 
 
-def rotating_by(rates: Mapping[str, str]) -> Mapping[str, str]:
-    """Movers about three axes that make one rotation: their variables by axis.
+def rotating_by(names: Sequence[str]) -> dict[str, str]:
+    """Movers about three axes that make one rotation: the variables of x, y and z.
 
     The engine carries the centre of a later mover along, but never its axis: the axes are the
     bowl's, and the rotation is that about x after that about y after that about z.
     """
-    axes = {"z": "0. 0. 1.", "y": "0. 1. 0.", "x": "1. 0. 0."}
-    return {f"_{name}": rotating(rates[name], axis) for name, axis in axes.items()}
+    axes = {"_z": "0. 0. 1.", "_y": "0. 1. 0.", "_x": "1. 0. 0."}
+    turns = zip(axes.items(), reversed(names), strict=True)
+    return {part: rotating(name, axis) for (part, axis), name in turns}
+
+
+def rates_about_axes(matrix: Floats, drive: Drive) -> tuple[float, float, float]:
+    """Angular speeds about x, y and z that make a rotation, (3, 3), in a step, rad/s."""
+    x = math.atan2(-matrix[1, 2], matrix[2, 2])
+    y, z = math.asin(matrix[0, 2]), math.atan2(-matrix[0, 1], matrix[0, 0])
+    return x / drive.timestep_s, y / drive.timestep_s, z / drive.timestep_s

@@ -63,7 +63,7 @@ _RANGES = {
     "motion.path.points.*.0": _Range(-1e7, -1e6, 1e6, 1e7, {"ms": 1e-3}),
     "motion.path.points.*.[123]": _Range(-10, -2, 2, 10, _LENGTH),
     "motion.path.points.*.speed_m_s": _Range(0, 0, 3, 30, {}),
-    "motion.path.points.*.4": _Range(-1e6, -36e3, 36e3, 1e6, {}),
+    "motion.path.points.*.[456]": _Range(-1e6, -36e3, 36e3, 1e6, {}),
     "motion.path.bowl_rpm": _Range(-1e4, -500, 500, 1e4, {"rad/s": 30 / math.pi}),
     "motion.path.fraction": _Range(1e-6, 1e-4, 1, 1, {}),
     "motion.path.revolutions": _Range(1e-5, 1e-3, 1e3, 1e5, {}),

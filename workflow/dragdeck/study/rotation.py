@@ -39,6 +39,14 @@ def by_vector(vector_rad: Floats) -> Floats:
     return np.asarray(np.eye(3) + np.sinc(angle / np.pi) * cross + half * cross @ cross)
 
 
+def rotation_vector(matrix: Floats) -> Floats:
+    """Rotation vector, (3,), of a matrix, (3, 3), by less than half a turn."""
+    odd = (matrix - matrix.T) / 2
+    across = np.array([odd[2, 1], odd[0, 2], odd[1, 0]])
+    angle = np.arctan2(np.linalg.norm(across), (np.trace(matrix) - 1) / 2)
+    return np.asarray(across / np.sinc(angle / np.pi))
+
+
 @dataclass(frozen=True)
 class Rotation:
     """N orientations of a workpiece: from its own frame, +x its front and z up, to the bowl's.

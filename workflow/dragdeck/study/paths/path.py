@@ -126,6 +126,21 @@ class WorkpiecePath(Model):
         return ()
 
     @property
+    def leans(self) -> bool:
+        """Whether it inclines the workpiece."""
+        return False
+
+    @property
+    def most_turned_deg(self) -> float:
+        """Largest angle that it gives the workpiece to turn by on a straight stretch."""
+        return 0.0
+
+    @property
+    def turning_rad_s(self) -> float:
+        """Highest angular speed that it gives a workpiece that leans, at its own speed."""
+        return 0.0
+
+    @property
     def implied(self) -> Mapping[str, float]:
         """What follows from its fields and has to be plausible too, by dotted name."""
         return {}
@@ -219,21 +234,27 @@ class WorkpiecePath(Model):
     def straight_on(self, drive: Drive, since: Steps, direction_rad: Floats) -> Floats:
         """Velocity, (N, 3), at the mean speed in given directions."""
         ahead = np.cos(direction_rad), np.sin(direction_rad), np.zeros_like(direction_rad)
-        return drive.speed_m_s * drive.begin.pace(since)[:, None] * np.column_stack(ahead)
+        speed = drive.speed_m_s * drive.begin.pace(since)
+        return np.asarray(speed[:, None] * np.column_stack(ahead))
 
     def on_engine(self, drive: Drive) -> EngineMotion:
         """Its part of the input script: from place to place, and the turn between two."""
-        variables = {
-            "path_now": str(drive.share_formula()),
-            "path_before": str(drive.share_formula(late=1)),
-        }
-        now, before = (Formula(f"v_{name}") for name in variables)
-        for axis, to, of in zip("xyz", self.place(now), self.place(before), strict=True):
-            variables[f"path_v{axis}"] = f"({formula(to)}-{formula(of)})/dt"
-        movers = {"": "linear/variable v_path_vx v_path_vy v_path_vz"}
-        if self.turns(drive.orientation):
-            (x, y, _), (u, v, _) = self.tangent(before), self.tangent(now)
-            variables["path_turn"] = f"atan2({x * v - y * u},{x * u + y * v})/dt"
+        variables, turns = dict[str, str](), self.turns(drive.orientation)
+        for when, late in (("now", 0), ("before", 1)):
+            variables[f"path_{when}"] = str(drive.share_formula(late))
+            share = Formula(f"v_path_{when}")
+            found = dict(zip("xyz", self.place(share), strict=True))
+            along = dict(zip(("ahead_x", "ahead_y"), self.tangent(share), strict=False))
+            for name, value in {**found, **(along if turns else {})}.items():
+                variables[f"path_{name}_{when}"] = formula(value)
+        for axis in "xyz":
+            variables[f"path_v{axis}"] = f"(v_path_{axis}_now-v_path_{axis}_before)/dt"
+        movers: dict[str, str] = {"": "linear/variable v_path_vx v_path_vy v_path_vz"}
+        if turns:
+            x, y, u, v = (
+                f"v_path_ahead_{axis}_{when}" for when in ("before", "now") for axis in "xy"
+            )
+            variables["path_turn"] = f"atan2({x}*{v}-{y}*{u},{x}*{u}+{y}*{v})/dt"
             movers["_turn"] = rotating("path_turn")
         return EngineMotion(movers, variables, "along the path, from its place before the step")
 

@@ -168,7 +168,7 @@ def _about_own_axis(drive: Drive, heading: str | float, rates: dict[str, str]) -
         "spin_wy": "asin(v_spin_m13)/dt",
         "spin_wz": "atan(-v_spin_m12/v_spin_m11)/dt",
     }
-    return EngineMotion(rotating_by({name: f"spin_w{name}" for name in "xyz"}), rates | parts)
+    return EngineMotion(rotating_by([f"spin_w{axis}" for axis in "xyz"]), rates | parts)
 
 
 def _rate(rpm: float) -> float:
