@@ -24,6 +24,7 @@ from dragchain.run.kinematics import (
     axis_speed,
     directions,
     drag_phase,
+    motion_of,
     workpiece_rotation,
 )
 from dragchain.run.workpiece import read_surface
@@ -81,6 +82,38 @@ TURNING = {
 REVERSING = {"schedule": [{"until_s": 0.06, "rpm": 300}, {"until_s": 0.12, "rpm": -600}]}
 UP_AND_DOWN = {"amplitude_m": 0.001, "frequency_hz": 6}
 
+
+EIGHT = {"kind": "figure_eight", "radius_m": 0.003, "direction_deg": 40, "loops": 0.6}
+LEANING = [[0, 0, 0], [15, -10, 20], [15, -10, 20], [-60, 20, -15], [-80, 0, 10]]
+INCLINED = {
+    "path": {
+        "kind": "waypoints",
+        "points": [
+            [*point[:4], *turns]
+            for point, turns in zip(TURNING["path"]["points"], LEANING, strict=True)  # type: ignore[index]
+        ],
+    },
+    "speed_m_s": None,
+}
+"""Waypoints with turn, pitch and roll."""
+
+POSED: dict[str, dict[str, Any]] = {
+    "tilt-spin": {"path": CIRCLE, "tilt_deg": 20, "spin": {"rpm": 400}},
+    "tilt-spin-fixed": {
+        "path": CIRCLE | {"direction": "cw"}, "tilt_deg": -15, "orientation": "fixed",
+        "spin": REVERSING, "oscillation": UP_AND_DOWN,
+    },
+    "tilt-spin-line": {"path": LINE, "tilt_deg": 30, "spin": REVERSING},
+    "eight": {"path": EIGHT, "oscillation": UP_AND_DOWN},
+    "eight-fixed": {"path": EIGHT, "orientation": "fixed", "ramp_s": 0.05},
+    "eight-tilt-spin": {"path": EIGHT, "tilt_deg": 20, "spin": {"rpm": -300}, "ramp_s": 0.1},
+    "start": {"path": CIRCLE, "ramp_s": 0.08, "spin": {"rpm": 200}},
+    "start-fixed": {"path": CIRCLE, "ramp_s": 0.08, "orientation": "fixed"},
+    "start-line": {"path": LINE, "ramp_s": 0.05},
+    "inclined": INCLINED,
+    "inclined-tilt": {**INCLINED, "tilt_deg": 10},
+    "turning-tilt": {**TURNING, "tilt_deg": 15, "oscillation": UP_AND_DOWN},
+}  # fmt: skip
 
 RAMP_S = 0.1
 """Time in which a superposed motion starts: its speed grows as 3 x^2 - 2 x^3."""
@@ -223,6 +256,27 @@ def test_the_engine_moves_the_workpiece_as_both_packages_say(
     assert farthest_corner(folder, steps, place) < 1e-7
 
 
+@pytest.mark.parametrize("motion", POSED.values(), ids=POSED)
+def test_the_engine_poses_the_workpiece_as_its_path_does(
+    runs: Runs, motion: dict[str, Any]
+) -> None:
+    """In three dimensions: the reference point to 1e-9 m, the facets to the digits of a file."""
+    folder = runs.shallow(**motion)
+    engine(folder)
+    steps, place = reference(folder)
+    assert off_pose(folder, steps, place) < 1e-9
+    assert farthest_corner(folder, steps, place) < 1e-7
+
+
+def off_pose(folder: Path, steps: np.ndarray, place: np.ndarray) -> float:
+    """How far the engine's reference point is from where its motion has it, at most, m."""
+    case = load_case(folder)
+    start, moved = drag_phase(case).start_step, motion_of(case)
+    rows = np.loadtxt(folder / "workpiece_force.1.txt", skiprows=1)
+    begun = np.array([*moved.motion.path.start_point, rows[rows[:, 0] == start, 10][0]])
+    return float(np.abs(place - moved.places(steps - start, begun)).max())
+
+
 @pytest.mark.parametrize("rpm", [30, -30])
 def test_the_bed_rotates_with_the_bowl_about_a_workpiece_at_rest(runs: Runs, rpm: float) -> None:
     """The same way and no faster, slowed by the workpiece; the drag is along the bed's motion."""
@@ -265,6 +319,24 @@ def test_a_resumed_run_continues_the_motion(runs: Runs, path: dict[str, Any]) ->
     np.testing.assert_allclose(place, before[np.isin(whole, steps)], atol=1e-11)
     off = place - analytic(case, motion, steps)
     assert np.abs(off[:, :2]).max() < 1e-9
+    assert farthest_corner(folder, steps, place) < 1e-7
+
+
+@pytest.mark.parametrize("name", ["tilt-spin-fixed", "eight-tilt-spin", "inclined"])
+def test_a_resumed_run_continues_the_pose(runs: Runs, name: str) -> None:
+    """From a checkpoint within the drag: a restart file keeps neither axis nor moved centre."""
+    folder = runs.shallow(**POSED[name])
+    engine(folder)
+    drag, whole = drag_phase(load_case(folder)), reference(folder)
+    written = [int(file.name.split(".")[1]) for file in folder.glob("checkpoint.*.restart")]
+    step = min(step for step in written if step > drag.start_step + 100)
+    for file in folder.glob("corners.*"):
+        file.unlink()
+    engine(folder, *f"-var part 2 -var resume 1 -var from checkpoint.{step}.restart".split())
+    steps, place = reference(folder, part=2)
+    assert drag.end_step == steps[-1]
+    np.testing.assert_allclose(place, whole[1][np.isin(whole[0], steps)], atol=1e-11)
+    assert off_pose(folder, steps, place) < 1e-9
     assert farthest_corner(folder, steps, place) < 1e-7
 
 
