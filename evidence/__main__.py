@@ -8,12 +8,12 @@ from dragdeck.cli import FIDELITY, STUDY
 from dragdeck.command_line import Argument, Command, Program
 
 COMMANDS = (
-    Command("render-suite", "write the input scripts of all cases of the verification suite",
-            "Write the input scripts of all cases of the verification suite.",
-            "verification.suite:render_suite", (STUDY, FIDELITY)),
-    Command("judge-suite", "compare the runs of the verification suite with reference solutions",
-            "Compare the runs of the verification suite with reference solutions.",
-            "verification.report:write_verification", (OUT_DIR, RUN_DIRS)),
+    Command("verify", "run the verification suite and compare it with reference solutions",
+            "Run the verification suite and compare it with reference solutions.",
+            "verification.report:verify", (
+        STUDY, FIDELITY, OUT_DIR,
+        Argument("--cores", type=int, default=1, metavar="N",
+                 help="runs at the same time; default: 1"))),
     Command("verdict", "print the verdict of the verification suite; fail if a quantity failed",
             "Print the verdict of the verification suite; fail if a quantity failed.",
             "verification.report:verdict", (

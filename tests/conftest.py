@@ -1,13 +1,14 @@
 """What the tests of both packages share."""
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 from hypothesis import settings
+from made_study import Load, Made, put
 from paths import ROOT, SMALL_STUDY
 
 from dragdeck.cases.case import Case
@@ -82,7 +83,29 @@ def write_study(project: Project) -> WriteStudy:
 
 
 @pytest.fixture
-def case(small: dict[str, Any], write_study: WriteStudy) -> Case:
+def load(small: dict[str, Any], write_study: WriteStudy) -> Load:
+    """Load the cases of the small study with these fields changed, by their dotted names."""
+
+    def loaded(changes: Mapping[str, Any] | None = None) -> list[Case]:
+        put(small, changes or {})
+        return load_cases(write_study(small))
+
+    return loaded
+
+
+@pytest.fixture
+def made(load: Load) -> Made:
+    """The one case of the small study with these fields changed, by their dotted names."""
+
+    def only(changes: Mapping[str, Any] | None = None) -> Case:
+        (case,) = load(changes)
+        return case
+
+    return only
+
+
+@pytest.fixture
+def case(load: Load) -> Case:
     """The one case of the small study."""
-    (only,) = load_cases(write_study(small))
+    (only,) = load()
     return only

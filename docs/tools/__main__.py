@@ -10,7 +10,7 @@ import sys
 import nbformat
 from figures import draw_all
 from nbclient import NotebookClient
-from page_parts import stale_files
+from page_parts import PageError, stale_files
 from records import ROOT
 
 
@@ -21,7 +21,10 @@ def main() -> int:
     parser.add_argument("--figures", action="store_true", help="draw the figures, too")
     parser.add_argument("--notebooks", action="store_true", help="run examples/, keep their output")
     options = parser.parse_args()
-    stale = list(stale_files())
+    try:
+        stale = list(stale_files())
+    except PageError as error:
+        sys.exit(str(error))
     for file, text in stale:
         print(file)
         if not options.check:

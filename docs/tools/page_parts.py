@@ -95,11 +95,11 @@ class Parts:
         for value in (self.new[name], self.old.get(name, "")):
             words = r"\s+".join(map(re.escape, value.split()))
             if found := value and re.search(rf"(?<![\w.+-]){words}$", before[-400:]):
-                return before.removesuffix(found[0]) + (
-                    found[0] if value == self.new[name] else self.new[name]
-                )
+                shown = found[0] if value == self.new[name] else self.new[name]
+                return before.removesuffix(found[0]) + shown
         if before[-1:] not in (" ", "\n", "("):
-            raise PageError(f"not {self.new[name]!r} before <!--{name}-->: ...{before[-60:]!r}")
+            wanted = f"{self.new[name]!r} or nothing"
+            raise PageError(f"put {wanted} before <!--{name}-->: ...{before[-60:]!r}")
         return before + self.new[name]
 
 
@@ -123,8 +123,8 @@ def _value(row: Mapping[str, str]) -> str:
         shown = set(texts(chosen(row["record"], row["rows"]), row["format"]))
     except Exception as error:
         raise PageError(f"value {row['name']!r}: {type(error).__name__}: {error}") from error
-    if len(shown) != 1:
-        raise PageError(f"value {row['name']!r}: {len(shown)} values instead of one")
+    if len(shown) != 1 or "" in shown:
+        raise PageError(f"value {row['name']!r}: not one value, but {sorted(shown)}")
     return shown.pop()
 
 

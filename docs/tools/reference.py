@@ -22,7 +22,7 @@ from dragdeck.cli import PROGRAM as DRAGDECK
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Fidelity, Study
 from dragdeck.study.plausible import _RANGES as RANGES
 
-NUMBERS = re.compile(r"[-+x ]*\d[\d., %]*( \(.*\))?|")
+NUMBERS = re.compile(r"[-+x ]*\d[\d., %]*(e[-+]\d+)?( \(.*\))?|")
 
 
 def markdown_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -1,21 +1,27 @@
-"""The force on the workpiece over several packings, against measured and published figures."""
+"""Force and load on the workpiece over several packings, and what other settings do to the drag."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+import pandas as pd
+from pydantic import JsonValue
 from scipy import signal, stats
 
 from dragchain.arrays import Floats
 from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
+from dragchain.loading.contact_events import Thresholds
+from dragchain.loading.document import FILE, ContactType, Loading
 from dragchain.run.case import Case
 from dragchain.run.kinematics import drag_start_s
 from dragchain.run.reference import reference_drags
+from dragchain.statistics.bed_effects import fit_effects
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.statistics.estimate import Estimate, Real
+from dragchain.tables.by_step import read_table
 from dragdeck.documents import Part
-from evidence.validation.runs_by_bed import Point, over_packings
+from evidence.validation.runs import MeasuredRun, RunsByBed, over_packings
 
 _COMPONENTS = ("drag_n", "lateral_n", "vertical_n")
 
@@ -132,9 +138,9 @@ class Compared(Part):
     std_ratio: Estimate | None
 
 
-def of_packings(packings: Sequence[Point]) -> Force:
+def force_of_packings(packings: Sequence[MeasuredRun]) -> Force:
     """The force of every packing, and of all of them together."""
-    rows = [_packing_force(point) for point in packings]
+    rows = [_packing_force(run) for run in packings]
     return Force(
         packings=tuple(rows),
         together={name: _together([getattr(row, name) for row in rows]) for name in _COMPONENTS},
@@ -144,10 +150,10 @@ def of_packings(packings: Sequence[Point]) -> Force:
     )
 
 
-def _packing_force(point: Point) -> PackingForce:
-    samples, own = read_counted(point.folder, _COMPONENTS), point.measures
+def _packing_force(run: MeasuredRun) -> PackingForce:
+    samples, own = read_counted(run.folder, _COMPONENTS), run.measures
     forces = {name: estimate_mean(samples[name].to_numpy()) for name in _COMPONENTS}
-    numbers = {"seed": point.seed, "bed_height_m": own.single["bed_height"]}
+    numbers = {"seed": run.seed, "bed_height_m": own.single["bed_height"]}
     return PackingForce.model_validate({**dict(own), **dict(own.cost), **numbers, **forces})
 
 
@@ -177,23 +183,23 @@ def _alike(drags: Sequence[MeanEstimate]) -> Likeness:
     )
 
 
-def _peaks(packings: Sequence[Point]) -> Peaks:
+def _peaks(packings: Sequence[MeasuredRun]) -> Peaks:
     """Peaks by the rule of docs/reference/results.md, at three least prominences."""
     counts: dict[float, list[float]] = {factor: [] for factor in _PROMINENCES}
     times, largest = [], []
-    for point in packings:
-        samples = read_counted(point.folder, ("time_s", "drag_n"))
+    for run in packings:
+        samples = read_counted(run.folder, ("time_s", "drag_n"))
         time_s, drag = (samples[name].to_numpy(np.float64) for name in ("time_s", "drag_n"))
         for factor in _PROMINENCES:
             peaks = find_drag_peaks(
                 time_s,
                 drag,
-                min_separation_s=peak_separation_s(point.case),
+                min_separation_s=peak_separation_s(run.case),
                 min_prominence_n=factor * float(np.std(drag, ddof=1)),
             )
-            counts[factor].append(len(peaks.index) / point.measures.arc_m)
+            counts[factor].append(len(peaks.index) / run.measures.arc_m)
             if factor == 1.0:
-                times.append(tuple((peaks.time_s - drag_start_s(point.case)).tolist()))
+                times.append(tuple((peaks.time_s - drag_start_s(run.case)).tolist()))
                 largest.append(float(peaks.drag_n.min(initial=math.inf)))
     return Peaks(
         per_metre={f"{factor:g}": over_packings(found) for factor, found in counts.items()},
@@ -202,7 +208,7 @@ def _peaks(packings: Sequence[Point]) -> Peaks:
     )
 
 
-def spectrum(packings: Sequence[Point]) -> Spectrum:
+def spectrum(packings: Sequence[MeasuredRun]) -> Spectrum:
     """Power spectrum of the drag along the path, by Welch's method, mean over packings.
 
     Welch (1967), IEEE Trans. Audio Electroacoust. 15, 70-73: Hann windows of
@@ -210,9 +216,9 @@ def spectrum(packings: Sequence[Point]) -> Spectrum:
     """
     curves, halves = [], []
     grid = np.empty(0)
-    for point in packings:
-        drag = read_counted(point.folder, ("drag_n",))["drag_n"].to_numpy(np.float64)
-        spacing = point.measures.arc_m / len(drag) / (2.0 * point.case.media.radius_mean_m)
+    for run in packings:
+        drag = read_counted(run.folder, ("drag_n",))["drag_n"].to_numpy(np.float64)
+        spacing = run.measures.arc_m / len(drag) / (2.0 * run.case.media.radius_mean_m)
         length = min(len(drag), round(SEGMENT / spacing))
         waves, density = (half[1:] for half in signal.welch(drag, 1.0 / spacing, nperseg=length))
         grid = grid if grid.size else waves
@@ -246,3 +252,211 @@ def compare(drag: Together, case: Case) -> tuple[Compared, ...]:
         )
         for reference in reference_drags(case.reference)
     )
+
+
+# --- what every other setting does to the drag ---------------------------------------------
+
+
+class Effect(Part):
+    """The effect of a setting on a quantity.
+
+    Attributes
+    ----------
+    quantity : str
+        ``drag_mean`` or ``drag_std``.
+    youngs_modulus_scale, timestep_fraction, speed_factor : float
+        The fidelity.
+    runs : int
+    field, value, reference_value
+        The input that it changes (empty if none), to what, and what it is at the same fidelity
+        without the change.
+    change, ci95_low, ci95_high : float
+        Relative change, against the same fidelity without the changed input, or against the
+        packings if it changes the fidelity alone.
+    exponent, exponent_ci95_low, exponent_ci95_high : float or None
+        Of the change over that of the input.
+    """
+
+    quantity: str
+    youngs_modulus_scale: float
+    timestep_fraction: float
+    speed_factor: float
+    runs: int
+    field: str
+    value: JsonValue
+    reference_value: JsonValue
+    change: float
+    ci95_low: float
+    ci95_high: float
+    exponent: float | None
+    exponent_ci95_low: float | None
+    exponent_ci95_high: float | None
+
+
+def effects(runs: RunsByBed) -> list[Effect]:
+    """The effect of every other setting on the mean drag and on its standard deviation.
+
+    All runs are fitted together (`bed_effects`): one mean per setting, one variance for all, in
+    inverse proportion to the path. What runs from one bed have in common is not made use of: it
+    was measured to be little (docs/evidence/tradeoff.md), and these are too few runs to tell.
+
+    Raises
+    ------
+    SeriesError
+        If there are too few runs.
+    """
+    drags = [
+        read_counted(run.folder, ("drag_n",))["drag_n"].to_numpy(np.float64) for run in runs.all
+    ]
+    sizes = {
+        "drag_mean": [abs(float(drag.mean())) for drag in drags],
+        "drag_std": [float(drag.std(ddof=1)) for drag in drags],
+    }
+    return [row for name, values in sizes.items() for row in _of_quantity(runs, name, values)]
+
+
+def effect_table(rows: Sequence[Effect]) -> pd.DataFrame:
+    """The effects as a table, one row per quantity and setting."""
+    return pd.DataFrame([dict(row) for row in rows], columns=list(Effect.model_fields))
+
+
+def _base(runs: RunsByBed, run: MeasuredRun) -> MeasuredRun:
+    """What a run is to be compared with."""
+    alike = (one for one in runs.all if one.settings == run.settings and not one.changed)
+    return next(alike, runs.all[0]) if run.changed else runs.all[0]
+
+
+def _of_quantity(runs: RunsByBed, quantity: str, sizes: Sequence[float]) -> Iterator[Effect]:
+    settings = list(dict.fromkeys(run.but_for_bed for run in runs.all))
+    units = dict(zip(settings, np.eye(len(settings)), strict=True))
+    design = np.array([units[run.but_for_bed] for run in runs.all])
+    weights = np.sqrt([run.measures.arc_m for run in runs.all])
+    weights /= weights.max()
+    fit = fit_effects(weights[:, None] * design, weights * np.log(sizes), range(len(weights)))
+    for setting in settings[1:]:
+        own = [run for run in runs.all if run.but_for_bed == setting]
+        run, base = own[0], _base(runs, own[0])
+        field, value = next(iter(run.changed.items()), ("", None))
+        before = base.measures.inputs.get(field)
+        logarithm = fit.estimate(units[run.but_for_bed] - units[base.but_for_bed])
+        change = logarithm.mapped(math.expm1)
+        exponent = _exponent(logarithm, value, before) if len(run.changed) == 1 else None
+        yield Effect(
+            quantity=quantity,
+            **run.settings.parameters(),
+            runs=len(own),
+            field=field,
+            value=value,
+            reference_value=before,
+            change=change.value,
+            ci95_low=change.ci95_low,
+            ci95_high=change.ci95_high,
+            exponent=exponent and exponent.value,
+            exponent_ci95_low=exponent and exponent.ci95_low,
+            exponent_ci95_high=exponent and exponent.ci95_high,
+        )
+
+
+def _exponent(change: Estimate, new: JsonValue, old: JsonValue) -> Estimate | None:
+    """Exponent of a change, in logarithms, over that of its input; None without a ratio of both."""
+    if not (isinstance(new, int | float) and isinstance(old, int | float) and min(new, old) > 0):
+        return None
+    return change.over(math.log(new / old))
+
+
+# --- load, sliding and friction on the workpiece -----------------------------------------------
+
+_PER_METRE = {
+    "normal_impulse_n_s": "N s/m",
+    "sliding_m": "m/m",
+    "force_slide_n_m": "N m/m",
+    "friction_work_j": "J/m",
+}
+"""Amounts per metre of path, each with its unit."""
+
+_SHARES = ("events", "normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
+
+
+class LoadingRow(Part):
+    """A number over the packings; the page has its name in words."""
+
+    label: str
+    unit: str
+    value: float
+    ci95_low: float
+    ci95_high: float
+
+
+class LoadingOverPackings(Part):
+    """The loading over the packings.
+
+    Attributes
+    ----------
+    rows : sequence of LoadingRow
+    types : mapping
+        Type of contact event to its percentages of all events and of amounts.
+    closure : float
+        Largest relative error of the sums over facets against the force on the workpiece.
+    limits, sample_interval_s
+        Of the first packing.
+    """
+
+    rows: tuple[LoadingRow, ...]
+    types: Mapping[str, Mapping[str, Estimate]]
+    closure: float
+    limits: Thresholds
+    sample_interval_s: float
+
+
+def load_of_packings(packings: Sequence[MeasuredRun]) -> LoadingOverPackings:
+    """Average what `dragchain loading` found in every packing.
+
+    Raises
+    ------
+    DocumentError
+        If a packing has no ``loading.json``.
+    """
+    every = [Loading.read(run.folder / FILE) for run in packings]
+    first, numbers = every[0], [_numbers(one) for one in every]
+    return LoadingOverPackings(
+        rows=tuple(
+            LoadingRow(label=key[0], unit=key[1], **vars(over_packings([n[key] for n in numbers])))
+            for key in numbers[0]
+        ),
+        types={kind: _shares([one.types[kind] for one in every]) for kind in first.types},
+        closure=max(one.closure.facets_relative_error for one in every),
+        limits=first.limits,
+        sample_interval_s=first.sample_interval_s,
+    )
+
+
+def _numbers(loading: Loading) -> dict[tuple[str, str], float]:
+    """The numbers that packings are compared by: name and unit to value."""
+    front = loading.front_fraction
+    fractions = {
+        "friction_fraction_of_work": loading.friction_fraction_of_work,
+        "front_fraction_normal_impulse": front["normal_impulse_n_s"],
+        "front_fraction_force_slide": front["force_slide_n_m"],
+        "load_while_sliding_fraction": loading.load_while_sliding_fraction,
+    }
+    return {
+        ("mean_contacts", ""): loading.mean_contacts.value,
+        **{(name, unit): loading.per_metre[name].value for name, unit in _PER_METRE.items()},
+        **{(name, "%"): 100.0 * one.value for name, one in fractions.items()},
+    }
+
+
+def _shares(types: Sequence[ContactType]) -> dict[str, Estimate]:
+    return {
+        name: over_packings([100.0 * one.fraction_of[name].value for one in types])
+        for name in _SHARES
+    }
+
+
+def facets(packings: Sequence[MeasuredRun]) -> pd.DataFrame:
+    """The facets of every packing, one row per facet and packing."""
+    tables = [
+        read_table(run.folder / "tables" / "facets.parquet").assign(packing=run.seed)
+        for run in packings
+    ]
+    return pd.concat(tables, ignore_index=True)

@@ -1,30 +1,59 @@
-"""Tables, figures and page of a validation."""
+"""The report on a validation: its document, tables, figures and page."""
 
 import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
+import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from dragchain.figures.style import drawing, png
-from dragchain.report.page import data_uri, render_page, write_bundle
+from dragchain.drag.force import read_counted
+from dragchain.drag.peaks import drag_peaks
+from dragchain.figures.panels import (
+    band,
+    compass,
+    compass_bars,
+    depth_bars,
+    legend_below,
+    new_figure,
+    new_panels,
+    row,
+    row_names,
+)
+from dragchain.figures.style import BLUE, COLOURS, GREY, RED
+from dragchain.report.campaign import write_report
+from dragchain.run.kinematics import drag_start_s
 from dragchain.scaling.document import ScalingFile
-from dragchain.scaling.fit import draw_scalings, read_scalings
-from dragchain.statistics.estimate import EstimateColumns
+from dragchain.scaling.fit import SCENE, draw_scalings, read_scalings
+from dragchain.statistics.estimate import Estimate, EstimateColumns
 from dragdeck.documents import Document
-from evidence.validation import chain_peaks, figures
-from evidence.validation import loading_over_packings as loading
-from evidence.validation.around_workpiece import Profile, Statements, of_packings
-from evidence.validation.claims import Claim, claim_table, claims
-from evidence.validation.effects import Effect, effect_table, effects
-from evidence.validation.force import Compared, Force, compare
-from evidence.validation.force import of_packings as force_of
-from evidence.validation.runs_by_bed import Points, read_points
-
-_SAME_SCENE = ("bowl_to_particle", "particle_friction", "lowest_restitution", "particles")
-"""Numbers that a scene shares with the sweeps that are shown beside it."""
+from evidence.validation import peaks as chain_peaks
+from evidence.validation.force import (
+    Compared,
+    Effect,
+    Force,
+    LoadingOverPackings,
+    Spectrum,
+    compare,
+    effect_table,
+    effects,
+    facets,
+    force_of_packings,
+    load_of_packings,
+)
+from evidence.validation.runs import MeasuredRun, RunsByBed, read_runs
+from evidence.validation.statements import (
+    Claim,
+    Network,
+    Profile,
+    Statements,
+    claim_table,
+    claims,
+    of_packings,
+)
 
 
 class Validation(Document):
@@ -37,7 +66,7 @@ class Validation(Document):
     engine_hours: float
     force: Force
     comparison: tuple[Compared, ...]
-    load: loading.LoadingOverPackings
+    load: LoadingOverPackings
     statements: Statements
     scalings: tuple[ScalingFile, ...]
     claims: tuple[Claim, ...]
@@ -65,36 +94,43 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     SeriesError
         There are too few runs to compare settings.
     """
-    points = read_points(run_dirs)
-    found = validate(points, command)
-    peaks = chain_peaks.of_runs([point.folder for point in points.packings])
-    pictures = _draw(points, found)
-    write_bundle(
+    runs = read_runs(run_dirs)
+    first, found = runs.packings[0], validate(runs, command)
+    peaks = chain_peaks.of_runs([run.folder for run in runs.packings])
+    write_report(
         out_dir,
-        tables={**tables(points, found), "chain_tests": peaks.table()},
-        figures=pictures,
+        "validation/validation.html.j2",
+        draw=lambda: _draw(runs, found),
+        pictures={"workpiece": (first.folder / "figures" / "workpiece.png").read_bytes()},
+        tables={**_tables(runs, found), "chain_tests": peaks.table()},
         documents={"validation": found, "peaks": peaks},
-        pages={"report": render(points, found, peaks, pictures)},
+        package="evidence",
+        found=json.loads(found.as_text()),
+        scalings=found.scalings,
+        peaks=json.loads(peaks.as_text()),
+        assumptions=first.case.assumptions,
+        varied={row.field for row in found.effects},
+        runs=runs,
     )
 
 
-def validate(points: Points, command: str) -> Validation:
+def validate(runs: RunsByBed, command: str) -> Validation:
     """All numbers of the page but those of peaks and chains."""
-    first = points.packings[0]
-    force, statements = force_of(points.packings), of_packings(points.packings)
+    first = runs.packings[0]
+    force, statements = force_of_packings(runs.packings), of_packings(runs.packings)
     return Validation(
         study=first.case.study,
         command=command,
-        measured=max(point.measures.started for point in points.all)[:10],
+        measured=max(run.measures.started for run in runs.all)[:10],
         versions=first.measures.versions,
-        engine_hours=sum(point.measures.cost.cpu_time_s for point in points.all) / 3600.0,
+        engine_hours=sum(run.measures.cost.cpu_time_s for run in runs.all) / 3600.0,
         force=force,
         comparison=compare(force.together["drag_n"], first.case),
-        load=loading.of_packings(points.packings),
+        load=load_of_packings(runs.packings),
         statements=statements,
         scalings=tuple(_scalings_of(first.measures.numbers)),
         claims=claims(statements),
-        effects=tuple(effects(points)),
+        effects=tuple(effects(runs)),
     )
 
 
@@ -103,20 +139,24 @@ def _scalings_of(numbers: Mapping[str, float]) -> list[ScalingFile]:
     return [
         found
         for found in read_scalings()
-        if all(math.isclose(found.scene[k], numbers[k], rel_tol=0.01) for k in _SAME_SCENE)
+        if all(math.isclose(found.scene[k], numbers[k], rel_tol=0.01) for k in SCENE)
     ]
 
 
-def tables(points: Points, found: Validation) -> dict[str, pd.DataFrame]:
+def _tables(runs: RunsByBed, found: Validation) -> dict[str, pd.DataFrame]:
     """The numbers of the page as tables, by name."""
     force, statements = found.force, found.statements
     network, spectrum = statements.network, force.spectrum
+    compared = [
+        row.model_dump(exclude={"std_ratio"} if row.std_ratio is None else None)
+        for row in found.comparison
+    ]
     return {
         "packings": pd.json_normalize([row.model_dump() for row in force.packings], sep="_"),
         "effects": effect_table(found.effects),
         "load": pd.DataFrame([dict(row) for row in found.load.rows]),
-        "facets": loading.facets(points.packings),
-        "comparison": pd.json_normalize([_flat(row) for row in found.comparison], sep="_"),
+        "facets": facets(runs.packings),
+        "comparison": pd.json_normalize(compared, sep="_"),
         "statements": claim_table(found.claims),
         "corridor": pd.DataFrame(
             {
@@ -133,10 +173,6 @@ def tables(points: Points, found: Validation) -> dict[str, pd.DataFrame]:
     }
 
 
-def _flat(row: Compared) -> dict[str, Any]:
-    return row.model_dump(exclude={"std_ratio"} if row.std_ratio is None else None)
-
-
 def _bins(edges: Sequence[float], unit: str) -> dict[str, Sequence[float]]:
     return {f"from_{unit}": edges[:-1], f"to_{unit}": edges[1:]}
 
@@ -150,43 +186,157 @@ def _profile(profile: Profile, unit: str) -> pd.DataFrame:
     return pd.DataFrame({**_bins(profile.edges, unit), **values})
 
 
-def _draw(points: Points, found: Validation) -> dict[str, bytes]:
-    """The figures of the page as PNG, by name."""
-    with drawing():
-        drawn = {
-            "comparison": figures.comparison(found.force, found.comparison, found.effects),
-            "traces": figures.traces(points.packings, found.comparison),
-            "spectrum": figures.spectrum(found.force.spectrum),
-            "around": figures.around(found.statements),
-            "corridor": figures.corridor(found.statements.network),
-        }
-        if any(row.field for row in found.effects):
-            drawn["assumed"] = figures.assumed(found.effects)
-        if found.scalings:
-            drawn["scaling"] = draw_scalings(found.scalings)
-        pictures = {name: png(figure) for name, figure in drawn.items()}
-    workpiece = points.packings[0].folder / "figures" / "workpiece.png"
-    return pictures | {"workpiece": workpiece.read_bytes()}
+# --- figures -----------------------------------------------------------------------------------
 
 
-def render(
-    points: Points, found: Validation, peaks: chain_peaks.Findings, pictures: Mapping[str, bytes]
-) -> str:
-    """The page: HTML that needs no other file and no network."""
+def _draw(runs: RunsByBed, found: Validation) -> dict[str, Figure]:
+    """The figures of the page, by name."""
+    drawn = {
+        "comparison": _comparison(found.force, found.comparison, found.effects),
+        "traces": _traces(runs.packings, found.comparison),
+        "spectrum": _spectrum(found.force.spectrum),
+        "around": _around(found.statements),
+        "corridor": _corridor(found.statements.network),
+    }
+    if any(row.field for row in found.effects):
+        drawn["assumed"] = _assumed(found.effects)
+    if found.scalings:
+        drawn["scaling"] = draw_scalings(found.scalings)
+    return drawn
 
-    def picture(name: str) -> str | None:
-        shown = pictures.get(Path(name).stem)
-        return data_uri(shown, "png") if shown else None
 
-    return render_page(
-        "validation/validation.html.j2",
-        None,
-        "evidence",
-        found=json.loads(found.as_text()),
-        scalings=found.scalings,
-        peaks=json.loads(peaks.as_text()),
-        assumptions=points.packings[0].case.assumptions,
-        varied={row.field for row in found.effects},
-        points=points,
-        picture=picture,
-    )
+def _traces(packings: Sequence[MeasuredRun], compared: Sequence[Compared]) -> Figure:
+    """The drag of every packing over process time, its peaks marked, over the source's band."""
+    height = 0.7 + 1.35 * len(packings)
+    figure, panels = new_panels(height, len(packings), columns=1, sharex=True, sharey=True)
+    for axes, run in zip(panels, packings, strict=True):
+        _bands(axes, compared)
+        _trace(axes, run)
+        axes.set_ylabel("drag force (N)")
+    panels[-1].set_xlabel("process time (s)")
+    return legend_below(figure)
+
+
+def _trace(axes: Axes, run: MeasuredRun) -> None:
+    samples = read_counted(run.folder, ("time_s", "drag_n"))
+    time_s, drag = samples["time_s"].to_numpy(np.float64), samples["drag_n"].to_numpy(np.float64)
+    peaks = drag_peaks(samples, run.case)
+    zero = drag_start_s(run.case)
+    axes.plot(time_s - zero, drag, color=COLOURS["drag"], linewidth=0.5)
+    axes.plot(peaks.time_s - zero, peaks.drag_n, "v", color=COLOURS["peak"], label="peak")
+    axes.axhline(float(drag.mean()), color="black", linewidth=1.0, label="mean of the packing")
+    force = f"{drag.mean():.2f} ± {drag.std(ddof=1):.2f} N"
+    axes.set_title(f"packing {run.seed}: {force}, {len(peaks.index)} peaks")
+
+
+def _bands(axes: Axes, compared: Sequence[Compared]) -> None:
+    for one in compared:
+        colour = COLOURS[one.label]
+        axes.axhline(one.mean_n, color=colour, linestyle="--", label=f"{one.label} mean")
+        if one.std_n and one.label == "experiment":
+            low, high = one.mean_n - one.std_n, one.mean_n + one.std_n
+            label = "experiment, ± one standard deviation"
+            axes.axhspan(low, high, color=colour, alpha=0.12, linewidth=0, label=label)
+
+
+_Row = tuple[str, Estimate, str]
+"""Name, value and colour of a row of `_rows`."""
+
+
+def _comparison(force: Force, compared: Sequence[Compared], effects: Sequence[Effect]) -> Figure:
+    """Mean drags: the source's, each packing's with its own interval, and all together."""
+    together = force.together["drag_n"].mean
+    rows: list[_Row] = [
+        (one.label, Estimate.around(one.mean_n, 0.0), COLOURS[one.label]) for one in compared
+    ]
+    for packing in force.packings:
+        own = packing.drag_n
+        estimate = Estimate(own.mean, own.ci95_low, own.ci95_high)
+        rows.append((f"packing {packing.seed}", estimate, BLUE))
+    rows.append(("all packings", together, "black"))
+    for one in effects:
+        if one.quantity == "drag_mean" and not one.field:
+            changed = _change(one).mapped(lambda change: together.value * (1.0 + change))
+            rows.append((_fidelity(one), changed, GREY))
+    return _rows(rows, "mean drag (N); bars: 95 % CI")
+
+
+def _change(effect: Effect) -> Estimate:
+    return Estimate(effect.change, effect.ci95_low, effect.ci95_high)
+
+
+def _fidelity(effect: Effect) -> str:
+    name = f"E x {effect.youngs_modulus_scale:g}, {100 * effect.timestep_fraction:g} %"
+    return name if effect.speed_factor == 1.0 else f"{name}, speed x {effect.speed_factor:g}"
+
+
+def _assumed(effects: Sequence[Effect]) -> Figure:
+    """What each assumed input does to the mean drag."""
+    rows: list[_Row] = []
+    for one in effects:
+        if one.quantity == "drag_mean" and one.field:
+            name = f"{one.field} = {_value(one.value)} (assumed: {_value(one.reference_value)})"
+            rows.append((name, _change(one).over(0.01), BLUE))
+    figure = _rows(rows, "change of the mean drag (%); bars: 95 % CI")
+    figure.axes[0].axvline(0.0, color="black", linewidth=0.8)
+    return figure
+
+
+def _value(value: object) -> str:
+    return f"{value:g}" if isinstance(value, int | float) else str(value)
+
+
+def _rows(rows: Sequence[_Row], label: str) -> Figure:
+    """Values with their intervals, one below the other."""
+    figure, (axes,) = new_panels(0.9 + 0.27 * len(rows))
+    for place, (_, one, colour) in enumerate(rows):
+        row(axes, place, one.value, one, colour)
+    row_names(axes, [name for name, *_ in rows])
+    axes.set(xlabel=label)
+    return figure
+
+
+def _spectrum(found: Spectrum) -> Figure:
+    """Power spectrum of the drag along the path."""
+    figure, (axes,) = new_panels(3.2)
+    waves, density, half = found.waves_per_diameter, found.density, found.half_wave.value
+    band(axes, waves, density, BLUE)
+    axes.loglog(waves, density.mean, color=BLUE, label="mean over packings; band: their range")
+    label = f"half of the variance to the left (wavelength > {half:.1f} particle diameters)"
+    axes.axvline(1.0 / half, color=RED, linestyle="--", label=label)
+    axes.set_xlabel("wavenumber (1 / particle diameter)")
+    axes.set_ylabel("power density (N² particle diameters)")
+    axes.legend(loc="upper right")
+    return figure
+
+
+def _around(found: Statements) -> Figure:
+    """Normal force on the workpiece by azimuth, and that of a contact by depth."""
+    figure = new_figure(3.9)
+    left, right = compass(figure, 1, 2, 1), figure.add_subplot(1, 2, 2)
+    edges = found.azimuth.edges
+    compass_bars(left, edges, found.azimuth.columns, 100.0, "%")
+    depth_bars(right, found.depth.edges, found.depth.columns)
+    right.set(xlabel="mean normal force per contact (N)", ylabel="depth (mm)")
+    right.set_title("bars: 95 % CI over packings")
+    return figure
+
+
+def _corridor(network: Network) -> Figure:
+    """Mean contact force of the network ahead of the workpiece and behind it."""
+    figure, (axes,) = new_panels(3.2)
+    edges = np.array(network.edges_diameters)
+    middle = (edges[1:] + edges[:-1]) / 2
+    sides = (("ahead", network.ahead_n), ("behind", network.behind_n))
+    for name, side in sides:
+        colour = COLOURS[name]
+        band(axes, middle, side, colour)
+        axes.plot(middle, side.value, "o-", color=colour, label=name)
+    wall = network.wall_diameters
+    axes.axhline(network.far_n.value, color="black", linestyle="--", label="far field")
+    axes.axvline(wall, color=GREY, linewidth=2.0)
+    axes.text(wall, 0.0, " bowl wall", color=GREY, va="bottom")
+    axes.set(ylabel="mean normal force\nper contact (N)", xlim=(0, wall + 0.5), ylim=(0, None))
+    axes.set_xlabel("distance from the workpiece's surface (particle diameters)")
+    axes.legend()
+    return figure

@@ -1,66 +1,85 @@
-"""Tables and page of the verification suite."""
+"""The command that verifies a study's contact law: runs, tables and page of the suite."""
 
-import math
 from collections.abc import Hashable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from itertools import groupby
+from functools import partial
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
+import numpy as np
 import pandas as pd
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from dragchain.contact_law.hertz import tangential_damping_ratio
-from dragchain.errors import TableError
-from dragchain.figures.style import drawing, png
-from dragchain.report.page import data_uri, render_page, write_bundle
+from dragchain.figures.panels import legend_below, new_panels
+from dragchain.figures.style import GREY, MARKERS, SERIES
+from dragchain.report.campaign import write_report
 from dragchain.tables.by_step import read_table
+from dragdeck.decks.render import write_run
+from dragdeck.decks.templates import environment
+from dragdeck.engine import run_folder
+from dragdeck.engine.reports import say, silent
 from dragdeck.errors import RejectedRunError
-from evidence.contact_law.impact import limited_restitution
-from evidence.verification.checks import CHECKS, JUDGED, Verdict, judge
-from evidence.verification.collide import CollideCase
-from evidence.verification.figures import draw
-from evidence.verification.published import published
-from evidence.verification.recording import Recording, read_recording
+from dragdeck.project import find_project, run_path, study_templates
+from evidence.verification.checks import (
+    COULOMB,
+    EXACT,
+    INPUT,
+    INTEGRATED,
+    JUDGED,
+    TOLERANCE,
+    Compared,
+    QuantityCheck,
+    Verdict,
+    check_rows,
+    checks_by_test,
+    published_curve,
+    series_name,
+)
+from evidence.verification.experiment import collide_scene
+from evidence.verification.recording import read_recording
+from evidence.verification.suite import Test, suite_file, suite_of
 
 _BY_SERIES = ["number", "test", "series", "quantity", "against"]
 
 Rows = Sequence[Mapping[Hashable, object]]
 
 
-@dataclass(frozen=True)
-class Section:
-    """A test on the page.
+# --- the commands ---------------------------------------------------------------------------
 
-    Attributes
-    ----------
-    case : CollideCase
-        Of one of its runs.
-    picture : str
-        Its figure as a data URI.
-    same, others : sequence of rows
-        Comparisons with the law that the engine claims to compute, and with others.
-    steps : list of int
-        Time steps in the shortest contact of its runs.
+
+def verify(study: str, fidelity: str | None, out_dir: Path, cores: int) -> None:
+    """Run the suite for the materials of a study and write its report.
+
+    Runs of the same inputs are not repeated; one that was interrupted is gone on with.
+
+    Raises
+    ------
+    InputError
+        The study cannot be used.
+    EngineError
+        No LIGGGHTS, or it was interrupted.
+    RejectedRunError
+        A run did not pass its acceptance checks.
     """
-
-    case: CollideCase
-    picture: str
-    same: Rows
-    others: Rows
-    steps: Sequence[int]
-
-
-@dataclass(frozen=True)
-class TwoSpins:
-    """Scaled spins at one scaled patch velocity, read off the published points of two tests."""
-
-    patch: float
-    tangential: float
-    angle: float
+    project = find_project(Path.cwd())
+    case = project.cases(study, fidelity)[0]
+    templates = environment(project.templates, study_templates(case))
+    folders = []
+    for name, experiment in suite_of(case.study).items():
+        folders.append(project.root / run_path(experiment.case.study, "collide", name))
+        write_run(collide_scene(experiment), folders[-1], templates)
+    with ProcessPoolExecutor(cores) as pool:
+        done = pool.map(partial(run_folder.run, report=silent), folders)
+        for number, (folder, record) in enumerate(zip(folders, done, strict=True), 1):
+            say(f"verification {number} of {len(folders)}: {folder.name}: {record.state}")
+    write_verification(out_dir, folders)
 
 
 def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> None:
-    """Judge the runs of the suite and write its tables and its page.
+    """Judge runs of the suite and write its tables and its page.
 
     Writes ``checks.csv`` and ``checks.parquet`` (one row per comparison), ``verification.csv`` and
     ``verification.parquet`` (one row per quantity of a series: its worst comparison) and
@@ -78,33 +97,26 @@ def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> None:
     RejectedRunError
         A run is not complete.
     TableError
-        No run is given, or an impact is not whole.
+        An impact is not whole.
     """
-    if not run_dirs:
-        raise TableError("no folder of a run is given, so there is nothing to verify")
-    runs = [read_recording(folder) for folder in run_dirs]
-    checks = judge(runs)
-    summary = summarise(checks)
-    write_bundle(
+    compared = checks_by_test([read_recording(folder) for folder in run_dirs])
+    each = [check_rows(run, one) for rows in compared.values() for run, one in rows]
+    checks = pd.concat([rows for rows in each if len(rows)]).sort_values("number", kind="stable")
+    checks = checks.reset_index(drop=True)
+    summary = worst_rows(checks)
+    write_report(
         out_dir,
+        "verification/verification.html.j2",
+        draw=lambda: {test: draw_test(test, rows) for test, rows in compared.items()},
         tables={"checks": checks, "verification": summary},
-        pages={"verification": render(runs, summary)},
+        name="verification",
+        package="evidence",
+        sections={test: _section(test, rows, summary) for test, rows in compared.items()},
+        notes=suite_file().notes,
+        counts=counts(summary),
+        failures=_shown(summary[summary["verdict"] == "fail"]),
+        runs=len(run_dirs),
     )
-
-
-def summarise(checks: pd.DataFrame) -> pd.DataFrame:
-    """The worst comparison of each quantity of each series, with their number."""
-    groups = [
-        group.sort_values("error", kind="stable").tail(1).assign(points=len(group))
-        for _, group in checks.groupby(_BY_SERIES, sort=False)
-    ]
-    return pd.concat(groups, ignore_index=True)
-
-
-def counts(summary: pd.DataFrame) -> dict[str, int]:
-    """How many rows have each verdict."""
-    verdicts = summary["verdict"].tolist()
-    return {name: verdicts.count(name) for name in get_args(Verdict)}
 
 
 def verdict(report_dir: Path) -> str:
@@ -130,62 +142,61 @@ def verdict(report_dir: Path) -> str:
     raise RejectedRunError("\n  ".join([f"{report_dir / 'verification.html'}: {said}", *lines]))
 
 
-def render(runs: Sequence[Recording], summary: pd.DataFrame) -> str:
-    """The page: HTML that needs no other file and no network."""
-    order = list(CHECKS)
-    ordered = sorted(runs, key=lambda run: (run.case.number, order.index(run.case.test)))
-    by_test = {test: list(group) for test, group in groupby(ordered, key=lambda run: run.case.test)}
-    return render_page(
-        "verification/verification.html.j2",
-        {
-            "quantity": quantity,
-            "limited_restitution": limited_restitution,
-            "tangential_damping_ratio": tangential_damping_ratio,
-        },
-        "evidence",
-        sections={test: _section(test, group, summary) for test, group in by_test.items()},
-        spins=published_spins(by_test.get("oblique_angle"), by_test.get("oblique_tangential")),
-        counts=counts(summary),
-        failures=summary[summary["verdict"] == "fail"].to_dict("records"),
-        runs=len(runs),
-    )
+# --- tables of the page ---------------------------------------------------------------------
 
 
-def _section(test: str, runs: Sequence[Recording], summary: pd.DataFrame) -> Section:
-    rows = summary[summary["test"] == test]
-    judged = rows["against"].isin(JUDGED)
-    with drawing():
-        picture = data_uri(png(draw(test, runs)))
-    return Section(
-        case=runs[0].case,
-        picture=picture,
-        same=rows[judged].to_dict("records"),
-        others=rows[~judged].to_dict("records"),
-        steps=sorted({run.case.steps_per_contact for run in runs}),
-    )
+def worst_rows(checks: pd.DataFrame) -> pd.DataFrame:
+    """The worst comparison of each quantity of each series, with their number."""
+    groups = [
+        group.sort_values("error", kind="stable").tail(1).assign(points=len(group))
+        for _, group in checks.groupby(_BY_SERIES, sort=False)
+    ]
+    return pd.concat(groups, ignore_index=True)
 
 
-_SPIN_AT = 4.0
-"""Scaled patch velocity at which the published spins of two tests are compared."""
+def counts(summary: pd.DataFrame) -> dict[str, int]:
+    """How many rows have each verdict."""
+    verdicts = summary["verdict"].tolist()
+    return {name: verdicts.count(name) for name in get_args(Verdict)}
 
 
-def published_spins(
-    angle: Sequence[Recording] | None, tangential: Sequence[Recording] | None
-) -> TwoSpins | None:
-    """The published spins of the tests over the angle and over the tangential speed.
+@dataclass(frozen=True)
+class TestSection:
+    """A test on the page.
 
-    Both are scaled as the second is: surface speed by spin over friction times normal speed,
-    against patch velocity over the same.
+    Attributes
+    ----------
+    test : Test
+    same, others : sequence of rows
+        Comparisons with the law that the engine claims to compute, and with others.
+    steps : list of int
+        Time steps in the shortest contact of its runs.
     """
-    if not angle or not tangential:
-        return None
-    impact = angle[0].contacts[0]
-    contact, before = impact.constants, impact.before
-    inclined = math.atan(_SPIN_AT * contact.friction)
-    normal = math.hypot(before.normal_m_s, before.tangential_m_s) * math.cos(inclined)
-    spin = published("oblique_angle", angle[0].case.series, "spin_rad_s").at(math.degrees(inclined))
-    own = published("oblique_tangential", tangential[0].case.series, "scaled_spin").at(_SPIN_AT)
-    return TwoSpins(_SPIN_AT, own, contact.particle.radius_m * spin / (contact.friction * normal))
+
+    test: Test
+    same: Rows
+    others: Rows
+    steps: Sequence[int]
+
+
+def _section(test: str, compared: Compared, summary: pd.DataFrame) -> TestSection:
+    rows = summary[summary["test"] == test]
+    same = rows["against"].isin(JUDGED)
+    steps = sorted({run.case.steps_per_contact for run, _ in compared})
+    return TestSection(suite_file().tests()[test], _shown(rows[same]), _shown(rows[~same]), steps)
+
+
+_CLASSES = {"pass": "good-word", "fail": "bad-word", "agrees": "good-word", "differs": "warn"}
+
+
+def _shown(rows: pd.DataFrame) -> Rows:
+    """Rows of a summary as the page shows them."""
+    verdicts = [
+        Markup('<span class="{}">{}</span>').format(_CLASSES[word], word)
+        for word in rows["verdict"]
+    ]
+    shown = rows.assign(quantity=rows["quantity"].map(in_words), verdict=verdicts)
+    return shown.to_dict("records")
 
 
 _UNITS = {
@@ -200,9 +211,70 @@ _UNITS = {
 }
 
 
-def quantity(name: str) -> str:
+def in_words(quantity: str) -> str:
     """A quantity's name in words, its unit in brackets."""
     for ending, unit in _UNITS.items():
-        if name.endswith(ending):
-            return f"{name.removesuffix(ending).replace('_', ' ')} ({unit})"
-    return name.replace("_", " ")
+        if quantity.endswith(ending):
+            return f"{quantity.removesuffix(ending).replace('_', ' ')} ({unit})"
+    return quantity.replace("_", " ")
+
+
+# --- figures --------------------------------------------------------------------------------
+
+
+_LINES: Mapping[str, Mapping[str, Any]] = {
+    EXACT: {"label": "line: exact formula"},
+    INTEGRATED: {"label": "line: contact law integrated by scipy"},
+    COULOMB: {"color": "black", "ls": "--", "label": "rigid-body sliding with Coulomb friction"},
+    INPUT: {"color": "black", "ls": ":", "label": "input value"},
+    TOLERANCE: {"color": GREY, "ls": ":", "label": "tolerance"},
+}
+"""How references are drawn, those of no series in its colour."""
+
+_OTHERS: Mapping[str, tuple[str, ...]] = {
+    "oblique_angle": ("experiment (Kharaz et al. 2001)",),
+    "oblique_tangential": ("finite elements (Wu)",),
+}
+"""Series that the paper draws and nobody here models."""
+
+
+def draw_test(test: str, compared: Compared) -> Figure:
+    """The figure of a test: a panel for each quantity, the engine's points over the references."""
+    drawn = [(one.series or series_name(run), one) for run, one in compared if len(one.drawn)]
+    names = list(dict.fromkeys(name for name, _ in drawn))
+    quantities = list(dict.fromkeys(one.quantity for _, one in drawn))
+    axes_of, count = suite_file().axes, len(quantities)
+    figure, panels = new_panels(3.7, count, 3.7 * max(count, 2))
+    for axes, quantity in zip(panels, quantities, strict=True):
+        shown: set[str] = set()
+        for name, one in drawn:
+            if one.quantity == quantity:
+                _draw_comparison(axes, one, names.index(name), "" if name in shown else name)
+                shown.add(name)
+        materials = list(dict.fromkeys(run.case.series for run, _ in compared))
+        _draw_published(axes, test, materials, quantity)
+        known = {**axes_of.get(test, {}), **axes_of.get(quantity, {})}
+        axes.set(**{"ylabel": in_words(quantity), **known})
+    return legend_below(figure)
+
+
+def _draw_comparison(axes: Axes, one: QuantityCheck, at: int, name: str) -> None:
+    """Draw a reference, and the engine's points if they have a name."""
+    colour = SERIES[at % len(SERIES)]
+    x, reference, engine = np.array(sorted(map(tuple, one.drawn)), dtype=np.float64).T
+    if name:
+        mark, size = (MARKERS[at % len(MARKERS)], 5) if len(x) < 100 else (".", 2)
+        label = f"{name}: LIGGGHTS"
+        axes.plot(x, engine, mark, color=colour, ms=size, mfc="none", label=label)
+    if np.isfinite(reference).any():
+        axes.plot(x, reference, **{"color": colour, "lw": 0.9, **_LINES.get(one.against, {})})
+
+
+def _draw_published(axes: Axes, test: str, series: Sequence[str], quantity: str) -> None:
+    others = _OTHERS.get(test, ())
+    for name, marker in zip((*series, *others), "xx+", strict=False):
+        x, y = published_curve(test, name, quantity)
+        if len(x):
+            shade = "black" if name in others else GREY
+            label = f"published: {name}".replace("_", " ")
+            axes.plot(x, y, marker, color=shade, ms=5, mew=0.9, label=label)

@@ -10,7 +10,7 @@ from attack.calls import Said, refused
 from attack.checked import commands
 from attack.fuzz import binary_frames, prefix, text_frames
 from attack.ground import differences
-from tiny_run_files import Raw
+from made_run import Raw
 
 _VALUES = {"step": [1, 2, 3], "force_n": [0.1, np.nan, None], "ids": [[1], [2, 3], []]}
 

@@ -34,10 +34,8 @@ def numbered(pages: list[tuple[Path, str]]) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def first_run(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    """A project whose packages are those of this one, and how its first study ended there."""
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A project whose packages are those of this one."""
     folder = tmp_path_factory.mktemp("clone")
     for name in (*PROJECT, "examples", "benchmarks", "contract", "docs", "tests", "evidence"):
         if not (folder / name).exists():
@@ -51,35 +49,29 @@ def first_run(
     stamp = subprocess.run(["sh", "-c", wanted], cwd=folder, capture_output=True, check=True)
     extras = "".join(f"{extra}\n" for extra in ("cad", "crate", "docs", "notebook", "test"))
     (folder / ".venv/dragdeck-stamp").write_bytes(stamp.stdout + extras.encode())
-    return folder, shell(f"./run all --cores 2 --config study={STUDY}", folder)
-
-
-def test_the_first_study_runs(first_run: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
-    _, ran = first_run
-    assert ran.returncode == 0, ran.stdout + ran.stderr
-
-
-@pytest.fixture(scope="module")
-def clone(first_run: tuple[Path, subprocess.CompletedProcess[str]]) -> Path:
-    """The project with the results of its first study."""
-    folder, ran = first_run
-    if ran.returncode != 0:
-        pytest.skip("the first study failed, which test_the_first_study_runs reports")
     return folder
 
 
-def shell(text: str, folder: Path) -> subprocess.CompletedProcess[str]:
+@pytest.fixture(scope="module")
+def clone(project: Path) -> Path:
+    """The project with the results of its first study."""
+    runs(f"./run all --cores 2 --config study={STUDY}", project)
+    return project
+
+
+def runs(text: str, folder: Path) -> None:
+    """The commands end without an error."""
     words = ["bash", "-euo", "pipefail", "-c", text]
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     environment["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{environment['PATH']}"
     environment.pop("DISPLAY", None)
-    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
+    ran = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
+    assert ran.returncode == 0, f"{text}\n{ran.stdout[-2000:]}\n{ran.stderr[-2000:]}"
 
 
 @pytest.mark.parametrize(("page", "text"), SHELL, ids=numbered(SHELL))
 def test_a_command_runs(clone: Path, page: Path, text: str) -> None:
-    ran = shell(text, clone)
-    assert ran.returncode == 0, f"{ran.stdout[-2000:]}\n{ran.stderr[-2000:]}"
+    runs(text, clone)
 
 
 def calls(text: str) -> Iterator[list[str]]:
@@ -100,42 +92,39 @@ def test_a_long_command_would_run(clone: Path, call: str, pytestconfig: pytest.C
     With `--long-commands` they run as they are printed, but for those that run tests: hours.
     """
     if pytestconfig.getoption("--long-commands") and not call.startswith("./run test"):
-        ran = shell(call, clone)
-        assert ran.returncode == 0, f"{ran.stdout[-2000:]}\n{ran.stderr[-2000:]}"
+        runs(call, clone)
         return
     match call.split():
         case ["./run", target, *_] if target not in NOT_SNAKEMAKE:
-            ran = shell(f"{call} --dry-run", clone)
+            runs(f"{call} --dry-run", clone)
         case ["snakemake", *_]:
-            ran = shell(f"{call} --dry-run --cores 1", clone)
+            runs(f"{call} --dry-run --cores 1", clone)
         case ["./run", "dragdeck" | "dragchain" as program, command, *_]:
-            ran = shell(f"{program} {command} --help", clone)
+            runs(f"{program} {command} --help", clone)
         case ["./run", own, *_]:
-            ran = shell(f"./run --help | grep -F 'run {own}'", clone)
+            runs(f"./run --help | grep -F 'run {own}'", clone)
         case ["python", script, *_]:
-            ran = shell(f"python {script} --help", clone)
+            runs(f"python {script} --help", clone)
         case _:
             pytest.fail(f"{call}: mark its block `sh elsewhere`")
-    assert ran.returncode == 0, f"{ran.stdout[-2000:]}\n{ran.stderr[-2000:]}"
 
 
 @pytest.mark.parametrize("page", sorted({page for page, _ in PYTHON}), ids=name_of)
 def test_the_python_of_a_page_runs(clone: Path, page: Path) -> None:
     script = clone / "example.py"
     script.write_text("\n".join(text for own, text in PYTHON if own == page))
-    ran = shell("python example.py", clone)
-    assert ran.returncode == 0, ran.stderr[-2000:]
+    runs("python example.py", clone)
 
 
 @pytest.mark.parametrize(("page", "text"), STUDIES, ids=numbered(STUDIES))
-def test_an_example_of_a_study_is_valid(clone: Path, page: Path, text: str) -> None:
+def test_an_example_of_a_study_is_valid(project: Path, page: Path, text: str) -> None:
     example = yaml.safe_load(text)
     base = {} if "materials" in example and "motion" in example else {"extends": "uhlmann2015"}
-    folder = clone / "studies/example"
+    folder = project / "studies/example"
     folder.mkdir(exist_ok=True)
     (folder / "path.csv").write_text(WAYPOINTS)
     (folder / "study.yaml").write_text(yaml.safe_dump({**base, "title": "Example", **example}))
-    assert Project(clone).cases("example")
+    assert Project(project).cases("example")
 
 
 def test_only_known_kinds_of_code_are_on_the_pages() -> None:

@@ -10,7 +10,7 @@ from page_parts import PageError, Parts, stale_files, table_recipes, values
 from paths import ROOT
 from records import change, record_table, shown_value
 
-from evidence.contact_law.impact import limited_restitution
+from evidence.verification.law import limited_restitution
 
 TEXT = "".join(page.read_text(encoding="utf-8") for page in PAGES)
 

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tiny_run_files import Raw, write_tiny_run
+from made_run import Raw
+from tiny_run_files import write_tiny_run
 
 
 @pytest.fixture

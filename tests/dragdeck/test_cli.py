@@ -75,11 +75,6 @@ def test_render_writes_all_that_a_run_needs(case: Case, project: Project) -> Non
     assert names == {"in.liggghts", "case.json", "columns.json", "particles.data"}
 
 
-def test_an_unknown_run_lists_the_known(case: Case, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["step", "render", "small", "filling", "none"]) == 1
-    assert FILLING.run_id(case) in capsys.readouterr().err
-
-
 def test_outside_a_project(
     tmp_path_factory: pytest.TempPathFactory,
     monkeypatch: pytest.MonkeyPatch,
@@ -201,9 +196,3 @@ def test_a_contact_law_that_adds_a_force_is_recorded(
     assert recorded["added_forces"] == ["cohesion sjkr2"]
     (changed,) = recorded["changed_law"]
     assert changed == "pair_style gran model hertz tangential history cohesion sjkr2 limitForce on"
-
-
-def test_a_study_without_templates_changes_no_law(case: Case, project: Project) -> None:
-    assert main(["step", "render", "small", "filling", FILLING.run_id(case)]) == 0
-    recorded = json.loads((project.run_folder(case, FILLING) / "case.json").read_text())
-    assert recorded["added_forces"] == recorded["changed_law"] == []

@@ -83,23 +83,3 @@ def test_open_says_where_the_report_is(case: Case, project: Project, capsys: Sai
     assert capsys.readouterr().out == f"{file}\n"
     assert main(["status", "small"]) == 0
     assert capsys.readouterr().out.endswith(f"report: {file}\n")
-
-
-def test_open_starts_the_viewer_of_a_display(
-    case: Case, project: Project, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    file = project.report("small")
-    file.parent.mkdir(parents=True)
-    file.touch()
-    opened: list[list[str]] = []
-    monkeypatch.setenv("DISPLAY", ":0")
-    monkeypatch.setattr("shutil.which", lambda name: f"/usr/bin/{name}")
-    monkeypatch.setattr("subprocess.Popen", lambda words, **_: opened.append(words))
-    assert main(["open", "small"]) == 0
-    assert opened == [["/usr/bin/xdg-open", str(file)]]
-
-
-def test_an_unknown_study_is_named(case: Case, capsys: Said) -> None:
-    for command in ("status", "open"):
-        assert main([command, "large"]) == 1
-        assert "one of: small" in capsys.readouterr().err

@@ -20,7 +20,7 @@ HUNG_S = 3600.0
 
 
 class Browser:
-    """A window of 1366 x 900 pixels, unless `size` says otherwise.
+    """A window of 1366 x 900 pixels.
 
     Parameters
     ----------
@@ -30,15 +30,13 @@ class Browser:
         Beyond those of every test: `WEBGL` or `NO_WEBGL`.
     """
 
-    def __init__(
-        self, profile: Path, switches: tuple[str, ...] = WEBGL, size: str = "1366,900"
-    ) -> None:
+    def __init__(self, profile: Path, switches: tuple[str, ...] = WEBGL) -> None:
         from selenium import webdriver
         from selenium.webdriver.chrome.service import Service
 
         options = webdriver.ChromeOptions()
         options.binary_location = shutil.which("chromium")
-        own = (f"--user-data-dir={profile}", f"--window-size={size}")
+        own = (f"--user-data-dir={profile}", "--window-size=1366,900")
         for switch in (*_SWITCHES, *switches, *own):
             options.add_argument(switch)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
@@ -94,27 +92,6 @@ class Browser:
             chain.move_to_element_with_offset(element, *off)
             press()
         chain.perform()
-
-    def phone(self) -> None:
-        """Show pages as a phone of 390 x 844 pixels does, until `desktop`."""
-        size = {"width": 390, "height": 844, "deviceScaleFactor": 2, "mobile": True}
-        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-
-    def desktop(self) -> None:
-        """Show pages in the window again."""
-        self.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-
-    def saved(self, folder: Path, selector: str) -> Path:
-        """Click what saves a file, and wait for the file."""
-        where = {"behavior": "allow", "downloadPath": str(folder)}
-        self.driver.execute_cdp_cmd("Browser.setDownloadBehavior", where)
-        self.click(selector)
-
-        def files() -> list[Path]:
-            return [file for file in folder.iterdir() if not file.name.endswith(".crdownload")]
-
-        self.wait(files, "the file")
-        return files()[0]
 
     def errors(self) -> list[str]:
         """What the page wrote to the console, but for notes of the graphics driver."""

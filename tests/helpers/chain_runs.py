@@ -4,7 +4,7 @@ import numpy as np
 
 from dragchain.arrays import Floats
 from dragchain.drag.peaks import find_drag_peaks
-from evidence.validation.chain_peaks import ChainSeries, Findings, findings
+from evidence.validation.peaks import ChainSeries, Findings, findings
 
 FRAMES = 400
 INTERVAL_S = 0.01

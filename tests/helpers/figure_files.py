@@ -1,13 +1,12 @@
-"""Shared by tests of several modules."""
+"""A process run with one peak of the drag, and its tables."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pyvista as pv
-from made_motion import with_motion
+from made_run import line, made_case, output, phases, save, write_documents
 
 from dragchain.network.write import write_chains
 
@@ -16,52 +15,19 @@ STEP_S = 1e-3
 DRAG_START = 100
 LAST = 500
 PERIOD = 20
-LINE = {"kind": "line", "start_m": [-0.01, 0.0]}
 
 
-def case_json(scene_name: str) -> dict[str, Any]:
-    case = {
-        "schema": 2, "study": "made", "scene": scene_name, "run": f"made-{scene_name}",
-        "case": "made case", "upstream": {}, "timestep_s": STEP_S, "rayleigh_time_s": 2e-3,
-        "gravity_m_s2": 10.0,
-        "fidelity": {
-            "name": "draft", "youngs_modulus_scale": 0.01, "timestep_fraction": 0.5,
-            "speed_factor": 1.0, "skin_m": 0.001, "ranks": 1,
-        },
-        "inputs": {"media.count": 3},
-        "media": {"count": 3, "radius_mean_m": R, "radius_std_m": 0.0, "density_kg_m3": 2500.0},
-        "bowl": {"radius_m": 0.02, "walls": "primitive"},
-        "workpiece": {"kind": "cylinder", "radius_m": 0.002, "length_m": 0.05,
-        "mesh": "workpiece.stl",
-                 "immersion_depth_m": 0.02},
-
-               "surface_m": 0.03,
-        "phases": [
-            {"name": "plunge", "start_step": 0, "end_step": DRAG_START},
-            {"name": "drag", "start_step": DRAG_START, "end_step": LAST},
-        ],
-        "statistics": {"transient_s": 0.1}, "restitution": 0.7, "assumptions": [],
+def case_json(scene: str, **values: Any) -> dict[str, Any]:
+    """Content of ``case.json`` of a run of three particles."""
+    own = {
+        "timestep_s": STEP_S, "gravity_m_s2": 10.0, "inputs": {"media.count": 3},
+        "media": {"count": 3, "radius_mean_m": R},
+        "workpiece": {"radius_m": 0.002, "length_m": 0.05},
+        "motion": line(0.1, start_m=[-0.01, 0.0]), "phases": phases(DRAG_START, LAST),
+        "restitution": 0.7,
         "reference": {"source": "a paper", "experiment": {"drag_mean_n": -4.0}},
-        "versions": {"dragdeck": "0.1.0"},
     }  # fmt: skip
-    return with_motion(case, LINE, 0.1)
-
-
-def columns_json(run_dir: Path, outputs: dict[str, Any]) -> None:
-    content = {"schema": 2, "outputs": outputs}
-    (run_dir / "columns.json").write_text(json.dumps(content))
-
-
-def printed(columns: list[str], period: int, last: int | None = LAST) -> dict[str, Any]:
-    return {
-        "kind": "print", "binary": False, "pattern": "out.{part}.txt", "columns": columns,
-        "engine_columns": None, "period_steps": period, "first_step": 0, "last_step": last,
-    }  # fmt: skip
-
-
-def save(table: pd.DataFrame, run_dir: Path, name: str) -> None:
-    (run_dir / "tables").mkdir(exist_ok=True)
-    table.to_parquet(run_dir / "tables" / f"{name}.parquet", index=False)
+    return made_case(scene, f"made-{scene}", **own | values)
 
 
 def resistance(steps: Any) -> Any:
@@ -127,8 +93,8 @@ def workpiece_contacts_table() -> pd.DataFrame:
 
 def write_process_run(run_dir: Path) -> Path:
     """Write a process run with one peak, its tables and its chains into a folder that is there."""
-    (run_dir / "case.json").write_text(json.dumps(case_json("process")))
-    columns_json(run_dir, {"workpiece_contacts": printed(["step"], 10)})
+    outputs = {"workpiece_contacts": output("print", ["step"], 10, 0, LAST)}
+    write_documents(run_dir, case_json("process"), outputs)
     contacts, particles = network_tables()
     save(workpiece_force_table(), run_dir, "workpiece_force")
     save(contacts, run_dir, "contacts")

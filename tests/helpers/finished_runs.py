@@ -1,12 +1,12 @@
 """Runs with all their tables, made in a second from the tiny run."""
 
-import json
 import math
 from pathlib import Path
 from typing import Any
 
-from report_files import run_json
-from tiny_run_files import WORKPIECE_RADIUS_M, write_tiny_run
+import pyvista as pv
+from made_run import run_json, write_documents
+from tiny_run_files import WORKPIECE_RADIUS_M, case_json, write_tiny_run
 
 from dragchain import write_tables
 from dragchain.loading.write import write_loading
@@ -41,12 +41,20 @@ def write_finished_run(folder: Path, **case: Any) -> Path:
     """Write a process run with its tables, chains and loading; `case` changes its case.json."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     write_tiny_run(folder)
-    file = folder / "case.json"
-    content = json.loads(file.read_text()) | {"statistics": {"transient_s": TRANSIENT_S}}
-    file.write_text(json.dumps(content | {"run": folder.name} | case))
-    (folder / "run.json").write_text(json.dumps(run_json()))
+    shorter = case_json(statistics={"transient_s": TRANSIENT_S}) | {"run": folder.name}
+    write_documents(folder, shorter | case, record=run_json())
     (folder / "workpiece.stl").write_text(square_workpiece())
     write_tables(folder)
     write_chains(folder)
     write_loading(folder)
+    return folder
+
+
+def analysed_tiny_run(folder: Path) -> Path:
+    """The tiny run with its tables, its chains and a mesh of the workpiece."""
+    write_tiny_run(folder)
+    write_tables(folder)
+    write_chains(folder)
+    workpiece = pv.Cylinder(center=(0, 0, 0.03), direction=(0, 0, 1), radius=0.005, height=0.06)
+    workpiece.triangulate().save(folder / "workpiece.stl")
     return folder

@@ -1,14 +1,12 @@
 """A run with four particles on a plate, made by hand: one slides, one rolls, one hits, one
 rests."""
 
-import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from made_motion import with_motion
+from made_run import line, made_case, output, phases, write_documents
 
 STEP_S = 1e-4
 PERIOD = 10
@@ -41,37 +39,20 @@ endsolid plate
 """A square of 20 mm that looks along +x; its diagonal runs up to the left."""
 
 
-LINE = {"kind": "line", "start_m": [0.0, 0.0]}
-
-
-def case_json(path: Mapping[str, Any] = LINE, **motion: Any) -> dict[str, Any]:
+def case_json(**motion: Any) -> dict[str, Any]:
+    """Content of ``case.json``; `motion` changes that along a line."""
     steel = {"youngs_modulus_pa": 2e11, "poissons_ratio": 0.3}
-    case = {
-        "schema": 2, "study": "made", "scene": "process", "run": "made-process",
-        "case": "made case", "upstream": {}, "timestep_s": STEP_S, "rayleigh_time_s": 2e-4,
-        "gravity_m_s2": 9.81,
-        "fidelity": {
-            "name": "draft", "youngs_modulus_scale": 0.01, "timestep_fraction": 0.5,
-            "speed_factor": 1.0, "skin_m": 0.001, "ranks": 1,
-        },
-        "inputs": {
-            "media.material": "ceramic", "workpiece.material": "steel",
-            "pairs.ceramic-steel.friction": MU,
-            **{f"materials.{m}.{k}": v for m in ("ceramic", "steel") for k, v in steel.items()},
-        },
-        "media": {"count": 4, "radius_mean_m": 3e-3, "radius_std_m": 0.0, "density_kg_m3": 2500.0},
-        "bowl": {"radius_m": 0.1, "walls": "primitive"},
-        "workpiece": {"kind": "mesh", "radius_m": 0.01, "length_m": SIZE, "mesh": "workpiece.stl",
-                 "immersion_depth_m": SIZE},
-        "surface_m": SURFACE,
-        "phases": [
-            {"name": "plunge", "start_step": 0, "end_step": START},
-            {"name": "drag", "start_step": START, "end_step": LAST},
-        ],
-        "statistics": {"transient_s": 0.0}, "assumptions": [], "reference": None,
-        "versions": {"dragdeck": "0.1.0"},
+    inputs = {
+        "media.material": "ceramic", "workpiece.material": "steel",
+        "pairs.ceramic-steel.friction": MU,
+        **{f"materials.{m}.{k}": v for m in ("ceramic", "steel") for k, v in steel.items()},
     }  # fmt: skip
-    return with_motion(case, path, SPEED, **motion)
+    return made_case(
+        "process", "made-process", timestep_s=STEP_S, rayleigh_time_s=2e-4, inputs=inputs,
+        bowl={"radius_m": 0.1}, surface_m=SURFACE, motion=line(SPEED) | motion,
+        workpiece={"kind": "mesh", "radius_m": 0.01, "length_m": SIZE, "immersion_depth_m": SIZE},
+        phases=phases(START, LAST), statistics={"transient_s": 0.0},
+    )  # fmt: skip
 
 
 def contact(
@@ -115,15 +96,8 @@ def made_contacts() -> list[dict[str, Any]]:
 
 def write_run(folder: Path, rows: list[dict[str, Any]]) -> Path:
     """A run folder with its tables."""
-    (folder / "tables").mkdir(parents=True)
-    (folder / "case.json").write_text(json.dumps(case_json()))
-    output = {
-        "kind": "local", "binary": False, "pattern": "workpiece_contacts.{part}.dump",
-        "columns": ["point_x_m"], "engine_columns": None, "period_steps": PERIOD,
-        "first_step": START, "last_step": LAST,
-    }  # fmt: skip
-    columns = {"schema": 2, "outputs": {"workpiece_contacts": output}}
-    (folder / "columns.json").write_text(json.dumps(columns))
+    outputs = output("local", ["point_x_m"], PERIOD, START, LAST)
+    write_documents(folder, case_json(), {"workpiece_contacts": outputs})
     (folder / "workpiece.stl").write_text(PLATE)
     contacts = pd.DataFrame(rows).sort_values(["step", "particle_id"])
     contacts.to_parquet(folder / "tables/workpiece_contacts.parquet")

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pyvista as pv
-from figure_files import DRAG_START, LAST, LINE, PERIOD, STEP_S, case_json, columns_json, save
-from made_motion import with_motion
+from figure_files import DRAG_START, LAST, PERIOD, STEP_S, case_json
+from made_run import output, particles_kept, run_json, save, write_documents
 from networks import RADIUS_M, random_frame
 
 from dragchain.figures.style import drawing
@@ -23,23 +23,17 @@ PEAK_N = (6.0, 5.0, 4.0)
 KIND = {body: f"particle-{name}" for body, name in KINDS.items()}
 
 
-def write_network_run(
-    folder: Path, kind: str = "cylinder", heading_deg: float = 0.0, **changes: Any
-) -> Path:
+def write_network_run(folder: Path, kind: str = "cylinder", **changes: Any) -> Path:
     """Write a run of 216 particles; `changes` are of its ``case.json``.
 
     The forces of each network frame are those of one random network times a factor, and the
     particles move by as much as 0.2 radii. The drag has three peaks.
     """
-    (folder / "tables").mkdir(parents=True)
-    path = LINE | {"direction_deg": heading_deg}
-    case = with_motion(case_json("process") | changes, path, 0.1)
-    case["workpiece"] = case["workpiece"] | {"kind": kind}
-    (folder / "case.json").write_text(json.dumps(case))
-    network = {"first_step": DRAG_START, "last_step": LAST, "period_steps": PERIOD}
-    output = {"kind": "local", "binary": False, "pattern": "x.{part}", "engine_columns": None}
+    case = case_json("process", **changes)
+    case["workpiece"]["kind"] = kind
     names = ("contacts", "particles", "workpiece_contacts", "workpiece_particles")
-    columns_json(folder, {n: {**output, **network, "columns": ["step"]} for n in names})
+    network = output("local", ["step"], PERIOD, DRAG_START, LAST)
+    write_documents(folder, case, dict.fromkeys(names, network))
     frames = [_frame(step) for step in range(DRAG_START, LAST + 1, PERIOD)]
     for number, name in enumerate(("contacts", "particles")):
         save(pd.concat([frame[number] for frame in frames], ignore_index=True), folder, name)
@@ -51,10 +45,8 @@ def write_network_run(
 
 def accept(folder: Path, **changes: Any) -> None:
     """Write a ``run.json`` that passed its checks, unless it is changed."""
-    check = {"code": "particles_kept", "name": "no particle lost", "passed": True,
-             "seen": "216", "limit": "216"}  # fmt: skip
-    record = {"schema": 2, "state": "complete", "engine_version": "3.8", "ranks": 1,
-              "started": "2026-01-01T00:00:00", "checks": [check | changes]}  # fmt: skip
+    check = particles_kept(1422) | {"seen": "216", "limit": "216"} | changes
+    record = run_json(checks=[check], ranks=1)
     (folder / "run.json").write_text(json.dumps(record))
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from evidence.verification.collide import CollideCase
+from evidence.verification.experiment import CollideCase
 from evidence.verification.recording import Recording
 
 STEEL = {"name": "steel", "youngs_modulus_pa": 2e11, "poissons_ratio": 0.3, "density_kg_m3": 7800.0}

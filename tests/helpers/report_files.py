@@ -1,12 +1,11 @@
-"""Shared by tests of several modules."""
+"""Runs of a study as a report finds them: documents, findings and pictures."""
 
 import base64
-import json
 import math
 from pathlib import Path
 from typing import Any
 
-from made_motion import with_motion
+from made_run import made_case, run_json, write_documents
 from pages import Page
 
 from dragchain.report.findings import (
@@ -48,45 +47,23 @@ ASKED = {
 
 
 def case_json(scene: str, run: str, **more: Any) -> dict[str, Any]:
-    case = {
-        "schema": 2, "study": "small", "scene": scene, "run": run, "case": "10 mm <workpiece>",
-        "upstream": {}, "timestep_s": 2.5e-5, "rayleigh_time_s": 3.2e-5, "gravity_m_s2": 9.81,
-        "fidelity": {
-            "name": "draft", "youngs_modulus_scale": 0.01, "timestep_fraction": 0.77,
-            "speed_factor": 1.0, "skin_m": 0.0003, "ranks": 2,
-        },
+    """Content of ``case.json`` of a study's run."""
+    own = {
+        "study": "small", "case": "10 mm <workpiece>", "timestep_s": 2.5e-5,
+        "rayleigh_time_s": 3.2e-5, "surface_m": 0.07, "restitution": 0.68,
         "inputs": {"media.count": 1422, "seeds": [1, 2]},
-        "media": {"count": 1422, "radius_mean_m": 0.00327, "radius_std_m": 0.0,
-                  "density_kg_m3": 2656.0},
-        "bowl": {"radius_m": 0.04, "walls": "primitive"},
-        "workpiece": {"kind": "cylinder", "radius_m": 0.005, "length_m": 0.08,
-        "mesh": "workpiece.stl",
-                 "immersion_depth_m": 0.05},
-        "surface_m": 0.07,
+        "fidelity": {"timestep_fraction": 0.77, "skin_m": 0.0003, "ranks": 2},
+        "media": {"count": 1422, "radius_mean_m": 0.00327, "density_kg_m3": 2656.0},
+        "bowl": {"radius_m": 0.04}, "workpiece": {"length_m": 0.08, "immersion_depth_m": 0.05},
+        "motion": {"path": {"kind": "circle", "radius_m": 0.02}, "speed_m_s": 0.01,
+                   "orientation": "follow_path"},
         "phases": [{"name": "drag", "start_step": 4000, "end_step": 64000}],
-        "statistics": {"transient_s": 0.5}, "restitution": 0.68,
+        "statistics": {"transient_s": 0.5},
         "assumptions": [{"field": "bowl.radius_m", "value": 0.04, "why": "a plausible fraction"}],
         "reference": {"source": "a paper",
                       "experiment": {"drag_mean_n": -2.59, "drag_std_n": 0.66}},
-        "versions": {"dragdeck": "0.1.0"},
-    } | more  # fmt: skip
-    path = {"kind": "circle", "radius_m": 0.02}
-    return with_motion(case, path, 0.01, orientation="follow_path")
-
-
-def run_json(**more: Any) -> dict[str, Any]:
-    return {
-        "schema": 2, "state": "complete", "engine_version": "Engine 3.8", "ranks": 2,
-        "steps": 160000, "steps_per_s": 2100.0, "wall_time_s": 76.0,
-        "started": "2026-01-01T00:00:00", "parts": [{"part": 1, "from": None, "from_step": 0}],
-        "checks": [particles_kept(1422)],
-    } | more  # fmt: skip
-
-
-def particles_kept(seen: int) -> dict[str, Any]:
-    return {"code": "particles_kept", "name": "no particle lost", "passed": seen == 1422,
-            "seen": str(seen), "limit": "1422",
-            "remedy": None if seen == 1422 else "choose a smaller timestep_fraction"}  # fmt: skip
+    }  # fmt: skip
+    return made_case(scene, run, **own | more)
 
 
 def known(value: float) -> Estimate:
@@ -135,10 +112,8 @@ DROP = DropFindings(
 
 def make_run(results: Path, case: dict[str, Any], findings: Findings, names: list[str]) -> Path:
     folder = results / "small" / case["scene"] / case["run"]
-    (folder / "tables").mkdir(parents=True)
+    write_documents(folder, case, record=run_json())
     (folder / "figures").mkdir()
-    (folder / "case.json").write_text(json.dumps(case))
-    (folder / "run.json").write_text(json.dumps(run_json()))
     findings.write(folder / FILE)
     for name in names:
         (folder / "figures" / f"{name}.png").write_bytes(PNG)

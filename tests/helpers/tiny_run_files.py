@@ -1,46 +1,11 @@
-"""What the engine writes, made by hand, and the files of a run small enough to check by hand."""
+"""The files of a run small enough to check by hand."""
 
-import json
-import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from made_motion import with_motion
-
-BOX = "ITEM: BOX BOUNDS ff ff ff\n-0.05 0.05\n-0.05 0.05\n0 0.4\n"
-
-
-class Raw:
-    """Writes what the engine writes."""
-
-    @staticmethod
-    def binary(step: int, rows: Sequence[Sequence[float]], width: int, ranks: int = 2) -> bytes:
-        """One frame of a binary ``dump custom``; the rows are dealt out to the ranks."""
-        fractions = [rows[rank::ranks] for rank in range(ranks)]
-        chunks = [
-            struct.pack(f"<i{width * len(fraction)}d", width * len(fraction), *np.ravel(fraction))
-            for fraction in fractions
-        ]
-        box = (-0.05, 0.05, -0.05, 0.05, 0.0, 0.4)
-        head = struct.pack("<qqi6i6dii", step, len(rows), 0, *[1] * 6, *box, width, ranks)
-        return head + b"".join(chunks)
-
-    @staticmethod
-    def text(step: int, rows: Iterable[Iterable[float]], names: Sequence[str], kind: str) -> bytes:
-        """One frame of a text dump of kind ``custom`` or ``local``."""
-        noun = {"custom": "ATOMS", "local": "ENTRIES"}[kind]
-        lines = [" ".join(f"{value:.9g}" for value in row) + " \n" for row in rows]
-        head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF {noun}\n{len(lines)}\n{BOX}"
-        return (head + f"ITEM: {noun} {' '.join(names)} \n" + "".join(lines)).encode()
-
-    @staticmethod
-    def prints(rows: Iterable[Iterable[float]], names: Sequence[str]) -> bytes:
-        """A ``fix print`` file."""
-        lines = [" ".join(f"{value:.15g}" for value in row) + "\n" for row in rows]
-        return (" ".join(names) + "\n" + "".join(lines)).encode()
-
+from made_run import Raw, line, made_case, output, phases, write_documents
 
 TIMESTEP_S = 1e-3
 GRAVITY_M_S2 = 9.81
@@ -154,114 +119,72 @@ def _particles(step: int) -> list[list[float]]:
     ]
 
 
-def outputs_json() -> dict[str, Any]:
-    """Content of ``columns.json``."""
-    outputs = {
-        name: {
-            "kind": kind,
-            "binary": binary,
-            "pattern": f"{name}.{{part}}.{ending}",
-            "columns": COLUMNS[name],
-            "engine_columns": [f"c_x[{i}]" for i in range(len(COLUMNS[name]))]
-            if kind == "local"
-            else None,
-            "period_steps": period,
-            "first_step": first,
-            "last_step": LAST,
-        }
+def outputs() -> dict[str, Any]:
+    """The outputs in ``columns.json``."""
+    return {
+        name: output(kind, COLUMNS[name], period, first, LAST, f"{name}.{{part}}.{ending}",
+                     binary=binary, engine_columns=_engine_columns(name))
         for name, (kind, binary, ending, period, first) in KINDS.items()
-    }
-    return {"schema": 2, "outputs": outputs}
+    }  # fmt: skip
 
 
-def case_json() -> dict[str, Any]:
+def _engine_columns(name: str) -> list[str] | None:
+    local = KINDS[name][0] == "local"
+    return [f"c_x[{i}]" for i in range(len(COLUMNS[name]))] if local else None
+
+
+def case_json(**values: Any) -> dict[str, Any]:
     """Content of ``case.json``."""
-    case = {
-        "schema": 2,
-        "study": "tiny",
-        "scene": "process",
-        "run": "tiny-00000000",
-        "case": "tiny",
+    inputs = {
+        "media.count": 4,
+        "media.material": "stone",
+        **dict.fromkeys(("bowl.material", "workpiece.material"), "steel"),
+        **dict.fromkeys(("pairs.stone-stone.friction", "pairs.steel-stone.friction"), FRICTION),
+        **{f"materials.{m}.youngs_modulus_pa": 1e9 for m in ("stone", "steel")},
+        **{f"materials.{m}.poissons_ratio": 0.3 for m in ("stone", "steel")},
+    }
+    tiny = {
+        "study": "tiny", "case": "tiny", "timestep_s": TIMESTEP_S, "surface_m": SURFACE_M,
         "upstream": {"filling": "filling-00000000", "drop_test": "drop-00000000"},
-        "timestep_s": TIMESTEP_S,
-        "rayleigh_time_s": 2e-3,
-        "gravity_m_s2": GRAVITY_M_S2,
-        "fidelity": {
-            "name": "draft",
-            "youngs_modulus_scale": 0.01,
-            "timestep_fraction": 0.5,
-            "speed_factor": 1.0,
-            "skin_m": 0.001,
-            "ranks": 2,
-        },
-        "inputs": {
-            "media.count": 4,
-            "media.material": "stone",
-            **dict.fromkeys(("bowl.material", "workpiece.material"), "steel"),
-            **dict.fromkeys(("pairs.stone-stone.friction", "pairs.steel-stone.friction"), FRICTION),
-            **{f"materials.{m}.youngs_modulus_pa": 1e9 for m in ("stone", "steel")},
-            **{f"materials.{m}.poissons_ratio": 0.3 for m in ("stone", "steel")},
-        },
-        "media": {
-            "count": 4,
-            "radius_mean_m": RADIUS_M,
-            "radius_std_m": 0.0,
-            "density_kg_m3": DENSITY_KG_M3,
-        },
-        "bowl": {"radius_m": BOWL_RADIUS_M, "walls": "primitive"},
-        "workpiece": {
-            "kind": "cylinder",
-            "radius_m": WORKPIECE_RADIUS_M,
-            "length_m": 0.06,
-            "mesh": "workpiece.stl",
-            "immersion_depth_m": 0.03,
-        },
-        "surface_m": SURFACE_M,
-        "phases": [
-            {"name": "plunge", "start_step": 0, "end_step": DRAG_START},
-            {"name": "drag", "start_step": DRAG_START, "end_step": LAST},
-        ],
+        "fidelity": {"ranks": 2}, "media": {"radius_mean_m": RADIUS_M}, "inputs": inputs,
+        "bowl": {"radius_m": BOWL_RADIUS_M}, "workpiece": {"immersion_depth_m": 0.03},
+        "motion": line(SPEED_M_S), "phases": phases(DRAG_START, LAST),
         "statistics": {"transient_s": 0.02},
         "assumptions": [{"field": "bowl.radius_m", "value": BOWL_RADIUS_M, "why": "by hand"}],
-        "reference": None,
-        "versions": {"dragdeck": "0.1.0"},
-    }
-    return with_motion(case, {"kind": "line", "start_m": [0.0, 0.0]}, SPEED_M_S)
+    }  # fmt: skip
+    return made_case("process", "tiny-00000000", **tiny | values)
 
 
 def raw_files() -> Mapping[str, bytes]:
     """Names and contents of the raw outputs."""
-    outputs = outputs_json()["outputs"]
-    steps = {
-        name: range(output["first_step"], LAST + 1, output["period_steps"])
-        for name, output in outputs.items()
-    }
-    engine = {name: output["engine_columns"] for name, output in outputs.items()}
+    steps = {name: range(first, LAST + 1, period) for name, (*_, period, first) in KINDS.items()}
     thermo = [[step, step * TIMESTEP_S, 4, 0, 0] for step in steps["thermo"]]
     workpiece_force = [_workpiece_force(step) for step in steps["workpiece_force"]]
+    binary = {"workpiece_particles": workpiece_particles, "particles": _particles}
+    text = {"workpiece_contacts": _workpiece_contacts, "contacts": _contacts}
     return {
         "thermo.1.txt": Raw.prints(thermo, COLUMNS["thermo"]),
         "workpiece_force.1.txt": Raw.prints(workpiece_force, COLUMNS["workpiece_force"]),
-        "workpiece_particles.1.bin": b"".join(
-            Raw.binary(s, workpiece_particles(s), len(COLUMNS["workpiece_particles"]))
-            for s in steps["workpiece_particles"]
-        ),
-        "particles.1.bin": b"".join(Raw.binary(s, _particles(s), 17) for s in steps["particles"]),
-        "workpiece_contacts.1.dump": b"".join(
-            Raw.text(s, _workpiece_contacts(s), engine["workpiece_contacts"], "local")
-            for s in steps["workpiece_contacts"]
-        ),
-        "contacts.1.dump": b"".join(
-            Raw.text(s, _contacts(s), engine["contacts"], "local") for s in steps["contacts"]
-        ),
+        **{
+            f"{name}.1.bin": b"".join(
+                Raw.binary(step, rows(step), len(COLUMNS[name])) for step in steps[name]
+            )
+            for name, rows in binary.items()
+        },
+        **{
+            f"{name}.1.dump": b"".join(
+                Raw.text(step, rows(step), _engine_columns(name), "local") for step in steps[name]
+            )
+            for name, rows in text.items()
+        },
     }
 
 
 def write_tiny_run(folder: Path) -> Path:
     """Write the run into a new folder, without its tables."""
     folder.mkdir()
-    (folder / "case.json").write_text(json.dumps(case_json()))
-    (folder / "columns.json").write_text(json.dumps(outputs_json()))
+    write_documents(folder, case_json(), outputs())
+    (folder / "tables").rmdir()
     for name, content in raw_files().items():
         (folder / name).write_bytes(content)
     return folder

@@ -10,9 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from loading_files import LINE as STRAIGHT
 from loading_files import STEP_S, case_json
-from made_motion import with_motion
+from made_run import line, with_motion
 from paths import ROOT, SMALL_STUDY
 from plate import PLATE
 
@@ -488,7 +487,7 @@ def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: 
         "timestep_s": drag.timestep_s,
         "phases": [{"name": "drag", "start_step": 0, "end_step": STEPS}],
     }
-    made = with_motion(made, STRAIGHT, SPEED, spin={"rpm": RPM, "ramp_s": 0})
+    made = with_motion(made, **line(SPEED), spin={"rpm": RPM, "ramp_s": 0})
     made["inputs"] |= {"bowl.material": "steel", "pairs.ceramic-steel.friction": FRICTION}
     (tmp_path / "case.json").write_text(json.dumps(made))
     engine(tmp_path)

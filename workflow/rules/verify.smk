@@ -1,61 +1,12 @@
 # Verification of the contact law on the engine: single impacts and a few particles.
 
-VERIFICATION_RUNS = list(suite_of(CASES[0].study))
 
-
-rule render_verification:
-    input:
-        templates_of("collide"),
-        suite="evidence/verification/suite.yaml",
-    output:
-        [
-            of_experiment(run, file)
-            for run in VERIFICATION_RUNS
-            for file in ("in.liggghts", "case.json", "columns.json", "bodies.data")
-        ],
-    log:
-        "results/verification/logs/render.log",
-    benchmark:
-        "results/verification/benchmarks/render.tsv"
-    conda:
-        "../envs/python.yaml"
-    params:
-        study=STUDY,
-        fidelity=fidelity_option,
-        source=source_hash("evidence.verification.suite"),
-    shell:
-        "python -m evidence render-suite {params.study} {params.fidelity} > {log} 2>&1"
-
-
-rule run_verification:
-    input:
-        of_experiment("{run}", "in.liggghts"),
-        of_experiment("{run}", "case.json"),
-        of_experiment("{run}", "columns.json"),
-        of_experiment("{run}", "bodies.data"),
-    output:
-        of_experiment("{run}", "run.json"),
-    log:
-        of_experiment("{run}", "logs/run.log"),
-    benchmark:
-        of_experiment("{run}", "benchmarks/run.tsv")
-    conda:
-        "../envs/python.yaml"
-    resources:
-        engine=1,
-    params:
-        source=source_hash("dragdeck.engine.run_folder"),
-    shell:
-        "dragdeck run $(dirname {output}) > {log} 2>&1"
-
-
+# Many runs of seconds in one job; a job that is interrupted goes on where it was.
 rule judge_verification:
     input:
-        [of_experiment(run, "run.json") for run in VERIFICATION_RUNS],
-        templates=page_templates(
-            "verification/verification.html.j2", "verification/tests.html.j2", package="evidence"
-        ),
-        published="evidence/verification/published.csv",
+        WORK.templates_of("collide"),
+        page=WORK.page_templates("verification/verification.html.j2", package="evidence"),
+        suite=["evidence/verification/suite.yaml", "evidence/verification/published.csv"],
     output:
         multiext(
             "results/verification/report/",
@@ -71,16 +22,22 @@ rule judge_verification:
             labels={"run": "all", "figure": "report"},
         ),
     log:
-        "results/verification/logs/judge.log",
+        "results/verification/logs/verify.log",
     benchmark:
-        "results/verification/benchmarks/judge.tsv"
+        "results/verification/benchmarks/verify.tsv"
     conda:
         "../envs/python.yaml"
+    threads: 4
+    resources:
+        prints=1,
     params:
-        runs=[of_experiment(run, "") for run in VERIFICATION_RUNS],
+        study=STUDY,
+        fidelity=WORK.fidelity_option,
+        cases=[scene.digest(CASES[0]) for scene in SCENES.values()],
         source=source_hash("evidence.verification.report"),
     shell:
-        "python -m evidence judge-suite --out $(dirname {output.page}) {params.runs} > {log} 2>&1"
+        "python -m evidence verify {params.study} {params.fidelity} --cores {threads}"
+        " --out $(dirname {output.page}) 2>&1 | tee -i {log}"
 
 
 # Fails if a quantity failed, and leaves the report to look at.

@@ -25,15 +25,6 @@ def effective_modulus(first: Elastic, second: Elastic) -> float:
     )
 
 
-def effective_shear(first: Elastic, second: Elastic) -> float:
-    """Effective shear modulus 1/G* = sum (2 - nu)/G, Pa (Mindlin 1949)."""
-    return 1 / sum(
-        2 * (2 - nu) * (1 + nu) / material.youngs_modulus_pa
-        for material in (first, second)
-        for nu in (material.poissons_ratio,)
-    )
-
-
 def contact_time(mass_kg: float, radius_m: float, modulus_pa: float, speed_m_s: float) -> float:
     """Time for which a particle that hits a plane touches it, s (Johnson 1985, eq. 11.24).
 
@@ -46,12 +37,3 @@ def contact_time(mass_kg: float, radius_m: float, modulus_pa: float, speed_m_s: 
 def sphere_mass(radius_m: Number, density_kg_m3: float) -> Number:
     """Mass of solid spheres, kg."""
     return 4 / 3 * math.pi * radius_m**3 * density_kg_m3
-
-
-def tangential_damping_ratio(poissons_ratio: float) -> float:
-    """Tangential damping constant over the normal one, for two bodies of one material.
-
-    The engine's law takes both from the stiffnesses, ``sqrt(k_t / k_n)`` with
-    ``k_n = 2 E* sqrt(R* d)`` and ``k_t = 8 G* sqrt(R* d)``.
-    """
-    return math.sqrt(2 * (1 - poissons_ratio) / (2 - poissons_ratio))

@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.dumps.run_parts import iter_prints
 from dragchain.figures import network_picture
 from dragchain.figures.network_picture import force_bar, show_network
 from dragchain.figures.panels import (
@@ -38,6 +37,7 @@ from dragchain.report.findings import (
 from dragchain.report.run_data import RunData, write_findings
 from dragchain.run.case import Case, load_case, load_outputs
 from dragchain.run.kinematics import process_time
+from dragchain.run.run_parts import iter_prints
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 

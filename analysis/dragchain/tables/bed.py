@@ -3,11 +3,11 @@
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
 from dragdeck.documents import Document
+from dragdeck.dumps.frame import Frame
 
 
 class Packing(Document):

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from dragchain.dumps.any_dump import dump_files, layout_of
-from dragchain.dumps.fast_reader import read_batches
-from dragchain.errors import DumpError
+import numpy as np
+
 from dragchain.tables.parquet import table_writer
+from dragdeck.dumps.reader import dump_files, layout_of, read_frames
+from dragdeck.errors import DumpError
 
 
 def dump_to_parquet(
@@ -36,9 +37,9 @@ def dump_to_parquet(
     frames, broken = 0, None
     with table_writer(Path(target), ("step", *output.columns)) as table:
         try:
-            for batch in read_batches(files, output):
-                table.write({"step": batch.steps_of_rows(), **batch.columns})
-                frames += len(batch.steps)
+            for frame in read_frames(files, output):
+                table.write({"step": np.full(frame.rows, frame.step), **frame.columns})
+                frames += 1
         except DumpError as error:
             broken = error
     if broken is not None:

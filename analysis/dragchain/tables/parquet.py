@@ -11,8 +11,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from dragchain.dumps.frame import is_integer_column
 from dragchain.tables.columns import described
+from dragdeck.dumps.frame import is_integer_column
 from dragdeck.files import draft_of
 
 GROUP_ROWS = 131_072

@@ -44,7 +44,7 @@ def record_of(
             "python": platform.python_version(),
             "numpy": np.__version__,
         },
-        machine=Machine(cores=os.cpu_count(), processor=_processor()),
+        machine=Machine(cores=os.cpu_count(), processor=processor()),
         runs=len(measures),
         engine_hours=sum(one.cost.cpu_time_s for one in measures) / 3600.0,
         scene=_scene_numbers(tradeoff),
@@ -71,7 +71,8 @@ def _joined(names: Iterable[object]) -> str:
     return ", ".join(sorted(set(map(str, names))))
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Name of the machine's processor, as far as it is known."""
     file = Path("/proc/cpuinfo")
     lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import pyvista as pv
-from analysed_run import analysed_tiny_run
+from finished_runs import analysed_tiny_run
 from PIL import Image
 from tiny_run_files import BOWL_RADIUS_M, LAST, TIMESTEP_S, workpiece_x_m
 

@@ -6,7 +6,6 @@ from dragchain.figures.panels import (
     compass,
     compass_bars,
     depth_bars,
-    key,
     log_ticks,
     new_figure,
     new_panels,
@@ -63,10 +62,3 @@ def test_percent_ticks_are_plain_numbers(axes: Axes) -> None:
     axes.figure.draw_without_rendering()
     labels = [tick.get_text() for tick in axes.get_yticklabels()]
     assert {"0.1", "1", "10", "100"} <= set(labels)
-
-
-def test_a_key_needs_no_data(axes: Axes) -> None:
-    key(axes, "not significant", mfc="white")
-    (handle,), labels = axes.get_legend_handles_labels()
-    assert labels == ["not significant"]
-    assert handle.get_markerfacecolor() == "white" and not len(handle.get_xdata())

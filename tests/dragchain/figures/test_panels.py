@@ -21,11 +21,6 @@ def drawn(labels: list[str]) -> Figure:
     return legend_below(figure)
 
 
-def test_a_label_stands_in_the_legend_once() -> None:
-    (legend,) = drawn(["one", "two"]).legends
-    assert [text.get_text() for text in legend.get_texts()] == ["one", "two"]
-
-
 @pytest.mark.parametrize("letters", [12, 40])
 @pytest.mark.parametrize("count", [1, 7])
 def test_a_legend_fits_into_the_figure(letters: int, count: int) -> None:
@@ -35,12 +30,3 @@ def test_a_legend_fits_into_the_figure(letters: int, count: int) -> None:
         (legend,) = figure.legends
         box = legend.get_window_extent()
     assert box.width <= WIDTH_IN * figure.dpi
-
-
-def test_short_labels_share_a_line() -> None:
-    with drawing():
-        figure = drawn(["one", "two", "three", "four"])
-        figure.draw_without_rendering()
-        (legend,) = figure.legends
-        lines = {round(text.get_window_extent().y0) for text in legend.get_texts()}
-    assert len(lines) == 1

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from dragchain.figures.panels import head, new_panels
-from dragchain.figures.style import few_colours, png, true_minus
+from dragchain.figures.style import few_colours, png
 
 
 @pytest.mark.parametrize(
@@ -29,13 +29,6 @@ def test_a_hyphen_before_a_number_becomes_a_minus_sign(written: str, shown: str)
     assert legend.get_texts()[0].get_text() == shown
 
 
-def test_minus_signs_of_single_axes() -> None:
-    _, (axes,) = new_panels(3.0)
-    axes.set_xlabel("-1")
-    true_minus(axes)
-    assert axes.get_xlabel() == "\u22121"
-
-
 def test_a_picture_of_few_colours_is_smaller() -> None:
     pixels = np.random.default_rng(1).integers(0, 256, (200, 200, 3), dtype=np.uint8)
     whole, few = Image.fromarray(pixels), few_colours(Image.fromarray(pixels))
@@ -46,10 +39,3 @@ def test_a_picture_of_few_colours_is_smaller() -> None:
         sizes.append(len(content.getvalue()))
     assert len(whole.getcolors(100_000) or ()) > 256 >= len(few.getcolors(100_000) or ())
     assert sizes[1] < sizes[0]
-
-
-def test_white_stays_white_in_few_colours() -> None:
-    pixels = np.full((40, 40, 3), 254, dtype=np.uint8)
-    pixels[::2] = 255
-    shown = few_colours(Image.fromarray(pixels)).convert("RGB")
-    assert shown.getpixel((0, 0)) == (255, 255, 255)

@@ -178,6 +178,17 @@ def test_the_work_of_the_workpiece_is_drag_times_path(found: Loading) -> None:
     assert found.path_m == pytest.approx(SPEED * FRAMES * DT)
 
 
+def test_what_is_ahead_has_its_fraction_and_an_approach_its_work(tmp_path: Path) -> None:
+    ahead = [contact(i, REST, (0.0, 0.01), (-1.0, 0.0, 0.0), approach=0.2) for i in range(FRAMES)]
+    behind = [
+        contact(i, HIT, (0.0, 0.01), (-3.0, 0.0, 0.0)) | {"azimuth_rad": turned}
+        for i, turned in enumerate(np.linspace(1.6, 2 * np.pi - 1.6, FRAMES))
+    ]
+    found = compute_loading(write_run(tmp_path / "run", ahead + behind), Thresholds()).summary
+    assert found.front_fraction["normal_impulse_n_s"].value == pytest.approx(0.25)
+    assert found.totals["normal_work_j"] == pytest.approx(FRAMES * 1.0 * 0.2 * DT)
+
+
 def test_an_interval_holds_its_value_and_has_a_width(found: Loading) -> None:
     per_metre = found.per_metre["force_slide_n_m"]
     assert per_metre.ci95_low < per_metre.value < per_metre.ci95_high

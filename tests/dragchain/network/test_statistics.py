@@ -3,7 +3,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -156,25 +155,6 @@ def test_frames_follow_the_count_of_particles_and_may_be_empty(run_dir: Path) ->
     assert [frame.normal_force.size for frame in frames] == [7, 0]
 
 
-def test_frames_are_read_as_they_are_needed(run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("contacts", "particles"):
-        file = run_dir / "tables" / f"{name}.parquet"
-        pd.read_parquet(file).to_parquet(file, row_group_size=2)
-    read: list[int] = []
-    real = pq.ParquetFile.read_row_group
-
-    def noted(self: pq.ParquetFile, group: int, **options: object) -> pa.Table:
-        read.append(group)
-        return real(self, group, **options)
-
-    monkeypatch.setattr(pq.ParquetFile, "read_row_group", noted)
-    frames = read_frames(run_dir, (0, 30))
-    next(frames)
-    first = len(read)
-    assert sum(1 for _ in frames) == 3
-    assert len(read) > 2 * first
-
-
 def test_a_frame_has_the_heading_of_its_step(run_dir: Path) -> None:
     table = pd.read_parquet(run_dir / "tables" / "workpiece_force.parquet")
     for frame in read_frames(run_dir):
@@ -252,20 +232,6 @@ def test_a_table_in_parts_is_the_whole_table(tmp_path: Path) -> None:
     whole.to_parquet(tmp_path / "w.parquet", index=False)
     schemas = [pq.read_schema(tmp_path / f"{name}.parquet") for name in "tw"]
     assert schemas[0].equals(schemas[1], check_metadata=True)
-
-
-def test_a_table_in_parts_that_breaks_off_leaves_the_old_one(tmp_path: Path) -> None:
-    (tmp_path / "t.parquet").write_bytes(b"old")
-
-    def break_off() -> None:
-        with table_writer(tmp_path / "t.parquet", group_rows=1) as table:
-            table.write(contact_rows(1, STAR))
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        break_off()
-    assert [file.name for file in tmp_path.iterdir()] == ["t.parquet"]
-    assert (tmp_path / "t.parquet").read_bytes() == b"old"
 
 
 def test_write_chains_writes_counted_frames_only(run_dir: Path) -> None:

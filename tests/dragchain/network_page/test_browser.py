@@ -1,6 +1,5 @@
 """network.html in a real browser: what it shows is what the tables say."""
 
-import base64
 import json
 import math
 import re
@@ -12,13 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from browser import MISSING, NO_WEBGL, Browser
-from matplotlib.colors import to_hex
+from made_run import line
 from network_run_files import PEAK_N, PEAKS_S, accept, draw, write_network_run
-from PIL import Image
 from selenium.webdriver import ActionChains, Keys
 from selenium.webdriver.support.ui import Select
 
-from dragchain.figures.style import COLOURS
 from dragchain.network_page.page import write_page
 from dragchain.report.page import MINUS, TIMES
 
@@ -35,7 +32,8 @@ HOSTILE = '</script><script>document.title="taken"</script>'
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A workpiece from an STL file, with contacts on its end face; the study has a hostile name."""
     folder = tmp_path_factory.mktemp("made") / "run"
-    write_network_run(folder, "mesh", heading_deg=math.degrees(2.5), study=HOSTILE)
+    motion = line(0.1, start_m=[-0.01, 0.0], direction_deg=math.degrees(2.5))
+    write_network_run(folder, "mesh", motion=motion, study=HOSTILE)
     contacts = pd.read_parquet(folder / "tables/contacts.parquet")
     touching = contacts["kind"] == "particle-workpiece"
     height_m = contacts["point_z_m"].clip(lower=surface_m(folder) - 0.03)
@@ -161,38 +159,7 @@ def test_the_slider_moves_the_cursor_and_the_profiles(page: Browser) -> None:
     assert f"at {time_s:.3f} s" in page.find("#profile-depth").get_attribute("aria-label")
 
 
-def test_the_curve_is_read_zoomed_and_clicked(page: Browser, run: Path) -> None:
-    def span() -> list[float]:
-        return page.run("const {min, max} = networkPage.curve.plot.scales.x; return [min, max]")
-
-    page.drag("#curve", (200, 60), (400, 60))
-    page.wait(lambda: span()[0] > 0.05 and span()[1] < 0.3, "the part of the curve")
-    time_s, raw_n, _ = numbers(page.text("#hovered"))
-    force = pd.read_parquet(run / "tables/workpiece_force.parquet")
-    near = force[(force["time_s"] - 0.1 - time_s).abs() < 6e-4]
-    assert any(raw_n == four_digits(-drag) for drag in near["drag_n"])
-    page.click("#whole")
-    page.wait(lambda: span() == pytest.approx([0.001, 0.4], abs=1e-6), "the whole curve")
-    page.run("networkPage.show(0); document.getElementById('path').click()")
-    page.click("#curve .peak")
-    network = pd.read_parquet(run / "tables/network.parquet")
-    nearest = (network["time_s"] - 0.1 - PEAKS_S[0]).abs().argmin()
-    assert step_at(page) == network["step"][nearest]
-    assert "Dominant path" in page.text("#status")
-    page.click_at("#curve .u-over", 1, 60)
-    assert frame_at(page) == 0
-
-
 # --- contacts and particles ----------------------------------------------------------------------
-
-
-def test_the_facet_with_the_highest_load(page: Browser, run: Path) -> None:
-    page.click("#highest-facet")
-    facets = pd.read_parquet(run / "tables/facets.parquet")
-    highest = facets.loc[facets["force_slide_pa"].idxmax()]
-    assert page.text("#chosen h3") == f"Facet {highest['facet_id']:.0f} of the workpiece"
-    assert chosen(page)["sliding load"] == four_digits(highest["force_slide_pa"])
-    assert chosen(page)["mean pressure"] == four_digits(highest["mean_pressure_pa"])
 
 
 def test_a_click_on_a_particle_tells_its_numbers(page: Browser, run: Path) -> None:
@@ -288,132 +255,16 @@ def test_a_section_plane_hides_what_is_beyond_it(page: Browser, run: Path) -> No
         page.click("#section-side")
 
 
-def test_distances_are_measured_over_time(page: Browser, run: Path) -> None:
-    def places() -> pd.DataFrame:
-        table = rows(run, "particles", step_at(page)).set_index("particle_id")
-        return 1e3 * table[["x_m", "y_m", "z_m"]]
-
+def test_a_distance_is_measured_over_time(page: Browser, run: Path) -> None:
     page.find("#measure").send_keys(Keys.SPACE)
     find(page, "3")
-    assert page.text("#distance") == "Distance: choose two particles or contacts"
     find(page, "200")
     for frame in (7, 2):
         page.run("networkPage.go(arguments[0])", frame)
-        apart = float(np.linalg.norm(places().loc[3] - places().loc[200]))
+        places = rows(run, "particles", step_at(page)).set_index("particle_id")
+        places = 1e3 * places[["x_m", "y_m", "z_m"]]
+        apart = float(np.linalg.norm(places.loc[3] - places.loc[200]))
         assert numbers(page.text("#distance")) == [pytest.approx(apart, abs=0.01)]
-    contacts = rows(run, "contacts", step_at(page))
-    outer = contacts[contacts["b_id"] == 0].iloc[0]
-    inner = contacts[contacts["b_id"] > 0].iloc[5]
-    between = places().loc[[inner["a_id"], inner["b_id"]]].mean().to_numpy(float)  # of equal radii
-    point = 1e3 * outer[["point_x_m", "point_y_m", "point_z_m"]].to_numpy(float)
-    find(page, f"{outer['a_id']} workpiece")
-    find(page, f"{inner['a_id']} {inner['b_id']}")
-    apart = float(np.linalg.norm(between - point))
-    assert numbers(page.text("#distance")) == [pytest.approx(apart, abs=0.01)]
-
-
-# --- the picture ---------------------------------------------------------------------------------
-
-
-def test_what_the_figures_show_too_has_their_colour(page: Browser) -> None:
-    drawn = {"transient": ".transient", "chain": ".check .chain", "drag": ".check .smooth",
-             "dominant_path": ".check .path", "peak": ".peak.now"}  # fmt: skip
-    look = "return getComputedStyle(document.querySelector(arguments[0])).backgroundColor"
-    for name, place in drawn.items():
-        channels = map(int, re.findall(r"\d+", page.run(look, place)))
-        assert "#{:02x}{:02x}{:02x}".format(*channels) == COLOURS[name].lower(), name
-    assert page.run("return networkPage.curve.plot.series[2].stroke()") == COLOURS["drag"]
-    page.run("document.getElementById('load').value = 'plain'; networkPage.redraw()")
-    tint = page.run("return [...networkPage.workpiece.tints.slice(0, 3)]")
-    assert to_hex(tint) == COLOURS["workpiece"]
-
-
-def test_colours_and_views_change_the_picture(page: Browser) -> None:
-    def picture() -> str:
-        return page.run(
-            "networkPage.view.draw(1); return networkPage.view.renderer.domElement.toDataURL()"
-        )
-
-    page.run("document.getElementById('size').value = 60; networkPage.redraw()")
-    seen = [picture()]
-    for colour in ("class of contact", "speed", "displacement"):
-        choose(page, "colour", colour)
-        assert colour.split()[0].capitalize() in page.text("#legend")
-        seen.append(picture())
-    for name in ("above", "along", "side", "follow"):
-        page.click(f"#presets [data-preset={name}]")
-        seen.append(picture())
-    now = frame_at(page)
-    page.find("#canvas").send_keys(Keys.ARROW_LEFT)
-    seen.append(picture())
-    page.find("#canvas").send_keys(",")
-    assert frame_at(page) == now - 1
-    assert len(set(seen)) == len(seen)
-    target, (x, y) = page.run("""const {view, workpiece, number} = networkPage;
-        const {x, y} = workpiece.pose(number); return [view.controls.target.toArray(), [x, y]]""")
-    assert target[:2] == pytest.approx([x, y])  # the workpiece is followed
-
-
-def test_a_phone_shows_all_of_the_page_and_all_controls_have_names(page: Browser) -> None:
-    try:
-        page.phone()
-        page.run("location.reload()")
-        page.wait(lambda: page.run("return document.documentElement.dataset.ready"), "the page")
-        assert page.run("return document.documentElement.scrollWidth") == 390
-        beyond = page.run("""return [...document.querySelectorAll("main *")]
-            .filter(one => one.getBoundingClientRect().right > 390.5).map(one => one.outerHTML)""")
-        assert beyond == []
-        top, bottom, below = page.run("""
-            const at = name => document.getElementById(name).getBoundingClientRect();
-            document.getElementById("section-axis").scrollIntoView({block: "center"});
-            return [at("canvas").top, at("canvas").bottom, at("section-axis").top]""")
-        assert 0 <= top < bottom < below < 844
-        nameless = page.run("""
-            const controls = "input, select, button, #canvas, [role=img], [role=slider]";
-            const named = one => one.getAttribute("aria-label") || one.textContent.trim();
-            return [...document.querySelectorAll(controls)]
-                .filter(one => !one.labels?.length && !named(one)).map(one => one.outerHTML)""")
-        assert nameless == []
-    finally:
-        page.desktop()
-
-
-def test_a_saved_picture_is_the_view_at_twice_its_size(page: Browser, tmp_path: Path) -> None:
-    boxes = page.run("""
-        const from = document.getElementById("canvas").getBoundingClientRect();
-        const box = selector => document.querySelector(selector).getBoundingClientRect();
-        return ["#canvas", "#legend .bar", "#legend div", "#scale-bar", "#caption-time"].map(box)
-            .map(({left, top, right, bottom}) =>
-                [left - from.left, top - from.top, right - from.left, bottom - from.top])""")
-    time_s = page.run("return networkPage.frames.times[networkPage.number]")
-    file = page.saved(tmp_path, "#save-picture")
-    assert file.name == f"made-process_{time_s:.3f}s.png"
-    with Image.open(file) as image:
-        seen = np.asarray(image.convert("RGB")).astype(int)
-    parts = [seen[2 * round(top) : 2 * round(bottom), 2 * round(left) : 2 * round(right)]
-             for left, top, right, bottom in boxes]  # fmt: skip
-    scene, bar, title, scale, time = parts
-    assert scene.shape == seen.shape
-    assert len(np.unique(scene[200:-200:5, 600:-600:5].reshape(-1, 3), axis=0)) > 100
-    assert bar[6, 6].sum() > bar[6, -6].sum() + 300  # from light to dark
-    assert title.min() < 100 and time.min() < 100  # letters
-    dark = (scale.max(axis=2) < 100).mean(axis=1)
-    assert dark[-2] == 1.0 and dark[2] < 0.2  # a line with two ticks
-
-
-def test_a_film_shows_all_frames(page: Browser, tmp_path: Path) -> None:
-    size = page.run("const {clientWidth, clientHeight} = document.getElementById('canvas');"
-                    "return [clientWidth, clientHeight].map(one => one - one % 2)")  # fmt: skip
-    file = page.saved(tmp_path, "#save-video")
-    assert page.run("return networkPage.number + 1 === networkPage.frames.count")
-    assert page.text("#save-video") == "Save video"
-    seen = page.run("""return new Promise((done, failed) => {
-        const film = document.createElement("video");
-        film.onerror = () => failed(film.error.message);
-        film.onloadeddata = () => done([film.videoWidth, film.videoHeight]);
-        film.src = "data:video/webm;base64," + arguments[0];
-    })""", base64.b64encode(file.read_bytes()).decode())  # fmt: skip
-    assert seen == size
 
 
 # --- without a scene -----------------------------------------------------------------------------
@@ -430,22 +281,6 @@ def test_without_webgl_a_picture_stands_for_the_scene(run: Path, tmp_path: Path)
         assert page.run("return document.querySelector('#curve .cursor').offsetLeft") > 100
     finally:
         page.close()
-
-
-@pytest.mark.parametrize(
-    ("command", "static", "live"),
-    [("setEmulatedMedia", {"media": "print"}, {"media": ""}),
-     ("setScriptExecutionDisabled", {"value": True}, {"value": False})],
-)  # fmt: skip
-def test_printed_or_without_scripts_it_shows_static_pictures(
-    window: Browser, run: Path, command: str, static: dict[str, object], live: dict[str, object]
-) -> None:
-    window.driver.execute_cdp_cmd(f"Emulation.{command}", static)
-    window.driver.get((run / "network.html").resolve().as_uri())
-    assert window.find("#static-scene img").is_displayed()
-    assert window.find("#static-curve img").is_displayed()
-    assert not window.find("#canvas").is_displayed()
-    window.driver.execute_cdp_cmd(f"Emulation.{command}", live)
 
 
 def test_data_that_are_damaged_are_told(window: Browser, run: Path, tmp_path: Path) -> None:
@@ -509,14 +344,3 @@ def test_profiles_are_those_of_the_tables(page: Browser, run: Path) -> None:
     assert numbers(largest)[-1] == four_digits(max(cells))
     ActionChains(page.driver).move_to_element(page.find("#profile-map")).perform()
     assert re.fullmatch(r"azimuth .*°, depth .* mm: mean .* N", page.text("#profile-told"))
-
-
-def test_the_distribution_counts_all_contacts(page: Browser, run: Path) -> None:
-    force = rows(run, "contacts", step_at(page))["normal_force_n"]
-    bars = told(page, "size")
-    counts = {low: now for (low, _), (now, _) in bars.items()}
-    assert (force >= min(counts)).sum() == pytest.approx(sum(counts.values()), abs=2)
-    for low, high in list(bars)[::5]:
-        assert abs(counts[low] - force.between(low, high).sum()) <= 2  # limits have three digits
-    said = page.find("#profile-size").get_attribute("aria-label")
-    assert numbers(said)[1] == four_digits(force.mean())

@@ -14,6 +14,7 @@ import pytest
 from figure_files import case_json
 from hypothesis import given
 from hypothesis import strategies as st
+from made_run import line
 from network_run_files import PEAK_N, PEAKS_S, accept, draw, write_network_run
 from pages import Page
 
@@ -204,7 +205,8 @@ def test_the_pose_puts_the_facets_where_the_run_has_them(
     tmp_path: Path, kind: str, turn: float
 ) -> None:
     """A cylinder lies in its file as it is put into the bowl, a mesh of a user looks along +x."""
-    folder = write_network_run(tmp_path / "run", kind, heading_deg=math.degrees(turn))
+    motion = line(0.1, start_m=[-0.01, 0.0], direction_deg=math.degrees(turn))
+    folder = write_network_run(tmp_path / "run", kind, motion=motion)
     write_page(folder)
     page = Written(folder / "network.html")
     (workpiece,) = page.head["workpieces"]

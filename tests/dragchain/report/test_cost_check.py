@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from made_run import run_json
 from report_files import (
     ASKED,
     PICTURES,
@@ -16,7 +17,6 @@ from report_files import (
     make_run,
     page_of,
     process_findings,
-    run_json,
     write_quantities,
 )
 

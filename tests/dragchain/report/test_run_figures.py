@@ -10,19 +10,15 @@ import pytest
 from changed import changed
 from figure_files import (
     LAST,
-    LINE,
     STEP_S,
     R,
     case_json,
-    columns_json,
-    printed,
     resistance,
-    save,
     workpiece_contacts_table,
     workpiece_force_table,
     write_process_run,
 )
-from made_motion import with_motion
+from made_run import line, output, save, with_motion, write_documents
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -191,7 +187,7 @@ def test_times_of_a_faster_run_are_those_of_the_process(process: Path) -> None:
     case = load_case(process)
     fidelity = case.fidelity.model_copy(update={"speed_factor": 5.0})
     data = case.model_copy(update={"fidelity": fidelity}).model_dump()
-    fast = Case.model_validate(with_motion(data, LINE, 0.1))
+    fast = Case.model_validate(with_motion(data, **line(0.1, start_m=[-0.01, 0.0])))
     slow, quick = (process_findings(RunData(process, one)) for one in (case, fast))
     for name in ("process_time_s", "separation_s"):
         ours, theirs = (np.array(getattr(found.peaks, name)) for found in (quick, slow))
@@ -302,10 +298,9 @@ def test_a_machine_that_cannot_render_is_told_what_to_install(
 
 @pytest.fixture
 def filling(tmp_path: Path) -> Path:
-    content = case_json("filling")
-    content["phases"] = [{"name": "settle", "start_step": 0, "end_step": LAST}]
-    content["settled"] = {"energy_ratio": 1e-5}
-    (tmp_path / "case.json").write_text(json.dumps(content))
+    settle = [{"name": "settle", "start_step": 0, "end_step": LAST}]
+    case = case_json("filling", phases=settle, settled={"energy_ratio": 1e-5})
+    write_documents(tmp_path, case)
     bed = {
         "schema": 2,
         "bed_height_m": 0.07,
@@ -316,7 +311,6 @@ def filling(tmp_path: Path) -> Path:
         "radius_std_m": 0.0,
         "kinetic_energy_ratio": 1e-7,
     }
-    (tmp_path / "tables").mkdir()
     (tmp_path / "tables" / "packing.json").write_text(json.dumps(bed))
     return tmp_path
 
@@ -345,11 +339,9 @@ def test_energy_ratio_of_particles_that_fell_their_diameter_is_one(filling: Path
 
 
 def test_a_drop_is_drawn_with_its_restitution(tmp_path: Path) -> None:
-    content = case_json("drop_test")
-    content["phases"] = []
-    (tmp_path / "case.json").write_text(json.dumps(content))
     columns = ["step", "time_s", "z_m", "vz_m_s", "force_n"]
-    columns_json(tmp_path, {"impacts": printed(columns, 1, None)})
+    outputs = {"impacts": output("print", columns, 1, 0, None, pattern="out.{part}.txt")}
+    write_documents(tmp_path, case_json("drop_test", phases=[]), outputs)
     lines = [" ".join(columns)]
     for first in (10, 200, 300):
         lines += [

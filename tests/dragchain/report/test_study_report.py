@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from loading_files import made_contacts, write_run
-from made_motion import with_motion
+from made_run import particles_kept, run_json, with_motion
 from pages import stands_alone
 from report_files import (
     DROP,
@@ -21,9 +21,7 @@ from report_files import (
     case_json,
     make_run,
     page_of,
-    particles_kept,
     process_findings,
-    run_json,
     write_quantities,
 )
 

@@ -3,7 +3,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from made_motion import with_motion
+from made_run import with_motion
 
 from dragchain import DocumentError, TableError, load_case, load_outputs
 from dragchain.run.case import Statistics, changed_inputs

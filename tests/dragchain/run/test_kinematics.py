@@ -7,7 +7,7 @@ import pytest
 from changed import changed
 from hypothesis import given
 from hypothesis import strategies as st
-from made_motion import with_motion
+from made_run import with_motion
 
 from dragchain import TableError, load_case
 from dragchain.run.case import Case, Phase, Statistics

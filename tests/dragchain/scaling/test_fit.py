@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from made_motion import with_motion
+from made_run import with_motion
 from tiny_run_files import DENSITY_KG_M3, GRAVITY_M_S2, RADIUS_M, WORKPIECE_RADIUS_M, case_json
 
 from dragchain.cli import main

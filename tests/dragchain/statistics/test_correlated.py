@@ -139,3 +139,14 @@ def test_the_interval_is_students() -> None:
     assert estimate.effective_samples == 40.0
     assert estimate.se == pytest.approx(np.sqrt(40 / 39 / 40))
     assert estimate.ci95_high / estimate.se == pytest.approx(2.155, abs=1e-3)
+
+
+def test_the_interval_of_a_ratio_of_means_has_the_larger_relative_width() -> None:
+    """Of a mean of 4 +- 1 % and one of 2 +- 10 %, by far the latter."""
+    rng = np.random.default_rng(4)
+    above, below = (estimate_mean(rng.normal(mean, s, 10_000)) for mean, s in ((4, 2), (2, 10)))
+    ratio = above.over(below)
+    half = 0.5 * (below.ci95_high - below.ci95_low) / below.mean * ratio.value
+    assert ratio.value == above.mean / below.mean
+    assert ratio.value - ratio.ci95_low == pytest.approx(half, rel=0.02)
+    assert ratio.ci95_high - ratio.value == pytest.approx(half, rel=0.02)

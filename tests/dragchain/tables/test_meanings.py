@@ -9,6 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 from finished_runs import write_finished_run
 from loading_files import made_contacts, write_run
+from made_run import Raw
 from report_files import (
     ASKED,
     DROP,
@@ -19,7 +20,7 @@ from report_files import (
     process_findings,
     write_quantities,
 )
-from tiny_run_files import RADIUS_M, Raw
+from tiny_run_files import RADIUS_M
 from tiny_run_files import case_json as tiny_case
 
 from dragchain import write_tables

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from made_motion import with_motion
+from made_run import with_motion
 from tiny_run_files import (
     COLUMNS,
     LAST,
@@ -22,8 +22,8 @@ from tiny_run_files import (
 
 from dragchain import DumpError, RejectedRunError, TableError, load_case, load_outputs, write_tables
 from dragchain.drag.force import read_counted, summarise_forces
-from dragchain.dumps.run_parts import iter_prints
 from dragchain.loading.write import write_loading
+from dragchain.run.run_parts import iter_prints
 from dragchain.tables.columns import FORCES, REFERENCE
 from dragchain.tables.write import WorkpieceSamples
 

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tradeoff_files import measures
-from tradeoff_runs import (
+from tradeoff_files import (
     BOTH,
     COARSE,
     REFERENCE,
@@ -15,6 +14,7 @@ from tradeoff_runs import (
     WITHIN,
     contents,
     made,
+    measures,
     point_of,
 )
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.stats import binomtest
-from tradeoff_files import BLOCK_M, VALUES, measures, write
-from tradeoff_runs import (
+from tradeoff_files import (
+    BLOCK_M,
     BOTH,
     COARSE,
     FAILURE,
@@ -16,10 +16,13 @@ from tradeoff_runs import (
     REFERENCE,
     SOFT,
     SOFTNESS,
+    VALUES,
     WITHIN,
     contents,
     made,
+    measures,
     point_of,
+    write,
 )
 
 from dragchain.errors import TableError

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tradeoff_files import measures
-from tradeoff_runs import REFERENCE, SOFT, contents, made
+from tradeoff_files import REFERENCE, SOFT, contents, made, measures
 
 from dragchain.tradeoff.outcome import Tradeoff
 from dragchain.tradeoff.path_length import along, coverage, reaches

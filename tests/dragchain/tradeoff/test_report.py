@@ -10,8 +10,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from pages import stands_alone
-from tradeoff_files import measures, write, write_drop
-from tradeoff_runs import BOTH, FAILURE, contents
+from tradeoff_files import (
+    BOTH,
+    FAILURE,
+    contents,
+    measures,
+    write,
+    write_drop,
+)
 
 from dragchain.cli import main as dragchain
 from dragchain.tradeoff.changes import read_costs

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from made_study import Made
 from made_tradeoff import made_tradeoff
 from paths import ROOT
 
@@ -139,11 +140,11 @@ def test_the_work_that_is_compared_is_that_of_the_runs(paper: Case, speed: float
 
 
 def test_strong_damping_shortens_the_steps_of_the_filling(
-    small: dict[str, Any], write_study: Write, tradeoff: Tradeoff
+    small: dict[str, Any], tradeoff: Tradeoff, made: Made
 ) -> None:
     for pair in small["pairs"].values():
         pair["restitution"] = 0.3
-    (damped,) = load_cases(write_study(small))
+    damped = made()
     found = advise(damped, asked(), tradeoff)
     standard = BUILT_IN_FIDELITIES["standard"]
     study = damped.study.model_copy(update={"fidelity": standard})

@@ -1,11 +1,11 @@
 """The drops of a calibration, and the recovery of a known restitution on the real engine."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from made_study import Made
 from make_record import Sensor, synthetic_record
 from scipy.integrate import solve_ivp
 
@@ -33,18 +33,14 @@ from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import hertz_contact_time, rayleigh_time
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DROP_TEST, DropFidelity, drop_scene
-from dragdeck.sweep.cases import load_cases
-
-WriteStudy = Callable[..., Path]
 
 
 @pytest.fixture
-def measured_case(small: dict[str, Any], write_study: WriteStudy) -> Case:
+def measured_case(small: dict[str, Any], made: Made) -> Case:
     """The small study with a measured drop test, at a modulus and step of its own."""
     small["calibration"] = {"record": "record.csv"}
     small["fidelities"]["quick"].update(youngs_modulus_scale=0.01, timestep_fraction=0.5)
-    (only,) = load_cases(write_study(small))
-    return only
+    return made()
 
 
 # --- which drops -----------------------------------------------------------------------------
@@ -116,9 +112,8 @@ def test_a_study_without_a_record_is_told_so(case: Case, measured_case: Case) ->
 
 
 def test_confirm_asks_for_the_fit(
-    measured_case: Case, project: Project, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+    measured_case: Case, project: Project, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
     monkeypatch.chdir(project.root)
     assert main(["step", "drops", "small", "confirm", "--out", "anywhere"]) == 1
     assert "--fit" in capsys.readouterr().err

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from made_study import Made
 from paths import ROOT
 
 from dragdeck.cases.case import Case
@@ -98,11 +99,12 @@ def test_a_script_changes_with_a_coefficient_if_its_name_does(
     scene: str,
     pair: str,
     field: str,
+    made: Made,
 ) -> None:
     (before,) = load_cases(write_study(with_three_materials(small)))
     old = render(before, project, scene)
     small["pairs"][pair][field] = 0.123
-    (after,) = load_cases(write_study(small))
+    after = made()
     ids = {SCENES[scene].run_id(case) for case in (before, after)}
     body, changed = (
         [line for line in commands(text) if not line.startswith("variable from")]
@@ -129,36 +131,6 @@ def test_a_study_may_change_one_block(case: Case, project: Project) -> None:
     body = [line for line in changed.splitlines() if not line.startswith("# ") and line]
     assert body == [line for line in plain.splitlines() if not line.startswith("# ") and line]
     assert "base/process.in.j2" in changed  # the header names every template
-
-
-def test_a_missing_value_names_template_line_and_variable(case: Case, project: Project) -> None:
-    own_template(
-        case,
-        '{% extends "base/process.in.j2" %}\n{% block extra %}\n\n{{ deck.colour }}\n'
-        "{% endblock %}\n",
-    )
-    with pytest.raises(InputError) as caught:
-        render(case, project, "process")
-    assert caught.value.field == "line 4"
-    assert "process.in.j2" in str(caught.value)
-    assert "colour" in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("{% block extra %}", "template syntax"),
-        ('{% extends "base/nothing.in.j2" %}', "no such template"),
-        ('{% extends "base/process.in.j2" %}{% block extra %}{{ "x" | num }}{% endblock %}', "'x'"),
-    ],
-)
-def test_a_broken_template_is_explained(
-    case: Case, project: Project, text: str, words: str
-) -> None:
-    own_template(case, text)
-    with pytest.raises(InputError) as caught:
-        render(case, project, "process")
-    assert words in str(caught.value)
 
 
 def test_nothing_is_written_when_a_template_fails(
@@ -215,16 +187,12 @@ def test_the_tip_ends_at_the_asked_depth(case: Case) -> None:
     ],
 )
 def test_an_impossible_scene_is_refused(
-    small: dict[str, Any],
-    write_study: Callable[..., Path],
-    field: tuple[str, str],
-    value: Any,
-    words: str,
+    small: dict[str, Any], field: tuple[str, str], value: Any, words: str, made: Made
 ) -> None:
     small[field[0]][field[1]] = value
     if field == ("media", "radius_mean_m"):
         small["media"]["count"] = 1
-    (case,) = load_cases(write_study(small))
+    case = made()
     with pytest.raises(InputError) as caught:
         for scene in SCENES.values():
             scene.build(case, BED)
@@ -233,46 +201,37 @@ def test_an_impossible_scene_is_refused(
     assert caught.value.remedy
 
 
-def test_a_workpiece_never_crosses_a_radius_in_a_step(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
+def test_a_workpiece_never_crosses_a_radius_in_a_step(small: dict[str, Any], made: Made) -> None:
     small["fidelities"]["quick"]["speed_factor"] = 100
-    small["motion"]["plunge_speed_m_s"] = 29
-    (case,) = load_cases(write_study(small))
+    case = made({"motion.plunge_speed_m_s": 29})
     with pytest.raises(InputError, match="moves by more than a particle radius per step") as caught:
         process_scene(case, BED)
     assert caught.value.field == "motion.speed_m_s"
 
 
-def test_all_that_does_not_fit_is_named(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
-    small["motion"] |= {"immersion_depth_m": 0.05, "path": {"kind": "circle", "radius_m": 0.0215}}
-    (case,) = load_cases(write_study(small))
+def test_all_that_does_not_fit_is_named(made: Made) -> None:
+    case = made(
+        {"motion": {"immersion_depth_m": 0.05, "path": {"kind": "circle", "radius_m": 0.0215}}}
+    )
     with pytest.raises(InputError) as caught:
         process_scene(case, BED)
     fields = [error.field for error in (caught.value, *caught.value.more)]
     assert fields == ["motion.path", "motion.immersion_depth_m"]
 
 
-def test_a_narrow_gap_is_a_warning(small: dict[str, Any], write_study: Callable[..., Path]) -> None:
-    small["motion"]["path"]["radius_m"] = 0.012
-    (case,) = load_cases(write_study(small))
+def test_a_narrow_gap_is_a_warning(made: Made) -> None:
+    case = made({"motion.path.radius_m": 0.012})
     (gap,) = (one for one in process_scene(case, BED).warnings if one.code == "gap")
     assert "jam" in gap.text and not gap.settings
 
 
 @pytest.mark.parametrize(("size_m", "many"), [(1.5e-3, False), (2e-4, True)])
 def test_a_particle_may_have_each_facet_as_its_neighbour(
-    small: dict[str, Any],
-    write_study: Callable[..., Path],
-    project: Project,
-    size_m: float,
-    many: bool,
+    small: dict[str, Any], project: Project, size_m: float, many: bool, made: Made
 ) -> None:
     """LIGGGHTS ends with `mesh neighbor list overflow` beyond 2000 of them."""
     small["workpiece"]["shape"] |= {"facet_size_m": size_m, "facet_length_m": size_m}
-    (case,) = load_cases(write_study(small))
+    case = made()
     scene = process_scene(case, BED)
     facets = scene.files["workpiece.stl"]().count("facet normal")
     assert (facets > 2000) == many

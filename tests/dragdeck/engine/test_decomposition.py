@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_study import Load, Made
 
 from dragdeck.cases.ranks import CORES_VARIABLE, FEWEST_PARTICLES_A_RANK, auto_ranks
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
-from dragdeck.engine.decomposition import decomposition, ranks_check
+from dragdeck.engine.acceptance import ranks_check
+from dragdeck.engine.log import decomposition
 from dragdeck.engine.record import Decomposition, ParticlesPerRank
 from dragdeck.errors import InputError
 from dragdeck.outlook.process import bed_notes
@@ -121,7 +123,7 @@ def test_many_cases_get_a_core_each_and_one_big_case_gets_them_all() -> None:
 
 
 def test_auto_depends_on_the_study_and_the_machine_but_run_ids_do_not(
-    small: dict[str, Any], write_study: WriteStudy, monkeypatch: pytest.MonkeyPatch
+    small: dict[str, Any], write_study: WriteStudy, monkeypatch: pytest.MonkeyPatch, load: Load
 ) -> None:
     small["media"]["count"] = 4 * FEWEST_PARTICLES_A_RANK
     small["bowl"] |= {"radius_m": 0.3}
@@ -137,36 +139,30 @@ def test_auto_depends_on_the_study_and_the_machine_but_run_ids_do_not(
         ids.add(PROCESS.run_id(case))
     assert len(ids) == 1
     monkeypatch.setenv(CORES_VARIABLE, "4")
-    small["sweep"] = {"seed": [1, 2]}
-    assert [case.ranks for case in load_cases(write_study(small))] == [2, 2]
+    assert [case.ranks for case in load({"sweep": {"seed": [1, 2]}})] == [2, 2]
 
 
 @pytest.mark.parametrize("value", ["0", "two", "-1", "1.5", ""])
 def test_a_strange_number_of_cores_is_refused(
-    small: dict[str, Any], write_study: WriteStudy, monkeypatch: pytest.MonkeyPatch, value: str
+    monkeypatch: pytest.MonkeyPatch, value: str, made: Made
 ) -> None:
-    small["fidelity"] = {"ranks": "auto"}
-    (case,) = load_cases(write_study(small))
+    case = made({"fidelity": {"ranks": "auto"}})
     monkeypatch.setenv(CORES_VARIABLE, value)
     with pytest.raises(InputError, match="not a number of cores"):
         _ = case.ranks
 
 
 @pytest.mark.parametrize("value", [0, -1, 1.5, "all", True])
-def test_other_ranks_are_refused(
-    small: dict[str, Any], write_study: WriteStudy, value: object
-) -> None:
-    small["fidelity"] = {"ranks": value}
+def test_other_ranks_are_refused(value: object, load: Load) -> None:
     with pytest.raises(InputError, match=r"fidelity\.ranks"):
-        load_cases(write_study(small))
+        load({"fidelity": {"ranks": value}})
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 4, "auto"])
 def test_an_upright_bowl_leaves_the_split_to_the_engine(
-    small: dict[str, Any], write_study: WriteStudy, project: Project, ranks: object
+    project: Project, ranks: object, made: Made
 ) -> None:
-    small["fidelity"] = {"youngs_modulus_scale": 1e-3, "ranks": ranks}
-    (case,) = load_cases(write_study(small))
+    case = made({"fidelity": {"youngs_modulus_scale": 1e-3, "ranks": ranks}})
     text = deck_text(filling_scene(case), environment(project.templates))
     assert "\nprocessors * * 1\n" in text
 
@@ -196,25 +192,23 @@ def test_an_engine_that_runs_once_a_rank_is_found_out() -> None:
 
 
 def test_particles_too_soft_for_their_bed_get_a_warning_with_a_way_out(
-    small: dict[str, Any], write_study: WriteStudy
+    small: dict[str, Any], made: Made
 ) -> None:
     small["media"]["count"], small["bowl"]["height_m"] = 3000, 1.0
-    small["fidelity"] = {"youngs_modulus_scale": 1e-4}
-    (case,) = load_cases(write_study(small))
+    case = made({"fidelity": {"youngs_modulus_scale": 1e-4}})
     (caution,) = [one for one in filling_scene(case).warnings if one.code == "overlap"]
     assert "ABOVE" in dict(bed_notes(case))["overlap"]
     small["fidelity"] |= caution.settings
     assert f"at least {small['fidelity']['youngs_modulus_scale']:g}" in caution.text
-    (case,) = load_cases(write_study(small))
+    case = made()
     assert "overlap" not in [one.code for one in filling_scene(case).warnings]
 
 
 def test_particles_that_outrun_their_neighbour_lists_get_a_warning_with_a_way_out(
-    small: dict[str, Any], write_study: WriteStudy
+    small: dict[str, Any], made: Made
 ) -> None:
-    small["fidelity"] = {"youngs_modulus_scale": 1e-4, "filling_timestep_fraction": 0.8}
-    (case,) = load_cases(write_study(small))
+    case = made({"fidelity": {"youngs_modulus_scale": 1e-4, "filling_timestep_fraction": 0.8}})
     (caution,) = [one for one in filling_scene(case).warnings if one.code == "skin"]
     small["fidelity"] |= caution.settings
-    (case,) = load_cases(write_study(small))
+    case = made()
     assert "skin" not in [one.code for one in filling_scene(case).warnings]

@@ -1,18 +1,16 @@
 """Limits that a healthy run never meets, and what is said of a run that did."""
 
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
+from made_study import Made
 from run_files import rewrite
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
-from dragdeck.engine.limits import breach, within
-from dragdeck.engine.log import Sample, read_samples
+from dragdeck.engine.log import Sample, breach, read_samples, within
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import RejectedRunError
@@ -21,7 +19,6 @@ from dragdeck.physics.run_limits import ENERGY_FACTOR, SPEED_FACTOR, run_limits
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING, filling_scene
 from dragdeck.scenes.process import process_scene
-from dragdeck.sweep.cases import load_cases
 
 COLUMNS = [
     "step",
@@ -87,9 +84,9 @@ def test_every_bed_has_limits_above_what_it_starts_with(case: Case) -> None:
 
 
 @pytest.fixture
-def unstable(small: dict[str, Any], write_study: Callable[..., Path], project: Project) -> Path:
+def unstable(project: Project, made: Made) -> Path:
     """A rendered fill with three times the Rayleigh time as its step."""
-    (case,) = load_cases(write_study(small))
+    case = made()
     folder = project.run_folder(case, FILLING)
     scene = filling_scene(case)
     write_run(scene, folder, environment(project.templates))

@@ -13,13 +13,14 @@ from typing import Any
 
 import psutil
 import pytest
+from made_study import Made
 from run_files import rewrite
 
 from dragdeck.cases.case import Case
+from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import fingerprint, run
@@ -28,7 +29,6 @@ from dragdeck.errors import EngineError, InputError, RejectedRunError
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DROP_TEST, drop_scene
 from dragdeck.scenes.filling import FILLING, filling_scene
-from dragdeck.sweep.cases import load_cases
 
 pytestmark = pytest.mark.engine
 
@@ -84,9 +84,7 @@ def test_a_comment_in_the_deck_changes_nothing(filling: Path) -> None:
     assert fingerprint(filling, inputs) != before
 
 
-def test_a_changed_deck_moves_the_old_run_aside(
-    filling: Path, small: dict[str, Any], write_study: Callable[..., Path], project: Project
-) -> None:
+def test_a_changed_deck_moves_the_old_run_aside(filling: Path) -> None:
     run(filling, silent)
     old = (filling / "particles.1.bin").read_bytes()
     deck = filling / "in.liggghts"
@@ -104,13 +102,11 @@ def test_a_changed_deck_moves_the_old_run_aside(
     assert any(str(kept) in line for line in lines)
 
 
-def slow_filling(
-    small: dict[str, Any], write_study: Callable[..., Path], project: Project, ranks: int
-) -> Path:
+def slow_filling(made: Made, project: Project, ranks: int = 1) -> Path:
     """A rendered fill of a few seconds, not yet run."""
-    small["fidelities"]["quick"].update(ranks=ranks, filling_timestep_fraction=0.1)
-    small["media"]["count"] = 150
-    (case,) = load_cases(write_study(small))
+    quick = {"ranks": ranks, "filling_timestep_fraction": 0.1}
+    changes = {f"fidelities.quick.{name}": value for name, value in quick.items()}
+    case = made({"media.count": 150, **changes})
     folder = project.run_folder(case, FILLING)
     write_run(filling_scene(case), folder, environment(project.templates))
     return folder
@@ -134,13 +130,9 @@ def has_checkpoint(folder: Path) -> Callable[[], bool]:
 
 @pytest.mark.parametrize(("ranks", "number"), [(1, signal.SIGINT), (2, signal.SIGTERM)])
 def test_a_stop_leaves_a_checkpoint_and_the_run_goes_on(
-    small: dict[str, Any],
-    write_study: Callable[..., Path],
-    project: Project,
-    ranks: int,
-    number: signal.Signals,
+    made: Made, project: Project, ranks: int, number: signal.Signals
 ) -> None:
-    folder = slow_filling(small, write_study, project, ranks)
+    folder = slow_filling(made, project, ranks)
     process = start(folder)
     wait_for(has_checkpoint(folder), process)
     process.send_signal(number)
@@ -157,10 +149,8 @@ def test_a_stop_leaves_a_checkpoint_and_the_run_goes_on(
     assert result.state == "complete"
 
 
-def test_a_killed_engine_is_never_a_result(
-    small: dict[str, Any], write_study: Callable[..., Path], project: Project
-) -> None:
-    folder = slow_filling(small, write_study, project, 1)
+def test_a_killed_engine_is_never_a_result(made: Made, project: Project) -> None:
+    folder = slow_filling(made, project)
     process = start(folder)
     wait_for(has_checkpoint(folder), process)
     for child in psutil.Process(process.pid).children(recursive=True):
@@ -174,9 +164,9 @@ def test_a_killed_engine_is_never_a_result(
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_after_a_kill_and_damage_the_run_goes_on_from_what_is_whole(
-    small: dict[str, Any], write_study: Callable[..., Path], project: Project, ranks: int
+    made: Made, project: Project, ranks: int
 ) -> None:
-    folder = slow_filling(small, write_study, project, ranks)
+    folder = slow_filling(made, project, ranks)
     process = start(folder)
     wait_for(lambda: len(list(folder.glob("checkpoint.*.*.restart"))) > 1, process)
     family = psutil.Process(process.pid).children(recursive=True)
@@ -205,10 +195,8 @@ def test_a_changed_input_is_refused(filling: Path) -> None:
     assert not (filling / "state.json").exists()
 
 
-def test_a_queue_that_signals_the_engine_too_stops_the_run(
-    small: dict[str, Any], write_study: Callable[..., Path], project: Project
-) -> None:
-    folder = slow_filling(small, write_study, project, 1)
+def test_a_queue_that_signals_the_engine_too_stops_the_run(made: Made, project: Project) -> None:
+    folder = slow_filling(made, project)
     process = start(folder)
     wait_for(has_checkpoint(folder), process)
     (engine,) = psutil.Process(process.pid).children()
@@ -260,7 +248,7 @@ def test_a_truncated_output_fails_its_check(filling: Path) -> None:
             "packing.restart",
         ),
     )
-    damage = r"frame \d+, byte \d+: the file ends within"
+    damage = r"frame \d+, byte \d+: the file ends after \d+ bytes, inside"
     with pytest.raises(EngineError, match=rf"(?s)particles\.1\.bin, {damage}.*disk has space"):
         run(filling, silent)
     assert not (filling / "run.json").exists()
@@ -305,19 +293,12 @@ def test_a_drop_has_three_impacts(case: Case, project: Project) -> None:
 
 def watcher(folder: Path, **changed: Any) -> Watcher:
     """The watch over a run of one output."""
+    thermo = folder / "thermo.1.txt"
     usual: dict[str, Any] = {
-        "folder": folder,
-        "screen": folder / "screen.1.txt",
-        "files": [folder / "thermo.1.txt"],
-        "thermo": folder / "thermo.1.txt",
-        "columns": HEAD.split(),
-        "first": 0,
-        "last": 100,
-        "particles": 9,
-        "ranks": 1,
-        "limits": None,
-        "patience_s": 60.0,
-    }
+        "folder": folder, "screen": folder / "screen.1.txt", "files": [thermo], "thermo": thermo,
+        "columns": HEAD.split(), "first": 0, "last": 100, "particles": 9, "ranks": 1,
+        "limits": None, "patience_s": 60.0,
+    }  # fmt: skip
     return Watcher(**{**usual, **changed})
 
 

@@ -2,19 +2,20 @@
 
 import json
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from made_study import Made
 
 from dragdeck.cases.case import Case
+from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.outputs import particles
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.record import AcceptanceCheck, RunPart, RunRecord
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run_to_outcome
@@ -22,7 +23,6 @@ from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
-from dragdeck.sweep.cases import load_cases
 
 OUTPUT = particles(10, 10, 40, bowl_facets=True)
 RADIUS = 3e-3
@@ -117,14 +117,13 @@ def test_a_frame_that_is_no_packing_fails(tmp_path: Path, overlap: float) -> Non
 
 @pytest.mark.engine
 def test_the_engine_at_a_stable_and_at_an_unstable_step(
-    small: dict[str, Any], write_study: Callable[..., Path], project: Project
+    small: dict[str, Any], project: Project, made: Made
 ) -> None:
     """Every other check passes at the unstable step: nothing else sees it."""
     small["motion"]["path"]["revolutions"] = 0.05
     records = {}
     for fraction in (0.5, 1.05):
-        small["fidelities"]["quick"]["timestep_fraction"] = fraction
-        (case,) = load_cases(write_study(small))
+        case = made({"fidelities.quick.timestep_fraction": fraction})
         records[fraction] = outcome(case, project)
     assert records[0.5].state == "complete"
     assert records[1.05].state == "failed"

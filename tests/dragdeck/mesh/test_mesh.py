@@ -64,19 +64,9 @@ def test_tetrahedron_by_hand():
     assert problems(TETRAHEDRON) == []
 
 
-def test_volume_does_not_depend_on_the_place():
-    far = m.surface(TETRAHEDRON.vertices + np.array([3.0, -5.0, 7.0]), TETRAHEDRON.faces)
-    assert m.place(far).volume == pytest.approx(TETRAHEDRON.volume, rel=1e-9)
-
-
 def test_bounds_ignore_nodes_that_no_facet_uses():
     points = np.vstack([TETRAHEDRON.vertices, [9.0, 9.0, 9.0]])
     assert m.surface(points, TETRAHEDRON.faces).bounds.max() == 0.01
-
-
-def test_a_mesh_cannot_be_changed_by_accident():
-    with pytest.raises(ValueError, match="read-only"):
-        TETRAHEDRON.vertices[0, 0] = 1.0
 
 
 def test_a_facet_cannot_name_a_node_that_is_not_there():
@@ -380,11 +370,6 @@ def test_wrong_unit_is_named(factor: float, remedy: str):
     assert remedy in str(caught.value.remedy)
 
 
-def test_workpiece_wider_than_the_bowl():
-    with pytest.raises(InputError, match="not plausible in this bowl"):
-        m.check(m.cylinder(0.041, 0.08, 0.01), surroundings=SCENE)
-
-
 # --- files ------------------------------------------------------------------------
 
 
@@ -490,12 +475,6 @@ def test_file_without_facets_is_an_empty_mesh(tmp_path: Path, content: bytes):
     (tmp_path / "empty.stl").write_bytes(content)
     with pytest.raises(InputError, match="the mesh is empty"):
         m.check(m.read(tmp_path / "empty.stl", "m"))
-
-
-def test_a_text_that_ends_inside_a_solid_is_damaged(tmp_path: Path):
-    (tmp_path / "cut.stl").write_text("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvert")
-    with pytest.raises(InputError, match="damaged"):
-        m.read(tmp_path / "cut.stl", "m")
 
 
 def test_words_in_capitals_and_names_of_solids_are_no_trouble(tmp_path: Path):

@@ -63,10 +63,6 @@ def test_where_a_filling_ends_is_an_estimate() -> None:
     assert late.cells[2] == "longer than expected"
 
 
-def test_a_waiting_run_says_that_its_speed_is_assumed() -> None:
-    assert str(a_run("a", 30.0)) == "filling a: waiting, speed assumed, about 30 s left"
-
-
 def test_nothing_is_said_of_what_is_not_expected() -> None:
     nothing = Cost(0, 0.0, "assumed")
     status = RunStatus("running", step=40, steps_per_s=20.0)

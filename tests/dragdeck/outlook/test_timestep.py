@@ -1,12 +1,11 @@
 """What is said of a time step before a run."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
+from made_study import Made
 from paths import ROOT
 
 from dragdeck.cases.bed import particle_material, smallest_radius
@@ -85,9 +84,7 @@ def test_unlike_bodies_are_looked_at_too(case: Case) -> None:
     assert ratio == pytest.approx((2**2 / 2 / stiffer**2) ** 0.2, rel=1e-12)
 
 
-def test_the_body_with_the_smaller_rayleigh_time_limits(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
+def test_the_body_with_the_smaller_rayleigh_time_limits(small: dict[str, Any], made: Made) -> None:
     """A stiff, light and thin workpiece is faster than a particle."""
     small["workpiece"] = {
         "material": "light",
@@ -96,8 +93,7 @@ def test_the_body_with_the_smaller_rayleigh_time_limits(
     small["materials"]["light"] = {
         "youngs_modulus_pa": 300e9, "poissons_ratio": 0.2, "density_kg_m3": 1000,
     }  # fmt: skip
-    small["pairs"]["ceramic-light"] = {"restitution": 0.6, "friction": 0.3}
-    (case,) = load_cases(write_study(small))
+    case = made({"pairs.ceramic-light": {"restitution": 0.6, "friction": 0.3}})
     (workpiece,) = [
         pair for pair in outlook(case, PROCESS, 1e-6) if pair.bodies == "particle on workpiece"
     ]
@@ -106,33 +102,11 @@ def test_the_body_with_the_smaller_rayleigh_time_limits(
     assert workpiece.rayleigh_fraction == pytest.approx(1e-6 / known, rel=1e-12)
 
 
-def test_strong_damping_has_its_own_safe_step(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
-    (case,) = load_cases(write_study(small))
+def test_strong_damping_has_its_own_safe_step(made: Made) -> None:
+    case = made()
     ordinary, _ = safe_fraction(case, FILLING)
-    small["pairs"]["ceramic-steel"]["restitution"] = 0.1
-    (damped,) = load_cases(write_study(small))
+    damped = made({"pairs.ceramic-steel.restitution": 0.1})
     assert safe_fraction(damped, FILLING)[0] < ordinary
-
-
-def test_explain_names_every_pair(
-    case: Case,
-    project: Project,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(project.root)
-    assert main(["explain", "small", "process", "--verbose"]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    for words in (
-        "particle on workpiece",
-        "particle on bowl",
-        "steps per contact",
-        "safe step",
-        "safety",
-    ):
-        assert words in said
 
 
 @pytest.mark.engine

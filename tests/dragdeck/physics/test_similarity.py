@@ -1,18 +1,16 @@
 """The dimensionless numbers of a scene, rounded limits, and how soft particles may be."""
 
 import math
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
+from made_study import Made
 
 from dragdeck.cases.case import Case
 from dragdeck.physics.contact_mechanics import SOLID_FRACTION_ESTIMATE
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.similarity import softest_scale
 from dragdeck.scenes.dimensionless import describe
-from dragdeck.sweep.cases import load_cases
 
 
 def test_numbers_of_a_scene_by_hand(case: Case) -> None:
@@ -29,10 +27,10 @@ def test_numbers_of_a_scene_by_hand(case: Case) -> None:
 
 
 def test_denser_particles_are_softer_and_slower_in_these_numbers(
-    small: dict[str, Any], write_study: Callable[..., Path], case: Case
+    small: dict[str, Any], case: Case, made: Made
 ) -> None:
     small["materials"]["ceramic"]["density_kg_m3"] *= 8
-    (heavy,) = load_cases(write_study(small))
+    heavy = made()
     before, after = describe(case), describe(heavy)
     assert after["stiffness_number"] == pytest.approx(before["stiffness_number"] / 4)
     assert after["inertial_number"] == pytest.approx(before["inertial_number"])

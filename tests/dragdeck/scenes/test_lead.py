@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dragdeck.study.superposed.kind import DragSteps
 
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.decks.render import deck_text
@@ -17,7 +18,7 @@ from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
 from dragdeck.project import Project
 from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.lead import RAMP_STAGES, covered, led, windows_of
+from dragdeck.scenes.lead import RAMP_STAGES, covered, led, step_at, windows_of
 from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.scene import StudyScene
@@ -150,6 +151,11 @@ def test_windows_lie_beside_each_other_on_the_counted_path(made: Make) -> None:
         number = case.stretch.marks.index(window.stretch.begin) + 1
         assert scene.deck.source == f"../../process/{PROCESS.run_id(case)}/state.{number}.restart"
         assert scene.deck.materials.youngs_modulus_scale == 1
+
+
+def test_a_fraction_of_the_drag_has_its_step() -> None:
+    drag = DragSteps(100, 500, 1e-5)
+    assert [step_at(fraction, drag) for fraction in (0, 0.25, 1)] == [100, 200, 500]
 
 
 def test_the_first_windows_are_spread_over_the_path(made: Make) -> None:

@@ -1,16 +1,14 @@
 """``case.json`` of a run states the settings of that run, not those of the process beside it."""
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
+from made_study import Made
 
 from dragdeck.physics.contact_mechanics import effective_modulus
 from dragdeck.scenes.drop_test import drop_scene
 from dragdeck.scenes.filling import expected_bed, filling_scene
 from dragdeck.scenes.process import PROCESS
-from dragdeck.sweep.cases import load_cases
 
 QUICK = {
     "youngs_modulus_scale": 0.01, "timestep_fraction": 0.5, "filling_timestep_fraction": 0.3,
@@ -19,10 +17,8 @@ QUICK = {
 
 
 @pytest.fixture
-def fast(small: dict[str, Any], write_study: Callable[..., Path]) -> Any:
-    small["fidelities"]["quick"] = QUICK
-    (only,) = load_cases(write_study(small))
-    return only
+def fast(made: Made) -> Any:
+    return made({"fidelities.quick": QUICK})
 
 
 def test_the_drop_test_states_its_own_modulus_and_step(fast: Any) -> None:

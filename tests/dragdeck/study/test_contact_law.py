@@ -29,7 +29,7 @@ from dragdeck.study.contact_law import (
 )
 from dragdeck.study.material import Material
 from dragdeck.sweep.cases import load_cases
-from evidence.verification.collide import Body, Experiment, Wall, collide_case, collide_scene
+from evidence.verification.experiment import PlacedSphere, Wall, collide_scene, experiment
 
 OPTIONAL = [name for name, row in coefficients().items() if row.model]
 USED = 0.1
@@ -144,21 +144,14 @@ def test_a_rolling_particle_slows_down_by_five_sevenths_of_the_coefficient(
     mu, radius, speed, gravity, step = 0.02, 0.003, 0.1, 9.81, 1e-6
     steel = Material(youngs_modulus_pa=1e8, poissons_ratio=0.3, density_kg_m3=7800)
     pair = Pair(restitution=0.5, friction=0.5, rolling_friction=mu)
-    turning = Body(
-        type=1,
-        radius_m=radius,
-        position_m=(0, 0, radius),
-        velocity_m_s=(speed, 0, 0),
-        spin_rad_s=(0, speed / radius, 0),
-    )
-    rolling = collide_case(
-        [("particle", steel), ("plane", steel)], {(1, 2): pair}, [turning],
-        study="rolling", run="rolling", title="A rolling particle",
-        walls=[Wall("floor", 2, "zplane 0.0")], timestep_s=step, rayleigh_time_s=20 * step,
-        gravity_m_s2=(0, 0, -gravity), test="rolling", number=1, heading="", series="", vary="",
-        steps_per_contact=1, contacts=[],
+    turning = PlacedSphere(1, radius, (0, 0, radius), (speed, 0, 0), (0, speed / radius, 0))
+    rolling = experiment(
+        "rolling", 1, "A rolling particle", [],
+        types=[("particle", steel), ("plane", steel)], pairs={(1, 2): pair}, bodies=[turning],
+        walls=[Wall("floor", 2, "zplane 0.0")], timestep_s=step, series="", vary="", contacts=[],
+        gravity_m_s2=(0, 0, -gravity), steps_per_contact=1, steps=200_000, period=20_000,
     )  # fmt: skip
-    scene = collide_scene(Experiment(rolling, steps=200_000, period=20_000))
+    scene = collide_scene(rolling)
     folder = tmp_path / "rolling"
     write_run(scene, folder, environment(project.templates))
     run(folder, lambda line: None)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from made_study import Load, Made
 
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
@@ -14,7 +15,7 @@ from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.registry import SCENES
-from dragdeck.sweep.cases import load_cases, new_study, study_file
+from dragdeck.sweep.cases import load_cases, study_file
 
 
 @pytest.fixture
@@ -74,11 +75,8 @@ def test_the_order_of_keys_does_not_matter(ids: Callable[..., dict[str, str]]) -
     assert ids(reverse) == ids()
 
 
-def test_a_matrix_makes_every_combination(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
-    small["sweep"] = {"motion.speed_m_s": [0.01, 0.02], "seed": [1, 2, 3]}
-    cases = load_cases(write_study(small))
+def test_a_matrix_makes_every_combination(load: Load) -> None:
+    cases = load({"sweep": {"motion.speed_m_s": [0.01, 0.02], "seed": [1, 2, 3]}})
     assert len(cases) == len({PROCESS.run_id(case) for case in cases}) == 6
     assert cases[3].name == "quick_speed_m_s-0.02_seed-1"
     assert cases[3].study.motion.speed_m_s == 0.02
@@ -86,47 +84,14 @@ def test_a_matrix_makes_every_combination(
     assert len(by_run(cases, DROP_TEST)) == 1
 
 
-@pytest.mark.parametrize(
-    ("sweep", "words"),
-    [
-        ({"motion.colour": [1]}, "motion.colour: unknown key"),
-        ({"seed": []}, "sweep.seed: no values"),
-        ({"seed": [1, 1]}, "given twice"),
-        ({"bowl.radius_m.deeper": [1]}, "below a single value"),
-        ({"motion.speed_m_s": [0.01, -1]}, "motion.speed_m_s"),
-        ({"motion.speed_m_s": [0.01, "1e-2"]}, "given twice"),
-        ({"seed": [1, 1.0]}, "given twice"),
-        ({"sweep": [{"seed": [1, 2]}]}, "sweep.sweep: no run depends on it"),
-        ({"sweep.seed": [1, 2]}, "sweep.sweep.seed: no run depends on it"),
-        ({"title": ["a", "b"]}, "sweep.title: no run depends on it"),
-        ({"seed": [[1, 2], [3]]}, "seed"),
-        ({"seed": list(range(201))}, "makes 201 cases, more than are accepted"),
-        ({"seed": list(range(9999)), "media.count": list(range(9999))}, "makes 99980001 cases"),
-    ],
-)
-def test_a_wrong_matrix_is_explained(
-    small: dict[str, Any], write_study: Callable[..., Path], sweep: dict[str, Any], words: str
-) -> None:
-    small["sweep"] = sweep
-    with pytest.raises(InputError) as caught:
-        load_cases(write_study(small))
-    assert words in str(caught.value)
-
-
-def test_many_cases_need_a_confirmation(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
+def test_many_cases_need_a_confirmation(small: dict[str, Any], load: Load) -> None:
     small["sweep"] = {"seed": list(range(201))}
-    small["accepted"] = {"cases": 201}
-    assert len(load_cases(write_study(small))) == 201
+    assert len(load({"accepted": {"cases": 201}})) == 201
 
 
-def test_problems_of_all_cases_are_named_together(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
-    small["sweep"] = {"motion.speed_m_s": [0.01, -1, -2], "seed": [1, -3]}
+def test_problems_of_all_cases_are_named_together(load: Load) -> None:
     with pytest.raises(InputError) as caught:
-        load_cases(write_study(small))
+        load({"sweep": {"motion.speed_m_s": [0.01, -1, -2], "seed": [1, -3]}})
     values = [error.value for error in (caught.value, *caught.value.more)]
     assert sorted(map(str, values)) == ["-1", "-2", "-3"]
 
@@ -145,11 +110,6 @@ def test_the_fidelity_of_the_command_line_goes_first(
     assert PROCESS.run_id(case).startswith("draft-")
 
 
-def test_an_unknown_study_lists_the_known(project: Project, case: Case) -> None:
-    with pytest.raises(InputError, match="one of: small"):
-        study_file(project.studies, "large")
-
-
 def test_an_edited_mesh_names_another_run(
     project: Project, small: dict[str, Any], write_study: Callable[..., Path]
 ) -> None:
@@ -164,16 +124,57 @@ def test_an_edited_mesh_names_another_run(
     assert FILLING.run_id(before) == FILLING.run_id(after)
 
 
-SCALING = {"field": "motion.immersion_depth_m", "expected_exponent": 2, "source": "somebody"}
+DEPTH, KIND = "motion.immersion_depth_m", "workpiece.shape.kind"
 DEPTHS = [0.010, "1.5e-2", 0.020]
+SCALING = {"field": DEPTH, "expected_exponent": 2, "source": "somebody"}
+SWEPT = {DEPTH: DEPTHS, "seed": [1, 2]}
+MANY = {"seed": list(range(9999)), "media.count": list(range(9999))}
+REFUSED = [
+    *(({"sweep": sweep}, field, words) for sweep, field, words in [
+        ({"motion.colour": [1]}, "motion.colour", "unknown key"),
+        ({"seed": []}, "sweep.seed", "no values"),
+        ({"seed": [1, 1]}, "", "given twice"),
+        ({"seed": [1, 1.0]}, "", "given twice"),
+        ({"motion.speed_m_s": [0.01, "1e-2"]}, "", "given twice"),
+        ({"bowl.radius_m.deeper": [1]}, "", "below a single value"),
+        ({"motion.speed_m_s": [0.01, -1]}, "motion.speed_m_s", ""),
+        ({"sweep": [{"seed": [1, 2]}]}, "sweep.sweep", "no run depends on it"),
+        ({"sweep.seed": [1, 2]}, "sweep.sweep.seed", "no run depends on it"),
+        ({"title": ["a", "b"]}, "sweep.title", "no run depends on it"),
+        ({"seed": [[1, 2], [3]]}, "seed", ""),
+        ({"seed": list(range(201))}, "", "makes 201 cases, more than are accepted"),
+        (MANY, "", "makes 99980001 cases"),
+    ]),
+    *(({"sweep": sweep, "scaling": {**SCALING, **scaling}}, field, words)
+      for scaling, sweep, field, words in [
+        ({"field": "motion.depth_m"}, SWEPT, "scaling.field", "not a field of sweep"),
+        ({}, {**SWEPT, "motion.speed_m_s": [0.01, 0.02]}, "sweep", "exactly one field"),
+        ({}, {**SWEPT, DEPTH: [0.01, 0.02]}, f"sweep.{DEPTH}", "too few levels"),
+        ({"fit_range": [0.01, 0.015]}, SWEPT, f"sweep.{DEPTH}", "too few levels"),
+        ({"fit_range": [0.02, 0.01]}, SWEPT, "scaling", "fit_range must increase"),
+        ({"field": "seed"}, SWEPT, "scaling", "seed"),
+        ({"slope": 2}, SWEPT, "scaling.slope", "unknown key"),
+        ({"field": KIND}, {"seed": [1, 2], KIND: ["cylinder"]}, f"sweep.{KIND}", "numbers above 0"),
+    ]),
+    *(({"assumptions": [{"field": "media", "why": "any"}, {"field": field, "why": "any"}]},
+       "assumptions.1.field", f"no such field {field!r}")
+      for field in ("media.cuont", "path", "motion.path.lenght_m", "media.")),
+]  # fmt: skip
 
 
-def test_a_scaling_is_part_of_no_run(
-    small: dict[str, Any], write_study: Callable[..., Path]
+@pytest.mark.parametrize(("changes", "field", "words"), REFUSED)
+def test_what_no_run_can_be_made_of_is_refused(
+    load: Load, changes: dict[str, Any], field: str, words: str
 ) -> None:
-    data = {**small, "sweep": {"motion.immersion_depth_m": DEPTHS, "seed": [1, 2]}}
-    before = load_cases(write_study(data))
-    after = load_cases(write_study({**data, "scaling": SCALING}))
+    with pytest.raises(InputError) as caught:
+        load(changes)
+    found = [caught.value, *caught.value.more]
+    assert any(str(one.field).startswith(field) and words in str(one) for one in found)
+
+
+def test_a_scaling_is_part_of_no_run(load: Load) -> None:
+    before = load({"sweep": {DEPTH: DEPTHS, "seed": [1, 2]}})
+    after = load({"scaling": SCALING})
     assert len(after) == 6
     for one, other in zip(before, after, strict=True):
         for scene in SCENES.values():
@@ -182,83 +183,13 @@ def test_a_scaling_is_part_of_no_run(
     assert after[0].study.scaling is not None and before[0].study.scaling is None
 
 
-@pytest.mark.parametrize(
-    ("scaling", "sweep", "field", "words"),
-    [
-        ({"field": "motion.depth_m"}, {}, "scaling.field", "not a field of sweep"),
-        ({}, {"motion.speed_m_s": [0.01, 0.02]}, "sweep", "exactly one field"),
-        (
-            {},
-            {"motion.immersion_depth_m": [0.01, 0.02]},
-            "sweep.motion.immersion_depth_m",
-            "too few levels",
-        ),
-        ({"fit_range": [0.01, 0.015]}, {}, "sweep.motion.immersion_depth_m", "too few levels"),
-        ({"fit_range": [0.02, 0.01]}, {}, "scaling", "fit_range must increase"),
-        ({"field": "seed"}, {}, "scaling", "seed"),
-        ({"slope": 2}, {}, "scaling.slope", "unknown key"),
-        (
-            {"field": "workpiece.shape.kind"},
-            {"motion.immersion_depth_m": None, "workpiece.shape.kind": ["cylinder"] * 1},
-            "sweep.workpiece.shape.kind",
-            "numbers above 0",
-        ),
-    ],
-)
-def test_a_scaling_that_the_matrix_cannot_tell_is_refused(
-    small: dict[str, Any],
-    write_study: Callable[..., Path],
-    scaling: dict[str, Any],
-    sweep: dict[str, Any],
-    field: str,
-    words: str,
-) -> None:
-    varied = {"motion.immersion_depth_m": DEPTHS, "seed": [1, 2], **sweep}
-    data = {
-        **small,
-        "sweep": {name: values for name, values in varied.items() if values},
-        "scaling": {**SCALING, **scaling},
-    }
-    with pytest.raises(InputError, match=words) as caught:
-        load_cases(write_study(data))
-    assert caught.value.field == field
-
-
-@pytest.mark.parametrize("field", ["media.cuont", "path", "motion.path.lenght_m", "media."])
-def test_an_assumption_about_no_field_is_refused(
-    small: dict[str, Any], write_study: Callable[..., Path], field: str
-) -> None:
-    small["assumptions"] = [{"field": "media", "why": "any"}, {"field": field, "why": "any"}]
-    with pytest.raises(InputError, match="no such field") as caught:
-        load_cases(write_study(small))
-    assert (caught.value.field, repr(field) in caught.value.problem) == (
-        "assumptions.1.field",
-        True,
-    )
-
-
 @pytest.mark.parametrize("field", ["media.count", "pairs", "motion.tilt_deg", "reference"])
-def test_an_assumption_may_be_about_a_field_or_a_block(
-    small: dict[str, Any], write_study: Callable[..., Path], field: str
-) -> None:
-    small["assumptions"] = [{"field": field, "why": "any"}]
-    assert load_cases(write_study(small))
+def test_an_assumption_may_be_about_a_field_or_a_block(field: str, load: Load) -> None:
+    assert load({"assumptions": [{"field": field, "why": "any"}]})
 
 
-@pytest.mark.parametrize("name", [".", "..", "", "a/b"])
-def test_a_name_that_can_be_none_is_not_called_taken(
-    write_study: Any, small: Any, name: str
-) -> None:
-    with pytest.raises(InputError, match="this name cannot be used for a study"):
-        new_study(write_study(small).parent.parent, name, "small")
-
-
-def test_an_assumption_about_another_kind_of_path_is_left_out(
-    small: dict[str, Any], write_study: Callable[..., Path]
-) -> None:
-    small["assumptions"] = [{"field": "motion.path.radius_m", "why": "a guess"}]
-    (circle,) = load_cases(write_study(small))
-    small["motion"]["path"] = {"kind": "line", "start_m": [-0.01, 0.0], "length_m": 0.02}
-    (line,) = load_cases(write_study(small))
+def test_an_assumption_about_another_kind_of_path_is_left_out(made: Made) -> None:
+    circle = made({"assumptions": [{"field": "motion.path.radius_m", "why": "a guess"}]})
+    line = made({"motion.path": {"kind": "line", "start_m": [-0.01, 0.0], "length_m": 0.02}})
     assumed = [process_scene(one).case.assumptions for one in (circle, line)]
     assert [len(one) for one in assumed] == [1, 0]

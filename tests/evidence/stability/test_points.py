@@ -150,7 +150,7 @@ def ended(run: PointRun, state: str, *failed: str) -> PointRun:
 
 
 def test_a_list_that_cannot_be_used_is_named_with_its_field(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"(?s)settle\.json.*points\.0\.regime"):
+    with pytest.raises(InputError, match=r"(?s)settle\.json.*points\[0\]\.regime"):
         read_points([listed(tmp_path, regime="bounce")])
 
 

@@ -19,21 +19,15 @@ from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import Measures, RunCost
 from dragdeck.errors import DocumentError
 from evidence.validation import force
-from evidence.validation.around_workpiece import contacts_of
-from evidence.validation.corridor import Corridor, relative_places
-from evidence.validation.effects import effect_table, effects
-from evidence.validation.runs_by_bed import (
-    Point,
-    Points,
-    over_packings,
-    read_points,
-)
+from evidence.validation.force import effect_table, effects
+from evidence.validation.runs import MeasuredRun, RunsByBed, over_packings, read_runs
+from evidence.validation.statements import Corridor, contacts_of, relative_places
 
 RATE_HZ = 1000.0
 DIAMETER_M = 2 * 8.76e-3
 
 
-def made_point(
+def made_run(
     tiny_run: Path,
     folder: Path,
     seed: int,
@@ -41,7 +35,7 @@ def made_point(
     *,
     parameters: tuple[float, float] = (1.0, 0.64),
     varied: dict[str, Any] | None = None,
-) -> Point:
+) -> MeasuredRun:
     """A run of the tiny case with this drag."""
     (folder / "tables").mkdir(parents=True)
     table = pd.DataFrame({"time_s": np.arange(len(drag)) / RATE_HZ, "drag_n": drag})
@@ -81,7 +75,7 @@ def made_point(
         started="2026-01-01T00:00:00+00:00",
         complete=True,
     )
-    return Point(folder, case, measures, varied or {})
+    return MeasuredRun(folder, case, measures, varied or {})
 
 
 def series(mean: float, rng: np.random.Generator, count: int = 4000) -> np.ndarray[Any, Any]:
@@ -95,12 +89,12 @@ def series(mean: float, rng: np.random.Generator, count: int = 4000) -> np.ndarr
 
 
 @pytest.fixture
-def points(tiny_run: Path, tmp_path: Path) -> Points:
+def runs(tiny_run: Path, tmp_path: Path) -> RunsByBed:
     """Four fills, a control that is 10 % up, and soft runs with and without a wider bowl."""
     rng = np.random.default_rng(7)
 
-    def run(name: str, seed: int, factor: float, **more: Any) -> Point:
-        return made_point(tiny_run, tmp_path / name, seed, factor * series(-2.5, rng), **more)
+    def run(name: str, seed: int, factor: float, **more: Any) -> MeasuredRun:
+        return made_run(tiny_run, tmp_path / name, seed, factor * series(-2.5, rng), **more)
 
     packings = [run(f"filling-{seed}", seed, 1.0) for seed in (1, 2, 3, 4)]
     soft: dict[str, Any] = {"parameters": (1e-3, 0.5)}
@@ -109,7 +103,7 @@ def points(tiny_run: Path, tmp_path: Path) -> Points:
         others.append(run(f"soft-{seed}", seed, 1.05, **soft))
         wider = {"bowl.radius_m": 0.08}
         others.append(run(f"wide-{seed}", seed, 1.05 * 0.5, **soft, varied=wider))
-    return Points(packings, others)
+    return RunsByBed(packings, others)
 
 
 def test_the_interval_over_packings_covers_as_often_as_it_says() -> None:
@@ -132,8 +126,8 @@ def test_one_filling_has_no_interval() -> None:
         over_packings([1.0])
 
 
-def test_the_mean_over_packings_is_that_of_the_drag(points: Points) -> None:
-    found = force.of_packings(points.packings)
+def test_the_mean_over_packings_is_that_of_the_drag(runs: RunsByBed) -> None:
+    found = force.force_of_packings(runs.packings)
     drag, lateral = found.together["drag_n"], found.together["lateral_n"]
     assert drag.mean.contains(-2.5)
     assert drag.mean.value == pytest.approx(-2.5, abs=0.15)  # 4 s.e. of 4 packings
@@ -145,17 +139,17 @@ def test_the_mean_over_packings_is_that_of_the_drag(points: Points) -> None:
 def test_packings_that_differ_are_seen(tiny_run: Path, tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     packings = [
-        made_point(tiny_run, tmp_path / f"far-{seed}", seed, series(-2.5 - seed, rng))
+        made_run(tiny_run, tmp_path / f"far-{seed}", seed, series(-2.5 - seed, rng))
         for seed in (1, 2, 3)
     ]
-    assert force.of_packings(packings).alike.p_value < 1e-6
+    assert force.force_of_packings(packings).alike.p_value < 1e-6
 
 
 def test_half_of_a_sine_of_variance_lies_at_its_wave(tiny_run: Path, tmp_path: Path) -> None:
     count = 4000
     path = np.linspace(0.0, 20.0, count, endpoint=False)  # particle diameters
     packings = [
-        made_point(tiny_run, tmp_path / f"sine-{seed}", seed, np.sin(2 * np.pi * path / 2.0))
+        made_run(tiny_run, tmp_path / f"sine-{seed}", seed, np.sin(2 * np.pi * path / 2.0))
         for seed in (1, 2)
     ]
     found = force.spectrum(packings)
@@ -164,17 +158,17 @@ def test_half_of_a_sine_of_variance_lies_at_its_wave(tiny_run: Path, tmp_path: P
     assert found.waves_per_diameter[peak] == pytest.approx(0.5)
 
 
-def test_the_comparison_has_the_sign_of_more_drag(points: Points) -> None:
+def test_the_comparison_has_the_sign_of_more_drag(runs: RunsByBed) -> None:
     drag = force.Together(mean=Estimate(-2.75, -3.0, -2.5), std=Estimate(0.6, 0.5, 0.7))
-    measured, published = force.compare(drag, points.packings[0].case)
+    measured, published = force.compare(drag, runs.packings[0].case)
     assert vars(measured.difference) == pytest.approx(vars(Estimate(0.1, 0.0, 0.2)))
     assert measured.std_ratio is not None and published.std_ratio is None
     assert vars(measured.std_ratio) == pytest.approx(vars(Estimate(1.2, 1.0, 1.4)))
     assert published.difference.value == pytest.approx(0.375)
 
 
-def test_effects_are_found_against_what_they_change(points: Points) -> None:
-    table = effect_table(effects(points))
+def test_effects_are_found_against_what_they_change(runs: RunsByBed) -> None:
+    table = effect_table(effects(runs))
     mean = table[table["quantity"] == "drag_mean"]
     control, soft, wide = (mean.iloc[i] for i in range(3))
     assert (control.timestep_fraction, control.field, control.runs) == (0.2, "", 1)
@@ -189,24 +183,24 @@ def test_effects_are_found_against_what_they_change(points: Points) -> None:
     assert (spread.ci95_low < spread.change).all() and (spread.change < spread.ci95_high).all()
 
 
-def test_a_shorter_run_counts_less(points: Points) -> None:
+def test_a_shorter_run_counts_less(runs: RunsByBed) -> None:
     def half_width(arc_m: float) -> float:
-        control, *others = points.others
+        control, *others = runs.others
         shorter = dataclasses.replace(control, measures=changed(control.measures, arc_m=arc_m))
-        row = effects(Points(points.packings, [shorter, *others]))[0]
+        row = effects(RunsByBed(runs.packings, [shorter, *others]))[0]
         return row.ci95_high - row.ci95_low
 
-    whole = points.packings[0].measures.arc_m
+    whole = runs.packings[0].measures.arc_m
     assert half_width(whole / 4.0) > 1.4 * half_width(whole)
 
 
 # --- statements --------------------------------------------------------------------------------
 
 
-def with_contacts(points: Points, seed: int = 0) -> list[Point]:
+def with_contacts(runs: RunsByBed, seed: int = 0) -> list[MeasuredRun]:
     """Contacts on the workpiece: three ahead for one behind, force 1 N/m times the depth more."""
     rng = np.random.default_rng(seed)
-    for point in points.packings:
+    for point in runs.packings:
         workpiece = point.case.workpiece
         assert workpiece is not None
         ahead = rng.uniform(-np.pi / 2, np.pi / 2, 3000)
@@ -221,27 +215,29 @@ def with_contacts(points: Points, seed: int = 0) -> list[Point]:
             }
         )
         table.to_parquet(point.folder / "tables" / "workpiece_contacts.parquet")
-    return points.packings
+    return runs.packings
 
 
-def test_contacts_around_the_workpiece(points: Points) -> None:
-    rows = [contacts_of(point) for point in with_contacts(points)]
-    assert [row.ahead_behind for row in rows] == pytest.approx([3.0] * 4, rel=0.01)
-    assert [row.depth_slope_n_per_m for row in rows] == pytest.approx([1.0] * 4)
+def test_contacts_around_the_workpiece(runs: RunsByBed) -> None:
+    rows = [contacts_of(point) for point in with_contacts(runs)]
+    assert [row.numbers["ahead_behind"] for row in rows] == pytest.approx([3.0] * 4, rel=0.01)
+    assert [row.numbers["depth_slope_n_per_m"] for row in rows] == pytest.approx([1.0] * 4)
     assert rows[0].azimuth.sum() == pytest.approx(1.0)
-    assert rows[0].front_fraction == pytest.approx(0.375, abs=0.03)
-    assert rows[0].front_over_flank == pytest.approx(1.0, abs=0.1)
+    assert rows[0].numbers["front_fraction"] == pytest.approx(0.375, abs=0.03)
+    assert rows[0].numbers["front_over_flank"] == pytest.approx(1.0, abs=0.1)
 
 
-def test_silent_contacts_do_not_count(points: Points) -> None:
-    (point, *_) = with_contacts(points)
+def test_silent_contacts_do_not_count(runs: RunsByBed) -> None:
+    (point, *_) = with_contacts(runs)
     file = point.folder / "tables" / "workpiece_contacts.parquet"
     before = contacts_of(point)
     table = pd.read_parquet(file)
     silent = table.assign(normal_force_n=0.0, azimuth_rad=0.0)
     pd.concat([table, silent]).to_parquet(file)
-    after = vars(contacts_of(point))
-    assert all(np.array_equal(after[name], value) for name, value in vars(before).items())
+    after = contacts_of(point)
+    assert after.numbers == before.numbers
+    assert np.array_equal(after.azimuth, before.azimuth)
+    assert np.array_equal(after.depth, before.depth)
 
 
 def test_the_corridor_is_along_the_motion(tmp_path: Path) -> None:
@@ -275,14 +271,14 @@ def test_the_reach_lies_where_half_of_the_excess_is_left() -> None:
 
 def test_a_reference_that_is_not_measured_is_named(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match=r"measures.json: there is no such file"):
-        read_points([tmp_path])
+        read_runs([tmp_path])
 
 
 def test_the_section_of_the_validation_page_shows_every_scaling() -> None:
     scalings = read_scalings()
     template = page_environment(package="evidence").get_template("validation/scaling.html.j2")
-    page = template.render(found=scalings, picture=lambda name: f"data:image/png;base64,{name}")
-    assert 'src="data:image/png;base64,scaling.png"' in page
+    page = template.render(found=scalings, pictures={"scaling": "data:image/png;base64,scaling"})
+    assert 'src="data:image/png;base64,scaling"' in page
     for found in scalings:
         exponent = found.judged.exponent
         ends = (exponent.value, exponent.ci95_low, exponent.ci95_high)

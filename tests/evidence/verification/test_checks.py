@@ -1,27 +1,40 @@
 """Comparisons with the references, and what is taken from recordings for them."""
 
 import math
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from recordings import recording
 
+from dragdeck.errors import RejectedRunError
 from evidence.verification import checks
-from evidence.verification.quantities import fitted_order, incline_reference, momentum_changes
+from evidence.verification.checks import (
+    COULOMB,
+    EXACT,
+    QUANTITIES,
+    QuantityCheck,
+    check_rows,
+    fitted_order,
+    incline_reference,
+    momentum_changes,
+    published_curve,
+)
+from evidence.verification.report import in_words, verdict, worst_rows
 
 
 def test_a_verdict_depends_on_the_error_and_on_the_reference() -> None:
-    run = recording([[1.0]])
-    rows = [(0.0, 2.0, 2.02), (1.0, 1.0, 1.1)]
-    same = checks.compare(run, "force_n", checks.EXACT, rows, 0.02)
+    run, rows = recording([[1.0]]), [(0.0, 2.0, 2.02), (1.0, 1.0, 1.1)]
+    same = check_rows(run, QuantityCheck("force_n", EXACT, rows, 0.02))
     assert same["verdict"].tolist() == ["pass", "fail"]
     assert same["error"].tolist() == pytest.approx([0.01, 0.05])
-    other = checks.compare(run, "force_n", checks.COULOMB, rows, 0.02)
+    other = check_rows(run, QuantityCheck("force_n", COULOMB, rows, 0.02))
     assert other["verdict"].tolist() == ["agrees", "differs"]
 
 
 def test_not_a_number_is_never_a_pass() -> None:
-    check = checks.compare(recording([[1.0]]), "f", checks.EXACT, [(0.0, 1.0, math.nan)], 1.0)
+    check = check_rows(recording([[1.0]]), QuantityCheck("f", EXACT, [(0.0, 1.0, math.nan)], 1.0))
     assert check["verdict"].tolist() == ["fail"]
 
 
@@ -56,5 +69,49 @@ def test_a_particle_rolls_or_slips_down_an_incline(friction: float, rolls: bool)
 
 
 def test_a_fitted_order_is_the_exponent() -> None:
-    rows = [(10, 1e-2), (100, 1e-4), (1000, 1e-6)]
-    assert fitted_order(rows) == pytest.approx(2.0)
+    assert fitted_order([(10, 1e-2), (100, 1e-4), (1000, 1e-6)]) == pytest.approx(2.0)
+
+
+def test_published_curves_are_in_order_and_only_where_they_belong() -> None:
+    x, y = published_curve("oblique_angle", "aluminium_oxide on rigid", "spin_rad_s")
+    assert (np.diff(x) > 0).all()
+    assert np.interp(29.96, x, y) == pytest.approx(-616.5)
+    assert published_curve("oblique_angle", "no such", "spin_rad_s").shape == (2, 0)
+
+
+def test_every_published_point_is_a_number_of_a_test() -> None:
+    table = pd.read_csv(Path(checks.__file__).with_name("published.csv"), comment="#")
+    assert np.isfinite(table[["x", "y"]].to_numpy()).all()
+    assert set(table["test"]) <= {*QUANTITIES, "elastic_pair", "elastic_plane"}
+
+
+def test_the_page_quotes_the_published_spins_of_two_tests() -> None:
+    """Both at a scaled patch velocity of 4: tan(angle) = 4 x 0.092 in test 4, at 3.9 m/s."""
+    own = np.interp(
+        4.0, *published_curve("oblique_tangential", "steel_fem on rigid", "scaled_spin")
+    )
+    angle = math.atan(4 * 0.092)
+    curve = published_curve("oblique_angle", "aluminium_oxide on rigid", "spin_rad_s")
+    scale = 0.0025 / (0.092 * 3.9 * math.cos(angle))
+    other = scale * np.interp(math.degrees(angle), *curve)
+    text = Path(checks.__file__).with_name("suite.yaml").read_text()
+    assert f"{own:.2f} here and" in text and f"{other:.2f} there" in " ".join(text.split())
+
+
+def test_the_summary_keeps_the_worst_point_and_a_failure_is_named(tmp_path: Path) -> None:
+    rows = [(0.0, 2.0, 2.0), (7.0, 2.0, 2.2)]
+    summary = worst_rows(
+        check_rows(recording([[1.0]]), QuantityCheck("force_n", EXACT, rows, 0.02))
+    )
+    assert summary[["x", "points", "verdict"]].values.tolist() == [[7.0, 2, "fail"]]
+    summary.to_parquet(tmp_path / "verification.parquet")
+    with pytest.raises(RejectedRunError, match=r"elastic_plane, s on s, force_n: error 0\.1"):
+        verdict(tmp_path)
+    summary.assign(verdict="pass").to_parquet(tmp_path / "verification.parquet")
+    assert verdict(tmp_path).startswith("1 pass, 0 fail")
+
+
+def test_units_are_read_from_the_end_of_a_name() -> None:
+    assert in_words("floor_force_n") == "floor force (N)"
+    assert in_words("spin_up_rad_s2") == "spin up (rad/s²)"
+    assert in_words("rebound_over_approach") == "rebound over approach"

@@ -13,7 +13,8 @@ from dragdeck.decks.templates import environment
 from dragdeck.engine.run_folder import run
 from dragdeck.project import Project
 from evidence.__main__ import main
-from evidence.verification.collide import collide_scene
+from evidence.verification.experiment import collide_scene
+from evidence.verification.report import write_verification
 from evidence.verification.suite import suite_of
 
 pytestmark = pytest.mark.engine
@@ -45,7 +46,7 @@ def test_the_engine_meets_the_law_and_a_wrong_law_is_caught(
     folders: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "report"
-    assert main(["judge-suite", "--out", str(out), *map(str, folders)]) == 0
+    write_verification(out, folders)
     assert main(["verdict", str(out)]) == 0
     said = capsys.readouterr().out
     assert " 0 fail" in said
@@ -66,7 +67,7 @@ def test_the_engine_meets_the_law_and_a_wrong_law_is_caught(
         for kind in case["types"]:
             kind["youngs_modulus_pa"] *= 1.01
         file.write_text(json.dumps(case))
-    assert main(["judge-suite", "--out", str(out), *map(str, folders)]) == 0
+    write_verification(out, folders)
     assert main(["verdict", str(out)]) == 1
     said = capsys.readouterr().err
     assert "elastic_pair" in said

@@ -6,18 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from paths import ROOT
 from pydantic import ValidationError
 
-from dragdeck.cases.case import Case
+from dragdeck.cases.case import Case, digest
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
 from dragdeck.project import Project
 from dragdeck.study.model import Study
-from evidence.__main__ import main
-from evidence.verification.collide import Experiment, collide_scene, frame_period
-from evidence.verification.impacts import Impacts
-from evidence.verification.lab import contact_time
-from evidence.verification.suite import suite_file, suite_of
+from evidence.verification.checks import CHECKS
+from evidence.verification.experiment import Experiment, collide_scene, frame_period
+from evidence.verification.suite import Impacts, hertz_time, suite_file, suite_of
 
 
 @pytest.fixture
@@ -49,8 +48,10 @@ def test_every_experiment_is_a_deck(experiments: dict[str, Experiment], project:
         assert experiment.steps - scene.deck.outputs[1].period_steps < last <= experiment.steps
 
 
-def test_the_suite_is_always_the_same(case: Case) -> None:
-    assert list(suite_of(case.study)) == list(suite_of(case.study))
+def test_the_runs_of_the_default_study_keep_their_names() -> None:
+    """The digest in a name depends on all that its run does."""
+    study = Project(ROOT).cases("uhlmann2015")[0].study
+    assert digest(list(suite_of(study))) == "b20bef91"
 
 
 def test_a_study_changes_its_own_series_and_no_other(case: Case) -> None:
@@ -144,8 +145,8 @@ def test_no_particle_of_the_suite_can_leave_its_box(experiments: dict[str, Exper
 
 def test_two_equal_particles_touch_shorter_than_one_on_its_like(case: Case) -> None:
     steel = case.study.materials["steel"]
-    plane = contact_time(steel, 0.01, None, None, steel, 1.0)
-    pair = contact_time(steel, 0.01, steel, 0.01, steel, 1.0)
+    plane = hertz_time(steel, 0.01, steel, None, 1.0)
+    pair = hertz_time(steel, 0.01, steel, 0.01, 1.0)
     assert pair / plane == pytest.approx((0.5**2 / 0.5) ** 0.2)
 
 
@@ -167,19 +168,14 @@ def test_a_rigid_partner_is_stiff(case: Case) -> None:
 def test_a_test_varies_one_thing() -> None:
     with pytest.raises(ValidationError, match="exactly one"):
         Impacts.model_validate(
-            {"number": 1, "title": "t", "partner": "plane", "radius_m": 1, "speed_m_s": 1,
-             "vary": {"spin_m_s": [1], "angle_deg": [1]}, "series": []}
+            {"number": 1, "title": "t", "text": [], "partner": "plane", "radius_m": 1,
+             "speed_m_s": 1, "vary": {"spin_m_s": [1], "angle_deg": [1]}, "series": []}
         )  # fmt: skip
 
 
-def test_the_command_writes_every_deck(
-    case: Case, project: Project, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(project.root)
-    assert main(["render-suite", "small"]) == 0
-    runs = list(suite_of(case.study))
-    for run in runs:
-        folder = project.results("verification") / "collide" / run
-        assert {file.name for file in folder.iterdir()} == {
-            "in.liggghts", "case.json", "columns.json", "bodies.data",
-        }  # fmt: skip
+def test_the_page_has_checks_and_words_of_every_test() -> None:
+    suite = suite_file()
+    assert list(suite.tests()) == list(CHECKS)
+    for name, test in suite.tests().items():
+        assert test.text, name
+        assert all(" " in words or words in suite.notes for words in test.text), name

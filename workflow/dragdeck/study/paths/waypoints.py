@@ -112,7 +112,8 @@ class WaypointsPath(WorkpiecePath):
 
     def plain(self) -> dict[str, JsonValue]:
         """Waypoints have their inclination only if there is any: no run is named anew."""
-        shown = list[JsonValue]([list(point)[: 7 if self.leans else 5] for point in self.points])
+        count = 7 if self.leans else 5
+        shown: list[JsonValue] = [list[JsonValue](point[:count]) for point in self.points]
         return super().plain() | {"points": shown}
 
     @property
@@ -344,13 +345,15 @@ class WaypointsPath(WorkpiecePath):
 
     def entry(self, drive: Drive) -> Json:
         """Its stages from the start of the drag; its direction never turns the workpiece."""
+        stages: list[JsonValue] = [self._entry_of(stage, drive) for stage in self.stages(drive)]
+        return {"orientation": "fixed", "stages": stages}
+
+    def _entry_of(self, stage: Stage, drive: Drive) -> dict[str, JsonValue]:
+        rotation = list[JsonValue](stage.rotation_rad)
         return {
-            "orientation": "fixed",
-            "stages": [
-                {"steps": stage.steps, "velocity_m_s": list(stage.velocity_m_s)}
-                | ({"rotation_rad": list(stage.rotation_rad)} if self._inclined(drive) else {})
-                for stage in self.stages(drive)
-            ],
+            "steps": stage.steps,
+            "velocity_m_s": list[JsonValue](stage.velocity_m_s),
+            **({"rotation_rad": rotation} if self._inclined(drive) else {}),
         }
 
 

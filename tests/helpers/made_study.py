@@ -1,0 +1,21 @@
+"""The small study with some of its fields changed."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from dragdeck.cases.case import Case
+
+Load = Callable[..., list[Case]]
+Made = Callable[..., Case]
+
+
+def put(data: dict[str, Any], changes: Mapping[str, Any]) -> None:
+    """Set fields by their dotted names; a whole block keeps what it is not given."""
+    for name, value in changes.items():
+        *above, last = name.split(".")
+        block = data
+        for part in above:
+            block = block.setdefault(part, {})
+        old = block.get(last)
+        merged = not above and isinstance(old, dict) and isinstance(value, Mapping)
+        block[last] = {**old, **value} if merged else value
