@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation as Quaternion
 
 from dragchain.arrays import Floats, Ints
 from dragchain.drag.force import read_counted
@@ -363,7 +364,8 @@ def _workpiece(columns: Columns, run: Run, frames: list[ShownFrame]) -> dict[str
     for frame in frames:
         assert frame.data.workpiece is not None
         place, rotation = frame.data.workpiece
-        poses.append([*(1e3 * place).tolist(), float(rotation.front_rad[0])])
+        turn = Quaternion.from_matrix(rotation.matrices[0]).as_quat()
+        poses.append([*(1e3 * place).tolist(), *turn.tolist()])
     return {
         "poses": poses,
         "headings": _headings(run, frames),

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from made_run import line
 from network_run_files import PEAK_N, PEAKS_S, accept, draw, write_network_run
 from pages import Page
+from scipy.spatial.transform import Rotation
 
 from dragchain.cli import main
 from dragchain.errors import SeriesError, TableError
@@ -210,10 +211,9 @@ def test_the_pose_puts_the_facets_where_the_run_has_them(
     write_page(folder)
     page = Written(folder / "network.html")
     (workpiece,) = page.head["workpieces"]
-    x, y, z, angle = workpiece["poses"][0]
+    place, turn = workpiece["poses"][0][:3], workpiece["poses"][0][3:]
     corners = page.columns["corners"].reshape(-1, 3)
-    cos, sin = np.cos(angle), np.sin(angle)
-    placed = corners @ np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]]) + [x, y, z]
+    placed = Rotation.from_quat(turn).apply(corners) + place
     first = table(folder, "workpiece_force", page.head["steps"][0]).iloc[0]
     import meshio
 
