@@ -19,8 +19,7 @@ from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN, drawing,
 from dragchain.report.page import page_environment
 from dragchain.run.case import Case, load_case
 from dragchain.run.completeness import RunRecord
-from dragchain.run.kinematics import needed
-from dragchain.run.paths.circle import Circle
+from dragchain.run.kinematics import motion_of, needed
 from dragchain.scaling.document import (
     BandPoint,
     CurvePoint,
@@ -35,6 +34,7 @@ from dragchain.statistics import power_law
 from dragchain.statistics.estimate import Estimate, flattened
 from dragchain.statistics.power_law import fit_shifted, fit_two_terms
 from dragdeck.files import write_bytes, write_text
+from dragdeck.study.paths.circle import CirclePath
 
 _STORED = Path(__file__).parent / "data"
 """The scalings that were measured for the documentation."""
@@ -63,10 +63,11 @@ class LevelRun:
     @property
     def gap_particles(self) -> float | None:
         """Gap between workpiece and bowl wall in mean particle diameters; None off a circle."""
-        if not isinstance(self.case.motion, Circle):
+        path = motion_of(self.case).motion.path
+        if not isinstance(path, CirclePath):
             return None
         bowl, workpiece = needed(self.case.bowl, "bowl"), needed(self.case.workpiece, "workpiece")
-        gap = bowl.radius_m - self.case.motion.radius_m - workpiece.radius_m
+        gap = bowl.radius_m - path.radius_m - workpiece.radius_m
         return gap / (2.0 * self.case.media.radius_mean_m)
 
     @property
