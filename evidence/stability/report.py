@@ -67,7 +67,6 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
         package="evidence",
         summary=summary,
         sizes=sizes,
-        regimes=[{"regime": name, **dict(row)} for name, row in summary.regimes.items()],
         class_names=CLASSES,
         classes=[
             {"regime": regime, **Counter(dict.fromkeys(CLASSES, 0)), **Counter(own["class"])}
