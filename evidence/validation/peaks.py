@@ -294,7 +294,7 @@ class RunRow(Part):
     peaks: int
 
 
-class Findings(Document):
+class PeakFindings(Document):
     """The content of ``peaks.json``."""
 
     runs: tuple[RunRow, ...]
@@ -307,7 +307,7 @@ class Findings(Document):
         return pd.DataFrame([dict(test) for test in self.tests])
 
 
-def of_runs(run_dirs: Sequence[Path]) -> Findings:
+def of_runs(run_dirs: Sequence[Path]) -> PeakFindings:
     """Test the runs, which differ by their packing, and judge the statements.
 
     Raises
@@ -315,10 +315,10 @@ def of_runs(run_dirs: Sequence[Path]) -> Findings:
     TableError
         A table is missing, or a run has no peak.
     """
-    return findings([read_run(folder) for folder in run_dirs])
+    return peak_findings([read_run(folder) for folder in run_dirs])
 
 
-def findings(runs: Sequence[ChainSeries], count: int = SHIFTS) -> Findings:
+def peak_findings(runs: Sequence[ChainSeries], count: int = SHIFTS) -> PeakFindings:
     """Make all tests, each with so many shifts, and judge the statements."""
     shifts = draw_shifts([len(run.time_s) for run in runs], count)
     tests = [_difference(runs, shifts, name) for name in DESCRIPTORS]
@@ -328,17 +328,17 @@ def findings(runs: Sequence[ChainSeries], count: int = SHIFTS) -> Findings:
     ]
     adjusted = holm([test.p for test in tests]).tolist()
     tests = [test.model_copy(update={"p_holm": p}) for test, p in zip(tests, adjusted, strict=True)]
-    return Findings(
+    return PeakFindings(
         runs=tuple(
             RunRow(run=run.run, frames=len(run.time_s), peaks=len(run.peaks)) for run in runs
         ),
         shifts=count,
-        statements=tuple(judge(name, tests) for name in get_args(Statement)),
+        statements=tuple(judge_statement(name, tests) for name in get_args(Statement)),
         tests=tuple(tests),
     )
 
 
-def judge(statement: Statement, tests: Sequence[PeakTest]) -> Judgement:
+def judge_statement(statement: Statement, tests: Sequence[PeakTest]) -> Judgement:
     """The verdict on a statement.
 
     Confirmed if a test supports it and all but the conservative one confirm it; contradicted if no

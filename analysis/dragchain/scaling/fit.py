@@ -54,7 +54,7 @@ _UNLIKE = frozenset({"seed"})
 
 
 @dataclass(frozen=True)
-class LevelRun:
+class RunOfScaling:
     """One run of a scaling: its row in ``scaling.json``, and its case."""
 
     row: ScaledRun
@@ -78,7 +78,7 @@ class LevelRun:
         return gap / (2.0 * self.case.media.radius_mean_m)
 
 
-def read_runs(run_dirs: Sequence[Path], field: str) -> list[LevelRun]:
+def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[RunOfScaling]:
     """Read the runs of a scaling from their tables, ordered by level and bed.
 
     Raises
@@ -92,7 +92,7 @@ def read_runs(run_dirs: Sequence[Path], field: str) -> list[LevelRun]:
     return sorted(runs, key=lambda run: (run.row.level, run.row.bed))
 
 
-def _read_run(folder: Path, field: str) -> LevelRun:
+def _read_run(folder: Path, field: str) -> RunOfScaling:
     case = load_case(folder)
     level = case.inputs.get(field)
     if isinstance(level, bool) or not isinstance(level, int | float) or level <= 0:
@@ -112,7 +112,7 @@ def _read_run(folder: Path, field: str) -> LevelRun:
         eta=-drag.mean / (weight * workpiece.immersion_depth_m**2),
         bed=case.upstream.get("filling", case.run),
     )
-    return LevelRun(row, case)
+    return RunOfScaling(row, case)
 
 
 def _check_alike(cases: Sequence[Case], field: str) -> None:
@@ -154,7 +154,7 @@ def find(
     TableError, SeriesError
         If the runs do not make a scaling.
     """
-    runs = read_runs(run_dirs, field)
+    runs = read_scaled_runs(run_dirs, field)
     law = power_law.fit_power_law(_sample(runs))
     inner = None
     if expected.within is not None:
@@ -195,7 +195,7 @@ def find(
     )
 
 
-def _sample(runs: Sequence[LevelRun]) -> power_law.RunMeans:
+def _sample(runs: Sequence[RunOfScaling]) -> power_law.RunMeans:
     rows = [run.row for run in runs]
     drag = np.array([row.drag_n for row in rows])
     errors = np.array([row.standard_error_n for row in rows]) / drag
@@ -234,7 +234,7 @@ def _shifted(law: power_law.PowerLaw, power: float) -> ShiftedLaw:
     return ShiftedLaw(**vars(found), curve=curve)
 
 
-def _mean_eta(runs: Sequence[LevelRun], law: power_law.PowerLaw) -> Estimate:
+def _mean_eta(runs: Sequence[RunOfScaling], law: power_law.PowerLaw) -> Estimate:
     """Geometric mean of eta over the runs of a law; a trend in it widens the interval."""
     known = [run.row.eta for run in runs if run.row.level in law.runs.levels]
     etas = replace(law.runs, values=np.array(known))
@@ -244,7 +244,7 @@ def _mean_eta(runs: Sequence[LevelRun], law: power_law.PowerLaw) -> Estimate:
     return fit.estimate([1.0]).exp()
 
 
-def _level(law: power_law.PowerLaw, number: int, runs: Sequence[LevelRun]) -> Level:
+def _level(law: power_law.PowerLaw, number: int, runs: Sequence[RunOfScaling]) -> Level:
     x = float(law.runs.levels[number])
     here = [run for run in runs if run.row.level == x]
     return Level(
