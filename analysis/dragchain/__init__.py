@@ -22,21 +22,22 @@ if TYPE_CHECKING:
         UnknownNameError,
     )
     from dragchain.results import FinishedRun, Study, load
-    from dragchain.run.case import Case, Output, load_case, load_outputs
     from dragchain.statistics.correlated import MeanEstimate, estimate_mean
     from dragchain.tables.convert import dump_to_parquet
     from dragchain.tables.write import write_tables
+    from dragdeck.decks.outputs import OutputOfRun, load_outputs
     from dragdeck.errors import DocumentError, DragdeckError, RejectedRunError
+    from dragdeck.records.case import CaseOfRun, load_case
 
 __all__ = [
-    "Case",
+    "CaseOfRun",
     "DocumentError",
     "DragdeckError",
     "DumpError",
     "FinishedRun",
     "Frame",
     "MeanEstimate",
-    "Output",
+    "OutputOfRun",
     "RecordError",
     "RejectedRunError",
     "SeriesError",
@@ -61,10 +62,11 @@ _MODULES = {
     "dragchain.dumps.frame": ("Frame",),
     "dragchain.dumps.run_parts": ("iter_frames", "iter_prints"),
     "dragchain.results": ("FinishedRun", "Study", "load"),
-    "dragchain.run.case": ("Case", "Output", "load_case", "load_outputs"),
     "dragchain.statistics.correlated": ("MeanEstimate", "estimate_mean"),
     "dragchain.tables.convert": ("dump_to_parquet",),
     "dragchain.tables.write": ("write_tables",),
+    "dragdeck.records.case": ("CaseOfRun", "load_case"),
+    "dragdeck.decks.outputs": ("OutputOfRun", "load_outputs"),
     "dragdeck.errors": ("DocumentError", "DragdeckError", "RejectedRunError"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}

@@ -21,7 +21,6 @@ from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import deck_text, write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.log import engine_errors, loops, reached_end
 from dragdeck.engine.process import Engine, command, execute, find_engine
 from dragdeck.engine.reports import Report
@@ -29,6 +28,7 @@ from dragdeck.engine.run_folder import fingerprint
 from dragdeck.errors import EngineError, InputError, choices
 from dragdeck.files import write_text
 from dragdeck.project import study_templates
+from dragdeck.records.run import CaseFile
 from dragdeck.scenes.process import process_scene
 
 SECONDS = 0.15
@@ -223,7 +223,7 @@ class _Bench:
             old.unlink()
         write_run(deck.whole, place, templates)
         write_text(place / _START_FILE, deck_text(deck.start, templates))
-        return fingerprint(place, RunInputs.read(place / CASE_FILE))
+        return fingerprint(place, CaseFile.read(place / CASE_FILE))
 
     def rounds(self, count: int) -> list[TimedVariant]:
         """Time what was not timed yet; the rows of all rounds."""

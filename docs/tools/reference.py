@@ -2,13 +2,10 @@
 
 import argparse
 import csv
-import json
-import re
 from collections.abc import Callable, Iterator
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from blocks import markdown_table
 from pybtex.database import parse_file
@@ -100,69 +97,6 @@ def all_columns() -> str:
     return "\n\n".join(f"### `{table}`\n\n{columns(table)}" for table in tables)
 
 
-# --- documents -------------------------------------------------------------------------
-
-
-def contracts() -> str:
-    """A section for each document, made from its schema."""
-    files = sorted((ROOT / "contract").glob("*.schema.json"))
-    return "\n\n".join(_document(file) for file in files)
-
-
-def _document(file: Path) -> str:
-    schema = json.loads(file.read_text())
-    name = file.name.removesuffix(".schema.json")
-    parts = [f"## `{name}`", _first(schema), _keys(schema)]
-    for part, inner in schema.get("$defs", {}).items():
-        if said := _first(inner):
-            parts += [f"**{part}**: {said}", _keys(inner)]
-    return "\n\n".join(part for part in parts if part)
-
-
-def _first(schema: dict[str, Any]) -> str:
-    """The first paragraph of what a schema says of itself."""
-    return " ".join(str(schema.get("description", "")).partition("\n\n")[0].split())
-
-
-def _keys(schema: dict[str, Any]) -> str:
-    required = schema.get("required", [])
-    said = _attributes(str(schema.get("description", "")))
-    rows = [
-        [f"`{key}`", _type(inner), "yes" if key in required else "no", said.get(key, "")]
-        for key, inner in schema.get("properties", {}).items()
-    ]
-    return markdown_table(["key", "type", "required", "meaning"], rows) if rows else ""
-
-
-def _type(schema: dict[str, Any]) -> str:
-    """The type of a value in words."""
-    if "$ref" in schema:
-        return schema["$ref"].rsplit("/", 1)[-1]
-    if "const" in schema:
-        return f"`{schema['const']}`"
-    if "enum" in schema:
-        return " or ".join(f"`{value}`" for value in schema["enum"])
-    if "anyOf" in schema or "oneOf" in schema:
-        return " or ".join(_type(one) for one in schema.get("anyOf", schema.get("oneOf")))
-    kind = str(schema.get("type", "any"))
-    if kind == "array":
-        return f"list of {_type(schema['items'])}" if "items" in schema else "list"
-    if kind == "object":
-        inner = schema.get("additionalProperties")
-        return f"mapping to {_type(inner)}" if isinstance(inner, dict) else "mapping"
-    return kind
-
-
-def _attributes(text: str) -> dict[str, str]:
-    """What a docstring says of each attribute."""
-    _, found, text = text.partition("Attributes\n----------\n")
-    said = {}
-    for names, body in re.findall(r"^(\S[^:\n]*?) : [^\n]*\n((?:[ ]+[^\n]*\n?)*)", text, re.M):
-        for name in names.split(", "):
-            said[name] = " ".join(body.split())
-    return said if found else {}
-
-
 # --- bibliography ------------------------------------------------------------------------
 
 
@@ -182,7 +116,6 @@ TEXTS: dict[str, Callable[[], str]] = {
     "dragdeck_commands": lambda: commands(DRAGDECK.parser()),
     "dragchain_commands": lambda: commands(DRAGCHAIN.parser()),
     "columns": all_columns,
-    "contracts": contracts,
     "bibliography": bibliography,
 }
 """What a block ``text`` can name."""

@@ -11,9 +11,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from dragchain.run.completeness import AcceptanceCheck, CheckCode, CheckReason
 from dragchain.statistics.estimate import Estimate, flattened
 from dragdeck.documents import Document, Part
+from dragdeck.records.run import AcceptanceCheck, CheckCode, CheckReason
 from evidence.stability.measures import (
     COLUMNS,
     MEASURES,

@@ -13,12 +13,12 @@ import numpy as np
 from dragchain.arrays import Floats
 from dragchain.drag.around import AZIMUTH_BINS, DEPTH_BINS
 from dragchain.drag.azimuth import circumference, parts, to_the_left, within
-from dragchain.run.case import Case
-from dragchain.run.kinematics import needed
+from dragchain.run.kinematics import motion_of, needed
 from dragchain.run.paths.circle import Circle
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real
 from dragchain.tables.by_step import read_table
 from dragdeck.documents import Part
+from dragdeck.records.case import CaseOfRun
 from evidence.validation.corridor import Network, bin_by_bin, corridor, network
 from evidence.validation.runs_by_bed import Point, over_packings
 
@@ -182,9 +182,10 @@ def _around(azimuth: Floats, force: Floats) -> Floats:
     return np.asarray(sum(halves) / (2.0 * force.sum()))
 
 
-def _outer_over_inner(case: Case, azimuth: Floats, force: Floats) -> float | None:
-    if not isinstance(case.motion, Circle):
+def _outer_over_inner(case: CaseOfRun, azimuth: Floats, force: Floats) -> float | None:
+    path = motion_of(case)
+    if not isinstance(path, Circle):
         return None
     left = float((force * to_the_left(azimuth)).sum() / force.sum())
-    outer = left if case.motion.sign < 0 else 1.0 - left
+    outer = left if path.sign < 0 else 1.0 - left
     return _ratio(outer, 1.0 - outer)

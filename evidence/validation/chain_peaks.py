@@ -23,9 +23,9 @@ from dragchain.drag.peaks import drag_peaks, peak_separation_s
 from dragchain.errors import TableError
 from dragchain.network.chains import dominant_path, widest_paths
 from dragchain.network.frame import WORKPIECE, NetworkFrame, read_frames
-from dragchain.run.case import load_case
 from dragchain.statistics.estimate import Real, Verdict
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import load_case
 from evidence.validation import shift_test
 from evidence.validation.shift_test import ShiftTest
 

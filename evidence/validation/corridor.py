@@ -14,7 +14,7 @@ from scipy.stats import binned_statistic
 from dragchain.arrays import Floats
 from dragchain.drag.force import read_counted
 from dragchain.errors import TableError
-from dragchain.run.kinematics import needed
+from dragchain.run.kinematics import motion_of, needed
 from dragchain.run.paths.circle import Circle
 from dragchain.statistics.estimate import Estimate, EstimateColumns
 from dragchain.tables.by_step import read_groups
@@ -128,13 +128,14 @@ def corridor(point: Point) -> Corridor:
         The workpiece does not run on a circle about the bowl's axis.
     """
     case = point.case
-    if case.bowl is None or case.surface_m is None or not isinstance(case.motion, Circle):
+    path = motion_of(case)
+    if case.surface_m is None or not isinstance(path, Circle):
         raise TableError(
             f"{case.run}: the corridor needs a workpiece on a circle about the bowl's axis"
         )
     workpiece, diameter = needed(case.workpiece, "workpiece"), 2.0 * case.media.radius_mean_m
     radius = workpiece.radius_m
-    wall = (np.sqrt(case.bowl.radius_m**2 - case.motion.radius_m**2) - radius) / diameter
+    wall = (np.sqrt(case.bowl.radius_m**2 - path.radius_m**2) - radius) / diameter
     edges = np.arange(0.0, wall + 1e-9, _BIN)
     tip = case.surface_m - workpiece.immersion_depth_m
     places: list[Floats] = []

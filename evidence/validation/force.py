@@ -9,12 +9,12 @@ from scipy import signal, stats
 from dragchain.arrays import Floats
 from dragchain.drag.force import read_counted
 from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
-from dragchain.run.case import Case
 from dragchain.run.kinematics import drag_start_s
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.statistics.estimate import Estimate, Real
 from dragdeck.documents import Part
+from dragdeck.records.case import CaseOfRun
 from evidence.validation.runs_by_bed import Point, over_packings
 
 _COMPONENTS = ("drag_n", "lateral_n", "vertical_n")
@@ -234,7 +234,7 @@ def _half_wave(waves: Floats, density: Floats) -> float:
     return float(1.0 / np.interp(0.5 * total[-1], total - 0.5 * density, waves))
 
 
-def compare(drag: Together, case: Case) -> tuple[Compared, ...]:
+def compare(drag: Together, case: CaseOfRun) -> tuple[Compared, ...]:
     """Mean and standard deviation of the drag beside every reference figure of the study."""
     return tuple(
         Compared(

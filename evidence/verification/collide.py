@@ -7,12 +7,12 @@ from typing import Any, Literal
 
 from dragdeck import __version__
 from dragdeck.decks import outputs
-from dragdeck.decks.case_file import CaseFile, CountOfRun, RanksOfRun
 from dragdeck.decks.data_file import Body as DataBody
 from dragdeck.decks.data_file import Vector, data_file
 from dragdeck.decks.deck import Deck, LeftOut, Materials, Scene, contact_law
 from dragdeck.documents import Part
 from dragdeck.physics.rounding import round_to
+from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.material import Material
 

@@ -11,8 +11,8 @@ from dragchain.arrays import Floats
 from dragchain.contact_law.hertz import Elastic, effective_modulus, effective_shear, sphere_mass
 from dragchain.dumps.run_parts import iter_frames
 from dragchain.errors import TableError
-from dragchain.run.case import load_outputs
-from dragchain.run.completeness import read_accepted
+from dragdeck.decks.outputs import load_outputs
+from dragdeck.records.run import read_accepted
 from evidence.contact_law.impact import Contact, Motion, Particle, sliding_impact
 from evidence.contact_law.integrated_impact import integrated_impact
 from evidence.verification.collide import CollideCase, ContactFacts

@@ -39,7 +39,7 @@ def first_run(
 ) -> tuple[Path, subprocess.CompletedProcess[str]]:
     """A project whose packages are those of this one, and how its first study ended there."""
     folder = tmp_path_factory.mktemp("clone")
-    for name in (*PROJECT, "examples", "benchmarks", "contract", "docs", "tests", "evidence"):
+    for name in (*PROJECT, "examples", "benchmarks", "docs", "tests", "evidence"):
         if not (folder / name).exists():
             (folder / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "studies", folder / "studies")

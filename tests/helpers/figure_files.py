@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pyvista as pv
+from run_files import OF_EVERY_RUN
 
 from dragchain.network.write import write_chains
 
@@ -19,6 +20,7 @@ PERIOD = 20
 
 def case_json(scene_name: str) -> dict[str, Any]:
     return {
+        **OF_EVERY_RUN,
         "schema": 2, "study": "made", "scene": scene_name, "run": f"made-{scene_name}",
         "case": "made case", "upstream": {}, "timestep_s": STEP_S, "rayleigh_time_s": 2e-3,
         "gravity_m_s2": 10.0,
@@ -36,7 +38,7 @@ def case_json(scene_name: str) -> dict[str, Any]:
                "surface_m": 0.03,
         "motion": {
             "kind": "line", "axis_speed_m_s": 0.1, "start_m": [-0.01, 0.0], "direction_rad": 0.0,
-            "start_direction_rad": 0.0,
+            "start_direction_rad": 0.0, "orientation": "follow_path",
         },
         "phases": [
             {"name": "plunge", "start_step": 0, "end_step": DRAG_START},

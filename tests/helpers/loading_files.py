@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from run_files import OF_EVERY_RUN
 
 STEP_S = 1e-4
 PERIOD = 10
@@ -42,7 +43,7 @@ endsolid plate
 def case_json(**motion: Any) -> dict[str, Any]:
     steel = {"youngs_modulus_pa": 2e11, "poissons_ratio": 0.3}
     return {
-        "schema": 2, "study": "made", "scene": "process", "run": "made-process",
+        **OF_EVERY_RUN, "schema": 2, "study": "made", "scene": "process", "run": "made-process",
         "case": "made case", "upstream": {}, "timestep_s": STEP_S, "rayleigh_time_s": 2e-4,
         "gravity_m_s2": 9.81,
         "fidelity": {
@@ -60,7 +61,8 @@ def case_json(**motion: Any) -> dict[str, Any]:
                  "immersion_depth_m": SIZE},
         "surface_m": SURFACE,
         "motion": {"kind": "line", "axis_speed_m_s": SPEED, "start_m": [0.0, 0.0],
-                   "direction_rad": 0.0, "start_direction_rad": 0.0} | motion,
+                   "direction_rad": 0.0, "start_direction_rad": 0.0,
+                   "orientation": "follow_path"} | motion,
         "phases": [
             {"name": "plunge", "start_step": 0, "end_step": START},
             {"name": "drag", "start_step": START, "end_step": LAST},

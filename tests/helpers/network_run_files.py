@@ -49,7 +49,7 @@ def accept(folder: Path, **changes: Any) -> None:
     """Write a ``run.json`` that passed its checks, unless it is changed."""
     check = {"code": "particles_kept", "name": "no particle lost", "passed": True,
              "seen": "216", "limit": "216"}  # fmt: skip
-    record = {"schema": 2, "state": "complete", "engine_version": "3.8", "ranks": 1,
+    record = {"schema": 2, "inputs": "0f", "state": "complete", "engine_version": "3.8", "ranks": 1,
               "started": "2026-01-01T00:00:00", "checks": [check | changes]}  # fmt: skip
     (folder / "run.json").write_text(json.dumps(record))
 

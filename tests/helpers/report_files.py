@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pages import Page
+from run_files import OF_EVERY_RUN
 
 from dragchain.report.findings import (
     FILE,
@@ -48,6 +49,7 @@ ASKED = {
 
 def case_json(scene: str, run: str, **more: Any) -> dict[str, Any]:
     return {
+        **OF_EVERY_RUN,
         "schema": 2, "study": "small", "scene": scene, "run": run, "case": "10 mm <workpiece>",
         "upstream": {}, "timestep_s": 2.5e-5, "rayleigh_time_s": 3.2e-5, "gravity_m_s2": 9.81,
         "fidelity": {
@@ -75,7 +77,8 @@ def case_json(scene: str, run: str, **more: Any) -> dict[str, Any]:
 
 def run_json(**more: Any) -> dict[str, Any]:
     return {
-        "schema": 2, "state": "complete", "engine_version": "Engine 3.8", "ranks": 2,
+        "schema": 2, "state": "complete", "inputs": "0f",
+        "engine_version": "Engine 3.8", "ranks": 2,
         "steps": 160000, "steps_per_s": 2100.0, "wall_time_s": 76.0,
         "started": "2026-01-01T00:00:00", "parts": [{"part": 1, "from": None, "from_step": 0}],
         "checks": [particles_kept(1422)],

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from run_files import OF_EVERY_RUN
 
 BOX = "ITEM: BOX BOUNDS ff ff ff\n-0.05 0.05\n-0.05 0.05\n0 0.4\n"
 
@@ -176,6 +177,7 @@ def outputs_json() -> dict[str, Any]:
 def case_json() -> dict[str, Any]:
     """Content of ``case.json``."""
     return {
+        **OF_EVERY_RUN,
         "schema": 2,
         "study": "tiny",
         "scene": "process",
@@ -223,6 +225,7 @@ def case_json() -> dict[str, Any]:
             "start_m": [0.0, 0.0],
             "direction_rad": 0.0,
             "start_direction_rad": 0.0,
+            "orientation": "follow_path",
         },
         "phases": [
             {"name": "plunge", "start_step": 0, "end_step": DRAG_START},

@@ -28,7 +28,6 @@ from dragdeck.advice.options import Speed, with_option
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
-from dragdeck.decks.deck import StudyScene
 from dragdeck.decks.render import (
     added_forces,
     deck_text,
@@ -63,7 +62,7 @@ from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.registry import SCENES
-from dragdeck.scenes.scene import SceneType, read_bed
+from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
 from dragdeck.study.check import explained, warnings
 from dragdeck.study.model import RESTITUTION
 from dragdeck.study.yaml import located

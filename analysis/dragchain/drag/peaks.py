@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
-from dragchain.run.case import Case
 from dragchain.run.kinematics import motion_of
+from dragdeck.records.case import CaseOfRun
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Peaks:
     prominence_n: Floats
 
 
-def drag_peaks(samples: pd.DataFrame, case: Case) -> Peaks:
+def drag_peaks(samples: pd.DataFrame, case: CaseOfRun) -> Peaks:
     """The peaks of counted samples with ``time_s`` and ``drag_n``; see `find_drag_peaks`."""
     time_s, drag_n = (samples[name].to_numpy(np.float64) for name in ("time_s", "drag_n"))
     return find_drag_peaks(time_s, drag_n, min_separation_s=peak_separation_s(case))
@@ -87,6 +87,6 @@ def find_drag_peaks(
     return Peaks(index.astype(np.int64), time_s[index], drag_n[index], found["prominences"])
 
 
-def peak_separation_s(case: Case) -> float:
+def peak_separation_s(case: CaseOfRun) -> float:
     """The time in which the workpiece travels one mean particle radius, s."""
     return case.media.radius_mean_m / motion_of(case).axis_speed_m_s

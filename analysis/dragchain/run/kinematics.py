@@ -1,23 +1,39 @@
 """How the workpiece moves: phases of a run, paths, the workpiece's frame, counted samples."""
 
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, TypeAdapter
 
 from dragchain.arrays import Floats, Ints, wrap_angle
 from dragchain.errors import TableError
-from dragchain.run.case import Case, Phase
+from dragchain.run.paths.circle import Circle
 from dragchain.run.paths.kind import WorkpiecePath
+from dragchain.run.paths.line import Line
+from dragchain.run.paths.rest import Rest
+from dragchain.run.paths.waypoints import Waypoints
+from dragchain.run.superposed.kind import SuperposedMotion
+from dragchain.run.superposed.oscillation import Oscillation
+from dragchain.run.superposed.spin import Spin
+from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import Phase
+
+_PATH: TypeAdapter[WorkpiecePath] = TypeAdapter(
+    Annotated[Circle | Line | Rest | Waypoints, Field(discriminator="kind")]
+)
+_SUPERPOSED: TypeAdapter[SuperposedMotion] = TypeAdapter(
+    Annotated[Spin | Oscillation, Field(discriminator="kind")]
+)
 
 
-def drag_start_s(case: Case) -> float:
+def drag_start_s(case: CaseOfRun) -> float:
     """The simulated time at which the drag begins, the zero of process time."""
     return drag_phase(case).start_step * case.timestep_s
 
 
-def process_time(simulated_s: Floats, case: Case) -> Floats:
+def process_time(simulated_s: Floats, case: CaseOfRun) -> Floats:
     """Process time of simulated times: from the start of the drag, at the speed of the process.
 
     A workpiece that is f times as fast takes 1/f of the time for the same path.
@@ -26,7 +42,7 @@ def process_time(simulated_s: Floats, case: Case) -> Floats:
     ----------
     simulated_s : (N,) ndarray
         Simulated times, s.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -75,14 +91,14 @@ def phase_codes(steps: Ints, phases: Sequence[Phase]) -> NDArray[np.int8]:
     return np.searchsorted(ends, steps, side="left").astype(np.int8)
 
 
-def counted_mask(steps: Ints, case: Case) -> NDArray[np.bool_]:
+def counted_mask(steps: Ints, case: CaseOfRun) -> NDArray[np.bool_]:
     """Mark the samples that statistics use: those of the drag, after the transient.
 
     Parameters
     ----------
     steps : (N,) ndarray of int
         Steps.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -97,7 +113,7 @@ def counted_mask(steps: Ints, case: Case) -> NDArray[np.bool_]:
     return (steps > drag.start_step) & (steps <= drag.end_step) & after
 
 
-def drag_phase(case: Case) -> Phase:
+def drag_phase(case: CaseOfRun) -> Phase:
     """The phase named ``drag``."""
     for phase in case.phases:
         if phase.name == "drag":
@@ -112,14 +128,17 @@ def needed(value: T | None, name: str) -> T:
     return value
 
 
-def motion_of(case: Case) -> WorkpiecePath:
+def motion_of(case: CaseOfRun) -> WorkpiecePath:
     """The motion of the workpiece in the drag."""
-    if case.motion is None:
-        raise TableError("case.json has no motion, which these tables require")
-    return case.motion
+    return _PATH.validate_python(needed(case.motion, "motion").model_dump())
 
 
-def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:
+def superposed_on(case: CaseOfRun) -> list[SuperposedMotion]:
+    """The motions superposed on the path."""
+    return [_SUPERPOSED.validate_python(one.model_dump()) for one in case.superposed]
+
+
+def directions(steps: Ints, ref_xy_m: Floats, case: CaseOfRun) -> Floats:
     """Direction of the workpiece's motion in the horizontal plane.
 
     In the drag that of its path; before it, the direction with which the drag starts.
@@ -130,7 +149,7 @@ def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:
         Steps.
     ref_xy_m : (N, 2) ndarray
         Reference point of the workpiece at these steps, m.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -143,7 +162,7 @@ def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:
     return np.where(since > 0, path.directions(since, case.timestep_s, ref_xy_m), start)
 
 
-def workpiece_turn(steps: Ints, direction_rad: Floats, case: Case) -> Floats:
+def workpiece_turn(steps: Ints, direction_rad: Floats, case: CaseOfRun) -> Floats:
     """Angle of the workpiece's own frame about the vertical, (N,) in rad.
 
     Parameters
@@ -152,26 +171,26 @@ def workpiece_turn(steps: Ints, direction_rad: Floats, case: Case) -> Floats:
         Steps.
     direction_rad : (N,) ndarray
         Direction of motion at these steps, rad.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
     """
     turn, since = motion_of(case).turn(direction_rad), steps - drag_phase(case).start_step
-    for motion in case.superposed:
+    for motion in superposed_on(case):
         turn = turn + motion.turn(since, case.timestep_s)
     return turn
 
 
-def surface_speed(case: Case) -> float:
+def surface_speed(case: CaseOfRun) -> float:
     """Highest speed of the workpiece's surface in the drag, m/s: of its axis, and what is added."""
     return motion_of(case).axis_speed_m_s * (1.0 + case.numbers.get("superposed_speed", 0.0))
 
 
-def spins(case: Case) -> bool:
+def spins(case: CaseOfRun) -> bool:
     """Whether a superposed motion turns the workpiece."""
-    return any(one.turns for one in case.superposed)
+    return any(one.turns for one in superposed_on(case))
 
 
-def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: Case) -> Floats:
+def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: CaseOfRun) -> Floats:
     """Velocity of points that are fixed to the workpiece, in the drag.
 
     Parameters
@@ -182,7 +201,7 @@ def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: Case) 
         The points at these steps, m.
     ref_m : (N, 3) ndarray
         Reference point of the workpiece at these steps, m.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -194,7 +213,7 @@ def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: Case) 
     drag, dt = drag_phase(case), case.timestep_s
     since, heading = steps - drag.start_step, directions(steps, ref_m[:, :2], case)
     velocity = motion_of(case).velocity(since, dt, point_m, heading)
-    for motion in case.superposed:
+    for motion in superposed_on(case):
         velocity = velocity + motion.velocity(since, dt, point_m - ref_m)
     dragged = (steps > drag.start_step) & (steps <= drag.end_step)
     return np.where(dragged[:, None], velocity, np.nan)

@@ -8,11 +8,11 @@ import numpy as np
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.case import Case
 from dragchain.run.kinematics import motion_of, needed
+from dragdeck.records.case import CaseOfRun
 
 
-def workpiece_mesh(run_dir: Path, case: Case) -> Any:
+def workpiece_mesh(run_dir: Path, case: CaseOfRun) -> Any:
     """Read the workpiece's mesh, as it lies in its file.
 
     Raises
@@ -27,7 +27,7 @@ def workpiece_mesh(run_dir: Path, case: Case) -> Any:
     return pv.read(file)
 
 
-def _mesh_file(run_dir: Path, case: Case) -> Path:
+def _mesh_file(run_dir: Path, case: CaseOfRun) -> Path:
     file = run_dir / needed(case.workpiece, "workpiece").mesh
     if not file.is_file():
         raise TableError(
@@ -85,7 +85,7 @@ def turned(vectors: Floats, angle_rad: Floats | float) -> Floats:
     return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-1)
 
 
-def read_surface(run_dir: Path, case: Case) -> Surface:
+def read_surface(run_dir: Path, case: CaseOfRun) -> Surface:
     """Read the workpiece's mesh into its own frame.
 
     The STL file of a user's mesh looks along +x as it is; a cylinder is put into

@@ -17,9 +17,7 @@ from dragchain.errors import TableError
 from dragchain.figures.panels import legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN, drawing, png
 from dragchain.report.page import page_environment
-from dragchain.run.case import Case, load_case
-from dragchain.run.completeness import RunRecord
-from dragchain.run.kinematics import needed
+from dragchain.run.kinematics import motion_of, needed
 from dragchain.run.paths.circle import Circle
 from dragchain.scaling.document import (
     BandPoint,
@@ -35,6 +33,8 @@ from dragchain.statistics import power_law
 from dragchain.statistics.estimate import Estimate, flattened
 from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
 from dragdeck.files import write_bytes, write_text
+from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import RunRecord
 
 _STORED = Path(__file__).parent / "data"
 """The scalings that were measured for the documentation."""
@@ -58,15 +58,16 @@ class Run:
     """One run of a scaling: its row in ``scaling.json``, and its case."""
 
     row: ScaledRun
-    case: Case
+    case: CaseOfRun
 
     @property
     def gap_particles(self) -> float | None:
         """Gap between workpiece and bowl wall in mean particle diameters; None off a circle."""
-        if not isinstance(self.case.motion, Circle):
+        path = motion_of(self.case)
+        if not isinstance(path, Circle):
             return None
-        bowl, workpiece = needed(self.case.bowl, "bowl"), needed(self.case.workpiece, "workpiece")
-        gap = bowl.radius_m - self.case.motion.radius_m - workpiece.radius_m
+        bowl, workpiece = self.case.bowl, needed(self.case.workpiece, "workpiece")
+        gap = bowl.radius_m - path.radius_m - workpiece.radius_m
         return gap / (2.0 * self.case.media.radius_mean_m)
 
     @property
@@ -114,7 +115,7 @@ def _read_run(folder: Path, field: str) -> Run:
     return Run(row, case)
 
 
-def _check_alike(cases: Sequence[Case], field: str) -> None:
+def _check_alike(cases: Sequence[CaseOfRun], field: str) -> None:
     first, *others = cases
     wanted = {**first.inputs, "fidelity": first.fidelity}
     for case in others:

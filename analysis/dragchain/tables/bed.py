@@ -5,9 +5,8 @@ import numpy as np
 from dragchain.arrays import Floats
 from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
-from dragchain.run.case import Case
-from dragchain.run.kinematics import needed
 from dragdeck.documents import Document
+from dragdeck.records.case import CaseOfRun
 
 
 class Packing(Document):
@@ -43,14 +42,14 @@ class Packing(Document):
     kinetic_energy_ratio: float
 
 
-def describe_bed(particles: Frame, case: Case) -> Packing:
+def describe_bed(particles: Frame, case: CaseOfRun) -> Packing:
     """Describe a settled bed.
 
     Parameters
     ----------
     particles : Frame
         The last frame of ``particles``, N particles.
-    case : Case
+    case : CaseOfRun
         The case of the fill.
 
     Raises
@@ -63,7 +62,7 @@ def describe_bed(particles: Frame, case: Case) -> Packing:
             f"step {particles.step}: the last frame of particles is empty, so there is no packing"
         )
     radius = particles.vectors("radius_m")[:, 0]
-    bowl_radius = needed(case.bowl, "bowl").radius_m
+    bowl_radius = case.bowl.radius_m
     height = bed_height(particles.vectors("x_m", "y_m", "z_m"), radius, bowl_radius)
     volume = 4.0 / 3.0 * np.pi * radius**3
     mass = volume * case.media.density_kg_m3

@@ -19,9 +19,9 @@ from dragchain.figures.style import COLOURS, drawing, few_colours, force_map, pn
 from dragchain.report.findings import FILE, ProcessFindings
 from dragchain.report.run_data import RunData
 from dragchain.report.run_figures import network_xz
-from dragchain.run.case import load_case
 from dragchain.run.kinematics import needed
 from dragdeck.errors import DragdeckError
+from dragdeck.records.case import load_case
 
 STUDY = "half_minute"
 """Its results are needed: ``./run all --config study=half_minute``."""
@@ -46,7 +46,7 @@ def _export(run: Path) -> bytes:
         parts = pv.read(file)
         particles, contacts, workpiece = parts[0], parts[1], parts[2]
     plotter = new_plotter(*_PIXELS)
-    radius, surface = needed(case.bowl, "bowl").radius_m, needed(case.surface_m, "surface_m")
+    radius, surface = case.bowl.radius_m, needed(case.surface_m, "surface_m")
     behind = particles.extract_points(particles.points[:, 1] > 0, include_cells=False)
     ball = pv.Sphere(radius=1.0, theta_resolution=24, phi_resolution=24)
     spheres = behind.glyph(scale="radius", orient=False, geom=ball)

@@ -12,9 +12,9 @@ from dragchain.dumps.careful_reader import read_print_file
 from dragchain.dumps.fast_reader import read_frames
 from dragchain.dumps.run_parts import iter_frames, iter_prints, part_files
 from dragchain.errors import DumpError, TruncatedDumpError
-from dragchain.run.case import Output
+from dragdeck.decks.outputs import OutputOfRun
 
-PARTICLES = Output(
+PARTICLES = OutputOfRun(
     name="particles",
     kind="custom",
     binary=True,
@@ -25,7 +25,7 @@ PARTICLES = Output(
     first_step=0,
     last_step=20,
 )
-CONTACTS = Output(
+CONTACTS = OutputOfRun(
     name="contacts",
     kind="local",
     binary=False,
@@ -36,7 +36,7 @@ CONTACTS = Output(
     first_step=0,
     last_step=20,
 )
-FORCE = Output(
+FORCE = OutputOfRun(
     name="force",
     kind="print",
     binary=False,
@@ -340,7 +340,7 @@ frames = st.lists(
     min_size=1,
     max_size=5,
 )
-ANY = Output(
+ANY = OutputOfRun(
     name="any",
     kind="custom",
     binary=True,

@@ -34,12 +34,12 @@ from dragchain.loading.document import FILE, Loading
 from dragchain.loading.figure import averaged_load
 from dragchain.loading.samples import sample
 from dragchain.loading.write import compute_loading, write_loading
-from dragchain.run.case import load_case
-from dragchain.run.kinematics import workpiece_velocity
+from dragchain.run.kinematics import motion_of, workpiece_velocity
 from dragchain.run.paths.circle import Circle
 from dragchain.run.workpiece import Surface, off_facet, read_surface, turned
 from dragchain.tables.workpiece_contacts import WallContacts
 from dragchain.tables.write import workpiece_contact_rows
+from dragdeck.records.case import load_case
 
 
 @pytest.fixture(scope="module")
@@ -324,7 +324,7 @@ def test_a_cylinder_is_turned_back_into_its_own_frame(tmp_path: Path) -> None:
     """Its STL file goes into the bed unturned: what looks ahead at the start becomes +x."""
     (tmp_path / "workpiece.stl").write_text(PLATE)
     case = made_case(tmp_path, **circle(True))
-    assert isinstance(case.motion, Circle)
+    assert isinstance(motion_of(case), Circle)
     as_mesh = read_surface(tmp_path, case)
     np.testing.assert_allclose(as_mesh.normals, [[1, 0, 0]] * 2)
     case = changed(case, workpiece=changed(case.workpiece, kind="cylinder"))

@@ -204,7 +204,7 @@ def test_the_pose_puts_the_facets_where_the_run_has_them(
 ) -> None:
     """A cylinder lies in its file as it is put into the bowl, a mesh of a user looks along +x."""
     motion = {"kind": "line", "axis_speed_m_s": 0.1, "start_m": [-0.01, 0.0], "direction_rad": turn,
-              "start_direction_rad": turn}  # fmt: skip
+              "start_direction_rad": turn, "orientation": "fixed"}  # fmt: skip
     folder = write_network_run(tmp_path / "run", kind, motion=motion)
     write_page(folder)
     page = Written(folder / "network.html")

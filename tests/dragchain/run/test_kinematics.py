@@ -9,12 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dragchain import TableError, load_case
-from dragchain.run.case import Case, Phase, Statistics
 from dragchain.run.kinematics import (
     counted_mask,
     directions,
+    motion_of,
     phase_codes,
     spins,
+    superposed_on,
     workpiece_frame,
     workpiece_turn,
     workpiece_velocity,
@@ -27,6 +28,8 @@ from dragchain.run.superposed.oscillation import Oscillation
 from dragchain.run.superposed.spin import Spin, SpinStage
 from dragchain.run.workpiece import turned
 from dragdeck.errors import DocumentError
+from dragdeck.records.case import CaseOfRun, StatisticsOfRun
+from dragdeck.records.run import Phase
 
 PHASES = (
     Phase(name="plunge", start_step=0, end_step=10),
@@ -36,12 +39,14 @@ PHASES = (
 
 
 @pytest.fixture
-def case(tiny_run: Path) -> Case:
-    return changed(load_case(tiny_run), phases=PHASES, statistics=Statistics(transient_s=0.005))
+def case(tiny_run: Path) -> CaseOfRun:
+    return changed(
+        load_case(tiny_run), phases=PHASES, statistics=StatisticsOfRun(transient_s=0.005)
+    )
 
 
 @pytest.fixture
-def circling(case: Case) -> Case:
+def circling(case: CaseOfRun) -> CaseOfRun:
     return changed(
         case,
         motion=Circle(
@@ -66,21 +71,23 @@ def test_a_step_without_a_phase_is_an_error(steps, phases) -> None:
         phase_codes(np.array(steps), phases)
 
 
-def test_samples_count_from_the_end_of_the_run_in(case: Case) -> None:
+def test_samples_count_from_the_end_of_the_run_in(case: CaseOfRun) -> None:
     steps = np.array([20, 24, 25, 26, 40])
     assert counted_mask(steps, case).tolist() == [False, False, True, True, True]
 
 
-def test_without_run_in_the_step_that_starts_the_drag_does_not_count(case: Case) -> None:
+def test_without_run_in_the_step_that_starts_the_drag_does_not_count(case: CaseOfRun) -> None:
     steps = np.array([19, 20, 21])
-    assert counted_mask(steps, changed(case, statistics=Statistics(transient_s=0.0))).tolist() == [
+    assert counted_mask(
+        steps, changed(case, statistics=StatisticsOfRun(transient_s=0.0))
+    ).tolist() == [
         False,
         False,
         True,
     ]
 
 
-def test_a_case_without_drag_is_an_error(case: Case) -> None:
+def test_a_case_without_drag_is_an_error(case: CaseOfRun) -> None:
     with pytest.raises(TableError, match="no phase named drag"):
         counted_mask(np.array([1]), changed(case, phases=PHASES[:2]))
 
@@ -102,12 +109,12 @@ def test_on_a_circle_the_workpiece_heads_along_the_tangent(circling, sense, plac
     assert directions(np.array([30]), np.array([place]), turned) == pytest.approx(heading)
 
 
-def test_before_the_drag_the_heading_is_the_one_it_starts_with(circling: Case) -> None:
+def test_before_the_drag_the_heading_is_the_one_it_starts_with(circling: CaseOfRun) -> None:
     places = np.array([[0.0, 0.0], [0.01, 0.0], [0.0, 0.02]])
     np.testing.assert_allclose(directions(np.array([5, 15, 20]), places, circling), [pi / 2] * 3)
 
 
-def test_on_a_line_the_heading_is_the_lines(case: Case) -> None:
+def test_on_a_line_the_heading_is_the_lines(case: CaseOfRun) -> None:
     case = changed(case, motion=changed(case.motion, start_direction_rad=1.5 * pi))
     np.testing.assert_allclose(directions(np.array([0, 30]), np.ones((2, 2)), case), [-pi / 2] * 2)
 
@@ -135,7 +142,7 @@ def test_half_a_turn_wraps_to_plus_pi() -> None:
     np.testing.assert_array_equal(wrap_angle([pi, -pi]), [pi, pi])
 
 
-def test_a_workpiece_at_rest_has_no_velocity_and_one_direction(case: Case) -> None:
+def test_a_workpiece_at_rest_has_no_velocity_and_one_direction(case: CaseOfRun) -> None:
     """Relative to a bowl that rotates counter-clockwise it moves along -y."""
     rest = Rest(
         kind="rest", axis_speed_m_s=0.02, start_direction_rad=-pi / 2, radius_m=0.01, bowl_rad_s=2.0
@@ -162,7 +169,7 @@ STAGES = (
 
 
 @pytest.fixture
-def on_waypoints(case: Case) -> Case:
+def on_waypoints(case: CaseOfRun) -> CaseOfRun:
     stages = tuple(WaypointStage(steps=steps, velocity_m_s=v) for steps, v in STAGES)
     path = Waypoints(
         kind="waypoints", axis_speed_m_s=0.02, start_direction_rad=-pi / 2, stages=stages
@@ -170,14 +177,14 @@ def on_waypoints(case: Case) -> Case:
     return changed(case, motion=path)
 
 
-def test_a_stretch_without_a_direction_keeps_the_last_one(on_waypoints: Case) -> None:
+def test_a_stretch_without_a_direction_keeps_the_last_one(on_waypoints: CaseOfRun) -> None:
     """The first one has that of the next; a stage owns its last step."""
     steps = np.array([0, 20, 21, 23, 24, 27, 28, 29, 30, 31, 32, 40])
     found = directions(steps, np.zeros((12, 2)), on_waypoints)
     np.testing.assert_allclose(found, [-pi / 2] * 10 + [pi] * 2)
 
 
-def test_the_workpiece_does_not_turn_on_waypoints(on_waypoints: Case) -> None:
+def test_the_workpiece_does_not_turn_on_waypoints(on_waypoints: CaseOfRun) -> None:
     steps = np.array([0, 21, 40])
     heading = directions(steps, np.zeros((3, 2)), on_waypoints)
     np.testing.assert_allclose(workpiece_turn(steps, heading, on_waypoints), -pi / 2)
@@ -186,7 +193,7 @@ def test_the_workpiece_does_not_turn_on_waypoints(on_waypoints: Case) -> None:
 
 @pytest.mark.parametrize("superposed", [False, True])
 def test_on_waypoints_the_velocity_is_that_of_the_stage(
-    on_waypoints: Case, superposed: bool
+    on_waypoints: CaseOfRun, superposed: bool
 ) -> None:
     steps = np.arange(21, 41)
     case = changed(on_waypoints, superposed=(SPIN,)) if superposed else on_waypoints
@@ -204,11 +211,7 @@ def test_on_waypoints_the_velocity_is_that_of_the_stage(
 def test_waypoints_are_read_from_case_json(tiny_run: Path, edit_json: Any, on_waypoints) -> None:
     entry = on_waypoints.motion.model_dump()
     edit_json(tiny_run / "case.json", lambda case: case.update(motion=entry))
-    assert load_case(tiny_run).motion == on_waypoints.motion
-    entry["stages"] = []
-    edit_json(tiny_run / "case.json", lambda case: case.update(motion=entry))
-    with pytest.raises(DocumentError, match="stages"):
-        load_case(tiny_run)
+    assert motion_of(load_case(tiny_run)) == motion_of(on_waypoints)
 
 
 # --- superposed on the path ----------------------------------------------------------------------
@@ -219,11 +222,11 @@ SPIN = Spin(
 OSCILLATION = Oscillation(kind="oscillation", amplitude_m=1e-3, rate_rad_s=40.0)
 
 
-def with_all(case: Case) -> Case:
+def with_all(case: CaseOfRun) -> CaseOfRun:
     return changed(case, superposed=(SPIN, OSCILLATION))
 
 
-def test_the_turn_adds_up_the_stages(circling: Case) -> None:
+def test_the_turn_adds_up_the_stages(circling: CaseOfRun) -> None:
     """In the drag, from step 20 to 40; the path's own turn beside it."""
     steps = np.array([0, 20, 24, 28, 30, 40, 50])
     turn = workpiece_turn(steps, np.zeros(7), with_all(circling)) / circling.timestep_s
@@ -232,7 +235,7 @@ def test_the_turn_adds_up_the_stages(circling: Case) -> None:
     assert not spins(circling)
 
 
-def place(case: Case, steps: np.ndarray, own_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def place(case: CaseOfRun, steps: np.ndarray, own_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A point that is fixed to the workpiece and the reference point, from angles alone."""
     time = (steps - 20) * case.timestep_s
     angle = 0.01 / 0.02 * time
@@ -243,7 +246,7 @@ def place(case: Case, steps: np.ndarray, own_m: np.ndarray) -> tuple[np.ndarray,
 
 
 @pytest.mark.parametrize("orientation", ["follow_path", "fixed"])
-def test_the_velocity_is_the_change_of_the_place(circling: Case, orientation: str) -> None:
+def test_the_velocity_is_the_change_of_the_place(circling: CaseOfRun, orientation: str) -> None:
     """Of a point beside and above the reference point, apart from steps where the spin changes."""
     case = with_all(circling)
     case = changed(case, motion=changed(case.motion, orientation=orientation), timestep_s=1e-5)
@@ -256,7 +259,7 @@ def test_the_velocity_is_the_change_of_the_place(circling: Case, orientation: st
     )
 
 
-def test_a_stage_owns_its_last_step(circling: Case) -> None:
+def test_a_stage_owns_its_last_step(circling: CaseOfRun) -> None:
     case = with_all(circling)
     steps = np.array([28, 29])
     reference = np.tile([0.02, 0.0, 0.0], (2, 1))
@@ -269,7 +272,7 @@ def test_a_stage_owns_its_last_step(circling: Case) -> None:
 def test_superposed_motions_are_told_by_their_kind(tiny_run: Path, edit_json: Any) -> None:
     entries = [one.model_dump() for one in (SPIN, OSCILLATION)]
     edit_json(tiny_run / "case.json", lambda case: case.update(superposed=entries))
-    assert load_case(tiny_run).superposed == (SPIN, OSCILLATION)
+    assert superposed_on(load_case(tiny_run)) == [SPIN, OSCILLATION]
     entries[0]["kind"] = "wobble"
     edit_json(tiny_run / "case.json", lambda case: case.update(superposed=entries))
     with pytest.raises(DocumentError, match="wobble"):

@@ -196,7 +196,7 @@ def test_a_study_that_asks_gets_settings_and_remembers(asking: Case) -> None:
     said = process_scene(asking).case
     assert said.fidelity.name == asking.fidelity_name
     assert said.asked is not None
-    assert (said.asked.tolerance, said.asked.quantities) == (0.05, SEVERAL)
+    assert (said.asked.tolerance, said.asked.quantities) == (0.05, tuple(SEVERAL))
     assert 0 < said.asked.relative_cost <= said.asked.largest_cost and said.asked.fallback is None
     others = filling_scene(asking).case, drop_scene(asking).case
     assert not any("asked" in json.loads(other.as_text()) for other in others)

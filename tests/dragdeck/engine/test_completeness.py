@@ -13,7 +13,6 @@ from tiny_run_files import Raw
 
 from dragchain.dumps.careful_reader import read_carefully
 from dragchain.errors import DumpError
-from dragchain.run.case import Output
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine.completeness import (
     coverage,
@@ -22,7 +21,7 @@ from dragdeck.engine.completeness import (
     some_frames,
     whole_frames,
 )
-from dragdeck.engine.record import RunPart
+from dragdeck.records.run import RunPart
 
 FORCE = OutputOfRun(
     kind="print",
@@ -103,14 +102,14 @@ def dump(name: str) -> OutputOfRun:
     return OutputOfRun(
         kind="custom",
         binary=name.endswith(".bin"),
-        pattern=name,
+        pattern="{part}",
         columns=NAMES,
         engine_columns=NAMES,
         period_steps=7,
         first_step=0,
         last_step=21,
         rows_per_particle=1.0,
-    )
+    ).model_copy(update={"pattern": name})
 
 
 NUMBERS = re.compile(r"row \d+: |(id|x|c_f\[1\]) is |as numbers|are not text|names the columns")
@@ -122,7 +121,7 @@ def careful(file: Path) -> tuple[list[int], DumpError | None]:
     layout = dump(file.name).model_dump(exclude={"rows_per_particle"}) | {"pattern": "{part}"}
     steps: list[int] = []
     try:
-        steps.extend(frame.step for frame in read_carefully(file, Output(**layout)))
+        steps.extend(frame.step for frame in read_carefully(file, OutputOfRun(**layout)))
     except DumpError as error:
         return steps, error
     return steps, None

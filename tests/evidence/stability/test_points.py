@@ -143,14 +143,14 @@ def ended(run: PointRun, state: str, *failed: str) -> PointRun:
     (run.folder / "state.json").write_text(
         json.dumps(
             {"schema": 2, "state": state, "started": "2026-11-21", "engine_version": "3.8.0",
-             "ranks": 1, "parts": [], "checks": checks}
+             "ranks": 1, "parts": [], "checks": checks, "inputs": "0f"}
         )
     )  # fmt: skip
     return PointRun(run.point, run.folder)
 
 
 def test_a_list_that_cannot_be_used_is_named_with_its_field(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"(?s)settle\.json.*points\.0\.regime"):
+    with pytest.raises(InputError, match=r"(?s)settle\.json.*points\[0\]\.regime"):
         read_points([listed(tmp_path, regime="bounce")])
 
 

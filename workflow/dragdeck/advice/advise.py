@@ -16,9 +16,9 @@ from dragdeck.advice.options import (
     with_option,
 )
 from dragdeck.cases.case import Case
-from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.errors import InputError
 from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
+from dragdeck.records.advised import AdvisedSettings
 from dragdeck.study.model import RESTITUTION, Tolerance
 
 

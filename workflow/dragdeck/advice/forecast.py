@@ -11,17 +11,16 @@ from dragdeck import __version__
 from dragdeck.advice.advise import Advice, percent
 from dragdeck.advice.options import SCALE, Option, Speed, step_cost, with_option
 from dragdeck.cases.case import Case
-from dragdeck.decks.advised import AdvisedSettings
-from dragdeck.decks.deck import StudyScene
 from dragdeck.documents import Document, Part
 from dragdeck.engine.reports import shown_time
 from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds
 from dragdeck.outlook.measured import Tradeoff
+from dragdeck.records.advised import AdvisedSettings
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import FIRST_WINDOWS, with_leads
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.scene import SceneType
+from dragdeck.scenes.scene import SceneType, StudyScene
 from dragdeck.study.base import Json
 from dragdeck.study.model import Fidelity, Tolerance
 

@@ -7,16 +7,22 @@ from pathlib import Path
 import numpy as np
 
 from dragdeck.decks import CASE_FILE, PACKING_FILE
-from dragdeck.decks.case_file import CaseOfStudy, SteadyCriterion
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
 from dragdeck.engine.completeness import coverage, part_files, some_frames
 from dragdeck.engine.decomposition import decomposition, ranks_check
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.limits import breach, within
-from dragdeck.engine.record import AcceptanceCheck, CheckCode, CheckReason, RunPart
 from dragdeck.physics.contact_network import Floats, stability_number
+from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import (
+    AcceptanceCheck,
+    CaseFile,
+    CheckCode,
+    CheckReason,
+    RunPart,
+    SteadyCriterion,
+)
 
 _FRAMES = 20
 """Frames whose contacts are evaluated. An assumption: the median of so many frames scatters little
@@ -25,7 +31,7 @@ _FRAMES = 20
 
 def check_run(
     folder: Path,
-    inputs: RunInputs,
+    inputs: CaseFile,
     outputs: Mapping[str, OutputOfRun],
     exit_status: int,
     parts: Sequence[RunPart],
@@ -37,7 +43,7 @@ def check_run(
     ----------
     folder : Path
         The run's folder.
-    inputs : RunInputs
+    inputs : CaseFile
         From ``case.json``.
     outputs : mapping of str to OutputOfRun
         From ``columns.json``.
@@ -200,7 +206,7 @@ def _stable_timestep(
     folder: Path, particles: OutputOfRun, parts: Sequence[RunPart]
 ) -> AcceptanceCheck:
     """Whether the median `stability_number` of the frames is 1 at most."""
-    case = CaseOfStudy.read(folder / CASE_FILE)
+    case = CaseOfRun.read(folder / CASE_FILE)
     wanted = [particles.columns.index(name) for name in ("x_m", "y_m", "z_m", "radius_m")]
     frames = some_frames(folder, particles, parts, _FRAMES)
     found = [_stability_number(case, rows[:, wanted]) for rows in frames]
@@ -216,7 +222,7 @@ def _stable_timestep(
     )  # fmt: skip
 
 
-def _stability_number(case: CaseOfStudy, rows: Floats) -> float:
+def _stability_number(case: CaseOfRun, rows: Floats) -> float:
     """That of centres and radii; infinite for those of no packing."""
     if not (rows.size and np.isfinite(rows).all()):
         return math.inf

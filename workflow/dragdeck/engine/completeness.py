@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from dragdeck.decks.outputs import OutputOfRun
-from dragdeck.engine.record import RunPart
 from dragdeck.physics.contact_network import Floats
+from dragdeck.records.run import RunPart
 
 _HEAD = struct.Struct("<qqi6i")
 """Of a binary frame: step, number of rows, whether the box is triclinic, its boundaries."""

@@ -3,7 +3,7 @@
 import math
 import re
 
-from dragdeck.engine.record import AcceptanceCheck, Decomposition, ParticlesPerRank
+from dragdeck.records.run import AcceptanceCheck, Decomposition, ParticlesPerRank
 
 
 def decomposition(screen: str) -> Decomposition | None:

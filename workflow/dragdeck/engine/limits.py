@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 
 from dragdeck.engine.log import Sample
-from dragdeck.engine.record import AcceptanceCheck, CheckReason
 from dragdeck.physics.run_limits import SPEED_FACTOR, RunLimits
+from dragdeck.records.run import AcceptanceCheck, CheckReason
 
 
 def breach(samples: Sequence[Sample], limits: RunLimits) -> AcceptanceCheck | None:

@@ -17,13 +17,12 @@ from dragdeck.engine.checkpoints import (
 )
 from dragdeck.engine.completeness import cut_outputs, first_gap, part_files
 from dragdeck.engine.decomposition import decomposition
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.process import Ending, Engine, command, execute
-from dragdeck.engine.record import REMEDIES, AcceptanceCheck, CheckCode, RunPart, RunRecord
 from dragdeck.engine.reports import Report
 from dragdeck.engine.space import SPARE_BYTES, check_space, free_bytes, space_left
 from dragdeck.engine.watch import EngineEnded, LimitMet, Watcher, cut_screen
 from dragdeck.errors import EngineError, RejectedRunError
+from dragdeck.records.run import REMEDIES, AcceptanceCheck, CaseFile, CheckCode, RunPart, RunRecord
 
 STATE_FILE = "state.json"
 _WRITTEN: set[CheckCode] = {"output_complete", "packing_whole"}
@@ -37,7 +36,7 @@ class PartOfRun:
     Attributes
     ----------
     folder : Path
-    inputs : RunInputs
+    inputs : CaseFile
     columns : ColumnsFile
     record : RunRecord or None
         Of the parts before; None for a first start.
@@ -45,7 +44,7 @@ class PartOfRun:
     """
 
     folder: Path
-    inputs: RunInputs
+    inputs: CaseFile
     columns: ColumnsFile
     record: RunRecord | None
     report: Report

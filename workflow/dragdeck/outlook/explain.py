@@ -10,10 +10,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from dragdeck.decks.deck import StudyScene
 from dragdeck.engine.reports import shown_time
 from dragdeck.outlook.measured import MeasuredCost, Tradeoff
-from dragdeck.scenes.scene import SceneType
+from dragdeck.scenes.scene import SceneType, StudyScene
 from dragdeck.scenes.workpiece import FACET_STEP_S
 
 
