@@ -7,7 +7,7 @@ import numpy as np
 from cost_variants import BASES, SceneName, Variant
 from dragchain.statistics.estimate import Estimate, finite, mean_of
 from dragdeck.documents import Document, Part
-from dragdeck.outlook.measured import MeasuredCost
+from dragdeck.records.tradeoff import CostEntry, CostsFile, Machine
 from dragdeck.study.model import Fidelity
 
 
@@ -60,27 +60,6 @@ class RoundsFile(Document):
     rows: Sequence[TimedVariant] = ()
 
 
-class Cost(MeasuredCost):
-    """The cost of a variant.
-
-    Attributes
-    ----------
-    ratio, ci95_low, ci95_high, wall_ratio : float
-        Count what `unit` says.
-    against : str
-        What it is compared with.
-    per_step, per_second : float
-        The same ratio in both units.
-    """
-
-    against: str
-    per_second: float
-    wall_ratio: float
-    rounds: int
-    steps: int
-    timestep_s: float
-
-
 class BaseCost(Part):
     """How fast a base is."""
 
@@ -93,14 +72,7 @@ class BaseCost(Part):
     steps_per_s: float
 
 
-class Machine(Part):
-    """Where it was timed."""
-
-    cores: int | None
-    processor: str
-
-
-class CostsFile(Document):
+class TimedCosts(CostsFile):
     """``costs.json``: what each variant costs, and how, when and where that was measured."""
 
     study: str
@@ -113,7 +85,6 @@ class CostsFile(Document):
     machine: Machine
     load_average_before: float
     bases: Sequence[BaseCost]
-    costs: Sequence[Cost]
 
 
 def geometric(ratios: Sequence[float]) -> Estimate:
@@ -121,7 +92,7 @@ def geometric(ratios: Sequence[float]) -> Estimate:
     return mean_of(np.log(ratios)).exp()
 
 
-def cost(variant: Variant, rows: Sequence[TimedVariant], steps_s: Mapping[str, float]) -> Cost:
+def cost(variant: Variant, rows: Sequence[TimedVariant], steps_s: Mapping[str, float]) -> CostEntry:
     """The cost of a variant.
 
     Parameters
@@ -136,7 +107,7 @@ def cost(variant: Variant, rows: Sequence[TimedVariant], steps_s: Mapping[str, f
     steps_per_second = steps_s[variant.base] / steps_s[variant.name]
     factor = steps_per_second if variant.unit == "per_second" else 1.0
     cpu, wall = map(geometric, zip(*(row.over(row.base) for row in own), strict=True))
-    return Cost(
+    return CostEntry(
         ratio=cpu.value * factor,
         ci95_low=finite(cpu.ci95_low * factor),
         ci95_high=finite(cpu.ci95_high * factor),

@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 
 from cost_decks import Beds, CostTemplates, TimedDecks, digest, with_own_blocks
-from cost_file import CostsFile, Machine, RoundsFile, TimedVariant, Timing, base_cost, cost
+from cost_file import RoundsFile, TimedCosts, TimedVariant, Timing, base_cost, cost
 from cost_variants import BASES, Variant, standard_case, variant_case, variants
 from dragdeck import __version__
 from dragdeck.cases.case import Case
@@ -29,6 +29,7 @@ from dragdeck.errors import EngineError, InputError, choices
 from dragdeck.files import write_text
 from dragdeck.project import study_templates
 from dragdeck.records.run import CaseFile
+from dragdeck.records.tradeoff import Machine
 from dragdeck.scenes.process import process_scene
 
 SECONDS = 0.15
@@ -293,7 +294,7 @@ def _known_rows(file: Path, inputs: Mapping[str, str], report: Report) -> list[T
     return same
 
 
-def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> CostsFile:
+def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> TimedCosts:
     """Content of ``costs.json``."""
     study, steps_s = bench.base.study, bench.timesteps_s
     base_of = {variant.name: variant.base for variant in bench.variants}
@@ -301,7 +302,7 @@ def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> CostsFile:
         base.name: [row.base for row in rows if base_of.get(row.name) == base.name]
         for base in bench.bases
     }
-    return CostsFile(
+    return TimedCosts(
         study=bench.base.study_name,
         fidelity=study.chosen_fidelity(),
         particles=study.media.count,

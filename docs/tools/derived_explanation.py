@@ -8,10 +8,10 @@ from tables import ROOT, Store, derived
 from dragchain.contact_law.hertz import tangential_damping_ratio
 from dragchain.statistics.estimate import student_quantile
 from dragdeck.cases.bed import bed_rayleigh_time, bed_timestep, full_stiffness_number
-from dragdeck.outlook.measured import StableStepLaw
 from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear, shear_modulus
 from dragdeck.physics.damping import damping_ratio
 from dragdeck.project import Project
+from dragdeck.records.stability import StableStepLaw
 from dragdeck.study.model import BUILT_IN_FIDELITIES, Study
 from evidence.contact_law.impact import limited_restitution
 

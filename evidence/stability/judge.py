@@ -4,16 +4,15 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from pydantic import BeforeValidator
 
 from dragchain.statistics.estimate import Estimate, flattened
-from dragdeck.documents import Document, Part
 from dragdeck.records.run import AcceptanceCheck, CheckCode, CheckReason
+from dragdeck.records.stability import Criteria, RestitutionErrors, SafeSteps, StabilityFile
 from evidence.stability.measures import (
     COLUMNS,
     MEASURES,
@@ -291,130 +290,6 @@ def _seen(run: PointRun, own: Row | None, fine: Row | None) -> Seen:
         overlap_ratio=own["overlap_ratio"] if own else None,
         errors=measure.errors(own, fine) if own and fine else {},
     )
-
-
-# --- the document ------------------------------------------------------------------------------
-
-
-def _to_digits(digits: int) -> BeforeValidator:
-    def rounded(value: object) -> object:
-        if not isinstance(value, float):
-            return value
-        return None if math.isnan(value) else float(f"{value:.{digits}g}")
-
-    return BeforeValidator(rounded)
-
-
-Step = Annotated[float | None, _to_digits(4)]
-"""A step over another, to four digits; NaN becomes None."""
-
-KnownStep = Annotated[float, _to_digits(4)]
-"""The same of a step that is always known."""
-
-Rounded = Annotated[float, _to_digits(3)]
-"""A number to three digits."""
-
-
-class SafeSteps(Part):
-    """The largest safe step of a regime: the smallest of its usable conditions.
-
-    ``..._fraction`` is over the Rayleigh time, ``..._critical`` over the critical step.
-
-    Attributes
-    ----------
-    conditions, usable : int
-        How many there are, and how many of them have a stable reference.
-    base : float or None
-        Safe at the base point.
-    safe, recommended : float
-        Safe in all usable conditions, and that times the safety factor.
-    over_rule : float
-        The safe step over the 20 % rule.
-    stable : float
-        No energy gained and no particle lost in any usable condition.
-    limited_by : str
-        The condition with the smallest safe step.
-    ordinary : float or None
-        Safe without the strongly damped conditions, those below `ORDINARY_RESTITUTION`.
-    """
-
-    conditions: int
-    usable: int
-    base_fraction: Step
-    base_critical: Step
-    safe_fraction: KnownStep
-    recommended_fraction: KnownStep
-    over_rule: KnownStep
-    stable_fraction: Step
-    safe_critical: Step
-    recommended_critical: Step
-    stable_critical: Step
-    limited_by: str
-    ordinary_fraction: Step
-    ordinary_critical: Step
-
-
-class RestitutionErrors(Part):
-    """Errors of head-on impacts in bins of steps per contact, fewest steps first.
-
-    Attributes
-    ----------
-    steps_per_contact : (B,) tuple of float
-        Geometric mean of a bin.
-    median : (B,) tuple of float
-        Of the largest restitution error among a run's impacts.
-    worst, ordinary_worst : (B,) tuple of float
-        Largest of the bin and of all with more steps; ordinary: where the restitution is at least
-        `ORDINARY_RESTITUTION`.
-    peak_force_worst : (B,) tuple of float
-        The same of the relative error of the peak force.
-    runs : (B,) tuple of int
-    """
-
-    steps_per_contact: tuple[Rounded, ...]
-    median: tuple[Rounded, ...]
-    ordinary_worst: tuple[Rounded, ...]
-    worst: tuple[Rounded, ...]
-    peak_force_worst: tuple[Rounded, ...]
-    runs: tuple[int, ...]
-
-
-class Criteria(Part):
-    """The limits that points were classified with; see `ENERGY_LIMITS` and `OVERLAP_LIMIT`."""
-
-    tolerance: float
-    overlap_limit: float
-    energy_limits: Mapping[str, float]
-    rest_floor: float
-
-
-class StabilityFile(Document):
-    """The content of ``stability.json``.
-
-    Attributes
-    ----------
-    measured : str
-        Date of the last run.
-    points : int
-    engine_wall_time_s : float
-        Of all runs.
-    safety_factor : float
-        Recommended over safe step.
-    regimes : mapping of str to SafeSteps
-    """
-
-    remedy = "make it with: snakemake stability"
-
-    commands: tuple[str, ...]
-    engine_versions: tuple[str, ...]
-    dragdeck_versions: tuple[str, ...]
-    measured: str
-    points: int
-    engine_wall_time_s: float
-    safety_factor: float
-    criteria: Criteria
-    regimes: Mapping[str, SafeSteps]
-    restitution_error: RestitutionErrors
 
 
 # --- the largest safe steps --------------------------------------------------------------------

@@ -14,6 +14,7 @@ from dragchain.arrays import Floats
 from dragchain.figures.panels import head, key, legend_below, log_ticks, new_panels, row_names
 from dragchain.figures.style import BLUE, GREEN, GREY, INK, ORANGE, RED
 from dragchain.report.campaign import write_report
+from dragdeck.records.stability import RestitutionErrors
 from evidence.stability.judge import (
     CLASSES,
     ENERGY,
@@ -24,7 +25,6 @@ from evidence.stability.judge import (
     RULE,
     STABLE,
     TOLERANCE,
-    RestitutionErrors,
     conditions,
     head_on_impacts,
     judge,

@@ -44,7 +44,6 @@ from dragdeck.errors import DragdeckError, InputError, choices, together
 from dragdeck.files import write_bytes, write_text
 from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, show
 from dragdeck.outlook.explain import page as page_of_scene
-from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_measured
 from dragdeck.outlook.process import (
     bed_notes,
     dimensionless,
@@ -60,6 +59,7 @@ from dragdeck.preview.page import Words, page
 from dragdeck.preview.picture import picture, small_picture
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
+from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.registry import SCENES
 from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
@@ -310,7 +310,7 @@ def advise(
     tolerance: float | None,
     quantity: str | None,
     quick: bool,
-    tradeoff: Tradeoff | None = None,
+    tradeoff: TradeoffRecord | None = None,
 ) -> None:
     """Show the settings for a tolerance, with their cost, and keep them."""
     project = find_project(Path.cwd())

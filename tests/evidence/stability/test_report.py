@@ -11,16 +11,9 @@ from pages import stands_alone
 from paths import DATA, ROOT
 
 from dragchain.cli import main as dragchain
+from dragdeck.records.stability import StabilityFile
 from evidence.__main__ import main as evidence
-from evidence.stability.judge import (
-    ENERGY,
-    REFUSED,
-    STABLE,
-    TOLERANCE,
-    UNSTABLE,
-    StabilityFile,
-    error_table,
-)
+from evidence.stability.judge import ENERGY, REFUSED, STABLE, TOLERANCE, UNSTABLE, error_table
 from evidence.stability.points import bed_settings
 from evidence.stability.runs import map_runs
 
