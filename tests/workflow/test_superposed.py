@@ -18,7 +18,6 @@ from plate import PLATE
 from dragchain import load_case, write_tables
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.write import compute_loading
-from dragchain.run.case import Case
 from dragchain.run.kinematics import (
     axis_speed,
     directions,
@@ -35,6 +34,7 @@ from dragdeck.engine.process import find_engine
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run_to_outcome
 from dragdeck.project import Project
+from dragdeck.records.case import CaseOfRun
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import read_bed
@@ -180,7 +180,7 @@ def asked_speed(motion: dict[str, Any]) -> float:
     return float(ways.sum() / np.ptp(points[:, 0]))
 
 
-def analytic(case: Case, motion: dict[str, Any], steps: np.ndarray) -> np.ndarray:
+def analytic(case: CaseOfRun, motion: dict[str, Any], steps: np.ndarray) -> np.ndarray:
     """Where the reference point has to be, its height from that of the immersion."""
     time = (steps - drag_phase(case).start_step) * case.timestep_s
     path, way = motion["path"], axis_speed(case) * time

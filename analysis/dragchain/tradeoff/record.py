@@ -9,9 +9,9 @@ import numpy as np
 
 from dragchain.tradeoff.changes import Costs
 from dragchain.tradeoff.compare import Setting
-from dragchain.tradeoff.drops import Drop
+from dragchain.tradeoff.drops import ComparedDrop
 from dragchain.tradeoff.outcome import Tradeoff, breaks
-from dragchain.tradeoff.tradeoff_document import (
+from dragdeck.records.tradeoff import (
     DropEntry,
     ErrorEntry,
     FidelityParameters,
@@ -22,9 +22,9 @@ from dragchain.tradeoff.tradeoff_document import (
 )
 
 
-def record_of(
+def tradeoff_record(
     tradeoff: Tradeoff,
-    drops: Iterable[Drop],
+    drops: Iterable[ComparedDrop],
     costs: Costs,
     plan: str,
     commands: Sequence[str],

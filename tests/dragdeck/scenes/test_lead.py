@@ -115,7 +115,7 @@ def test_a_lead_is_soft_and_ends_where_the_run_goes_on(made: Make, project: Proj
     assert lead is not None
     scene = process_scene(lead, BED)
     assert scene.deck.materials.youngs_modulus_scale == 0.01
-    assert scene.case.marks == ["state.1.restart"]
+    assert scene.case.marks == ("state.1.restart",)
     text = script(scene, project)
     last = scene.case.phases[-1].end_step
     assert f'"run {last} upto" "write_restart state.1.restart"' in text

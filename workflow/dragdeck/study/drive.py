@@ -27,7 +27,7 @@ class SmoothStart:
     steps: int = 0
 
     def advance(self, since: ArrayLike) -> _Array:
-        """StepCounts at full speed that get the motion as far as so many from its start."""
+        """Steps at full speed that get the motion as far as so many from its start."""
         since, ramp = np.asarray(since, dtype=np.float64), max(self.steps, 1)
         begun = np.minimum(since, self.steps)
         return np.asarray(begun**3 / ramp**2 * (1.0 - begun / (2.0 * ramp)) + (since - begun))

@@ -35,7 +35,7 @@ def turned(place: Point, angle_deg: float) -> Point:
 class WorkpiecePath(Model):
     """Block of a study: where the workpiece's axis goes in the drag.
 
-    Speeds and lengths are relative to the bowl. StepCounts are counted from the start of the drag.
+    Speeds and lengths are relative to the bowl. Steps are counted from the start of the drag.
 
     Attributes
     ----------

@@ -74,7 +74,7 @@ class Spin(SuperposedMotion):
     # --- as a run drives it --------------------------------------------------------------------
 
     def stages(self, drive: Drive) -> Sequence[tuple[int, float]]:
-        """StepCounts and rate about the axis, rad/s, of those that begin before the drag ends.
+        """Steps and rate about the axis, rad/s, of those that begin before the drag ends.
 
         Each is as far as it should turn the workpiece. The ramp is not counted here: while it
         lasts, the workpiece turns less.
