@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dragchain.run.case import Case, Output, load_case, load_outputs
     from dragchain.run.run_parts import iter_frames, iter_prints
     from dragchain.statistics.correlated import MeanEstimate, estimate_mean
-    from dragchain.tables.convert import dump_to_parquet
+    from dragchain.tables.parquet import dump_to_parquet
     from dragchain.tables.write import write_tables
     from dragdeck.dumps.frame import Frame
     from dragdeck.dumps.reader import read_dump
@@ -65,7 +65,7 @@ _MODULES = {
     "dragchain.run.case": ("Case", "Output", "load_case", "load_outputs"),
     "dragchain.run.run_parts": ("iter_frames", "iter_prints"),
     "dragchain.statistics.correlated": ("MeanEstimate", "estimate_mean"),
-    "dragchain.tables.convert": ("dump_to_parquet",),
+    "dragchain.tables.parquet": ("dump_to_parquet",),
     "dragchain.tables.write": ("write_tables",),
     "dragdeck.dumps.frame": ("Frame",),
     "dragdeck.dumps.reader": ("read_dump",),

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import SeriesError
 from dragchain.run.case import Case
-from dragchain.run.kinematics import motion_of
+from dragchain.run.kinematics import axis_speed
 from dragchain.statistics.correlated import MeanEstimate, estimate_mean, estimates, frame_sums
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import intact
@@ -140,7 +140,7 @@ def find_drag_peaks(
 
 def peak_separation_s(case: Case) -> float:
     """The time in which the workpiece travels one mean particle radius, s."""
-    return case.media.radius_mean_m / motion_of(case).axis_speed_m_s
+    return case.media.radius_mean_m / axis_speed(case)
 
 
 _ON_LIMIT_RAD = 1e-6

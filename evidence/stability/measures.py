@@ -64,14 +64,13 @@ class PointRun:
     def case(self) -> CaseOfStudy | None:
         """What it models; None of a point that no deck could be written for."""
         file = self.folder / CASE_FILE
-        return CaseOfStudy.read(file) if file.is_file() else None
+        kind = ImpactCase if self.point.regime == "impact" else CaseOfStudy
+        return kind.read(file) if file.is_file() else None
 
-    @cached_property
+    @property
     def impact(self) -> ImpactOfRun | None:
         """How its bodies meet; None outside single impacts."""
-        if self.point.regime != "impact" or self.case is None:
-            return None
-        return ImpactCase.read(self.folder / CASE_FILE).impact
+        return self.case.impact if isinstance(self.case, ImpactCase) else None
 
     def frames(self, name: str) -> Iterator[Frame]:
         """Frames of a dump."""

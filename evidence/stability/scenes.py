@@ -35,7 +35,7 @@ _CONTACT_TIMES = 4
 
 
 @dataclass(frozen=True)
-class Impact:
+class ImpactSettings:
     """How two bodies meet.
 
     Attributes
@@ -93,7 +93,9 @@ class ImpactCase(CaseOfStudy):
     limits: RunLimits
 
 
-def impact_scene(case: Case, run: str, impact: Impact, fraction: float) -> Scene[ImpactCase]:
+def impact_scene(
+    case: Case, run: str, impact: ImpactSettings, fraction: float
+) -> Scene[ImpactCase]:
     """Impacts of the mean particle at a time step.
 
     Parameters
@@ -102,7 +104,7 @@ def impact_scene(case: Case, run: str, impact: Impact, fraction: float) -> Scene
         Gives the particle, its material and its pair with itself.
     run : str
         The run id.
-    impact : Impact
+    impact : ImpactSettings
     fraction : float
         Time step over the Rayleigh time of the striking particle, the smaller one.
 
@@ -171,7 +173,7 @@ def impact_scene(case: Case, run: str, impact: Impact, fraction: float) -> Scene
     return Scene(deck=deck, case=content, steps=steps, files=files)
 
 
-def _bodies(radius_m: float, density_kg_m3: float, impact: Impact, dt: float) -> list[Body]:
+def _bodies(radius_m: float, density_kg_m3: float, impact: ImpactSettings, dt: float) -> list[Body]:
     """A striking particle for each phase, and the particle it strikes if it is no plate."""
     normal = impact.normal_speed_m_s
     along = impact.speed_m_s * math.sin(math.radians(impact.angle_deg))

@@ -74,7 +74,7 @@ class RunsByBed:
         return [*self.packings, *self.others]
 
 
-def read_runs(folders: Sequence[Path]) -> RunsByBed:
+def read_validation_runs(folders: Sequence[Path]) -> RunsByBed:
     """Read the runs of a validation; the first is the reference.
 
     Parameters
@@ -108,7 +108,7 @@ def read_runs(folders: Sequence[Path]) -> RunsByBed:
     return RunsByBed(sorted(packings, key=lambda run: run.seed), others)
 
 
-def over_packings(values: Sequence[float], *, ratio: bool = False) -> Estimate:
+def packing_mean(values: Sequence[float], *, ratio: bool = False) -> Estimate:
     """The mean of one number per packing, with the interval that their differences give.
 
     Student's t with one degree of freedom less than there are packings: nothing is

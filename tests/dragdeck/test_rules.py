@@ -11,7 +11,7 @@ from paths import ROOT
 from snakemake_interface_common.exceptions import WorkflowError
 
 from dragdeck.project import Project
-from dragdeck.rules import Workflow, of_whole_run, settings
+from dragdeck.rules import Workflow, checked_settings, of_whole_run
 
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
 
@@ -22,13 +22,16 @@ def work(study: str, **changes: Any) -> Workflow:
 
 
 def test_settings_are_text_and_checked() -> None:
-    assert settings({"study": "a", "fidelity": None}, SCHEMA) == {"study": "a", "fidelity": ""}
+    assert checked_settings({"study": "a", "fidelity": None}, SCHEMA) == {
+        "study": "a",
+        "fidelity": "",
+    }
     for config, words in (
         ({"studdy": "a"}, "did you mean 'study'"),
         ({"study": "a b"}, "study=a b: not a name"),
     ):
         with pytest.raises(WorkflowError, match=words):
-            settings(config, SCHEMA)
+            checked_settings(config, SCHEMA)
 
 
 def test_what_cannot_be_used_stops_the_workflow() -> None:

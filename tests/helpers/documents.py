@@ -15,7 +15,7 @@ WRITERS = {
     "drops": "dragdeck.campaigns.restitution_drops:DropsFile",
     "costs": "cost_file:TimedCosts",
     "packing": "dragchain.tables.bed:Packing",
-    "stability": "evidence.stability.judge:StabilityFile",
+    "stability": "dragdeck.outlook.measured:StabilityMap",
     "scaling": "dragchain.scaling.document:ScalingFile",
     "calibration": "dragchain.calibration.results:CalibrationFile",
     "measures": "dragchain.tradeoff.measures:Measures",
@@ -35,7 +35,6 @@ READERS = {
     "case.drop_test": ["dragchain.run.case:Case"],
     "case.filling": ["dragchain.run.case:Case"],
     "case.process": ["dragchain.run.case:Case"],
-    "stability": ["dragdeck.outlook.measured:StabilityMap"],
     "drops": [
         "dragchain.calibration.simulated_drops:DropTest",
         "dragchain.calibration.simulated_drops:DropsFile",

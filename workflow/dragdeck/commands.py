@@ -14,8 +14,7 @@ import jinja2
 from pydantic import ValidationError
 from rich.table import Table
 
-from dragdeck.advice.advise import Advice
-from dragdeck.advice.advise import advise as advised_settings
+from dragdeck.advice.advise import Advice, advised_settings
 from dragdeck.advice.forecast import (
     AdviceFile,
     advice_file,
@@ -57,8 +56,7 @@ from dragdeck.outlook.runs import expected_runs, plan_in_words
 from dragdeck.outlook.timestep import stable_step_cautions, stable_step_note, timestep_notes
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import CaseLayout, layout
-from dragdeck.preview.page import Words, page
-from dragdeck.preview.picture import picture, small_picture
+from dragdeck.preview.page import Words, page, picture, small_picture
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
 from dragdeck.scenes.lead import with_leads

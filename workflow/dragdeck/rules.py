@@ -95,7 +95,7 @@ def _stop(error: DragdeckError) -> NoReturn:
     raise WorkflowError(str(error)) from None
 
 
-def settings(config: Mapping[str, object], schema: Mapping[str, Any]) -> dict[str, str]:
+def checked_settings(config: Mapping[str, object], schema: Mapping[str, Any]) -> dict[str, str]:
     """The keys of config/config.yaml and of --config as text.
 
     Raises

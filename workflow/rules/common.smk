@@ -1,4 +1,4 @@
-# What the rules share: the call's settings, and the study with its runs as `WORK` (dragdeck.rules).
+# What the rules share: the call's checked_settings, and the study with its runs as `WORK` (dragdeck.rules).
 import os
 import signal
 import sys
@@ -22,7 +22,7 @@ from dragdeck.rules import (
     of_run,
     of_whole_run,
     or_stop,
-    settings,
+    checked_settings,
     tables_of,
 )
 from dragdeck.scenes.registry import SCENES
@@ -52,7 +52,7 @@ if workflow.is_main_process and workflow.local_exec and workflow.resource_settin
     os.environ[CORES_VARIABLE] = str(given)
 
 SCHEMA = yaml.safe_load(Path(workflow.source_path("../schemas/config.schema.yaml")).read_text())
-config.update(settings(config, SCHEMA))
+config.update(checked_settings(config, SCHEMA))
 STUDY, FIDELITY, PLAN, STABILITY_MAP, COLOURS = (
     config.get(key, "") for key in SCHEMA["properties"]
 )

@@ -25,12 +25,13 @@ from dragchain.errors import TableError
 from dragchain.figures.rendering import Camera, Image, new_plotter, photograph
 from dragchain.figures.style import COLOURS, force_map
 from dragchain.network.chains import WidestPath, dominant_path, widest_paths
-from dragchain.network.frame import NetworkFrame, read_frames
+from dragchain.network.frame import NetworkFrame, network_frames
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed, process_time
 from dragchain.run.workpiece import placed, workpiece_mesh
 from dragchain.tables.by_step import read_table
 from dragchain.tables.run_folder import workpiece_places
+from dragdeck.study.rotation import Rotation
 
 View = Literal["xy", "xz"]
 
@@ -62,9 +63,8 @@ class NetworkScene:
         The network frame.
     workpiece_m : (3,) float
         Centre of the workpiece's bottom face at the frame.
-    workpiece_turn_rad : float
-        Angle about the vertical by which the workpiece is turned from its STL file,
-        where it looks along +x.
+    rotation : Rotation
+        Orientation of the workpiece, which looks along +x in its STL file.
     dominant : WidestPath or None
         The frame's dominant workpiece path.
     process_time_s : float
@@ -73,7 +73,7 @@ class NetworkScene:
 
     frame: NetworkFrame
     workpiece_m: Floats
-    workpiece_turn_rad: float
+    rotation: Rotation
     dominant: WidestPath | None
     process_time_s: float
 
@@ -121,7 +121,7 @@ def load_scene(run_dir: Path, case: Case) -> NetworkScene:
     network = read_table(run_dir / "tables" / "network.parquet", ["step", "time_s"])
     times = process_time(network["time_s"].to_numpy(np.float64), case)
     step = picture_step(network["step"].to_numpy(np.float64), times)
-    frame = next(read_frames(run_dir, (step, step)), None)
+    frame = next(network_frames(run_dir, (step, step)), None)
     if frame is None:
         raise TableError(f"particles.parquet lacks step {step}, which network.parquet has")
     path = dominant_path(frame, widest_paths(frame))
@@ -207,7 +207,7 @@ def render_view(
     plotter = new_plotter(*np.ceil(size_mm * pixels_per_mm).astype(int).tolist())
     plotter.enable_depth_peeling(number_of_peels=8)
     _add_bowl(plotter, case, view)
-    workpiece = placed(workpiece_mesh(run_dir, case), scene.workpiece_m, scene.workpiece_turn_rad)
+    workpiece = placed(workpiece_mesh(run_dir, case), scene.workpiece_m, scene.rotation)
     plotter.add_mesh(workpiece, color=COLOURS["workpiece"], opacity=0.45)
     _add_contacts(plotter, scene.frame, case.media.radius_mean_m, part.contacts)
     image = photograph(plotter, _camera((low + high) / 2, view, case), float(high[1] - low[1]))

@@ -126,7 +126,7 @@ def _view(axes: Axes, mesh: Any, name: str, scale: Normalize, case: Case) -> Non
 
 def _keeps_direction(case: Case) -> bool:
     """Whether the workpiece's motion has one direction in its own frame."""
-    return not spins(case) and motion_of(case).keeps_direction
+    return motion_of(case).keeps_direction
 
 
 def _render(mesh: Any, eye: tuple[float, float], scale: Normalize, case: Case) -> Image:

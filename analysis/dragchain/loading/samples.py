@@ -14,15 +14,16 @@ from dragchain.errors import TableError
 from dragchain.loading.contact_events import AMOUNTS, POINT, SLIP, Thresholds, surfaces
 from dragchain.run.case import Case, load_outputs
 from dragchain.run.kinematics import (
+    axis_speed,
+    bowl_velocity,
     counted_mask,
-    motion_of,
     needed,
     spins,
     workpiece_frame,
-    workpiece_turn,
+    workpiece_rotation,
     workpiece_velocity,
 )
-from dragchain.run.workpiece import Surface, off_facet, turned
+from dragchain.run.workpiece import Surface, off_facet
 from dragchain.statistics.correlated import slow_waves
 from dragchain.tables.by_step import read_groups
 
@@ -109,7 +110,7 @@ def sample(run_dir: Path, case: Case, limits: Thresholds) -> Sampled:
             "the drag that enters the statistics"
         )
     impulse = workpiece[["drag_n", "lateral_n", "vertical_n"]].to_numpy().sum(axis=0) * interval_s
-    path = motion_of(case).axis_speed_m_s * interval_s * len(steps)
+    path = axis_speed(case) * interval_s * len(steps)
     return Sampled(pd.concat(parts, ignore_index=True), len(steps), interval_s, path, impulse)
 
 
@@ -166,21 +167,21 @@ def _with_amounts(
     reference = workpiece[_REFERENCE].to_numpy()
     heading = workpiece["direction_rad"].to_numpy()
     steps = rows["step"].to_numpy()
-    turn = workpiece_turn(steps, heading, case)
+    rotation = workpiece_rotation(steps, heading, case)
     speed = np.linalg.norm(slip, axis=1)
     most = surfaces(case).friction * normal
     mobilisation = np.divide(tangential, most, out=np.full_like(most, np.inf), where=most > 0.0)
     mobilised = mobilisation >= limits.mobilised
     velocity = workpiece_velocity(steps, point, reference, case)
-    velocity -= motion_of(case).bowl_velocity(point)
+    velocity -= bowl_velocity(point, case)
     drag = workpiece_frame(force, heading) * interval_s
     in_body = {}
     if spins(case):
-        in_body = dict(zip(BODY, (workpiece_frame(force, turn) * interval_s).T, strict=True))
+        in_body = dict(zip(BODY, (rotation.into(force) * interval_s).T, strict=True))
     added = rows.assign(
         **in_body,
-        **dict(zip(POINT, turned(point - reference, -turn).T, strict=True)),
-        **dict(zip(SLIP, turned(slip, -turn).T, strict=True)),
+        **dict(zip(POINT, rotation.into(point - reference).T, strict=True)),
+        **dict(zip(SLIP, rotation.into(slip).T, strict=True)),
         **dict(zip(WORKPIECE, drag.T, strict=True)),
         mobilisation=mobilisation,
         mobilised=mobilised,

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from dragchain.arrays import Floats, Ints, wrap_angle
+from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.network.chains import (
     ALPHA_RAD,
@@ -21,9 +21,10 @@ from dragchain.network.chains import (
     peters_rows,
     split_chains,
 )
-from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame, read_frames
+from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame, network_frames
 from dragchain.network.statistics import cluster_rows, frame_clusters, frame_statistics
 from dragchain.tables.parquet import table_writer, write_parquet
+from dragdeck.study.rotation import wrap_angle
 
 
 def chain_table(
@@ -190,7 +191,7 @@ def write_chains(run_dir: Path) -> None:
     grown: list[dict[str, NDArray[Any]]] = []
     tables = run_dir / "tables"
     with table_writer(tables / "chains.parquet") as found:
-        for frame in read_frames(run_dir):
+        for frame in network_frames(run_dir):
             clusters = frame_clusters(frame)
             network.append(frame_statistics(frame, clusters))
             grown.append(cluster_rows(frame, clusters))

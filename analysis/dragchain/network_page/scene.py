@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation as Quaternion
 
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import DragPeaks, drag_peaks, peak_separation_s, read_counted
@@ -361,8 +362,9 @@ def _workpiece(columns: PackedColumns, run: Run, frames: list[ShownFrame]) -> di
     poses = []
     for frame in frames:
         assert frame.data.workpiece is not None
-        place, turn = frame.data.workpiece
-        poses.append([*(1e3 * place).tolist(), turn])
+        place, rotation = frame.data.workpiece
+        turn = Quaternion.from_matrix(rotation.matrices[0]).as_quat()
+        poses.append([*(1e3 * place).tolist(), *turn.tolist()])
     return {
         "poses": poses,
         "headings": _headings(run, frames),

@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Generic, TypeVar
 
+import numpy as np
 from pydantic import JsonValue
 
 from dragchain.loading.document import FILE as LOADING
@@ -33,16 +34,8 @@ from dragchain.report.values import (
 )
 from dragchain.run.case import Case, changed_inputs, load_case
 from dragchain.run.completeness import RunRecord, read_accepted
-from dragchain.run.kinematics import drag_phase, motion_of, needed
+from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
 from dragdeck.errors import DocumentError, RejectedRunError
-
-_PATHS = {
-    "": "path",
-    "circle": "circle of radius {radius} mm",
-    "line": "straight line",
-    "rest": "at rest at {radius} mm from the axis of a rotating bowl",
-    "waypoints": "waypoints",
-}
 
 
 def set_up(case: Case, packings: int, filling: FillingFindings | None) -> list[tuple[str, str]]:
@@ -85,17 +78,15 @@ def _workpiece(case: Case) -> Iterator[str]:
 
 
 def _path(case: Case) -> Iterator[str]:
-    motion, drag = motion_of(case), drag_phase(case)
-    radius = 1e3 * float(getattr(motion, "radius_m", 0.0))
-    yield _PATHS[_text(case.inputs.get("motion.path.kind"))].format(radius=number(radius))
-    time_s = (drag.end_step - drag.start_step) * case.timestep_s
-    yield f"{_mm(time_s * motion.axis_speed_m_s)} long"
+    yield motion_of(case).motion.path.words(number)
+    end_s = np.array([drag_phase(case).end_step * case.timestep_s])
+    yield f"{_mm(float(path_passed(end_s, case)[0]))} long"
     yield f"immersed {_mm(needed(case.workpiece, 'workpiece').immersion_depth_m)}"
     yield from (f"with {one.kind}" for one in case.superposed)
 
 
 def _speed(case: Case) -> Iterator[str]:
-    simulated, factor = motion_of(case).axis_speed_m_s, case.fidelity.speed_factor
+    simulated, factor = axis_speed(case), case.fidelity.speed_factor
     yield f"{number(1e3 * simulated / factor)} mm/s"
     if factor != 1.0:
         yield f"simulated at {number(1e3 * simulated)} mm/s"

@@ -179,8 +179,8 @@ def page_environment(
 def cell(environment: jinja2.Environment, row: object, key: str, form: str = "") -> object:
     """A value of a row by its dotted key, written by a filter: ``number``, ``measured:2``."""
     value = row
-    for part in key.split("."):
-        value = environment.getitem(value, part)
+    for part in filter(None, key.split(".")):
+        value = environment.getitem(value, int(part) if part.isdigit() else part)
     name, _, digits = form.partition(":")
     return environment.filters[name](value, *map(int, digits.split())) if name else value
 

@@ -41,7 +41,7 @@ from dragchain.report.findings import (
     Wake,
 )
 from dragchain.run.case import Case, load_outputs
-from dragchain.run.kinematics import drag_start_s, motion_of, needed, process_time
+from dragchain.run.kinematics import drag_start_s, needed, path_passed, process_time
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
@@ -185,7 +185,7 @@ def _wake(samples: pd.DataFrame, case: Case) -> Wake | None:
     workpiece = needed(case.workpiece, "workpiece")
     if workpiece.wake_from_m is None:
         return None
-    path = (samples["time_s"] - drag_start_s(case)) * motion_of(case).axis_speed_m_s
+    path = path_passed(samples["time_s"].to_numpy(), case)
     fresh = path <= workpiece.wake_from_m - 2 * workpiece.radius_m
     try:
         before, after = (

@@ -3,18 +3,13 @@
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
-from pydantic import Field, JsonValue, PositiveFloat, PositiveInt, model_validator
+from pydantic import JsonValue, PositiveFloat, PositiveInt, model_validator
 
 from dragchain.errors import TableError
-from dragchain.run.paths.circle import Circle
-from dragchain.run.paths.line import Line
-from dragchain.run.paths.rest import Rest
-from dragchain.run.paths.waypoints import Waypoints
-from dragchain.run.superposed.oscillation import Oscillation
-from dragchain.run.superposed.spin import Spin
 from dragdeck.documents import Document, Part
+from dragdeck.study.driven import PathEntry, SuperposedEntry
 
 Scene = Literal["drop_test", "filling", "process"]
 OutputKind = Literal["print", "custom", "local"]
@@ -62,13 +57,6 @@ class Workpiece(Part):
     number: int = 0
     count: PositiveInt = 1
     wake_from_m: PositiveFloat | None = None
-
-
-AnySuperposed = Annotated[Spin | Oscillation, Field(discriminator="kind")]
-"""The registry of motions superposed on the path: an entry of ``superposed``, told by its kind."""
-
-AnyPath = Annotated[Circle | Line | Rest | Waypoints, Field(discriminator="kind")]
-"""The registry of paths: ``motion`` of a process, told by its kind."""
 
 
 class Phase(Part):
@@ -172,8 +160,8 @@ class Case(Document):
     bowl: Bowl | None = None
     workpiece: Workpiece | None = None
     surface_m: PositiveFloat | None = None
-    motion: AnyPath | None = None
-    superposed: tuple[AnySuperposed, ...] = ()
+    motion: PathEntry | None = None
+    superposed: tuple[SuperposedEntry, ...] = ()
     phases: tuple[Phase, ...]
     statistics: Statistics | None = None
     restitution: float | None = None

@@ -11,11 +11,12 @@ import pandas as pd
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.run.case import Case, Output, friction_with, load_case, load_outputs
-from dragchain.run.kinematics import needed, workpiece_turn
+from dragchain.run.kinematics import needed, workpiece_rotation
 from dragchain.run.run_parts import iter_frames, iter_prints
 from dragchain.tables.by_step import read_table
 from dragchain.tables.workpiece_contacts import Meshes, WorkpieceFrames, join_workpiece_frames
 from dragdeck.dumps.frame import Columns, Frame
+from dragdeck.study.rotation import Rotation
 
 _BATCH_ROWS = 8192
 """Contacts on the workpiece that are joined at once, but for those of the last frame."""
@@ -124,14 +125,14 @@ class Run:
             yield _joined(batch)
 
 
-WorkpiecePlaces = Callable[[int], tuple[Floats, float]]
+WorkpiecePlaces = Callable[[int], tuple[Floats, Rotation]]
 
 WORKPIECE_COLUMNS = ("step", "ref_x_m", "ref_y_m", "ref_z_m", "direction_rad")
 """Columns of ``workpiece_force.parquet`` that say where the workpiece is."""
 
 
 def workpiece_places(run_dir: Path, case: Case) -> WorkpiecePlaces:
-    """A function of a step: the workpiece's reference point in m, and its turn in rad.
+    """A function of a step: the workpiece's reference point in m, and its orientation.
 
     Raises
     ------
@@ -142,8 +143,8 @@ def workpiece_places(run_dir: Path, case: Case) -> WorkpiecePlaces:
     return lambda step: workpiece_place(workpiece, step, case)
 
 
-def workpiece_place(workpiece: pd.DataFrame, step: int, case: Case) -> tuple[Floats, float]:
-    """The workpiece's reference point at a step in m, (3,), and its turn in rad.
+def workpiece_place(workpiece: pd.DataFrame, step: int, case: Case) -> tuple[Floats, Rotation]:
+    """The workpiece's reference point at a step in m, (3,), and its orientation.
 
     Parameters
     ----------
@@ -155,7 +156,7 @@ def workpiece_place(workpiece: pd.DataFrame, step: int, case: Case) -> tuple[Flo
     case : Case
         The case, of a process.
     """
-    return _reference_point(workpiece, step), _workpiece_turn(workpiece, step, case)
+    return _reference_point(workpiece, step), _workpiece_rotation(workpiece, step, case)
 
 
 def _reference_point(workpiece: pd.DataFrame, step: int) -> Floats:
@@ -165,8 +166,8 @@ def _reference_point(workpiece: pd.DataFrame, step: int) -> Floats:
     return np.array([np.interp(step, at, column) for column in point.T])
 
 
-def _workpiece_turn(workpiece: pd.DataFrame, step: int, case: Case) -> float:
-    """The workpiece's angle at a step, its direction of motion that of the nearest sample."""
+def _workpiece_rotation(workpiece: pd.DataFrame, step: int, case: Case) -> Rotation:
+    """The workpiece's orientation at a step, its direction of motion that of the nearest sample."""
     nearest = [int(np.abs(workpiece["step"].to_numpy(np.int64) - step).argmin())]
     direction = workpiece["direction_rad"].to_numpy(np.float64)[nearest]
-    return float(workpiece_turn(np.array([step]), direction, case)[0])
+    return workpiece_rotation(np.array([step]), direction, case)

@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 import pyarrow as pa
 
-from dragchain.arrays import Floats, Ints, wrap_angle
+from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.run.case import Case, Scene, friction_with
 from dragchain.run.kinematics import (
@@ -19,7 +19,7 @@ from dragchain.run.kinematics import (
     phase_codes,
     spins,
     workpiece_frame,
-    workpiece_turn,
+    workpiece_rotation,
     workpiece_velocity,
 )
 from dragchain.tables.bed import describe_bed
@@ -49,6 +49,7 @@ from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WallContacts
 from dragdeck.dumps.frame import Columns
 from dragdeck.errors import RejectedRunError
+from dragdeck.study.rotation import wrap_angle
 
 
 @dataclass(frozen=True)
@@ -126,8 +127,8 @@ def workpiece_force_rows(rows: Columns, case: Case) -> Rows:
     drag, lateral, vertical = workpiece_frame(force, heading).T
     body: Rows = {}
     if spins(case):
-        turn = workpiece_turn(steps, heading, case)
-        body = dict(zip(BODY, (turn, *workpiece_frame(force, turn).T), strict=True))
+        rotation = workpiece_rotation(steps, heading, case)
+        body = dict(zip(BODY, (rotation.front_rad, *rotation.into(force).T), strict=True))
     return {
         **rows,
         "phase": _phases(steps, case),

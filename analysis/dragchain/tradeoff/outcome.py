@@ -239,7 +239,7 @@ def _failure(run: PlanRun) -> str:
     return "; ".join(f"{check.name}: {check.seen}" for check in run.measures.failure)
 
 
-def error_table(tradeoff: Tradeoff) -> pd.DataFrame:
+def errors_by_setting(tradeoff: Tradeoff) -> pd.DataFrame:
     """One row a setting and quantity: cost, error, interval and bound."""
     rows = [
         {

@@ -26,7 +26,7 @@ from dragchain.tradeoff.outcome import (
     Tradeoff,
     choose,
     compare_settings,
-    error_table,
+    errors_by_setting,
     run_table,
 )
 from dragchain.tradeoff.path_length import Reach, along, chance, reaches
@@ -149,7 +149,7 @@ def write_tradeoff(
     page = tradeoff_page(tradeoff, known, dropped, figures, record=record, costs=priced)
     write_bundle(
         out_dir,
-        tables={"runs": run_table(tradeoff), "errors": error_table(tradeoff)},
+        tables={"runs": run_table(tradeoff), "errors": errors_by_setting(tradeoff)},
         figures=figures,
         documents={"tradeoff": record},
         pages={"report": page},

@@ -21,7 +21,7 @@ from dragchain.network.frame import (
     NetworkFrame,
     counted_range,
     frame_of,
-    read_frames,
+    network_frames,
 )
 from dragchain.network.statistics import (
     FORCE_FACTORS,
@@ -168,7 +168,7 @@ def run_dir(tmp_path: Path) -> Path:
 
 
 def test_frames_follow_the_count_of_particles_and_may_be_empty(run_dir: Path) -> None:
-    frames = list(read_frames(run_dir))
+    frames = list(network_frames(run_dir))
     assert [frame.step for frame in frames] == [10, 20]
     assert [frame.particle_id.size for frame in frames] == [6, 2]
     assert [frame.normal_force.size for frame in frames] == [7, 0]
@@ -176,7 +176,7 @@ def test_frames_follow_the_count_of_particles_and_may_be_empty(run_dir: Path) ->
 
 def test_a_frame_has_the_heading_of_its_step(run_dir: Path) -> None:
     table = pd.read_parquet(run_dir / "tables" / "workpiece_force.parquet")
-    for frame in read_frames(run_dir):
+    for frame in network_frames(run_dir):
         expected = table.loc[table["step"] == frame.step, "direction_rad"].iloc[0]
         assert math.cos(frame.direction_rad - expected) == pytest.approx(1.0)
 
@@ -190,9 +190,9 @@ def grouped(run_dir: Path, rows: int) -> None:
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 5, 100])
 def test_frames_may_spread_over_row_groups(run_dir: Path, rows: int) -> None:
-    whole = list(read_frames(run_dir, (0, 30)))
+    whole = list(network_frames(run_dir, (0, 30)))
     grouped(run_dir, rows)
-    parts = list(read_frames(run_dir, (0, 30)))
+    parts = list(network_frames(run_dir, (0, 30)))
     assert [frame.step for frame in parts] == [0, 10, 20, 30]
     for one, other in zip(whole, parts, strict=True):
         for name, values in vars(one).items():
@@ -209,7 +209,7 @@ def test_row_groups_are_read_when_their_frames_are_due(run_dir: Path, monkeypatc
 
     monkeypatch.setattr(pq.ParquetFile, "read_row_group", noted)
     grouped(run_dir, 2)
-    frames = read_frames(run_dir, (10, 30))
+    frames = network_frames(run_dir, (10, 30))
     next(frames)
     # rows 7 to 13 of contacts and 6 to 11 of particles are step 10, and a row beyond shows their
     # ends
@@ -223,14 +223,14 @@ def test_a_table_whose_steps_fall_is_refused(run_dir: Path) -> None:
     file = run_dir / "tables" / "contacts.parquet"
     pd.read_parquet(file).iloc[::-1].to_parquet(file)
     with pytest.raises(TableError, match=r"contacts.parquet is not sorted by step"):
-        list(read_frames(run_dir, (10, 30)))
+        list(network_frames(run_dir, (10, 30)))
 
 
 def test_a_table_without_a_column_is_refused(run_dir: Path) -> None:
     file = run_dir / "tables" / "particles.parquet"
     pd.read_parquet(file).drop(columns="radius_m").to_parquet(file)
     with pytest.raises(TableError, match=r"particles.parquet: column radius_m is missing"):
-        list(read_frames(run_dir))
+        list(network_frames(run_dir))
 
 
 def test_a_particle_with_two_rows_is_refused() -> None:

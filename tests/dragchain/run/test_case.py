@@ -1,12 +1,14 @@
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
+from made_run import with_motion
 
-from dragchain import DocumentError, load_case, load_outputs
+from dragchain import DocumentError, TableError, load_case, load_outputs
 from dragchain.run.case import Statistics, changed_inputs
-from dragchain.run.paths.circle import Circle
-from dragchain.run.paths.line import Line
+from dragchain.run.kinematics import motion_of
+from dragdeck.study.paths.circle import CirclePath
 
 
 def test_reads_a_process(tiny_run: Path) -> None:
@@ -18,29 +20,32 @@ def test_reads_a_process(tiny_run: Path) -> None:
     )
     assert case.bowl is not None
     assert case.bowl.radius_m == 0.04
-    assert case.motion == Line(
-        kind="line",
-        axis_speed_m_s=1e-4,
-        start_m=(0.0, 0.0),
-        direction_rad=0.0,
-        start_direction_rad=0.0,
-    )
+    assert case.motion is not None
+    assert (case.motion.kind, case.motion.start_direction_rad) == ("line", 0.0)
+    assert case.motion.axis_speed_m_s == pytest.approx(1e-4)
     assert [phase.name for phase in case.phases] == ["plunge", "drag"]
     assert case.restitution is None
 
 
 def test_reads_a_circle(tiny_run: Path, edit_json) -> None:
-    circle = {
-        "kind": "circle",
-        "axis_speed_m_s": 0.01,
-        "radius_m": 0.02,
-        "direction": "cw",
-        "orientation": "follow_path",
-    }
-    edit_json(
-        tiny_run / "case.json", lambda c: c.update(motion={**circle, "start_direction_rad": 1.5})
-    )
-    assert load_case(tiny_run).motion == Circle(**circle, start_direction_rad=1.5)
+    path = {"kind": "circle", "radius_m": 0.02, "direction": "cw"}
+    edit_json(tiny_run / "case.json", lambda case: case.update(with_motion(case, path, 0.01)))
+    found = motion_of(load_case(tiny_run)).motion.path
+    assert isinstance(found, CirclePath)
+    assert (found.radius_m, found.sign) == (0.02, -1)
+
+
+def test_a_motion_that_this_version_makes_otherwise_is_refused(tiny_run: Path, edit_json) -> None:
+    """The tables follow from the inputs; what was simulated stands beside them."""
+    path = {"kind": "circle", "radius_m": 0.02}
+
+    def slower(case: dict[str, Any]) -> None:
+        case.update(with_motion(case, path, 0.01, spin={"rpm": 60}))
+        case["superposed"][0]["stages"][0]["rate_rad_s"] *= 0.99
+
+    edit_json(tiny_run / "case.json", slower)
+    with pytest.raises(TableError, match="another version of dragdeck"):
+        motion_of(load_case(tiny_run))
 
 
 def test_a_drop_needs_neither_bowl_nor_workpiece(tiny_run: Path, edit_json) -> None:

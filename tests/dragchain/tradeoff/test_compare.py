@@ -33,7 +33,7 @@ from dragchain.tradeoff.outcome import (
     Tradeoff,
     breaks,
     choose,
-    error_table,
+    errors_by_setting,
     largest_bound,
     run_table,
 )
@@ -118,7 +118,7 @@ def test_a_setting_that_only_failed_has_no_errors(tmp_path: Path) -> None:
     tradeoff = made(tmp_path, found)
     assert Setting(*FAST) in tradeoff.settings()
     assert all(Setting(*FAST) not in own.errors for own in tradeoff.comparisons.values())
-    assert not (error_table(tradeoff)["speed_factor"] == 5.0).any()
+    assert not (errors_by_setting(tradeoff)["speed_factor"] == 5.0).any()
 
 
 def test_the_longest_of_runs_that_differ_in_path_counts(tmp_path: Path) -> None:

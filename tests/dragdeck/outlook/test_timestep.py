@@ -37,7 +37,12 @@ from dragdeck.study.model import Fidelity
 from dragdeck.sweep.cases import load_cases
 
 TABLE = RestitutionErrors(
-    steps_per_contact=[5.0, 50.0], worst=[3e-1, 3e-3], ordinary_worst=[1e-1, 1e-3]
+    steps_per_contact=(5.0, 50.0),
+    median=(1e-2, 1e-4),
+    ordinary_worst=(1e-1, 1e-3),
+    worst=(3e-1, 3e-3),
+    peak_force_worst=(1e-1, 1e-3),
+    runs=(9, 9),
 )
 
 

@@ -69,12 +69,12 @@ def resolve(case: Case, asked: Tolerance, tradeoff: Tradeoff | None = None) -> C
     InputError
         The quantities do not go together.
     """
-    advice = advise(case, asked, tradeoff or measured_tradeoff())
+    advice = advised_settings(case, asked, tradeoff or measured_tradeoff())
     study = with_option(case.study, advice.chosen)
     return replace(case, study=study, asked=asked, advised=advice.for_case)
 
 
-def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
+def advised_settings(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
     """The settings for a tolerance.
 
     Parameters

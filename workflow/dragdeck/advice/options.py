@@ -82,7 +82,7 @@ class Work:
         entry_s = (
             expected_surface(study) / motion.plunge_speed_m_s + way / motion.approach_speed_m_s
         )
-        process_s = entry_s + motion.path_length_m / motion.axis_speed_m_s
+        process_s = entry_s + motion.path_length_m / motion.axis_speed_m_s + motion.ramp_s / 2
         facets = sum(workpiece_facets(one) for one in of_each_workpiece(case))
         return cls(study, tradeoff, expected_time(study), process_s, entry_s, facets)
 

@@ -9,7 +9,7 @@ from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.decks.case_file import CaseOfStudy, SteadyCriterion
 from dragdeck.documents import Part
 from dragdeck.physics.run_limits import RunLimits
-from dragdeck.study.model import AnyPathOfRun, AnySuperposedOfRun
+from dragdeck.study.driven import PathEntry, SuperposedEntry
 
 
 class WorkpieceOfRun(Part):
@@ -113,8 +113,8 @@ class ProcessCase(CaseOfStudy):
     numbers: Mapping[str, float]
     surface_m: float
     workpiece: WorkpieceOfRun
-    motion: AnyPathOfRun
-    superposed: Sequence[AnySuperposedOfRun] = Field(default=(), exclude_if=lambda value: not value)
+    motion: PathEntry
+    superposed: Sequence[SuperposedEntry] = Field(default=(), exclude_if=lambda value: not value)
     statistics: StatisticsOfRun
     steady: SteadyCriterion | None = Field(default=None, exclude_if=lambda value: value is None)
     limits: RunLimits

@@ -5,7 +5,9 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator
 
 from dragdeck.documents import Document, Part
 from dragdeck.errors import InputError
@@ -141,52 +143,124 @@ def tradeoff_if_measured(file: Path = _TRADEOFF_FILE) -> Tradeoff | None:
         return None
 
 
-class RegimeSteps(Part):
-    """Safe time steps of a regime of the stability map, over the Rayleigh time.
+def _to_digits(digits: int) -> BeforeValidator:
+    def rounded(value: object) -> object:
+        if not isinstance(value, float):
+            return value
+        return None if math.isnan(value) else float(f"{value:.{digits}g}")
+
+    return BeforeValidator(rounded)
+
+
+_Step = Annotated[float | None, _to_digits(4)]
+"""A step over another, to four digits; NaN becomes None."""
+
+_KnownStep = Annotated[float, _to_digits(4)]
+"""The same of a step that is always known."""
+
+_Rounded = Annotated[float, _to_digits(3)]
+"""A number to three digits."""
+
+
+class SafeSteps(Part):
+    """The largest safe step of a regime: the smallest of its usable conditions.
+
+    ``..._fraction`` is over the Rayleigh time, ``..._critical`` over the critical step.
 
     Attributes
     ----------
-    safe_fraction : float
-        Of all conditions.
-    ordinary_fraction : float or None
-        Of those without strong damping; None where there were none.
+    conditions, usable : int
+        How many there are, and how many of them have a stable reference.
+    base : float or None
+        Safe at the base point.
+    safe, recommended : float
+        Safe in all usable conditions, and that times the safety factor.
+    over_rule : float
+        The safe step over the 20 % rule.
+    stable : float
+        No energy gained and no particle lost in any usable condition.
+    limited_by : str
+        The condition with the smallest safe step.
+    ordinary : float or None
+        Safe without the strongly damped conditions, those below `ORDINARY_RESTITUTION`.
     """
 
-    safe_fraction: float
-    ordinary_fraction: float | None
+    conditions: int
+    usable: int
+    base_fraction: _Step
+    base_critical: _Step
+    safe_fraction: _KnownStep
+    recommended_fraction: _KnownStep
+    over_rule: _KnownStep
+    stable_fraction: _Step
+    safe_critical: _Step
+    recommended_critical: _Step
+    stable_critical: _Step
+    limited_by: str
+    ordinary_fraction: _Step
+    ordinary_critical: _Step
 
 
 class RestitutionErrors(Part):
-    """Errors of the restitution by steps per contact, which rise.
+    """Errors of head-on impacts in bins of steps per contact, fewest steps first.
 
     Attributes
     ----------
-    steps_per_contact, worst, ordinary_worst : (N,) sequence of float
-        Steps, and the largest errors of any impacts and of those without strong damping.
+    steps_per_contact : (B,) tuple of float
+        Geometric mean of a bin.
+    median : (B,) tuple of float
+        Of the largest restitution error among a run's impacts.
+    worst, ordinary_worst : (B,) tuple of float
+        Largest of the bin and of all with more steps; ordinary: where the restitution is at least
+        `ORDINARY_RESTITUTION`.
+    peak_force_worst : (B,) tuple of float
+        The same of the relative error of the peak force.
+    runs : (B,) tuple of int
     """
 
-    steps_per_contact: Sequence[float]
-    worst: Sequence[float]
-    ordinary_worst: Sequence[float]
+    steps_per_contact: tuple[_Rounded, ...]
+    median: tuple[_Rounded, ...]
+    ordinary_worst: tuple[_Rounded, ...]
+    worst: tuple[_Rounded, ...]
+    peak_force_worst: tuple[_Rounded, ...]
+    runs: tuple[int, ...]
+
+
+class Criteria(Part):
+    """The limits that points were classified with; see `ENERGY_LIMITS` and `OVERLAP_LIMIT`."""
+
+    tolerance: float
+    overlap_limit: float
+    energy_limits: Mapping[str, float]
+    rest_floor: float
 
 
 class StabilityMap(Document):
-    """What is read of the stability map.
+    """The content of ``stability.json``.
 
     Attributes
     ----------
     measured : str
-        Date of its last run.
+        Date of the last run.
+    points : int
+    engine_wall_time_s : float
+        Of all runs.
     safety_factor : float
         Recommended over safe step.
+    regimes : mapping of str to SafeSteps
     """
 
     remedy = "measure it: snakemake stability; then copy its stability.json here"
 
-    engine_versions: Sequence[str]
+    commands: tuple[str, ...]
+    engine_versions: tuple[str, ...]
+    dragdeck_versions: tuple[str, ...]
     measured: str
+    points: int
+    engine_wall_time_s: float
     safety_factor: float
-    regimes: Mapping[str, RegimeSteps]
+    criteria: Criteria
+    regimes: Mapping[str, SafeSteps]
     restitution_error: RestitutionErrors
 
 
