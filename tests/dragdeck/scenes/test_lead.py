@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dragdeck.study.superposed.kind import DragSteps
 
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.decks.render import deck_text
@@ -23,6 +22,7 @@ from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.scene import StudyScene
 from dragdeck.study.base import Json
+from dragdeck.study.drive import Drive
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)
@@ -154,7 +154,7 @@ def test_windows_lie_beside_each_other_on_the_counted_path(made: Make) -> None:
 
 
 def test_a_fraction_of_the_drag_has_its_step() -> None:
-    drag = DragSteps(100, 500, 1e-5)
+    drag = Drive(100, 500, 1e-5, 0.01)
     assert [step_at(fraction, drag) for fraction in (0, 0.25, 1)] == [100, 200, 500]
 
 
