@@ -16,15 +16,8 @@ from rich.table import Table
 
 from dragdeck.advice.advise import Advice
 from dragdeck.advice.advise import advise as advised_settings
-from dragdeck.advice.forecast import (
-    AdviceFile,
-    advice_file,
-    forecast,
-    question,
-    roles,
-    tables,
-)
-from dragdeck.advice.options import Speed, with_option
+from dragdeck.advice.forecast import advice_file, forecast, question, roles, tables
+from dragdeck.advice.options import with_option
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
@@ -59,6 +52,7 @@ from dragdeck.preview.page import Words, page
 from dragdeck.preview.picture import picture, small_picture
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
+from dragdeck.records.advice import AdviceFile, Speed
 from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.registry import SCENES
