@@ -18,14 +18,7 @@ from dragchain.report.cases import (
     read_upstream,
     upstream_folders,
 )
-from dragchain.report.cost_check import (
-    CostRow,
-    Option,
-    answers,
-    cost_rows,
-    prediction_for,
-    read_advice,
-)
+from dragchain.report.cost_check import CostRow, answers, cost_rows, prediction_for, read_advice
 from dragchain.report.findings import FIGURES, FillingFindings, Findings, ProcessFindings
 from dragchain.report.page import (
     NETWORK_PAGE,
@@ -41,6 +34,7 @@ from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.tables.network_contacts import Corrections
 from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
+from dragdeck.records.advice import OptionEntry
 from dragdeck.records.case import AssumptionOfRun, load_case
 from dragdeck.records.run import RunRecord
 
@@ -258,7 +252,7 @@ def _with_upstream(run_dirs: Sequence[Path]) -> list[Path]:
 
 
 def _read(
-    run_dirs: Sequence[Path], options: Sequence[Option]
+    run_dirs: Sequence[Path], options: Sequence[OptionEntry]
 ) -> tuple[list[RunSection], list[MissingRun]]:
     """What the page shows of the process runs, and the runs without a result."""
     sections, missing = [], []
@@ -273,7 +267,7 @@ def _read(
     return sections, missing
 
 
-def _section(study: StudyRuns, options: Sequence[Option]) -> RunSection:
+def _section(study: StudyRuns, options: Sequence[OptionEntry]) -> RunSection:
     process = study.process
     expected = prediction_for(process.case, options)
     records = {str(run.case.scene): run.record for run in study.runs}
