@@ -27,6 +27,9 @@ from dragchain.tables.by_step import read_table
 from dragchain.tables.columns import CENTRE, POINT, VELOCITY
 from dragchain.tables.run_folder import Run
 
+# --- columns as bytes ----------------------------------------------------------------------------
+
+
 Kind = Literal["u8", "u16", "u32", "f24"]
 """Whole numbers of 1, 2 or 4 bytes, or the first 3 bytes of a single-precision number."""
 
@@ -66,6 +69,9 @@ class PackedColumns:
     def text(self) -> str:
         """All columns, one after another, compressed (zlib) and in base64."""
         return base64.b64encode(zlib.compress(b"".join(self._parts))).decode("ascii")
+
+
+# --- shown frames --------------------------------------------------------------------------------
 
 
 FRAMES = 100
@@ -179,6 +185,9 @@ def _near(frame: NetworkFrame, workpiece_m: Floats) -> NDArray[np.bool_]:
     if away.size <= MOST_PARTICLES:
         return np.ones(away.size, dtype=bool)
     return np.asarray(away < np.partition(away, MOST_PARTICLES)[MOST_PARTICLES])
+
+
+# --- scene ---------------------------------------------------------------------------------------
 
 
 _LOADS = {

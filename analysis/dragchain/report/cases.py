@@ -36,6 +36,9 @@ from dragchain.run.completeness import RunRecord, read_accepted
 from dragchain.run.kinematics import drag_phase, motion_of, needed
 from dragdeck.errors import DocumentError, RejectedRunError
 
+# --- what was simulated --------------------------------------------------------------------------
+
+
 _PATHS = {
     "": "path",
     "circle": "circle of radius {radius} mm",
@@ -139,6 +142,9 @@ def _text(value: JsonValue) -> str:
     return value if isinstance(value, str) else ""
 
 
+# --- runs ----------------------------------------------------------------------------------------
+
+
 F = TypeVar("F", bound=Findings, covariant=True)
 
 
@@ -236,6 +242,9 @@ def upstream_folders(run_dir: Path, case: Case) -> dict[str, Path]:
 def _read(run_dir: Path, findings: type[F]) -> ReportedRun[F]:
     record = read_accepted(run_dir)
     return ReportedRun(run_dir, load_case(run_dir), findings.read(run_dir / FILE), record)
+
+
+# --- cases ---------------------------------------------------------------------------------------
 
 
 _SEED = "seed"

@@ -41,6 +41,9 @@ from dragchain.run.run_parts import iter_prints
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 
+# --- panels --------------------------------------------------------------------------------------
+
+
 _DEPTH = "depth below the surface (mm)"
 
 
@@ -109,6 +112,9 @@ def load_depth_panel(axes: Axes, found: ProcessFindings) -> None:
     """Sum of the normal forces per depth in bins of depth."""
     depth_bars(axes, found.depth.edges_m, found.depth.line_load_n_per_m, 1e-3)
     axes.set(xlabel="total normal force per depth (N/mm)", ylabel=_DEPTH)
+
+
+# --- process -------------------------------------------------------------------------------------
 
 
 def forces(run: RunData, found: ProcessFindings) -> Figure:

@@ -44,6 +44,9 @@ from dragchain.tables.network_contacts import Corrections
 from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
 
+# --- runs without a result -----------------------------------------------------------------------
+
+
 _STEPS = ("render", "run", "tables", "chains", "loading", "figures")
 """The steps of a run that have a log, in order: the first that failed is to blame."""
 
@@ -153,6 +156,9 @@ def _split(message: str) -> tuple[str, str]:
     """The problem and the remedy of a message, each in one line."""
     problem, _, remedy = message.partition("remedy:")
     return " ".join(problem.split()), " ".join(remedy.split()) or "see the logs in its folder"
+
+
+# --- report --------------------------------------------------------------------------------------
 
 
 _SHOWN = 6

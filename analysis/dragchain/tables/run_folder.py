@@ -124,6 +124,9 @@ class Run:
             yield _joined(batch)
 
 
+# --- place of the workpiece ----------------------------------------------------------------------
+
+
 WorkpiecePlaces = Callable[[int], tuple[Floats, float]]
 
 WORKPIECE_COLUMNS = ("step", "ref_x_m", "ref_y_m", "ref_z_m", "direction_rad")

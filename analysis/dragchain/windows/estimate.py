@@ -167,6 +167,9 @@ class Round(Document):
         return [one for one in self.windows if not one.refused]
 
 
+# --- estimate ------------------------------------------------------------------------------------
+
+
 UNKNOWN = Known(
     ratio_log=0.0, ratio_log_std=math.inf, variance_ratio=0.0, degrees=0.0, packing_std=0.0
 )

@@ -319,6 +319,9 @@ def _drop_option(process: Fidelity, drop: MeasuredDrop, fraction: float) -> Opti
     return Option(process, cost, cost, abs(drop.restitution_error), fraction)
 
 
+# --- speed of this machine -----------------------------------------------------------------------
+
+
 SCALE = 1e-3
 """On the modulus of the short run; more where the engine refuses so soft a particle."""
 
