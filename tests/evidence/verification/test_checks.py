@@ -15,8 +15,10 @@ from evidence.verification.checks import (
     EXACT,
     QUANTITIES,
     QuantityCheck,
+    abscissa,
     check_rows,
     fitted_order,
+    flight_energy,
     incline_reference,
     momentum_changes,
     published_curve,
@@ -66,6 +68,35 @@ def test_a_particle_rolls_or_slips_down_an_incline(friction: float, rolls: bool)
     else:
         assert speed == pytest.approx(10 * (math.sin(angle) - friction * math.cos(angle)))
         assert speed + spin > 0.0
+
+
+def test_the_energy_of_flight_counts_the_impacts_before() -> None:
+    run = recording([[3.0], [2.0], [0.9], [2.0], [3.0]])
+    run.velocity_m_s[:, 0, 2] = (-2.0, -2.0, 0.0, 1.0, 1.0)
+    run.force_n[2, 0, 2] = 5.0
+    impacts, energy = flight_energy(run)
+    assert impacts.tolist() == [0, 0, 1, 1]
+    assert energy == pytest.approx([1.0, 1.0, 0.25, 0.25])
+
+
+@pytest.mark.parametrize(
+    ("test", "quantity", "expected"),
+    [
+        ("oblique_angle", "spin_rad_s", 40.0),
+        ("oblique_tangential", "scaled_spin", -2.0 / (0.2 * 0.2)),
+        ("spin_plane", "patch_restitution", 3.5 * 0.2 * 1.5 * 0.2 / -2.0),
+        ("spin_plane", "recoil_tangent", -2.0 / 0.2),
+        ("spin_pair", "tangential_m_s", -2.0),
+    ],
+)
+def test_a_quantity_is_drawn_against_what_the_paper_has(
+    test: str, quantity: str, expected: float
+) -> None:
+    """A particle of radius 1 m that comes down at 0.2 m/s and spins at -2 rad/s."""
+    fall = {"particle": 1, "partner": "plane", "value": 40.0}
+    run = recording([[1.1], [0.9], [1.1]], test=test, contacts=[fall])
+    run.spin_rad_s[0, 0, 1] = 2.0
+    assert abscissa(run.contact, quantity) == pytest.approx(expected)
 
 
 def test_a_fitted_order_is_the_exponent() -> None:
