@@ -27,7 +27,7 @@ from dragchain.run.completeness import RunRecord
 from dragchain.tradeoff.measure_run import quantities_along
 from dragchain.windows.estimate import Round, WindowsRecord
 from dragchain.windows.rounds import judged
-from dragdeck.advice.options import Work, plain_option, stiff_settings
+from dragdeck.advice.advise import Work, plain_option, stiff_settings
 from dragdeck.cases.case import Case
 from dragdeck.outlook.measured import measured_tradeoff
 from dragdeck.project import Project, by_run

@@ -14,7 +14,7 @@ import jinja2
 from pydantic import ValidationError
 from rich.table import Table
 
-from dragdeck.advice.advise import Advice, advised_settings
+from dragdeck.advice.advise import Advice, Speed, advised_settings, with_option
 from dragdeck.advice.forecast import (
     AdviceFile,
     advice_file,
@@ -23,7 +23,6 @@ from dragdeck.advice.forecast import (
     question,
     roles,
 )
-from dragdeck.advice.options import Speed, with_option
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here

@@ -8,8 +8,7 @@ from pathlib import Path
 from rich.table import Table
 
 from dragdeck import __version__
-from dragdeck.advice.advise import Advice, shown_share
-from dragdeck.advice.options import SCALE, Option, Speed, step_cost, with_option
+from dragdeck.advice.advise import SCALE, Advice, Option, Speed, shown_share, step_cost, with_option
 from dragdeck.cases.case import Case
 from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.decks.deck import StudyScene
