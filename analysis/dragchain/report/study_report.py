@@ -38,6 +38,9 @@ from dragdeck.records.advice import OptionEntry
 from dragdeck.records.case import AssumptionOfRun, load_case
 from dragdeck.records.run import RunRecord
 
+# --- runs without a result -----------------------------------------------------------------------
+
+
 _STEPS = ("render", "run", "tables", "chains", "loading", "figures")
 """The steps of a run that have a log, in order: the first that failed is to blame."""
 
@@ -147,6 +150,9 @@ def _split(message: str) -> tuple[str, str]:
     """The problem and the remedy of a message, each in one line."""
     problem, _, remedy = message.partition("remedy:")
     return " ".join(problem.split()), " ".join(remedy.split()) or "see the logs in its folder"
+
+
+# --- report --------------------------------------------------------------------------------------
 
 
 _SHOWN = 6
