@@ -14,7 +14,7 @@ import jinja2
 from pydantic import ValidationError
 from rich.table import Table
 
-from dragdeck.advice.advise import Advice, advised_settings
+from dragdeck.advice.advise import Advice, advised_settings, with_option
 from dragdeck.advice.forecast import (
     advice_file,
     advice_tables,
@@ -22,7 +22,6 @@ from dragdeck.advice.forecast import (
     question,
     roles,
 )
-from dragdeck.advice.options import with_option
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here

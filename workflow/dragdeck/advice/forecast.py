@@ -8,8 +8,7 @@ from pathlib import Path
 from rich.table import Table
 
 from dragdeck import __version__
-from dragdeck.advice.advise import Advice, shown_share
-from dragdeck.advice.options import SCALE, Option, step_cost, with_option
+from dragdeck.advice.advise import SCALE, Advice, Option, shown_share, step_cost, with_option
 from dragdeck.cases.case import Case
 from dragdeck.engine.reports import shown_time
 from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import jinja2
 
-from dragdeck.advice.options import SCALE, consistent
+from dragdeck.advice.advise import SCALE, consistent
 from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case
 from dragdeck.engine.batch import Batch
