@@ -264,7 +264,7 @@ class Beds:
         return self._filled[run]
 
     def _kept(self, name: str, scene: AnyScene) -> str:
-        run = f"{name}-{digest(deck_text(scene, self.batch.templates))}"
+        run = f"{name}-{text_hash(deck_text(scene, self.batch.templates))}"
         self.batch.result(run, scene)
         return self._seen(self.batch.folder / run / "bed.restart")
 
@@ -280,6 +280,6 @@ def _walls(case: Case) -> tuple[float, float | None, Workpiece]:
     return scale, study.bowl.facet_size_m, study.workpiece
 
 
-def digest(text: str) -> str:
+def text_hash(text: str) -> str:
     """The start of a text's hash."""
     return hashlib.sha256(text.encode()).hexdigest()[:8]

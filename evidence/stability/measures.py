@@ -12,12 +12,11 @@ from scipy.spatial import KDTree
 
 from dragchain.arrays import Floats, Ints
 from dragchain.contact_law.hertz import sphere_mass
-from dragchain.dumps.frame import Columns, Frame
-from dragchain.dumps.run_parts import iter_frames, iter_prints
 from dragchain.errors import TableError
 from dragchain.run.case import Case, friction_with, load_outputs
 from dragchain.run.completeness import RunRecord
 from dragchain.run.kinematics import drag_phase, needed
+from dragchain.run.run_parts import iter_frames, iter_prints
 from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import NORMAL_QUANTILE, Estimate
 from dragchain.tables.network_contacts import KINDS, contact_rows
@@ -26,6 +25,7 @@ from dragchain.tables.workpiece_contacts import WorkpieceFrames
 from dragchain.tables.write import workpiece_force_rows
 from dragdeck.decks import CASE_FILE
 from dragdeck.decks.case_file import CaseOfStudy
+from dragdeck.dumps.frame import Columns, Frame
 from dragdeck.physics.contact_network import largest_eigenvalue
 from dragdeck.physics.damping import damping_ratio
 from evidence.stability.points import Point, PointsFile

@@ -9,8 +9,7 @@ from pydantic import JsonValue
 from scipy import signal, stats
 
 from dragchain.arrays import Floats
-from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
+from dragchain.drag import find_drag_peaks, peak_separation_s, read_counted
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.document import FILE, ContactType, Loading
 from dragchain.run.case import Case

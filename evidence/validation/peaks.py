@@ -24,11 +24,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.signal import find_peaks
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import drag_peaks, peak_separation_s
+from dragchain.drag import drag_peaks, peak_separation_s, read_counted
 from dragchain.errors import TableError
 from dragchain.network.chains import dominant_path, widest_paths
-from dragchain.network.frame import WORKPIECE, NetworkFrame, read_frames
+from dragchain.network.frame import WORKPIECE, NetworkFrame, network_frames
 from dragchain.run.case import load_case
 from dragchain.statistics.estimate import Estimate, Real, Verdict, mean_of
 from dragdeck.documents import Document, Part
@@ -368,7 +367,7 @@ def read_run(run_dir: Path) -> ChainSeries:
         If a table is missing, or the drag has no peak.
     """
     case = load_case(run_dir)
-    rows = [{"time_s": frame.time_s, **chain_numbers(frame)} for frame in read_frames(run_dir)]
+    rows = [{"time_s": frame.time_s, **chain_numbers(frame)} for frame in network_frames(run_dir)]
     columns = {name: np.array([row[name] for row in rows]) for name in ("time_s", *DESCRIPTORS)}
     time_s = columns.pop("time_s")
     peak_s = drag_peaks(read_counted(run_dir, ("time_s", "drag_n")), case).time_s

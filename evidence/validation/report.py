@@ -10,8 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import drag_peaks
+from dragchain.drag import drag_peaks, read_counted
 from dragchain.figures.panels import (
     band,
     compass,

@@ -12,7 +12,7 @@ from pydantic import JsonValue
 from dragchain.errors import SeriesError, TableError
 from dragchain.run.case import Case, load_case
 from dragchain.statistics.estimate import Estimate, mean_of
-from dragchain.tradeoff.compare import Setting, changed_settings
+from dragchain.tradeoff.compare import Setting, differing_inputs
 from dragchain.tradeoff.measures import FILE, Measures
 
 _FEWEST = 2
@@ -94,7 +94,7 @@ def read_validation_runs(folders: Sequence[Path]) -> RunsByBed:
     if not standard.complete:
         raise TableError(f"{folders[0]}: the reference run is not complete, so nothing is known")
     first, *runs = (
-        MeasuredRun(folder, load_case(folder), own, changed_settings(own, standard))
+        MeasuredRun(folder, load_case(folder), own, differing_inputs(own, standard))
         for folder, own in measures.items()
         if own.complete
     )

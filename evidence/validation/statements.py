@@ -13,9 +13,15 @@ import pandas as pd
 from scipy.stats import binned_statistic
 
 from dragchain.arrays import Floats
-from dragchain.drag.around import AZIMUTH_BINS, DEPTH_BINS
-from dragchain.drag.azimuth import circumference, parts, to_the_left, within
-from dragchain.drag.force import read_counted
+from dragchain.drag import (
+    AZIMUTH_BINS,
+    DEPTH_BINS,
+    circumference,
+    parts,
+    read_counted,
+    to_the_left,
+    within_angle,
+)
 from dragchain.errors import TableError
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
@@ -312,9 +318,9 @@ def contacts_of(run: MeasuredRun) -> Around:
     azimuth, depth, force = (
         table[name].to_numpy(np.float64) for name in ("azimuth_rad", "depth_m", "normal_force_n")
     )
-    ahead = float((force * within(azimuth, np.pi / 2)).sum() / force.sum())
-    front = within(azimuth, _FRONT)
-    flank = within(azimuth, 2 * _FRONT) - front
+    ahead = float((force * within_angle(azimuth, np.pi / 2)).sum() / force.sum())
+    front = within_angle(azimuth, _FRONT)
+    flank = within_angle(azimuth, 2 * _FRONT) - front
     in_front, at_flanks = float((force * front).sum()), float((force * flank).sum())
     immersion = needed(run.case.workpiece, "workpiece").immersion_depth_m
     levels = np.linspace(0.0, immersion, DEPTH_BINS + 1)

@@ -18,7 +18,7 @@ from dragdeck.cases.case import Case
 from dragdeck.cli import main
 from dragdeck.errors import InputError
 from dragdeck.mesh import cylinder, prism, write_stl
-from dragdeck.preview.layout import COLOURS, Layout, layout
+from dragdeck.preview.layout import COLOURS, CaseLayout, layout
 from dragdeck.preview.page import Words, page
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project
@@ -71,7 +71,7 @@ def pixels(image: np.ndarray, name: str) -> int:
     return int((image @ hue > 0.995 * norms).sum())
 
 
-def volume_and_bounds(found: Layout) -> tuple[float, np.ndarray]:
+def volume_and_bounds(found: CaseLayout) -> tuple[float, np.ndarray]:
     body = found.workpieces[0]
     swept = swept_volume(body.mesh, body.drag.poses)
     return swept.volume, swept.bounds
@@ -178,7 +178,7 @@ def test_the_named_case_is_drawn_and_the_first_by_default(
 ) -> None:
     drawn: list[Words] = []
 
-    def draw(found: Layout, words: Words, folder: Path) -> list[Path]:
+    def draw(found: CaseLayout, words: Words, folder: Path) -> list[Path]:
         drawn.append(words)
         return []
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.drag.peaks import find_drag_peaks
+from dragchain.drag import find_drag_peaks
 from evidence.validation.peaks import ChainSeries, PeakFindings, peak_findings
 
 FRAMES = 400

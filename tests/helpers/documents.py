@@ -13,7 +13,7 @@ WRITERS = {
     "case.filling": "dragdeck.decks.case_file:FillingCase",
     "case.process": "dragdeck.decks.process_case:ProcessCase",
     "drops": "dragdeck.campaigns.restitution_drops:DropsFile",
-    "costs": "cost_file:CostsFile",
+    "costs": "cost_file:TimedCosts",
     "packing": "dragchain.tables.bed:Packing",
     "stability": "dragdeck.outlook.measured:StabilityMap",
     "scaling": "dragchain.scaling.document:ScalingFile",

@@ -19,7 +19,6 @@ from dragchain.windows.estimate import Round
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
-STUDY = ("process", "--config", "study=small")
 WINDOWS = {"tolerance": 0.01, "quantities": ["drag_mean", "workpiece_contacts"], "most": 3}
 
 

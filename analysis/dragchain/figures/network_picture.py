@@ -25,7 +25,7 @@ from dragchain.errors import TableError
 from dragchain.figures.rendering import Camera, Image, new_plotter, photograph
 from dragchain.figures.style import COLOURS, force_map
 from dragchain.network.chains import WidestPath, dominant_path, widest_paths
-from dragchain.network.frame import NetworkFrame, read_frames
+from dragchain.network.frame import NetworkFrame, network_frames
 from dragchain.run.case import Case
 from dragchain.run.kinematics import needed, process_time
 from dragchain.run.workpiece import placed, workpiece_mesh
@@ -53,7 +53,7 @@ _MOST_PIXELS = 1400
 
 
 @dataclass(frozen=True)
-class Scene:
+class NetworkScene:
     """What one picture shows; lengths in m, forces in N.
 
     Attributes
@@ -110,7 +110,7 @@ def picture_step(steps: Floats, process_time_s: Floats, wanted_s: float = _PICTU
     return int(steps[row])
 
 
-def load_scene(run_dir: Path, case: Case) -> Scene:
+def load_scene(run_dir: Path, case: Case) -> NetworkScene:
     """Read what the picture of a process run shows at the frame of `picture_step`.
 
     Raises
@@ -121,12 +121,12 @@ def load_scene(run_dir: Path, case: Case) -> Scene:
     network = read_table(run_dir / "tables" / "network.parquet", ["step", "time_s"])
     times = process_time(network["time_s"].to_numpy(np.float64), case)
     step = picture_step(network["step"].to_numpy(np.float64), times)
-    frame = next(read_frames(run_dir, (step, step)), None)
+    frame = next(network_frames(run_dir, (step, step)), None)
     if frame is None:
         raise TableError(f"particles.parquet lacks step {step}, which network.parquet has")
     path = dominant_path(frame, widest_paths(frame))
     moment = float(process_time(np.array(frame.time_s), case))
-    return Scene(frame, *workpiece_places(run_dir, case)(frame.step), path, moment)
+    return NetworkScene(frame, *workpiece_places(run_dir, case)(frame.step), path, moment)
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ class Window:
     contacts: NDArray[np.bool_] | None = None
 
 
-def window(case: Case, scene: Scene, view: View) -> Window:
+def window(case: Case, scene: NetworkScene, view: View) -> Window:
     """The whole bowl, or the workpiece's surroundings if the bowl is much wider than they are.
 
     Only contacts whose point lies in the surroundings are then drawn: `WINDOW_DIAMETERS` to
@@ -182,8 +182,12 @@ def cut_words(case: Case, view: View) -> str:
     return words + (f", {DEPTH_DIAMETERS:g} in front of and behind it" if view == "xz" else "")
 
 
-def render(
-    run_dir: Path, case: Case, scene: Scene, view: View, pixels_per_mm: float = _PIXELS_PER_MM
+def render_view(
+    run_dir: Path,
+    case: Case,
+    scene: NetworkScene,
+    view: View,
+    pixels_per_mm: float = _PIXELS_PER_MM,
 ) -> tuple[Image, Floats]:
     """Render one view in parallel projection.
 
@@ -263,7 +267,7 @@ def _tubes(axis: Floats, force: Floats, radius: Floats) -> Any:
     return mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES, capping=True)
 
 
-def show_network(axes: Axes, shown: Scene, view: View, image: Image, extent: Floats) -> None:
+def show_network(axes: Axes, shown: NetworkScene, view: View, image: Image, extent: Floats) -> None:
     """Set a rendered view on axes in mm, with the dominant path and the motion marked.
 
     Parameters
@@ -285,7 +289,7 @@ def force_bar(figure: Figure, panel: Axes, largest_n: float) -> None:
     figure.colorbar(scale, ax=panel, shrink=0.8, pad=0.02, aspect=28, label=label)
 
 
-def _mark_chain(axes: Axes, shown: Scene, pick: Sequence[int]) -> None:
+def _mark_chain(axes: Axes, shown: NetworkScene, pick: Sequence[int]) -> None:
     """Outline the dominant path on axes in mm; `pick` names the two coordinates."""
     if shown.dominant is None:
         return
@@ -299,7 +303,7 @@ def _mark_chain(axes: Axes, shown: Scene, pick: Sequence[int]) -> None:
             axes.add_patch(Circle(centre, radius, fill=False, edgecolor=colour, linewidth=thick))
 
 
-def _mark_motion(axes: Axes, shown: Scene, view: View) -> None:
+def _mark_motion(axes: Axes, shown: NetworkScene, view: View) -> None:
     """Draw the direction of motion where it hides little.
 
     Behind the workpiece, or above the bed.

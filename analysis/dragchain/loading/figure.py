@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from dragchain.arrays import Floats
-from dragchain.drag.around import AZIMUTH_BINS
-from dragchain.drag.azimuth import circumference, parts
+from dragchain.drag import AZIMUTH_BINS, circumference, parts
 from dragchain.figures.panels import depth_bars, head, new_panels
 from dragchain.figures.rendering import Camera, Image, check_rendering, new_plotter, photograph
 from dragchain.figures.style import GREY, WIDTH_IN, force_map

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.azimuth import circumference, parts, within
+from dragchain.drag import circumference, parts, within_angle
 from dragchain.loading.contact_events import (
     AMOUNTS,
     TYPES,
@@ -28,8 +28,8 @@ from dragchain.loading.document import (
 )
 from dragchain.loading.samples import WORKPIECE, Sampled
 from dragchain.run.case import Case
+from dragchain.statistics.correlated import estimates
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
-from dragchain.statistics.frame_means import estimates
 
 DEPTH_BINS, AZIMUTH_BINS = 20, 24
 
@@ -46,7 +46,7 @@ _INTENSITIES = (
 """Columns of the events whose distribution is told."""
 
 
-def summarise(
+def summarise_loading(
     sampled: Sampled,
     facets: pd.DataFrame,
     events: pd.DataFrame,
@@ -92,7 +92,7 @@ def summarise(
 
 def _totals(sampled: Sampled, events: pd.DataFrame) -> Totals:
     rows, count = sampled.rows, len(_KNOWN)
-    ahead = within(rows["azimuth_rad"].to_numpy(np.float64), np.pi / 2)
+    ahead = within_angle(rows["azimuth_rad"].to_numpy(np.float64), np.pi / 2)
     sums = np.column_stack(
         [
             *(sampled.per_frame(rows[name]) for name in _KNOWN),

@@ -4,7 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from dragchain.network_page.scene import ROUNDING, Scene, load_scene
+from dragchain.network_page.scene import ROUNDING, PageScene, page_scene
 from dragchain.report.page import NETWORK_PAGE, file_uri, page_environment
 from dragchain.run.basis import changed_settings, effects
 from dragchain.run.case import Case
@@ -31,19 +31,19 @@ def write_page(run_dir: Path) -> str:
         If the run is too short to have peaks.
     """
     run = Run.open(run_dir)
-    page = render(run.case, load_scene(run), _pictures(run_dir), _rejection(run_dir))
+    page = page_html(run.case, page_scene(run), _pictures(run_dir), _rejection(run_dir))
     file = run_dir / NETWORK_PAGE
     write_text(file, page)
     return f"{len(page.encode()) / 1e6:.1f} MB: {file}"
 
 
-def render(case: Case, scene: Scene, pictures: dict[str, str | None], rejection: str) -> str:
+def page_html(case: Case, scene: PageScene, pictures: dict[str, str | None], rejection: str) -> str:
     """The page as HTML.
 
     Parameters
     ----------
     case : Case
-    scene : Scene
+    scene : PageScene
     pictures : dict of str to str or None
         Data URIs of the static pictures.
     rejection : str

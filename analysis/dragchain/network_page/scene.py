@@ -15,8 +15,7 @@ from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import Peaks, drag_peaks, peak_separation_s
+from dragchain.drag import DragPeaks, drag_peaks, peak_separation_s, read_counted
 from dragchain.errors import TableError
 from dragchain.export.frames import FrameData, FrameSeries
 from dragchain.figures.style import force_map
@@ -44,7 +43,7 @@ def short_floats(values: Floats) -> NDArray[np.uint32]:
 
 
 @dataclass
-class Columns:
+class PackedColumns:
     """Columns in the order in which they were added.
 
     Attributes
@@ -112,7 +111,7 @@ class ShownFrame:
     flags: Ints
 
 
-def highest_peaks(run: Run) -> Peaks:
+def highest_peaks(run: Run) -> DragPeaks:
     """The peaks of the drag force in the counted stretch, the highest first, `PEAKS` at most.
 
     Raises
@@ -122,7 +121,7 @@ def highest_peaks(run: Run) -> Peaks:
     """
     peaks = drag_peaks(read_counted(run.folder, ("time_s", "drag_n")), run.case)
     order = np.argsort(peaks.drag_n, kind="stable")[:PEAKS]
-    return Peaks(
+    return DragPeaks(
         peaks.index[order], peaks.time_s[order], peaks.drag_n[order], peaks.prominence_n[order]
     )
 
@@ -200,14 +199,14 @@ _TOP = 0.999
 
 
 @dataclass(frozen=True)
-class Scene:
+class PageScene:
     """The content of a page: `head` is plain data, `columns` has the long series."""
 
     head: dict[str, Any]
-    columns: Columns
+    columns: PackedColumns
 
 
-def load_scene(run: Run) -> Scene:
+def page_scene(run: Run) -> PageScene:
     """Read what the page of a process run shows.
 
     Raises
@@ -217,7 +216,7 @@ def load_scene(run: Run) -> Scene:
     SeriesError
         If the run is too short to have peaks.
     """
-    case, columns, peaks = run.case, Columns(), highest_peaks(run)
+    case, columns, peaks = run.case, PackedColumns(), highest_peaks(run)
     series = shown_frames(run, peaks.time_s)
     frames = list(read_shown(series))
     times_s = process_time(series.times_s, case)
@@ -242,7 +241,7 @@ def load_scene(run: Run) -> Scene:
         "peaks": _peaks(peaks, times_s, case),
         "colours": _colours(),
     }
-    return Scene(head | {"columns": columns.entries}, columns)
+    return PageScene(head | {"columns": columns.entries}, columns)
 
 
 def _colours() -> list[str]:
@@ -254,7 +253,7 @@ def _colours() -> list[str]:
 # --- frames ----------------------------------------------------------------------------------
 
 
-def _frames(columns: Columns, frames: list[ShownFrame], case: Case) -> dict[str, Any]:
+def _frames(columns: PackedColumns, frames: list[ShownFrame], case: Case) -> dict[str, Any]:
     """Add particles and contacts of all frames; where each frame starts, and the box of places."""
     centres = [_vectors(one.data.particles, CENTRE)[one.particles] for one in frames]
     points = [_outer_points(one) for one in frames]
@@ -353,7 +352,7 @@ def _path(row: Mapping[Any, Any] | None) -> dict[str, Any] | None:
 # --- workpiece and force -----------------------------------------------------------------------
 
 
-def _workpiece(columns: Columns, run: Run, frames: list[ShownFrame]) -> dict[str, Any]:
+def _workpiece(columns: PackedColumns, run: Run, frames: list[ShownFrame]) -> dict[str, Any]:
     """Add the workpiece's facets in its own frame and their loads; its poses, frame by frame."""
     case = run.case
     surface = read_surface(run.folder, case)
@@ -373,7 +372,7 @@ def _workpiece(columns: Columns, run: Run, frames: list[ShownFrame]) -> dict[str
     }
 
 
-def _loads(columns: Columns, run: Run) -> list[dict[str, Any]]:
+def _loads(columns: PackedColumns, run: Run) -> list[dict[str, Any]]:
     """Add the columns of ``facets.parquet`` that are shown, if the table was made."""
     file = run.table("facets.parquet")
     if not file.is_file():
@@ -400,7 +399,7 @@ def _force(run: Run, names: list[str]) -> pd.DataFrame:
     return read_table(run.table("workpiece_force.parquet"), names)
 
 
-def _curve(columns: Columns, run: Run) -> dict[str, Any]:
+def _curve(columns: PackedColumns, run: Run) -> dict[str, Any]:
     """Add the force against the motion over the drag; its times, and how it is filtered."""
     table = _force(run, ["step", "time_s", "drag_n", "in_statistics"])
     table = table[table["step"] > drag_phase(run.case).start_step]
@@ -421,7 +420,7 @@ def _curve(columns: Columns, run: Run) -> dict[str, Any]:
     }
 
 
-def _peaks(peaks: Peaks, times_s: Floats, case: Case) -> list[dict[str, Any]]:
+def _peaks(peaks: DragPeaks, times_s: Floats, case: Case) -> list[dict[str, Any]]:
     """The highest peaks, each with its nearest frame."""
     return [
         {"time": time, "force": -drag, "frame": int(np.abs(times_s - time).argmin())}

@@ -28,8 +28,8 @@ from dragchain.report.values import (
     Extrapolated,
     ExtrapolatedQuantity,
     Values,
-    over_packings,
     values_of,
+    values_over_packings,
 )
 from dragchain.run.case import Case, changed_inputs, load_case
 from dragchain.run.completeness import RunRecord, read_accepted
@@ -184,7 +184,7 @@ class StudyRuns:
         return [run for run in runs if run is not None]
 
 
-def read_study(run_dir: Path) -> StudyRuns:
+def read_study_runs(run_dir: Path) -> StudyRuns:
     """Read a process run with its filling and drop test.
 
     A drop test without a result is left out: the process does not start from it.
@@ -223,7 +223,7 @@ def read_optional(run_dir: Path) -> tuple[Loading | None, Extrapolated | None]:
 
 
 def read_upstream(run_dir: Path) -> ReportedRun[Findings]:
-    """Read a filling or a drop test; errors are those of `read_study`."""
+    """Read a filling or a drop test; errors are those of `read_study_runs`."""
     return _read(run_dir, Findings)
 
 
@@ -268,7 +268,7 @@ class ReportedCase:
     @cached_property
     def values(self) -> Values:
         """Its quantities, means over the packings."""
-        return over_packings([study.values for study in self.studies])
+        return values_over_packings([study.values for study in self.studies])
 
     @cached_property
     def set_up(self) -> list[tuple[str, str]]:

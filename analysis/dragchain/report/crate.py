@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from dragchain.errors import ExportError
-from dragchain.report.cases import read_study
+from dragchain.report.cases import read_study_runs
 from dragchain.run.case import Case, load_case
 from dragchain.run.completeness import read_accepted
 from dragdeck.files import write_text
@@ -168,7 +168,7 @@ class _Crate:
         if case.scene != "process":
             return []
         found = []
-        for one in read_study(folder).values.standings:
+        for one in read_study_runs(folder).values.standings:
             about: dict[str, object] = {
                 "@type": "PropertyValue",
                 "name": one.quantity.label,

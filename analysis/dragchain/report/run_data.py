@@ -10,11 +10,19 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.around import ahead_behind, azimuth_profile, depth_profile, depth_slope
-from dragchain.drag.force import FORCES, read_counted, summarise_forces
-from dragchain.drag.peaks import drag_peaks, peak_separation_s
+from dragchain.drag import (
+    FORCES,
+    ahead_behind,
+    azimuth_profile,
+    depth_profile,
+    depth_slope,
+    drag_peaks,
+    peak_separation_s,
+    read_counted,
+    summarise_forces,
+)
 from dragchain.errors import SeriesError
-from dragchain.figures.network_picture import Scene, load_scene
+from dragchain.figures.network_picture import NetworkScene, load_scene
 from dragchain.figures.rendering import check_rendering
 from dragchain.report.findings import (
     FILE,
@@ -108,7 +116,7 @@ class RunData:
         return dominant_bottlenecks(self.network, self.chains)
 
     @cached_property
-    def scene(self) -> Scene:
+    def scene(self) -> NetworkScene:
         """What the pictures of the contact network show, if pictures can be rendered here."""
         check_rendering()
         return load_scene(self.folder, self.case)

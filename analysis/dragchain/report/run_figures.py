@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.dumps.run_parts import iter_prints
 from dragchain.figures import network_picture
 from dragchain.figures.network_picture import force_bar, show_network
 from dragchain.figures.panels import (
@@ -38,6 +37,7 @@ from dragchain.report.findings import (
 from dragchain.report.run_data import RunData, write_findings
 from dragchain.run.case import Case, load_case, load_outputs
 from dragchain.run.kinematics import process_time
+from dragchain.run.run_parts import iter_prints
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
 
@@ -60,11 +60,11 @@ def forces_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
     label = f"mean drag {ours.mean:.2f} N (95 % CI {interval} N)"
     axes.plot(span, [ours.mean] * 2, color="black", label=label)
     for one in found.comparison:
-        published(axes, one)
+        published_mean(axes, one)
     axes.set(xlabel="process time (s)", ylabel="force on the workpiece (N)", xlim=(0, time_s[-1]))
 
 
-def published(axes: Axes, one: Comparison) -> None:
+def published_mean(axes: Axes, one: Comparison) -> None:
     """A published mean, dashed over what was drawn before it, with its standard deviation."""
     colour, text = COLOURS[one.label], f"{one.label} mean {one.mean_n:.2f} N"
     if one.std_n is not None:
@@ -187,7 +187,7 @@ def network_xz(run: RunData, found: ProcessFindings) -> Figure:
 def _network(run: RunData, view: network_picture.View, side: str) -> Figure:
     """A rendered view on axes in mm, with what it shows named."""
     shown = run.scene
-    image, extent = network_picture.render(run.folder, run.case, shown, view)
+    image, extent = network_picture.render_view(run.folder, run.case, shown, view)
     height = 4.3 * (extent[3] - extent[2]) / (extent[1] - extent[0]) + 0.9
     figure, (axes,) = new_panels(height, width_in=HALF_IN)
     show_network(axes, shown, view, image, extent)
@@ -202,7 +202,7 @@ def _network(run: RunData, view: network_picture.View, side: str) -> Figure:
     return figure
 
 
-def _path_words(shown: network_picture.Scene) -> str:
+def _path_words(shown: network_picture.NetworkScene) -> str:
     if shown.dominant is None:
         return "no path of strong contacts from workpiece to bowl"
     forces = shown.frame.normal_force[list(shown.dominant.contacts)]

@@ -284,7 +284,7 @@ def of_mean(mean: MeanEstimate) -> Estimate:
     return Estimate(mean.mean, mean.ci95_low, mean.ci95_high)
 
 
-def over_packings(several: Sequence[Values]) -> Values:
+def values_over_packings(several: Sequence[Values]) -> Values:
     """The means over the packings of one case, each with Student's t interval between them.
 
     That of a value from windows joins those of the single runs, each of which includes the scatter

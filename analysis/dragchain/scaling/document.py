@@ -7,7 +7,7 @@ from pydantic import Field
 
 from dragchain.run.case import Fidelity
 from dragchain.statistics.estimate import CONFIDENCE, Estimate, Verdict
-from dragchain.statistics.power_law_forms import TwoTerms
+from dragchain.statistics.power_law import TwoTerms
 from dragdeck.documents import Document, Part
 
 Judged = Literal[Verdict, "no expectation"]

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.drag.force import FORCES, read_counted, summarise_forces
+from dragchain.drag import FORCES, read_counted, summarise_forces
 from dragchain.errors import TableError
 from dragchain.figures.panels import legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN, drawing, png
@@ -33,7 +33,7 @@ from dragchain.scaling.document import (
 )
 from dragchain.statistics import power_law
 from dragchain.statistics.estimate import Estimate, flattened
-from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
+from dragchain.statistics.power_law import fit_shifted, fit_two_terms
 from dragdeck.files import write_bytes, write_text
 
 _STORED = Path(__file__).parent / "data"
@@ -54,7 +54,7 @@ _UNLIKE = frozenset({"seed"})
 
 
 @dataclass(frozen=True)
-class RunOfScaling:
+class LevelRun:
     """One run of a scaling: its row in ``scaling.json``, and its case."""
 
     row: ScaledRun
@@ -77,7 +77,7 @@ class RunOfScaling:
         return gap / (2.0 * self.case.media.radius_mean_m)
 
 
-def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[RunOfScaling]:
+def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[LevelRun]:
     """Read the runs of a scaling from their tables, ordered by level and bed.
 
     Raises
@@ -91,7 +91,7 @@ def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[RunOfScaling]
     return sorted(runs, key=lambda run: (run.row.level, run.row.bed))
 
 
-def _read_run(folder: Path, field: str) -> RunOfScaling:
+def _read_run(folder: Path, field: str) -> LevelRun:
     case = load_case(folder)
     level = case.inputs.get(field)
     if isinstance(level, bool) or not isinstance(level, int | float) or level <= 0:
@@ -111,7 +111,7 @@ def _read_run(folder: Path, field: str) -> RunOfScaling:
         eta=-drag.mean / (weight * workpiece.immersion_depth_m**2),
         bed=case.upstream.get("filling", case.run),
     )
-    return RunOfScaling(row, case)
+    return LevelRun(row, case)
 
 
 def _check_alike(cases: Sequence[Case], field: str) -> None:
@@ -194,11 +194,11 @@ def find(
     )
 
 
-def _sample(runs: Sequence[RunOfScaling]) -> power_law.Runs:
+def _sample(runs: Sequence[LevelRun]) -> power_law.RunMeans:
     rows = [run.row for run in runs]
     drag = np.array([row.drag_n for row in rows])
     errors = np.array([row.standard_error_n for row in rows]) / drag
-    return power_law.Runs(
+    return power_law.RunMeans(
         np.array([row.level for row in rows]), drag, errors, [row.bed for row in rows]
     )
 
@@ -233,7 +233,7 @@ def _shifted(law: power_law.PowerLaw, power: float) -> ShiftedLaw:
     return ShiftedLaw(**vars(found), curve=curve)
 
 
-def _mean_eta(runs: Sequence[RunOfScaling], law: power_law.PowerLaw) -> Estimate:
+def _mean_eta(runs: Sequence[LevelRun], law: power_law.PowerLaw) -> Estimate:
     """Geometric mean of eta over the runs of a law; a trend in it widens the interval."""
     known = [run.row.eta for run in runs if run.row.level in law.runs.levels]
     etas = replace(law.runs, values=np.array(known))
@@ -243,7 +243,7 @@ def _mean_eta(runs: Sequence[RunOfScaling], law: power_law.PowerLaw) -> Estimate
     return fit.estimate([1.0]).exp()
 
 
-def _level(law: power_law.PowerLaw, number: int, runs: Sequence[RunOfScaling]) -> Level:
+def _level(law: power_law.PowerLaw, number: int, runs: Sequence[LevelRun]) -> Level:
     x = float(law.runs.levels[number])
     here = [run for run in runs if run.row.level == x]
     return Level(

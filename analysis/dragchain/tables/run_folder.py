@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats
-from dragchain.dumps.frame import Columns, Frame
-from dragchain.dumps.run_parts import iter_frames, iter_prints
 from dragchain.errors import TableError
 from dragchain.run.case import Case, Output, friction_with, load_case, load_outputs
 from dragchain.run.kinematics import needed, workpiece_turn
+from dragchain.run.run_parts import iter_frames, iter_prints
 from dragchain.tables.by_step import read_table
 from dragchain.tables.workpiece_contacts import Meshes, WorkpieceFrames, join_workpiece_frames
+from dragdeck.dumps.frame import Columns, Frame
 
 _BATCH_ROWS = 8192
 """Contacts on the workpiece that are joined at once, but for those of the last frame."""

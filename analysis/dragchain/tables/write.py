@@ -10,7 +10,6 @@ import numpy as np
 import pyarrow as pa
 
 from dragchain.arrays import Floats, Ints, wrap_angle
-from dragchain.dumps.frame import Columns
 from dragchain.errors import TableError
 from dragchain.run.case import Case, Scene, friction_with
 from dragchain.run.kinematics import (
@@ -48,6 +47,7 @@ from dragchain.tables.network_contacts import (
 from dragchain.tables.parquet import Rows, category, table_writer
 from dragchain.tables.run_folder import Run
 from dragchain.tables.workpiece_contacts import WallContacts
+from dragdeck.dumps.frame import Columns
 from dragdeck.errors import RejectedRunError
 
 

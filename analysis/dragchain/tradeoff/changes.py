@@ -10,7 +10,7 @@ import numpy as np
 from scipy import stats
 
 from dragchain.statistics.estimate import Estimate, finite, student_quantile
-from dragchain.tradeoff.compare import OTHER, Comparison, Error, Setting
+from dragchain.tradeoff.compare import OTHER, Error, QuantityComparison, Setting
 from dragchain.tradeoff.measures import MAIN
 from dragchain.tradeoff.outcome import StepCosts, Tradeoff
 from dragchain.tradeoff.tradeoff_document import CostEntry
@@ -85,7 +85,7 @@ def modulus_levels(tradeoff: Tradeoff) -> list[float]:
     return sorted(own - {tradeoff.reference.youngs_modulus_scale}, reverse=True)
 
 
-def softness(tradeoff: Tradeoff, comparison: Comparison, level: float) -> Softness | None:
+def softness(tradeoff: Tradeoff, comparison: QuantityComparison, level: float) -> Softness | None:
     """The effect of a modulus by itself, or with as little else as was run.
 
     None if no complete run at that modulus has the quantity.
@@ -112,7 +112,7 @@ def softness(tradeoff: Tradeoff, comparison: Comparison, level: float) -> Softne
 
 
 @dataclass(frozen=True)
-class Effects:
+class ModulusEffects:
     """What a modulus does to the quantities: their labels by effect."""
 
     level: float
@@ -121,9 +121,9 @@ class Effects:
     open: list[str]
 
 
-def effects(tradeoff: Tradeoff) -> list[Effects]:
+def modulus_effects(tradeoff: Tradeoff) -> list[ModulusEffects]:
     """For each modulus what it ruins, what it keeps, and what the runs cannot decide."""
-    rows = [Effects(level, [], [], []) for level in modulus_levels(tradeoff)]
+    rows = [ModulusEffects(level, [], [], []) for level in modulus_levels(tradeoff)]
     for row in rows:
         for comparison in tradeoff.comparisons.values():
             soft = softness(tradeoff, comparison, row.level)

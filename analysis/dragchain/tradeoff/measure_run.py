@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.azimuth import parts
-from dragchain.drag.force import read_counted
+from dragchain.drag import parts, read_counted
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.samples import Sampled, sample
@@ -180,7 +179,7 @@ def _of_force(force: pd.DataFrame, path: CountedPath) -> dict[str, Floats]:
     }
     squares = {
         f"drag_std_{name}": path.mean(
-            steps, band(deviation, spacing, low * path.diameter_m, high * path.diameter_m) ** 2
+            steps, band_pass(deviation, spacing, low * path.diameter_m, high * path.diameter_m) ** 2
         )
         for name, (low, high) in bands.items()
     }
@@ -193,7 +192,7 @@ def _of_force(force: pd.DataFrame, path: CountedPath) -> dict[str, Floats]:
     }
 
 
-def band(series: Floats, spacing_m: float, shortest_m: float, longest_m: float) -> Floats:
+def band_pass(series: Floats, spacing_m: float, shortest_m: float, longest_m: float) -> Floats:
     """The part of a series whose wave lengths lie in [shortest, longest).
 
     Parameters
@@ -360,14 +359,14 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
     if measures.complete:
         write_tables(run_dir)
         write_chains(run_dir)
-        measures = measured(measures, run_dir, case, Packing.read(packing_table))
+        measures = with_quantities(measures, run_dir, case, Packing.read(packing_table))
     else:
         measures = measures.model_copy(update={"failure": outcome.failed_checks})
     measures.write(run_dir / FILE)
     return measures
 
 
-def measured(measures: Measures, run_dir: Path, case: Case, bed: Packing) -> Measures:
+def with_quantities(measures: Measures, run_dir: Path, case: Case, bed: Packing) -> Measures:
     """The measures of a complete run with its quantities, from its tables."""
     single = {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction}
     return measures.model_copy(update={**dict(quantities_along(run_dir, case)), "single": single})

@@ -25,15 +25,15 @@ from dragchain.cli import main
 from dragchain.errors import ExportError, TableError
 from dragchain.export.frames import FrameSeries, Membership, Selection, chain_membership
 from dragchain.export.write import fresh_folder, write_export
-from dragchain.network.chain_table import chain_table
 from dragchain.network.chains import (
     WidestPath,
     dominant_path,
     peters_rows,
     widest_paths,
 )
-from dragchain.network.frame import NetworkFrame, read_frames
+from dragchain.network.frame import NetworkFrame, network_frames
 from dragchain.network.statistics import contact_counts
+from dragchain.network.write import chain_table
 from dragchain.tables.run_folder import Run
 
 STEPS = range(0, LAST + 1, 20)
@@ -313,7 +313,7 @@ def test_xyz_holds_what_the_tables_hold(run: Path) -> None:
     frames = read_xyz(done.file)
     assert [int(keys["Timestep"]) for keys, _ in frames] == list(STEPS)
     last = None
-    for (keys, columns), last in zip(frames, read_frames(run, (0, LAST)), strict=True):
+    for (keys, columns), last in zip(frames, network_frames(run, (0, LAST)), strict=True):
         step = int(keys["Timestep"])
         rows = particles[particles["step"] == step].sort_values("particle_id")
         assert float(keys["Time"]) == rows["time_s"].iloc[0]

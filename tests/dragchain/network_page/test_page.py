@@ -20,7 +20,14 @@ from dragchain.cli import main
 from dragchain.errors import SeriesError, TableError
 from dragchain.network_page import scene as scene_module
 from dragchain.network_page.page import write_page
-from dragchain.network_page.scene import BODIES, DOMINANT, PATH, QUASI_LINEAR, ROUNDING, Columns
+from dragchain.network_page.scene import (
+    BODIES,
+    DOMINANT,
+    PATH,
+    QUASI_LINEAR,
+    ROUNDING,
+    PackedColumns,
+)
 from dragchain.report.page import TIMES
 
 _BYTES = {"u8": 1, "u16": 2, "u32": 4, "f24": 3}
@@ -85,7 +92,7 @@ def table(run: Path, name: str, step: int | None = None) -> pd.DataFrame:
     st.lists(st.floats(1e-12, 1e9), min_size=1, max_size=40), st.lists(st.integers(0, 2**32 - 1))
 )
 def test_columns_keep_what_they_promise(numbers: list[float], ids: list[int]) -> None:
-    columns = Columns()
+    columns = PackedColumns()
     columns.add("numbers", "f24", np.array(numbers))
     columns.add("ids", "u32", np.array(ids, dtype=np.int64))
     columns.add("zero", "f24", np.zeros(1))

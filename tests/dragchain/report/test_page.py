@@ -20,13 +20,13 @@ from dragchain.report.page import (
     file_uri,
     fixed,
     fraction,
+    heading_key,
     interval,
     measured,
     number,
     page_environment,
     percent,
     sections,
-    slug,
     with_interval,
 )
 from dragchain.statistics.estimate import Estimate
@@ -90,7 +90,8 @@ def test_a_listing_writes_each_column_in_its_form() -> None:
     rows = [("a & b", {"mean": 0.25, "said": "confirmed", **drag}), ("a & b", {"mean": None})]
     text = """{% from "report/macros.html.j2" import listing %}
 {{ listing(rows, [("case", "0", {"a & b": "both"}), ("drag (N)", "1.mean", "measured:3")]) }}
-{{ listing(rows[:1], [("case", "0", ""), ("said", "1.said", "verdict"), ("", "1", "estimate:2")]) }}"""
+{% set columns = [("case", "0", ""), ("said", "1.said", "verdict"), ("", "1", "estimate:2")] %}
+{{ listing(rows[:1], columns) }}"""
     found = page_environment().from_string(text).render(rows=rows).replace("\n", "")
     assert '<th>case</th><th class="n">drag (N)</th>' in found
     assert '<td>both</td><td class="n">0.250</td>' in found
@@ -131,7 +132,7 @@ def test_one_style_sheet_is_enough(name: str) -> None:
 
 
 def test_names_of_sections() -> None:
-    assert slug("Do chains explain the peaks?") == "do-chains-explain-the-peaks"
+    assert heading_key("Do chains explain the peaks?") == "do-chains-explain-the-peaks"
     body = '<h2 id="a">Load &amp; wear</h2><h2>no name</h2>\n<h2 id="b">B</h2>'
     assert sections(body) == [("a", "Load &amp; wear"), ("b", "B")]
 

@@ -223,8 +223,8 @@ def test_a_rendered_contact_is_where_its_axes_say(
 ) -> None:
     case = load_case(process)
     far = np.array([0.015, 0.012, 0.01])
-    shown = scene.Scene(network_frame([2.0, 0.5]), far, 0.0, None, 0.2)
-    image, extent = scene.render(process, case, shown, view)
+    shown = scene.NetworkScene(network_frame([2.0, 0.5]), far, 0.0, None, 0.2)
+    image, extent = scene.render_view(process, case, shown, view)
     assert is_strongest(pixel(image, extent, 0.0, level_mm))
     assert is_strongest(pixel(image, extent, -2.5, level_mm + 2.0))
     assert not is_strongest(pixel(image, extent, 0.0, level_mm + 3.5))
@@ -242,7 +242,9 @@ def widened(case: Case, radius_m: float) -> Case:
 
 def test_a_bowl_not_much_wider_than_the_window_is_shown_whole(process: Path) -> None:
     case = load_case(process)
-    shown = scene.Scene(network_frame([1.0, 1.0]), np.array([0.01, 0.0, 0.01]), 0.0, None, 0.2)
+    shown = scene.NetworkScene(
+        network_frame([1.0, 1.0]), np.array([0.01, 0.0, 0.01]), 0.0, None, 0.2
+    )
     part = scene.window(case, shown, "xy")
     assert part.contacts is None and part.low.tolist() == [-0.024, -0.024]
     assert scene.cut_words(case, "xz") == ""
@@ -255,7 +257,7 @@ def test_a_wide_bowl_is_cut_to_the_surroundings_of_the_workpiece(process: Path) 
     workpiece = np.array([0.5 + 0.004 - reach / 2, 0.1, 0.01])
     frame = network_frame([1.0, 1.0])
     places = np.array([[0.0, 1.1 * depth, 0.0], [-1.1 * reach, 0.0, 0.0]]) + workpiece
-    shown = scene.Scene(replace(frame, point=places), workpiece, 0.0, None, 0.2)
+    shown = scene.NetworkScene(replace(frame, point=places), workpiece, 0.0, None, 0.2)
     above, side = (scene.window(case, shown, view) for view in ("xy", "xz"))
     assert above.low.tolist() == pytest.approx((workpiece[:2] - reach).tolist())
     assert above.high.tolist() == pytest.approx([0.504, 0.1 + reach])  # no farther than the bowl
@@ -267,17 +269,17 @@ def test_a_wide_bowl_is_cut_to_the_surroundings_of_the_workpiece(process: Path) 
 def test_a_picture_of_a_wide_bowl_has_no_more_pixels_than_vtk_takes(process: Path) -> None:
     case = widened(load_case(process), 2.0)
     frame = network_frame([2.0, 0.5])
-    shown = scene.Scene(frame, np.array([0.015, 0.012, 0.01]), 0.0, None, 0.2)
-    image, extent = scene.render(process, case, shown, "xy", 40.0)
+    shown = scene.NetworkScene(frame, np.array([0.015, 0.012, 0.01]), 0.0, None, 0.2)
+    image, extent = scene.render_view(process, case, shown, "xy", 40.0)
     assert max(image.shape[:2]) <= 1401
     assert is_strongest(pixel(image, extent, 0.0, 0.0))
 
 
 def test_a_missing_workpiece_mesh_is_named(process: Path, tmp_path: Path) -> None:
     case = load_case(process)
-    shown = scene.Scene(network_frame([1.0, 1.0]), np.zeros(3), 0.0, None, 0.2)
+    shown = scene.NetworkScene(network_frame([1.0, 1.0]), np.zeros(3), 0.0, None, 0.2)
     with pytest.raises(TableError, match=r"workpiece\.stl"):
-        scene.render(tmp_path, case, shown, "xy")
+        scene.render_view(tmp_path, case, shown, "xy")
 
 
 def test_a_machine_that_cannot_render_is_told_what_to_install(

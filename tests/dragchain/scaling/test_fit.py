@@ -23,7 +23,7 @@ from dragchain.scaling.fit import (
     write_scaling,
 )
 from dragchain.statistics.estimate import Estimate
-from dragchain.statistics.power_law import Runs, fit_power_law
+from dragchain.statistics.power_law import RunMeans, fit_power_law
 from dragdeck.errors import DocumentError
 
 DEPTH = "motion.immersion_depth_m"
@@ -203,4 +203,4 @@ def _refit(found: ScalingFile) -> Estimate:
     runs = pd.DataFrame([dict(run) for run in found.runs])
     drag = runs.drag_n.to_numpy()
     errors = runs.standard_error_n.to_numpy() / drag
-    return fit_power_law(Runs(runs.level.to_numpy(), drag, errors, list(runs.bed))).exponent
+    return fit_power_law(RunMeans(runs.level.to_numpy(), drag, errors, list(runs.bed))).exponent

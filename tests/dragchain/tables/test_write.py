@@ -20,9 +20,9 @@ from tiny_run_files import (
 )
 
 from dragchain import DumpError, RejectedRunError, TableError, load_case, load_outputs, write_tables
-from dragchain.drag.force import read_counted, summarise_forces
-from dragchain.dumps.run_parts import iter_prints
+from dragchain.drag import read_counted, summarise_forces
 from dragchain.loading.write import write_loading
+from dragchain.run.run_parts import iter_prints
 from dragchain.tables.columns import FORCES, REFERENCE
 from dragchain.tables.write import WorkpieceSamples
 

@@ -7,11 +7,16 @@ from pathlib import Path
 import pytest
 from made_run import Raw
 
-from dragdeck.decks.case_file import CountOfRun, RanksOfRun, SettlingCriterion, SteadyCriterion
+from dragdeck.decks.case_file import (
+    CountOfRun,
+    RanksOfRun,
+    RunInputs,
+    SettlingCriterion,
+    SteadyCriterion,
+)
 from dragdeck.decks.outputs import Kind, OutputOfRun
+from dragdeck.dumps.grammar import whole_frames
 from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.completeness import whole_frames
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.record import RunPart
 
 
@@ -36,9 +41,8 @@ CUSTOM = written("custom", "particles", ["a_id", "force_n"], None)
 
 def text_frame(step: int, rows: list[str]) -> str:
     box = "ITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
-    head = (
-        f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ENTRIES\n{len(rows)}\n{box}ITEM: ENTRIES a b \n"
-    )
+    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ENTRIES\n{len(rows)}\n{box}"
+    head += "ITEM: ENTRIES a_id force_n \n"
     return head + "".join(row + "\n" for row in rows)
 
 

@@ -11,7 +11,8 @@ from made_study import Load, Made
 from dragdeck.cases.ranks import CORES_VARIABLE, FEWEST_PARTICLES_A_RANK, auto_ranks
 from dragdeck.decks.render import deck_text
 from dragdeck.decks.templates import environment
-from dragdeck.engine.decomposition import decomposition, ranks_check
+from dragdeck.engine.acceptance import ranks_check
+from dragdeck.engine.log import decomposition
 from dragdeck.engine.record import Decomposition, ParticlesPerRank
 from dragdeck.errors import InputError
 from dragdeck.outlook.process import bed_notes

@@ -10,8 +10,7 @@ from run_files import rewrite
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
-from dragdeck.engine.limits import breach, within
-from dragdeck.engine.log import Sample, read_samples
+from dragdeck.engine.log import Sample, breach, read_samples, within
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import RejectedRunError

@@ -17,10 +17,10 @@ from made_study import Made
 from run_files import rewrite
 
 from dragdeck.cases.case import Case
+from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import fingerprint, run
@@ -248,7 +248,7 @@ def test_a_truncated_output_fails_its_check(filling: Path) -> None:
             "packing.restart",
         ),
     )
-    damage = r"frame \d+, byte \d+: the file ends within"
+    damage = r"frame \d+, byte \d+: the file ends after \d+ bytes, inside"
     with pytest.raises(EngineError, match=rf"(?s)particles\.1\.bin, {damage}.*disk has space"):
         run(filling, silent)
     assert not (filling / "run.json").exists()

@@ -11,11 +11,11 @@ import pytest
 from made_study import Made
 
 from dragdeck.cases.case import Case
+from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.outputs import particles
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.record import AcceptanceCheck, RunPart, RunRecord
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run_to_outcome

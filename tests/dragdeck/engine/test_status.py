@@ -8,7 +8,7 @@ import pytest
 from dragdeck.cases.case import Case
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
-from dragdeck.engine.lock import only_runner
+from dragdeck.engine.process import only_runner
 from dragdeck.engine.record import AcceptanceCheck, RunPart, RunRecord, State
 from dragdeck.engine.reports import printable, shown_time, silent
 from dragdeck.engine.status import run_status

@@ -13,7 +13,7 @@ from made_run import save
 from networks import R, make_frame, row
 from scipy.stats import binom, false_discovery_control
 
-from dragchain.drag.peaks import find_drag_peaks
+from dragchain.drag import find_drag_peaks
 from dragchain.errors import TableError
 from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame
 from dragchain.report.page import page_environment

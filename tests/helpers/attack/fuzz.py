@@ -13,9 +13,8 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from made_run import Raw
 
-from dragchain.dumps.any_dump import read_dump
-from dragchain.dumps.careful_reader import read_print_file
 from dragchain.run.case import Output
+from dragdeck.dumps.reader import read_dump, read_prints
 from dragdeck.errors import DragdeckError
 from dragdeck.mesh.checks import findings
 from dragdeck.mesh.files import read
@@ -192,7 +191,7 @@ def _try_print_file(folder: Path, content: bytes) -> None:
     steps: list[float] = []
     values: list[float] = []
     try:
-        for block in read_print_file(file, layout):
+        for block in read_prints(file, layout):
             steps += block["step"].tolist()
             values += block["force_n"].tolist()
     except DragdeckError as error:

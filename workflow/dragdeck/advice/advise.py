@@ -69,12 +69,12 @@ def resolve(case: Case, asked: Tolerance, tradeoff: Tradeoff | None = None) -> C
     InputError
         The quantities do not go together.
     """
-    advice = advise(case, asked, tradeoff or measured_tradeoff())
+    advice = advised_settings(case, asked, tradeoff or measured_tradeoff())
     study = with_option(case.study, advice.chosen)
     return replace(case, study=study, asked=asked, advised=advice.for_case)
 
 
-def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
+def advised_settings(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
     """The settings for a tolerance.
 
     Parameters
@@ -106,12 +106,13 @@ def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
     if good:
         return Advice(asked, min(good, key=lambda one: one.relative_cost), finest)
     why = (
-        f"no measured time step has an error of the restitution below {percent(asked.tolerance)}: "
-        f"the smallest one is used, with {percent(finest.error or 0.0)}"
+        "no measured time step has an error of the restitution below "
+        f"{shown_share(asked.tolerance)}: the smallest one is used, with "
+        f"{shown_share(finest.error or 0.0)}"
     )
     return Advice(asked, finest, finest, why)
 
 
-def percent(fraction: float) -> str:
+def shown_share(fraction: float) -> str:
     """A share without its sign, as a percentage with two significant digits."""
     return f"{float(f'{100 * abs(fraction):.2g}'):g} %"

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.table import Table
 
 from dragdeck import __version__
-from dragdeck.advice.advise import Advice, percent
+from dragdeck.advice.advise import Advice, shown_share
 from dragdeck.advice.options import SCALE, Option, Speed, step_cost, with_option
 from dragdeck.cases.case import Case
 from dragdeck.decks.advised import AdvisedSettings
@@ -275,11 +275,11 @@ def advice_file(
     )
 
 
-def tables(case: Case, advice: Advice, rows: Sequence[Forecast]) -> Iterator[Table]:
+def advice_tables(case: Case, advice: Advice, rows: Sequence[Forecast]) -> Iterator[Table]:
     """What `dragdeck advise` prints of a case: the options, and what must be said of them."""
     asked = advice.asked
     what = ", ".join(asked.quantities)
-    title = f"{case.study_name} {case.name}: {what} within {percent(asked.tolerance)}"
+    title = f"{case.study_name} {case.name}: {what} within {shown_share(asked.tolerance)}"
     table = Table(title=title, title_justify="left")
     for name in ("", "settings", "cost", "steps", "wall time"):
         table.add_column(name)
@@ -306,7 +306,7 @@ def _about(case: Case, advice: Advice, advised: Forecast) -> Iterator[tuple[str,
     runs, chosen = " and ".join(advised.steps), advice.chosen.fidelity
     yield "cost", f"CPU time of {runs} / that of the reference"
     if advice.chosen.error is not None:
-        yield "error", f"largest measured error of an impact: {percent(advice.chosen.error)}"
+        yield "error", f"largest measured error of an impact: {shown_share(advice.chosen.error)}"
     elif chosen.windows is not None:
         yield "tolerance", _OF_WINDOWS
     elif chosen.soft_start is not None:

@@ -44,6 +44,11 @@ class OutputOfRun(Part):
     last_step: int | None
     rows_per_particle: float
 
+    @property
+    def header(self) -> Sequence[str]:
+        """What LIGGGHTS writes in the header of a text file."""
+        return self.columns if self.engine_columns is None else self.engine_columns
+
 
 class ColumnsFile(Document):
     """``columns.json``: the raw output files of a run."""

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from dragdeck.decks import DECK_FILE
+from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.engine import log
 from dragdeck.engine.acceptance import check_run
@@ -16,10 +17,14 @@ from dragdeck.engine.checkpoints import (
     take_forced_restarts,
 )
 from dragdeck.engine.completeness import cut_outputs, first_gap, part_files
-from dragdeck.engine.decomposition import decomposition
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.process import Ending, Engine, command, execute
-from dragdeck.engine.record import REMEDIES, AcceptanceCheck, CheckCode, RunPart, RunRecord
+from dragdeck.engine.record import (
+    REMEDIES,
+    AcceptanceCheck,
+    CheckCode,
+    RunPart,
+    RunRecord,
+)
 from dragdeck.engine.reports import Report
 from dragdeck.engine.space import SPARE_BYTES, check_space, free_bytes, space_left
 from dragdeck.engine.watch import EngineEnded, LimitMet, Watcher, cut_screen
@@ -158,7 +163,7 @@ class PartOfRun:
         why = None if log.reached_end(screen) else self._interruption(screen, asked, ending)
         if why is not None:
             raise self._stopped(why)
-        self.record = self._record.model_copy(update={"decomposition": decomposition(screen)})
+        self.record = self._record.model_copy(update={"decomposition": log.decomposition(screen)})
         checks = check_run(
             self.folder,
             self.inputs,

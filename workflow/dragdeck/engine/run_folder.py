@@ -10,12 +10,11 @@ import shutil
 from pathlib import Path
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE, DECK_FILE, RUN_FILE
+from dragdeck.decks.case_file import RunInputs
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.engine.checkpoints import take_forced_restarts
-from dragdeck.engine.inputs import RunInputs
-from dragdeck.engine.lock import LOCK_FILE, only_runner
 from dragdeck.engine.part import STATE_FILE, PartOfRun, why_rejected
-from dragdeck.engine.process import find_engine
+from dragdeck.engine.process import LOCK_FILE, find_engine, only_runner
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import Report, say
 from dragdeck.engine.space import full_disk_named

@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Literal
 
 from dragdeck.decks import CASE_FILE, COLUMNS_FILE
-from dragdeck.decks.case_file import FillingCase
+from dragdeck.decks.case_file import FillingCase, RunInputs
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.engine.completeness import part_files
-from dragdeck.engine.inputs import RunInputs
-from dragdeck.engine.lock import is_held
 from dragdeck.engine.log import Sample, last_step, read_samples
 from dragdeck.engine.part import STATE_FILE, why_rejected
+from dragdeck.engine.process import is_held
 from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import printable
 from dragdeck.errors import InputError

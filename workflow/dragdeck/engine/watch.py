@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from dragdeck.engine.checkpoints import drop_old_checkpoints, name_whole_checkpoints
-from dragdeck.engine.limits import breach
-from dragdeck.engine.log import Sample, read_samples
+from dragdeck.engine.log import Sample, breach, read_samples
 from dragdeck.engine.record import AcceptanceCheck
 from dragdeck.engine.reports import shown_bytes
 from dragdeck.engine.space import SPARE_BYTES, free_bytes, size_of

@@ -99,7 +99,9 @@ def _ratio(cost: MeasuredCost, tradeoff: Tradeoff) -> str:
     return f"{cost.ratio:.3g}x{interval}, LIGGGHTS {engine}, {date}"
 
 
-def page(scene: StudyScene, cost: Cost, runs: int, width: int, reduced: str = "") -> Iterator[str]:
+def scene_lines(
+    scene: StudyScene, cost: Cost, runs: int, width: int, reduced: str = ""
+) -> Iterator[str]:
     """The lines of one scene on a page that fits a terminal: names without reasons and prices.
 
     Parameters

@@ -99,7 +99,7 @@ class StudyRun:
         return f"{self.name}: {', '.join(filter(None, (self.status.state, *self.cells)))}"
 
 
-def alike(runs: Mapping[Path, Case]) -> list[dict[Path, Case]]:
+def alike_but_for_seed(runs: Mapping[Path, Case]) -> list[dict[Path, Case]]:
     """Runs by their folders, those that differ in the seed alone together: they cost the same."""
     found: dict[str, dict[Path, Case]] = {}
     for folder, case in runs.items():
@@ -125,7 +125,7 @@ def expected_runs(
         The scene of runs that differ in the seed alone, if not that of `kind`.
     """
     speeds = measured_speeds(next(iter(runs)).parent) if runs else []
-    for group in alike(runs):
+    for group in alike_but_for_seed(runs):
         first = next(iter(group.values()))
         try:
             scene = build(group) if build else kind.build(first, None)

@@ -90,7 +90,7 @@ class MovingWorkpiece:
 
 
 @dataclass(frozen=True)
-class Layout:
+class CaseLayout:
     """What is drawn of a case; lengths in m.
 
     Attributes
@@ -112,7 +112,7 @@ class Layout:
     workpieces: Sequence[MovingWorkpiece]
 
 
-def layout(case: Case) -> Layout:
+def layout(case: Case) -> CaseLayout:
     """The geometry of a case in the expected bed, whether it fits or not.
 
     Raises
@@ -122,7 +122,7 @@ def layout(case: Case) -> Layout:
     """
     study = case.study
     radius, level = study.bowl.radius_m, expected_bed(study).surface_m
-    return Layout(
+    return CaseLayout(
         bowl=bowl(radius, study.bowl.height_m, radius / 10),
         bed=_disc(radius, level),
         bowl_radius_m=radius,
@@ -184,7 +184,7 @@ COLOURS: dict[str, str] = json.loads(
 
 
 @dataclass(frozen=True)
-class View:
+class Projection:
     """A parallel projection: what points right and up in it, as unit vectors."""
 
     title: str
@@ -199,7 +199,7 @@ class View:
         return np.array([self.right, self.up, np.cross(self.right, self.up)])
 
 
-def views(direction_rad: float) -> list[View]:
+def views(direction_rad: float) -> list[Projection]:
     """From above, along the motion at the start of the drag, from its right, and obliquely."""
     c, s = math.cos(direction_rad), math.sin(direction_rad)
     x, y, z = np.eye(3)
@@ -207,8 +207,10 @@ def views(direction_rad: float) -> list[View]:
     right, back = (beside + ahead) / math.sqrt(2), (beside - ahead) / math.sqrt(2)
     low = math.radians(28)
     return [
-        View("From above", x, y, "x (mm)", "y (mm)"),
-        View("In the direction of motion", beside, z, "to the right of the axis (mm)", "z (mm)"),
-        View("From the right of the motion", ahead, z, "along the motion (mm)", "z (mm)"),
-        View("Oblique", right, math.cos(low) * z - math.sin(low) * back, "", ""),
+        Projection("From above", x, y, "x (mm)", "y (mm)"),
+        Projection(
+            "In the direction of motion", beside, z, "to the right of the axis (mm)", "z (mm)"
+        ),
+        Projection("From the right of the motion", ahead, z, "along the motion (mm)", "z (mm)"),
+        Projection("Oblique", right, math.cos(low) * z - math.sin(low) * back, "", ""),
     ]

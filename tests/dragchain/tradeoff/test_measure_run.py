@@ -11,7 +11,7 @@ import pytest
 from dragchain.errors import TableError
 from dragchain.run.completeness import AcceptanceCheck
 from dragchain.tables.bed import Packing
-from dragchain.tradeoff.measure_run import CountedPath, band, write_measures
+from dragchain.tradeoff.measure_run import CountedPath, band_pass, write_measures
 from dragchain.tradeoff.measures import QUANTITIES, Measures
 
 SPACING, COUNT = 0.1, 600
@@ -39,7 +39,7 @@ def wave(length: float) -> np.ndarray:
 def test_bands_add_up_and_so_do_their_squares(count: int) -> None:
     whole = series()[:count] - series()[:count].mean()
     limits = [0.0, 0.7, 3.0, math.inf]
-    bands = [band(whole, SPACING, a, b) for a, b in pairwise(limits)]
+    bands = [band_pass(whole, SPACING, a, b) for a, b in pairwise(limits)]
     assert np.sum(bands, axis=0) == pytest.approx(whole, abs=1e-12)
     assert sum(np.sum(one**2) for one in bands) == pytest.approx(np.sum(whole**2))
     assert min(np.sum(one**2) for one in bands) > 0.0
@@ -47,20 +47,20 @@ def test_bands_add_up_and_so_do_their_squares(count: int) -> None:
 
 def test_a_wave_is_in_the_band_of_its_length() -> None:
     both = wave(5.0) + 0.5 * wave(0.5)
-    assert band(both, SPACING, 2.0, math.inf) == pytest.approx(wave(5.0), abs=1e-12)
-    assert band(both, SPACING, 0.0, 1.0) == pytest.approx(0.5 * wave(0.5), abs=1e-12)
-    assert band(both, SPACING, 1.0, 2.0) == pytest.approx(0.0, abs=1e-12)
+    assert band_pass(both, SPACING, 2.0, math.inf) == pytest.approx(wave(5.0), abs=1e-12)
+    assert band_pass(both, SPACING, 0.0, 1.0) == pytest.approx(0.5 * wave(0.5), abs=1e-12)
+    assert band_pass(both, SPACING, 1.0, 2.0) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_wave_at_a_limit_is_in_the_longer_band() -> None:
     # 5.0 is the exact inverse of a frequency of the series
-    assert band(wave(5.0), SPACING, 5.0, math.inf) == pytest.approx(wave(5.0), abs=1e-12)
-    assert band(wave(5.0), SPACING, 0.0, 5.0) == pytest.approx(0.0, abs=1e-12)
+    assert band_pass(wave(5.0), SPACING, 5.0, math.inf) == pytest.approx(wave(5.0), abs=1e-12)
+    assert band_pass(wave(5.0), SPACING, 0.0, 5.0) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_mean_belongs_to_the_longest_waves() -> None:
-    assert band(wave(5.0) + 3.0, SPACING, 2.0, math.inf) == pytest.approx(wave(5.0) + 3.0)
-    assert band(wave(5.0) + 3.0, SPACING, 0.0, 2.0) == pytest.approx(0.0, abs=1e-12)
+    assert band_pass(wave(5.0) + 3.0, SPACING, 2.0, math.inf) == pytest.approx(wave(5.0) + 3.0)
+    assert band_pass(wave(5.0) + 3.0, SPACING, 0.0, 2.0) == pytest.approx(0.0, abs=1e-12)
 
 
 PATH = CountedPath(first_step=100, last_step=500, length_m=0.04, diameter_m=0.01, blocks=4)

@@ -8,11 +8,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from dragchain.dumps.careful_reader import read_print_file
-from dragchain.dumps.fast_reader import read_frames
-from dragchain.dumps.run_parts import iter_frames, iter_prints, part_files
-from dragchain.errors import DumpError, TruncatedDumpError
 from dragchain.run.case import Output
+from dragchain.run.run_parts import iter_frames, iter_prints, part_files
+from dragdeck.dumps.reader import read_frames, read_prints
+from dragdeck.errors import DumpError, TruncatedDumpError
 
 PARTICLES = Output(
     name="particles",
@@ -143,7 +142,7 @@ def test_a_cut_number_is_not_read_as_another_number(tmp_path: Path, raw) -> None
     file = tmp_path / "force.1.txt"
     file.write_bytes(b"step force_x_n\n2 1.5\n4 2.25\n6 3.1")
     with pytest.raises(TruncatedDumpError, match="rows before it are intact") as caught:
-        list(read_print_file(file, FORCE))
+        list(read_prints(file, FORCE))
     assert (caught.value.frame, caught.value.offset) == (2, 28)
 
 
@@ -211,14 +210,14 @@ def test_refuses_nan_in_a_binary(tmp_path: Path, raw) -> None:
 
 def test_skips_a_header_that_comes_again(tmp_path: Path) -> None:
     (tmp_path / "f").write_bytes(b"step force_x_n\n2 1\nstep force_x_n\n4 2\n6 3\nstep force_x_n\n")
-    blocks = list(read_print_file(tmp_path / "f", FORCE))
+    blocks = list(read_prints(tmp_path / "f", FORCE))
     np.testing.assert_array_equal(np.concatenate([b["step"] for b in blocks]), [2, 4, 6])
     np.testing.assert_array_equal(np.concatenate([b["force_x_n"] for b in blocks]), [1, 2, 3])
 
 
 def test_reads_a_print_file_in_blocks(tmp_path: Path, raw) -> None:
     (tmp_path / "f").write_bytes(force_file(raw, range(2, 12, 2)))
-    blocks = [b["step"].tolist() for b in read_print_file(tmp_path / "f", FORCE, block_rows=2)]
+    blocks = [b["step"].tolist() for b in read_prints(tmp_path / "f", FORCE, block_rows=2)]
     assert blocks == [[2, 4], [6, 8], [10]]
 
 
@@ -236,7 +235,7 @@ def test_reads_a_print_file_in_blocks(tmp_path: Path, raw) -> None:
 def test_refuses_a_spoilt_print_file(tmp_path: Path, content, message, row, offset) -> None:
     (tmp_path / "f").write_bytes(content)
     with pytest.raises(DumpError, match=message) as caught:
-        list(read_print_file(tmp_path / "f", FORCE))
+        list(read_prints(tmp_path / "f", FORCE))
     assert (caught.value.frame, caught.value.offset) == (row, offset)
 
 

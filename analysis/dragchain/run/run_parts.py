@@ -11,11 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from dragchain.dumps.careful_reader import read_print_file
-from dragchain.dumps.fast_reader import read_frames
-from dragchain.dumps.frame import Columns, Frame
-from dragchain.errors import DumpError, TruncatedDumpError
 from dragchain.run.case import Output
+from dragdeck.dumps.frame import Columns, Frame
+from dragdeck.dumps.reader import read_frames, read_prints
+from dragdeck.errors import DumpError, TruncatedDumpError
 
 
 def part_files(run_dir: Path | str, output: Output) -> list[Path]:
@@ -104,7 +103,7 @@ def iter_prints(run_dir: Path | str, output: Output) -> Iterator[Columns]:
     """
 
     def read(file: Path) -> Iterator[_Piece]:
-        for columns in read_print_file(file, output):
+        for columns in read_prints(file, output):
             yield _Piece(int(columns["step"][0]), int(columns["step"][-1]), columns)
 
     return (piece.columns for piece in _merged(run_dir, output, read))

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dragchain.dumps.any_dump import read_dump
-from dragchain.errors import DumpError
+from dragdeck.dumps.reader import read_dump
+from dragdeck.errors import DumpError
 
 _MOST_BYTES = 100_000_000
 

@@ -22,11 +22,11 @@ class Layout(Protocol):
         """Whether it is a binary dump."""
 
     @property
-    def columns(self) -> tuple[str, ...]:
-        """Name of each column in dragchain."""
+    def columns(self) -> Sequence[str]:
+        """Name of each column."""
 
     @property
-    def header(self) -> tuple[str, ...]:
+    def header(self) -> Sequence[str]:
         """Name of each column in the header of a text file."""
 
 

@@ -26,7 +26,7 @@ from tiny_run_files import case_json as tiny_case
 from dragchain import write_tables
 from dragchain.loading.samples import BODY as BODY_IMPULSE
 from dragchain.loading.write import write_loading
-from dragchain.report.study_report import write_report
+from dragchain.report.study_report import write_study_report
 from dragchain.tables import parquet
 from dragchain.tables.columns import BODY, columns_of, descriptions, unit_of
 
@@ -66,7 +66,7 @@ def write_summary(results: Path) -> None:
     write_loading(made)
     (run / "tables/loading.json").write_bytes((made / "tables/loading.json").read_bytes())
     shutil.rmtree(made)
-    write_report(results / "report", [run])
+    write_study_report(results / "report", [run])
 
 
 def write_all(folder: Path) -> dict[str, Path]:
