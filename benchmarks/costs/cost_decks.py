@@ -177,10 +177,16 @@ def _in_its_drag(workpiece: MovedWorkpiece, steps: int) -> MovedWorkpiece:
     for leg in workpiece.legs[:-1]:
         u, v, w = leg.velocity_m_s
         x, y, z = (place + leg.duration_s * speed for place, speed in ((x, u), (y, v), (z, w)))
-    last = workpiece.legs[-1]
-    shorter = replace(last.leg, duration_s=last.duration_s * steps / last.steps)
-    drag = replace(last, leg=shorter, start_step=0, end_step=steps)
-    return replace(workpiece, start_m=(x, y, z), legs=(drag,))
+    last, drive = workpiece.legs[-1], workpiece.driven.drive
+    way = replace(workpiece.driven, drive=replace(drive, start=0, end=drive.steps))
+    drag = replace(
+        last,
+        start_step=0,
+        end_step=steps,
+        duration_s=last.duration_s * steps / last.steps,
+        motion=way.motion.path.on_engine(way.drive).ending(workpiece.ending),
+    )
+    return replace(workpiece, start_m=(x, y, z), legs=(drag,), driven=way)
 
 
 # --- beds -----------------------------------------------------------------------------------

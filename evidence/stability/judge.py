@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from dragchain.run.completeness import AcceptanceCheck, CheckCode, CheckReason
 from dragchain.statistics.estimate import Estimate, flattened
-from dragdeck.outlook.measured import Criteria, RestitutionErrors, SafeSteps, StabilityMap
+from dragdeck.records.run import AcceptanceCheck, CheckCode, CheckReason
+from dragdeck.records.stability import Criteria, RestitutionErrors, SafeSteps, StabilityFile
 from evidence.stability.measures import (
     COLUMNS,
     MEASURES,
@@ -424,7 +424,7 @@ def _envelope(
 
 def summarise_map(
     points: pd.DataFrame, found: pd.DataFrame, runs: Sequence[PointRun]
-) -> StabilityMap:
+) -> StabilityFile:
     """What ``dragdeck check`` uses: safe steps, errors of impacts, and where they come from.
 
     Parameters
@@ -436,7 +436,7 @@ def summarise_map(
     records = [run.record for run in runs if run.record]
     cases = [run.case for run in runs if run.record and run.case]
     started = max((record.started for record in records), default=datetime.now(UTC).isoformat())
-    return StabilityMap(
+    return StabilityFile(
         commands=("snakemake stability",),
         engine_versions=tuple(sorted({record.engine_version for record in records})),
         dragdeck_versions=tuple(sorted({case.versions["dragdeck"] for case in cases})),

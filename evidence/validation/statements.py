@@ -23,12 +23,12 @@ from dragchain.drag import (
     within_angle,
 )
 from dragchain.errors import TableError
-from dragchain.run.case import Case
-from dragchain.run.kinematics import needed
-from dragchain.run.paths.circle import Circle
+from dragchain.run.kinematics import motion_of, needed
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real, Verdict
 from dragchain.tables.by_step import read_groups, read_table
 from dragdeck.documents import Part
+from dragdeck.records.case import CaseOfRun
+from dragdeck.study.paths.circle import CirclePath
 from evidence.validation.runs import MeasuredRun, packing_mean
 
 # --- the network in a corridor along the motion ------------------------------------------------
@@ -140,13 +140,14 @@ def corridor(run: MeasuredRun) -> Corridor:
         The workpiece does not run on a circle about the bowl's axis.
     """
     case = run.case
-    if case.bowl is None or case.surface_m is None or not isinstance(case.motion, Circle):
+    path = motion_of(case).motion.path
+    if case.bowl is None or case.surface_m is None or not isinstance(path, CirclePath):
         raise TableError(
             f"{case.run}: the corridor needs a workpiece on a circle about the bowl's axis"
         )
     workpiece, diameter = needed(case.workpiece, "workpiece"), 2.0 * case.media.radius_mean_m
     radius = workpiece.radius_m
-    wall = (np.sqrt(case.bowl.radius_m**2 - case.motion.radius_m**2) - radius) / diameter
+    wall = (np.sqrt(case.bowl.radius_m**2 - path.radius_m**2) - radius) / diameter
     edges = np.arange(0.0, wall + 1e-9, _BIN)
     tip = case.surface_m - workpiece.immersion_depth_m
     places: list[Floats] = []
@@ -361,11 +362,12 @@ def _around(azimuth: Floats, force: Floats) -> Floats:
     return np.asarray(sum(halves) / (2.0 * force.sum()))
 
 
-def _outer_over_inner(case: Case, azimuth: Floats, force: Floats) -> float | None:
-    if not isinstance(case.motion, Circle):
+def _outer_over_inner(case: CaseOfRun, azimuth: Floats, force: Floats) -> float | None:
+    path = motion_of(case).motion.path
+    if not isinstance(path, CirclePath):
         return None
     left = float((force * to_the_left(azimuth)).sum() / force.sum())
-    outer = left if case.motion.sign < 0 else 1.0 - left
+    outer = left if path.sign < 0 else 1.0 - left
     return _ratio(outer, 1.0 - outer)
 
 

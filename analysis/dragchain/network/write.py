@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from dragchain.arrays import Floats, Ints, wrap_angle
+from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.network.chains import (
     ALPHA_RAD,
@@ -24,6 +24,7 @@ from dragchain.network.chains import (
 from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame, network_frames
 from dragchain.network.statistics import cluster_rows, frame_clusters, frame_statistics
 from dragchain.tables.parquet import table_writer, write_parquet
+from dragdeck.study.rotation import wrap_angle
 
 
 def chain_table(

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation as Quaternion
 
 from dragchain.arrays import Floats, Ints
 from dragchain.drag import DragPeaks, drag_peaks, peak_separation_s, read_counted
@@ -20,12 +21,12 @@ from dragchain.errors import TableError
 from dragchain.export.frames import FrameData, FrameSeries
 from dragchain.figures.style import force_map
 from dragchain.network.frame import KINDS, PARTICLE, NetworkFrame
-from dragchain.run.case import Case
 from dragchain.run.kinematics import drag_phase, needed, process_time
 from dragchain.run.workpiece import read_surface
 from dragchain.tables.by_step import read_table
 from dragchain.tables.columns import CENTRE, POINT, VELOCITY
 from dragchain.tables.run_folder import Run
+from dragdeck.records.case import CaseOfRun
 
 Kind = Literal["u8", "u16", "u32", "f24"]
 """Whole numbers of 1, 2 or 4 bytes, or the first 3 bytes of a single-precision number."""
@@ -220,7 +221,7 @@ def page_scene(run: Run) -> PageScene:
     series = shown_frames(run, peaks.time_s)
     frames = list(read_shown(series))
     times_s = process_time(series.times_s, case)
-    bowl, surface = needed(case.bowl, "bowl"), 1e3 * needed(case.surface_m, "surface_m")
+    bowl, surface = case.bowl, 1e3 * needed(case.surface_m, "surface_m")
     head = {
         "run": case.run,
         "steps": series.steps.tolist(),
@@ -253,7 +254,7 @@ def _colours() -> list[str]:
 # --- frames ----------------------------------------------------------------------------------
 
 
-def _frames(columns: PackedColumns, frames: list[ShownFrame], case: Case) -> dict[str, Any]:
+def _frames(columns: PackedColumns, frames: list[ShownFrame], case: CaseOfRun) -> dict[str, Any]:
     """Add particles and contacts of all frames; where each frame starts, and the box of places."""
     centres = [_vectors(one.data.particles, CENTRE)[one.particles] for one in frames]
     points = [_outer_points(one) for one in frames]
@@ -300,13 +301,13 @@ def _joined(tables: list[pd.DataFrame], name: str) -> Any:
     return np.concatenate([table[name].to_numpy() for table in tables])
 
 
-def _speeds(particles: pd.DataFrame, case: Case) -> Floats:
+def _speeds(particles: pd.DataFrame, case: CaseOfRun) -> Floats:
     """Speeds of particles in process time, m/s."""
     simulated = np.linalg.norm(_vectors(particles, VELOCITY), axis=1)
     return np.asarray(simulated / case.fidelity.speed_factor)
 
 
-def _scales(frames: list[ShownFrame], case: Case) -> dict[str, float]:
+def _scales(frames: list[ShownFrame], case: CaseOfRun) -> dict[str, float]:
     """The tops of the colour scales, and the mean normal force, over all shown frames."""
     forces = [_table(one)["normal_force_n"].to_numpy()[one.contacts] for one in frames]
     largest = [part.max(initial=0.0) for part in forces]
@@ -361,8 +362,9 @@ def _workpiece(columns: PackedColumns, run: Run, frames: list[ShownFrame]) -> di
     poses = []
     for frame in frames:
         assert frame.data.workpiece is not None
-        place, turn = frame.data.workpiece
-        poses.append([*(1e3 * place).tolist(), turn])
+        place, rotation = frame.data.workpiece
+        turn = Quaternion.from_matrix(rotation.matrices[0]).as_quat()
+        poses.append([*(1e3 * place).tolist(), *turn.tolist()])
     return {
         "poses": poses,
         "headings": _headings(run, frames),
@@ -420,7 +422,7 @@ def _curve(columns: PackedColumns, run: Run) -> dict[str, Any]:
     }
 
 
-def _peaks(peaks: DragPeaks, times_s: Floats, case: Case) -> list[dict[str, Any]]:
+def _peaks(peaks: DragPeaks, times_s: Floats, case: CaseOfRun) -> list[dict[str, Any]]:
     """The highest peaks, each with its nearest frame."""
     return [
         {"time": time, "force": -drag, "frame": int(np.abs(times_s - time).argmin())}

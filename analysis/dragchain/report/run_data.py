@@ -40,14 +40,15 @@ from dragchain.report.findings import (
     ProcessFindings,
     Wake,
 )
-from dragchain.run.case import Case, load_outputs
-from dragchain.run.kinematics import drag_start_s, motion_of, needed, process_time
+from dragchain.run.kinematics import drag_start_s, needed, path_passed, process_time
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
 from dragchain.tables.bed import Packing
 from dragchain.tables.by_step import read_table
 from dragchain.tables.impacts import effective_restitution
+from dragdeck.decks.outputs import load_outputs
+from dragdeck.records.case import CaseOfRun
 
 
 class DragTrace(NamedTuple):
@@ -75,11 +76,11 @@ class RunData:
     Attributes
     ----------
     folder : Path
-    case : Case
+    case : CaseOfRun
     """
 
     folder: Path
-    case: Case
+    case: CaseOfRun
 
     def table(self, name: str, columns: list[str] | None = None) -> pd.DataFrame:
         """A table of the run, or some of its columns."""
@@ -181,11 +182,11 @@ def process_findings(run: RunData) -> ProcessFindings:
     )
 
 
-def _wake(samples: pd.DataFrame, case: Case) -> Wake | None:
+def _wake(samples: pd.DataFrame, case: CaseOfRun) -> Wake | None:
     workpiece = needed(case.workpiece, "workpiece")
     if workpiece.wake_from_m is None:
         return None
-    path = (samples["time_s"] - drag_start_s(case)) * motion_of(case).axis_speed_m_s
+    path = path_passed(samples["time_s"].to_numpy(), case)
     fresh = path <= workpiece.wake_from_m - 2 * workpiece.radius_m
     try:
         before, after = (

@@ -35,11 +35,12 @@ from dragchain.report.findings import (
     ProcessFindings,
 )
 from dragchain.report.run_data import RunData, write_findings
-from dragchain.run.case import Case, load_case, load_outputs
 from dragchain.run.kinematics import process_time
 from dragchain.run.run_parts import iter_prints
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
+from dragdeck.decks.outputs import load_outputs
+from dragdeck.records.case import CaseOfRun, load_case
 
 _DEPTH = "depth below the surface (mm)"
 
@@ -215,7 +216,7 @@ def _path_words(shown: network_picture.NetworkScene) -> str:
 # --- filling and drop test -----------------------------------------------------------------------
 
 
-def energy_ratio(energy_j: Floats, particles: Floats, case: Case) -> Floats:
+def energy_ratio(energy_j: Floats, particles: Floats, case: CaseOfRun) -> Floats:
     """The mean energy of a particle over m g d, (N,): what the mean particle gains falling by d.
 
     Parameters
@@ -224,7 +225,7 @@ def energy_ratio(energy_j: Floats, particles: Floats, case: Case) -> Floats:
         Kinetic energy of all particles in J, spin included.
     particles : (N,) array
         Number of particles.
-    case : Case
+    case : CaseOfRun
         The filling; mass and diameter are those of its mean particle.
     """
     radius = case.media.radius_mean_m

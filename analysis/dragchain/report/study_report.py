@@ -37,12 +37,12 @@ from dragchain.report.page import (
 )
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
-from dragchain.run.case import Assumption, load_case
-from dragchain.run.completeness import RunRecord
 from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.tables.network_contacts import Corrections
 from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
+from dragdeck.records.case import AssumptionOfRun, load_case
+from dragdeck.records.run import RunRecord
 
 _STEPS = ("render", "run", "tables", "chains", "loading", "figures")
 """The steps of a run that have a log, in order: the first that failed is to blame."""
@@ -181,7 +181,7 @@ class RunSection:
     """What the page shows of one process run; `network` is its page on the contact network."""
 
     study: StudyRuns
-    assumptions: list[Assumption]
+    assumptions: list[AssumptionOfRun]
     pictures: list[ShownFigure]
     network: Path | None
     corrections: Corrections | None
@@ -290,9 +290,9 @@ def _section(study: StudyRuns, options: Sequence[Option]) -> RunSection:
     )
 
 
-def _assumptions(study: StudyRuns) -> list[Assumption]:
+def _assumptions(study: StudyRuns) -> list[AssumptionOfRun]:
     """The assumptions of all runs of a study, by field."""
-    known: dict[str, Assumption] = {}
+    known: dict[str, AssumptionOfRun] = {}
     for run in reversed(study.runs):
         known |= {assumption.field: assumption for assumption in run.case.assumptions}
     return [known[field] for field in sorted(known)]

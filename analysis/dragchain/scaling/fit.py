@@ -17,10 +17,7 @@ from dragchain.errors import TableError
 from dragchain.figures.panels import legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN, drawing, png
 from dragchain.report.page import page_environment
-from dragchain.run.case import Case, load_case
-from dragchain.run.completeness import RunRecord
-from dragchain.run.kinematics import needed
-from dragchain.run.paths.circle import Circle
+from dragchain.run.kinematics import motion_of, needed
 from dragchain.scaling.document import (
     BandPoint,
     CurvePoint,
@@ -35,6 +32,9 @@ from dragchain.statistics import power_law
 from dragchain.statistics.estimate import Estimate, flattened
 from dragchain.statistics.power_law import fit_shifted, fit_two_terms
 from dragdeck.files import write_bytes, write_text
+from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import RunRecord
+from dragdeck.study.paths.circle import CirclePath
 
 _STORED = Path(__file__).parent / "data"
 """The scalings that were measured for the documentation."""
@@ -54,19 +54,20 @@ _UNLIKE = frozenset({"seed"})
 
 
 @dataclass(frozen=True)
-class LevelRun:
+class RunOfScaling:
     """One run of a scaling: its row in ``scaling.json``, and its case."""
 
     row: ScaledRun
-    case: Case
+    case: CaseOfRun
 
     @property
     def gap_particles(self) -> float | None:
         """Gap between workpiece and bowl wall in mean particle diameters; None off a circle."""
-        if not isinstance(self.case.motion, Circle):
+        path = motion_of(self.case).motion.path
+        if not isinstance(path, CirclePath):
             return None
         bowl, workpiece = needed(self.case.bowl, "bowl"), needed(self.case.workpiece, "workpiece")
-        gap = bowl.radius_m - self.case.motion.radius_m - workpiece.radius_m
+        gap = bowl.radius_m - path.radius_m - workpiece.radius_m
         return gap / (2.0 * self.case.media.radius_mean_m)
 
     @property
@@ -77,7 +78,7 @@ class LevelRun:
         return gap / (2.0 * self.case.media.radius_mean_m)
 
 
-def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[LevelRun]:
+def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[RunOfScaling]:
     """Read the runs of a scaling from their tables, ordered by level and bed.
 
     Raises
@@ -91,7 +92,7 @@ def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[LevelRun]:
     return sorted(runs, key=lambda run: (run.row.level, run.row.bed))
 
 
-def _read_run(folder: Path, field: str) -> LevelRun:
+def _read_run(folder: Path, field: str) -> RunOfScaling:
     case = load_case(folder)
     level = case.inputs.get(field)
     if isinstance(level, bool) or not isinstance(level, int | float) or level <= 0:
@@ -111,10 +112,10 @@ def _read_run(folder: Path, field: str) -> LevelRun:
         eta=-drag.mean / (weight * workpiece.immersion_depth_m**2),
         bed=case.upstream.get("filling", case.run),
     )
-    return LevelRun(row, case)
+    return RunOfScaling(row, case)
 
 
-def _check_alike(cases: Sequence[Case], field: str) -> None:
+def _check_alike(cases: Sequence[CaseOfRun], field: str) -> None:
     first, *others = cases
     wanted = {**first.inputs, "fidelity": first.fidelity}
     for case in others:
@@ -194,7 +195,7 @@ def find(
     )
 
 
-def _sample(runs: Sequence[LevelRun]) -> power_law.RunMeans:
+def _sample(runs: Sequence[RunOfScaling]) -> power_law.RunMeans:
     rows = [run.row for run in runs]
     drag = np.array([row.drag_n for row in rows])
     errors = np.array([row.standard_error_n for row in rows]) / drag
@@ -233,7 +234,7 @@ def _shifted(law: power_law.PowerLaw, power: float) -> ShiftedLaw:
     return ShiftedLaw(**vars(found), curve=curve)
 
 
-def _mean_eta(runs: Sequence[LevelRun], law: power_law.PowerLaw) -> Estimate:
+def _mean_eta(runs: Sequence[RunOfScaling], law: power_law.PowerLaw) -> Estimate:
     """Geometric mean of eta over the runs of a law; a trend in it widens the interval."""
     known = [run.row.eta for run in runs if run.row.level in law.runs.levels]
     etas = replace(law.runs, values=np.array(known))
@@ -243,7 +244,7 @@ def _mean_eta(runs: Sequence[LevelRun], law: power_law.PowerLaw) -> Estimate:
     return fit.estimate([1.0]).exp()
 
 
-def _level(law: power_law.PowerLaw, number: int, runs: Sequence[LevelRun]) -> Level:
+def _level(law: power_law.PowerLaw, number: int, runs: Sequence[RunOfScaling]) -> Level:
     x = float(law.runs.levels[number])
     here = [run for run in runs if run.row.level == x]
     return Level(

@@ -12,9 +12,9 @@ import numpy as np
 from pydantic import JsonValue
 
 from dragchain.arrays import Floats
-from dragchain.run.case import Fidelity
-from dragchain.run.completeness import AcceptanceCheck
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import FidelityOfRun
+from dragdeck.records.run import AcceptanceCheck
 
 
 @dataclass(frozen=True)
@@ -219,7 +219,7 @@ class Measures(PathQuantities, Document):
     run: str
     bed: str | None
     inputs: Mapping[str, JsonValue]
-    fidelity: Fidelity
+    fidelity: FidelityOfRun
     numbers: Mapping[str, float] = {}
     complete: bool
     cost: RunCost

@@ -10,8 +10,6 @@ from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.network.write import write_chains
 from dragchain.report.values import LoadMap, Need
-from dragchain.run.case import load_case
-from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.tables.write import write_tables
@@ -28,6 +26,8 @@ from dragchain.windows.estimate import (
     windows_needed,
 )
 from dragchain.windows.load_map import corrected
+from dragdeck.records.case import load_case
+from dragdeck.records.run import RunRecord
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 import pyvista as pv
 from finished_runs import analysed_tiny_run
+from made_run import with_motion
 from tiny_run_files import (
     CHAIN_Z_M,
     LAST,
@@ -181,10 +182,8 @@ def test_the_workpiece_is_where_the_force_was_measured(run: Path) -> None:
 
 def test_the_workpiece_turns_with_its_path(run: Path, edit_json) -> None:
     def circle(case: dict[str, Any]) -> None:
-        case["motion"] = {
-            "kind": "circle", "axis_speed_m_s": 1e-4, "radius_m": 0.02, "direction": "ccw",
-            "start_direction_rad": 0.0, "orientation": "follow_path",
-        }  # fmt: skip
+        path = {"kind": "circle", "radius_m": 0.02}
+        case.update(with_motion(case, path, 1e-4, orientation="follow_path"))
 
     edit_json(run / "case.json", circle)
     force = table(run, "workpiece_force").assign(direction_rad=np.pi / 2)

@@ -25,10 +25,10 @@ from dragchain.report.cost_check import Option, answers, cost_rows, prediction_f
 from dragchain.report.study_report import write_study_report
 from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity
 from dragchain.run.basis import QUANTITIES
-from dragchain.run.case import Case
-from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
 from dragdeck.errors import DocumentError
+from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import RunRecord
 
 RECORD = RunRecord.model_validate(run_json())
 
@@ -104,7 +104,7 @@ def test_no_advice_no_comparison(run: Path, tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_a_prediction_of_other_settings_is_not_compared(run: Path, other: dict[str, Any]) -> None:
-    case = Case.read(run / "case.json")
+    case = CaseOfRun.read(run / "case.json")
     wrong, right = (Option.model_validate(one) for one in (other, option()))
     assert prediction_for(case, [wrong]) is None
     assert prediction_for(case, [wrong, right]) == right

@@ -90,8 +90,8 @@ def test_a_listing_writes_each_column_in_its_form() -> None:
     rows = [("a & b", {"mean": 0.25, "said": "confirmed", **drag}), ("a & b", {"mean": None})]
     text = """{% from "report/macros.html.j2" import listing %}
 {{ listing(rows, [("case", "0", {"a & b": "both"}), ("drag (N)", "1.mean", "measured:3")]) }}
-{% set columns = [("case", "0", ""), ("said", "1.said", "verdict"), ("", "1", "estimate:2")] %}
-{{ listing(rows[:1], columns) }}"""
+{{ listing(rows[:1], [("case", "0", ""), ("said", "1.said", "verdict"),
+                       ("", "1", "estimate:2")]) }}"""
     found = page_environment().from_string(text).render(rows=rows).replace("\n", "")
     assert '<th>case</th><th class="n">drag (N)</th>' in found
     assert '<td>both</td><td class="n">0.250</td>' in found

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from loading_files import made_contacts, write_run
-from made_run import particles_kept, run_json
+from made_run import particles_kept, run_json, with_motion
 from pages import stands_alone
 from report_files import (
     DROP,
@@ -31,8 +31,8 @@ from dragchain.report.findings import FIGURES, FILE
 from dragchain.report.study_report import write_study_report
 from dragchain.report.summary import input_column, main_numbers
 from dragchain.report.values import Need
-from dragchain.run.completeness import RunRecord, refusal
 from dragchain.tables.network_contacts import Corrections
+from dragdeck.records.run import RunRecord, refusal
 
 
 @pytest.fixture
@@ -313,6 +313,8 @@ def with_settings(process: Path, **settings: float) -> Path:
     """The process run with other settings and with its loading."""
     case = json.loads((process / "case.json").read_text())
     case["fidelity"] |= settings
+    circle = {"kind": "circle", "radius_m": 0.02}
+    case = with_motion(case, circle, 0.01, orientation="follow_path")
     (process / "case.json").write_text(json.dumps(case))
     made = write_run(process.parent / "made", made_contacts())
     write_loading(made)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from made_run import with_motion
 from tiny_run_files import DENSITY_KG_M3, GRAVITY_M_S2, RADIUS_M, WORKPIECE_RADIUS_M, case_json
 
 from dragchain.cli import main
@@ -41,15 +42,9 @@ def write_run(tmp_path: Path) -> Writer:
         case["inputs"] |= {**inputs, "seed": seed}
         case["upstream"]["filling"] = f"filling-{seed}"
         case["workpiece"]["immersion_depth_m"] = inputs.get(DEPTH, 0.03)
-        case["motion"] = {
-            **{
-                "kind": "circle",
-                "axis_speed_m_s": 0.01,
-                "radius_m": 0.02,
-                "direction": "ccw",
-            },
-            **{"start_direction_rad": 1.57, "orientation": "follow_path"},
-        }
+        path = {"kind": "circle", "radius_m": 0.02, "revolutions": 1}
+        speed = float(str(inputs.get("motion.speed_m_s", 0.01)))
+        case = with_motion(case, path, speed, orientation="follow_path")
         folder = tmp_path / case["run"]
         (folder / "tables").mkdir(parents=True)
         (folder / "case.json").write_text(json.dumps(case))

@@ -8,7 +8,7 @@ from dragdeck.advice.advise import advised_settings
 from dragdeck.advice.options import with_option
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import CORES_VARIABLE
-from dragdeck.outlook.measured import measured_tradeoff
+from dragdeck.records.tradeoff import measured_tradeoff
 from dragdeck.study.model import Fidelity, Tolerance
 
 

@@ -7,7 +7,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from dragdeck.study.superposed.kind import DragSteps
 
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.decks.render import deck_text
@@ -21,7 +23,6 @@ from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.scene import StudyScene
 from dragdeck.study.base import Json
-from dragdeck.study.superposed.kind import DragSteps
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)
@@ -66,10 +67,10 @@ def script(scene: StudyScene, project: Project) -> str:
 def test_a_run_begins_where_its_course_is(path: str, more: Json, made: Make) -> None:
     case = led(made(STIFF, path=PATHS[path], **more))
     scene, way = process_scene(case, BED), course(case.study, BED)
-    *_, (drag, begun) = way.begun()
     (body,), entry = scene.deck.workpieces, scene.deck.entry_step
-    place = way.pose(drag, begun, entry - way.drag.start)
-    assert (*body.start_m, math.radians(body.turn_deg)) == pytest.approx(place, abs=1e-12)
+    place, rotation = way.poses(way.legs[-1], np.array([entry - way.drag.start]))
+    assert body.start_m == pytest.approx(place[0], abs=1e-12)
+    assert math.radians(body.turn_deg) == pytest.approx(rotation.turn_rad[0], abs=1e-12)
     assert [leg.name for leg in body.legs] == ["drag"]
     assert scene.steps == way.drag.end - entry
 
@@ -98,7 +99,7 @@ def test_a_lead_is_soft_and_ends_where_the_run_goes_on(made: Make, project: Proj
     assert lead is not None
     scene = process_scene(lead, BED)
     assert scene.deck.materials.youngs_modulus_scale == 0.01
-    assert scene.case.marks == ["state.1.restart"]
+    assert scene.case.marks == ("state.1.restart",)
     text = script(scene, project)
     last = scene.case.phases[-1].end_step
     assert f'"run {last} upto" "write_restart state.1.restart"' in text

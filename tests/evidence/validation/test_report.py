@@ -13,11 +13,12 @@ from scipy import stats
 
 from dragchain.errors import SeriesError
 from dragchain.report.page import MINUS, page_environment
-from dragchain.run.case import PublishedDrag, Reference, load_case
 from dragchain.scaling.fit import read_scalings
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import Measures, RunCost
 from dragdeck.errors import DocumentError
+from dragdeck.records.case import load_case
+from dragdeck.study.reference import Drag, Reference
 from evidence.validation import force
 from evidence.validation.force import effect_table, setting_effects
 from evidence.validation.runs import MeasuredRun, RunsByBed, packing_mean, read_validation_runs
@@ -47,8 +48,8 @@ def made_run(
         run=folder.name,
         reference=Reference(
             source="a paper",
-            experiment=PublishedDrag(drag_mean_n=-2.5, drag_std_n=0.5),
-            simulation=PublishedDrag(drag_mean_n=-2.0),
+            experiment=Drag(drag_mean_n=-2.5, drag_std_n=0.5),
+            simulation=Drag(drag_mean_n=-2.0),
         ),
     )
     modulus, step = parameters

@@ -16,9 +16,9 @@ from dragdeck.advice.options import (
     with_option,
 )
 from dragdeck.cases.case import Case
-from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.errors import InputError
-from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
+from dragdeck.records.advised import AdvisedSettings
+from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff
 from dragdeck.study.model import RESTITUTION, Tolerance
 
 
@@ -54,14 +54,14 @@ class Advice:
         )
 
 
-def resolve(case: Case, asked: Tolerance, tradeoff: Tradeoff | None = None) -> Case:
+def resolve(case: Case, asked: Tolerance, tradeoff: TradeoffRecord | None = None) -> Case:
     """The case with the settings that a tolerance asks for; it remembers the question.
 
     Parameters
     ----------
     case : Case
     asked : Tolerance
-    tradeoff : Tradeoff, optional
+    tradeoff : TradeoffRecord, optional
         Instead of `measured_tradeoff`.
 
     Raises
@@ -74,7 +74,7 @@ def resolve(case: Case, asked: Tolerance, tradeoff: Tradeoff | None = None) -> C
     return replace(case, study=study, asked=asked, advised=advice.for_case)
 
 
-def advised_settings(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
+def advised_settings(case: Case, asked: Tolerance, tradeoff: TradeoffRecord) -> Advice:
     """The settings for a tolerance.
 
     Parameters
@@ -82,7 +82,7 @@ def advised_settings(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice
     case : Case
         Its own fidelity does not matter.
     asked : Tolerance
-    tradeoff : Tradeoff
+    tradeoff : TradeoffRecord
         Errors of the drop test, and what steps cost.
 
     Raises

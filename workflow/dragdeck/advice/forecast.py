@@ -11,17 +11,16 @@ from dragdeck import __version__
 from dragdeck.advice.advise import Advice, shown_share
 from dragdeck.advice.options import SCALE, Option, Speed, step_cost, with_option
 from dragdeck.cases.case import Case
-from dragdeck.decks.advised import AdvisedSettings
-from dragdeck.decks.deck import StudyScene
 from dragdeck.documents import Document, Part
 from dragdeck.engine.reports import shown_time
 from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds
-from dragdeck.outlook.measured import Tradeoff
+from dragdeck.records.advised import AdvisedSettings
+from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import FIRST_WINDOWS, with_leads
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.scene import SceneType
+from dragdeck.scenes.scene import SceneType, StudyScene
 from dragdeck.study.base import Json
 from dragdeck.study.model import Fidelity, Tolerance
 
@@ -201,7 +200,7 @@ def forecast(
     option: Option,
     speed: Speed | None,
     results: Path,
-    tradeoff: Tradeoff,
+    tradeoff: TradeoffRecord,
 ) -> Forecast:
     """Steps and wall time of an option.
 
@@ -215,7 +214,7 @@ def forecast(
         Of this machine; None: what earlier runs took, or an assumption.
     results : Path
         The study's results.
-    tradeoff : Tradeoff
+    tradeoff : TradeoffRecord
         What steps of soft particles cost.
     """
     chosen = replace(case, study=with_option(case.study, option))
@@ -240,7 +239,7 @@ def forecast(
 
 
 def _cost(
-    kind: SceneType, scene: StudyScene, speed: Speed | None, results: Path, tradeoff: Tradeoff
+    kind: SceneType, scene: StudyScene, speed: Speed | None, results: Path, tradeoff: TradeoffRecord
 ) -> Cost:
     """Steps and wall time of a scene, by the speed of this machine if it was measured."""
     if speed is None or kind.single_particle:

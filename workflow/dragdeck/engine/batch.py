@@ -9,10 +9,10 @@ import jinja2
 from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import write_run
 from dragdeck.engine.part import STATE_FILE
-from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import Report, silent
 from dragdeck.engine.run_folder import run
 from dragdeck.errors import InputError, RejectedRunError
+from dragdeck.records.run import RunRecord
 
 
 @dataclass(frozen=True)
