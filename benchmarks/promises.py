@@ -31,8 +31,8 @@ from dragdeck.project import Project, by_run
 from dragdeck.records.case import load_case
 from dragdeck.records.run import RunRecord
 from dragdeck.records.tradeoff import measured_tradeoff
-from dragdeck.scenes.dimensionless import describe
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import SCENES
+from dragdeck.scenes.workpiece import describe
 
 TOLERANCE = 0.1
 QUANTITIES = [

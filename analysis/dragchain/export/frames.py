@@ -18,7 +18,7 @@ from dragchain.tables.by_step import RisingSteps, read_groups, read_steps
 from dragchain.tables.columns import CONTACTS, KINEMATICS
 from dragchain.tables.run_folder import WORKPIECE_COLUMNS, Run, workpiece_place
 from dragdeck.records.case import CaseOfRun
-from dragdeck.study.rotation import Rotation
+from dragdeck.study.drive import Rotation
 
 _BODY = {name: body for body, name in KINDS.items()}
 

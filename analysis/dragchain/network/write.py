@@ -24,7 +24,7 @@ from dragchain.network.chains import (
 from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame, network_frames
 from dragchain.network.statistics import cluster_rows, frame_clusters, frame_statistics
 from dragchain.tables.parquet import table_writer, write_parquet
-from dragdeck.study.rotation import wrap_angle
+from dragdeck.study.drive import wrap_angle
 
 
 def chain_table(

@@ -18,7 +18,7 @@ from dragchain.tables.workpiece_contacts import Meshes, WorkpieceFrames, join_wo
 from dragdeck.decks.outputs import OutputOfRun, load_outputs
 from dragdeck.dumps.frame import Columns, Frame
 from dragdeck.records.case import CaseOfRun, load_case
-from dragdeck.study.rotation import Rotation
+from dragdeck.study.drive import Rotation
 
 _BATCH_ROWS = 8192
 """Contacts on the workpiece that are joined at once, but for those of the last frame."""

@@ -46,8 +46,8 @@ from dragchain.report.run_figures import (
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.estimate import Estimate
 from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.study.drive import Rotation
 from dragdeck.study.reference import Drag, Reference
-from dragdeck.study.rotation import Rotation
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
 

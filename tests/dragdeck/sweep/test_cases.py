@@ -13,8 +13,7 @@ from dragdeck.errors import InputError
 from dragdeck.project import Project, by_run
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
-from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.registry import SCENES
+from dragdeck.scenes.process import PROCESS, SCENES, process_scene
 from dragdeck.sweep.cases import load_cases, study_file
 
 

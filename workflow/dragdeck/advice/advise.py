@@ -20,12 +20,16 @@ from dragdeck.physics.rounding import rounded
 from dragdeck.physics.similarity import softest_scale
 from dragdeck.records.advised import AdvisedSettings
 from dragdeck.records.tradeoff import DropEntry, TradeoffRecord, measured_tradeoff
-from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.filling import FILLING, expected_surface, expected_time, filling_cautions
-from dragdeck.scenes.fit import process_cautions
 from dragdeck.scenes.lead import FIRST_WINDOWS, covered_fraction, window_count, window_fraction
-from dragdeck.scenes.legs import plunge_point
-from dragdeck.scenes.workpiece import FACET_STEP_S, PARTICLE_STEPS_PER_S, workpiece_facets
+from dragdeck.scenes.motion import plunge_point
+from dragdeck.scenes.workpiece import (
+    FACET_STEP_S,
+    PARTICLE_STEPS_PER_S,
+    describe,
+    process_cautions,
+    workpiece_facets,
+)
 from dragdeck.study.model import (
     BUILT_IN_FIDELITIES,
     LARGEST_TIMESTEP_FRACTION,

@@ -22,7 +22,7 @@ from dragdeck.physics.packing import Bed
 from dragdeck.records.advice import Speed
 from dragdeck.records.run import RunRecord
 from dragdeck.scenes.filling import FILLING, expected_surface
-from dragdeck.scenes.legs import plunge_point
+from dragdeck.scenes.motion import plunge_point
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import SceneType
 from dragdeck.study.model import Fidelity, Motion, Outputs, Study

@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import BeforeValidator
 
 from dragdeck.documents import Document, Part
-from dragdeck.physics.damping import damping_ratio
+from dragdeck.physics.contact_mechanics import damping_ratio
 
 _DATA = Path(str(resources.files("dragdeck"))) / "data"
 """The records that were measured with this version."""
