@@ -1,8 +1,7 @@
 // What colours and lengths mean.
 import { CLASS_COLOURS } from "./colours.js";
-import { make } from "./dom.js";
-import { CLASSES } from "./frames.js";
-import { digits } from "./numbers.js";
+import { digits, make } from "./dom.js";
+import { CLASSES } from "./data.js";
 
 const SCALES = {
   force: ["Normal force of a contact (N)", 1],
@@ -36,7 +35,7 @@ function classes() {
   const rows = CLASSES.map((name, kind) => {
     const swatch = make("i");
     swatch.style.background = CLASS_COLOURS[kind];
-    return make("div", {}, swatch, name.replace("-", "–"));
+    return make("div", {}, swatch, name);
   });
   return make("div", {}, "Class of a contact", ...rows);
 }
