@@ -3,7 +3,7 @@
 import { BufferAttribute, BufferGeometry, Group, Mesh } from "three";
 import { CHOSEN, COLOURS, rgb } from "./colours.js";
 import { CLASSES, DOMINANT, PATH, QUASI_LINEAR, vector } from "./data.js";
-import { Bodies } from "./network.js";
+import { Bodies } from "./bodies.js";
 import { digits, fixed, whole } from "./dom.js";
 import { facetMaterial } from "./shading.js";
 import { tinted } from "./workpiece.js";

@@ -6,7 +6,7 @@ import { Frames, distance, readColumns } from "./data.js";
 import { byId, digits, fixed, make, seconds, whole } from "./dom.js";
 import { ForceCurve } from "./force_curve.js";
 import { showLegend, showScale } from "./legend.js";
-import { Contacts, Media } from "./network.js";
+import { Contacts, Media } from "./bodies.js";
 import { Player } from "./player.js";
 import { ProfilePlots } from "./profile_plots.js";
 import { PRESETS, View } from "./view.js";
@@ -26,7 +26,8 @@ class Page {
     this.look = {};
     this.chosen = null;
     this.measured = null; // the particles or contacts whose distance is measured
-    for (const [name, colour] of Object.entries(COLOURS))
+    const classes = CLASS_COLOURS.map((colour, kind) => [`class-${kind}`, colour]);
+    for (const [name, colour] of [...Object.entries(COLOURS), ...classes])
       document.documentElement.style.setProperty(`--${name}`, colour); // network.css takes them by name
     this.startCurve(columns);
     this.startScene(columns);
@@ -110,20 +111,12 @@ class Page {
 
   /** What is to be seen: the bowl, or the surroundings of the workpiece in a wide one. */
   area() {
-    const { radius, height } = this.head.bowl;
-    const { reach, x, y } = this.frames.partial
-      ? { reach: this.reach, ...this.workpiece.pose(this.number) }
-      : { reach: radius, x: 0, y: 0 };
+    const { bowl, media } = this.head,
+      { height } = bowl,
+      { partial } = this.frames,
+      { x, y } = partial ? this.workpiece.pose(this.number) : { x: 0, y: 0 },
+      reach = partial ? media.reach : bowl.radius;
     return { centre: new Vector3(x, y, 0.5 * height), radius: Math.hypot(reach, 0.5 * height), reach, height };
-  }
-
-  /** How far the shown particles reach from the workpiece's axis, mm. */
-  get reach() {
-    const { centre } = this.frames.at(0),
-      { x, y } = this.workpiece.pose(0);
-    let reach = 0;
-    for (let k = 0; k < centre.length; k += 3) reach = Math.max(reach, Math.hypot(centre[k] - x, centre[k + 1] - y));
-    return reach;
   }
 
   preset(name) {
@@ -173,8 +166,6 @@ class Page {
     };
     for (const button of byId("presets").children) button.onclick = () => this.preset(button.dataset.preset);
     byId("mean").onclick = () => this.setThreshold(scales.mean);
-    for (const swatch of document.querySelectorAll("[data-class]"))
-      swatch.style.background = CLASS_COLOURS[swatch.dataset.class];
     this.placeSection();
   }
 

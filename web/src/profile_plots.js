@@ -32,11 +32,8 @@ const FORCE = {
 
 const inWords = (value) => (Number.isInteger(value) ? whole(value) : digits(value));
 const highest = (values) => values.reduce((best, value, bin) => (value > values[best] ? bin : best), 0);
-const binOf = (limits, at) =>
-  Math.max(
-    limits.slice(0, -1).findLastIndex((limit) => limit <= at),
-    0,
-  );
+/** The bin that a value is in: how many inner limits are not above it. */
+const binOf = (limits, at) => limits.slice(1, -1).filter((limit) => limit <= at).length;
 const ends = (limits) => [limits[0], limits.at(-1)];
 /** Heights of bars, from zero at the first limit to zero at the last one. */
 const outline = (values) => [0, ...values, 0];

@@ -18,7 +18,7 @@ from dragchain.arrays import Floats, Ints
 from dragchain.drag.around import AZIMUTH_BINS
 from dragchain.drag.azimuth import circumference, parts
 from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import Peaks, drag_peaks, peak_separation_s
+from dragchain.drag.peaks import drag_peaks, peak_separation_s
 from dragchain.errors import TableError
 from dragchain.export.frames import FrameSeries
 from dragchain.figures.style import force_map
@@ -114,8 +114,13 @@ class Shown:
         """The contacts on workpiece and bowl."""
         return self.contacts[self.contacts["b"] > BODIES - len(KINDS)]
 
+    def reach_m(self) -> float:
+        """How far the particles of the first frame are from the workpiece's axis, at most."""
+        first = self.particles[self.particles["frame"] == 0][list(CENTRE)].to_numpy()
+        return float(np.hypot(*(first - self.poses[0, :3])[:, :2].T).max())
 
-def highest_peaks(run: Run) -> Peaks:
+
+def highest_peaks(run: Run) -> pd.DataFrame:
     """The peaks of the drag force in the counted stretch, the highest first, `PEAKS` at most.
 
     Raises
@@ -124,10 +129,8 @@ def highest_peaks(run: Run) -> Peaks:
         If the run is too short to have peaks.
     """
     peaks = drag_peaks(read_counted(run.folder, ("time_s", "drag_n")), run.case)
-    order = np.argsort(peaks.drag_n, kind="stable")[:PEAKS]
-    return Peaks(
-        peaks.index[order], peaks.time_s[order], peaks.drag_n[order], peaks.prominence_n[order]
-    )
+    found = pd.DataFrame({"time_s": peaks.time_s, "drag_n": peaks.drag_n})
+    return found.nsmallest(PEAKS, "drag_n")
 
 
 def shown_frames(run: Run, peak_time_s: Floats) -> FrameSeries:
@@ -237,7 +240,7 @@ def load_scene(run: Run) -> Scene:
         If the run is too short to have peaks.
     """
     case, columns, peaks = run.case, Columns(), highest_peaks(run)
-    series = shown_frames(run, peaks.time_s)
+    series = shown_frames(run, peaks["time_s"].to_numpy())
     shown = read_shown(series)
     times_s = process_time(series.times_s, case)
     headings = _headings(run, series.steps)
@@ -256,6 +259,7 @@ def load_scene(run: Run) -> Scene:
             "radius": 1e3 * case.media.radius_mean_m,
             "count": shown.most,
             "most": MOST_PARTICLES,
+            "reach": 1e3 * shown.reach_m(),
         },
         "workpieces": [_workpiece(columns, run, shown) | {"headings": headings.tolist()}],
         "profiles": profiles(columns, shown, headings, surface),
@@ -374,20 +378,18 @@ def profiles(columns: Columns, shown: Shown, headings: Floats, surface: float) -
         mean = values.mean(axis=0)
         return {"limits": limits.tolist(), "mean": mean.tolist(), "top": float(values.max()) or 1.0}
 
+    rows, sums = (
+        np.bincount(shown.contacts["frame"], weights=weights, minlength=frames)
+        for weights in (None, shown.contacts["normal_force_n"])
+    )
     mean = cells.mean(axis=0)
     return {
         "azimuth": profile("azimuth", np.degrees(circumference(AZIMUTH_BINS)), cells.sum(axis=1)),
         "depth": profile("depth", limits, cells.sum(axis=2) / np.diff(limits)),
-        "size": profile("size", *_sizes(shown.contacts, frames)) | {"means": _means(shown)},
+        "size": profile("size", *_sizes(shown.contacts, frames))
+        | {"means": (sums / np.maximum(rows, 1)).tolist()},
         "map": {"mean": mean.ravel().tolist(), "top": float(mean.max()) or 1.0},
     }
-
-
-def _means(shown: Shown) -> list[float]:
-    """The mean normal force of each frame, N; 0 without contacts."""
-    forces = shown.contacts.groupby("frame")["normal_force_n"].mean()
-    means: list[float] = forces.reindex(range(len(shown.poses)), fill_value=0.0).tolist()
-    return means
 
 
 def _levels(depth: Floats) -> Floats:
@@ -483,11 +485,10 @@ def _curve(columns: Columns, run: Run) -> dict[str, Any]:
     }
 
 
-def _peaks(peaks: Peaks, times_s: Floats, case: Case) -> list[dict[str, Any]]:
+def _peaks(peaks: pd.DataFrame, times_s: Floats, case: Case) -> list[dict[str, Any]]:
     """The highest peaks, each with its nearest frame."""
+    times = process_time(peaks["time_s"].to_numpy(), case).tolist()
     return [
         {"time": time, "force": -drag, "frame": int(np.abs(times_s - time).argmin())}
-        for time, drag in zip(
-            process_time(peaks.time_s, case).tolist(), peaks.drag_n.tolist(), strict=True
-        )
+        for time, drag in zip(times, peaks["drag_n"].tolist(), strict=True)
     ]

@@ -245,8 +245,8 @@ def test_a_section_plane_hides_what_is_beyond_it(page: Browser, run: Path) -> No
     for _ in range(2):
         larger = page.find("#section-side").is_selected()
         kept = set(particles["particle_id"][beyond == larger])
-        ids = page.run("const {media, frames, number} = networkPage;"
-                       "return media.spheres.rows.map(row => frames.at(number).id[row])")  # fmt: skip
+        ids = page.run("const {media: {spheres}, frames, number} = networkPage;"
+                       "return spheres.rows.map(row => frames.at(number).id[row])")  # fmt: skip
         assert set(ids) == kept
         other = contacts["b_id"].isin(kept) | (contacts["b_id"] <= 0)
         inside = (contacts["a_id"].isin(kept) & other).sum()

@@ -93,7 +93,8 @@ export class Media {
   /** Show a frame; `look` is the state of the controls. */
   update(frame, look, colourOf) {
     const onPath = look.path ? particlesOnPath(frame) : new Set(),
-      measure = { speed: frame.speed, displacement: this.frames.moved(frame) }[look.colour];
+      measures = { speed: () => frame.speed, displacement: () => this.frames.moved(frame) },
+      measure = measures[look.colour]?.();
     const plain = rgb(MEDIA),
       path = blend(rgb(COLOURS.dominant_path), [1, 1, 1], 0.25);
     this.spheres.clear();
