@@ -46,7 +46,7 @@ rule all:
     input:
         rules.write_report.output,
         [
-            every(name, *(f"figures/{figure}.png" for figure in scene.figures))
+            WORK.every(name, *(f"figures/{figure}.png" for figure in scene.figures))
             for name, scene in SCENES.items()
         ],
 
@@ -54,19 +54,19 @@ rule all:
 # The drop tests.
 rule drop_test:
     input:
-        every_table("drop_test"),
+        WORK.every_table("drop_test"),
 
 
 # The settled packings.
 rule filling:
     input:
-        every_table("filling"),
+        WORK.every_table("filling"),
 
 
 # The process runs with their tables.
 rule process:
     input:
-        every_table("process"),
+        WORK.every_table("process"),
 
 
 # summary.csv, summary.parquet, summary.xlsx and report.html.
@@ -78,13 +78,13 @@ rule report:
 # The figures of the process runs for a publication: SVG, PDF and PNG at the widths of columns.
 rule figures:
     input:
-        every("process", "figures/journal/workpiece.pdf"),
+        WORK.every("process", "figures/journal/workpiece.pdf"),
 
 
 # The process runs as time series for ParaView and OVITO, with a view for ParaView.
 rule export:
     input:
-        every("process", "export/paraview/run.pvd", "export/paraview/view.py"),
+        WORK.every("process", "export/paraview/run.pvd", "export/paraview/view.py"),
 
 
 # The study's inputs, runs and report as an RO-Crate.

@@ -31,7 +31,7 @@ from paper_drops import FALL_S, HEIGHT, paper_drop, paper_drops  # noqa: E402
 
 from dragchain.arrays import Floats  # noqa: E402
 from dragchain.calibration.fit import calibrate  # noqa: E402
-from dragchain.calibration.measured_impacts import measure  # noqa: E402
+from dragchain.calibration.measured_impacts import measure_impacts  # noqa: E402
 from dragchain.calibration.simulated_drops import Sweep, prepare  # noqa: E402
 from dragchain.loading.samples import (  # noqa: E402
     LEAST_EVENTS,
@@ -39,15 +39,18 @@ from dragchain.loading.samples import (  # noqa: E402
     standard_errors,
 )
 from dragchain.statistics.bed_effects import Factors, fit_effects  # noqa: E402
-from dragchain.statistics.correlated import SLOW_WAVES, estimate_mean  # noqa: E402
+from dragchain.statistics.correlated import (  # noqa: E402
+    SLOW_WAVES,
+    estimate_mean,
+    estimates,
+)
 from dragchain.statistics.estimate import (  # noqa: E402
     NORMAL_QUANTILE,
     Estimate,
     mean_of,
     t_interval,
 )
-from dragchain.statistics.frame_means import estimates  # noqa: E402
-from dragchain.statistics.power_law import Runs, fit_power_law  # noqa: E402
+from dragchain.statistics.power_law import RunMeans, fit_power_law  # noqa: E402
 from dragchain.tradeoff.measures import PathQuantities  # noqa: E402
 from dragchain.windows.estimate import WindowOfRun, WindowsRecord  # noqa: E402
 from dragchain.windows.rounds import judged  # noqa: E402
@@ -136,7 +139,7 @@ def two_parts(random: Random, length: int) -> tuple[Estimate, float]:
     return after.over(before), 1.0
 
 
-def over_packings(random: Random, packings: int) -> tuple[Estimate, float]:
+def mean_over_packings(random: Random, packings: int) -> tuple[Estimate, float]:
     """Mean over packings."""
     return mean_of(random.normal(size=packings)), 0.0
 
@@ -178,7 +181,7 @@ def exponent(random: Random, packings: int, fraction: float = 0.3) -> tuple[Esti
     errors = 0.03 * random.uniform(0.5, 1.5, len(x))
     noise = bed + random.normal(0.0, 0.06 * math.sqrt(1.0 - fraction), len(x))
     values = np.exp(2.0 * np.log(x / 25.0) + noise + random.normal(0.0, errors))
-    return fit_power_law(Runs(x, values, errors, beds)).exponent, 2.0
+    return fit_power_law(RunMeans(x, values, errors, beds)).exponent, 2.0
 
 
 @cache
@@ -190,7 +193,9 @@ def calibration(random: Random, impacts: int) -> tuple[Estimate, float]:
     """Restitution from a noisy record of a drop whose height is known to 0.1 mm."""
     drop = paper_drop(0.68, height=HEIGHT + 1e-4 * random.normal())
     sensor = Sensor(500e3, 0.05, offset_n=4.0, drift_n_per_s=1.0, resolution_n=0.005)
-    found = calibrate(measure(record_of(drop, sensor, random), fall_time_s=FALL_S), _sweep())
+    found = calibrate(
+        measure_impacts(record_of(drop, sensor, random), fall_time_s=FALL_S), _sweep()
+    )
     return found.fit_reference.interval, 0.68
 
 
@@ -258,7 +263,7 @@ KINDS = (
     Simulated("bin of a profile", _EVENTS, (10, 25, 50, 200), profile),
     Simulated("load of a facet", _EVENTS, (10, 25, 50, 200), facet),
     Simulated("ratio of two parts of a run", _TIMES, (10, 20, 40, 80), two_parts),
-    Simulated("mean over packings", _PACKINGS, (2, 4, 8), over_packings),
+    Simulated("mean over packings", _PACKINGS, (2, 4, 8), mean_over_packings),
     Simulated("difference of two cases", _PACKINGS, (2, 3, 4, 8), difference),
     Simulated("effect of a setting", _PACKINGS, (2, 3, 4), effect),
     Simulated(

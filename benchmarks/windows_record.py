@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import polygamma
 
-from dragchain.tradeoff.measures import QUANTITIES, Quantity
+from dragchain.tradeoff.measures import QUANTITIES, Measurand
 from dragchain.windows.estimate import Known, WindowsRecord
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -35,7 +35,7 @@ MOST_DEGREES = 10.0
 
 
 @dataclass(frozen=True)
-class Run:
+class RecordedRun:
     """A quantity of a run: its value, its relative variance along the path, and its blocks."""
 
     scene: str
@@ -46,7 +46,7 @@ class Run:
     blocks: int
 
 
-def runs(quantity: Quantity) -> Iterator[Run]:
+def runs(quantity: Measurand) -> Iterator[RecordedRun]:
     """The quantity in every complete run at the speed of its scene."""
     for archive in ARCHIVES:
         with tarfile.open(archive) as files:
@@ -61,7 +61,7 @@ def runs(quantity: Quantity) -> Iterator[Run]:
                 values = quantity.rooted(np.array(blocks, dtype=np.float64))
                 mean = abs(float(values.mean()))
                 numbers = {key: one for key, one in run["numbers"].items() if key != "particles"}
-                yield Run(
+                yield RecordedRun(
                     scene=f"{archive.name} {sorted(numbers.items())}",
                     scale=run["fidelity"]["youngs_modulus_scale"],
                     step=run["fidelity"]["timestep_fraction"],
@@ -71,9 +71,9 @@ def runs(quantity: Quantity) -> Iterator[Run]:
                 )
 
 
-def known(quantity: Quantity) -> Known | None:
+def known(quantity: Measurand) -> Known | None:
     """What the runs say of a quantity; None if too few scenes have it."""
-    scenes = defaultdict[str, list[Run]](list)
+    scenes = defaultdict[str, list[RecordedRun]](list)
     for run in runs(quantity):
         scenes[run.scene].append(run)
     pairs = [
@@ -99,19 +99,19 @@ def known(quantity: Quantity) -> Known | None:
     )
 
 
-def _mean(every: Sequence[Run]) -> float:
+def _mean(every: Sequence[RecordedRun]) -> float:
     return float(np.mean([run.value for run in every]))
 
 
-def _variance_of_mean(every: Sequence[Run]) -> float:
+def _variance_of_mean(every: Sequence[RecordedRun]) -> float:
     return float(np.mean([run.variance / run.blocks for run in every])) / len(every)
 
 
-def _pooled(every: Sequence[Run]) -> float:
+def _pooled(every: Sequence[RecordedRun]) -> float:
     return float(np.mean([run.variance for run in every]))
 
 
-def _log_variance(every: Sequence[Run]) -> float:
+def _log_variance(every: Sequence[RecordedRun]) -> float:
     """Variance of the logarithm of a variance with so many degrees of freedom."""
     return float(polygamma(1, sum(run.blocks - 1 for run in every) / 2))
 
@@ -124,11 +124,11 @@ def _degrees(excess: float) -> float:
     return float(brentq(lambda degrees: polygamma(1, degrees / 2) - excess, least / 2, most))
 
 
-def _between_packings(scenes: Iterable[list[Run]]) -> float:
+def _between_packings(scenes: Iterable[list[RecordedRun]]) -> float:
     """Relative standard deviation of a mean between packings beyond that along the path."""
     squares, degrees = 0.0, 0
     for every in scenes:
-        groups = defaultdict[tuple[float, float], list[Run]](list)
+        groups = defaultdict[tuple[float, float], list[RecordedRun]](list)
         for run in every:
             groups[run.scale, run.step].append(run)
         for group in groups.values():

@@ -10,33 +10,38 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from dragchain import plot
-    from dragchain.dumps.any_dump import read_dump
-    from dragchain.dumps.frame import Frame
-    from dragchain.dumps.run_parts import iter_frames, iter_prints
     from dragchain.errors import (
-        DumpError,
         RecordError,
         SeriesError,
         TableError,
-        TruncatedDumpError,
         UnknownNameError,
     )
     from dragchain.results import FinishedRun, Study, load
-    from dragchain.run.case import Case, Output, load_case, load_outputs
+    from dragchain.run.run_parts import iter_frames, iter_prints
     from dragchain.statistics.correlated import MeanEstimate, estimate_mean
-    from dragchain.tables.convert import dump_to_parquet
+    from dragchain.tables.parquet import dump_to_parquet
     from dragchain.tables.write import write_tables
-    from dragdeck.errors import DocumentError, DragdeckError, RejectedRunError
+    from dragdeck.decks.outputs import OutputOfRun, load_outputs
+    from dragdeck.dumps.frame import Frame
+    from dragdeck.dumps.reader import read_dump
+    from dragdeck.errors import (
+        DocumentError,
+        DragdeckError,
+        DumpError,
+        RejectedRunError,
+        TruncatedDumpError,
+    )
+    from dragdeck.records.case import CaseOfRun, load_case
 
 __all__ = [
-    "Case",
+    "CaseOfRun",
     "DocumentError",
     "DragdeckError",
     "DumpError",
     "FinishedRun",
     "Frame",
     "MeanEstimate",
-    "Output",
+    "OutputOfRun",
     "RecordError",
     "RejectedRunError",
     "SeriesError",
@@ -57,15 +62,19 @@ __all__ = [
 ]
 
 _MODULES = {
-    "dragchain.dumps.any_dump": ("read_dump",),
-    "dragchain.dumps.frame": ("Frame",),
-    "dragchain.dumps.run_parts": ("iter_frames", "iter_prints"),
     "dragchain.results": ("FinishedRun", "Study", "load"),
-    "dragchain.run.case": ("Case", "Output", "load_case", "load_outputs"),
+    "dragchain.run.run_parts": ("iter_frames", "iter_prints"),
     "dragchain.statistics.correlated": ("MeanEstimate", "estimate_mean"),
-    "dragchain.tables.convert": ("dump_to_parquet",),
+    "dragchain.tables.parquet": ("dump_to_parquet",),
     "dragchain.tables.write": ("write_tables",),
-    "dragdeck.errors": ("DocumentError", "DragdeckError", "RejectedRunError"),
+    "dragdeck.decks.outputs": ("OutputOfRun", "load_outputs"),
+    "dragdeck.dumps.frame": ("Frame",),
+    "dragdeck.dumps.reader": ("read_dump",),
+    "dragdeck.errors": (
+        *("DocumentError", "DragdeckError", "DumpError", "RejectedRunError"),
+        "TruncatedDumpError",
+    ),
+    "dragdeck.records.case": ("CaseOfRun", "load_case"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}
 

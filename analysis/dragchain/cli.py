@@ -80,7 +80,7 @@ COMMANDS = (
     Command("report", "write the report on a study",
             "Write the report on the process runs of a study. It reads their tables and figures "
             "and writes report.html and summary.csv, .parquet and .xlsx to the folder.",
-            "report.study_report:write_report", (
+            "report.study_report:write_study_report", (
         OUT_DIR, RUN_DIRS,
         Argument("--advice", type=Path, metavar="FILE",
                   help="advice.json, made by dragdeck advise, to compare its predicted costs "
@@ -188,7 +188,7 @@ STEPS = (
     Command("calibration-report", "write the report on a calibration",
             "Write the report on a calibration. It reads the CSV file and the results in DIR, and "
             "writes report.html and figures to DIR.",
-            "calibration.report:write_report", (
+            "calibration.report:write_calibration_report", (
                 RECORD,
                 Argument("folder", type=Path, metavar="DIR", help="folder of the calibration"))),
 )  # fmt: skip

@@ -11,7 +11,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from cost_timing import SECONDS, measure
+from cost_timing import SECONDS, time_variants
 from dragdeck.command_line import guarded
 from dragdeck.engine.reports import say
 from dragdeck.project import find_project
@@ -36,7 +36,7 @@ def _measure(asked: argparse.Namespace) -> None:
     project = find_project(Path.cwd())
     case = project.cases(asked.study, asked.fidelity)[0]
     how = {"rounds": asked.rounds, "seconds": asked.seconds, "only": asked.only}
-    measure(case, project.templates, asked.out, say, **how)
+    time_variants(case, project.templates, asked.out, say, **how)
 
 
 if __name__ == "__main__":

@@ -177,10 +177,16 @@ def _in_its_drag(workpiece: MovedWorkpiece, steps: int) -> MovedWorkpiece:
     for leg in workpiece.legs[:-1]:
         u, v, w = leg.velocity_m_s
         x, y, z = (place + leg.duration_s * speed for place, speed in ((x, u), (y, v), (z, w)))
-    last = workpiece.legs[-1]
-    shorter = replace(last.leg, duration_s=last.duration_s * steps / last.steps)
-    drag = replace(last, leg=shorter, start_step=0, end_step=steps)
-    return replace(workpiece, start_m=(x, y, z), legs=(drag,))
+    last, drive = workpiece.legs[-1], workpiece.driven.drive
+    way = replace(workpiece.driven, drive=replace(drive, start=0, end=drive.steps))
+    drag = replace(
+        last,
+        start_step=0,
+        end_step=steps,
+        duration_s=last.duration_s * steps / last.steps,
+        motion=way.motion.path.on_engine(way.drive).ending(workpiece.ending),
+    )
+    return replace(workpiece, start_m=(x, y, z), legs=(drag,), driven=way)
 
 
 # --- beds -----------------------------------------------------------------------------------
@@ -264,7 +270,7 @@ class Beds:
         return self._filled[run]
 
     def _kept(self, name: str, scene: AnyScene) -> str:
-        run = f"{name}-{digest(deck_text(scene, self.batch.templates))}"
+        run = f"{name}-{text_hash(deck_text(scene, self.batch.templates))}"
         self.batch.result(run, scene)
         return self._seen(self.batch.folder / run / "bed.restart")
 
@@ -280,6 +286,6 @@ def _walls(case: Case) -> tuple[float, float | None, Workpiece]:
     return scale, study.bowl.facet_size_m, study.workpiece
 
 
-def digest(text: str) -> str:
+def text_hash(text: str) -> str:
     """The start of a text's hash."""
     return hashlib.sha256(text.encode()).hexdigest()[:8]

@@ -7,7 +7,7 @@ import numpy as np
 from cost_variants import BASES, SceneName, Variant
 from dragchain.statistics.estimate import Estimate, finite, mean_of
 from dragdeck.documents import Document, Part
-from dragdeck.outlook.measured import MeasuredCost
+from dragdeck.records.tradeoff import CostEntry, Machine
 from dragdeck.study.model import Fidelity
 
 
@@ -60,7 +60,7 @@ class RoundsFile(Document):
     rows: Sequence[TimedVariant] = ()
 
 
-class Cost(MeasuredCost):
+class VariantCost(CostEntry):
     """The cost of a variant.
 
     Attributes
@@ -93,14 +93,7 @@ class BaseCost(Part):
     steps_per_s: float
 
 
-class Machine(Part):
-    """Where it was timed."""
-
-    cores: int | None
-    processor: str
-
-
-class CostsFile(Document):
+class TimedCosts(Document):
     """``costs.json``: what each variant costs, and how, when and where that was measured."""
 
     study: str
@@ -113,7 +106,7 @@ class CostsFile(Document):
     machine: Machine
     load_average_before: float
     bases: Sequence[BaseCost]
-    costs: Sequence[Cost]
+    costs: Sequence[VariantCost]
 
 
 def geometric(ratios: Sequence[float]) -> Estimate:
@@ -121,7 +114,9 @@ def geometric(ratios: Sequence[float]) -> Estimate:
     return mean_of(np.log(ratios)).exp()
 
 
-def cost(variant: Variant, rows: Sequence[TimedVariant], steps_s: Mapping[str, float]) -> Cost:
+def cost(
+    variant: Variant, rows: Sequence[TimedVariant], steps_s: Mapping[str, float]
+) -> VariantCost:
     """The cost of a variant.
 
     Parameters
@@ -136,7 +131,7 @@ def cost(variant: Variant, rows: Sequence[TimedVariant], steps_s: Mapping[str, f
     steps_per_second = steps_s[variant.base] / steps_s[variant.name]
     factor = steps_per_second if variant.unit == "per_second" else 1.0
     cpu, wall = map(geometric, zip(*(row.over(row.base) for row in own), strict=True))
-    return Cost(
+    return VariantCost(
         ratio=cpu.value * factor,
         ci95_low=finite(cpu.ci95_low * factor),
         ci95_high=finite(cpu.ci95_high * factor),

@@ -1,8 +1,6 @@
 """Timing of the cost variants: the rounds and the result."""
 
 import os
-import platform
-import re
 import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,9 +9,10 @@ from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 
-from cost_decks import Beds, CostTemplates, TimedDecks, digest, with_own_blocks
-from cost_file import CostsFile, Machine, RoundsFile, TimedVariant, Timing, base_cost, cost
+from cost_decks import Beds, CostTemplates, TimedDecks, text_hash, with_own_blocks
+from cost_file import RoundsFile, TimedCosts, TimedVariant, Timing, base_cost, cost
 from cost_variants import BASES, Variant, standard_case, variant_case, variants
+from dragchain.tradeoff.record import processor
 from dragdeck import __version__
 from dragdeck.cases.case import Case
 from dragdeck.decks import CASE_FILE, DECK_FILE
@@ -21,7 +20,6 @@ from dragdeck.decks.deck import AnyScene
 from dragdeck.decks.render import deck_text, write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.batch import Batch
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.log import engine_errors, loops, reached_end
 from dragdeck.engine.process import Engine, command, execute, find_engine
 from dragdeck.engine.reports import Report
@@ -29,6 +27,8 @@ from dragdeck.engine.run_folder import fingerprint
 from dragdeck.errors import EngineError, InputError, choices
 from dragdeck.files import write_text
 from dragdeck.project import study_templates
+from dragdeck.records.run import CaseFile
+from dragdeck.records.tradeoff import Machine
 from dragdeck.scenes.process import process_scene
 
 SECONDS = 0.15
@@ -44,7 +44,7 @@ _START_FILE = "start.liggghts"
 _ROUNDS_FILE = "rounds.json"
 
 
-def measure(
+def time_variants(
     case: Case,
     templates: Path,
     out: Path,
@@ -211,7 +211,7 @@ class _Bench:
         own = {name: f"{self._write(name, deck)} {deck.ranks}" for name, deck in self.decks.items()}
         where = f"{self.engine.version} {processor()}"
         return {
-            variant.name: digest(f"{where} {own[variant.name]} {own[variant.base]}")
+            variant.name: text_hash(f"{where} {own[variant.name]} {own[variant.base]}")
             for variant in self.variants
         }
 
@@ -223,7 +223,7 @@ class _Bench:
             old.unlink()
         write_run(deck.whole, place, templates)
         write_text(place / _START_FILE, deck_text(deck.start, templates))
-        return fingerprint(place, RunInputs.read(place / CASE_FILE))
+        return fingerprint(place, CaseFile.read(place / CASE_FILE))
 
     def rounds(self, count: int) -> list[TimedVariant]:
         """Time what was not timed yet; the rows of all rounds."""
@@ -288,12 +288,12 @@ def _known_rows(file: Path, inputs: Mapping[str, str], report: Report) -> list[T
     same = [row for row in known.rows if inputs.get(row.name) == row.inputs]
     if len(same) < len(known.rows):
         kept = file.parent / "archive"
-        known.write(kept / f"rounds-{digest(known.as_text())}.json")
+        known.write(kept / f"rounds-{text_hash(known.as_text())}.json")
         report(f"timings of other decks were moved to {kept}")
     return same
 
 
-def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> CostsFile:
+def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> TimedCosts:
     """Content of ``costs.json``."""
     study, steps_s = bench.base.study, bench.timesteps_s
     base_of = {variant.name: variant.base for variant in bench.variants}
@@ -301,7 +301,7 @@ def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> CostsFile:
         base.name: [row.base for row in rows if base_of.get(row.name) == base.name]
         for base in bench.bases
     }
-    return CostsFile(
+    return TimedCosts(
         study=bench.base.study_name,
         fidelity=study.chosen_fidelity(),
         particles=study.media.count,
@@ -314,11 +314,3 @@ def _result(bench: _Bench, rows: Sequence[TimedVariant]) -> CostsFile:
         bases=[base_cost(base, of_base[base.name], steps_s[base.name]) for base in bench.bases],
         costs=[cost(variant, rows, steps_s) for variant in bench.variants],
     )
-
-
-def processor() -> str:
-    """Name of the machine's processor, as far as it is known."""
-    known = Path("/proc/cpuinfo")
-    text = known.read_text(encoding="utf-8") if known.is_file() else ""
-    found = re.search(r"^model name\s*:\s*(.+)$", text, flags=re.MULTILINE)
-    return found.group(1).strip() if found else platform.processor() or platform.machine()

@@ -1,19 +1,18 @@
 """The judgement of a map: class of every point, safe step of every condition and regime."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from pydantic import BeforeValidator
 
-from dragchain.run.completeness import AcceptanceCheck, CheckCode, CheckReason
 from dragchain.statistics.estimate import Estimate, flattened
-from dragdeck.documents import Document, Part
+from dragdeck.records.run import AcceptanceCheck, CheckCode, CheckReason
+from dragdeck.records.stability import Criteria, RestitutionErrors, SafeSteps, StabilityFile
 from evidence.stability.measures import (
     COLUMNS,
     MEASURES,
@@ -98,24 +97,18 @@ class Verdict(NamedTuple):
     check: CheckCode | None = None
 
 
-class _Rule(NamedTuple):
-    """The class of a run whose check of this code did not pass, and the words for it."""
+_Reason = CheckReason | None
 
-    kind: str
-    code: CheckCode
-    reason: CheckReason | None = None
-    why: str = "{}"
-
-
-_RULES = (
-    _Rule(LOST, "no_engine_error", "lost_particles"),
-    _Rule(LOST, "within_limits", "particles", "stopped early: {}"),
-    _Rule(LOST, "particles_kept"),
-    _Rule(ENERGY, "within_limits", why="stopped early: {}"),
-    _Rule(ENERGY, "finite_numbers", why="numbers that are not finite"),
-    _Rule(ENERGY, "at_rest", why="the bed does not come to rest: {}"),
+_CHECKS: tuple[tuple[str, CheckCode, _Reason, str], ...] = (
+    (LOST, "no_engine_error", "lost_particles", "{}"),
+    (LOST, "within_limits", "particles", "stopped early: {}"),
+    (LOST, "particles_kept", None, "{}"),
+    (ENERGY, "within_limits", None, "stopped early: {}"),
+    (ENERGY, "finite_numbers", None, "numbers that are not finite"),
+    (ENERGY, "at_rest", None, "the bed does not come to rest: {}"),
 )
-"""In the order in which they count."""
+"""The class of a run whose check of a code did not pass for a reason (None: any), and the words
+for it, in the order in which they count."""
 
 
 def classify(seen: Seen) -> Verdict:
@@ -123,57 +116,34 @@ def classify(seen: Seen) -> Verdict:
 
     A run that ended is no proof of a stable step: its energy counts too.
     """
-    judges: tuple[Callable[[Seen], Verdict | None], ...] = (
-        _refused,
-        _failed_check,
-        _energy_gained,
-        _overlap_too_large,
-        _inaccurate,
-    )
-    verdicts = (judge(seen) for judge in judges)
-    stable = Verdict(STABLE, "no criterion of the others met")
-    return next((verdict for verdict in verdicts if verdict is not None), stable)
+    return next(_verdicts(seen))
 
 
-def _refused(seen: Seen) -> Verdict | None:
+def _verdicts(seen: Seen) -> Iterator[Verdict]:
+    """All classes that a point falls into, the one that counts first."""
     if seen.refused is not None:
-        return Verdict(REFUSED, seen.refused.replace("\n", " "))
+        yield Verdict(REFUSED, seen.refused.replace("\n", " "))
     error = seen.failed_check("no_engine_error", "other")
-    return None if error is None or seen.steps else Verdict(REFUSED, error.seen, error.code)
-
-
-def _failed_check(seen: Seen) -> Verdict | None:
-    for kind, code, reason, why in _RULES:
-        check = seen.failed_check(code, reason)
-        if check is not None:
-            return Verdict(kind, why.format(check.seen), code)
-    return None
-
-
-def _energy_gained(seen: Seen) -> Verdict | None:
-    limit = ENERGY_LIMITS[seen.regime]
-    if seen.energy_ratio is None or seen.energy_ratio <= limit:
-        return None
-    why = f"energy {seen.energy_ratio:.3g} times what it should be at most (limit {limit:g})"
-    return Verdict(ENERGY, why)
-
-
-def _overlap_too_large(seen: Seen) -> Verdict | None:
-    if seen.overlap_ratio is None or seen.overlap_ratio <= OVERLAP_LIMIT:
-        return None
-    why = f"overlap {seen.overlap_ratio:.3g} of the radius (limit {OVERLAP_LIMIT:g})"
-    return Verdict(OVERLAP, why)
-
-
-def _inaccurate(seen: Seen) -> Verdict | None:
+    if error is not None and not seen.steps:
+        yield Verdict(REFUSED, error.seen, error.code)
+    for kind, code, reason, why in _CHECKS:
+        if check := seen.failed_check(code, reason):
+            yield Verdict(kind, why.format(check.seen), code)
+    ratio, limit = seen.energy_ratio, ENERGY_LIMITS[seen.regime]
+    if ratio is not None and ratio > limit:
+        why = f"energy {ratio:.3g} times what it should be at most (limit {limit:g})"
+        yield Verdict(ENERGY, why)
+    if seen.overlap_ratio is not None and seen.overlap_ratio > OVERLAP_LIMIT:
+        why = f"overlap {seen.overlap_ratio:.3g} of the radius (limit {OVERLAP_LIMIT:g})"
+        yield Verdict(OVERLAP, why)
     if seen.failed:
         why = "; ".join(f"{check.name}: {check.seen}" for check in seen.failed)
-        return Verdict(INACCURATE, why, seen.failed[0].code)
-    for name, error in seen.errors.items():
-        if _at_least(error) > TOLERANCE:
-            why = f"error of the {name} {error.value:+.3g} (tolerance {TOLERANCE:g})"
-            return Verdict(INACCURATE, why)
-    return None
+        yield Verdict(INACCURATE, why, seen.failed[0].code)
+    for name, deviation in seen.errors.items():
+        if _at_least(deviation) > TOLERANCE:
+            why = f"error of the {name} {deviation.value:+.3g} (tolerance {TOLERANCE:g})"
+            yield Verdict(INACCURATE, why)
+    yield Verdict(STABLE, "no criterion of the others met")
 
 
 def _at_least(error: Estimate) -> float:
@@ -192,7 +162,7 @@ _ERRORS = (
 )
 
 
-def judge(runs: Sequence[PointRun]) -> tuple[pd.DataFrame, list[Verdict]]:
+def judge_points(runs: Sequence[PointRun]) -> tuple[pd.DataFrame, list[Verdict]]:
     """Measure and classify all points, condition by condition.
 
     Returns
@@ -293,130 +263,6 @@ def _seen(run: PointRun, own: Row | None, fine: Row | None) -> Seen:
     )
 
 
-# --- the document ------------------------------------------------------------------------------
-
-
-def _to_digits(digits: int) -> BeforeValidator:
-    def rounded(value: object) -> object:
-        if not isinstance(value, float):
-            return value
-        return None if math.isnan(value) else float(f"{value:.{digits}g}")
-
-    return BeforeValidator(rounded)
-
-
-Step = Annotated[float | None, _to_digits(4)]
-"""A step over another, to four digits; NaN becomes None."""
-
-KnownStep = Annotated[float, _to_digits(4)]
-"""The same of a step that is always known."""
-
-Rounded = Annotated[float, _to_digits(3)]
-"""A number to three digits."""
-
-
-class SafeSteps(Part):
-    """The largest safe step of a regime: the smallest of its usable conditions.
-
-    ``..._fraction`` is over the Rayleigh time, ``..._critical`` over the critical step.
-
-    Attributes
-    ----------
-    conditions, usable : int
-        How many there are, and how many of them have a stable reference.
-    base : float or None
-        Safe at the base point.
-    safe, recommended : float
-        Safe in all usable conditions, and that times the safety factor.
-    over_rule : float
-        The safe step over the 20 % rule.
-    stable : float
-        No energy gained and no particle lost in any usable condition.
-    limited_by : str
-        The condition with the smallest safe step.
-    ordinary : float or None
-        Safe without the strongly damped conditions, those below `ORDINARY_RESTITUTION`.
-    """
-
-    conditions: int
-    usable: int
-    base_fraction: Step
-    base_critical: Step
-    safe_fraction: KnownStep
-    recommended_fraction: KnownStep
-    over_rule: KnownStep
-    stable_fraction: Step
-    safe_critical: Step
-    recommended_critical: Step
-    stable_critical: Step
-    limited_by: str
-    ordinary_fraction: Step
-    ordinary_critical: Step
-
-
-class RestitutionErrors(Part):
-    """Errors of head-on impacts in bins of steps per contact, fewest steps first.
-
-    Attributes
-    ----------
-    steps_per_contact : (B,) tuple of float
-        Geometric mean of a bin.
-    median : (B,) tuple of float
-        Of the largest restitution error among a run's impacts.
-    worst, ordinary_worst : (B,) tuple of float
-        Largest of the bin and of all with more steps; ordinary: where the restitution is at least
-        `ORDINARY_RESTITUTION`.
-    peak_force_worst : (B,) tuple of float
-        The same of the relative error of the peak force.
-    runs : (B,) tuple of int
-    """
-
-    steps_per_contact: tuple[Rounded, ...]
-    median: tuple[Rounded, ...]
-    ordinary_worst: tuple[Rounded, ...]
-    worst: tuple[Rounded, ...]
-    peak_force_worst: tuple[Rounded, ...]
-    runs: tuple[int, ...]
-
-
-class Criteria(Part):
-    """The limits that points were classified with; see `ENERGY_LIMITS` and `OVERLAP_LIMIT`."""
-
-    tolerance: float
-    overlap_limit: float
-    energy_limits: Mapping[str, float]
-    rest_floor: float
-
-
-class StabilityFile(Document):
-    """The content of ``stability.json``.
-
-    Attributes
-    ----------
-    measured : str
-        Date of the last run.
-    points : int
-    engine_wall_time_s : float
-        Of all runs.
-    safety_factor : float
-        Recommended over safe step.
-    regimes : mapping of str to SafeSteps
-    """
-
-    remedy = "make it with: snakemake stability"
-
-    commands: tuple[str, ...]
-    engine_versions: tuple[str, ...]
-    dragdeck_versions: tuple[str, ...]
-    measured: str
-    points: int
-    engine_wall_time_s: float
-    safety_factor: float
-    criteria: Criteria
-    regimes: Mapping[str, SafeSteps]
-    restitution_error: RestitutionErrors
-
-
 # --- the largest safe steps --------------------------------------------------------------------
 
 SAFETY_FACTOR = 0.8
@@ -435,7 +281,7 @@ _NOT_SAFE = (INACCURATE, *UNSTABLE, REFUSED)
 """A large overlap comes from load and stiffness, not from the step: it limits no step."""
 
 
-def safe_fraction(points: pd.DataFrame, bad: Sequence[str]) -> float:
+def largest_safe(points: pd.DataFrame, bad: Sequence[str]) -> float:
     """Largest step below which no point of a condition is of a bad class.
 
     Parameters
@@ -474,8 +320,8 @@ def conditions(points: pd.DataFrame) -> pd.DataFrame:
 def _safe_steps(points: pd.DataFrame) -> dict[str, object]:
     reference = points[points["reference"]].iloc[0]
     usable = reference["class"] == STABLE
-    safe = safe_fraction(points, _NOT_SAFE) if usable else math.nan
-    stable = safe_fraction(points, (*UNSTABLE, REFUSED))
+    safe = largest_safe(points, _NOT_SAFE) if usable else math.nan
+    stable = largest_safe(points, (*UNSTABLE, REFUSED))
     per_rayleigh = reference["rayleigh_time_s"] / reference["critical_step_s"]
     return {
         **{name: reference[name] for name in ("regime", "condition", "axis", "label")},
@@ -514,28 +360,27 @@ def _regime(found: pd.DataFrame) -> SafeSteps:
     base = usable[usable["axis"] == "base"]
     ordinary = usable[usable["restitution"] >= _ORDINARY_RESTITUTION]
     worst = usable.sort_values("safe_fraction", kind="stable").iloc[0]
-    safe, safe_critical = float(worst["safe_fraction"]), float(usable["safe_critical"].min())
-    return SafeSteps(
-        conditions=len(found),
-        usable=len(usable),
-        base_fraction=_least(base["safe_fraction"]),
-        base_critical=_least(base["safe_critical"]),
-        safe_fraction=safe,
-        recommended_fraction=SAFETY_FACTOR * safe,
-        over_rule=safe / RULE,
-        stable_fraction=_least(usable["stable_fraction"]),
-        safe_critical=safe_critical,
-        recommended_critical=SAFETY_FACTOR * safe_critical,
-        stable_critical=_least(usable["stable_critical"]),
-        limited_by=str(worst["label"]),
-        ordinary_fraction=_least(ordinary["safe_fraction"]),
-        ordinary_critical=_least(ordinary["safe_critical"]),
+    least = {
+        f"{name}_{unit}": float(rows[f"{kind}_{unit}"].min())
+        for unit in ("fraction", "critical")
+        for name, rows, kind in (
+            ("base", base, "safe"),
+            ("safe", usable, "safe"),
+            ("stable", usable, "stable"),
+            ("ordinary", ordinary, "safe"),
+        )
+    }
+    return SafeSteps.model_validate(
+        {
+            **least,
+            "conditions": len(found),
+            "usable": len(usable),
+            "limited_by": str(worst["label"]),
+            "over_rule": least["safe_fraction"] / RULE,
+            "recommended_fraction": SAFETY_FACTOR * least["safe_fraction"],
+            "recommended_critical": SAFETY_FACTOR * least["safe_critical"],
+        }
     )
-
-
-def _least(values: "pd.Series[float]") -> float:
-    """The smallest value; NaN for none."""
-    return float(values.min())
 
 
 def head_on_impacts(points: pd.DataFrame) -> pd.DataFrame:
@@ -549,7 +394,7 @@ def head_on_impacts(points: pd.DataFrame) -> pd.DataFrame:
     ]
 
 
-def error_table(points: pd.DataFrame) -> RestitutionErrors:
+def restitution_errors(points: pd.DataFrame) -> RestitutionErrors:
     """Restitution error against steps per contact, over all head-on impacts that ended."""
     impacts = head_on_impacts(points)
     impacts = impacts[impacts["state"] == "complete"]
@@ -577,7 +422,9 @@ def _envelope(
     return tuple(np.maximum.accumulate(largest[::-1])[::-1].tolist())
 
 
-def summarise(points: pd.DataFrame, found: pd.DataFrame, runs: Sequence[PointRun]) -> StabilityFile:
+def summarise_map(
+    points: pd.DataFrame, found: pd.DataFrame, runs: Sequence[PointRun]
+) -> StabilityFile:
     """What ``dragdeck check`` uses: safe steps, errors of impacts, and where they come from.
 
     Parameters
@@ -604,5 +451,5 @@ def summarise(points: pd.DataFrame, found: pd.DataFrame, runs: Sequence[PointRun
             rest_floor=REST_FLOOR,
         ),
         regimes=regimes(found),
-        restitution_error=error_table(points),
+        restitution_error=restitution_errors(points),
     )

@@ -14,6 +14,7 @@ from dragchain.arrays import Floats
 from dragchain.figures.panels import head, key, legend_below, log_ticks, new_panels, row_names
 from dragchain.figures.style import BLUE, GREEN, GREY, INK, ORANGE, RED
 from dragchain.report.campaign import write_report
+from dragdeck.records.stability import RestitutionErrors
 from evidence.stability.judge import (
     CLASSES,
     ENERGY,
@@ -24,11 +25,10 @@ from evidence.stability.judge import (
     RULE,
     STABLE,
     TOLERANCE,
-    RestitutionErrors,
     conditions,
     head_on_impacts,
-    judge,
-    summarise,
+    judge_points,
+    summarise_map,
 )
 from evidence.stability.measures import PointRun, read_points
 from evidence.stability.points import REGIMES
@@ -53,21 +53,20 @@ def write_stability(out_dir: Path, lists: Sequence[Path]) -> None:
         A run was interrupted.
     """
     runs = read_points(lists)
-    points, verdicts = judge(runs)
+    points, verdicts = judge_points(runs)
     found = conditions(points)
-    summary, sizes = summarise(points, found, runs), _run_sizes(runs)
+    summary, sizes = summarise_map(points, found, runs), _run_sizes(runs)
     tested = points[~points["reference"]]
     axes = points.groupby(["regime", "axis"], sort=False)["label"]
     write_report(
         out_dir,
         "stability/stability.html.j2",
-        draw=lambda: draw(points, found, summary.restitution_error, sizes),
+        draw=lambda: draw_map(points, found, summary.restitution_error, sizes),
         tables={"points": points, "conditions": found},
         documents={"stability": summary},
         package="evidence",
         summary=summary,
         sizes=sizes,
-        regimes=[{"regime": name, **dict(row)} for name, row in summary.regimes.items()],
         class_names=CLASSES,
         classes=[
             {"regime": regime, **Counter(dict.fromkeys(CLASSES, 0)), **Counter(own["class"])}
@@ -127,7 +126,7 @@ _TITLES = {
 }
 
 
-def draw(
+def draw_map(
     points: pd.DataFrame,
     conditions: pd.DataFrame,
     errors: RestitutionErrors,

@@ -28,7 +28,7 @@ from evidence.stability.points import (
     bed_settings,
     load_points,
 )
-from evidence.stability.scenes import Impact, LoadedPacking, column_scene, impact_scene
+from evidence.stability.scenes import ImpactSettings, LoadedPacking, column_scene, impact_scene
 
 _BED_ENERGY_RATIO = 1e-4
 """When such a bed counts as settled: without friction single particles go round for long."""
@@ -160,7 +160,7 @@ def _case(base: Case, point: Point) -> Case:
 
 
 def _impact(base: Case, point: Point) -> AnyScene:
-    how = Impact(*map(point.number, ("speed_m_s", "angle_deg", "size_ratio")))
+    how = ImpactSettings(*map(point.number, ("speed_m_s", "angle_deg", "size_ratio")))
     return impact_scene(_case(base, point), point.name, how, point.fraction)
 
 

@@ -7,7 +7,6 @@ from typing import Literal
 from dragdeck.cases.bed import bed_rayleigh_time, particle_material, skin
 from dragdeck.cases.case import Case
 from dragdeck.decks import PACKING_FILE, outputs
-from dragdeck.decks.case_file import BowlOfRun, CaseOfStudy, MediaOfRun, Phase
 from dragdeck.decks.data_file import Body, data_file
 from dragdeck.decks.deck import Deck, Scene
 from dragdeck.documents import Part
@@ -19,6 +18,8 @@ from dragdeck.physics.contact_mechanics import (
 )
 from dragdeck.physics.rounding import timestep
 from dragdeck.physics.run_limits import RunLimits, run_limits
+from dragdeck.records.case import BowlOfRun, CaseOfRun, MediaOfRun
+from dragdeck.records.run import Phase
 from dragdeck.scenes.filling import box_top, filling_content
 from dragdeck.scenes.scene import case_of_study, material_table
 
@@ -35,7 +36,7 @@ _CONTACT_TIMES = 4
 
 
 @dataclass(frozen=True)
-class Impact:
+class ImpactSettings:
     """How two bodies meet.
 
     Attributes
@@ -85,7 +86,7 @@ class ImpactOfRun(Part):
     contact_time_s: float
 
 
-class ImpactCase(CaseOfStudy):
+class ImpactCase(CaseOfRun):
     """Single impacts."""
 
     scene: Literal["impact"] = "impact"
@@ -93,7 +94,9 @@ class ImpactCase(CaseOfStudy):
     limits: RunLimits
 
 
-def impact_scene(case: Case, run: str, impact: Impact, fraction: float) -> Scene[ImpactCase]:
+def impact_scene(
+    case: Case, run: str, impact: ImpactSettings, fraction: float
+) -> Scene[ImpactCase]:
     """Impacts of the mean particle at a time step.
 
     Parameters
@@ -102,7 +105,7 @@ def impact_scene(case: Case, run: str, impact: Impact, fraction: float) -> Scene
         Gives the particle, its material and its pair with itself.
     run : str
         The run id.
-    impact : Impact
+    impact : ImpactSettings
     fraction : float
         Time step over the Rayleigh time of the striking particle, the smaller one.
 
@@ -171,7 +174,7 @@ def impact_scene(case: Case, run: str, impact: Impact, fraction: float) -> Scene
     return Scene(deck=deck, case=content, steps=steps, files=files)
 
 
-def _bodies(radius_m: float, density_kg_m3: float, impact: Impact, dt: float) -> list[Body]:
+def _bodies(radius_m: float, density_kg_m3: float, impact: ImpactSettings, dt: float) -> list[Body]:
     """A striking particle for each phase, and the particle it strikes if it is no plate."""
     normal = impact.normal_speed_m_s
     along = impact.speed_m_s * math.sin(math.radians(impact.angle_deg))
@@ -219,7 +222,7 @@ class LoadedPacking(Part):
     load_factor: float
 
 
-class ColumnCase(CaseOfStudy):
+class ColumnCase(CaseOfRun):
     """Particles at rest."""
 
     scene: Literal["column"] = "column"

@@ -9,11 +9,9 @@ from pydantic import JsonValue
 from scipy import signal, stats
 
 from dragchain.arrays import Floats
-from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import find_drag_peaks, peak_separation_s
+from dragchain.drag import find_drag_peaks, peak_separation_s, read_counted
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.document import FILE, ContactType, Loading
-from dragchain.run.case import Case
 from dragchain.run.kinematics import drag_start_s
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.bed_effects import fit_effects
@@ -21,7 +19,8 @@ from dragchain.statistics.correlated import MeanEstimate, estimate_mean
 from dragchain.statistics.estimate import Estimate, Real
 from dragchain.tables.by_step import read_table
 from dragdeck.documents import Part
-from evidence.validation.runs import MeasuredRun, RunsByBed, over_packings
+from dragdeck.records.case import CaseOfRun
+from evidence.validation.runs import MeasuredRun, RunsByBed, packing_mean
 
 _COMPONENTS = ("drag_n", "lateral_n", "vertical_n")
 
@@ -62,7 +61,7 @@ class Likeness(Part):
     standard_error_within_n: Real
 
 
-class Peaks(Part):
+class PeakCounts(Part):
     """Peaks of the drag.
 
     Attributes
@@ -113,7 +112,7 @@ class Force(Part):
     packings: tuple[PackingForce, ...]
     together: Mapping[str, Together]
     alike: Likeness
-    peaks: Peaks
+    peaks: PeakCounts
     spectrum: Spectrum
 
 
@@ -159,8 +158,8 @@ def _packing_force(run: MeasuredRun) -> PackingForce:
 
 def _together(means: Sequence[MeanEstimate]) -> Together:
     return Together(
-        mean=over_packings([one.mean for one in means]),
-        std=over_packings([one.std for one in means], ratio=True),
+        mean=packing_mean([one.mean for one in means]),
+        std=packing_mean([one.std for one in means], ratio=True),
     )
 
 
@@ -183,7 +182,7 @@ def _alike(drags: Sequence[MeanEstimate]) -> Likeness:
     )
 
 
-def _peaks(packings: Sequence[MeasuredRun]) -> Peaks:
+def _peaks(packings: Sequence[MeasuredRun]) -> PeakCounts:
     """Peaks by the rule of docs/reference/results.md, at three least prominences."""
     counts: dict[float, list[float]] = {factor: [] for factor in _PROMINENCES}
     times, largest = [], []
@@ -201,8 +200,8 @@ def _peaks(packings: Sequence[MeasuredRun]) -> Peaks:
             if factor == 1.0:
                 times.append(tuple((peaks.time_s - drag_start_s(run.case)).tolist()))
                 largest.append(float(peaks.drag_n.min(initial=math.inf)))
-    return Peaks(
-        per_metre={f"{factor:g}": over_packings(found) for factor, found in counts.items()},
+    return PeakCounts(
+        per_metre={f"{factor:g}": packing_mean(found) for factor, found in counts.items()},
         process_time_s=tuple(times),
         largest_n=tuple(largest),
     )
@@ -231,7 +230,7 @@ def spectrum(packings: Sequence[MeasuredRun]) -> Spectrum:
     return Spectrum(
         waves_per_diameter=tuple(grid.tolist()),
         density=Density(mean=mean, ci95_low=low, ci95_high=high),
-        half_wave=over_packings(halves, ratio=True),
+        half_wave=packing_mean(halves, ratio=True),
     )
 
 
@@ -240,7 +239,7 @@ def _half_wave(waves: Floats, density: Floats) -> float:
     return float(1.0 / np.interp(0.5 * total[-1], total - 0.5 * density, waves))
 
 
-def compare(drag: Together, case: Case) -> tuple[Compared, ...]:
+def compare_drag(drag: Together, case: CaseOfRun) -> tuple[Compared, ...]:
     """Mean and standard deviation of the drag beside every reference figure of the study."""
     return tuple(
         Compared(
@@ -293,7 +292,7 @@ class Effect(Part):
     exponent_ci95_high: float | None
 
 
-def effects(runs: RunsByBed) -> list[Effect]:
+def setting_effects(runs: RunsByBed) -> list[Effect]:
     """The effect of every other setting on the mean drag and on its standard deviation.
 
     All runs are fitted together (`bed_effects`): one mean per setting, one variance for all, in
@@ -420,7 +419,7 @@ def load_of_packings(packings: Sequence[MeasuredRun]) -> LoadingOverPackings:
     first, numbers = every[0], [_numbers(one) for one in every]
     return LoadingOverPackings(
         rows=tuple(
-            LoadingRow(label=key[0], unit=key[1], **vars(over_packings([n[key] for n in numbers])))
+            LoadingRow(label=key[0], unit=key[1], **vars(packing_mean([n[key] for n in numbers])))
             for key in numbers[0]
         ),
         types={kind: _shares([one.types[kind] for one in every]) for kind in first.types},
@@ -448,7 +447,7 @@ def _numbers(loading: Loading) -> dict[tuple[str, str], float]:
 
 def _shares(types: Sequence[ContactType]) -> dict[str, Estimate]:
     return {
-        name: over_packings([100.0 * one.fraction_of[name].value for one in types])
+        name: packing_mean([100.0 * one.fraction_of[name].value for one in types])
         for name in _SHARES
     }
 

@@ -24,14 +24,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.signal import find_peaks
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import drag_peaks, peak_separation_s
+from dragchain.drag import drag_peaks, peak_separation_s, read_counted
 from dragchain.errors import TableError
 from dragchain.network.chains import dominant_path, widest_paths
-from dragchain.network.frame import WORKPIECE, NetworkFrame, read_frames
-from dragchain.run.case import load_case
+from dragchain.network.frame import WORKPIECE, NetworkFrame, network_frames
 from dragchain.statistics.estimate import Estimate, Real, Verdict, mean_of
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import load_case
 
 # --- tests by circular shifts ------------------------------------------------------------------
 
@@ -295,7 +294,7 @@ class RunRow(Part):
     peaks: int
 
 
-class Findings(Document):
+class PeakFindings(Document):
     """The content of ``peaks.json``."""
 
     runs: tuple[RunRow, ...]
@@ -308,7 +307,7 @@ class Findings(Document):
         return pd.DataFrame([dict(test) for test in self.tests])
 
 
-def of_runs(run_dirs: Sequence[Path]) -> Findings:
+def of_runs(run_dirs: Sequence[Path]) -> PeakFindings:
     """Test the runs, which differ by their packing, and judge the statements.
 
     Raises
@@ -316,10 +315,10 @@ def of_runs(run_dirs: Sequence[Path]) -> Findings:
     TableError
         A table is missing, or a run has no peak.
     """
-    return findings([read_run(folder) for folder in run_dirs])
+    return peak_findings([read_run(folder) for folder in run_dirs])
 
 
-def findings(runs: Sequence[ChainSeries], count: int = SHIFTS) -> Findings:
+def peak_findings(runs: Sequence[ChainSeries], count: int = SHIFTS) -> PeakFindings:
     """Make all tests, each with so many shifts, and judge the statements."""
     shifts = draw_shifts([len(run.time_s) for run in runs], count)
     tests = [_difference(runs, shifts, name) for name in DESCRIPTORS]
@@ -329,17 +328,17 @@ def findings(runs: Sequence[ChainSeries], count: int = SHIFTS) -> Findings:
     ]
     adjusted = holm([test.p for test in tests]).tolist()
     tests = [test.model_copy(update={"p_holm": p}) for test, p in zip(tests, adjusted, strict=True)]
-    return Findings(
+    return PeakFindings(
         runs=tuple(
             RunRow(run=run.run, frames=len(run.time_s), peaks=len(run.peaks)) for run in runs
         ),
         shifts=count,
-        statements=tuple(judge(name, tests) for name in get_args(Statement)),
+        statements=tuple(judge_statement(name, tests) for name in get_args(Statement)),
         tests=tuple(tests),
     )
 
 
-def judge(statement: Statement, tests: Sequence[PeakTest]) -> Judgement:
+def judge_statement(statement: Statement, tests: Sequence[PeakTest]) -> Judgement:
     """The verdict on a statement.
 
     Confirmed if a test supports it and all but the conservative one confirm it; contradicted if no
@@ -368,7 +367,7 @@ def read_run(run_dir: Path) -> ChainSeries:
         If a table is missing, or the drag has no peak.
     """
     case = load_case(run_dir)
-    rows = [{"time_s": frame.time_s, **chain_numbers(frame)} for frame in read_frames(run_dir)]
+    rows = [{"time_s": frame.time_s, **chain_numbers(frame)} for frame in network_frames(run_dir)]
     columns = {name: np.array([row[name] for row in rows]) for name in ("time_s", *DESCRIPTORS)}
     time_s = columns.pop("time_s")
     peak_s = drag_peaks(read_counted(run_dir, ("time_s", "drag_n")), case).time_s

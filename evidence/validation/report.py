@@ -10,8 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import drag_peaks
+from dragchain.drag import drag_peaks, read_counted
 from dragchain.figures.panels import (
     band,
     compass,
@@ -37,18 +36,18 @@ from evidence.validation.force import (
     Force,
     LoadingOverPackings,
     Spectrum,
-    compare,
+    compare_drag,
     effect_table,
-    effects,
     facets,
     force_of_packings,
     load_of_packings,
+    setting_effects,
 )
-from evidence.validation.runs import MeasuredRun, RunsByBed, read_runs
+from evidence.validation.runs import MeasuredRun, RunsByBed, read_validation_runs
 from evidence.validation.statements import (
     Claim,
     Network,
-    Profile,
+    PackingProfile,
     Statements,
     claim_table,
     claims,
@@ -94,8 +93,8 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     SeriesError
         There are too few runs to compare settings.
     """
-    runs = read_runs(run_dirs)
-    first, found = runs.packings[0], validate(runs, command)
+    runs = read_validation_runs(run_dirs)
+    first, found = runs.packings[0], validation_of(runs, command)
     peaks = chain_peaks.of_runs([run.folder for run in runs.packings])
     write_report(
         out_dir,
@@ -114,7 +113,7 @@ def write_validation(out_dir: Path, run_dirs: Sequence[Path], command: str) -> N
     )
 
 
-def validate(runs: RunsByBed, command: str) -> Validation:
+def validation_of(runs: RunsByBed, command: str) -> Validation:
     """All numbers of the page but those of peaks and chains."""
     first = runs.packings[0]
     force, statements = force_of_packings(runs.packings), of_packings(runs.packings)
@@ -125,12 +124,12 @@ def validate(runs: RunsByBed, command: str) -> Validation:
         versions=first.measures.versions,
         engine_hours=sum(run.measures.cost.cpu_time_s for run in runs.all) / 3600.0,
         force=force,
-        comparison=compare(force.together["drag_n"], first.case),
+        comparison=compare_drag(force.together["drag_n"], first.case),
         load=load_of_packings(runs.packings),
         statements=statements,
         scalings=tuple(_scalings_of(first.measures.numbers)),
         claims=claims(statements),
-        effects=tuple(effects(runs)),
+        effects=tuple(setting_effects(runs)),
     )
 
 
@@ -181,7 +180,7 @@ def _side(side: str, columns: EstimateColumns) -> dict[str, Sequence[float]]:
     return {f"{side}_{name}_n": values for name, values in vars(columns).items()}
 
 
-def _profile(profile: Profile, unit: str) -> pd.DataFrame:
+def _profile(profile: PackingProfile, unit: str) -> pd.DataFrame:
     values = profile.model_dump(exclude={"edges"})
     return pd.DataFrame({**_bins(profile.edges, unit), **values})
 

@@ -10,10 +10,10 @@ import numpy as np
 from pydantic import JsonValue
 
 from dragchain.errors import SeriesError, TableError
-from dragchain.run.case import Case, load_case
 from dragchain.statistics.estimate import Estimate, mean_of
-from dragchain.tradeoff.compare import Setting, changed_settings
+from dragchain.tradeoff.compare import Setting, differing_inputs
 from dragchain.tradeoff.measures import FILE, Measures
+from dragdeck.records.case import CaseOfRun, load_case
 
 _FEWEST = 2
 """Packings below which nothing is known of the differences between them."""
@@ -26,14 +26,14 @@ class MeasuredRun:
     Attributes
     ----------
     folder : Path
-    case : Case
+    case : CaseOfRun
     measures : Measures
     changed : mapping
         Dotted names and values of the inputs that differ from the reference's.
     """
 
     folder: Path
-    case: Case
+    case: CaseOfRun
     measures: Measures
     changed: Mapping[str, JsonValue]
 
@@ -74,7 +74,7 @@ class RunsByBed:
         return [*self.packings, *self.others]
 
 
-def read_runs(folders: Sequence[Path]) -> RunsByBed:
+def read_validation_runs(folders: Sequence[Path]) -> RunsByBed:
     """Read the runs of a validation; the first is the reference.
 
     Parameters
@@ -94,7 +94,7 @@ def read_runs(folders: Sequence[Path]) -> RunsByBed:
     if not standard.complete:
         raise TableError(f"{folders[0]}: the reference run is not complete, so nothing is known")
     first, *runs = (
-        MeasuredRun(folder, load_case(folder), own, changed_settings(own, standard))
+        MeasuredRun(folder, load_case(folder), own, differing_inputs(own, standard))
         for folder, own in measures.items()
         if own.complete
     )
@@ -108,7 +108,7 @@ def read_runs(folders: Sequence[Path]) -> RunsByBed:
     return RunsByBed(sorted(packings, key=lambda run: run.seed), others)
 
 
-def over_packings(values: Sequence[float], *, ratio: bool = False) -> Estimate:
+def packing_mean(values: Sequence[float], *, ratio: bool = False) -> Estimate:
     """The mean of one number per packing, with the interval that their differences give.
 
     Student's t with one degree of freedom less than there are packings: nothing is

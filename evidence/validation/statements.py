@@ -13,17 +13,23 @@ import pandas as pd
 from scipy.stats import binned_statistic
 
 from dragchain.arrays import Floats
-from dragchain.drag.around import AZIMUTH_BINS, DEPTH_BINS
-from dragchain.drag.azimuth import circumference, parts, to_the_left, within
-from dragchain.drag.force import read_counted
+from dragchain.drag import (
+    AZIMUTH_BINS,
+    DEPTH_BINS,
+    circumference,
+    parts,
+    read_counted,
+    to_the_left,
+    within_angle,
+)
 from dragchain.errors import TableError
-from dragchain.run.case import Case
-from dragchain.run.kinematics import needed
-from dragchain.run.paths.circle import Circle
+from dragchain.run.kinematics import motion_of, needed
 from dragchain.statistics.estimate import Estimate, EstimateColumns, Real, Verdict
 from dragchain.tables.by_step import read_groups, read_table
 from dragdeck.documents import Part
-from evidence.validation.runs import MeasuredRun, over_packings
+from dragdeck.records.case import CaseOfRun
+from dragdeck.study.paths.circle import CirclePath
+from evidence.validation.runs import MeasuredRun, packing_mean
 
 # --- the network in a corridor along the motion ------------------------------------------------
 
@@ -111,18 +117,18 @@ def network(corridors: Sequence[Corridor]) -> Network:
         wall_diameters=corridors[0].wall,
         ahead_n=bin_by_bin(ahead),
         behind_n=bin_by_bin(behind),
-        far_n=over_packings(far),
-        ratio=over_packings(ratios, ratio=True),
-        at_wall=over_packings(at_wall, ratio=True),
+        far_n=packing_mean(far),
+        ratio=packing_mean(ratios, ratio=True),
+        at_wall=packing_mean(at_wall, ratio=True),
         half_reach_diameters=(
-            over_packings(reached, ratio=True) if len(reached) == len(reaches) else None
+            packing_mean(reached, ratio=True) if len(reached) == len(reaches) else None
         ),
     )
 
 
 def bin_by_bin(curves: Floats) -> EstimateColumns:
     """The mean over packings of a curve per packing, (packings, bins)."""
-    return EstimateColumns.of([over_packings(column.tolist()) for column in curves.T])
+    return EstimateColumns.of([packing_mean(column.tolist()) for column in curves.T])
 
 
 def corridor(run: MeasuredRun) -> Corridor:
@@ -134,13 +140,14 @@ def corridor(run: MeasuredRun) -> Corridor:
         The workpiece does not run on a circle about the bowl's axis.
     """
     case = run.case
-    if case.bowl is None or case.surface_m is None or not isinstance(case.motion, Circle):
+    path = motion_of(case).motion.path
+    if case.bowl is None or case.surface_m is None or not isinstance(path, CirclePath):
         raise TableError(
             f"{case.run}: the corridor needs a workpiece on a circle about the bowl's axis"
         )
     workpiece, diameter = needed(case.workpiece, "workpiece"), 2.0 * case.media.radius_mean_m
     radius = workpiece.radius_m
-    wall = (np.sqrt(case.bowl.radius_m**2 - case.motion.radius_m**2) - radius) / diameter
+    wall = (np.sqrt(case.bowl.radius_m**2 - path.radius_m**2) - radius) / diameter
     edges = np.arange(0.0, wall + 1e-9, _BIN)
     tip = case.surface_m - workpiece.immersion_depth_m
     places: list[Floats] = []
@@ -216,7 +223,7 @@ class Around:
     depth_edges_m: Floats
 
 
-class Profile(Part):
+class PackingProfile(Part):
     """A curve per packing, averaged bin by bin; the bins are those of the first packing."""
 
     edges: tuple[float, ...]
@@ -248,7 +255,7 @@ class Statements(Part):
         Mean normal force of a contact there.
     depth_slope_n_per_m : Estimate
         Slope of a contact's normal force over its depth.
-    azimuth, depth : Profile
+    azimuth, depth : PackingProfile
         See `Around`.
     network : Network
     """
@@ -263,8 +270,8 @@ class Statements(Part):
     flank_contact_n: Estimate
     front_over_flank: Estimate
     outer_over_inner: Estimate | None
-    azimuth: Profile
-    depth: Profile
+    azimuth: PackingProfile
+    depth: PackingProfile
     network: Network
 
 
@@ -290,12 +297,12 @@ def of_packings(packings: Sequence[MeasuredRun]) -> Statements:
 
 def _together(values: Sequence[float | None], name: str) -> Estimate | None:
     known = [value for value in values if value is not None]
-    return over_packings(known, ratio=name in _RATIOS) if len(known) == len(values) else None
+    return packing_mean(known, ratio=name in _RATIOS) if len(known) == len(values) else None
 
 
-def _profile(curves: Sequence[Floats], edges: Floats) -> Profile:
+def _profile(curves: Sequence[Floats], edges: Floats) -> PackingProfile:
     columns = bin_by_bin(np.array(curves))
-    return Profile(edges=tuple(edges.tolist()), **vars(columns))
+    return PackingProfile(edges=tuple(edges.tolist()), **vars(columns))
 
 
 def contacts_of(run: MeasuredRun) -> Around:
@@ -312,9 +319,9 @@ def contacts_of(run: MeasuredRun) -> Around:
     azimuth, depth, force = (
         table[name].to_numpy(np.float64) for name in ("azimuth_rad", "depth_m", "normal_force_n")
     )
-    ahead = float((force * within(azimuth, np.pi / 2)).sum() / force.sum())
-    front = within(azimuth, _FRONT)
-    flank = within(azimuth, 2 * _FRONT) - front
+    ahead = float((force * within_angle(azimuth, np.pi / 2)).sum() / force.sum())
+    front = within_angle(azimuth, _FRONT)
+    flank = within_angle(azimuth, 2 * _FRONT) - front
     in_front, at_flanks = float((force * front).sum()), float((force * flank).sum())
     immersion = needed(run.case.workpiece, "workpiece").immersion_depth_m
     levels = np.linspace(0.0, immersion, DEPTH_BINS + 1)
@@ -355,11 +362,12 @@ def _around(azimuth: Floats, force: Floats) -> Floats:
     return np.asarray(sum(halves) / (2.0 * force.sum()))
 
 
-def _outer_over_inner(case: Case, azimuth: Floats, force: Floats) -> float | None:
-    if not isinstance(case.motion, Circle):
+def _outer_over_inner(case: CaseOfRun, azimuth: Floats, force: Floats) -> float | None:
+    path = motion_of(case).motion.path
+    if not isinstance(path, CirclePath):
         return None
     left = float((force * to_the_left(azimuth)).sum() / force.sum())
-    outer = left if case.motion.sign < 0 else 1.0 - left
+    outer = left if path.sign < 0 else 1.0 - left
     return _ratio(outer, 1.0 - outer)
 
 

@@ -19,7 +19,7 @@ from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragdeck.physics import contact_mechanics as mechanics
 from evidence.verification import law
-from evidence.verification.law import SLIDING, SPHERE, Contact, Motion
+from evidence.verification.law import SLIDING, SPHERE, ContactPair, RelativeMotion
 from evidence.verification.recording import RecordedContact, Recording
 
 _NORMAL = 1.0
@@ -70,7 +70,7 @@ Rows = Sequence[tuple[float, float, float]] | Floats
 
 
 @dataclass(frozen=True)
-class Comparison:
+class QuantityCheck:
     """A quantity of a run beside a reference.
 
     Attributes
@@ -103,7 +103,7 @@ def _curve(x: Floats | Ints, reference: Floats | float, engine: Floats) -> Float
 # --- tables ---------------------------------------------------------------------------------
 
 
-def judged(run: Recording, one: Comparison) -> pd.DataFrame:
+def check_rows(run: Recording, one: QuantityCheck) -> pd.DataFrame:
     """The rows of a comparison with their verdicts.
 
     Returns
@@ -150,11 +150,11 @@ def series_name(run: Recording) -> str:
     return f"{name}, {case.steps_per_contact} steps a contact" if steps else name
 
 
-Compared = Sequence[tuple[Recording, Comparison]]
+Compared = Sequence[tuple[Recording, QuantityCheck]]
 """Comparisons, each with its run."""
 
 
-def compare(runs: Sequence[Recording]) -> Mapping[str, Compared]:
+def checks_by_test(runs: Sequence[Recording]) -> Mapping[str, Compared]:
     """All comparisons of all runs by their test, in the order of the tests.
 
     Raises
@@ -182,7 +182,7 @@ def _published() -> pd.DataFrame:
     return pd.read_csv(Path(__file__).with_name("published.csv"), comment="#")
 
 
-def published(test: str, series: str, quantity: str) -> Floats:
+def published_curve(test: str, series: str, quantity: str) -> Floats:
     """Points of a published curve in order of x, (2, N); there may be none.
 
     ``published.csv`` holds points of the figures of Chung and Ooi (2011) that the authors of Kratos
@@ -197,7 +197,7 @@ def published(test: str, series: str, quantity: str) -> Floats:
     return table[own].sort_values("x")[["x", "y"]].to_numpy(np.float64).T
 
 
-def _elastic(run: Recording) -> Iterator[Comparison]:
+def _elastic(run: Recording) -> Iterator[QuantityCheck]:
     impact, contact = run.contact, run.contact.constants
     overlap = np.maximum(impact.overlap_m, 0.0)
     force = np.abs(run.force_n[:, impact.at, 2])
@@ -211,12 +211,12 @@ def _elastic(run: Recording) -> Iterator[Comparison]:
         ("rebound_over_approach", 1.0, impact.rebound),
     ):
         tolerance = _SECOND_ORDER / run.case.steps_per_contact
-        yield Comparison(quantity, EXACT, [(nan, reference, engine)], tolerance)
+        yield QuantityCheck(quantity, EXACT, [(nan, reference, engine)], tolerance)
     hertz = law.hertz_force(contact, overlap)
     worst = float(np.abs(force - hertz).max())
     inside = np.flatnonzero(overlap > 0)
     some = inside[:: max(1, len(inside) // 30)]
-    yield Comparison(
+    yield QuantityCheck(
         "force_at_any_overlap_n",
         EXACT,
         [(nan, 0.0, worst)],
@@ -225,31 +225,31 @@ def _elastic(run: Recording) -> Iterator[Comparison]:
         drawn=_curve(1e6 * overlap[some], hertz[some], force[some]),
     )
     since = 1e6 * (run.time_s - run.time_s[inside[0]])[some]
-    yield Comparison("force_over_time_n", EXACT, drawn=_curve(since, hertz[some], force[some]))
-    for value in published(run.case.test, run.case.series, "force_n")[1]:
+    yield QuantityCheck("force_over_time_n", EXACT, drawn=_curve(since, hertz[some], force[some]))
+    for value in published_curve(run.case.test, run.case.series, "force_n")[1]:
         row = (nan, float(value), float(force.max()))
-        yield Comparison("force_n", PUBLISHED, [row], READ_OFF)
+        yield QuantityCheck("force_n", PUBLISHED, [row], READ_OFF)
 
 
-def _rebounds(run: Recording) -> Comparison:
+def _rebounds(run: Recording) -> QuantityCheck:
     rows = [(impact.value, impact.constants.rebound, impact.rebound) for impact in run.contacts]
     tolerance = _NORMAL / run.case.steps_per_contact
-    return Comparison("rebound_over_approach", EXACT, rows, tolerance, 1.0)
+    return QuantityCheck("rebound_over_approach", EXACT, rows, tolerance, 1.0)
 
 
-def _restitution(run: Recording) -> Iterator[Comparison]:
+def _restitution(run: Recording) -> Iterator[QuantityCheck]:
     exact = _rebounds(run)
     yield exact
     entered = [(each.value, each.constants.restitution, each.rebound) for each in run.contacts]
     if run.case.limit_force:
-        yield Comparison("rebound_over_approach", INPUT, entered, exact.tolerance, 1.0)
-    yield Comparison("rebound_over_approach", EXACT, drawn=exact.rows)
-    yield Comparison("rebound_over_approach", INPUT, drawn=entered)
+        yield QuantityCheck("rebound_over_approach", INPUT, entered, exact.tolerance, 1.0)
+    yield QuantityCheck("rebound_over_approach", EXACT, drawn=exact.rows)
+    yield QuantityCheck("rebound_over_approach", INPUT, drawn=entered)
     errors = [(x, 0.0, 1e3 * (engine - reference)) for x, reference, engine in exact.rows]
-    yield Comparison("rebound_minus_exact", EXACT, drawn=errors)
+    yield QuantityCheck("rebound_minus_exact", EXACT, drawn=errors)
 
 
-Derived = Callable[[Contact, Motion, Motion], float]
+Derived = Callable[[ContactPair, RelativeMotion, RelativeMotion], float]
 """A quantity of an impact, from its contact and the motions before and after it."""
 
 _OBLIQUE_QUANTITIES: Mapping[str, Derived] = {
@@ -306,7 +306,7 @@ def abscissa(impact: RecordedContact, quantity: str) -> float:
     return before.spin_rad_s
 
 
-def _oblique(run: Recording) -> Iterator[Comparison]:
+def _oblique(run: Recording) -> Iterator[QuantityCheck]:
     case, impacts = run.case, run.contacts
     tolerance = _OBLIQUE / case.steps_per_contact
     arm = max(_arm(impact) for impact in impacts)
@@ -322,7 +322,7 @@ def _oblique(run: Recording) -> Iterator[Comparison]:
                 drawn[against].append((at, reference, engine))
         scale = max(abs(reference) for _, reference, _ in rows[INTEGRATED])
         for against, own in rows.items():
-            yield Comparison(quantity, against, own, allowed[against], scale, drawn[against])
+            yield QuantityCheck(quantity, against, own, allowed[against], scale, drawn[against])
 
 
 def _derived(impact: RecordedContact, quantity: str) -> tuple[float, float, dict[str, float]]:
@@ -332,7 +332,7 @@ def _derived(impact: RecordedContact, quantity: str) -> tuple[float, float, dict
     known = {INTEGRATED: derive(contact, before, impact.integrated)}
     if impact.slid is not None:
         known[COULOMB] = derive(contact, before, impact.slid)
-    curve = published(case.test, case.series, quantity)
+    curve = published_curve(case.test, case.series, quantity)
     if curve.shape[1] > 1 and curve[0, 0] <= at <= curve[0, -1]:
         known[PUBLISHED] = float(np.interp(at, *curve))
     return at, derive(contact, before, impact.after), known
@@ -344,13 +344,13 @@ def _arm(impact: RecordedContact) -> float:
     return law.largest_overlap(contact, impact.before.normal_m_s) / contact.particle.radius_m
 
 
-def _time_step(run: Recording) -> Iterator[Comparison]:
+def _time_step(run: Recording) -> Iterator[QuantityCheck]:
     row = (math.nan, run.contact.constants.rebound, run.contact.rebound)
     tolerance = _NORMAL / run.case.steps_per_contact
-    yield Comparison("rebound_over_approach", EXACT, [row], tolerance, 1.0)
+    yield QuantityCheck("rebound_over_approach", EXACT, [row], tolerance, 1.0)
 
 
-def _order_of_convergence(runs: Sequence[Recording]) -> Iterator[tuple[Recording, Comparison]]:
+def _order_of_convergence(runs: Sequence[Recording]) -> Iterator[tuple[Recording, QuantityCheck]]:
     """The order at which the rebound approaches its exact value; judged with limited force."""
     for limit in (False, True):
         own = [run for run in runs if run.case.limit_force == limit]
@@ -368,10 +368,10 @@ def _order_of_convergence(runs: Sequence[Recording]) -> Iterator[tuple[Recording
             order = [(math.nan, 1.0, fitted_order(errors))]
             yield (
                 own[-1],
-                Comparison("order_of_convergence", EXACT, order, _ORDER, 1.0, series=name),
+                QuantityCheck("order_of_convergence", EXACT, order, _ORDER, 1.0, series=name),
             )
         drawn = [(steps, _NORMAL / steps, error) for steps, error in errors]
-        yield own[-1], Comparison("rebound_error", TOLERANCE, drawn=drawn, series=name)
+        yield own[-1], QuantityCheck("rebound_error", TOLERANCE, drawn=drawn, series=name)
 
 
 def fitted_order(rows: Sequence[tuple[int, float]]) -> float:
@@ -383,13 +383,13 @@ def fitted_order(rows: Sequence[tuple[int, float]]) -> float:
 # --- many impacts, rest, steady motion ------------------------------------------------------
 
 
-def _bounce(run: Recording) -> Iterator[Comparison]:
+def _bounce(run: Recording) -> Iterator[QuantityCheck]:
     impacts, energy = flight_energy(run)
     least = float(run.case.impacts or 0)
-    yield Comparison("impacts", EXACT, [(math.nan, least, min(float(impacts[-1]), least))])
+    yield QuantityCheck("impacts", EXACT, [(math.nan, least, min(float(impacts[-1]), least))])
     worst = float(np.abs(energy - 1).max())
     drawn = _curve(impacts, 0.0, 1e6 * (energy - 1))
-    yield Comparison("energy_change", EXACT, [(math.nan, 0.0, worst)], _BOUNCES, 1.0, drawn)
+    yield QuantityCheck("energy_change", EXACT, [(math.nan, 0.0, worst)], _BOUNCES, 1.0, drawn)
 
 
 def flight_energy(run: Recording) -> tuple[Ints, Floats]:
@@ -401,15 +401,15 @@ def flight_energy(run: Recording) -> tuple[Ints, Floats]:
     return np.searchsorted(starts, free), (speed / speed[0]) ** 2
 
 
-def _momentum(run: Recording) -> Iterator[Comparison]:
+def _momentum(run: Recording) -> Iterator[QuantityCheck]:
     changes = [momentum_changes(contact) for contact in run.contacts]
     for at, quantity in enumerate(("linear_momentum_change", "angular_momentum_change")):
         sizes = [np.linalg.norm(each[at], axis=1) for each in changes]
         rows = [(c.value, 0.0, float(s.max())) for c, s in zip(run.contacts, sizes, strict=True)]
-        yield Comparison(quantity, EXACT, rows, _CONSERVED, 1.0)
+        yield QuantityCheck(quantity, EXACT, rows, _CONSERVED, 1.0)
         for contact, size in zip(run.contacts, sizes, strict=True):
             drawn, name = _curve(1e6 * run.time_s, math.nan, size), f"collision {contact.value:g}"
-            yield Comparison(quantity, EXACT, drawn=drawn, series=name)
+            yield QuantityCheck(quantity, EXACT, drawn=drawn, series=name)
 
 
 def momentum_changes(contact: RecordedContact) -> tuple[Floats, Floats]:
@@ -433,7 +433,7 @@ def momentum_changes(contact: RecordedContact) -> tuple[Floats, Floats]:
     return (total - total[0]) / size, (spun - spun[0]) / turn
 
 
-def _column(run: Recording) -> Iterator[Comparison]:
+def _column(run: Recording) -> Iterator[QuantityCheck]:
     """Each contact of the column from the floor up carries the weight above it."""
     at_rest = slice(-len(run.time_s) // 5, None)
     gravity, bodies = math.hypot(*run.case.gravity_m_s2), len(run.case.bodies)
@@ -447,17 +447,17 @@ def _column(run: Recording) -> Iterator[Comparison]:
     floor = run.wall_force_n["plane"][:, 0, 2]
     row = (math.nan, weights[0], float(floor[at_rest].mean()))
     drawn = _curve(1e3 * run.time_s, weights[0], floor)
-    yield Comparison("floor_force_n", EXACT, [row], _AT_REST, drawn=drawn)
-    yield Comparison("overlap_m", EXACT, rows, _AT_REST, drawn=rows)
+    yield QuantityCheck("floor_force_n", EXACT, [row], _AT_REST, drawn=drawn)
+    yield QuantityCheck("overlap_m", EXACT, rows, _AT_REST, drawn=rows)
 
 
-def _incline(run: Recording) -> Iterator[Comparison]:
+def _incline(run: Recording) -> Iterator[QuantityCheck]:
     for at, quantity in enumerate(("acceleration_m_s2", "spin_up_rad_s2")):
         rows = [
             (contact.value, incline_reference(contact)[at], incline_slopes(contact)[at])
             for contact in run.contacts
         ]
-        yield Comparison(quantity, EXACT, rows, _FITTED, drawn=rows)
+        yield QuantityCheck(quantity, EXACT, rows, _FITTED, drawn=rows)
     gravity = math.hypot(*run.case.gravity_m_s2) * math.cos(_angle(run))
     force = run.wall_force_n["plane"][_steady(run)]
     rows = [
@@ -468,7 +468,7 @@ def _incline(run: Recording) -> Iterator[Comparison]:
         )
         for contact in run.contacts
     ]
-    yield Comparison("normal_force_n", EXACT, rows, _FITTED)
+    yield QuantityCheck("normal_force_n", EXACT, rows, _FITTED)
 
 
 def _angle(run: Recording) -> float:
@@ -500,7 +500,7 @@ def incline_slopes(contact: RecordedContact) -> tuple[float, float]:
     return velocity, -float(np.polyfit(time, run.spin_rad_s[half, contact.at, 1], 1)[0])
 
 
-CHECKS: Mapping[str, Callable[[Recording], Iterator[Comparison]]] = {
+CHECKS: Mapping[str, Callable[[Recording], Iterator[QuantityCheck]]] = {
     "elastic_pair": _elastic,
     "elastic_plane": _elastic,
     "restitution": _restitution,

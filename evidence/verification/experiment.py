@@ -10,12 +10,12 @@ from pydantic.dataclasses import dataclass as checked
 from dragdeck import __version__
 from dragdeck.cases.case import digest
 from dragdeck.decks import outputs
-from dragdeck.decks.case_file import CaseFile, CountOfRun, RanksOfRun
 from dragdeck.decks.data_file import Body as DataBody
 from dragdeck.decks.data_file import Vector, data_file
-from dragdeck.decks.deck import Deck, LeftOut, Materials, Scene, contact_law
+from dragdeck.decks.deck import Deck, Materials, Scene, contact_law
 from dragdeck.physics.contact_mechanics import rayleigh_time
 from dragdeck.physics.rounding import round_to
+from dragdeck.records.run import CaseFile, CountOfRun, RanksOfRun
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.material import Material
 
@@ -43,7 +43,7 @@ class Wall:
 
 
 @checked(frozen=True)
-class Body:
+class PlacedSphere:
     """A particle: material type from 1, radius m, place m, velocity m/s and spin rad/s."""
 
     type: int
@@ -112,7 +112,7 @@ class CollideCase(CaseFile):
     media: CountOfRun
     types: Sequence[NamedMaterial]
     pairs: Sequence[MeetingPair]
-    bodies: Sequence[Body]
+    bodies: Sequence[PlacedSphere]
     walls: Sequence[Wall] = ()
 
     def type_of(self, body: int | str) -> int:
@@ -139,7 +139,7 @@ def experiment(
     *,
     types: Sequence[tuple[str, Material]],
     pairs: Mapping[tuple[int, int], Pair],
-    bodies: Sequence[Body],
+    bodies: Sequence[PlacedSphere],
     steps: int,
     period: int | None = None,
     **more: Any,
@@ -156,7 +156,7 @@ def experiment(
         A name and a material for each type.
     pairs : mapping of (int, int) to Pair
         Types (from 1, the smaller first) that meet, and what they do to each other.
-    bodies : sequence of Body
+    bodies : sequence of PlacedSphere
         The first sets the Rayleigh time.
     steps, period : int
     **more
@@ -191,7 +191,7 @@ def collide_scene(experiment: Experiment) -> Scene[CollideCase]:
     case, steps = experiment.case, experiment.steps
     every = experiment.period or frame_period(steps, len(case.bodies))
     look = max(1, steps // 10)
-    size = math.hypot(*case.gravity_m_s2)
+    (x, y, z), size = case.gravity_m_s2, math.hypot(*case.gravity_m_s2)
     deck = _CollideDeck(
         title=case.title,
         study=case.study,
@@ -201,8 +201,8 @@ def collide_scene(experiment: Experiment) -> Scene[CollideCase]:
         materials=_pair_table(case),
         limit_force=case.limit_force,
         gravity_m_s2=size,
-        gravity_direction=_direction(case.gravity_m_s2, size),
-        skin_m=_skin(case.bodies),
+        gravity_direction=(x / size, y / size, z / size) if size else (0, 0, -1),
+        skin_m=round_to(0.2 * min(body.radius_m for body in case.bodies), 3),
         timestep_s=case.timestep_s,
         outputs=(
             outputs.thermo(look, steps // look * look),
@@ -217,22 +217,12 @@ def collide_scene(experiment: Experiment) -> Scene[CollideCase]:
         case=case,
         steps=steps,
         files={"bodies.data": lambda: _bodies_data(case, steps * case.timestep_s)},
-        models={"every particle": "placed and set in motion by hand", "exact walls": "planes"},
-        leaves_out={
-            "output of pairs": LeftOut("forces on so few particles say all"),
-            "n_checkpoints": LeftOut("the run takes seconds"),
-        },
     )
 
 
 def frame_period(steps: int, bodies: int) -> int:
     """Steps between frames, so that a run of many particles stays small."""
     return max(1, math.ceil(steps * bodies / _FRAMES_TIMES_BODIES))
-
-
-def _skin(bodies: Sequence[Body]) -> float:
-    """Neighbour skin, m: a fifth of the smallest radius."""
-    return round_to(0.2 * min(body.radius_m for body in bodies), 3)
 
 
 def _pair_table(case: CollideCase) -> Materials:
@@ -267,10 +257,3 @@ def _side(case: CollideCase, axis: int, duration_s: float) -> tuple[float, float
     reach = 0.0 if walled else 2 * speed * duration_s + fall
     room = reach + 4 * max(body.radius_m for body in case.bodies)
     return round_to(min(places) - room, 6), round_to(max(places) + room, 6)
-
-
-def _direction(vector: Vector, size: float) -> Vector:
-    if size == 0:
-        return (0, 0, -1)
-    x, y, z = (component / size for component in vector)
-    return (x, y, z)

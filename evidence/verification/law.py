@@ -58,7 +58,7 @@ class Particle:
 
 
 @dataclass(frozen=True)
-class Contact:
+class ContactPair:
     """A particle and its partner: another particle, or a plane that does not move.
 
     Attributes
@@ -103,7 +103,7 @@ class Contact:
 
 
 @dataclass(frozen=True)
-class Motion:
+class RelativeMotion:
     """Relative motion at a contact.
 
     Attributes
@@ -122,7 +122,7 @@ class Motion:
     spin_rad_s: float = 0.0
     partner_spin_rad_s: float = 0.0
 
-    def patch_m_s(self, contact: Contact) -> float:
+    def patch_m_s(self, contact: ContactPair) -> float:
         """Tangential velocity of the surfaces past each other where they touch, m/s."""
         second = contact.partner.radius_m if contact.partner is not None else 0.0
         return (
@@ -132,19 +132,19 @@ class Motion:
         )
 
 
-def largest_overlap(contact: Contact, speed_m_s: float) -> float:
+def largest_overlap(contact: ContactPair, speed_m_s: float) -> float:
     """Largest overlap of an elastic impact, m (Johnson 1985, eq. 11.23)."""
     energy = 15 * contact.mass_kg * speed_m_s**2
     return float((energy / (16 * contact.modulus_pa * math.sqrt(contact.radius_m))) ** 0.4)
 
 
-def hertz_force(contact: Contact, overlap_m: Floats | float) -> Floats:
+def hertz_force(contact: ContactPair, overlap_m: Floats | float) -> Floats:
     """Elastic normal force, N (Johnson 1985, eq. 4.23)."""
     stiffness = 4 / 3 * contact.modulus_pa * np.sqrt(contact.radius_m)
     return np.asarray(stiffness * np.power(overlap_m, 1.5))
 
 
-def elastic_time(contact: Contact, speed_m_s: float) -> float:
+def elastic_time(contact: ContactPair, speed_m_s: float) -> float:
     """Duration of an elastic impact, s (Johnson 1985, eq. 11.24)."""
     return CONTACT_TIME * largest_overlap(contact, speed_m_s) / speed_m_s
 
@@ -163,7 +163,7 @@ def limited_restitution(restitution: float) -> float:
     return math.exp(-ratio * (math.pi - 2 * math.atan(ratio)))
 
 
-def sliding_impact(contact: Contact, before: Motion) -> Motion | None:
+def sliding_impact(contact: ContactPair, before: RelativeMotion) -> RelativeMotion | None:
     """Motion after an impact that slides from begin to end, for rigid bodies.
 
     Coulomb's law in impulses: the tangential impulse is the friction times the
@@ -175,7 +175,7 @@ def sliding_impact(contact: Contact, before: Motion) -> Motion | None:
     if abs(before.patch_m_s(contact)) < SLIDING * drop or drop == 0.0:
         return None
     impulse = way * drop * contact.mass_kg
-    return Motion(
+    return RelativeMotion(
         contact.rebound * before.normal_m_s,
         before.tangential_m_s - way * drop,
         before.spin_rad_s - contact.particle.spun_rad_s(impulse),
@@ -187,19 +187,19 @@ def sliding_impact(contact: Contact, before: Motion) -> Motion | None:
 
 
 @dataclass(frozen=True)
-class Impact:
+class IntegratedImpact:
     """An integrated impact.
 
     Attributes
     ----------
-    after : Motion
+    after : RelativeMotion
     duration_s : float
         Until the surfaces part, or with a limited force until the force vanishes.
     overlap_m : float
         The largest one.
     """
 
-    after: Motion
+    after: RelativeMotion
     duration_s: float
     overlap_m: float
 
@@ -212,7 +212,7 @@ class HertzLaw:
     sticks, else the sign of the sliding velocity.
     """
 
-    def __init__(self, contact: Contact) -> None:
+    def __init__(self, contact: ContactPair) -> None:
         self.contact = contact
         root = math.sqrt(contact.radius_m)
         logarithm = math.log(contact.restitution)
@@ -300,7 +300,7 @@ class _Event:
         return self.function(state)
 
 
-def integrated_impact(contact: Contact, before: Motion) -> Impact:
+def integrated_impact(contact: ContactPair, before: RelativeMotion) -> IntegratedImpact:
     """Integrate the contact law through one impact.
 
     Raises
@@ -335,8 +335,8 @@ def integrated_impact(contact: Contact, before: Motion) -> Impact:
         fired = {name for name, at in zip(events, solved.t_events or [], strict=True) if len(at)}
         vanished = contact.limit_force and law.whole_force(state) < 1e-9 * force
         if vanished or "parted" in fired:
-            after = Motion(-float(state[1]), *(float(velocity) for velocity in state[3:]))
-            return Impact(after, time, overlap)
+            after = RelativeMotion(-float(state[1]), *(float(velocity) for velocity in state[3:]))
+            return IntegratedImpact(after, time, overlap)
         if "let_go" in fired:
             repels = False
             state, way = _attracted(law, state)
@@ -345,7 +345,7 @@ def integrated_impact(contact: Contact, before: Motion) -> Impact:
     raise ArithmeticError(f"sticking and sliding took turns {_MOST_SWITCHES} times")
 
 
-def _begin(law: HertzLaw, before: Motion, unit_m: float) -> tuple[Floats, int]:
+def _begin(law: HertzLaw, before: RelativeMotion, unit_m: float) -> tuple[Floats, int]:
     """State just after touching, and whether it slides at once."""
     spins = before.spin_rad_s, before.partner_spin_rad_s
     state = np.array(

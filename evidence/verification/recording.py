@@ -8,13 +8,19 @@ from pathlib import Path
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.dumps.run_parts import iter_frames
 from dragchain.errors import TableError
-from dragchain.run.case import load_outputs
-from dragchain.run.completeness import read_accepted
+from dragchain.run.run_parts import iter_frames
+from dragdeck.decks.outputs import load_outputs
 from dragdeck.physics.contact_mechanics import effective_modulus, effective_shear, particle_mass
+from dragdeck.records.run import read_accepted
 from evidence.verification.experiment import CollideCase, ContactFacts
-from evidence.verification.law import Contact, Motion, Particle, integrated_impact, sliding_impact
+from evidence.verification.law import (
+    ContactPair,
+    Particle,
+    RelativeMotion,
+    integrated_impact,
+    sliding_impact,
+)
 
 _VECTORS = {
     "position_m": ("x_m", "y_m", "z_m"),
@@ -95,13 +101,13 @@ class RecordedContact:
         return None if isinstance(partner, str) else partner - 1
 
     @cached_property
-    def constants(self) -> Contact:
+    def constants(self) -> ContactPair:
         """What the law knows of the contact, from its two materials."""
         case, partner = self.run.case, self.partner_at
         kinds = [case.type_of(body) for body in (self.meeting.particle, self.meeting.partner)]
         own, other = (case.types[kind - 1] for kind in kinds)
         pair = next(pair for pair in case.pairs if list(pair.types) == sorted(kinds))
-        return Contact(
+        return ContactPair(
             particle=self.run.particle(self.meeting.particle),
             partner=None if partner is None else self.run.particle(partner + 1),
             modulus_pa=effective_modulus(own, other),
@@ -122,7 +128,7 @@ class RecordedContact:
         radii = radius + run.case.bodies[partner].radius_m
         return np.asarray(radii - np.linalg.norm(apart, axis=1))
 
-    def motion(self, frame: int) -> Motion:
+    def motion(self, frame: int) -> RelativeMotion:
         """Relative motion along z at a frame; normal: the speed of approach."""
         run, partner = self.run, self.partner_at
         velocity, spin = run.velocity_m_s[frame, self.at], -run.spin_rad_s[frame, self.at, 1]
@@ -130,25 +136,25 @@ class RecordedContact:
         if partner is not None:
             velocity = velocity - run.velocity_m_s[frame, partner]
             second = -run.spin_rad_s[frame, partner, 1]
-        return Motion(-float(velocity[2]), float(velocity[0]), float(spin), float(second))
+        return RelativeMotion(-float(velocity[2]), float(velocity[0]), float(spin), float(second))
 
     @cached_property
-    def _motions(self) -> tuple[Motion, Motion]:
+    def _motions(self) -> tuple[RelativeMotion, RelativeMotion]:
         overlap = self.overlap_m
         if overlap[0] >= 0 or overlap[-1] >= 0 or not (overlap > 0).any():
             name, particle = self.run.case.run, self.meeting.particle
             raise TableError(f"{name}: the impact of particle {particle} is not whole in it")
         end = self.motion(-1)
         spins = end.spin_rad_s, end.partner_spin_rad_s
-        return self.motion(0), Motion(-end.normal_m_s, end.tangential_m_s, *spins)
+        return self.motion(0), RelativeMotion(-end.normal_m_s, end.tangential_m_s, *spins)
 
     @property
-    def before(self) -> Motion:
+    def before(self) -> RelativeMotion:
         """Motion before the impact."""
         return self._motions[0]
 
     @property
-    def after(self) -> Motion:
+    def after(self) -> RelativeMotion:
         """Motion after the impact; normal: the speed of separation."""
         return self._motions[1]
 
@@ -158,12 +164,12 @@ class RecordedContact:
         return self.after.normal_m_s / self.before.normal_m_s
 
     @cached_property
-    def integrated(self) -> Motion:
+    def integrated(self) -> RelativeMotion:
         """Motion after the impact by the law integrated by scipy."""
         return integrated_impact(self.constants, self.before).after
 
     @property
-    def slid(self) -> Motion | None:
+    def slid(self) -> RelativeMotion | None:
         """Motion after the impact of rigid bodies that slide; None where they would not."""
         return sliding_impact(self.constants, self.before)
 

@@ -1,7 +1,6 @@
 """The command that verifies a study's contact law: runs, tables and page of the suite."""
 
 from collections.abc import Hashable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -17,10 +16,9 @@ from dragchain.figures.panels import legend_below, new_panels
 from dragchain.figures.style import GREY, MARKERS, SERIES
 from dragchain.report.campaign import write_report
 from dragchain.tables.by_step import read_table
-from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
-from dragdeck.engine import run_folder
-from dragdeck.engine.reports import say, silent
+from dragdeck.engine.batch import Batch
+from dragdeck.engine.reports import say
 from dragdeck.errors import RejectedRunError
 from dragdeck.project import find_project, run_path, study_templates
 from evidence.verification.checks import (
@@ -31,11 +29,11 @@ from evidence.verification.checks import (
     JUDGED,
     TOLERANCE,
     Compared,
-    Comparison,
+    QuantityCheck,
     Verdict,
-    compare,
-    judged,
-    published,
+    check_rows,
+    checks_by_test,
+    published_curve,
     series_name,
 )
 from evidence.verification.experiment import collide_scene
@@ -66,16 +64,11 @@ def verify(study: str, fidelity: str | None, out_dir: Path, cores: int) -> None:
     """
     project = find_project(Path.cwd())
     case = project.cases(study, fidelity)[0]
-    templates = environment(project.templates, study_templates(case))
-    folders = []
-    for name, experiment in suite_of(case.study).items():
-        folders.append(project.root / run_path(experiment.case.study, "collide", name))
-        write_run(collide_scene(experiment), folders[-1], templates)
-    with ProcessPoolExecutor(cores) as pool:
-        done = pool.map(partial(run_folder.run, report=silent), folders)
-        for number, (folder, record) in enumerate(zip(folders, done, strict=True), 1):
-            say(f"verification {number} of {len(folders)}: {folder.name}: {record.state}")
-    write_verification(out_dir, folders)
+    folder = project.root / run_path("verification", "collide", "")
+    batch = Batch(folder, environment(project.templates, study_templates(case)))
+    suite = {name: partial(collide_scene, one) for name, one in suite_of(case.study).items()}
+    batch.each(suite, say, cores)
+    write_verification(out_dir, [folder / name for name in suite])
 
 
 def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> None:
@@ -99,15 +92,15 @@ def write_verification(out_dir: Path, run_dirs: Sequence[Path]) -> None:
     TableError
         An impact is not whole.
     """
-    compared = compare([read_recording(folder) for folder in run_dirs])
-    each = [judged(run, one) for rows in compared.values() for run, one in rows]
+    compared = checks_by_test([read_recording(folder) for folder in run_dirs])
+    each = [check_rows(run, one) for rows in compared.values() for run, one in rows]
     checks = pd.concat([rows for rows in each if len(rows)]).sort_values("number", kind="stable")
     checks = checks.reset_index(drop=True)
-    summary = summarise(checks)
+    summary = worst_rows(checks)
     write_report(
         out_dir,
         "verification/verification.html.j2",
-        draw=lambda: {test: draw(test, rows) for test, rows in compared.items()},
+        draw=lambda: {test: draw_test(test, rows) for test, rows in compared.items()},
         tables={"checks": checks, "verification": summary},
         name="verification",
         package="evidence",
@@ -145,7 +138,7 @@ def verdict(report_dir: Path) -> str:
 # --- tables of the page ---------------------------------------------------------------------
 
 
-def summarise(checks: pd.DataFrame) -> pd.DataFrame:
+def worst_rows(checks: pd.DataFrame) -> pd.DataFrame:
     """The worst comparison of each quantity of each series, with their number."""
     groups = [
         group.sort_values("error", kind="stable").tail(1).assign(points=len(group))
@@ -161,7 +154,7 @@ def counts(summary: pd.DataFrame) -> dict[str, int]:
 
 
 @dataclass(frozen=True)
-class Section:
+class TestSection:
     """A test on the page.
 
     Attributes
@@ -179,11 +172,11 @@ class Section:
     steps: Sequence[int]
 
 
-def _section(test: str, compared: Compared, summary: pd.DataFrame) -> Section:
+def _section(test: str, compared: Compared, summary: pd.DataFrame) -> TestSection:
     rows = summary[summary["test"] == test]
     same = rows["against"].isin(JUDGED)
     steps = sorted({run.case.steps_per_contact for run, _ in compared})
-    return Section(suite_file().tests()[test], _shown(rows[same]), _shown(rows[~same]), steps)
+    return TestSection(suite_file().tests()[test], _shown(rows[same]), _shown(rows[~same]), steps)
 
 
 _CLASSES = {"pass": "good-word", "fail": "bad-word", "agrees": "good-word", "differs": "warn"}
@@ -238,7 +231,7 @@ _OTHERS: Mapping[str, tuple[str, ...]] = {
 """Series that the paper draws and nobody here models."""
 
 
-def draw(test: str, compared: Compared) -> Figure:
+def draw_test(test: str, compared: Compared) -> Figure:
     """The figure of a test: a panel for each quantity, the engine's points over the references."""
     drawn = [(one.series or series_name(run), one) for run, one in compared if len(one.drawn)]
     names = list(dict.fromkeys(name for name, _ in drawn))
@@ -258,7 +251,7 @@ def draw(test: str, compared: Compared) -> Figure:
     return legend_below(figure)
 
 
-def _draw_comparison(axes: Axes, one: Comparison, at: int, name: str) -> None:
+def _draw_comparison(axes: Axes, one: QuantityCheck, at: int, name: str) -> None:
     """Draw a reference, and the engine's points if they have a name."""
     colour = SERIES[at % len(SERIES)]
     x, reference, engine = np.array(sorted(map(tuple, one.drawn)), dtype=np.float64).T
@@ -273,7 +266,7 @@ def _draw_comparison(axes: Axes, one: Comparison, at: int, name: str) -> None:
 def _draw_published(axes: Axes, test: str, series: Sequence[str], quantity: str) -> None:
     others = _OTHERS.get(test, ())
     for name, marker in zip((*series, *others), "xx+", strict=False):
-        x, y = published(test, name, quantity)
+        x, y = published_curve(test, name, quantity)
         if len(x):
             shade = "black" if name in others else GREY
             label = f"published: {name}".replace("_", " ")

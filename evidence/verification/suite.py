@@ -17,7 +17,13 @@ from dragdeck.study.base import Model, Number, Positive, Whole
 from dragdeck.study.contact_law import Pair
 from dragdeck.study.material import Material
 from dragdeck.study.model import Study
-from evidence.verification.experiment import Body, ContactFacts, Experiment, Wall, experiment
+from evidence.verification.experiment import (
+    ContactFacts,
+    Experiment,
+    PlacedSphere,
+    Wall,
+    experiment,
+)
 
 RIGID = "rigid"
 _RIGID_FACTOR = 1e6
@@ -32,7 +38,7 @@ _LONGEST_CONTACTS = 3.0
 """Length of an impact run over the Hertz time of its slowest impact."""
 
 
-def contact_time(
+def hertz_time(
     particle: Material,
     radius_m: float,
     partner: Material,
@@ -182,11 +188,11 @@ class Impacts(Test):
         types = [(series.material, particle)] * len(distinct)
         types += [] if same else [(struck, partner)]
         times = [
-            contact_time(particle, self.radius_m, partner, self.struck_radius_m, one.closing_m_s)
+            hertz_time(particle, self.radius_m, partner, self.struck_radius_m, one.closing_m_s)
             for one in impacts
         ]
         dt = round_to(min(times) / steps, 4)
-        bodies: list[Body] = []
+        bodies: list[PlacedSphere] = []
         contacts: list[ContactFacts] = []
         for value, impact, pair in zip(values, impacts, pairs, strict=True):
             first, own = len(bodies) + 1, distinct.index(pair) + 1
@@ -228,7 +234,9 @@ class Impacts(Test):
             known = {key: own[key] if known[key] is None else known[key] for key in known}
         return Pair.model_validate(known)
 
-    def bodies(self, at: int, own: int, struck_type: int, timestep_s: float) -> Iterator[Body]:
+    def bodies(
+        self, at: int, own: int, struck_type: int, timestep_s: float
+    ) -> Iterator[PlacedSphere]:
         """The particle above its partner, moving down and along +x, and the partner.
 
         Spin moves the particle's underside along +x.
@@ -240,10 +248,10 @@ class Impacts(Test):
         along = self.tangential_m_s + self.speed_m_s * math.sin(angle)
         velocity = (along, 0.0, -self.speed_m_s * math.cos(angle))
         spin = 0.0 - self.spin_m_s / self.radius_m
-        yield Body(own, self.radius_m, place, velocity, (0.0, spin, 0.0))
+        yield PlacedSphere(own, self.radius_m, place, velocity, (0.0, spin, 0.0))
         if struck is not None:
             velocity, spin = (0.0, 0.0, self.partner_speed_m_s), spin * self.partner_spin
-            yield Body(struck_type, struck, (0.0, y, 0.0), velocity, (0.0, spin, 0.0))
+            yield PlacedSphere(struck_type, struck, (0.0, y, 0.0), velocity, (0.0, spin, 0.0))
 
 
 # --- tests that the suite has once each -----------------------------------------------------
@@ -268,7 +276,7 @@ class Bounce(OnWall):
     def experiments(self, name: str, lab: Lab) -> Iterator[Experiment]:
         """A run for each number of steps."""
         particle, wall = lab.material(self.material), lab.material(self.against)
-        time = contact_time(particle, self.radius_m, wall, None, self.speed_m_s)
+        time = hertz_time(particle, self.radius_m, wall, None, self.speed_m_s)
         flight = self.flight_contacts * time
         top = 2 * self.radius_m + self.speed_m_s * flight
         for steps in self.steps_per_contact:
@@ -283,7 +291,7 @@ class Bounce(OnWall):
                 impacts=self.impacts,
                 types=[(self.material, particle), (self.against, wall)],
                 pairs={(1, 2): Pair(restitution=1, friction=0)},
-                bodies=[Body(1, self.radius_m, (0, 0, top / 2), (0, 0, -self.speed_m_s))],
+                bodies=[PlacedSphere(1, self.radius_m, (0, 0, top / 2), (0, 0, -self.speed_m_s))],
                 walls=[Wall("floor", 2, "zplane 0.0"), Wall("ceiling", 2, f"zplane {top!r}")],
                 timestep_s=dt,
                 steps=math.ceil(self.impacts * (flight + 1.03 * time) / dt),
@@ -323,7 +331,7 @@ class Momentum(Test):
         """All collisions in one run."""
         particle, (first, second) = lab.material(self.material), self.radii_m
         times = [
-            contact_time(particle, first, particle, second, collision.closing_m_s)
+            hertz_time(particle, first, particle, second, collision.closing_m_s)
             for collision in self.collisions
         ]
         dt = round_to(min(times) / lab.steps_per_contact, 4)
@@ -346,13 +354,13 @@ class Momentum(Test):
             steps=math.ceil(_LONGEST_CONTACTS * max(times) / dt),
         )
 
-    def _bodies(self, at: int, collision: Collision, timestep_s: float) -> Iterator[Body]:
+    def _bodies(self, at: int, collision: Collision, timestep_s: float) -> Iterator[PlacedSphere]:
         first, second = self.radii_m
         distance = first + second + _APPROACH_STEPS * timestep_s * collision.closing_m_s
         centre = (0.0, at * 8 * second, 0.0)
         x, y, z = (c + distance * n for c, n in zip(centre, collision.direction, strict=True))
-        yield Body(1, first, (x, y, z), collision.velocity_m_s, collision.spin_rad_s)
-        yield Body(1, second, centre, spin_rad_s=collision.partner_spin_rad_s)
+        yield PlacedSphere(1, first, (x, y, z), collision.velocity_m_s, collision.spin_rad_s)
+        yield PlacedSphere(1, second, centre, spin_rad_s=collision.partner_spin_rad_s)
 
 
 class Resting(OnWall):
@@ -361,13 +369,19 @@ class Resting(OnWall):
     duration_s: Positive
 
     def resting(
-        self, name: str, lab: Lab, slug: str, bodies: Sequence[Body], frames: int, **more: Any
+        self,
+        name: str,
+        lab: Lab,
+        slug: str,
+        bodies: Sequence[PlacedSphere],
+        frames: int,
+        **more: Any,
     ) -> Experiment:
         """The run; its plane is the last type, and its particles have one each or share one."""
         particle, floor = lab.material(self.material), lab.material(self.against)
         steps, last = self.steps_per_contact[0], max(body.type for body in bodies) + 1
         fallen = mechanics.fall_speed(self.radius_m, lab.study.gravity_m_s2)
-        dt = round_to(contact_time(particle, self.radius_m, floor, None, fallen) / steps, 4)
+        dt = round_to(hertz_time(particle, self.radius_m, floor, None, fallen) / steps, 4)
         return self.made(
             name,
             slug,
@@ -383,7 +397,7 @@ class Resting(OnWall):
         )
 
 
-class Column(Resting):
+class StandingColumn(Resting):
     """Particles that stand on each other: what they do at rest."""
 
     particles: Whole
@@ -398,7 +412,7 @@ class Column(Resting):
             vary="particle",
             contacts=[ContactFacts(at, at - 1 or "plane", at) for at in numbers],
             pairs={(1, 2): lab.pair(own, self.against), (1, 1): lab.pair(own, own)},
-            bodies=[Body(1, radius, (0, 0, (2 * at - 1) * radius)) for at in numbers],
+            bodies=[PlacedSphere(1, radius, (0, 0, (2 * at - 1) * radius)) for at in numbers],
             gravity_m_s2=(0.0, 0.0, -lab.study.gravity_m_s2),
             frames=1000,
         )
@@ -428,7 +442,7 @@ class Incline(Resting):
             contacts=[ContactFacts(at, "plane", ratio) for at, ratio in ratios.items()],
             angle_deg=self.angle_deg,
             pairs=pairs,
-            bodies=[Body(at, radius, (0, 6 * at * radius, radius)) for at in ratios],
+            bodies=[PlacedSphere(at, radius, (0, 6 * at * radius, radius)) for at in ratios],
             gravity_m_s2=(size * math.sin(angle), 0.0, -size * math.cos(angle)),
             frames=500,
         )
@@ -447,7 +461,7 @@ class SuiteFile(Model):
     impacts: dict[str, Impacts]
     bounce: Bounce
     momentum: Momentum
-    column: Column
+    column: StandingColumn
     incline: Incline
 
     def tests(self) -> Mapping[str, Test]:

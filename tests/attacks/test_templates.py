@@ -63,68 +63,43 @@ _EXPRESSIONS = {
 
 _NAMED = {"it includes a study": r"study\.yaml", "it includes the password file": "passwd"}
 
+_PROCESS = "process.in.j2"
+_EITHER = r"process\.in\.j2|DRAGDECK END"
 _FILES: dict[str, tuple[str, str | bytes, str]] = {
-    "it extends itself": (
-        "process.in.j2",
-        '{% extends "process.in.j2" %}',
-        r"process\.in\.j2",
-    ),
-    "two extend each other": (
-        "process.in.j2",
-        '{% extends "filling.in.j2" %}',
-        r"(process|filling)\.in\.j2",
-    ),
-    "a misspelt block": (
-        "process.in.j2",
-        _BASE + "{% block extras %}\nprint 1\n{% endblock %}\n",
-        "extras",
-    ),
-    "a block twice": (
-        "process.in.j2",
-        _BASE + "{% block extra %}{% endblock %}{% block extra %}{% endblock %}",
-        "extra",
-    ),
+    "it extends itself": (_PROCESS, '{% extends "process.in.j2" %}', r"process\.in\.j2"),
+    "two extend each other": (_PROCESS, '{% extends "filling.in.j2" %}',
+                              r"(process|filling)\.in\.j2"),
+    "a misspelt block": (_PROCESS, _BASE + "{% block extras %}\nprint 1\n{% endblock %}\n",
+                         "extras"),
+    "a block twice": (_PROCESS, _BASE + 2 * "{% block extra %}{% endblock %}", "extra"),
     "a macro in place of another": (
-        "walls.j2",
-        '{% extends "base/walls.j2" %}{% macro bowl(script) %}{% endmacro %}',
-        "walls.j2.*bowl",
-    ),
-    "text outside of the blocks": ("process.in.j2", _BASE + "run 1\n", "outside of the blocks"),
+        "walls.j2", '{% extends "base/walls.j2" %}{% macro bowl(script) %}{% endmacro %}',
+        "walls.j2.*bowl"),
+    "text outside of the blocks": (_PROCESS, _BASE + "run 1\n", "outside of the blocks"),
     "a block that no script contains": (
-        "base.in.j2",
-        '{% extends "base/base.in.j2" %}{% block run %}{% endblock %}',
-        "changes no input script",
-    ),
-    "no outputs": (
-        "process.in.j2",
-        _BASE + "{% block outputs %}{% endblock %}",
-        "would not write the output files",
-    ),
-    "an endless loop": (
-        "process.in.j2",
-        _in_extra("label again\njump SELF again"),
-        "run for ever",
-    ),
+        "base.in.j2", '{% extends "base/base.in.j2" %}{% block run %}{% endblock %}',
+        "changes no input script"),
+    "no outputs": (_PROCESS, _BASE + "{% block outputs %}{% endblock %}",
+                   "would not write the output files"),
+    "an endless loop": (_PROCESS, _in_extra("label again\njump SELF again"), "run for ever"),
     "a file of no scene": ("proces.in.j2", _BASE, r"proces\.in\.j2"),
     "a file in capitals": ("Process.in.j2", _BASE, r"Process\.in\.j2"),
-    "an empty one": ("process.in.j2", "", r"process\.in\.j2|DRAGDECK END"),
-    "one without its end": ("process.in.j2", "run 1\n", r"process\.in\.j2|DRAGDECK END"),
-    "random bytes": ("process.in.j2", bytes(range(256)) * 9, r"process\.in\.j2"),
-    "UTF-16": ("process.in.j2", _BASE.encode("utf-16"), r"process\.in\.j2"),
-    "a NUL": ("process.in.j2", _in_extra("a\x00b"), r"process\.in\.j2"),
-}
-
-
+    "an empty one": (_PROCESS, "", _EITHER),
+    "one without its end": (_PROCESS, "run 1\n", _EITHER),
+    "random bytes": (_PROCESS, bytes(range(256)) * 9, r"process\.in\.j2"),
+    "UTF-16": (_PROCESS, _BASE.encode("utf-16"), r"process\.in\.j2"),
+    "a NUL": (_PROCESS, _in_extra("a\x00b"), r"process\.in\.j2"),
+}  # fmt: skip
 Template = tuple[str, str | bytes | Path | None, str]
 """A file's name, its content, or where it links to, or None for a folder, and what is named."""
 
 _TEMPLATES: dict[str, Template] = {
-    **{what: ("process.in.j2", _in_extra(text), _NAMED.get(what, r"\.j2"))
+    **{what: (_PROCESS, _in_extra(text), _NAMED.get(what, r"\.j2"))
        for what, text in _EXPRESSIONS.items()},
     **{what: (name, content, named) for what, (name, content, named) in _FILES.items()},
-    "a symlink to itself": ("process.in.j2", Path("process.in.j2"), r"process\.in\.j2"),
-    "a symlink to nothing": ("process.in.j2", Path("no"), r"process\.in\.j2"),
-    "a folder in its place": ("process.in.j2", None, r"process\.in\.j2"),
+    "a symlink to itself": (_PROCESS, Path(_PROCESS), r"process\.in\.j2"),
+    "a symlink to nothing": (_PROCESS, Path("no"), r"process\.in\.j2"),
+    "a folder in its place": (_PROCESS, None, r"process\.in\.j2"),
 }  # fmt: skip
 _UNUSED = ("proces.in.j2", "Process.in.j2")
 
@@ -142,7 +117,7 @@ def test_a_hostile_template_is_refused(attack: Template, tmp_path: Path) -> None
         file.symlink_to(content)
     else:
         file.write_bytes(content.encode() if isinstance(content, str) else content)
-        if name == "process.in.j2" and b"filling.in.j2" in file.read_bytes():
+        if name == _PROCESS and b"filling.in.j2" in file.read_bytes():
             (file.parent / "filling.in.j2").write_text('{% extends "process.in.j2" %}')
     warning_will_do = name in _UNUSED or content is None or isinstance(content, Path)
     assert checked(project, (named,)) in ((REFUSED, WARNED) if warning_will_do else (REFUSED,))

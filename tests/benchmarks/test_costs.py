@@ -14,7 +14,7 @@ from paths import ROOT
 
 from cost_decks import CostTemplates, Settled, TimedDecks, at_rest, with_own_blocks, workpiece_in
 from cost_file import TimedVariant, Timing, cost, geometric
-from cost_timing import BLOCK, blocks, measure
+from cost_timing import BLOCK, blocks, time_variants
 from cost_variants import BASES, Variant, bed_case, standard_case, variant_case, variants
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
@@ -285,12 +285,12 @@ def test_nothing_to_time_is_refused(
 ) -> None:
     out = tmp_path / "costs.json"
     with pytest.raises(InputError, match=f"{option}: nothing to time"):
-        measure(case, project.templates, out, silent, rounds=rounds, seconds=seconds)
+        time_variants(case, project.templates, out, silent, rounds=rounds, seconds=seconds)
 
 
 def test_an_unknown_variant_is_refused(case: Case, project: Project, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such variant"):
-        measure(case, project.templates, tmp_path / "costs.json", silent, only=["unknown"])
+        time_variants(case, project.templates, tmp_path / "costs.json", silent, only=["unknown"])
 
 
 @pytest.mark.engine
@@ -307,7 +307,9 @@ def test_two_variants_on_the_engine(
     said: list[str] = []
 
     def time_them(out: Path, rounds: int) -> dict[str, Any]:
-        measure(case, project.templates, out, said.append, rounds=rounds, seconds=0.04, only=chosen)
+        time_variants(
+            case, project.templates, out, said.append, rounds=rounds, seconds=0.04, only=chosen
+        )
         found: dict[str, Any] = json.loads(out.read_text())
         return found
 

@@ -18,13 +18,13 @@ from dragdeck.cases.case import Case
 from dragdeck.cli import main
 from dragdeck.errors import InputError
 from dragdeck.mesh import cylinder, prism, write_stl
-from dragdeck.preview.layout import COLOURS, Layout, layout
+from dragdeck.preview.layout import COLOURS, CaseLayout, layout
 from dragdeck.preview.page import Words, page
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project
 from dragdeck.scenes.filling import expected_surface
 from dragdeck.scenes.fit import check_fit, clearances
-from dragdeck.study.superposed.kind import DragSteps
+from dragdeck.study.drive import Drive
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin
 from dragdeck.sweep.cases import load_cases
@@ -71,7 +71,7 @@ def pixels(image: np.ndarray, name: str) -> int:
     return int((image @ hue > 0.995 * norms).sum())
 
 
-def volume_and_bounds(found: Layout) -> tuple[float, np.ndarray]:
+def volume_and_bounds(found: CaseLayout) -> tuple[float, np.ndarray]:
     body = found.workpieces[0]
     swept = swept_volume(body.mesh, body.drag.poses)
     return swept.volume, swept.bounds
@@ -178,7 +178,7 @@ def test_the_named_case_is_drawn_and_the_first_by_default(
 ) -> None:
     drawn: list[Words] = []
 
-    def draw(found: Layout, words: Words, folder: Path) -> list[Path]:
+    def draw(found: CaseLayout, words: Words, folder: Path) -> list[Path]:
         drawn.append(words)
         return []
 
@@ -249,12 +249,12 @@ def test_spin_and_oscillation_enlarge_the_swept_volume(made: Made) -> None:
 def test_what_is_superposed_moves_as_it_is_driven() -> None:
     stages = [(1, 60), (2, -30), (3, 0)]
     schedule = [{"until_s": until, "rpm": rpm} for until, rpm in stages]
-    drag = DragSteps(7, 9007, 1e-3)
-    spin = Spin.model_validate({"schedule": schedule, "ramp_s": 0}).of_run(drag)
-    turns = [spin.turn_rad(step, 1e-3) / (2 * np.pi) for step in (0, 500, 1000, 1500, 2000, 9000)]
+    drive = Drive(7, 9007, 1e-3, length_m=1.0)
+    spin = Spin.model_validate({"schedule": schedule, "ramp_s": 0})
+    turns = spin.turn(drive, np.array([0, 500, 1000, 1500, 2000, 9000])) / (2 * np.pi)
     assert turns == pytest.approx([0, 0.5, 1, 0.75, 0.5, 0.5])
-    up = Oscillation(amplitude_m=0.002, frequency_hz=2, ramp_s=0).of_run(drag)
-    lifts = [up.lift_m(step, 1e-3) for step in (0, 125, 375)]
+    up = Oscillation(amplitude_m=0.002, frequency_hz=2, ramp_s=0)
+    lifts = up.shift(drive, np.array([0, 125, 375]))[:, 2]
     assert lifts == pytest.approx([0, 0.002, -0.002])
 
 

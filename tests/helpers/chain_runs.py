@@ -3,8 +3,8 @@
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.drag.peaks import find_drag_peaks
-from evidence.validation.peaks import ChainSeries, Findings, findings
+from dragchain.drag import find_drag_peaks
+from evidence.validation.peaks import ChainSeries, PeakFindings, peak_findings
 
 FRAMES = 400
 INTERVAL_S = 0.01
@@ -34,7 +34,7 @@ def made_run(rng: np.random.Generator, pull: float) -> ChainSeries:
     return ChainSeries("made", time_s, peaks.index, 0.1, chains)
 
 
-def found_of(seed: int, pull: float, runs: int = 4) -> Findings:
+def found_of(seed: int, pull: float, runs: int = 4) -> PeakFindings:
     """The findings of runs whose drag follows their chains by `pull`."""
     rng = np.random.default_rng(seed)
-    return findings([made_run(rng, pull) for _ in range(runs)], COUNT)
+    return peak_findings([made_run(rng, pull) for _ in range(runs)], COUNT)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dragchain import load_outputs
-from dragchain.dumps.run_parts import iter_frames
+from dragchain.run.run_parts import iter_frames
 
 Place = Mapping[int, np.ndarray]
 

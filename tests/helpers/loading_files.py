@@ -40,7 +40,7 @@ endsolid plate
 
 
 def case_json(**motion: Any) -> dict[str, Any]:
-    """Content of ``case.json``; `motion` changes the line along +x."""
+    """Content of ``case.json``; `motion` changes that along a line."""
     steel = {"youngs_modulus_pa": 2e11, "poissons_ratio": 0.3}
     inputs = {
         "media.material": "ceramic", "workpiece.material": "steel",
@@ -49,7 +49,7 @@ def case_json(**motion: Any) -> dict[str, Any]:
     }  # fmt: skip
     return made_case(
         "process", "made-process", timestep_s=STEP_S, rayleigh_time_s=2e-4, inputs=inputs,
-        bowl={"radius_m": 0.1}, surface_m=SURFACE, motion=line(SPEED, **motion),
+        bowl={"radius_m": 0.1}, surface_m=SURFACE, motion=line(SPEED) | motion,
         workpiece={"kind": "mesh", "radius_m": 0.01, "length_m": SIZE, "immersion_depth_m": SIZE},
         phases=phases(START, LAST), statistics={"transient_s": 0.0},
     )  # fmt: skip

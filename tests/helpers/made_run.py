@@ -5,13 +5,19 @@ The modules `tiny_run_files`, `figure_files`, `loading_files`, `network_run_file
 """
 
 import json
+import math
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from run_files import OF_EVERY_RUN
+
+from dragdeck.study.base import flat
+from dragdeck.study.driven import DrivenMotion
+from dragdeck.study.model import Motion
 
 BOX = "ITEM: BOX BOUNDS ff ff ff\n-0.05 0.05\n-0.05 0.05\n0 0.4\n"
 
@@ -63,18 +69,63 @@ def made_case(scene: str, run: str, **values: Any) -> dict[str, Any]:
     Of fidelity, media, bowl and workpiece only the entries that differ need to be given.
     """
     blocks = {name: known | values.pop(name, {}) for name, known in _BLOCKS.items()}
-    return {
+    motion = values.pop("motion", line(0.1))
+    case = {
         "schema": 2, "study": "made", "scene": scene, "run": run, "case": "made case",
         "upstream": {}, "timestep_s": 1e-3, "rayleigh_time_s": 2e-3, "gravity_m_s2": 9.81,
-        "inputs": {}, "surface_m": 0.03, "motion": line(0.1), "statistics": {"transient_s": 0.1},
+        "inputs": {}, "surface_m": 0.03, "statistics": {"transient_s": 0.1},
         "assumptions": [], "reference": None, "versions": {"dragdeck": "0.1.0"},
+        **OF_EVERY_RUN,
     } | blocks | values  # fmt: skip
+    return with_motion(case, **motion)
 
 
-def line(speed_m_s: float, **more: Any) -> dict[str, Any]:
-    """A motion along +x from the bowl's axis."""
-    return {"kind": "line", "axis_speed_m_s": speed_m_s, "start_m": [0.0, 0.0],
-            "direction_rad": 0.0, "start_direction_rad": 0.0} | more  # fmt: skip
+def line(speed_m_s: float, **path: Any) -> dict[str, Any]:
+    """A motion along +x from the bowl's axis; fields of the path may be others."""
+    return {"path": {"kind": "line", "start_m": [0.0, 0.0], **path}, "speed_m_s": speed_m_s}
+
+
+def with_motion(
+    case: Mapping[str, Any], path: Mapping[str, Any], speed_m_s: float | None = None, **motion: Any
+) -> dict[str, Any]:
+    """A case whose workpiece is driven along a path in the steps of its drag, if it has one.
+
+    Parameters
+    ----------
+    case : mapping
+        The content of its ``case.json``.
+    path, motion : mapping
+        Fields of the study; the length of a line or circle is that of the drag.
+    speed_m_s : float, optional
+        Speed that is driven; None for one that gives its own.
+    """
+    drag = next((phase for phase in case.get("phases", ()) if phase["name"] == "drag"), None)
+    if drag is None:
+        return dict(case)
+    timestep, factor = case["timestep_s"], case["fidelity"]["speed_factor"]
+    length = (speed_m_s or 0.0) * (drag["end_step"] - drag["start_step"]) * timestep
+    lengths = {
+        "line": {"length_m": length},
+        "circle": {"revolutions": length / math.tau / path.get("radius_m", 1.0)},
+    }
+    study = Motion.model_validate(
+        {
+            "path": {**lengths.get(path["kind"], {}), **path},
+            "speed_m_s": None if speed_m_s is None else speed_m_s / factor,
+            "immersion_depth_m": case["workpiece"]["immersion_depth_m"],
+            "transient_m": 0.0,
+            "orientation": "fixed",
+            **motion,
+        }
+    )
+    driven = DrivenMotion.of(study, timestep, factor, drag["start_step"])
+    inputs = {name: value for name, value in case["inputs"].items() if "motion." not in name}
+    return {
+        **case,
+        "inputs": {**inputs, **flat(study.plain(), "motion.")},
+        "motion": driven.path_entry().model_dump(),
+        "superposed": [one.model_dump() for one in driven.superposed_entries()],
+    }
 
 
 def phases(drag_start: int, last: int) -> list[dict[str, Any]]:
@@ -94,7 +145,7 @@ def output(kind: str, columns: Sequence[str], period: int, first: int, last: int
 def run_json(**more: Any) -> dict[str, Any]:
     """Content of ``run.json`` of an accepted run."""
     return {
-        "schema": 2, "state": "complete", "engine_version": "Engine 3.8", "ranks": 2,
+        "schema": 2, "inputs": "0f", "state": "complete", "engine_version": "Engine 3.8", "ranks": 2,
         "steps": 160000, "steps_per_s": 2100.0, "wall_time_s": 76.0,
         "started": "2026-01-01T00:00:00", "parts": [{"part": 1, "from": None, "from_step": 0}],
         "checks": [particles_kept(1422)],

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from dragchain.arrays import Floats, Ints, wrap_angle
+from dragchain.arrays import Floats, Ints
 from dragchain.network.chains import (
     ALPHA_RAD,
     LEAST_PARTICLES,
@@ -20,6 +20,7 @@ from dragchain.network.chains import (
     major_stress,
 )
 from dragchain.network.frame import FLOOR, KINDS, SIDE, WORKPIECE, NetworkFrame
+from dragdeck.study.rotation import wrap_angle
 
 BOWL = -1
 Net = dict[int, list[tuple[float, int, int]]]

@@ -7,16 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from paths import PROJECT, ROOT, SMALL_STUDY
+from paths import DATA, PROJECT, ROOT
 
 
-def copy_of_project(folder: Path, study: dict[str, Any] | None = None) -> Path:
-    """A project in a folder, its only study ``small``: this content, or that of the tests."""
-    for name in PROJECT:
-        (folder / name).symlink_to(ROOT / name)
-    (folder / "studies/small").mkdir(parents=True)
-    text = SMALL_STUDY.read_text() if study is None else yaml.safe_dump(study)
-    (folder / "studies/small/study.yaml").write_text(text)
+def copy_of_project(folder: Path, study: dict[str, Any] | None = None, name: str = "small") -> Path:
+    """A project in a folder with one study: this content, or that of the tests' of this name."""
+    for part in PROJECT:
+        (folder / part).symlink_to(ROOT / part)
+    file = folder / "studies" / name / "study.yaml"
+    file.parent.mkdir(parents=True)
+    text = (DATA / f"{name}_study.yaml").read_text() if study is None else yaml.safe_dump(study)
+    file.write_text(text)
     return folder
 
 

@@ -3,6 +3,8 @@
 import math
 import struct
 
+from made_run import Raw
+
 NAMES = ("id", "x", "c_f[1]")
 ROWS = {
     0: [[3, 0.5, -1e-30], [1, 1 / 3, 2e8], [2, -0.25, 5e-324]],
@@ -12,28 +14,28 @@ ROWS = {
 }
 
 
-def text(raw, steps=ROWS, names=NAMES, kind="custom") -> bytes:
+def text(steps=ROWS, names=NAMES, kind="custom") -> bytes:
     places = [NAMES.index(name) for name in names]
     turned = {step: [[row[place] for place in places] for row in ROWS[step]] for step in steps}
-    return b"".join(raw.text(step, rows, names, kind) for step, rows in turned.items())
+    return b"".join(Raw.text(step, rows, names, kind) for step, rows in turned.items())
 
 
-def binary(raw, steps=ROWS) -> bytes:
-    return b"".join(raw.binary(step, ROWS[step], len(NAMES)) for step in steps)
+def binary(steps=ROWS) -> bytes:
+    return b"".join(Raw.binary(step, ROWS[step], len(NAMES)) for step in steps)
 
 
-def spoilt(raw) -> dict[str, tuple[str, bytes, str]]:
+def _spoilt() -> dict[str, tuple[str, bytes, str]]:
     """File name, content after two good frames, and what is said about it."""
-    good = text(raw, [14])
-    whole = raw.binary(14, ROWS[14], 3, 1)
+    good = text([14])
+    whole = Raw.binary(14, ROWS[14], 3, 1)
     return {
         "cut in a number": ("a.dump", good[:-4], "the file ends after"),
-        "cut between rows": ("a.dump", text(raw, [0]).rsplit(b"\n", 2)[0] + b"\n", "the file ends"),
+        "cut between rows": ("a.dump", text([0]).rsplit(b"\n", 2)[0] + b"\n", "the file ends"),
         "cut in the header": ("a.dump", good[:40], "the file ends after"),
         "count too large": ("a.dump", good.replace(b"ATOMS\n1\n", b"ATOMS\n2\n", 1), "ends|row 1"),
         "count too small": (
             "a.dump",
-            text(raw, [0]).replace(b"ATOMS\n3\n", b"ATOMS\n2\n", 1),
+            text([0]).replace(b"ATOMS\n3\n", b"ATOMS\n2\n", 1),
             "2 rows are not all",
         ),
         "nan": ("a.dump", good.replace(b" 4 ", b" nan "), "is nan"),
@@ -51,23 +53,11 @@ def spoilt(raw) -> dict[str, tuple[str, bytes, str]]:
         "binary: nan": ("a.bin", whole[:-8] + struct.pack("<d", math.nan), "is nan"),
         "binary: inf": ("a.bin", whole[:-8] + struct.pack("<d", -math.inf), "is -inf"),
         "binary: wrong count": ("a.bin", whole[:8] + b"\2" + whole[9:], "ends|wrote 1 rows"),
-        "binary: other width": ("a.bin", raw.binary(14, [[1, 2]], 2, 1), "2 columns"),
+        "binary: other width": ("a.bin", Raw.binary(14, [[1, 2]], 2, 1), "2 columns"),
         "binary: no columns": ("a.bin", whole[:92] + bytes(4) + whole[96:], "0 columns"),
         "binary: no ranks": ("a.bin", whole[:96] + bytes(4) + whole[100:], "from 0 ranks"),
         "binary: another program": ("a.bin", b"\x89HDF\r\n" + b"\xff" * 200, "not the header"),
     }
 
 
-SPOILT = [
-    *("cut in a number", "cut between rows", "cut in the header", "count too large"),
-    *("count too small", "nan", "-nan", "inf", "overflow", "a word", "a number less"),
-    *("a number more", "an id that is not whole", "another program", "bytes"),
-    *("binary: cut in rows", "binary: cut in header", "binary: nan", "binary: inf"),
-    *(
-        "binary: no columns",
-        "binary: no ranks",
-        "binary: wrong count",
-        "binary: other width",
-        "binary: another program",
-    ),
-]
+SPOILT = _spoilt()

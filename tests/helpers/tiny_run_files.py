@@ -137,7 +137,6 @@ def case_json(**values: Any) -> dict[str, Any]:
     """Content of ``case.json``."""
     inputs = {
         "media.count": 4,
-        "motion.speed_m_s": SPEED_M_S,
         "media.material": "stone",
         **dict.fromkeys(("bowl.material", "workpiece.material"), "steel"),
         **dict.fromkeys(("pairs.stone-stone.friction", "pairs.steel-stone.friction"), FRICTION),

@@ -10,10 +10,10 @@ import pandas as pd
 from made_run import run_json, save, write_documents
 from report_files import case_json
 
-from dragchain.tradeoff.compare import read_runs
+from dragchain.tradeoff.compare import read_plan_runs
 from dragchain.tradeoff.measure_run import FORCE_BINS
 from dragchain.tradeoff.measures import QUANTITIES
-from dragchain.tradeoff.outcome import Tradeoff, compare
+from dragchain.tradeoff.outcome import Tradeoff, compare_settings
 from dragdeck.documents import SCHEMA
 
 BLOCK_M = 0.0065
@@ -148,7 +148,7 @@ def contents(**changes: Any) -> list[dict[str, Any]]:
 def made(folder: Path, found: list[dict[str, Any]]) -> Tradeoff:
     """The trade-off of runs with these measures, the first at the reference."""
     files = write(folder, found)
-    return compare(*read_runs(files, files[0].parent))
+    return compare_settings(*read_plan_runs(files, files[0].parent))
 
 
 def point_of(content: dict[str, Any]) -> tuple[float, ...]:

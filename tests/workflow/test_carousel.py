@@ -16,8 +16,8 @@ from snakemake_calls import copy_of_project, jobs, snakemake
 from dragchain import load_case
 from dragchain.figures.style import PAPER_COLOURS, force_map
 from dragchain.report.journal import COLUMN_MM, PAGE_MM, write_journal_figures
-from dragchain.run.case import Case
-from dragchain.run.kinematics import drag_phase, motion_of
+from dragchain.run.kinematics import axis_speed, drag_phase
+from dragdeck.records.case import CaseOfRun
 
 pytestmark = [pytest.mark.engine, pytest.mark.slow]
 
@@ -52,7 +52,7 @@ def workpieces(project: Path) -> list[Path]:
     return folders
 
 
-def in_drag(folder: Path) -> tuple[Case, pd.DataFrame]:
+def in_drag(folder: Path) -> tuple[CaseOfRun, pd.DataFrame]:
     case = load_case(folder)
     force = pd.read_parquet(folder / "tables/workpiece_force.parquet")
     return case, force[force["step"] > drag_phase(case).start_step]
@@ -63,7 +63,7 @@ def test_each_goes_where_it_should(workpieces: list[Path]) -> None:
     for number, folder in enumerate(workpieces):
         case, force = in_drag(folder)
         time = (force["step"] - drag_phase(case).start_step).to_numpy() * case.timestep_s
-        way = motion_of(case).axis_speed_m_s * time  # 0.02 m/s, rounded to whole steps
+        way = axis_speed(case) * time  # 0.02 m/s, rounded to whole steps
         angle = way / RADIUS_M + 2 * np.pi * number / COUNT
         place = np.column_stack([RADIUS_M * np.cos(angle), RADIUS_M * np.sin(angle)])
         assert np.abs(force[["ref_x_m", "ref_y_m"]] - place).to_numpy().max() < 1e-9

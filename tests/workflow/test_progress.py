@@ -12,8 +12,7 @@ from typing import Any
 import pandas as pd
 import pytest
 import yaml
-from paths import DATA, PROJECT, ROOT
-from snakemake_calls import call_of, snakemake
+from snakemake_calls import call_of, copy_of_project, snakemake
 
 from dragdeck.cli import main
 
@@ -31,12 +30,7 @@ REJECTED = """{% extends "base/process.in.j2" %}
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("project")
-    for name in PROJECT:
-        (folder / name).symlink_to(ROOT / name)
-    (folder / "studies/tiny/templates").mkdir(parents=True)
-    shutil.copy(DATA / "tiny_study.yaml", folder / "studies/tiny/study.yaml")
-    return folder
+    return copy_of_project(tmp_path_factory.mktemp("project"), name="tiny")
 
 
 @pytest.fixture(scope="module")
@@ -155,6 +149,7 @@ def test_a_failed_run_is_told_in_full_and_has_a_status(
     data: dict[str, Any] = yaml.safe_load(file.read_text())
     data["sweep"] = {"motion.immersion_depth_m": [0.005, 0.006]}
     file.write_text(yaml.safe_dump(data))
+    (file.parent / "templates").mkdir()
     (file.parent / "templates/process.in.j2").write_text(REJECTED)
     done = snakemake(project, *SHOWN, "all", *STUDY)
     assert done.returncode != 0

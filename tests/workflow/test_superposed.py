@@ -11,21 +11,21 @@ import pandas as pd
 import pytest
 import yaml
 from loading_files import STEP_S, case_json
+from made_run import line, with_motion
 from paths import ROOT, SMALL_STUDY
 from plate import PLATE
 
 from dragchain import load_case, write_tables
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.write import compute_loading
-from dragchain.run.case import Case
 from dragchain.run.kinematics import (
+    axis_speed,
     directions,
     drag_phase,
     motion_of,
-    workpiece_turn,
+    workpiece_rotation,
 )
-from dragchain.run.superposed.spin import Spin as SpinRead
-from dragchain.run.workpiece import read_surface, turned
+from dragchain.run.workpiece import read_surface
 from dragdeck.decks import outputs
 from dragdeck.decks.outputs import ColumnsFile
 from dragdeck.decks.render import write_run
@@ -34,10 +34,13 @@ from dragdeck.engine.process import find_engine
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import run_to_outcome
 from dragdeck.project import Project
+from dragdeck.records.case import CaseOfRun
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.process import PROCESS
 from dragdeck.scenes.scene import read_bed
-from dragdeck.study.superposed.kind import DragSteps, SuperposedOfRun
+from dragdeck.study.drive import Drive
+from dragdeck.study.rotation import rotated
+from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin
 from dragdeck.sweep.cases import load_cases
@@ -78,6 +81,38 @@ TURNING = {
 REVERSING = {"schedule": [{"until_s": 0.06, "rpm": 300}, {"until_s": 0.12, "rpm": -600}]}
 UP_AND_DOWN = {"amplitude_m": 0.001, "frequency_hz": 6}
 
+
+EIGHT = {"kind": "figure_eight", "radius_m": 0.003, "direction_deg": 40, "loops": 0.6}
+LEANING = [[0, 0, 0], [15, -10, 20], [15, -10, 20], [-60, 20, -15], [-80, 0, 10]]
+INCLINED = {
+    "path": {
+        "kind": "waypoints",
+        "points": [
+            [*point[:4], *turns]
+            for point, turns in zip(TURNING["path"]["points"], LEANING, strict=True)  # type: ignore[index]
+        ],
+    },
+    "speed_m_s": None,
+}
+"""Waypoints with turn, pitch and roll."""
+
+POSED: dict[str, dict[str, Any]] = {
+    "tilt-spin": {"path": CIRCLE, "tilt_deg": 20, "spin": {"rpm": 400}},
+    "tilt-spin-fixed": {
+        "path": CIRCLE | {"direction": "cw"}, "tilt_deg": -15, "orientation": "fixed",
+        "spin": REVERSING, "oscillation": UP_AND_DOWN,
+    },
+    "tilt-spin-line": {"path": LINE, "tilt_deg": 30, "spin": REVERSING},
+    "eight": {"path": EIGHT, "oscillation": UP_AND_DOWN},
+    "eight-fixed": {"path": EIGHT, "orientation": "fixed", "ramp_s": 0.05},
+    "eight-tilt-spin": {"path": EIGHT, "tilt_deg": 20, "spin": {"rpm": -300}, "ramp_s": 0.1},
+    "start": {"path": CIRCLE, "ramp_s": 0.08, "spin": {"rpm": 200}},
+    "start-fixed": {"path": CIRCLE, "ramp_s": 0.08, "orientation": "fixed"},
+    "start-line": {"path": LINE, "ramp_s": 0.05},
+    "inclined": INCLINED,
+    "inclined-tilt": {**INCLINED, "tilt_deg": 10},
+    "turning-tilt": {**TURNING, "tilt_deg": 15, "oscillation": UP_AND_DOWN},
+}  # fmt: skip
 
 RAMP_S = 0.1
 """Time in which a superposed motion starts: its speed grows as 3 x^2 - 2 x^3."""
@@ -145,11 +180,11 @@ def asked_speed(motion: dict[str, Any]) -> float:
     return float(ways.sum() / np.ptp(points[:, 0]))
 
 
-def analytic(case: Case, motion: dict[str, Any], steps: np.ndarray) -> np.ndarray:
+def analytic(case: CaseOfRun, motion: dict[str, Any], steps: np.ndarray) -> np.ndarray:
     """Where the reference point has to be, its height from that of the immersion."""
     time = (steps - drag_phase(case).start_step) * case.timestep_s
-    path, way = motion["path"], motion_of(case).axis_speed_m_s * time
-    faster = motion_of(case).axis_speed_m_s / asked_speed(motion)
+    path, way = motion["path"], axis_speed(case) * time
+    faster = axis_speed(case) / asked_speed(motion)
     found = np.zeros((len(steps), 3))
     if path["kind"] == "circle":
         angle = (-1 if path.get("direction") == "cw" else 1) * way / path["radius_m"]
@@ -181,9 +216,10 @@ def farthest_corner(folder: Path, steps: np.ndarray, ref_m: np.ndarray) -> float
         if file.is_file():
             mesh, frames = meshio.stl.read(file), frames + 1
             at = np.array([step])
-            turn = workpiece_turn(at, directions(at, place[None, :2], case), case)[0]
+            heading = directions(at, place[None, :2], case)
+            turn = workpiece_rotation(at, heading, case).matrices[0]
             corners = mesh.points[mesh.cells_dict["triangle"]]
-            off = max(off, float(np.abs(corners - turned(surface.corners, turn) - place).max()))
+            off = max(off, float(np.abs(corners - surface.corners @ turn.T - place).max()))
     assert frames > 1
     return off
 
@@ -219,6 +255,27 @@ def test_the_engine_moves_the_workpiece_as_both_packages_say(
     assert farthest_corner(folder, steps, place) < 1e-7
 
 
+@pytest.mark.parametrize("motion", POSED.values(), ids=POSED)
+def test_the_engine_poses_the_workpiece_as_its_path_does(
+    runs: Runs, motion: dict[str, Any]
+) -> None:
+    """In three dimensions: the reference point to 1e-9 m, the facets to the digits of a file."""
+    folder = runs.shallow(**motion)
+    engine(folder)
+    steps, place = reference(folder)
+    assert off_pose(folder, steps, place) < 1e-9
+    assert farthest_corner(folder, steps, place) < 1e-7
+
+
+def off_pose(folder: Path, steps: np.ndarray, place: np.ndarray) -> float:
+    """How far the engine's reference point is from where its motion has it, at most, m."""
+    case = load_case(folder)
+    start, moved = drag_phase(case).start_step, motion_of(case)
+    rows = np.loadtxt(folder / "workpiece_force.1.txt", skiprows=1)
+    begun = np.array([*moved.motion.path.start_point, rows[rows[:, 0] == start, 10][0]])
+    return float(np.abs(place - moved.places(steps - start, begun)).max())
+
+
 @pytest.mark.parametrize("rpm", [30, -30])
 def test_the_bed_rotates_with_the_bowl_about_a_workpiece_at_rest(runs: Runs, rpm: float) -> None:
     """The same way and no faster, slowed by the workpiece; the drag is along the bed's motion."""
@@ -245,9 +302,8 @@ def test_a_resumed_run_continues_the_motion(runs: Runs, path: dict[str, Any]) ->
     folder = runs.shallow(**motion)
     engine(folder)
     case, checkpoints = load_case(folder), sorted(folder.glob("checkpoint.*.restart"))
-    stage = case.superposed[-1]
-    assert isinstance(stage, SpinRead)
-    begun = drag_phase(case).start_step + stage.stages[0].steps
+    stages = case.superposed[-1].model_dump()["stages"]
+    begun = drag_phase(case).start_step + stages[0]["steps"]
     checkpoint = next(
         file
         for file in sorted(checkpoints, key=lambda file: int(file.name.split(".")[1]))
@@ -265,6 +321,24 @@ def test_a_resumed_run_continues_the_motion(runs: Runs, path: dict[str, Any]) ->
     assert farthest_corner(folder, steps, place) < 1e-7
 
 
+@pytest.mark.parametrize("name", ["tilt-spin-fixed", "eight-tilt-spin", "inclined"])
+def test_a_resumed_run_continues_the_pose(runs: Runs, name: str) -> None:
+    """From a checkpoint within the drag: a restart file keeps neither axis nor moved centre."""
+    folder = runs.shallow(**POSED[name])
+    engine(folder)
+    drag, whole = drag_phase(load_case(folder)), reference(folder)
+    written = [int(file.name.split(".")[1]) for file in folder.glob("checkpoint.*.restart")]
+    step = min(step for step in written if step > drag.start_step + 100)
+    for file in folder.glob("corners.*"):
+        file.unlink()
+    engine(folder, *f"-var part 2 -var resume 1 -var from checkpoint.{step}.restart".split())
+    steps, place = reference(folder, part=2)
+    assert drag.end_step == steps[-1]
+    np.testing.assert_allclose(place, whole[1][np.isin(whole[0], steps)], atol=1e-11)
+    assert off_pose(folder, steps, place) < 1e-9
+    assert farthest_corner(folder, steps, place) < 1e-7
+
+
 def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
     """Facets gather in the body frame, whose sums are those of the workpiece; work is power."""
     schedule = [{"until_s": 0.12, "rpm": 300}, {"until_s": 1, "rpm": -300}]
@@ -277,7 +351,8 @@ def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
     case = load_case(folder)
     force = pd.read_parquet(folder / "tables/workpiece_force.parquet")
     force = force[force["in_statistics"]]
-    middle = drag_phase(case).start_step + case.superposed[0].stages[0].steps
+    stages = case.superposed[0].model_dump()["stages"]
+    middle = drag_phase(case).start_step + stages[0]["steps"]
     first = force["step"].to_numpy() <= middle
     torque = force["torque_z_n_m"].to_numpy()
     assert torque[first].mean() < 0 < torque[~first].mean()
@@ -286,7 +361,7 @@ def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
 
     world, body = (force[[f"{name}_{axis}_n" for axis in "xyz"]] for name in ("force", "body"))
     turn = force["turn_rad"].to_numpy()
-    np.testing.assert_allclose(turned(body.to_numpy(), turn), world, atol=1e-12)
+    np.testing.assert_allclose(rotated(body.to_numpy(), turn), world, atol=1e-12)
 
     found = compute_loading(folder, Thresholds())
     contacts = pd.read_parquet(folder / "tables/workpiece_contacts.parquet", columns=["step"])
@@ -298,10 +373,37 @@ def test_a_reversal_reverses_the_torque(runs: Runs) -> None:
     assert found.summary.closure.point_off_facet_max_m < 1e-6
 
     rate = np.where(sampled["step"] <= middle, 1, -1) * 300 * 2 * np.pi / 60
-    rate += motion_of(case).axis_speed_m_s / path["radius_m"]
-    power = -(sampled["drag_n"] * motion_of(case).axis_speed_m_s + sampled["torque_z_n_m"] * rate)
+    rate += axis_speed(case) / path["radius_m"]
+    power = -(sampled["drag_n"] * axis_speed(case) + sampled["torque_z_n_m"] * rate)
     work = found.summary.totals["workpiece_work_j"]
     assert work == pytest.approx(power.sum() * interval, rel=0.05)
+
+
+def test_contacts_lie_on_an_inclined_workpiece_that_spins(runs: Runs) -> None:
+    """In its own frame contacts are on their facets, and their work is the power of the motion."""
+    path, tilt, rpm = {"kind": "circle", "radius_m": 0.01, "revolutions": 0.07}, 15, 200
+    deep = {"immersion_depth_m": 0.02, "plunge_speed_m_s": 0.15, "transient_m": 1e-4}
+    folder = runs.rendered(300, path=path, tilt_deg=tilt, spin={"rpm": rpm, "ramp_s": 0.02}, **deep)
+    engine(folder)
+    write_tables(folder)
+    case, found = load_case(folder), compute_loading(folder, Thresholds())
+    assert found.summary.closure.point_off_facet_max_m < 1e-6
+    force = pd.read_parquet(folder / "tables/workpiece_force.parquet").query("in_statistics")
+    world, body = (force[[f"{name}_{axis}_n" for axis in "xyz"]] for name in ("force", "body"))
+    np.testing.assert_allclose(
+        np.linalg.norm(body, axis=1), np.linalg.norm(world, axis=1), atol=1e-12
+    )
+    contacts = pd.read_parquet(folder / "tables/workpiece_contacts.parquet", columns=["step"])
+    sampled = force[force["step"].isin(contacts["step"])]
+    lean, heading = np.radians(tilt), sampled["direction_rad"].to_numpy()
+    across, up = np.sin(lean) * np.ones_like(heading), np.cos(lean) * np.ones_like(heading)
+    axis = np.column_stack([across * np.cos(heading), across * np.sin(heading), up])
+    turning = rpm * 2 * np.pi / 60 * axis
+    turning[:, 2] += axis_speed(case) / path["radius_m"]
+    torque = sampled[[f"torque_{axis}_n_m" for axis in "xyz"]].to_numpy()
+    power = -(sampled["drag_n"] * axis_speed(case) + (torque * turning).sum(axis=1))
+    work = found.summary.totals["workpiece_work_j"]
+    assert work == pytest.approx(power.sum() * found.sampled.interval_s, rel=0.05)
 
 
 # --- a particle on a spinning plate --------------------------------------------------------------
@@ -338,7 +440,7 @@ fix drag all move/mesh mesh workpiece linear {{ speed }} 0. 0.
 {% for name, formula in superposed.variables | items %}
 variable {{ name }} equal {{ formula }}
 {% endfor %}
-fix superposed all move/mesh mesh workpiece {{ superposed.mover }}
+fix superposed all move/mesh mesh workpiece {{ superposed.movers[""] }}
 {% from "outputs.j2" import write %}
 {% for output in outputs %}
 {{ write(output) }}
@@ -354,12 +456,12 @@ def static_overlap(mass: float) -> float:
 
 
 def write_plate(
-    folder: Path, motion: SuperposedOfRun, drag: DragSteps, speed_m_s: float, written: Any
+    folder: Path, motion: SuperposedMotion, drag: Drive, speed_m_s: float, written: Any
 ) -> None:
     """Input script, plate and a particle that rests on it."""
     deck = environment(ROOT / "templates").from_string(DECK)
     text = deck.render(
-        superposed=motion.on_engine(drag.start), outputs=written, steps=drag.end,
+        superposed=motion.on_engine(drag, 0.0), outputs=written, steps=drag.end,
         timestep=drag.timestep_s, modulus=MODULUS, friction=FRICTION, gravity=GRAVITY,
         speed=speed_m_s, law="hertz tangential history",
     )  # fmt: skip
@@ -378,14 +480,13 @@ def test_an_oscillation_below_gravity_throws_no_particle_off(
     tmp_path: Path, ramp_s: float, thrown: bool
 ) -> None:
     """0.1 mm at 30 Hz accelerates with 0.36 g at most: only a start at full speed throws it off."""
-    oscillation = Oscillation(amplitude_m=1e-4, frequency_hz=30, ramp_s=ramp_s)
-    drag = DragSteps(0, 17_000, 1e-5)
+    motion = Oscillation(amplitude_m=1e-4, frequency_hz=30, ramp_s=ramp_s)
+    drag = Drive(0, 17_000, 1e-5, length_m=1.0)
     force = outputs.workpiece_force(20, drag.end, "workpiece")
-    motion = oscillation.of_run(drag)
     write_plate(tmp_path, motion, drag, 0.0, [force])
     engine(tmp_path)
     rows = np.loadtxt(tmp_path / "workpiece_force.1.txt", skiprows=1)
-    lifts = [motion.lift_m(step, drag.timestep_s) for step in rows[:, 0]]
+    lifts = motion.shift(drag, rows[:, 0])[:, 2]
     np.testing.assert_allclose(rows[:, 10], lifts, atol=1e-9)
     assert (rows[:, 4] == 0.0).any() == thrown
 
@@ -395,7 +496,8 @@ def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: 
 
     Friction then accelerates its centre by mu g, and its surface by another 5/2 mu g.
     """
-    drag, mass = DragSteps(0, STEPS, STEP_S / 10), DENSITY * 4 / 3 * np.pi * RADIUS**3
+    mass = DENSITY * 4 / 3 * np.pi * RADIUS**3
+    drag = Drive(0, STEPS, STEP_S / 10, length_m=SPEED * STEPS * STEP_S / 10)
     written = outputs.in_writing_order(
         [
             outputs.workpiece_force(20, STEPS, "workpiece"),
@@ -404,16 +506,15 @@ def test_a_particle_on_a_moving_and_spinning_plate_slips_as_it_should(tmp_path: 
         ]
     )
     spin = Spin(rpm=RPM, ramp_s=0.0)
-    write_plate(tmp_path, spin.of_run(drag), drag, SPEED, written)
+    write_plate(tmp_path, spin, drag, SPEED, written)
     ColumnsFile(outputs={each.name: each.as_part() for each in written}).write(
         tmp_path / "columns.json"
     )
-    superposed = [spin.of_run(drag).model_dump()]
-    made = case_json(axis_speed_m_s=SPEED, direction_rad=0.0) | {
-        "superposed": superposed,
+    made = case_json() | {
         "timestep_s": drag.timestep_s,
         "phases": [{"name": "drag", "start_step": 0, "end_step": STEPS}],
-    }  # fmt: skip
+    }
+    made = with_motion(made, **line(SPEED), spin={"rpm": RPM, "ramp_s": 0})
     made["inputs"] |= {"bowl.material": "steel", "pairs.ceramic-steel.friction": FRICTION}
     (tmp_path / "case.json").write_text(json.dumps(made))
     engine(tmp_path)

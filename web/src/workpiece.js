@@ -38,16 +38,16 @@ export class Workpiece {
     this.arrow.position.z = top;
   }
 
-  /** Where the workpiece's reference point is at a frame (mm), and its turn (rad). */
+  /** Where the workpiece's reference point is at a frame (mm), and its orientation as a quaternion. */
   pose(number) {
-    const [x, y, z, turn] = this.own.poses[number];
+    const [x, y, z, ...turn] = this.own.poses[number];
     return { x, y, z, turn, heading: this.own.headings[number] };
   }
 
   place(number) {
     const { x, y, z, turn, heading } = this.pose(number);
     this.group.position.set(x, y, z);
-    this.group.rotation.set(0, 0, turn);
+    this.group.quaternion.set(...turn);
     this.arrow.position.set(x, y, this.arrow.position.z);
     this.arrow.rotation.set(0, 0, heading);
   }

@@ -14,21 +14,19 @@ import jinja2
 from pydantic import ValidationError
 from rich.table import Table
 
-from dragdeck.advice.advise import Advice
-from dragdeck.advice.advise import advise as advised_settings
+from dragdeck.advice.advise import Advice, advised_settings
 from dragdeck.advice.forecast import (
     AdviceFile,
     advice_file,
+    advice_tables,
     forecast,
     question,
     roles,
-    tables,
 )
 from dragdeck.advice.options import Speed, with_option
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
-from dragdeck.decks.deck import StudyScene
 from dragdeck.decks.render import (
     added_forces,
     deck_text,
@@ -44,8 +42,7 @@ from dragdeck.engine.reports import say
 from dragdeck.errors import DragdeckError, InputError, choices, together
 from dragdeck.files import write_bytes, write_text
 from dragdeck.outlook.explain import expected_cost, explanation, measured_speeds, show
-from dragdeck.outlook.explain import page as page_of_scene
-from dragdeck.outlook.measured import Tradeoff, measured_tradeoff, tradeoff_if_measured
+from dragdeck.outlook.explain import scene_lines as page_of_scene
 from dragdeck.outlook.process import (
     bed_notes,
     dimensionless,
@@ -56,14 +53,14 @@ from dragdeck.outlook.process import (
 from dragdeck.outlook.runs import expected_runs, plan_in_words
 from dragdeck.outlook.timestep import stable_step_cautions, stable_step_note, timestep_notes
 from dragdeck.physics.packing import Bed
-from dragdeck.preview.layout import Layout, layout
-from dragdeck.preview.page import Words, page
-from dragdeck.preview.picture import picture, small_picture
+from dragdeck.preview.layout import CaseLayout, layout
+from dragdeck.preview.page import Words, page, picture, small_picture
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
+from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.registry import SCENES
-from dragdeck.scenes.scene import SceneType, read_bed
+from dragdeck.scenes.scene import SceneType, StudyScene, read_bed
 from dragdeck.study.check import explained, warnings
 from dragdeck.study.model import RESTITUTION
 from dragdeck.study.yaml import located
@@ -249,7 +246,7 @@ def _numbers(case: Case) -> dict[str, list[tuple[str, str]]]:
     }
 
 
-def _drawn(found: Layout, words: Words, folder: Path) -> list[Path]:
+def _drawn(found: CaseLayout, words: Words, folder: Path) -> list[Path]:
     """Write pictures and page of a layout into a folder and return their files."""
     swept = [swept_volume(body.mesh, body.drag.poses) for body in found.workpieces]
     png = picture(found, swept, words.heading, refused=bool(words.refusal))
@@ -311,7 +308,7 @@ def advise(
     tolerance: float | None,
     quantity: str | None,
     quick: bool,
-    tradeoff: Tradeoff | None = None,
+    tradeoff: TradeoffRecord | None = None,
 ) -> None:
     """Show the settings for a tolerance, with their cost, and keep them."""
     project = find_project(Path.cwd())
@@ -331,7 +328,7 @@ def advise(
     for case, advice in zip(every, advices, strict=True):
         options = [forecast(case, *row, speed, results, tradeoff) for row in roles(advice)]
         rows.append((advice, options))
-        show(tables(case, advice, options))
+        show(advice_tables(case, advice, options))
     _keep(results / "advice.json", advice_file(every[0], rows, speed))
 
 

@@ -106,6 +106,62 @@ class RejectedRunError(DragdeckError):
     """A run that did not pass the acceptance checks, or is not complete."""
 
 
+class DumpError(DragdeckError):
+    """A raw output whose content is not that announced in ``columns.json``.
+
+    Parameters
+    ----------
+    file : Path
+        The output file.
+    problem : str
+        What was found.
+    frame : int, optional
+        Number of the frame (of the data row in a ``fix print`` file), from 0.
+    offset : int, optional
+        Byte offset into the file at which the frame or the row starts.
+    expected : str, optional
+        What was expected instead.
+    kept : str, optional
+        Intact content before it.
+    remedy : str, optional
+        What the user can do.
+    """
+
+    def __init__(
+        self,
+        file: Path,
+        problem: str,
+        *,
+        frame: int | None = None,
+        offset: int | None = None,
+        expected: str | None = None,
+        kept: str | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        self.file = file
+        self.problem = problem
+        self.frame = frame
+        self.offset = offset
+        self.expected = expected
+        self.kept = kept
+        self.remedy = remedy
+        super().__init__()
+
+    def __str__(self) -> str:
+        """Problem with its place, what was expected, and what is intact."""
+        place = [f"{self.file}"]
+        if self.frame is not None:
+            place.append(f"frame {self.frame}")
+        if self.offset is not None:
+            place.append(f"byte {self.offset}")
+        problem = f"{', '.join(place)}: {self.problem}"
+        return rendered(problem, expected=self.expected, kept=self.kept, remedy=self.remedy)
+
+
+class TruncatedDumpError(DumpError):
+    """A raw output that ends inside a frame; the frames before it are intact."""
+
+
 CautionCode = Literal[
     "facets",
     "gap",

@@ -4,7 +4,7 @@
 
 rule advise:
     output:
-        ADVICE,
+        WORK.advice,
     log:
         f"results/{STUDY}/logs/advise.log",
     benchmark:
@@ -14,7 +14,7 @@ rule advise:
         "../envs/python.yaml"
     params:
         cases=[SCENES["process"].digest(case) for case in by_run(CASES, SCENES["process"]).values()],
-        fidelity=fidelity_option,
+        fidelity=WORK.fidelity_option,
         study=STUDY,
         source=source_hash("dragdeck.advice.forecast"),
     shell:

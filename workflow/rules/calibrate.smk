@@ -4,19 +4,19 @@
 
 rule read_drop_record:
     input:
-        drop_record,
+        WORK.drop_record,
     output:
-        of_study("calibration", "record.json"),
+        WORK.of_study("calibration", "record.json"),
     log:
-        of_study("calibration", "logs/record.log"),
+        WORK.of_study("calibration", "logs/record.log"),
     benchmark:
-        of_study("calibration", "benchmarks/record.tsv")
+        WORK.of_study("calibration", "benchmarks/record.tsv")
     conda:
         "../envs/python.yaml"
     resources:
         prints=1,
     params:
-        fall_time=fall_time,
+        fall_time=WORK.fall_time_s,
         source=source_hash("dragchain.calibration.measured_impacts"),
     shell:
         "dragchain step record {input:q} --fall-time {params.fall_time} --out {output} 2>&1 | tee -i {log}"
@@ -24,21 +24,21 @@ rule read_drop_record:
 
 rule sweep_drops:
     input:
-        calibration_inputs(),
-        of_study("calibration", "record.json"),
+        WORK.calibration_inputs(),
+        WORK.of_study("calibration", "record.json"),
     output:
-        of_study("calibration", "sweep/drops.json"),
+        WORK.of_study("calibration", "sweep/drops.json"),
     log:
-        of_study("calibration", "logs/sweep.log"),
+        WORK.of_study("calibration", "logs/sweep.log"),
     benchmark:
-        of_study("calibration", "benchmarks/sweep.tsv")
+        WORK.of_study("calibration", "benchmarks/sweep.tsv")
     conda:
         "../envs/python.yaml"
     resources:
         prints=1,
     params:
         study=STUDY,
-        fidelity=fidelity_option,
+        fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.campaigns.restitution_drops"),
     shell:
         "dragdeck step drops {params.study} sweep {params.fidelity}"
@@ -47,16 +47,16 @@ rule sweep_drops:
 
 rule fit_restitution:
     input:
-        record=drop_record,
-        drops=of_study("calibration", "sweep/drops.json"),
+        record=WORK.drop_record,
+        drops=WORK.of_study("calibration", "sweep/drops.json"),
     output:
-        result=of_study("calibration", "result.json"),
-        impacts=of_study("calibration", "impacts.csv"),
-        bias=of_study("calibration", "bias.csv"),
+        result=WORK.of_study("calibration", "result.json"),
+        impacts=WORK.of_study("calibration", "impacts.csv"),
+        bias=WORK.of_study("calibration", "bias.csv"),
     log:
-        of_study("calibration", "logs/fit.log"),
+        WORK.of_study("calibration", "logs/fit.log"),
     benchmark:
-        of_study("calibration", "benchmarks/fit.tsv")
+        WORK.of_study("calibration", "benchmarks/fit.tsv")
     conda:
         "../envs/python.yaml"
     resources:
@@ -70,21 +70,21 @@ rule fit_restitution:
 
 rule confirm_restitution:
     input:
-        calibration_inputs(),
-        fit=of_study("calibration", "result.json"),
+        WORK.calibration_inputs(),
+        fit=WORK.of_study("calibration", "result.json"),
     output:
-        of_study("calibration", "confirm/drops.json"),
+        WORK.of_study("calibration", "confirm/drops.json"),
     log:
-        of_study("calibration", "logs/confirm.log"),
+        WORK.of_study("calibration", "logs/confirm.log"),
     benchmark:
-        of_study("calibration", "benchmarks/confirm.tsv")
+        WORK.of_study("calibration", "benchmarks/confirm.tsv")
     conda:
         "../envs/python.yaml"
     resources:
         prints=1,
     params:
         study=STUDY,
-        fidelity=fidelity_option,
+        fidelity=WORK.fidelity_option,
         source=source_hash("dragdeck.campaigns.restitution_drops"),
     shell:
         "dragdeck step drops {params.study} confirm {params.fidelity} --fit {input.fit}"
@@ -94,24 +94,25 @@ rule confirm_restitution:
 rule write_calibration_report:
     input:
         rules.fit_restitution.output,
-        of_study("calibration", "sweep/drops.json"),
-        of_study("calibration", "confirm/drops.json"),
-        record=drop_record,
-        templates=page_templates("calibration/calibration.html.j2"),
+        WORK.of_study("calibration", "sweep/drops.json"),
+        WORK.of_study("calibration", "confirm/drops.json"),
+        record=WORK.drop_record,
+        templates=WORK.page_templates("calibration/calibration.html.j2"),
     output:
         page=report(
-            of_study("calibration", "report.html"),
+            WORK.of_study("calibration", "report.html"),
             caption="../report/calibration.rst",
             category="Calibration",
             labels={"run": "drop test", "figure": "report"},
         ),
         figures=[
-            of_study("calibration", f"figures/{name}.png") for name in ("impacts", "fit", "bias")
+            WORK.of_study("calibration", f"figures/{name}.png")
+            for name in ("impacts", "fit", "bias")
         ],
     log:
-        of_study("calibration", "logs/report.log"),
+        WORK.of_study("calibration", "logs/report.log"),
     benchmark:
-        of_study("calibration", "benchmarks/report.tsv")
+        WORK.of_study("calibration", "benchmarks/report.tsv")
     conda:
         "../envs/python.yaml"
     resources:

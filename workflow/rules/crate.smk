@@ -3,22 +3,22 @@
 
 rule write_crate:
     input:
-        [every(name, "run.json", "tables/figures.json") for name in SCENES],
+        [WORK.every(name, "run.json", "tables/figures.json") for name in SCENES],
         # A brace would start a wildcard.
-        lambda wildcards: [file for file in crate_inputs() if "{" not in file],
+        lambda wildcards: [file for file in WORK.crate_inputs() if "{" not in file],
         report=rules.write_report.output,
     output:
-        of_study("crate", "ro-crate-metadata.json"),
+        WORK.of_study("crate", "ro-crate-metadata.json"),
     log:
-        of_study("logs", "crate.log"),
+        WORK.of_study("logs", "crate.log"),
     benchmark:
-        of_study("benchmarks", "crate.tsv")
+        WORK.of_study("benchmarks", "crate.tsv")
     conda:
         "../envs/python.yaml"
     params:
-        runs=[folder for name in SCENES for folder in every_folder(name)],
-        licence=licence_option,
-        files=lambda wildcards: " ".join(map(quote, crate_inputs())),
+        runs=[folder for name in SCENES for folder in WORK.every_folder(name)],
+        licence=WORK.licence_option,
+        files=lambda wildcards: " ".join(map(quote, WORK.crate_inputs())),
         source=source_hash("dragchain.report.crate"),
     shell:
         "dragchain step crate --out $(dirname {output}) --report $(dirname {input.report[0]})"

@@ -8,9 +8,9 @@ for PLACE, SCENE in PLACES.items():
         name:
             f"render_{PLACE}"
         input:
-            templates_of(SCENE.name),
-            packing=of_its_bed(PLACE, "tables/packing.json"),
-            lead=of_its_lead(PLACE),
+            WORK.templates_of(SCENE.name),
+            packing=WORK.of_its_bed(PLACE, "tables/packing.json"),
+            lead=WORK.of_its_lead(PLACE),
         output:
             [
                 of_run(PLACE, file)
@@ -27,8 +27,8 @@ for PLACE, SCENE in PLACES.items():
         conda:
             "../envs/python.yaml"
         params:
-            case=digest_of(PLACE),
-            cases=cases_option(PLACE),
+            case=WORK.digest_of(PLACE),
+            cases=WORK.cases_option(PLACE),
             packing="--packing" if SCENE.needs_bed else "",
             source=source_hash("dragdeck.decks.render", "dragdeck.scenes.registry"),
             scene=SCENE.name,
@@ -44,8 +44,8 @@ for PLACE, SCENE in PLACES.items():
                 of_run(PLACE, file)
                 for file in ("in.liggghts", "case.json", "columns.json", *SCENE.inputs)
             ],
-            advice=asked_advice(PLACE),
-            filling=of_its_bed(PLACE, "run.json"),
+            advice=ancient(WORK.needed_advice(PLACE)),
+            filling=WORK.of_its_bed(PLACE, "run.json"),
         output:
             of_run(PLACE, RECORD[PLACE]),
         log:
@@ -57,7 +57,7 @@ for PLACE, SCENE in PLACES.items():
         priority: 0 if SCENE.single_particle else 1
         conda:
             "../envs/python.yaml"
-        threads: ranks_of(PLACE)
+        threads: WORK.ranks_of(PLACE)
         resources:
             engine=1,
         params:
@@ -75,9 +75,9 @@ for PLACE in ("process", WINDOWS):
         name:
             f"share_{PLACE}"
         input:
-            templates_of("process"),
+            WORK.templates_of("process"),
             run=of_whole_run(PLACE, RECORD[PLACE]),
-            packing=of_its_bed(PLACE, "tables/packing.json"),
+            packing=WORK.of_its_bed(PLACE, "tables/packing.json"),
         output:
             [
                 of_run(PLACE, file)
@@ -93,8 +93,8 @@ for PLACE in ("process", WINDOWS):
         conda:
             "../envs/python.yaml"
         params:
-            case=digest_of(PLACE),
-            cases=cases_option(PLACE),
+            case=WORK.digest_of(PLACE),
+            cases=WORK.cases_option(PLACE),
             source=source_hash("dragdeck.decks.render", "dragdeck.scenes.registry"),
         shell:
             "dragdeck step render {wildcards.study} process {wildcards.run} {params.cases}"
@@ -198,9 +198,9 @@ rule draw_for_journal:
 checkpoint judge_windows:
     input:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
-        records_of_round,
+        WORK.records_of_round,
         run=of_run("process", "run.json"),
-        before=round_before,
+        before=WORK.round_before,
         record=WINDOWS_RECORD,
     output:
         of_run("process", "windows/round-{round}.json"),
@@ -213,8 +213,8 @@ checkpoint judge_windows:
     conda:
         "../envs/python.yaml"
     params:
-        asked=windows_options,
-        windows=windows_of_round,
+        asked=WORK.windows_options,
+        windows=WORK.windows_of_round,
         source=source_hash("dragchain.windows.rounds"),
     shell:
         "dragchain step windows $(dirname {input.run}) --windows {params.windows} {params.asked}"
@@ -227,7 +227,7 @@ rule extrapolate_process:
         tables_of("process", [*SCENES["process"].tables, *SCENES["process"].network]),
         run=of_run("process", "run.json"),
         record=WINDOWS_RECORD,
-        windows=last_round,
+        windows=WORK.last_round,
     output:
         of_run("process", "tables/extrapolated.json"),
     log:
@@ -248,7 +248,7 @@ rule extrapolate_process:
 rule measure_points:
     input:
         of_run(POINTS, "outcome.json"),
-        bed=of_its_bed(POINTS, "tables/packing.json"),
+        bed=WORK.of_its_bed(POINTS, "tables/packing.json"),
     output:
         of_run(POINTS, "measures.json"),
     log:

@@ -3,26 +3,26 @@
 
 rule write_scaling:
     input:
-        every("process", "tables/workpiece_force.parquet"),
+        WORK.every("process", "tables/workpiece_force.parquet"),
     output:
-        multiext(of_study("scaling", "scaling."), "csv", "json"),
+        multiext(WORK.of_study("scaling", "scaling."), "csv", "json"),
         figure=report(
-            of_study("scaling", "scaling.png"),
+            WORK.of_study("scaling", "scaling.png"),
             caption="../report/scaling.rst",
             category="Scaling",
             labels={"run": "all", "figure": "scaling"},
         ),
     log:
-        of_study("scaling", "logs/scaling.log"),
+        WORK.of_study("scaling", "logs/scaling.log"),
     benchmark:
-        of_study("scaling", "benchmarks/scaling.tsv")
+        WORK.of_study("scaling", "benchmarks/scaling.tsv")
     conda:
         "../envs/python.yaml"
     resources:
         prints=1,
     params:
-        runs=every_folder("process"),
-        options=scaling_options,
+        runs=WORK.every_folder("process"),
+        options=WORK.scaling_options,
         command=f"snakemake scaling --config study={STUDY}",
         source=source_hash("dragchain.scaling.fit"),
     shell:

@@ -2,7 +2,13 @@
 # is a finding; a batch that is interrupted goes on where it was.
 
 
-STABILITY_BEDS = stability_beds()
+# Folders of the fillings that columns and drags start from; none without a map.
+STABILITY_BEDS = [
+    run_path("stability", "filling", name)
+    for name in (
+        or_stop(bed_settings, Path(STABILITY_MAP)) if Path(STABILITY_MAP).is_file() else []
+    )
+]
 
 
 # These fillings are no cases of the study: they differ in their materials.
@@ -14,7 +20,7 @@ rule settle_beds:
     input:
         points=STABILITY_MAP,
         study="studies/stability/study.yaml",
-        templates=stability_templates(),
+        templates=WORK.files("templates/*.j2"),
     output:
         [f"{bed}/run.json" for bed in STABILITY_BEDS],
     log:
@@ -35,8 +41,12 @@ rule run_regime:
     input:
         points=STABILITY_MAP,
         study="studies/stability/study.yaml",
-        templates=stability_templates(),
-        beds=beds_of_regime,
+        templates=WORK.files("templates/*.j2"),
+        beds=lambda wildcards: (
+            [f"{bed}/tables/packing.json" for bed in STABILITY_BEDS]
+            if wildcards.regime in ("column", "drag")
+            else []
+        ),
     output:
         "results/stability/points/{regime}.json",
     log:
@@ -61,7 +71,7 @@ rule write_stability:
             "results/stability/points/{regime}.json",
             regime=["impact", "settle", "column", "drag"],
         ),
-        templates=page_templates("stability/stability.html.j2", package="evidence"),
+        templates=WORK.page_templates("stability/stability.html.j2", package="evidence"),
     output:
         page=report(
             "results/stability/report.html",

@@ -4,16 +4,16 @@
 # Processor times side by side: no other job may run meanwhile.
 rule measure_costs:
     input:
-        templates_of("drop_test"),
-        templates_of("filling"),
-        templates_of("process"),
-        script=sorted(str(relative(file)) for file in PROJECT.root.glob("benchmarks/costs/*.*")),
+        WORK.templates_of("drop_test"),
+        WORK.templates_of("filling"),
+        WORK.templates_of("process"),
+        script=WORK.files("benchmarks/costs/*.*"),
     output:
-        of_tradeoff("costs.json"),
+        WORK.of_tradeoff("costs.json"),
     log:
-        of_tradeoff("logs/costs.log"),
+        WORK.of_tradeoff("logs/costs.log"),
     benchmark:
-        of_tradeoff("benchmarks/costs.tsv")
+        WORK.of_tradeoff("benchmarks/costs.tsv")
     conda:
         "../envs/python.yaml"
     threads: workflow.cores
@@ -21,8 +21,8 @@ rule measure_costs:
         prints=1,
     params:
         study=STUDY,
-        fidelity=fidelity_option,
-        rounds=lambda wildcards: points().cost_rounds,
+        fidelity=WORK.fidelity_option,
+        rounds=lambda wildcards: WORK.points.cost_rounds,
         cases=[scene.digest(CASES[0]) for scene in SCENES.values()],
         source=source_hash("dragdeck.engine.batch", "dragdeck.project", "dragchain.tables.write"),
     shell:
@@ -32,29 +32,29 @@ rule measure_costs:
 
 rule write_tradeoff:
     input:
-        measures=lambda wildcards: every_point("measures.json"),
-        drops=lambda wildcards: every_drop_point("tables/impacts.parquet"),
-        costs=lambda wildcards: [of_tradeoff("costs.json")] if points().cost_rounds else [],
-        templates=page_templates("tradeoff/tradeoff.html.j2"),
+        measures=lambda wildcards: WORK.every_point("measures.json"),
+        drops=lambda wildcards: WORK.every_drop_point("tables/impacts.parquet"),
+        costs=lambda wildcards: [WORK.of_tradeoff("costs.json")] if WORK.points.cost_rounds else [],
+        templates=WORK.page_templates("tradeoff/tradeoff.html.j2"),
     output:
         page=report(
-            of_tradeoff("report.html"),
+            WORK.of_tradeoff("report.html"),
             caption="../report/tradeoff.rst",
             category="Tradeoff",
             labels={"run": "all", "figure": "report"},
         ),
-        measured=of_tradeoff("tradeoff.json"),
-        runs=multiext(of_tradeoff(""), "runs.csv", "runs.parquet"),
-        errors=multiext(of_tradeoff(""), "errors.csv", "errors.parquet"),
+        measured=WORK.of_tradeoff("tradeoff.json"),
+        runs=multiext(WORK.of_tradeoff(""), "runs.csv", "runs.parquet"),
+        errors=multiext(WORK.of_tradeoff(""), "errors.csv", "errors.parquet"),
     log:
-        of_tradeoff("logs/report.log"),
+        WORK.of_tradeoff("logs/report.log"),
     benchmark:
-        of_tradeoff("benchmarks/report.tsv")
+        WORK.of_tradeoff("benchmarks/report.tsv")
     conda:
         "../envs/python.yaml"
     params:
-        reference=lambda wildcards: every_point("")[0],
-        drops=lambda wildcards: every_drop_point(""),
+        reference=lambda wildcards: WORK.every_point("")[0],
+        drops=lambda wildcards: WORK.every_drop_point(""),
         costs=lambda wildcards, input: f"--costs {input.costs}" if input.costs else "",
         plan=Path(PLAN).stem,
         command=f"snakemake tradeoff --config study={STUDY} plan={PLAN}",

@@ -3,28 +3,31 @@
 
 rule write_validation:
     input:
-        measures=lambda wildcards: every_point("measures.json", VALIDATION),
-        loads=lambda wildcards: every_packing("tables/loading.json"),
-        templates=page_templates(
+        measures=lambda wildcards: WORK.every_point("measures.json", VALIDATION),
+        loads=lambda wildcards: WORK.every_packing("tables/loading.json"),
+        templates=WORK.page_templates(
             *(f"validation/{name}.html.j2" for name in ("validation", "peaks", "scaling", "load")),
             package="evidence",
         ),
         words="analysis/dragchain/scaling/words.html.j2",
     output:
         page=report(
-            of_study("validation", "report.html"),
+            WORK.of_study("validation", "report.html"),
             caption="../report/validation.rst",
             category="Validation",
             labels={"run": "all", "figure": "report"},
         ),
-        found=of_study("validation", "validation.json"),
+        found=WORK.of_study("validation", "validation.json"),
         tables=multiext(
-            of_study("validation", ""), "packings.parquet", "effects.parquet", "statements.parquet"
+            WORK.of_study("validation", ""),
+            "packings.parquet",
+            "effects.parquet",
+            "statements.parquet",
         ),
     log:
-        of_study("validation", "logs/report.log"),
+        WORK.of_study("validation", "logs/report.log"),
     benchmark:
-        of_study("validation", "benchmarks/report.tsv")
+        WORK.of_study("validation", "benchmarks/report.tsv")
     conda:
         "../envs/python.yaml"
     params:

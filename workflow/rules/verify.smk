@@ -4,8 +4,8 @@
 # Many runs of seconds in one job; a job that is interrupted goes on where it was.
 rule judge_verification:
     input:
-        templates_of("collide"),
-        page=page_templates("verification/verification.html.j2", package="evidence"),
+        WORK.templates_of("collide"),
+        page=WORK.page_templates("verification/verification.html.j2", package="evidence"),
         suite=["evidence/verification/suite.yaml", "evidence/verification/published.csv"],
     output:
         multiext(
@@ -32,7 +32,7 @@ rule judge_verification:
         prints=1,
     params:
         study=STUDY,
-        fidelity=fidelity_option,
+        fidelity=WORK.fidelity_option,
         cases=[scene.digest(CASES[0]) for scene in SCENES.values()],
         source=source_hash("evidence.verification.report"),
     shell:

@@ -20,7 +20,7 @@ from scipy.stats import chi2
 
 from dragchain.arrays import Floats
 from dragchain.calibration.force_record import read_record
-from dragchain.calibration.measured_impacts import IMPACTS, Impact, Measured, measure, pulse
+from dragchain.calibration.measured_impacts import IMPACTS, Impact, Measured, measure_impacts, pulse
 from dragchain.calibration.simulated_drops import DropRun, Drops, Emulator, Sweep, Waveform, prepare
 from dragchain.errors import RecordError
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
@@ -315,7 +315,7 @@ def _edge(above: Callable[[float], float], best: float, end: float) -> float:
 
 
 @dataclass(frozen=True)
-class Calibration:
+class RecordFit:
     """A record, the sweep, and what follows.
 
     Attributes
@@ -347,13 +347,13 @@ class Calibration:
         return len(self.observed.log_peaks) > 0
 
 
-def calibrate_file(record: Path, drops: Drops) -> Calibration:
+def calibrate_file(record: Path, drops: Drops) -> RecordFit:
     """Fit the restitution to the CSV of a record."""
-    measured = measure(read_record(record), fall_time_s=drops.known.fall_time_s)
+    measured = measure_impacts(read_record(record), fall_time_s=drops.known.fall_time_s)
     return calibrate(measured, prepare(drops))
 
 
-def calibrate(measured: Measured, sweep: Sweep) -> Calibration:
+def calibrate(measured: Measured, sweep: Sweep) -> RecordFit:
     """Fit the restitution to a record.
 
     Raises
@@ -376,7 +376,7 @@ def calibrate(measured: Measured, sweep: Sweep) -> Calibration:
         Misfit(observed, e, sweep.reference.contact_s, known.height_m, known.height_std_m)
         for e in (sweep.production, sweep.reference)
     )
-    return Calibration(
+    return RecordFit(
         measured=measured,
         samplings=samplings,
         observed=observed,

@@ -114,7 +114,7 @@ class Measured(Document):
         return self.offset_n + self.drift_n_per_s * (time_s - start_s)
 
 
-def measure(record: Record, *, fall_time_s: float) -> Measured:
+def measure_impacts(record: Record, *, fall_time_s: float) -> Measured:
     """Find baseline, noise and the first impacts of a record.
 
     Parameters

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.calibration.fit import Calibration, calibrate_file
+from dragchain.calibration.fit import RecordFit, calibrate_file
 from dragchain.calibration.force_record import Record, read_record
 from dragchain.calibration.results import PURPOSES, CalibrationFile, confirmed
 from dragchain.calibration.simulated_drops import DropRun, Drops, read_drops
@@ -19,7 +19,7 @@ from dragchain.figures.style import BLUE, COLOURS, GREEN, GREY, ORANGE, RED, dra
 from dragchain.report.page import data_uri, render_page, write_bundle
 
 
-def draw_impacts(record: Record, found: Calibration, confirm: Drops) -> Figure:
+def draw_impacts(record: Record, found: RecordFit, confirm: Drops) -> Figure:
     """The record, and each impact measured and simulated."""
     measured, time = found.measured, record.time_s
     force = record.force_n - measured.baseline(time, float(time[0]))
@@ -37,7 +37,7 @@ def draw_impacts(record: Record, found: Calibration, confirm: Drops) -> Figure:
     return legend_below(figure)
 
 
-def _whole(axes: Axes, time: Floats, force: Floats, found: Calibration) -> None:
+def _whole(axes: Axes, time: Floats, force: Floats, found: RecordFit) -> None:
     measured = found.measured
     axes.plot((time - time[0]) * 1e3, force, color=COLOURS["experiment"], linewidth=0.7)
     for impact in measured.impacts:
@@ -76,7 +76,7 @@ def _one_impact(
     axes.set(xlabel="time (µs)")
 
 
-def draw_fit(found: Calibration) -> Figure:
+def draw_fit(found: RecordFit) -> Figure:
     """Misfit over the deck's restitution, and the residuals."""
     figure, (left, right) = new_panels(3.0, 2, width_ratios=(1.4, 1))
     _misfit(left, found)
@@ -84,7 +84,7 @@ def draw_fit(found: Calibration) -> Figure:
     return figure
 
 
-def _misfit(axes: Axes, found: Calibration) -> None:
+def _misfit(axes: Axes, found: RecordFit) -> None:
     fit, model = found.fit, found.sweep.production
     best, low, high = fit.restitution, fit.ci95_low, fit.ci95_high
     half = 2.2 * max(high - best, best - low)
@@ -97,7 +97,7 @@ def _misfit(axes: Axes, found: Calibration) -> None:
     axes.set(ylim=(0, 3 * fit.rise), title=f"{best:.4f} (95 % CI {low:.4f} to {high:.4f})")
 
 
-def _residuals(axes: Axes, found: Calibration) -> None:
+def _residuals(axes: Axes, found: RecordFit) -> None:
     fit = found.fit
     names = [f"time of impact {k + 2}" for k in range(len(found.observed.times_s))]
     names += [f"peak {k + 2} / peak 1" for k in range(len(found.observed.log_peaks))]
@@ -141,7 +141,7 @@ def _measured_lines(axes: Axes, rebound: float, deck: float) -> None:
     axes.set(xlim=ends, ylim=ends)
 
 
-def write_report(record: Path, folder: Path) -> None:
+def write_calibration_report(record: Path, folder: Path) -> None:
     """Draw the figures and write ``report.html`` of a calibration.
 
     Parameters

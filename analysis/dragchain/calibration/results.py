@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from dragchain.calibration.fit import Calibration, Fit, calibrate_file
+from dragchain.calibration.fit import Fit, RecordFit, calibrate_file
 from dragchain.calibration.force_record import read_record
-from dragchain.calibration.measured_impacts import Measured, measure
+from dragchain.calibration.measured_impacts import Measured, measure_impacts
 from dragchain.calibration.simulated_drops import (
     Drops,
     DropTest,
@@ -145,7 +145,7 @@ def write_record(record: Path, fall_time_s: float, out: Path) -> None:
     RecordError
         The record cannot be used.
     """
-    measure(read_record(record), fall_time_s=fall_time_s).write(out)
+    measure_impacts(read_record(record), fall_time_s=fall_time_s).write(out)
 
 
 def write_calibration(record: Path, drops_file: Path, out: Path) -> CalibrationFile:
@@ -179,7 +179,7 @@ def write_csv(file: Path, table: pd.DataFrame) -> None:
     write_text(file, table.to_csv(index=False, float_format="%.9g", lineterminator="\n"))
 
 
-def result(found: Calibration, drops: Drops) -> CalibrationFile:
+def result(found: RecordFit, drops: Drops) -> CalibrationFile:
     """Content of ``result.json``."""
     measured = found.fit_reference.interval.mapped(found.sweep.reference.rebound)
     deck, known = found.fit.restitution, drops.known
@@ -211,7 +211,7 @@ def _rounded(fit: Fit) -> float:
     return round(fit.restitution, max(2, math.ceil(-math.log10(width)) + 1))
 
 
-def _direct(found: Calibration) -> Direct:
+def _direct(found: RecordFit) -> Direct:
     deck, contact = found.fit_reference.restitution, found.sweep.reference.contact_s
     since = [0.0, *found.observed.times_s.tolist()]
     flights = [
@@ -264,7 +264,7 @@ def bias_table(drops: Drops) -> pd.DataFrame:
     return table.reset_index().sort_values(setting, ascending=[True, False, True])
 
 
-def _impact_table(found: Calibration) -> pd.DataFrame:
+def _impact_table(found: RecordFit) -> pd.DataFrame:
     """Measured and simulated impacts, one row each."""
     observed, samplings = found.observed, found.samplings
     model, reference = found.sweep.production, found.sweep.reference

@@ -14,11 +14,12 @@ from scipy.optimize import brentq
 
 from dragchain.arrays import Floats
 from dragchain.calibration.measured_impacts import IMPACTS
-from dragchain.dumps.run_parts import iter_prints
 from dragchain.errors import TableError
-from dragchain.run.case import load_case, load_outputs
+from dragchain.run.run_parts import iter_prints
 from dragchain.tables.impacts import speed_at_plate
+from dragdeck.decks.outputs import load_outputs
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import load_case
 
 Purpose = Literal["production", "reference", "confirm"]
 

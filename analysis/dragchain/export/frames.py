@@ -15,10 +15,11 @@ import pandas as pd
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import ExportError, TableError
 from dragchain.network.frame import KINDS, PARTICLE, WORKPIECE, NetworkFrame, frame_of
-from dragchain.run.case import Case
 from dragchain.tables.by_step import RisingSteps, read_steps
 from dragchain.tables.columns import CONTACTS, KINEMATICS
 from dragchain.tables.run_folder import Run, workpiece_places
+from dragdeck.records.case import CaseOfRun
+from dragdeck.study.rotation import Rotation
 
 _BODY = {name: body for body, name in KINDS.items()}
 _PARTICLES = ("step", *KINEMATICS)
@@ -151,8 +152,8 @@ class FrameData:
     membership : Membership or None
         What is in a chain; None if there are no chain tables, or if they do not
         reach this frame.
-    workpiece : (3,) float and float, or None
-        The workpiece's reference point in m and its turn in rad; None if there is no workpiece.
+    workpiece : (3,) float and Rotation, or None
+        The workpiece's reference point in m and its orientation; None if there is no workpiece.
     """
 
     step: int
@@ -161,7 +162,7 @@ class FrameData:
     contacts: pd.DataFrame | None
     network: NetworkFrame | None
     membership: Membership | None
-    workpiece: tuple[Floats, float] | None
+    workpiece: tuple[Floats, Rotation] | None
 
 
 @dataclass(frozen=True)
@@ -254,7 +255,7 @@ class FrameSeries:
                 rows.finish()
 
 
-def _inside(times_s: Floats, selection: Selection, case: Case) -> np.ndarray:
+def _inside(times_s: Floats, selection: Selection, case: CaseOfRun) -> np.ndarray:
     """Which times are in the interval; half a step is no difference."""
     low = -np.inf if selection.first_s is None else selection.first_s
     high = np.inf if selection.last_s is None else selection.last_s

@@ -20,7 +20,6 @@ from dragchain.figures.network_picture import segments
 from dragchain.network.chains import major_stress, particle_stress
 from dragchain.network.frame import PARTICLE, NetworkFrame
 from dragchain.network.statistics import contact_counts
-from dragchain.run.kinematics import needed
 from dragchain.run.workpiece import placed, workpiece_mesh
 from dragchain.tables.run_folder import Run
 from dragdeck.documents import Document
@@ -113,7 +112,7 @@ def _upper_end(values: NDArray[Any], part: float) -> float:
 def _write_view(folder: Path, series: FrameSeries, upper: Mapping[str, float]) -> None:
     """Write ``view.py`` and ``view.json``; a scale ends at the median over the frames."""
     case = series.run.case
-    bowl, height_m = needed(case.bowl, "bowl"), case.inputs.get("bowl.height_m")
+    bowl, height_m = case.bowl, case.inputs.get("bowl.height_m")
     View(
         chains=series.has_chains,
         bowl_radius_m=bowl.radius_m,

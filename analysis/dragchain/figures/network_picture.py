@@ -25,12 +25,13 @@ from dragchain.errors import TableError
 from dragchain.figures.rendering import Camera, Image, new_plotter, photograph
 from dragchain.figures.style import COLOURS, force_map
 from dragchain.network.chains import WidestPath, dominant_path, widest_paths
-from dragchain.network.frame import NetworkFrame, read_frames
-from dragchain.run.case import Case
+from dragchain.network.frame import NetworkFrame, network_frames
 from dragchain.run.kinematics import needed, process_time
 from dragchain.run.workpiece import placed, workpiece_mesh
 from dragchain.tables.by_step import read_table
 from dragchain.tables.run_folder import workpiece_places
+from dragdeck.records.case import CaseOfRun
+from dragdeck.study.rotation import Rotation
 
 View = Literal["xy", "xz"]
 
@@ -53,7 +54,7 @@ _MOST_PIXELS = 1400
 
 
 @dataclass(frozen=True)
-class Scene:
+class NetworkScene:
     """What one picture shows; lengths in m, forces in N.
 
     Attributes
@@ -62,9 +63,8 @@ class Scene:
         The network frame.
     workpiece_m : (3,) float
         Centre of the workpiece's bottom face at the frame.
-    workpiece_turn_rad : float
-        Angle about the vertical by which the workpiece is turned from its STL file,
-        where it looks along +x.
+    rotation : Rotation
+        Orientation of the workpiece, which looks along +x in its STL file.
     dominant : WidestPath or None
         The frame's dominant workpiece path.
     process_time_s : float
@@ -73,7 +73,7 @@ class Scene:
 
     frame: NetworkFrame
     workpiece_m: Floats
-    workpiece_turn_rad: float
+    rotation: Rotation
     dominant: WidestPath | None
     process_time_s: float
 
@@ -110,7 +110,7 @@ def picture_step(steps: Floats, process_time_s: Floats, wanted_s: float = _PICTU
     return int(steps[row])
 
 
-def load_scene(run_dir: Path, case: Case) -> Scene:
+def load_scene(run_dir: Path, case: CaseOfRun) -> NetworkScene:
     """Read what the picture of a process run shows at the frame of `picture_step`.
 
     Raises
@@ -121,12 +121,12 @@ def load_scene(run_dir: Path, case: Case) -> Scene:
     network = read_table(run_dir / "tables" / "network.parquet", ["step", "time_s"])
     times = process_time(network["time_s"].to_numpy(np.float64), case)
     step = picture_step(network["step"].to_numpy(np.float64), times)
-    frame = next(read_frames(run_dir, (step, step)), None)
+    frame = next(network_frames(run_dir, (step, step)), None)
     if frame is None:
         raise TableError(f"particles.parquet lacks step {step}, which network.parquet has")
     path = dominant_path(frame, widest_paths(frame))
     moment = float(process_time(np.array(frame.time_s), case))
-    return Scene(frame, *workpiece_places(run_dir, case)(frame.step), path, moment)
+    return NetworkScene(frame, *workpiece_places(run_dir, case)(frame.step), path, moment)
 
 
 @dataclass(frozen=True)
@@ -146,13 +146,13 @@ class Window:
     contacts: NDArray[np.bool_] | None = None
 
 
-def window(case: Case, scene: Scene, view: View) -> Window:
+def window(case: CaseOfRun, scene: NetworkScene, view: View) -> Window:
     """The whole bowl, or the workpiece's surroundings if the bowl is much wider than they are.
 
     Only contacts whose point lies in the surroundings are then drawn: `WINDOW_DIAMETERS` to
     either side of the workpiece and, seen from the side, `DEPTH_DIAMETERS` before and behind it.
     """
-    bowl_m = needed(case.bowl, "bowl").radius_m + _MARGIN_M
+    bowl_m = case.bowl.radius_m + _MARGIN_M
     floor = (-_MARGIN_M, 1.25 * needed(case.surface_m, "surface_m"))
     diameter, whole = 2.0 * case.media.radius_mean_m, _shows_all(case)
     middle = np.zeros(2) if whole else scene.workpiece_m[:2]
@@ -168,13 +168,13 @@ def window(case: Case, scene: Scene, view: View) -> Window:
     return Window(low, high, None if whole else near)
 
 
-def _shows_all(case: Case) -> bool:
+def _shows_all(case: CaseOfRun) -> bool:
     """Whether pictures of a case show its whole bowl."""
-    reach = needed(case.bowl, "bowl").radius_m + _MARGIN_M
+    reach = case.bowl.radius_m + _MARGIN_M
     return reach <= WINDOW_DIAMETERS * 2.0 * case.media.radius_mean_m
 
 
-def cut_words(case: Case, view: View) -> str:
+def cut_words(case: CaseOfRun, view: View) -> str:
     """What a picture leaves out, in words; empty if it shows the whole bowl."""
     if _shows_all(case):
         return ""
@@ -182,8 +182,12 @@ def cut_words(case: Case, view: View) -> str:
     return words + (f", {DEPTH_DIAMETERS:g} in front of and behind it" if view == "xz" else "")
 
 
-def render(
-    run_dir: Path, case: Case, scene: Scene, view: View, pixels_per_mm: float = _PIXELS_PER_MM
+def render_view(
+    run_dir: Path,
+    case: CaseOfRun,
+    scene: NetworkScene,
+    view: View,
+    pixels_per_mm: float = _PIXELS_PER_MM,
 ) -> tuple[Image, Floats]:
     """Render one view in parallel projection.
 
@@ -203,25 +207,25 @@ def render(
     plotter = new_plotter(*np.ceil(size_mm * pixels_per_mm).astype(int).tolist())
     plotter.enable_depth_peeling(number_of_peels=8)
     _add_bowl(plotter, case, view)
-    workpiece = placed(workpiece_mesh(run_dir, case), scene.workpiece_m, scene.workpiece_turn_rad)
+    workpiece = placed(workpiece_mesh(run_dir, case), scene.workpiece_m, scene.rotation)
     plotter.add_mesh(workpiece, color=COLOURS["workpiece"], opacity=0.45)
     _add_contacts(plotter, scene.frame, case.media.radius_mean_m, part.contacts)
     image = photograph(plotter, _camera((low + high) / 2, view, case), float(high[1] - low[1]))
     return image, np.array([low[0], high[0], low[1], high[1]]) * 1e3
 
 
-def _camera(middle: Floats, view: View, case: Case) -> Camera:
-    away = max(1.0, 2.0 * needed(case.bowl, "bowl").radius_m)
+def _camera(middle: Floats, view: View, case: CaseOfRun) -> Camera:
+    away = max(1.0, 2.0 * case.bowl.radius_m)
     x, other = middle
     if view == "xy":
         return Camera((x, other, away), (x, other, 0.0), (0.0, 1.0, 0.0))
     return Camera((x, -away, other), (x, 0.0, other))
 
 
-def _add_bowl(plotter: Any, case: Case, view: View) -> None:
+def _add_bowl(plotter: Any, case: CaseOfRun, view: View) -> None:
     import pyvista as pv
 
-    radius, height = needed(case.bowl, "bowl").radius_m, 1.2 * needed(case.surface_m, "surface_m")
+    radius, height = case.bowl.radius_m, 1.2 * needed(case.surface_m, "surface_m")
     wall = pv.Cylinder(
         center=(0, 0, height / 2), direction=(0, 0, 1), radius=radius, height=height,
         resolution=120, capping=False,
@@ -263,7 +267,7 @@ def _tubes(axis: Floats, force: Floats, radius: Floats) -> Any:
     return mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES, capping=True)
 
 
-def show_network(axes: Axes, shown: Scene, view: View, image: Image, extent: Floats) -> None:
+def show_network(axes: Axes, shown: NetworkScene, view: View, image: Image, extent: Floats) -> None:
     """Set a rendered view on axes in mm, with the dominant path and the motion marked.
 
     Parameters
@@ -285,7 +289,7 @@ def force_bar(figure: Figure, panel: Axes, largest_n: float) -> None:
     figure.colorbar(scale, ax=panel, shrink=0.8, pad=0.02, aspect=28, label=label)
 
 
-def _mark_chain(axes: Axes, shown: Scene, pick: Sequence[int]) -> None:
+def _mark_chain(axes: Axes, shown: NetworkScene, pick: Sequence[int]) -> None:
     """Outline the dominant path on axes in mm; `pick` names the two coordinates."""
     if shown.dominant is None:
         return
@@ -299,7 +303,7 @@ def _mark_chain(axes: Axes, shown: Scene, pick: Sequence[int]) -> None:
             axes.add_patch(Circle(centre, radius, fill=False, edgecolor=colour, linewidth=thick))
 
 
-def _mark_motion(axes: Axes, shown: Scene, view: View) -> None:
+def _mark_motion(axes: Axes, shown: NetworkScene, view: View) -> None:
     """Draw the direction of motion where it hides little.
 
     Behind the workpiece, or above the bed.

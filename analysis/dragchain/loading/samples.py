@@ -12,19 +12,21 @@ from numpy.typing import ArrayLike
 from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import AMOUNTS, POINT, SLIP, Thresholds, surfaces
-from dragchain.run.case import Case, load_outputs
 from dragchain.run.kinematics import (
+    axis_speed,
+    bowl_velocity,
     counted_mask,
-    motion_of,
     needed,
     spins,
     workpiece_frame,
-    workpiece_turn,
+    workpiece_rotation,
     workpiece_velocity,
 )
-from dragchain.run.workpiece import Surface, off_facet, turned
+from dragchain.run.workpiece import Surface, off_facet
 from dragchain.statistics.correlated import slow_waves
 from dragchain.tables.by_step import read_groups
+from dragdeck.decks.outputs import load_outputs
+from dragdeck.records.case import CaseOfRun
 
 WORKPIECE = ("drag_impulse_n_s", "lateral_impulse_n_s", "vertical_impulse_n_s")
 BODY = ("body_x_impulse_n_s", "body_y_impulse_n_s", "body_z_impulse_n_s")
@@ -93,7 +95,7 @@ class Sampled:
 # --- reading ---------------------------------------------------------------------------------
 
 
-def sample(run_dir: Path, case: Case, limits: Thresholds) -> Sampled:
+def sample(run_dir: Path, case: CaseOfRun, limits: Thresholds) -> Sampled:
     """Read the counted contacts of a run, a row group at a time; see `Sampled`."""
     tables = run_dir / "tables"
     steps, interval_s = _counted_steps(run_dir, case)
@@ -109,7 +111,7 @@ def sample(run_dir: Path, case: Case, limits: Thresholds) -> Sampled:
             "the drag that enters the statistics"
         )
     impulse = workpiece[["drag_n", "lateral_n", "vertical_n"]].to_numpy().sum(axis=0) * interval_s
-    path = motion_of(case).axis_speed_m_s * interval_s * len(steps)
+    path = axis_speed(case) * interval_s * len(steps)
     return Sampled(pd.concat(parts, ignore_index=True), len(steps), interval_s, path, impulse)
 
 
@@ -145,7 +147,7 @@ def _loaded(contacts: pd.DataFrame) -> pd.Series:
     return contacts["in_statistics"] & (contacts[_FORCE] != 0.0).any(axis=1)
 
 
-def _counted_steps(run_dir: Path, case: Case) -> tuple[Ints, float]:
+def _counted_steps(run_dir: Path, case: CaseOfRun) -> tuple[Ints, float]:
     """The counted steps of ``workpiece_contacts`` and the time between two, s."""
     output = load_outputs(run_dir)["workpiece_contacts"]
     last = needed(output.last_step, "last_step of workpiece_contacts")
@@ -158,7 +160,11 @@ def _counted_steps(run_dir: Path, case: Case) -> tuple[Ints, float]:
 
 
 def _with_amounts(
-    rows: pd.DataFrame, workpiece: pd.DataFrame, case: Case, interval_s: float, limits: Thresholds
+    rows: pd.DataFrame,
+    workpiece: pd.DataFrame,
+    case: CaseOfRun,
+    interval_s: float,
+    limits: Thresholds,
 ) -> pd.DataFrame:
     """Add to each contact its contributions, and its point and slip in the body frame."""
     force, slip, point = (rows[names].to_numpy() for names in (_FORCE, _VELOCITY, _PLACE))
@@ -166,21 +172,21 @@ def _with_amounts(
     reference = workpiece[_REFERENCE].to_numpy()
     heading = workpiece["direction_rad"].to_numpy()
     steps = rows["step"].to_numpy()
-    turn = workpiece_turn(steps, heading, case)
+    rotation = workpiece_rotation(steps, heading, case)
     speed = np.linalg.norm(slip, axis=1)
     most = surfaces(case).friction * normal
     mobilisation = np.divide(tangential, most, out=np.full_like(most, np.inf), where=most > 0.0)
     mobilised = mobilisation >= limits.mobilised
     velocity = workpiece_velocity(steps, point, reference, case)
-    velocity -= motion_of(case).bowl_velocity(point)
+    velocity -= bowl_velocity(point, case)
     drag = workpiece_frame(force, heading) * interval_s
     in_body = {}
     if spins(case):
-        in_body = dict(zip(BODY, (workpiece_frame(force, turn) * interval_s).T, strict=True))
+        in_body = dict(zip(BODY, (rotation.into(force) * interval_s).T, strict=True))
     added = rows.assign(
         **in_body,
-        **dict(zip(POINT, turned(point - reference, -turn).T, strict=True)),
-        **dict(zip(SLIP, turned(slip, -turn).T, strict=True)),
+        **dict(zip(POINT, rotation.into(point - reference).T, strict=True)),
+        **dict(zip(SLIP, rotation.into(slip).T, strict=True)),
         **dict(zip(WORKPIECE, drag.T, strict=True)),
         mobilisation=mobilisation,
         mobilised=mobilised,
@@ -209,7 +215,7 @@ _UNCERTAIN = ("normal_impulse_n_s", "force_slide_n_m", "friction_work_j")
 """Sums of a facet that come with a standard error."""
 
 
-def check_facets(sampled: Sampled, surface: Surface, case: Case) -> float:
+def check_facets(sampled: Sampled, surface: Surface, case: CaseOfRun) -> float:
     """How far contact points lie off their facets at most, m, if that is rounding."""
     facet = sampled.rows["facet_id"].to_numpy()
     if facet.min() < 0 or facet.max() >= len(surface.corners):

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.azimuth import circumference, parts, within
+from dragchain.drag import circumference, parts, within_angle
 from dragchain.loading.contact_events import (
     AMOUNTS,
     TYPES,
@@ -27,9 +27,9 @@ from dragchain.loading.document import (
     Totals,
 )
 from dragchain.loading.samples import WORKPIECE, Sampled
-from dragchain.run.case import Case
+from dragchain.statistics.correlated import estimates
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
-from dragchain.statistics.frame_means import estimates
+from dragdeck.records.case import CaseOfRun
 
 DEPTH_BINS, AZIMUTH_BINS = 20, 24
 
@@ -46,12 +46,12 @@ _INTENSITIES = (
 """Columns of the events whose distribution is told."""
 
 
-def summarise(
+def summarise_loading(
     sampled: Sampled,
     facets: pd.DataFrame,
     events: pd.DataFrame,
     event: Ints,
-    case: Case,
+    case: CaseOfRun,
     limits: Thresholds,
     off_facet_m: float,
 ) -> Loading:
@@ -65,7 +65,7 @@ def summarise(
         Of `facet_table` and `find_events`, the events with their ``type``.
     event : (N,) ndarray
         The event of each contact.
-    case : Case
+    case : CaseOfRun
     limits : Thresholds
     off_facet_m : float
         Largest distance of a contact point from its facet.
@@ -92,7 +92,7 @@ def summarise(
 
 def _totals(sampled: Sampled, events: pd.DataFrame) -> Totals:
     rows, count = sampled.rows, len(_KNOWN)
-    ahead = within(rows["azimuth_rad"].to_numpy(np.float64), np.pi / 2)
+    ahead = within_angle(rows["azimuth_rad"].to_numpy(np.float64), np.pi / 2)
     sums = np.column_stack(
         [
             *(sampled.per_frame(rows[name]) for name in _KNOWN),

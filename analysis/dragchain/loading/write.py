@@ -12,11 +12,11 @@ from dragchain.loading.contact_events import Thresholds, event_types, find_event
 from dragchain.loading.document import Loading
 from dragchain.loading.figure import workpiece_figure
 from dragchain.loading.samples import DRAWN, Sampled, as_polydata, check_facets, facet_table, sample
-from dragchain.loading.summary import summarise
-from dragchain.run.case import Case, load_case
+from dragchain.loading.summary import summarise_loading
 from dragchain.run.workpiece import Surface, read_surface
 from dragchain.tables.parquet import write_parquet
 from dragdeck.files import write_vtp
+from dragdeck.records.case import CaseOfRun, load_case
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class WorkpieceLoading:
 
     Attributes
     ----------
-    case : Case
+    case : CaseOfRun
     surface : Surface
         The workpiece.
     sampled : Sampled
@@ -36,7 +36,7 @@ class WorkpieceLoading:
         Content of ``loading.json``.
     """
 
-    case: Case
+    case: CaseOfRun
     surface: Surface
     sampled: Sampled
     facets: pd.DataFrame
@@ -101,6 +101,6 @@ def compute_loading(run_dir: Path, limits: Thresholds) -> WorkpieceLoading:
     events, event = find_events(sampled.rows, sampled.frames, sampled.interval_s)
     events["type"] = event_types(events, case, sampled.interval_s, limits)
     facets = facet_table(sampled, surface, events)
-    summary = summarise(sampled, facets, events, event, case, limits, off_m)
+    summary = summarise_loading(sampled, facets, events, event, case, limits, off_m)
     drawn = replace(sampled, rows=sampled.rows[DRAWN].copy())
     return WorkpieceLoading(case, surface, drawn, facets, events.drop(columns="frame"), summary)

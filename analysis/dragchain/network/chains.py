@@ -79,10 +79,10 @@ class ChainRows:
 
     def particle_lists(self) -> list[list[int]]:
         """The rows of each chain's particles."""
-        return split(self.particles, self.particle_starts)
+        return split_chains(self.particles, self.particle_starts)
 
 
-def split(values: Ints, starts: Ints) -> list[list[int]]:
+def split_chains(values: Ints, starts: Ints) -> list[list[int]]:
     """Values from each start to the next."""
     flat, at = values.tolist(), starts.tolist()
     return [flat[begin:end] for begin, end in pairwise(at)]
@@ -179,7 +179,9 @@ def widest_paths(
     the contacts behind that particle.
     """
     rows = path_rows(frame, threshold, with_workpiece=with_workpiece)
-    pairs = zip(rows.particle_lists(), split(rows.contacts, rows.contact_starts), strict=True)
+    pairs = zip(
+        rows.particle_lists(), split_chains(rows.contacts, rows.contact_starts), strict=True
+    )
     return [
         WidestPath(tuple(particles), tuple(links), _end(frame, links)) for particles, links in pairs
     ]

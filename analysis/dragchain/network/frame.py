@@ -155,7 +155,7 @@ def counted_range(workpiece_force: pd.DataFrame) -> tuple[int, int]:
     return int(step[where[0]]), int(step[where[-1]])
 
 
-def read_frames(run_dir: Path, steps: tuple[int, int] | None = None) -> Iterator[NetworkFrame]:
+def network_frames(run_dir: Path, steps: tuple[int, int] | None = None) -> Iterator[NetworkFrame]:
     """Yield the network frames of a process run in the order of their steps.
 
     The tables are read row group by row group: of each no more is held than a frame and the row

@@ -1,5 +1,6 @@
-"""The tables of a run's contact network."""
+"""The tables of a run's contact network: statistics, clusters, and chains by both definitions."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -7,12 +8,173 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.network.chain_table import chain_table
-from dragchain.network.clusters import cluster_rows, frame_clusters
-from dragchain.network.frame import read_frames
-from dragchain.network.statistics import frame_statistics
+from dragchain.network.chains import (
+    ALPHA_RAD,
+    STRESS_FACTOR,
+    THRESHOLD,
+    ChainRows,
+    major_stress,
+    particle_stress,
+    path_rows,
+    peters_rows,
+    split_chains,
+)
+from dragchain.network.frame import FLOOR, KINDS, SIDE, NetworkFrame, network_frames
+from dragchain.network.statistics import cluster_rows, frame_clusters, frame_statistics
 from dragchain.tables.parquet import table_writer, write_parquet
+from dragdeck.study.rotation import wrap_angle
+
+
+def chain_table(
+    frame: NetworkFrame,
+    *,
+    alpha_rad: float = ALPHA_RAD,
+    stress_factor: float = STRESS_FACTOR,
+    threshold: float = THRESHOLD,
+) -> pd.DataFrame:
+    """The chains of a frame by both definitions, one row per chain.
+
+    Returns
+    -------
+    DataFrame
+        ``definition`` (`peters` or `widest_path`), ``n_particles``, ``particle_ids`` (list, in
+        order), ``bottleneck_n`` and ``mean_force_n`` (smallest and mean normal force of the
+        chain's contacts), ``length_m`` (polyline through the centres; a workpiece path's begins at
+        the workpiece contact and ends at the bowl contact), ``azimuth_rad`` (direction from first
+        to last point in the xy plane, counter-clockwise from the workpiece's heading, in (-pi,
+        pi]), ``inclination_rad`` (the same line's angle above the horizontal), ``altitude_m``
+        (mean height of the centres above the floor), ``major_stress_mean_pa`` (peters only),
+        ``reaches_bowl``, ``end_kind`` (`floor`, `side` or `none`) and ``dominant``: the workpiece
+        path of the frame with the largest bottleneck, by mean force where two are equal. A
+        workpiece contact without a path to the bowl has a row with ``reaches_bowl`` false, the
+        particle on the workpiece only, and NaN for bottleneck, mean force, length and angles. A
+        chain by Peters et al. has no direction: it is listed from its higher end, and reaches the
+        bowl if one of its particles touches it; ``end_kind`` is then `none` all the same.
+    """
+    peters, paths = _peters(frame, alpha_rad, stress_factor), _paths(frame, threshold)
+    return pd.DataFrame({name: _joined(name, peters[name], paths[name]) for name in peters})
+
+
+def _joined(name: str, one: Any, other: Any) -> Any:
+    """A column of the chains of both definitions."""
+    if name == "particle_ids":
+        return pd.Series([*one, *other], dtype=object)
+    if name in ("definition", "end_kind"):
+        return pd.array([*one, *other], dtype="str")
+    return np.concatenate([one, other])
+
+
+def _peters(frame: NetworkFrame, alpha_rad: float, stress_factor: float) -> dict[str, Any]:
+    major = major_stress(particle_stress(frame))
+    rows = peters_rows(frame, alpha_rad, stress_factor, major)
+    on_bowl = np.zeros(frame.particle_id.size, dtype=bool)
+    on_bowl[frame.a[(frame.other == FLOOR) | (frame.other == SIDE)]] = True
+    return _columns(
+        frame,
+        rows,
+        _shape(frame, frame.centre[rows.particles], rows.particle_starts),
+        definition="peters",
+        stress_pa=_of_each(rows.particle_starts, major[0][rows.particles], _mean),
+        reaches=_of_each(rows.particle_starts, on_bowl[rows.particles], _any).astype(bool),
+        ends=["none"] * len(rows),
+    )
+
+
+def _paths(frame: NetworkFrame, threshold: float) -> dict[str, Any]:
+    rows = path_rows(frame, threshold)
+    whole = np.diff(rows.contact_starts) > 1
+    first = rows.contacts[rows.contact_starts[:-1]]
+    last = rows.contacts[rows.contact_starts[1:] - 1]
+    starts = rows.particle_starts + 2 * np.arange(len(rows) + 1)
+    points = np.empty((starts[-1], 3))
+    inner = np.ones(len(points), dtype=bool)
+    inner[starts[:-1]] = inner[starts[1:] - 1] = False
+    points[inner] = frame.centre[rows.particles]
+    points[starts[:-1]], points[starts[1:] - 1] = frame.point[first], frame.point[last]
+    kinds = zip(frame.other[last].tolist(), whole, strict=True)
+    columns = _columns(
+        frame,
+        rows,
+        _shape(frame, points, starts),
+        definition="widest_path",
+        stress_pa=np.full(len(rows), np.nan),
+        reaches=whole,
+        ends=[KINDS[kind] if there else "none" for kind, there in kinds],
+    )
+    for name in _OF_WHOLE_PATHS:
+        columns[name][~whole] = np.nan
+    order = np.lexsort((-columns["mean_force_n"], -columns["bottleneck_n"]))
+    columns["dominant"][order[:1]] = whole[order[:1]]
+    return columns
+
+
+_OF_WHOLE_PATHS = ["bottleneck_n", "mean_force_n", "length_m", "azimuth_rad", "inclination_rad"]
+
+
+def _columns(
+    frame: NetworkFrame,
+    rows: ChainRows,
+    shape: Mapping[str, Floats],
+    *,
+    definition: str,
+    stress_pa: Floats,
+    reaches: NDArray[np.bool_],
+    ends: list[str],
+) -> dict[str, Any]:
+    """The columns of chains of one definition, none of them dominant."""
+    forces, count = frame.normal_force[rows.contacts], len(rows)
+    ids = split_chains(frame.particle_id[rows.particles], rows.particle_starts)
+    height = frame.centre[rows.particles, 2]
+    return {
+        "step": np.full(count, frame.step),
+        "time_s": np.full(count, frame.time_s),
+        "definition": [definition] * count,
+        "n_particles": np.diff(rows.particle_starts),
+        "particle_ids": ids,
+        "bottleneck_n": _of_each(rows.contact_starts, forces, lambda x: x.min(axis=1)),
+        "mean_force_n": _of_each(rows.contact_starts, forces, _mean),
+        **shape,
+        "altitude_m": _of_each(rows.particle_starts, height, _mean),
+        "major_stress_mean_pa": stress_pa,
+        "reaches_bowl": reaches,
+        "end_kind": ends,
+        "dominant": np.zeros(count, dtype=bool),
+    }
+
+
+def _shape(frame: NetworkFrame, points: Floats, starts: Ints) -> dict[str, Floats]:
+    """Length of polylines, one after another, and direction from their first to last points."""
+    line = points[starts[1:] - 1] - points[starts[:-1]]
+    x, y, z = np.ascontiguousarray(line.T)
+    return {
+        "length_m": _of_each(starts, points, _length),
+        "azimuth_rad": wrap_angle(np.arctan2(y, x) - frame.direction_rad),
+        "inclination_rad": np.arctan2(z, np.hypot(x, y)),
+    }
+
+
+def _of_each(starts: Ints, values: NDArray[Any], measure: Callable[[Any], NDArray[Any]]) -> Floats:
+    """Measure each chain's values: all chains of one length at once, (n, length, ...)."""
+    found = np.empty(len(starts) - 1)
+    lengths = np.diff(starts)
+    for length in np.unique(lengths):
+        which = np.flatnonzero(lengths == length)
+        found[which] = measure(values[starts[which][:, None] + np.arange(length)])
+    return found
+
+
+def _mean(values: NDArray[Any]) -> Floats:
+    return np.asarray(values.mean(axis=1))
+
+
+def _any(values: NDArray[Any]) -> NDArray[np.bool_]:
+    return np.asarray(values.any(axis=1))
+
+
+def _length(points: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1))
 
 
 def write_chains(run_dir: Path) -> None:
@@ -29,7 +191,7 @@ def write_chains(run_dir: Path) -> None:
     grown: list[dict[str, NDArray[Any]]] = []
     tables = run_dir / "tables"
     with table_writer(tables / "chains.parquet") as found:
-        for frame in read_frames(run_dir):
+        for frame in network_frames(run_dir):
             clusters = frame_clusters(frame)
             network.append(frame_statistics(frame, clusters))
             grown.append(cluster_rows(frame, clusters))

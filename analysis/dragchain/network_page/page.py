@@ -4,14 +4,14 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from dragchain.network_page.scene import ROUNDING, Scene, load_scene
+from dragchain.network_page.scene import ROUNDING, PageScene, page_scene
 from dragchain.report.page import NETWORK_PAGE, file_uri, page_environment
 from dragchain.run.basis import changed_settings, effects
-from dragchain.run.case import Case
-from dragchain.run.completeness import read_accepted
 from dragchain.tables.run_folder import Run
 from dragdeck.errors import RejectedRunError
 from dragdeck.files import write_text
+from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import read_accepted
 
 _PICTURES = ("network_xz", "forces")
 """Figures of a run that stand for scene and curve where these cannot be drawn."""
@@ -31,19 +31,21 @@ def write_page(run_dir: Path) -> str:
         If the run is too short to have peaks.
     """
     run = Run.open(run_dir)
-    page = render(run.case, load_scene(run), _pictures(run_dir), _rejection(run_dir))
+    page = page_html(run.case, page_scene(run), _pictures(run_dir), _rejection(run_dir))
     file = run_dir / NETWORK_PAGE
     write_text(file, page)
     return f"{len(page.encode()) / 1e6:.1f} MB: {file}"
 
 
-def render(case: Case, scene: Scene, pictures: dict[str, str | None], rejection: str) -> str:
+def page_html(
+    case: CaseOfRun, scene: PageScene, pictures: dict[str, str | None], rejection: str
+) -> str:
     """The page as HTML.
 
     Parameters
     ----------
-    case : Case
-    scene : Scene
+    case : CaseOfRun
+    scene : PageScene
     pictures : dict of str to str or None
         Data URIs of the static pictures.
     rejection : str

@@ -13,22 +13,27 @@ import numpy as np
 import pandas as pd
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation as Quaternion
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.around import AZIMUTH_BINS
-from dragchain.drag.azimuth import circumference, parts
-from dragchain.drag.force import read_counted
-from dragchain.drag.peaks import drag_peaks, peak_separation_s
+from dragchain.drag import (
+    AZIMUTH_BINS,
+    circumference,
+    drag_peaks,
+    parts,
+    peak_separation_s,
+    read_counted,
+)
 from dragchain.errors import TableError
 from dragchain.export.frames import FrameSeries
 from dragchain.figures.style import force_map
 from dragchain.network.frame import KINDS, PARTICLE, NetworkFrame
-from dragchain.run.case import Case
 from dragchain.run.kinematics import drag_phase, needed, process_time
 from dragchain.run.workpiece import read_surface
 from dragchain.tables.by_step import read_table
 from dragchain.tables.columns import CENTRE, POINT, VELOCITY
 from dragchain.tables.run_folder import Run
+from dragdeck.records.case import CaseOfRun
 
 Kind = Literal["u8", "u16", "u32", "f24"]
 """Whole numbers of 1, 2 or 4 bytes, or the first 3 bytes of a single-precision number."""
@@ -46,7 +51,7 @@ def short_floats(values: Floats) -> NDArray[np.uint32]:
 
 
 @dataclass
-class Columns:
+class PackedColumns:
     """Columns in the order in which they were added.
 
     Attributes
@@ -99,8 +104,8 @@ class Shown:
         Rows of ``contacts.parquet`` of which no particle is left out; ``frame``; ``a`` and ``b``,
         places of the particles in their frame, where a body that is no particle is its ``b_id``
         plus `BODIES`; and ``flags``, sums of `QUASI_LINEAR`, `PATH` and `DOMINANT`.
-    poses : (F, 4) float
-        The workpiece's reference point in m and its turn in rad.
+    poses : (F, 7) float
+        The workpiece's reference point in m, and its orientation as a quaternion.
     most : int
         Particles of the frame that has most, with those that are left out.
     """
@@ -179,7 +184,8 @@ def read_shown(series: FrameSeries) -> Shown:
         )
         particles.append(data.particles[kept].assign(frame=number))
         contacts.append(found[(found["a"] >= 0) & (found["b"] >= 0)])
-        poses.append([*data.workpiece[0], data.workpiece[1]])
+        turn = Quaternion.from_matrix(data.workpiece[1].matrices[0]).as_quat()
+        poses.append([*data.workpiece[0], *turn])
         most = max(most, kept.size)
     return Shown(pd.concat(particles), pd.concat(contacts), np.array(poses), most)
 
@@ -222,14 +228,14 @@ _LEFT_OUT = 0.005
 
 
 @dataclass(frozen=True)
-class Scene:
+class PageScene:
     """The content of a page: `head` is plain data, `columns` has the long series."""
 
     head: dict[str, Any]
-    columns: Columns
+    columns: PackedColumns
 
 
-def load_scene(run: Run) -> Scene:
+def page_scene(run: Run) -> PageScene:
     """Read what the page of a process run shows.
 
     Raises
@@ -239,12 +245,12 @@ def load_scene(run: Run) -> Scene:
     SeriesError
         If the run is too short to have peaks.
     """
-    case, columns, peaks = run.case, Columns(), highest_peaks(run)
+    case, columns, peaks = run.case, PackedColumns(), highest_peaks(run)
     series = shown_frames(run, peaks["time_s"].to_numpy())
     shown = read_shown(series)
     times_s = process_time(series.times_s, case)
     headings = _headings(run, series.steps)
-    bowl, surface = needed(case.bowl, "bowl"), 1e3 * needed(case.surface_m, "surface_m")
+    bowl, surface = case.bowl, 1e3 * needed(case.surface_m, "surface_m")
     head = {
         "run": case.run,
         "steps": series.steps.tolist(),
@@ -267,7 +273,7 @@ def load_scene(run: Run) -> Scene:
         "peaks": _peaks(peaks, times_s, case),
         "colours": _colours(),
     }
-    return Scene(head | {"columns": columns.entries}, columns)
+    return PageScene(head | {"columns": columns.entries}, columns)
 
 
 def _colours() -> list[str]:
@@ -279,7 +285,7 @@ def _colours() -> list[str]:
 # --- frames ----------------------------------------------------------------------------------
 
 
-def _frames(columns: Columns, shown: Shown, case: Case) -> dict[str, Any]:
+def _frames(columns: PackedColumns, shown: Shown, case: CaseOfRun) -> dict[str, Any]:
     """Add particles and contacts of all frames; where each frame starts, and the box of places."""
     particles, contacts, touching = shown.particles, shown.contacts, shown.touching()
     centre, point = (
@@ -305,13 +311,13 @@ def _frames(columns: Columns, shown: Shown, case: Case) -> dict[str, Any]:
     return rows | {"low": (1e3 * low).tolist(), "step": 1e3 * step}
 
 
-def _speeds(particles: pd.DataFrame, case: Case) -> Floats:
+def _speeds(particles: pd.DataFrame, case: CaseOfRun) -> Floats:
     """Speeds of particles in process time, m/s."""
     simulated = np.linalg.norm(particles[list(VELOCITY)].to_numpy(), axis=1)
     return np.asarray(simulated / case.fidelity.speed_factor)
 
 
-def _scales(shown: Shown, case: Case) -> dict[str, float]:
+def _scales(shown: Shown, case: CaseOfRun) -> dict[str, float]:
     """The tops of the colour scales, and the mean normal force, over all shown frames."""
     forces = shown.contacts["normal_force_n"].to_numpy()
     largest = np.zeros(len(shown.poses))
@@ -354,7 +360,9 @@ def _path(row: Mapping[Any, Any] | None) -> dict[str, Any] | None:
 # --- profiles ----------------------------------------------------------------------------------
 
 
-def profiles(columns: Columns, shown: Shown, headings: Floats, surface: float) -> dict[str, Any]:
+def profiles(
+    columns: PackedColumns, shown: Shown, headings: Floats, surface: float
+) -> dict[str, Any]:
     """Add the profiles of the normal forces, frame by frame; limits and means of their bins.
 
     On the workpiece ``azimuth`` (limits in degrees; N), ``depth`` (mm; N/mm) and their ``map`` (N,
@@ -424,21 +432,21 @@ def _sizes(contacts: pd.DataFrame, frames: int) -> tuple[Floats, Floats]:
 # --- workpiece and force -----------------------------------------------------------------------
 
 
-def _workpiece(columns: Columns, run: Run, shown: Shown) -> dict[str, Any]:
+def _workpiece(columns: PackedColumns, run: Run, shown: Shown) -> dict[str, Any]:
     """Add the workpiece's facets in its own frame and their loads; its poses, frame by frame."""
     case = run.case
     surface = read_surface(run.folder, case)
     columns.add("corners", "f24", 1e3 * surface.corners)
     own = needed(case.workpiece, "workpiece")
     return {
-        "poses": (shown.poses * [1e3, 1e3, 1e3, 1.0]).tolist(),
+        "poses": (shown.poses * [1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0]).tolist(),
         "radius": 1e3 * own.radius_m,
         "immersion": 1e3 * own.immersion_depth_m,
         "loads": _loads(columns, run),
     }
 
 
-def _loads(columns: Columns, run: Run) -> list[dict[str, Any]]:
+def _loads(columns: PackedColumns, run: Run) -> list[dict[str, Any]]:
     """Add the columns of ``facets.parquet`` that are shown, if the table was made."""
     file = run.table("facets.parquet")
     if not file.is_file():
@@ -464,7 +472,7 @@ def _force(run: Run, names: list[str]) -> pd.DataFrame:
     return read_table(run.table("workpiece_force.parquet"), names)
 
 
-def _curve(columns: Columns, run: Run) -> dict[str, Any]:
+def _curve(columns: PackedColumns, run: Run) -> dict[str, Any]:
     """Add the force against the motion over the drag; its times, and how it is filtered."""
     table = _force(run, ["step", "time_s", "drag_n", "in_statistics"])
     table = table[table["step"] > drag_phase(run.case).start_step]
@@ -485,7 +493,7 @@ def _curve(columns: Columns, run: Run) -> dict[str, Any]:
     }
 
 
-def _peaks(peaks: pd.DataFrame, times_s: Floats, case: Case) -> list[dict[str, Any]]:
+def _peaks(peaks: pd.DataFrame, times_s: Floats, case: CaseOfRun) -> list[dict[str, Any]]:
     """The highest peaks, each with its nearest frame."""
     times = process_time(peaks["time_s"].to_numpy(), case).tolist()
     return [

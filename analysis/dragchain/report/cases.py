@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Generic, TypeVar
 
+import numpy as np
 from pydantic import JsonValue
 
 from dragchain.loading.document import FILE as LOADING
@@ -28,29 +29,24 @@ from dragchain.report.values import (
     Extrapolated,
     ExtrapolatedQuantity,
     Values,
-    over_packings,
     values_of,
+    values_over_packings,
 )
-from dragchain.run.case import Case, changed_inputs, load_case
-from dragchain.run.completeness import RunRecord, read_accepted
-from dragchain.run.kinematics import drag_phase, motion_of, needed
+from dragchain.run.case import changed_inputs
+from dragchain.run.kinematics import axis_speed, drag_phase, motion_of, needed, path_passed
 from dragdeck.errors import DocumentError, RejectedRunError
-
-_PATHS = {
-    "": "path",
-    "circle": "circle of radius {radius} mm",
-    "line": "straight line",
-    "rest": "at rest at {radius} mm from the axis of a rotating bowl",
-    "waypoints": "waypoints",
-}
+from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import RunRecord, read_accepted
 
 
-def set_up(case: Case, packings: int, filling: FillingFindings | None) -> list[tuple[str, str]]:
+def set_up(
+    case: CaseOfRun, packings: int, filling: FillingFindings | None
+) -> list[tuple[str, str]]:
     """Workpiece, path, speed, media, bowl and settings of a case.
 
     Parameters
     ----------
-    case : Case
+    case : CaseOfRun
         A process run.
     packings : int
         Number of packings (seeds) that are averaged.
@@ -72,7 +68,7 @@ def set_up(case: Case, packings: int, filling: FillingFindings | None) -> list[t
     ]
 
 
-def _workpiece(case: Case) -> Iterator[str]:
+def _workpiece(case: CaseOfRun) -> Iterator[str]:
     own, inputs = needed(case.workpiece, "workpiece"), case.inputs
     material = _text(inputs.get("workpiece.material"))
     if inputs.get("workpiece.shape.kind", own.kind) == "cylinder":
@@ -84,24 +80,22 @@ def _workpiece(case: Case) -> Iterator[str]:
         yield f"number {own.number} of {own.count}"
 
 
-def _path(case: Case) -> Iterator[str]:
-    motion, drag = motion_of(case), drag_phase(case)
-    radius = 1e3 * float(getattr(motion, "radius_m", 0.0))
-    yield _PATHS[_text(case.inputs.get("motion.path.kind"))].format(radius=number(radius))
-    time_s = (drag.end_step - drag.start_step) * case.timestep_s
-    yield f"{_mm(time_s * motion.axis_speed_m_s)} long"
+def _path(case: CaseOfRun) -> Iterator[str]:
+    yield motion_of(case).motion.path.words(number)
+    end_s = np.array([drag_phase(case).end_step * case.timestep_s])
+    yield f"{_mm(float(path_passed(end_s, case)[0]))} long"
     yield f"immersed {_mm(needed(case.workpiece, 'workpiece').immersion_depth_m)}"
     yield from (f"with {one.kind}" for one in case.superposed)
 
 
-def _speed(case: Case) -> Iterator[str]:
-    simulated, factor = motion_of(case).axis_speed_m_s, case.fidelity.speed_factor
+def _speed(case: CaseOfRun) -> Iterator[str]:
+    simulated, factor = axis_speed(case), case.fidelity.speed_factor
     yield f"{number(1e3 * simulated / factor)} mm/s"
     if factor != 1.0:
         yield f"simulated at {number(1e3 * simulated)} mm/s"
 
 
-def _media(case: Case) -> Iterator[str]:
+def _media(case: CaseOfRun) -> Iterator[str]:
     media, material = case.media, _text(case.inputs.get("media.material"))
     yield " ".join(filter(None, (number(media.count), material, "spheres")))
     spread = (
@@ -112,8 +106,8 @@ def _media(case: Case) -> Iterator[str]:
     yield f"diameter {_mm(2 * media.radius_mean_m)}{spread}"
 
 
-def _bowl(case: Case, filling: FillingFindings | None) -> Iterator[str]:
-    bowl, material = needed(case.bowl, "bowl"), _text(case.inputs.get("bowl.material"))
+def _bowl(case: CaseOfRun, filling: FillingFindings | None) -> Iterator[str]:
+    bowl, material = case.bowl, _text(case.inputs.get("bowl.material"))
     yield f"{material} cylinder, radius {_mm(bowl.radius_m)}".strip()
     if filling is not None and "bed_height_m" in filling.bed:
         fraction = filling.bed.get("solid_fraction")
@@ -121,7 +115,7 @@ def _bowl(case: Case, filling: FillingFindings | None) -> Iterator[str]:
         yield f"filled to {_mm(float(filling.bed['bed_height_m']))}{solid}"
 
 
-def _settings(case: Case, packings: int) -> Iterator[str]:
+def _settings(case: CaseOfRun, packings: int) -> Iterator[str]:
     own = case.fidelity
     yield (
         f"{own.name}: Young's modulus {TIMES} {number(own.youngs_modulus_scale)}, time step "
@@ -147,7 +141,7 @@ class ReportedRun(Generic[F]):
     """A run that counts: its folder, case, findings and ``run.json``."""
 
     folder: Path
-    case: Case
+    case: CaseOfRun
     findings: F
     record: RunRecord
 
@@ -184,7 +178,7 @@ class StudyRuns:
         return [run for run in runs if run is not None]
 
 
-def read_study(run_dir: Path) -> StudyRuns:
+def read_study_runs(run_dir: Path) -> StudyRuns:
     """Read a process run with its filling and drop test.
 
     A drop test without a result is left out: the process does not start from it.
@@ -223,11 +217,11 @@ def read_optional(run_dir: Path) -> tuple[Loading | None, Extrapolated | None]:
 
 
 def read_upstream(run_dir: Path) -> ReportedRun[Findings]:
-    """Read a filling or a drop test; errors are those of `read_study`."""
+    """Read a filling or a drop test; errors are those of `read_study_runs`."""
     return _read(run_dir, Findings)
 
 
-def upstream_folders(run_dir: Path, case: Case) -> dict[str, Path]:
+def upstream_folders(run_dir: Path, case: CaseOfRun) -> dict[str, Path]:
     """Folders of the filling and the drop test that a process run names, by scene."""
     results = run_dir.resolve().parent.parent
     return {scene: results / scene / run for scene, run in case.upstream.items()}
@@ -268,7 +262,7 @@ class ReportedCase:
     @cached_property
     def values(self) -> Values:
         """Its quantities, means over the packings."""
-        return over_packings([study.values for study in self.studies])
+        return values_over_packings([study.values for study in self.studies])
 
     @cached_property
     def set_up(self) -> list[tuple[str, str]]:

@@ -13,10 +13,12 @@ from pydantic import JsonValue
 
 from dragchain.report.cases import ReportedCase
 from dragchain.report.values import mean_over_packings
-from dragchain.run.case import AdvisedSettings, Case, changed_inputs
-from dragchain.run.completeness import RunRecord
+from dragchain.run.case import changed_inputs
 from dragchain.statistics.estimate import Estimate
 from dragdeck.documents import Document, Part
+from dragdeck.records.advised import AdvisedSettings
+from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import RunRecord
 
 _RESTITUTION = "restitution"
 """The quantity of the drop test."""
@@ -117,12 +119,12 @@ def read_advice(file: Path) -> list[Option]:
     return [option for case in Advice.read(file).cases for option in case.options]
 
 
-def prediction_for(case: Case, options: Sequence[Option]) -> Option | None:
+def prediction_for(case: CaseOfRun, options: Sequence[Option]) -> Option | None:
     """The option that a process run is: same settings, same inputs; None where there is none."""
     return next((option for option in options if _is_of(case, option)), None)
 
 
-def _is_of(case: Case, option: Option) -> bool:
+def _is_of(case: CaseOfRun, option: Option) -> bool:
     same = all(math.isclose(value, getattr(case.fidelity, name)) for name, value in option.settings)
     return same and not changed_inputs(case.inputs, option.inputs)
 

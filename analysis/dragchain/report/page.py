@@ -169,7 +169,7 @@ def page_environment(
     )
     shared = (
         *(number, measured, fixed, percent, fraction, interval, with_interval, mean_interval, ends),
-        *(in_percent, slug, sections, cell),
+        *(in_percent, heading_key, sections, cell),
     )
     environment.filters |= {one.__name__: one for one in shared} | dict(filters or {})
     return environment
@@ -179,13 +179,13 @@ def page_environment(
 def cell(environment: jinja2.Environment, row: object, key: str, form: str = "") -> object:
     """A value of a row by its dotted key, written by a filter: ``number``, ``measured:2``."""
     value = row
-    for part in key.split("."):
-        value = environment.getitem(value, part)
+    for part in filter(None, key.split(".")):
+        value = environment.getitem(value, int(part) if part.isdigit() else part)
     name, _, digits = form.partition(":")
     return environment.filters[name](value, *map(int, digits.split())) if name else value
 
 
-def slug(title: str) -> str:
+def heading_key(title: str) -> str:
     """A title as the name of an anchor: small letters, digits and hyphens."""
     return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
 

@@ -10,11 +10,19 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.around import ahead_behind, azimuth_profile, depth_profile, depth_slope
-from dragchain.drag.force import FORCES, read_counted, summarise_forces
-from dragchain.drag.peaks import drag_peaks, peak_separation_s
+from dragchain.drag import (
+    FORCES,
+    ahead_behind,
+    azimuth_profile,
+    depth_profile,
+    depth_slope,
+    drag_peaks,
+    peak_separation_s,
+    read_counted,
+    summarise_forces,
+)
 from dragchain.errors import SeriesError
-from dragchain.figures.network_picture import Scene, load_scene
+from dragchain.figures.network_picture import NetworkScene, load_scene
 from dragchain.figures.rendering import check_rendering
 from dragchain.report.findings import (
     FILE,
@@ -32,14 +40,15 @@ from dragchain.report.findings import (
     ProcessFindings,
     Wake,
 )
-from dragchain.run.case import Case, load_outputs
-from dragchain.run.kinematics import drag_start_s, motion_of, needed, process_time
+from dragchain.run.kinematics import drag_start_s, needed, path_passed, process_time
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import estimate_mean
 from dragchain.statistics.estimate import CONFIDENCE, EstimateColumns
 from dragchain.tables.bed import Packing
 from dragchain.tables.by_step import read_table
 from dragchain.tables.impacts import effective_restitution
+from dragdeck.decks.outputs import load_outputs
+from dragdeck.records.case import CaseOfRun
 
 
 class DragTrace(NamedTuple):
@@ -67,11 +76,11 @@ class RunData:
     Attributes
     ----------
     folder : Path
-    case : Case
+    case : CaseOfRun
     """
 
     folder: Path
-    case: Case
+    case: CaseOfRun
 
     def table(self, name: str, columns: list[str] | None = None) -> pd.DataFrame:
         """A table of the run, or some of its columns."""
@@ -108,7 +117,7 @@ class RunData:
         return dominant_bottlenecks(self.network, self.chains)
 
     @cached_property
-    def scene(self) -> Scene:
+    def scene(self) -> NetworkScene:
         """What the pictures of the contact network show, if pictures can be rendered here."""
         check_rendering()
         return load_scene(self.folder, self.case)
@@ -173,11 +182,11 @@ def process_findings(run: RunData) -> ProcessFindings:
     )
 
 
-def _wake(samples: pd.DataFrame, case: Case) -> Wake | None:
+def _wake(samples: pd.DataFrame, case: CaseOfRun) -> Wake | None:
     workpiece = needed(case.workpiece, "workpiece")
     if workpiece.wake_from_m is None:
         return None
-    path = (samples["time_s"] - drag_start_s(case)) * motion_of(case).axis_speed_m_s
+    path = path_passed(samples["time_s"].to_numpy(), case)
     fresh = path <= workpiece.wake_from_m - 2 * workpiece.radius_m
     try:
         before, after = (

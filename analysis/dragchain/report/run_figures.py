@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.dumps.run_parts import iter_prints
 from dragchain.figures import network_picture
 from dragchain.figures.network_picture import force_bar, show_network
 from dragchain.figures.panels import (
@@ -36,10 +35,12 @@ from dragchain.report.findings import (
     ProcessFindings,
 )
 from dragchain.report.run_data import RunData, write_findings
-from dragchain.run.case import Case, load_case, load_outputs
 from dragchain.run.kinematics import process_time
+from dragchain.run.run_parts import iter_prints
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate
+from dragdeck.decks.outputs import load_outputs
+from dragdeck.records.case import CaseOfRun, load_case
 
 _DEPTH = "depth below the surface (mm)"
 
@@ -60,11 +61,11 @@ def forces_panel(axes: Axes, run: RunData, found: ProcessFindings) -> None:
     label = f"mean drag {ours.mean:.2f} N (95 % CI {interval} N)"
     axes.plot(span, [ours.mean] * 2, color="black", label=label)
     for one in found.comparison:
-        published(axes, one)
+        published_mean(axes, one)
     axes.set(xlabel="process time (s)", ylabel="force on the workpiece (N)", xlim=(0, time_s[-1]))
 
 
-def published(axes: Axes, one: Comparison) -> None:
+def published_mean(axes: Axes, one: Comparison) -> None:
     """A published mean, dashed over what was drawn before it, with its standard deviation."""
     colour, text = COLOURS[one.label], f"{one.label} mean {one.mean_n:.2f} N"
     if one.std_n is not None:
@@ -187,7 +188,7 @@ def network_xz(run: RunData, found: ProcessFindings) -> Figure:
 def _network(run: RunData, view: network_picture.View, side: str) -> Figure:
     """A rendered view on axes in mm, with what it shows named."""
     shown = run.scene
-    image, extent = network_picture.render(run.folder, run.case, shown, view)
+    image, extent = network_picture.render_view(run.folder, run.case, shown, view)
     height = 4.3 * (extent[3] - extent[2]) / (extent[1] - extent[0]) + 0.9
     figure, (axes,) = new_panels(height, width_in=HALF_IN)
     show_network(axes, shown, view, image, extent)
@@ -202,7 +203,7 @@ def _network(run: RunData, view: network_picture.View, side: str) -> Figure:
     return figure
 
 
-def _path_words(shown: network_picture.Scene) -> str:
+def _path_words(shown: network_picture.NetworkScene) -> str:
     if shown.dominant is None:
         return "no path of strong contacts from workpiece to bowl"
     forces = shown.frame.normal_force[list(shown.dominant.contacts)]
@@ -215,7 +216,7 @@ def _path_words(shown: network_picture.Scene) -> str:
 # --- filling and drop test -----------------------------------------------------------------------
 
 
-def energy_ratio(energy_j: Floats, particles: Floats, case: Case) -> Floats:
+def energy_ratio(energy_j: Floats, particles: Floats, case: CaseOfRun) -> Floats:
     """The mean energy of a particle over m g d, (N,): what the mean particle gains falling by d.
 
     Parameters
@@ -224,7 +225,7 @@ def energy_ratio(energy_j: Floats, particles: Floats, case: Case) -> Floats:
         Kinetic energy of all particles in J, spin included.
     particles : (N,) array
         Number of particles.
-    case : Case
+    case : CaseOfRun
         The filling; mass and diameter are those of its mean particle.
     """
     radius = case.media.radius_mean_m

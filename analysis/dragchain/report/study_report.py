@@ -14,7 +14,7 @@ from dragchain.report.cases import (
     ReportedRun,
     StudyRuns,
     cases_of,
-    read_study,
+    read_study_runs,
     read_upstream,
     upstream_folders,
 )
@@ -37,12 +37,12 @@ from dragchain.report.page import (
 )
 from dragchain.report.spreadsheet import summary_workbook
 from dragchain.report.summary import summary
-from dragchain.run.case import Assumption, load_case
-from dragchain.run.completeness import RunRecord
 from dragchain.statistics.correlated import RELIABLE_TIMES
 from dragchain.tables.network_contacts import Corrections
 from dragdeck.errors import DragdeckError
 from dragdeck.files import write_bytes
+from dragdeck.records.case import AssumptionOfRun, load_case
+from dragdeck.records.run import RunRecord
 
 _STEPS = ("render", "run", "tables", "chains", "loading", "figures")
 """The steps of a run that have a log, in order: the first that failed is to blame."""
@@ -163,7 +163,7 @@ _FROM_LOADING = "workpiece"
 
 
 @dataclass(frozen=True)
-class Picture:
+class ShownFigure:
     """A figure of a run as a data URI; the page has its caption."""
 
     name: str
@@ -177,19 +177,19 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Section:
+class RunSection:
     """What the page shows of one process run; `network` is its page on the contact network."""
 
     study: StudyRuns
-    assumptions: list[Assumption]
-    pictures: list[Picture]
+    assumptions: list[AssumptionOfRun]
+    pictures: list[ShownFigure]
     network: Path | None
     corrections: Corrections | None
     costs: list[CostRow]
     cost_source: str | None
 
 
-def write_report(
+def write_study_report(
     out_dir: Path,
     run_dirs: Sequence[Path],
     advice: Path | None = None,
@@ -259,13 +259,13 @@ def _with_upstream(run_dirs: Sequence[Path]) -> list[Path]:
 
 def _read(
     run_dirs: Sequence[Path], options: Sequence[Option]
-) -> tuple[list[Section], list[MissingRun]]:
+) -> tuple[list[RunSection], list[MissingRun]]:
     """What the page shows of the process runs, and the runs without a result."""
     sections, missing = [], []
     for folder in run_dirs:
         try:
             if scene_of(folder) == "process":
-                sections.append(_section(read_study(folder), options))
+                sections.append(_section(read_study_runs(folder), options))
             else:
                 read_upstream(folder)
         except DragdeckError as error:
@@ -273,13 +273,13 @@ def _read(
     return sections, missing
 
 
-def _section(study: StudyRuns, options: Sequence[Option]) -> Section:
+def _section(study: StudyRuns, options: Sequence[Option]) -> RunSection:
     process = study.process
     expected = prediction_for(process.case, options)
     records = {str(run.case.scene): run.record for run in study.runs}
     corrections = process.folder / "tables" / "corrections.json"
     network = process.folder / NETWORK_PAGE
-    return Section(
+    return RunSection(
         study=study,
         assumptions=_assumptions(study),
         pictures=[picture for run in study.runs for picture in _pictures(run)],
@@ -290,22 +290,22 @@ def _section(study: StudyRuns, options: Sequence[Option]) -> Section:
     )
 
 
-def _assumptions(study: StudyRuns) -> list[Assumption]:
+def _assumptions(study: StudyRuns) -> list[AssumptionOfRun]:
     """The assumptions of all runs of a study, by field."""
-    known: dict[str, Assumption] = {}
+    known: dict[str, AssumptionOfRun] = {}
     for run in reversed(study.runs):
         known |= {assumption.field: assumption for assumption in run.case.assumptions}
     return [known[field] for field in sorted(known)]
 
 
-def _pictures(run: ReportedRun[Findings]) -> list[Picture]:
+def _pictures(run: ReportedRun[Findings]) -> list[ShownFigure]:
     """The figures of a run; only a filling may lack one, as it may have no thermo table."""
     scene = run.case.scene
     found = []
     for name in (*FIGURES[scene], *([_FROM_LOADING] if scene == "process" else [])):
         file = run.folder / "figures" / f"{name}.png"
         if (uri := file_uri(file)) is not None:
-            found.append(Picture(name, uri, _alt(name, run)))
+            found.append(ShownFigure(name, uri, _alt(name, run)))
         elif scene != "filling" and name != _FROM_LOADING:
             raise TableError(f"{file}: there is no such file; run `dragchain figures` first")
     return found
@@ -340,7 +340,7 @@ def _alt(name: str, run: ReportedRun[Findings]) -> str:
 
 
 def _render(
-    sections: Sequence[Section],
+    sections: Sequence[RunSection],
     cases: Sequence[ReportedCase],
     table: pd.DataFrame,
     missing: Sequence[MissingRun],
@@ -367,7 +367,7 @@ def _render(
     )
 
 
-def _network_pages(sections: Sequence[Section]) -> list[str]:
+def _network_pages(sections: Sequence[RunSection]) -> list[str]:
     """The name, beside the report, of each case's page on its contact network."""
     if len(sections) == 1:
         return [NETWORK_PAGE]

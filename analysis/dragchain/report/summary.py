@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -49,14 +49,14 @@ def _summary_row(study: StudyRuns, headline: str) -> Row:
         "engine_version": record.engine_version,
         **_forces(found.forces),
         **_comparisons(values.against),
-        **{key: cell for one in values.standings for key, cell in _of_run(one)},
+        **_of_runs(values.standings),
         **_asked(study),
         "peak_max_n": found.peaks.largest_n,
         **_wake(found),
         **_network(found),
         **_chains(found),
         **_upstream(study),
-        **{key: cell for one in values.standings if one.corrected for key, cell in _corrected(one)},
+        **_corrected(values.standings),
     }
 
 
@@ -86,12 +86,15 @@ def _forces(forces: Mapping[str, MeanEstimate]) -> Row:
 
 def _comparisons(comparisons: Sequence[Against]) -> Row:
     row: Row = {}
-    for against in comparisons:
-        name, percent = f"drag_against_{against.label}", against.difference.over(0.01)
-        row[f"{name}_percent"] = percent.value
-        row[f"{name}_ci95_low_percent"] = percent.ci95_low
-        row[f"{name}_ci95_high_percent"] = percent.ci95_high
+    for one in comparisons:
+        row |= _interval(f"drag_against_{one.label}", "_percent", one.difference.over(0.01))
     return row
+
+
+def _interval(name: str, unit: str, found: Estimate) -> Row:
+    """A value with the ends of its interval; `unit` ends the names of the columns."""
+    ends = {"": found.value, "_ci95_low": found.ci95_low, "_ci95_high": found.ci95_high}
+    return {f"{name}{end}{unit}": value for end, value in ends.items()}
 
 
 _NAMED_OTHERWISE = {
@@ -102,24 +105,29 @@ _NAMED_OTHERWISE = {
 """Quantities whose values of the run have columns from the findings."""
 
 
-def _of_run(one: Standing) -> Iterator[tuple[str, Cell]]:
-    """The value of the run, in process time, with its interval if it has one."""
-    if one.quantity.name not in _NAMED_OTHERWISE:
-        yield from _estimate(one.quantity.name, one.quantity.unit, one.run)
+def _of_runs(standings: Sequence[Standing]) -> Row:
+    """The values of the run, in process time."""
+    row: Row = {}
+    for one in standings:
+        if one.quantity.name not in _NAMED_OTHERWISE:
+            row |= _estimate(one.quantity.name, one.quantity.unit, one.run)
+    return row
 
 
-def _corrected(one: Standing) -> Iterator[tuple[str, Cell]]:
-    """The value at the physical Young's modulus."""
-    yield from _estimate(f"extrapolated_{one.quantity.name}", one.quantity.unit, one.shown)
+def _corrected(standings: Sequence[Standing]) -> Row:
+    """The values at the physical Young's modulus, where windows give them."""
+    row: Row = {}
+    for one in standings:
+        if one.corrected:
+            row |= _estimate(f"extrapolated_{one.quantity.name}", one.quantity.unit, one.shown)
+    return row
 
 
-def _estimate(name: str, unit: str, found: Estimate) -> Iterator[tuple[str, Cell]]:
+def _estimate(name: str, unit: str, found: Estimate) -> Row:
+    """A value, with its interval if it has one."""
     end = "_" + unit.lower().replace("/", "_per_").replace(" ", "_") if unit else ""
     end = end.replace("_1_per", "_per")
-    yield f"{name}{end}", found.value
-    if found.known:
-        yield f"{name}_ci95_low{end}", found.ci95_low
-        yield f"{name}_ci95_high{end}", found.ci95_high
+    return _interval(name, end, found) if found.known else {f"{name}{end}": found.value}
 
 
 def _asked(study: StudyRuns) -> Row:
@@ -145,9 +153,7 @@ def _wake(found: ProcessFindings) -> Row:
     return {
         "drag_fresh_mean_n": found.wake.fresh_n.mean,
         "drag_in_wake_mean_n": found.wake.wake_n.mean,
-        "drag_wake_ratio": found.wake.ratio.value,
-        "drag_wake_ratio_ci95_low": found.wake.ratio.ci95_low,
-        "drag_wake_ratio_ci95_high": found.wake.ratio.ci95_high,
+        **_interval("drag_wake_ratio", "", found.wake.ratio),
     }
 
 
@@ -162,13 +168,16 @@ def _network(found: ProcessFindings) -> Row:
         "workpiece_contacts_per_frame": network["n_particle_workpiece_contacts"],
         "ahead_mean_n": sides.ahead_n.value,
         "behind_mean_n": sides.behind_n.value,
-        "ahead_behind_ratio": sides.ratio.value,
-        "ahead_behind_ratio_ci95_low": sides.ratio.ci95_low,
-        "ahead_behind_ratio_ci95_high": sides.ratio.ci95_high,
-        "depth_slope_n_per_m": slope.value,
-        "depth_slope_ci95_low_n_per_m": slope.ci95_low,
-        "depth_slope_ci95_high_n_per_m": slope.ci95_high,
+        **_interval("ahead_behind_ratio", "", sides.ratio),
+        **_interval("depth_slope", "_n_per_m", slope),
     }
+
+
+_OF_CHAINS = (
+    *("widest_paths_per_frame", "widest_paths_to_side_fraction", "dominant_bottleneck_mean_n"),
+    *("dominant_bottleneck_max_n", "dominant_particles_mean", "dominant_altitude_mean_m"),
+    "dominant_azimuth_mean_rad",
+)
 
 
 def _chains(found: ProcessFindings) -> Row:
@@ -176,13 +185,7 @@ def _chains(found: ProcessFindings) -> Row:
     return {
         "peters_chains_per_frame": chains.peters_per_frame,
         "peters_chain_particles_mean": chains.peters_particles_mean,
-        "widest_paths_per_frame": chains.widest_paths_per_frame,
-        "widest_paths_to_side_fraction": chains.widest_paths_to_side_fraction,
-        "dominant_bottleneck_mean_n": chains.dominant_bottleneck_mean_n,
-        "dominant_bottleneck_max_n": chains.dominant_bottleneck_max_n,
-        "dominant_particles_mean": chains.dominant_particles_mean,
-        "dominant_altitude_mean_m": chains.dominant_altitude_mean_m,
-        "dominant_azimuth_mean_rad": chains.dominant_azimuth_mean_rad,
+        **{name: getattr(chains, name) for name in _OF_CHAINS},
     }
 
 

@@ -10,11 +10,11 @@ from typing import NamedTuple
 from dragchain.loading.document import Loading
 from dragchain.report.findings import ProcessFindings
 from dragchain.run.basis import QUANTITIES, Basis, Correction, Standing, judge, notes
-from dragchain.run.case import Case
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.correlated import MeanEstimate
 from dragchain.statistics.estimate import Estimate, mean_of
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import CaseOfRun
 
 EXTRAPOLATED = Path("tables") / "extrapolated.json"
 
@@ -172,13 +172,13 @@ class Values:
 
     Attributes
     ----------
-    case : Case
+    case : CaseOfRun
     standings : tuple of Standing
     packings : int
         Number of packings (seeds) that the values are means of.
     """
 
-    case: Case
+    case: CaseOfRun
     standings: tuple[Standing, ...]
     packings: int = 1
 
@@ -223,13 +223,16 @@ class Values:
 
 
 def values_of(
-    case: Case, found: ProcessFindings, loading: Loading | None, extrapolated: Extrapolated | None
+    case: CaseOfRun,
+    found: ProcessFindings,
+    loading: Loading | None,
+    extrapolated: Extrapolated | None,
 ) -> Values:
     """The quantities of a process run.
 
     Parameters
     ----------
-    case : Case
+    case : CaseOfRun
     found : ProcessFindings
     loading : Loading or None
         Content of ``loading.json``, if it was made.
@@ -248,7 +251,10 @@ def values_of(
 
 
 def _own(
-    case: Case, found: ProcessFindings, loading: Loading | None, extrapolated: Extrapolated | None
+    case: CaseOfRun,
+    found: ProcessFindings,
+    loading: Loading | None,
+    extrapolated: Extrapolated | None,
 ) -> Iterator[tuple[str, Estimate]]:
     """The values of the run in simulated time, later ones instead of earlier ones."""
     yield "drag_std", Estimate(found.forces["drag_n"].std, math.nan, math.nan)
@@ -284,7 +290,7 @@ def of_mean(mean: MeanEstimate) -> Estimate:
     return Estimate(mean.mean, mean.ci95_low, mean.ci95_high)
 
 
-def over_packings(several: Sequence[Values]) -> Values:
+def values_over_packings(several: Sequence[Values]) -> Values:
     """The means over the packings of one case, each with Student's t interval between them.
 
     That of a value from windows joins those of the single runs, each of which includes the scatter

@@ -1,23 +1,28 @@
 """How the workpiece moves: phases of a run, paths, the workpiece's frame, counted samples."""
 
-from collections.abc import Sequence
-from typing import TypeVar
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
-from dragchain.arrays import Floats, Ints, wrap_angle
+from dragchain.arrays import Floats, Ints
 from dragchain.errors import TableError
-from dragchain.run.case import Case, Phase
-from dragchain.run.paths.kind import WorkpiecePath
+from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import Phase
+from dragdeck.study.driven import DrivenMotion
+from dragdeck.study.model import Motion
+from dragdeck.study.rotation import Rotation, about_vertical, rotated, wrap_angle
 
 
-def drag_start_s(case: Case) -> float:
+def drag_start_s(case: CaseOfRun) -> float:
     """The simulated time at which the drag begins, the zero of process time."""
     return drag_phase(case).start_step * case.timestep_s
 
 
-def process_time(simulated_s: Floats, case: Case) -> Floats:
+def process_time(simulated_s: Floats, case: CaseOfRun) -> Floats:
     """Process time of simulated times: from the start of the drag, at the speed of the process.
 
     A workpiece that is f times as fast takes 1/f of the time for the same path.
@@ -26,7 +31,7 @@ def process_time(simulated_s: Floats, case: Case) -> Floats:
     ----------
     simulated_s : (N,) ndarray
         Simulated times, s.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -75,14 +80,14 @@ def phase_codes(steps: Ints, phases: Sequence[Phase]) -> NDArray[np.int8]:
     return np.searchsorted(ends, steps, side="left").astype(np.int8)
 
 
-def counted_mask(steps: Ints, case: Case) -> NDArray[np.bool_]:
+def counted_mask(steps: Ints, case: CaseOfRun) -> NDArray[np.bool_]:
     """Mark the samples that statistics use: those of the drag, after the transient.
 
     Parameters
     ----------
     steps : (N,) ndarray of int
         Steps.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -97,7 +102,7 @@ def counted_mask(steps: Ints, case: Case) -> NDArray[np.bool_]:
     return (steps > drag.start_step) & (steps <= drag.end_step) & after
 
 
-def drag_phase(case: Case) -> Phase:
+def drag_phase(case: CaseOfRun) -> Phase:
     """The phase named ``drag``."""
     for phase in case.phases:
         if phase.name == "drag":
@@ -112,14 +117,54 @@ def needed(value: T | None, name: str) -> T:
     return value
 
 
-def motion_of(case: Case) -> WorkpiecePath:
-    """The motion of the workpiece in the drag."""
-    if case.motion is None:
-        raise TableError("case.json has no motion, which these tables require")
-    return case.motion
+def motion_of(case: CaseOfRun) -> DrivenMotion:
+    """The motion of the workpiece in the drag, from the study's own fields.
+
+    Raises
+    ------
+    TableError
+        ``case.json`` has no motion, or it is not what this version makes of its inputs.
+    """
+    entry = needed(case.motion, "motion")
+    fields: dict[str, Any] = {}
+    for name, value in case.inputs.items():
+        *blocks, last = name.split(".")
+        if blocks[:1] == ["motion"]:
+            block = fields
+            for key in blocks[1:]:
+                block = block.setdefault(key, {})
+            block[last] = value
+    try:
+        motion = Motion.model_validate(fields)
+    except ValidationError as error:
+        raise _other_version(case, str(error.errors()[0]["msg"])) from None
+    start, factor = drag_phase(case).start_step, case.fidelity.speed_factor
+    driven = DrivenMotion.of(motion, case.timestep_s, factor, start)
+    made = [driven.path_entry(), *driven.superposed_entries()], [entry, *case.superposed]
+    if not _alike(*([one.model_dump() for one in entries] for entries in made)):
+        raise _other_version(case, "motion and superposed do not follow from its inputs")
+    return driven
 
 
-def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:
+def _other_version(case: CaseOfRun, problem: str) -> TableError:
+    return TableError(
+        f"{case.run}: case.json is of another version of dragdeck ({problem}): "
+        "render and run it again"
+    )
+
+
+def _alike(one: Any, other: Any) -> bool:
+    """Whether plain data are the same, numbers up to rounding."""
+    if isinstance(one, float | int) and isinstance(other, float | int):
+        return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-12)
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(_alike(one[key], other[key]) for key in one)
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return len(one) == len(other) and all(map(_alike, one, other))
+    return bool(one == other)
+
+
+def directions(steps: Ints, ref_xy_m: Floats, case: CaseOfRun) -> Floats:
     """Direction of the workpiece's motion in the horizontal plane.
 
     In the drag that of its path; before it, the direction with which the drag starts.
@@ -130,7 +175,7 @@ def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:
         Steps.
     ref_xy_m : (N, 2) ndarray
         Reference point of the workpiece at these steps, m.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -138,13 +183,13 @@ def directions(steps: Ints, ref_xy_m: Floats, case: Case) -> Floats:
     (N,) ndarray
         Angles from x towards y, rad, in (-pi, pi].
     """
-    path, since = motion_of(case), steps - drag_phase(case).start_step
-    start = wrap_angle(path.start_direction_rad)
-    return np.where(since > 0, path.directions(since, case.timestep_s, ref_xy_m), start)
+    driven, since = motion_of(case), steps - drag_phase(case).start_step
+    start = wrap_angle(driven.motion.path.direction_rad)
+    return np.where(since > 0, driven.directions(since, ref_xy_m), start)
 
 
-def workpiece_turn(steps: Ints, direction_rad: Floats, case: Case) -> Floats:
-    """Angle of the workpiece's own frame about the vertical, (N,) in rad.
+def workpiece_rotation(steps: Ints, direction_rad: Floats, case: CaseOfRun) -> Rotation:
+    """Orientations of the workpiece's own frame.
 
     Parameters
     ----------
@@ -152,26 +197,37 @@ def workpiece_turn(steps: Ints, direction_rad: Floats, case: Case) -> Floats:
         Steps.
     direction_rad : (N,) ndarray
         Direction of motion at these steps, rad.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
     """
-    turn, since = motion_of(case).turn(direction_rad), steps - drag_phase(case).start_step
-    for motion in case.superposed:
-        turn = turn + motion.turn(since, case.timestep_s)
-    return turn
+    since = steps - drag_phase(case).start_step
+    return motion_of(case).rotation_along(since, direction_rad)
 
 
-def surface_speed(case: Case) -> float:
+def axis_speed(case: CaseOfRun) -> float:
+    """Speed of the workpiece's axis relative to the bowl, the mean along its path, m/s."""
+    return needed(case.motion, "motion").axis_speed_m_s
+
+
+def path_passed(time_s: Floats, case: CaseOfRun) -> Floats:
+    """Length of the path up to simulated times, (N,) in m, at the mean speed along it."""
+    elapsed, begin = time_s - drag_start_s(case), motion_of(case).drive.begin
+    if begin.steps:
+        elapsed = begin.advance(elapsed / case.timestep_s) * case.timestep_s
+    return np.asarray(elapsed * axis_speed(case))
+
+
+def surface_speed(case: CaseOfRun) -> float:
     """Highest speed of the workpiece's surface in the drag, m/s: of its axis, and what is added."""
-    return motion_of(case).axis_speed_m_s * (1.0 + case.numbers.get("superposed_speed", 0.0))
+    return axis_speed(case) * (1.0 + case.numbers.get("superposed_speed", 0.0))
 
 
-def spins(case: Case) -> bool:
-    """Whether a superposed motion turns the workpiece."""
-    return any(one.turns for one in case.superposed)
+def spins(case: CaseOfRun) -> bool:
+    """Whether the workpiece turns in the frame of its path."""
+    return motion_of(case).turns
 
 
-def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: Case) -> Floats:
+def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: CaseOfRun) -> Floats:
     """Velocity of points that are fixed to the workpiece, in the drag.
 
     Parameters
@@ -182,7 +238,7 @@ def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: Case) 
         The points at these steps, m.
     ref_m : (N, 3) ndarray
         Reference point of the workpiece at these steps, m.
-    case : Case
+    case : CaseOfRun
         The case, of a process.
 
     Returns
@@ -191,13 +247,15 @@ def workpiece_velocity(steps: Ints, point_m: Floats, ref_m: Floats, case: Case) 
         Velocities, m/s; NaN outside of the drag, of which alone ``case.json``
         gives the motion.
     """
-    drag, dt = drag_phase(case), case.timestep_s
-    since, heading = steps - drag.start_step, directions(steps, ref_m[:, :2], case)
-    velocity = motion_of(case).velocity(since, dt, point_m, heading)
-    for motion in case.superposed:
-        velocity = velocity + motion.velocity(since, dt, point_m - ref_m)
+    drag = drag_phase(case)
+    velocity = motion_of(case).velocity(steps - drag.start_step, point_m, ref_m)
     dragged = (steps > drag.start_step) & (steps <= drag.end_step)
     return np.where(dragged[:, None], velocity, np.nan)
+
+
+def bowl_velocity(point_m: Floats, case: CaseOfRun) -> Floats:
+    """Velocity of (N, 3) points that are fixed to the bowl, (N, 3) in m/s."""
+    return about_vertical(motion_of(case).bowl_rad_s, point_m)
 
 
 def workpiece_frame(force_n: Floats, direction_rad: Floats) -> Floats:
@@ -216,7 +274,4 @@ def workpiece_frame(force_n: Floats, direction_rad: Floats) -> Floats:
         Forces along the direction of motion, along its left (z cross motion)
         and up, N.
     """
-    cos, sin = np.cos(direction_rad), np.sin(direction_rad)
-    along = force_n[:, 0] * cos + force_n[:, 1] * sin
-    left = force_n[:, 1] * cos - force_n[:, 0] * sin
-    return np.column_stack([along, left, force_n[:, 2]])
+    return rotated(force_n, -direction_rad)

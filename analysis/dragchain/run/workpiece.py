@@ -8,11 +8,12 @@ import numpy as np
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.case import Case
-from dragchain.run.kinematics import motion_of, needed
+from dragchain.run.kinematics import needed
+from dragdeck.records.case import CaseOfRun
+from dragdeck.study.rotation import Rotation, rotated
 
 
-def workpiece_mesh(run_dir: Path, case: Case) -> Any:
+def workpiece_mesh(run_dir: Path, case: CaseOfRun) -> Any:
     """Read the workpiece's mesh, as it lies in its file.
 
     Raises
@@ -27,7 +28,7 @@ def workpiece_mesh(run_dir: Path, case: Case) -> Any:
     return pv.read(file)
 
 
-def _mesh_file(run_dir: Path, case: Case) -> Path:
+def _mesh_file(run_dir: Path, case: CaseOfRun) -> Path:
     file = run_dir / needed(case.workpiece, "workpiece").mesh
     if not file.is_file():
         raise TableError(
@@ -36,10 +37,11 @@ def _mesh_file(run_dir: Path, case: Case) -> Path:
     return file
 
 
-def placed(workpiece: Any, workpiece_m: Floats, turn_rad: float) -> Any:
-    """The workpiece's mesh turned about the vertical and put to its reference point."""
-    turned = workpiece.rotate_z(np.degrees(turn_rad), inplace=False)
-    return turned.translate(workpiece_m, inplace=False)
+def placed(workpiece: Any, workpiece_m: Floats, rotation: Rotation) -> Any:
+    """The workpiece's mesh turned, and put to its reference point."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation.matrices[0], workpiece_m
+    return workpiece.transform(pose, inplace=False)
 
 
 @dataclass(frozen=True)
@@ -78,14 +80,7 @@ class Surface:
         return np.asarray(np.cross(second - first, third - first))
 
 
-def turned(vectors: Floats, angle_rad: Floats | float) -> Floats:
-    """Turn (..., 3) vectors about the vertical."""
-    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-1)
-
-
-def read_surface(run_dir: Path, case: Case) -> Surface:
+def read_surface(run_dir: Path, case: CaseOfRun) -> Surface:
     """Read the workpiece's mesh into its own frame.
 
     The STL file of a user's mesh looks along +x as it is; a cylinder is put into
@@ -98,7 +93,7 @@ def read_surface(run_dir: Path, case: Case) -> Surface:
     """
     corners = _corners(_mesh_file(run_dir, case))
     if needed(case.workpiece, "workpiece").kind == "cylinder":
-        corners = turned(corners, -motion_of(case).start_direction_rad)
+        corners = rotated(corners, -needed(case.motion, "motion").start_direction_rad)
     return Surface(corners)
 
 

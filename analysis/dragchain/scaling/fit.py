@@ -12,15 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dragchain.arrays import Floats
-from dragchain.drag.force import FORCES, read_counted, summarise_forces
+from dragchain.drag import FORCES, read_counted, summarise_forces
 from dragchain.errors import TableError
 from dragchain.figures.panels import legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, GREEN, INK, ORANGE, WIDTH_IN, drawing, png
 from dragchain.report.page import page_environment
-from dragchain.run.case import Case, load_case
-from dragchain.run.completeness import RunRecord
-from dragchain.run.kinematics import needed
-from dragchain.run.paths.circle import Circle
+from dragchain.run.kinematics import motion_of, needed
 from dragchain.scaling.document import (
     BandPoint,
     CurvePoint,
@@ -33,8 +30,11 @@ from dragchain.scaling.document import (
 )
 from dragchain.statistics import power_law
 from dragchain.statistics.estimate import Estimate, flattened
-from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
+from dragchain.statistics.power_law import fit_shifted, fit_two_terms
 from dragdeck.files import write_bytes, write_text
+from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import RunRecord
+from dragdeck.study.paths.circle import CirclePath
 
 _STORED = Path(__file__).parent / "data"
 """The scalings that were measured for the documentation."""
@@ -54,19 +54,20 @@ _UNLIKE = frozenset({"seed"})
 
 
 @dataclass(frozen=True)
-class Run:
+class RunOfScaling:
     """One run of a scaling: its row in ``scaling.json``, and its case."""
 
     row: ScaledRun
-    case: Case
+    case: CaseOfRun
 
     @property
     def gap_particles(self) -> float | None:
         """Gap between workpiece and bowl wall in mean particle diameters; None off a circle."""
-        if not isinstance(self.case.motion, Circle):
+        path = motion_of(self.case).motion.path
+        if not isinstance(path, CirclePath):
             return None
         bowl, workpiece = needed(self.case.bowl, "bowl"), needed(self.case.workpiece, "workpiece")
-        gap = bowl.radius_m - self.case.motion.radius_m - workpiece.radius_m
+        gap = bowl.radius_m - path.radius_m - workpiece.radius_m
         return gap / (2.0 * self.case.media.radius_mean_m)
 
     @property
@@ -77,7 +78,7 @@ class Run:
         return gap / (2.0 * self.case.media.radius_mean_m)
 
 
-def read_runs(run_dirs: Sequence[Path], field: str) -> list[Run]:
+def read_scaled_runs(run_dirs: Sequence[Path], field: str) -> list[RunOfScaling]:
     """Read the runs of a scaling from their tables, ordered by level and bed.
 
     Raises
@@ -91,7 +92,7 @@ def read_runs(run_dirs: Sequence[Path], field: str) -> list[Run]:
     return sorted(runs, key=lambda run: (run.row.level, run.row.bed))
 
 
-def _read_run(folder: Path, field: str) -> Run:
+def _read_run(folder: Path, field: str) -> RunOfScaling:
     case = load_case(folder)
     level = case.inputs.get(field)
     if isinstance(level, bool) or not isinstance(level, int | float) or level <= 0:
@@ -111,10 +112,10 @@ def _read_run(folder: Path, field: str) -> Run:
         eta=-drag.mean / (weight * workpiece.immersion_depth_m**2),
         bed=case.upstream.get("filling", case.run),
     )
-    return Run(row, case)
+    return RunOfScaling(row, case)
 
 
-def _check_alike(cases: Sequence[Case], field: str) -> None:
+def _check_alike(cases: Sequence[CaseOfRun], field: str) -> None:
     first, *others = cases
     wanted = {**first.inputs, "fidelity": first.fidelity}
     for case in others:
@@ -153,7 +154,7 @@ def find(
     TableError, SeriesError
         If the runs do not make a scaling.
     """
-    runs = read_runs(run_dirs, field)
+    runs = read_scaled_runs(run_dirs, field)
     law = power_law.fit_power_law(_sample(runs))
     inner = None
     if expected.within is not None:
@@ -194,11 +195,11 @@ def find(
     )
 
 
-def _sample(runs: Sequence[Run]) -> power_law.Runs:
+def _sample(runs: Sequence[RunOfScaling]) -> power_law.RunMeans:
     rows = [run.row for run in runs]
     drag = np.array([row.drag_n for row in rows])
     errors = np.array([row.standard_error_n for row in rows]) / drag
-    return power_law.Runs(
+    return power_law.RunMeans(
         np.array([row.level for row in rows]), drag, errors, [row.bed for row in rows]
     )
 
@@ -233,7 +234,7 @@ def _shifted(law: power_law.PowerLaw, power: float) -> ShiftedLaw:
     return ShiftedLaw(**vars(found), curve=curve)
 
 
-def _mean_eta(runs: Sequence[Run], law: power_law.PowerLaw) -> Estimate:
+def _mean_eta(runs: Sequence[RunOfScaling], law: power_law.PowerLaw) -> Estimate:
     """Geometric mean of eta over the runs of a law; a trend in it widens the interval."""
     known = [run.row.eta for run in runs if run.row.level in law.runs.levels]
     etas = replace(law.runs, values=np.array(known))
@@ -243,7 +244,7 @@ def _mean_eta(runs: Sequence[Run], law: power_law.PowerLaw) -> Estimate:
     return fit.estimate([1.0]).exp()
 
 
-def _level(law: power_law.PowerLaw, number: int, runs: Sequence[Run]) -> Level:
+def _level(law: power_law.PowerLaw, number: int, runs: Sequence[RunOfScaling]) -> Level:
     x = float(law.runs.levels[number])
     here = [run for run in runs if run.row.level == x]
     return Level(

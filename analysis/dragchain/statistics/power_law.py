@@ -17,15 +17,15 @@ from scipy.optimize import minimize
 
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError
-from dragchain.statistics.estimate import Estimate
-from dragchain.statistics.shared_bed import (
+from dragchain.statistics.bed_effects import (
     Effects,
     Whitened,
-    alike,
+    correlation,
     free_degrees,
     same,
     shares_beds,
 )
+from dragchain.statistics.estimate import Estimate
 
 _LEAST_LEVELS = 3
 """A line through two levels always fits."""
@@ -67,7 +67,7 @@ class Scatter:
 
 
 @dataclass(frozen=True)
-class Runs:
+class RunMeans:
     """What a fit is made from: N runs.
 
     Attributes
@@ -140,17 +140,17 @@ class Runs:
 
     def covariance(self, scatter: Scatter) -> Floats:
         """Covariance of the logarithms, (N, N)."""
-        between = alike(self.same_bed, scatter.bed_fraction)
+        between = correlation(self.same_bed, scatter.bed_fraction)
         return np.asarray(scatter.spread**2 * between + np.diag(self.errors**2))
 
-    def within(self, low: float, high: float) -> "Runs":
+    def within(self, low: float, high: float) -> "RunMeans":
         """The runs whose level is from `low` to `high`."""
         inside = (self.x >= low) & (self.x <= high)
         beds = [bed for bed, one in zip(self.beds, inside, strict=True) if one]
-        return Runs(self.x[inside], self.values[inside], self.errors[inside], beds)
+        return RunMeans(self.x[inside], self.values[inside], self.errors[inside], beds)
 
 
-def estimate_scatter(runs: Runs, design: Floats) -> Scatter:
+def estimate_scatter(runs: RunMeans, design: Floats) -> Scatter:
     """Scatter about a linear model by restricted likelihood.
 
     Patterson and Thompson 1971, Biometrika 58, 545; with known errors of the
@@ -198,7 +198,7 @@ class PowerLaw:
 
     Attributes
     ----------
-    runs : Runs
+    runs : RunMeans
     line : Linear
         Effects: logarithm of the value at the centre of the levels, and n.
     means : Linear
@@ -211,7 +211,7 @@ class PowerLaw:
         None if no level has runs enough to tell.
     """
 
-    runs: Runs
+    runs: RunMeans
     line: Linear
     means: Linear
     scatter: Scatter
@@ -250,7 +250,7 @@ class PowerLaw:
         return found.estimate([0.0, 0.0, 1.0]).exp(minus=1.0)
 
 
-def fit_power_law(runs: Runs) -> PowerLaw:
+def fit_power_law(runs: RunMeans) -> PowerLaw:
     """Fit a power law to runs, and test whether it holds.
 
     The test compares the residuals of the law with those of a mean for every
@@ -286,13 +286,13 @@ class AgainstLevels:
 
 
 def compare_with_levels(
-    runs: Runs, design: Floats, values: Floats, scale: float = 1.0
+    runs: RunMeans, design: Floats, values: Floats, scale: float = 1.0
 ) -> AgainstLevels | None:
     """Test a law of two effects by the means of the levels; None if too few runs repeat a level.
 
     Parameters
     ----------
-    runs : Runs
+    runs : RunMeans
     design : (N, 2) ndarray
         Of the law.
     values : (N,) ndarray
@@ -310,17 +310,142 @@ def compare_with_levels(
     return AgainstLevels(means, _lack_of_fit(straight, means, runs))
 
 
-def _level_means(runs: Runs, scatter: Scatter, line: Linear) -> Linear:
+def _level_means(runs: RunMeans, scatter: Scatter, line: Linear) -> Linear:
     """Means of levels without repetition, with the scatter about the line."""
     model = Whitened.of(runs.each_level(), runs.logarithms, runs.covariance(scatter))
     scale = max(1.0, line.square / (len(runs.x) - 2))
     return Linear(model.effects, np.asarray(scale * model.covariance), line.degrees, 0.0)
 
 
-def _lack_of_fit(straight: Linear, means: Linear, runs: Runs) -> float:
+def _lack_of_fit(straight: Linear, means: Linear, runs: RunMeans) -> float:
     more = len(runs.levels) - 2
     left = means.square / (len(runs.x) - len(runs.levels))
     if left == 0.0:
         return 0.0 if straight.square > 0.0 else 1.0
     ratio = (straight.square - means.square) / more / left
     return float(stats.f.sf(max(ratio, 0.0), more, means.degrees))
+
+
+@dataclass(frozen=True)
+class TwoTerms:
+    """``value = a x^n + b x^(n-1)`` with a given n.
+
+    Attributes
+    ----------
+    power : float
+        n.
+    leading, lower : Estimate
+        a and b.
+    lower_fraction : Estimate
+        Part of the value at the highest level that the lower term makes.
+    lack_of_fit : float or None
+        As for a power law.
+    """
+
+    power: float
+    leading: Estimate
+    lower: Estimate
+    lower_fraction: Estimate
+    lack_of_fit: float | None
+
+
+@dataclass(frozen=True)
+class Shifted:
+    """``value = a (x + offset)^n`` with a given n.
+
+    Attributes
+    ----------
+    power : float
+        n.
+    root_slope, root_constant : float
+        The root of the value is ``root_slope x + root_constant``.
+    offset : Estimate or None
+        By Fieller's theorem, in the unit of x; None if its interval is not bounded.
+    lack_of_fit : float or None
+        As for a power law.
+    """
+
+    power: float
+    root_slope: float
+    root_constant: float
+    offset: Estimate | None
+    lack_of_fit: float | None
+
+    def at(self, x: float) -> float:
+        """The value at a level; zero where the line is below."""
+        return float(max(self.root_slope * x + self.root_constant, 0.0) ** self.power)
+
+
+def fit_two_terms(law: PowerLaw, power: float) -> TwoTerms:
+    """Fit a sum of two powers, in place of one power with a free exponent.
+
+    Residuals are relative to the mean of the level, so that they scatter as the
+    logarithms of a power law do.
+
+    Parameters
+    ----------
+    law : PowerLaw
+        The power law fitted to the same runs.
+    power : float
+        The higher power.
+    """
+    runs = law.runs
+    terms = np.column_stack([runs.x**power, runs.x ** (power - 1.0)])
+    fit, lack = _fit_terms(law, terms, 1.0)
+    top = runs.levels[-1]
+    return TwoTerms(
+        power=power,
+        leading=fit.estimate([1.0, 0.0]),
+        lower=fit.estimate([0.0, 1.0]),
+        lower_fraction=_fraction(fit, np.array([top**power, top ** (power - 1.0)])),
+        lack_of_fit=lack,
+    )
+
+
+def fit_shifted(law: PowerLaw, power: float) -> Shifted:
+    """Fit a given power of a shifted x: the root of the value is a straight line.
+
+    Parameters
+    ----------
+    law : PowerLaw
+        The power law fitted to the same runs.
+    power : float
+        n, not zero.
+    """
+    x = law.runs.x
+    fit, lack = _fit_terms(law, np.column_stack([x, np.ones(len(x))]), 1.0 / power)
+    slope, constant = (float(effect) for effect in fit.effects)
+    return Shifted(power, slope, constant, _ratio(fit), lack)
+
+
+def _fit_terms(law: PowerLaw, terms: Floats, root: float) -> tuple[Linear, float | None]:
+    """Fit terms (N, 2) to a root of the values, relative to the levels, and test their lack."""
+    runs = law.runs
+    size = np.exp(root * (runs.each_level() @ law.means.effects))
+    design, relative = terms / size[:, None], runs.values**root / size
+    covariance = root**2 * runs.covariance(law.scatter)
+    fit = solve(design, relative, covariance, runs.degrees(2))
+    tested = compare_with_levels(runs, design, relative, root**2)
+    return fit, None if tested is None else tested.lack_of_fit
+
+
+def _ratio(fit: Linear) -> Estimate | None:
+    """Second effect over the first with its interval (Fieller 1954, J. R. Stat. Soc. B 16, 175)."""
+    (a, b), v, t2 = fit.effects, fit.covariance, fit.quantile**2
+    square = a * a - t2 * v[0, 0]
+    linear = -2.0 * (a * b - t2 * v[0, 1])
+    rest = b * b - t2 * v[1, 1]
+    inside = linear * linear - 4.0 * square * rest
+    if square <= 0.0 or inside < 0.0:
+        return None
+    low, high = (float((-linear + sign * np.sqrt(inside)) / (2.0 * square)) for sign in (-1, 1))
+    return Estimate(float(b / a), low, high)
+
+
+def _fraction(fit: Linear, sizes: Floats) -> Estimate:
+    """Part of the second term in the sum, each effect times a size; to first order."""
+    first, second = fit.effects * sizes
+    total = first + second
+    slope = np.array([-second * sizes[0], first * sizes[1]]) / total**2
+    half = fit.quantile * float(np.sqrt(slope @ fit.covariance @ slope))
+    return Estimate.around(float(second / total), half)

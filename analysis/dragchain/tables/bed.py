@@ -3,11 +3,11 @@
 import numpy as np
 
 from dragchain.arrays import Floats
-from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
-from dragchain.run.case import Case
 from dragchain.run.kinematics import needed
 from dragdeck.documents import Document
+from dragdeck.dumps.frame import Frame
+from dragdeck.records.case import CaseOfRun
 
 
 class Packing(Document):
@@ -16,7 +16,7 @@ class Packing(Document):
     Attributes
     ----------
     bed_height_m : float
-        Height of the settled surface, m; see `bed_height`.
+        Height of the settled surface, m; see `probed_height`.
     top_m : float
         Highest point of any particle, m.
     solid_fraction : float
@@ -43,14 +43,14 @@ class Packing(Document):
     kinetic_energy_ratio: float
 
 
-def describe_bed(particles: Frame, case: Case) -> Packing:
+def describe_bed(particles: Frame, case: CaseOfRun) -> Packing:
     """Describe a settled bed.
 
     Parameters
     ----------
     particles : Frame
         The last frame of ``particles``, N particles.
-    case : Case
+    case : CaseOfRun
         The case of the fill.
 
     Raises
@@ -64,7 +64,7 @@ def describe_bed(particles: Frame, case: Case) -> Packing:
         )
     radius = particles.vectors("radius_m")[:, 0]
     bowl_radius = needed(case.bowl, "bowl").radius_m
-    height = bed_height(particles.vectors("x_m", "y_m", "z_m"), radius, bowl_radius)
+    height = probed_height(particles.vectors("x_m", "y_m", "z_m"), radius, bowl_radius)
     volume = 4.0 / 3.0 * np.pi * radius**3
     mass = volume * case.media.density_kg_m3
     energy = 0.5 * mass * (particles.vectors("vx_m_s", "vy_m_s", "vz_m_s") ** 2).sum(axis=1)
@@ -80,7 +80,7 @@ def describe_bed(particles: Frame, case: Case) -> Packing:
     )
 
 
-def bed_height(centre_m: Floats, radius_m: Floats, bowl_radius_m: float) -> float:
+def probed_height(centre_m: Floats, radius_m: Floats, bowl_radius_m: float) -> float:
     """Mean height at which a thin vertical probe meets the bed.
 
     The probe comes down at the points of a square grid, one mean particle diameter

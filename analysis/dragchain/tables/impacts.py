@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
-from dragchain.dumps.frame import Columns
 from dragchain.errors import TableError
 from dragchain.tables.by_step import read_table
 from dragchain.tables.parquet import Rows
+from dragdeck.dumps.frame import Columns
 
 
 def speed_at_plate(speed_m_s: Floats, gap_m: Floats, gravity_m_s2: float) -> Floats:

@@ -1,4 +1,4 @@
-"""Parquet tables that are either whole or not there."""
+"""Parquet tables that are either whole or not there, and any dump of LIGGGHTS as such a table."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -6,13 +6,16 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from dragchain.dumps.frame import is_integer_column
 from dragchain.tables.columns import described
+from dragdeck.dumps.frame import is_integer_column
+from dragdeck.dumps.reader import dump_files, layout_of, read_frames
+from dragdeck.errors import DumpError
 from dragdeck.files import draft_of
 
 GROUP_ROWS = 131_072
@@ -178,3 +181,41 @@ class TableWriter:
         if self._writing is not None:
             self._writing.result()
         self._writing = None
+
+
+def dump_to_parquet(
+    source: Path | str, target: Path | str, columns: Sequence[str] | None = None
+) -> int:
+    """Convert a dump to one Parquet table, frame by frame.
+
+    Parameters
+    ----------
+    source : Path or str
+        As in `read_dump`.
+    target : Path or str
+        Parquet file to write, with the column ``step`` and those of the dump.
+
+    Returns
+    -------
+    int
+        The number of frames.
+
+    Raises
+    ------
+    TruncatedDumpError, DumpError
+        As in `read_dump`. The table then contains the frames before the error.
+    """
+    files = dump_files(source)
+    output = layout_of(files[0], columns)
+    frames, broken = 0, None
+    with table_writer(Path(target), ("step", *output.columns)) as table:
+        try:
+            for frame in read_frames(files, output):
+                table.write({"step": np.full(frame.rows, frame.step), **frame.columns})
+                frames += 1
+        except DumpError as error:
+            broken = error
+    if broken is not None:
+        broken.kept = f"{frames} frames, which are in {target}"
+        raise broken
+    return frames

@@ -9,13 +9,16 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats
-from dragchain.dumps.frame import Columns, Frame
-from dragchain.dumps.run_parts import iter_frames, iter_prints
 from dragchain.errors import TableError
-from dragchain.run.case import Case, Output, friction_with, load_case, load_outputs
-from dragchain.run.kinematics import needed, workpiece_turn
+from dragchain.run.case import friction_with
+from dragchain.run.kinematics import needed, workpiece_rotation
+from dragchain.run.run_parts import iter_frames, iter_prints
 from dragchain.tables.by_step import read_table
 from dragchain.tables.workpiece_contacts import Meshes, WorkpieceFrames, join_workpiece_frames
+from dragdeck.decks.outputs import OutputOfRun, load_outputs
+from dragdeck.dumps.frame import Columns, Frame
+from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.study.rotation import Rotation
 
 _BATCH_ROWS = 8192
 """Contacts on the workpiece that are joined at once, but for those of the last frame."""
@@ -54,15 +57,15 @@ class Run:
     ----------
     folder : Path
         The run folder.
-    case : Case
+    case : CaseOfRun
         What the run models.
-    outputs : mapping of str to Output
+    outputs : mapping of str to OutputOfRun
         The raw outputs that it wrote.
     """
 
     folder: Path
-    case: Case
-    outputs: Mapping[str, Output]
+    case: CaseOfRun
+    outputs: Mapping[str, OutputOfRun]
 
     @classmethod
     def open(cls, run_dir: Path | str) -> "Run":
@@ -124,14 +127,14 @@ class Run:
             yield _joined(batch)
 
 
-WorkpiecePlaces = Callable[[int], tuple[Floats, float]]
+WorkpiecePlaces = Callable[[int], tuple[Floats, Rotation]]
 
 _WORKPIECE = ["step", "ref_x_m", "ref_y_m", "ref_z_m", "direction_rad"]
 """Columns of ``workpiece_force.parquet`` that say where the workpiece is."""
 
 
-def workpiece_places(run_dir: Path, case: Case) -> WorkpiecePlaces:
-    """A function of a step: the workpiece's reference point in m, (3,), and its turn in rad.
+def workpiece_places(run_dir: Path, case: CaseOfRun) -> WorkpiecePlaces:
+    """A function of a step: the workpiece's reference point in m, (3,), and its orientation.
 
     Raises
     ------
@@ -142,7 +145,7 @@ def workpiece_places(run_dir: Path, case: Case) -> WorkpiecePlaces:
     table = read_table(file, _WORKPIECE)
     if table.empty:
         raise TableError(f"{file} contains no samples")
-    return lambda step: (_reference_point(table, step), _workpiece_turn(table, step, case))
+    return lambda step: (_reference_point(table, step), _workpiece_rotation(table, step, case))
 
 
 def _reference_point(workpiece: pd.DataFrame, step: int) -> Floats:
@@ -152,8 +155,8 @@ def _reference_point(workpiece: pd.DataFrame, step: int) -> Floats:
     return np.array([np.interp(step, at, column) for column in point.T])
 
 
-def _workpiece_turn(workpiece: pd.DataFrame, step: int, case: Case) -> float:
-    """The workpiece's angle at a step, its direction of motion that of the nearest sample."""
+def _workpiece_rotation(workpiece: pd.DataFrame, step: int, case: CaseOfRun) -> Rotation:
+    """The workpiece's orientation at a step, its direction of motion that of the nearest sample."""
     nearest = [int(np.abs(workpiece["step"].to_numpy(np.int64) - step).argmin())]
     direction = workpiece["direction_rad"].to_numpy(np.float64)[nearest]
-    return float(workpiece_turn(np.array([step]), direction, case)[0])
+    return workpiece_rotation(np.array([step]), direction, case)

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from dragchain.arrays import Floats, Ints
 from dragchain.contact_law.coulomb import within_friction
-from dragchain.dumps.frame import Columns, Frame
 from dragchain.errors import TableError
 from dragchain.tables.columns import CENTRE, FORCES, POINT, SPIN, VELOCITY
+from dragdeck.dumps.frame import Columns, Frame
 
 _NORMAL = ("normal_x", "normal_y", "normal_z")
 

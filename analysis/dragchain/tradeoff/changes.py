@@ -10,11 +10,10 @@ import numpy as np
 from scipy import stats
 
 from dragchain.statistics.estimate import Estimate, finite, student_quantile
-from dragchain.tradeoff.compare import OTHER, Comparison, Error, Setting
+from dragchain.tradeoff.compare import OTHER, Error, QuantityComparison, Setting
 from dragchain.tradeoff.measures import MAIN
 from dragchain.tradeoff.outcome import StepCosts, Tradeoff
-from dragchain.tradeoff.tradeoff_document import CostEntry
-from dragdeck.documents import Document, Part
+from dragdeck.records.tradeoff import CostEntry, CostsFile
 
 RUINED = 0.1
 """A significant error above this ruins a quantity; a bound below it keeps it."""
@@ -85,7 +84,7 @@ def modulus_levels(tradeoff: Tradeoff) -> list[float]:
     return sorted(own - {tradeoff.reference.youngs_modulus_scale}, reverse=True)
 
 
-def softness(tradeoff: Tradeoff, comparison: Comparison, level: float) -> Softness | None:
+def softness(tradeoff: Tradeoff, comparison: QuantityComparison, level: float) -> Softness | None:
     """The effect of a modulus by itself, or with as little else as was run.
 
     None if no complete run at that modulus has the quantity.
@@ -112,7 +111,7 @@ def softness(tradeoff: Tradeoff, comparison: Comparison, level: float) -> Softne
 
 
 @dataclass(frozen=True)
-class Effects:
+class ModulusEffects:
     """What a modulus does to the quantities: their labels by effect."""
 
     level: float
@@ -121,9 +120,9 @@ class Effects:
     open: list[str]
 
 
-def effects(tradeoff: Tradeoff) -> list[Effects]:
+def modulus_effects(tradeoff: Tradeoff) -> list[ModulusEffects]:
     """For each modulus what it ruins, what it keeps, and what the runs cannot decide."""
-    rows = [Effects(level, [], [], []) for level in modulus_levels(tradeoff)]
+    rows = [ModulusEffects(level, [], [], []) for level in modulus_levels(tradeoff)]
     for row in rows:
         for comparison in tradeoff.comparisons.values():
             soft = softness(tradeoff, comparison, row.level)
@@ -211,23 +210,6 @@ def _gain(
 
 _PLAIN = ("plain_full", "plain")
 """Names of the cost of the plain deck, that at full stiffness first."""
-
-
-class StandardFidelity(Part):
-    """Settings of the deck that the process entries were compared with."""
-
-    youngs_modulus_scale: float
-    timestep_fraction: float
-    speed_factor: float = 1.0
-
-
-class CostsFile(Document):
-    """What is read of ``costs.json``."""
-
-    remedy = "make it with: python benchmarks/costs"
-
-    fidelity: StandardFidelity | None = None
-    costs: tuple[CostEntry, ...]
 
 
 @dataclass(frozen=True)

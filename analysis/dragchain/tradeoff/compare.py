@@ -19,9 +19,9 @@ from scipy import stats
 from dragchain.arrays import Floats
 from dragchain.errors import SeriesError, TableError
 from dragchain.run.case import changed_inputs
-from dragchain.statistics.bed_effects import Factors, Fit, fit_effects
+from dragchain.statistics.bed_effects import EffectsFit, Factors, fit_effects
 from dragchain.statistics.estimate import CONFIDENCE, student_quantile
-from dragchain.tradeoff.measures import FILE, Measures, Quantity
+from dragchain.tradeoff.measures import FILE, Measurand, Measures
 
 _PARAMETERS = ("youngs_modulus_scale", "timestep_fraction", "speed_factor")
 OTHER = "other"
@@ -72,7 +72,7 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Run:
+class PlanRun:
     """A run of the trade-off.
 
     Attributes
@@ -104,7 +104,9 @@ class Run:
         return self.measures.complete
 
 
-def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Setting, float]:
+def read_plan_runs(
+    files: Sequence[Path], reference_run: Path
+) -> tuple[list[PlanRun], Setting, float]:
     """Read the runs of a trade-off.
 
     Of runs that differ in the length of their path alone the longest counts; one that is
@@ -119,7 +121,7 @@ def read_runs(files: Sequence[Path], reference_run: Path) -> tuple[list[Run], Se
 
     Returns
     -------
-    runs : list of Run
+    runs : list of PlanRun
     reference : Setting
     arc_m : float
         The longest path that all complete runs have, m.
@@ -155,7 +157,7 @@ def _inputs(measures: Measures) -> dict[str, JsonValue]:
     return {name: value for name, value in inputs.items() if name not in silent}
 
 
-def changed_settings(measures: Measures, standard: Measures) -> dict[str, JsonValue]:
+def differing_inputs(measures: Measures, standard: Measures) -> dict[str, JsonValue]:
     """Inputs and settings of a run, by dotted name, that differ from those of another.
 
     No parameter is among them.
@@ -164,7 +166,7 @@ def changed_settings(measures: Measures, standard: Measures) -> dict[str, JsonVa
 
 
 def _setting(measures: Measures, standard: Measures) -> Setting:
-    changed = changed_settings(measures, standard)
+    changed = differing_inputs(measures, standard)
     other = [f"{name} {_shown(value)}" for name, value in changed.items()]
     return Setting.of(measures.fidelity, ", ".join(other))
 
@@ -173,12 +175,12 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _run(setting: Setting, bed: str | None, measures: Measures, arc_m: float) -> Run:
+def _run(setting: Setting, bed: str | None, measures: Measures, arc_m: float) -> PlanRun:
     first, *further = (
         values_within(measures, arc_m, stretch)
         for stretch in range(max(1, int(measures.arc_m / arc_m + 1e-9)))
     )
-    return Run(setting, bed, first, measures, further)
+    return PlanRun(setting, bed, first, measures, further)
 
 
 def values_within(measures: Measures, arc_m: float, stretch: int = 0) -> dict[str, float]:
@@ -225,11 +227,11 @@ class Error:
 
 
 @dataclass(frozen=True)
-class Model:
+class EffectsModel:
     """Effects of settings: how they become columns of a design, and the fit of these."""
 
     factors: Factors
-    fit: Fit
+    fit: EffectsFit
 
     def error(self, setting: Levels, reference: Levels, signed: bool) -> Error:
         """The difference of one setting to another."""
@@ -238,12 +240,12 @@ class Model:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class QuantityComparison:
     """All settings against the reference in one quantity.
 
     Attributes
     ----------
-    quantity : Quantity
+    quantity : Measurand
     reference : float
         Its value at the reference, estimated from all runs.
     se : float
@@ -253,20 +255,20 @@ class Comparison:
     bed_fraction : float
         The part of its square that runs from one bed have in common.
     errors : dict of Setting to Error
-    model : Model
+    model : EffectsModel
         What `errors` and `between` draw on.
-    added : Model
+    added : EffectsModel
         Of single parameters, whose effects add up: what `alone` draws on.
     """
 
-    quantity: Quantity
+    quantity: Measurand
     reference: float
     se: float
     run_std: float
     bed_fraction: float
     errors: Mapping[Setting, Error]
-    model: Model = field(repr=False)
-    added: Model = field(repr=False)
+    model: EffectsModel = field(repr=False)
+    added: EffectsModel = field(repr=False)
 
     @property
     def reference_halfwidth(self) -> float:
@@ -294,7 +296,9 @@ class Comparison:
         return self.model.error(setting.factors(), base.factors(), self.quantity.signed)
 
 
-def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting) -> Comparison:
+def compare_quantity(
+    quantity: Measurand, runs: Sequence[PlanRun], reference: Setting
+) -> QuantityComparison:
     """Every setting against the reference in one quantity.
 
     Logarithms are compared, so that errors are relative; a quantity that may
@@ -322,7 +326,7 @@ def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting
     levels = reference.factors()
     model, added = _models(settings, values, [run.bed for run, _ in rows], levels)
     level, uncertainty = model.fit.contrast(model.factors.row(levels))
-    return Comparison(
+    return QuantityComparison(
         quantity=quantity,
         reference=scale * (level if quantity.signed else math.exp(level)),
         se=uncertainty,
@@ -339,18 +343,18 @@ def compare_quantity(quantity: Quantity, runs: Sequence[Run], reference: Setting
 
 def _models(
     settings: Sequence[Setting], values: Floats, beds: Sequence[str | None], reference: Levels
-) -> tuple[Model, Model]:
+) -> tuple[EffectsModel, EffectsModel]:
     """A model with an effect of every combination, and one whose effects add up.
 
     One stands for both if the runs do not allow the other: without repetitions effects are
     added up on trust, and what does not fit is scatter.
     """
     levels = [setting.factors() for setting in settings]
-    found: list[Model] = []
+    found: list[EffectsModel] = []
     for additive in (False, True):
         factors = Factors(levels, reference, additive)
         try:
-            found.append(Model(factors, fit_effects(factors.design(), values, beds)))
+            found.append(EffectsModel(factors, fit_effects(factors.design(), values, beds)))
         except SeriesError:
             if additive and not found:
                 raise

@@ -9,13 +9,14 @@ from pydantic import JsonValue
 
 from dragchain.arrays import Floats
 from dragchain.errors import TableError
-from dragchain.run.case import changed_inputs, load_case
-from dragchain.run.completeness import RunRecord
+from dragchain.run.case import changed_inputs
 from dragchain.tables.by_step import read_table
+from dragdeck.records.case import load_case
+from dragdeck.records.run import RunRecord
 
 
 @dataclass(frozen=True)
-class Drop:
+class ComparedDrop:
     """A drop test against the one with the finest step.
 
     Attributes
@@ -51,7 +52,7 @@ class _DropRun:
     cost_s: float
 
 
-def read_drops(folders: Sequence[Path]) -> list[Drop]:
+def compare_drops(folders: Sequence[Path]) -> list[ComparedDrop]:
     """Drop tests, the finest step first.
 
     Parameters
@@ -66,7 +67,7 @@ def read_drops(folders: Sequence[Path]) -> list[Drop]:
     """
     runs = sorted((_read_drop(folder) for folder in folders), key=lambda run: run.fraction)
     return [
-        Drop(
+        ComparedDrop(
             timestep_fraction=run.fraction,
             other=_difference(run.inputs, runs[0].inputs),
             restitution=float(run.ratios.mean()),
@@ -111,11 +112,11 @@ class DropChoice:
     `nearest` is that of the smallest bound.
     """
 
-    drop: Drop | None
-    nearest: Drop | None
+    drop: ComparedDrop | None
+    nearest: ComparedDrop | None
 
 
-def choose_drop(drops: Sequence[Drop], tolerance: float) -> DropChoice:
+def choose_drop(drops: Sequence[ComparedDrop], tolerance: float) -> DropChoice:
     """The cheapest drop that changes only its step and is within a tolerance at every impact."""
     own = [drop for drop in drops[1:] if not drop.other]
     able = [drop for drop in own if drop.bound <= tolerance and drop.relative_cost < 1.0]

@@ -14,8 +14,8 @@ from dragchain.arrays import Floats
 from dragchain.figures.panels import key, legend_below, log_ticks, new_panels
 from dragchain.figures.style import BLUE, INK, LIGHT, MARKERS, SERIES, WIDE_IN
 from dragchain.tradeoff.changes import differing, hub, modulus_levels
-from dragchain.tradeoff.compare import Error, Run, Setting
-from dragchain.tradeoff.drops import Drop
+from dragchain.tradeoff.compare import Error, PlanRun, Setting
+from dragchain.tradeoff.drops import ComparedDrop
 from dragchain.tradeoff.measure_run import FORCE_BINS
 from dragchain.tradeoff.measures import MAIN
 from dragchain.tradeoff.outcome import TOLERANCES, Tradeoff
@@ -38,7 +38,9 @@ _SHOWN_REACHES = (
 )
 
 
-def draw(tradeoff: Tradeoff, reaches: Sequence[Reach], drops: Sequence[Drop]) -> dict[str, Figure]:
+def draw_tradeoff(
+    tradeoff: Tradeoff, reaches: Sequence[Reach], drops: Sequence[ComparedDrop]
+) -> dict[str, Figure]:
     """All figures by name."""
     drawn: dict[str, Figure] = {}
     if any(name in tradeoff.comparisons for name in MAIN):
@@ -177,9 +179,9 @@ def exceedance(counts: Sequence[int]) -> tuple[Floats, Floats, float]:
     return FORCE_BINS[:-1], fraction, float(number @ middle / number.sum())
 
 
-def _force_runs(tradeoff: Tradeoff) -> dict[float, list[Run]]:
+def _force_runs(tradeoff: Tradeoff) -> dict[float, list[PlanRun]]:
     """Runs whose contact forces are shown, for each modulus: all else as alike as was run."""
-    found: dict[float, list[Run]] = {}
+    found: dict[float, list[PlanRun]] = {}
     for level in (tradeoff.reference.youngs_modulus_scale, *modulus_levels(tradeoff)):
         centre = replace(hub(tradeoff), youngs_modulus_scale=level)
         settings = [one for one in tradeoff.settings() if not one.other]
@@ -192,7 +194,7 @@ def _force_runs(tradeoff: Tradeoff) -> dict[float, list[Run]]:
     return found
 
 
-def _forces(shown: Mapping[float, Sequence[Run]]) -> Figure:
+def _forces(shown: Mapping[float, Sequence[PlanRun]]) -> Figure:
     shades = _colours(shown)
     figure, panels = new_panels(3.9, 2, WIDE_IN, sharey=True)
     for level, runs in shown.items():
@@ -240,7 +242,7 @@ def _path(reaches: Sequence[Reach]) -> Figure:
     return figure
 
 
-def _drop(drops: Sequence[Drop]) -> Figure:
+def _drop(drops: Sequence[ComparedDrop]) -> Figure:
     figure, (axes,) = new_panels(2.6, width_in=WIDE_IN)
     step = [100.0 * drop.timestep_fraction for drop in drops]
     mean, largest = np.maximum([(abs(drop.error), drop.bound) for drop in drops], 1e-6).T

@@ -9,33 +9,33 @@ import numpy as np
 import pandas as pd
 
 from dragchain.arrays import Floats, Ints
-from dragchain.drag.azimuth import parts
-from dragchain.drag.force import read_counted
+from dragchain.drag import parts, read_counted
 from dragchain.errors import TableError
 from dragchain.loading.contact_events import Thresholds
 from dragchain.loading.samples import Sampled, sample
 from dragchain.network.write import write_chains
-from dragchain.run.case import Case, load_case, load_outputs
-from dragchain.run.completeness import RunRecord
 from dragchain.run.kinematics import drag_phase, needed
 from dragchain.statistics.estimate import finite
 from dragchain.tables.bed import Packing
 from dragchain.tables.by_step import read_groups, read_table
 from dragchain.tables.write import write_tables
 from dragchain.tradeoff.measures import FILE, Measures, PathQuantities, RunCost
+from dragdeck.decks.outputs import load_outputs
+from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.records.run import RunRecord
 
 MAP_DEPTHS, MAP_AZIMUTHS = 4, 12
 """Bins of a load map: equal parts of the immersion depth, and of the circumference."""
 
 
-def loading_along(run_dir: Path, case: Case, blocks: int) -> tuple[dict[str, Floats], Floats]:
+def loading_along(run_dir: Path, case: CaseOfRun, blocks: int) -> tuple[dict[str, Floats], Floats]:
     """Quantities of loading in each block of the path, and the load map.
 
     Parameters
     ----------
     run_dir : Path
         With the tables of a complete run.
-    case : Case
+    case : CaseOfRun
     blocks : int
         Number of equal blocks B of the counted path.
 
@@ -104,7 +104,7 @@ class CountedPath:
     blocks: int
 
     @classmethod
-    def of(cls, case: Case, counted_steps: Ints) -> "CountedPath":
+    def of(cls, case: CaseOfRun, counted_steps: Ints) -> "CountedPath":
         """The path of a process, from the steps at which its force is counted, (N,)."""
         motion = case.motion
         assert motion is not None
@@ -152,7 +152,7 @@ class CountedPath:
             yield last, np.concatenate(held)
 
 
-def quantities_along(run_dir: Path, case: Case) -> PathQuantities:
+def quantities_along(run_dir: Path, case: CaseOfRun) -> PathQuantities:
     """The quantities of a complete run with tables and chains."""
     force = read_counted(run_dir, ("step", "drag_n", "lateral_n", "vertical_n"))
     path = CountedPath.of(case, force["step"].to_numpy(np.int64))
@@ -180,7 +180,7 @@ def _of_force(force: pd.DataFrame, path: CountedPath) -> dict[str, Floats]:
     }
     squares = {
         f"drag_std_{name}": path.mean(
-            steps, band(deviation, spacing, low * path.diameter_m, high * path.diameter_m) ** 2
+            steps, band_pass(deviation, spacing, low * path.diameter_m, high * path.diameter_m) ** 2
         )
         for name, (low, high) in bands.items()
     }
@@ -193,7 +193,7 @@ def _of_force(force: pd.DataFrame, path: CountedPath) -> dict[str, Floats]:
     }
 
 
-def band(series: Floats, spacing_m: float, shortest_m: float, longest_m: float) -> Floats:
+def band_pass(series: Floats, spacing_m: float, shortest_m: float, longest_m: float) -> Floats:
     """The part of a series whose wave lengths lie in [shortest, longest).
 
     Parameters
@@ -360,20 +360,20 @@ def write_measures(run_dir: Path, packing_table: Path) -> Measures:
     if measures.complete:
         write_tables(run_dir)
         write_chains(run_dir)
-        measures = measured(measures, run_dir, case, Packing.read(packing_table))
+        measures = with_quantities(measures, run_dir, case, Packing.read(packing_table))
     else:
         measures = measures.model_copy(update={"failure": outcome.failed_checks})
     measures.write(run_dir / FILE)
     return measures
 
 
-def measured(measures: Measures, run_dir: Path, case: Case, bed: Packing) -> Measures:
+def with_quantities(measures: Measures, run_dir: Path, case: CaseOfRun, bed: Packing) -> Measures:
     """The measures of a complete run with its quantities, from its tables."""
     single = {"bed_height": bed.bed_height_m, "solid_fraction": bed.solid_fraction}
     return measures.model_copy(update={**dict(quantities_along(run_dir, case)), "single": single})
 
 
-def _cost(case: Case, outcome: RunRecord) -> RunCost:
+def _cost(case: CaseOfRun, outcome: RunRecord) -> RunCost:
     """What a run cost; a run without its processor time counts its wall time on every rank."""
     assert case.motion is not None
     speed = case.motion.axis_speed_m_s

@@ -12,13 +12,13 @@ import numpy as np
 from pydantic import JsonValue
 
 from dragchain.arrays import Floats
-from dragchain.run.case import Fidelity
-from dragchain.run.completeness import AcceptanceCheck
 from dragdeck.documents import Document, Part
+from dragdeck.records.case import FidelityOfRun
+from dragdeck.records.run import AcceptanceCheck
 
 
 @dataclass(frozen=True)
-class Quantity:
+class Measurand:
     """Something a trade-off compares.
 
     Attributes
@@ -50,71 +50,73 @@ class Quantity:
 
 
 QUANTITIES = (
-    Quantity("drag_mean", "mean drag", "N", "mean drag"),
-    Quantity("drag_std", "standard deviation of the drag", "N", "std. dev. of drag", squared=True),
-    Quantity(
+    Measurand("drag_mean", "mean drag", "N", "mean drag"),
+    Measurand("drag_std", "standard deviation of the drag", "N", "std. dev. of drag", squared=True),
+    Measurand(
         "drag_std_long",
         "drag fluctuations at wavelengths above 2 particle diameters",
         "N",
         squared=True,
     ),
-    Quantity("drag_std_middle", "drag fluctuations at intermediate wavelengths", "N", squared=True),
-    Quantity(
+    Measurand(
+        "drag_std_middle", "drag fluctuations at intermediate wavelengths", "N", squared=True
+    ),
+    Measurand(
         "drag_std_short",
         "drag fluctuations at wavelengths below 1/4 particle diameter",
         "N",
         squared=True,
     ),
-    Quantity("lateral_mean", "mean lateral force", "N", signed=True),
-    Quantity("vertical_mean", "mean vertical force", "N", signed=True),
-    Quantity("workpiece_contacts", "contacts on the workpiece", short="contacts on workpiece"),
-    Quantity(
+    Measurand("lateral_mean", "mean lateral force", "N", signed=True),
+    Measurand("vertical_mean", "mean vertical force", "N", signed=True),
+    Measurand("workpiece_contacts", "contacts on the workpiece", short="contacts on workpiece"),
+    Measurand(
         "contact_force_mean",
         "mean normal force per contact on the workpiece",
         "N",
         "mean contact force",
     ),
-    Quantity("contact_force_p50", "median of the contact forces on the workpiece", "N"),
-    Quantity(
+    Measurand("contact_force_p50", "median of the contact forces on the workpiece", "N"),
+    Measurand(
         "contact_force_p90",
         "90th percentile of the contact forces on the workpiece",
         "N",
         "90th per\N{SOFT HYPHEN}centile of contact force",
     ),
-    Quantity("contact_force_p99", "99th percentile of the contact forces on the workpiece", "N"),
-    Quantity("normal_load", "sum of the normal forces on the workpiece", "N"),
-    Quantity(
+    Measurand("contact_force_p99", "99th percentile of the contact forces on the workpiece", "N"),
+    Measurand("normal_load", "sum of the normal forces on the workpiece", "N"),
+    Measurand(
         "sliding_distance",
         "sliding distance of all contacts over the path",
     ),
-    Quantity(
+    Measurand(
         "friction_work",
         "friction work on the workpiece for a metre of path",
         "J/m",
     ),
-    Quantity("workpiece_overlap", "mean relative overlap on the workpiece"),
-    Quantity(
+    Measurand("workpiece_overlap", "mean relative overlap on the workpiece"),
+    Measurand(
         "coordination_number",
         "coordination number",
         short="coordi\N{SOFT HYPHEN}nation number",
     ),
-    Quantity("mechanical_coordination_number", "coordination number without rattlers"),
-    Quantity("network_force_mean", "mean normal force in the network", "N"),
-    Quantity(
+    Measurand("mechanical_coordination_number", "coordination number without rattlers"),
+    Measurand("network_force_mean", "mean normal force in the network", "N"),
+    Measurand(
         "overlap_p99",
         "99th percentile of the relative overlap between particles",
     ),
-    Quantity("chain_count", "Peters chains per frame", short="Peters chains"),
-    Quantity("chain_length", "particles per Peters chain", short="particles per chain"),
-    Quantity("chain_alignment", "mean squared cosine of the angle between chains and motion"),
-    Quantity("path_bottleneck", "bottleneck force of the dominant path", "N"),
-    Quantity(
+    Measurand("chain_count", "Peters chains per frame", short="Peters chains"),
+    Measurand("chain_length", "particles per Peters chain", short="particles per chain"),
+    Measurand("chain_alignment", "mean squared cosine of the angle between chains and motion"),
+    Measurand("path_bottleneck", "bottleneck force of the dominant path", "N"),
+    Measurand(
         "force_slide",
         "normal force \N{MULTIPLICATION SIGN} sliding distance per metre of path",
         "N m/m",
     ),
-    Quantity("bed_height", "bed height", "m"),
-    Quantity("solid_fraction", "solid fraction"),
+    Measurand("bed_height", "bed height", "m"),
+    Measurand("solid_fraction", "solid fraction"),
 )
 """All but the last two have a value for every block of the path."""
 
@@ -217,7 +219,7 @@ class Measures(PathQuantities, Document):
     run: str
     bed: str | None
     inputs: Mapping[str, JsonValue]
-    fidelity: Fidelity
+    fidelity: FidelityOfRun
     numbers: Mapping[str, float] = {}
     complete: bool
     cost: RunCost

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from dragchain.errors import SeriesError
-from dragchain.tradeoff.compare import Comparison, Error, Run, Setting, compare_quantity
+from dragchain.tradeoff.compare import Error, PlanRun, QuantityComparison, Setting, compare_quantity
 from dragchain.tradeoff.measures import QUANTITIES
 
 BROKEN = 0.1
@@ -47,12 +47,12 @@ class Tradeoff:
 
     Attributes
     ----------
-    runs : list of Run
+    runs : list of PlanRun
         Complete and failed ones.
     reference : Setting
     arc_m : float
         The path that is compared, m.
-    comparisons : dict of str to Comparison
+    comparisons : dict of str to QuantityComparison
         Quantity to what the settings do to it.
     skipped : dict of str to str
         Quantities that could not be compared, and why.
@@ -62,10 +62,10 @@ class Tradeoff:
         Over the Rayleigh time: no setting with a larger one is recommended.
     """
 
-    runs: list[Run]
+    runs: list[PlanRun]
     reference: Setting
     arc_m: float
-    comparisons: Mapping[str, Comparison]
+    comparisons: Mapping[str, QuantityComparison]
     skipped: Mapping[str, str] = field(default_factory=dict)
     step_costs: StepCosts | None = None
     largest_step: float = math.inf
@@ -75,7 +75,7 @@ class Tradeoff:
         found = dict.fromkeys(run.setting for run in self.runs)
         return sorted(found, key=lambda setting: -self.median(setting, "steps_per_m"))
 
-    def of(self, setting: Setting) -> list[Run]:
+    def of(self, setting: Setting) -> list[PlanRun]:
         """The runs of a setting."""
         return [run for run in self.runs if run.setting == setting]
 
@@ -98,8 +98,8 @@ class Tradeoff:
         return float(np.median(known)) if known.size else math.nan
 
 
-def compare(
-    runs: Sequence[Run],
+def compare_settings(
+    runs: Sequence[PlanRun],
     reference: Setting,
     arc_m: float,
     step_costs: StepCosts | None = None,
@@ -110,7 +110,7 @@ def compare(
     A quantity that cannot be compared, because too few runs have it, is left
     out with the reason.
     """
-    found: dict[str, Comparison] = {}
+    found: dict[str, QuantityComparison] = {}
     skipped: dict[str, str] = {}
     for quantity in QUANTITIES:
         try:
@@ -235,11 +235,11 @@ def run_table(tradeoff: Tradeoff) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _failure(run: Run) -> str:
+def _failure(run: PlanRun) -> str:
     return "; ".join(f"{check.name}: {check.seen}" for check in run.measures.failure)
 
 
-def error_table(tradeoff: Tradeoff) -> pd.DataFrame:
+def errors_by_setting(tradeoff: Tradeoff) -> pd.DataFrame:
     """One row a setting and quantity: cost, error, interval and bound."""
     rows = [
         {

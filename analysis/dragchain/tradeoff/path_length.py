@@ -1,7 +1,7 @@
-"""How long to drag: what a run knows of a quantity, drifts, and how often intervals are right."""
+"""How long to drag: what a run knows of a quantity, how it drifts, and what chance shows."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
@@ -9,8 +9,7 @@ from scipy import stats
 from dragchain.arrays import Floats
 from dragchain.statistics.correlated import autocovariance
 from dragchain.statistics.estimate import CONFIDENCE, NORMAL_QUANTILE, student_quantile
-from dragchain.tradeoff.compare import compare_quantity
-from dragchain.tradeoff.measures import MAIN, QUANTITIES, Quantity
+from dragchain.tradeoff.measures import QUANTITIES, Measurand
 from dragchain.tradeoff.outcome import Tradeoff
 
 
@@ -20,7 +19,7 @@ class Reach:
 
     Attributes
     ----------
-    quantity : Quantity
+    quantity : Measurand
     halfwidth : float
         Relative half-width of the 95 % interval of one run over the common path.
     arc_m : float
@@ -29,7 +28,7 @@ class Reach:
         Length of a block: nothing is known of shorter paths, m.
     """
 
-    quantity: Quantity
+    quantity: Measurand
     halfwidth: float
     arc_m: float
     block_m: float
@@ -88,7 +87,7 @@ class Along:
     drift_halfwidth: float
 
 
-def along(tradeoff: Tradeoff, quantity: Quantity) -> Along | None:
+def along(tradeoff: Tradeoff, quantity: Measurand) -> Along | None:
     """How a quantity changes along the path; None if runs are too short for that."""
     complete = [run.measures for run in tradeoff.runs if run.complete]
     longest = max(measures.arc_m for measures in complete)
@@ -112,60 +111,11 @@ def along(tradeoff: Tradeoff, quantity: Quantity) -> Along | None:
     )
 
 
-def _drift(quantity: Quantity, blocks: Floats, drag: Floats) -> float:
+def _drift(quantity: Measurand, blocks: Floats, drag: Floats) -> float:
     half = len(blocks) // 2
     scale = drag.mean() if quantity.signed else quantity.of_blocks(blocks)
     change = quantity.of_blocks(blocks[-half:]) - quantity.of_blocks(blocks[:half])
     return float(change / abs(scale))
-
-
-TRIALS = 200
-"""Simulations of a plan."""
-
-
-def coverage(tradeoff: Tradeoff, name: str, trials: int = TRIALS) -> float | None:
-    """How often an interval of this plan holds the truth, from simulated runs.
-
-    Runs at the same settings and beds get values without any effect, with the
-    scatter and the bed's fraction of a quantity, and are compared just as the
-    measured ones: the share is estimated anew each time.
-
-    Parameters
-    ----------
-    tradeoff : Tradeoff
-    name : str
-        The quantity.
-    trials : int
-
-    Returns
-    -------
-    float or None
-        Over all settings; None if none was compared with the reference.
-    """
-    own = tradeoff.comparisons.get(name)
-    if own is None or set(own.errors) == {tradeoff.reference}:
-        return None
-    runs = [run for run in tradeoff.runs if name in run.values]
-    stretches = [sum(name in one for one in run.stretches) for run in runs]
-    beds = list(dict.fromkeys(run.bed for run in runs))
-    number = np.repeat([beds.index(run.bed) for run in runs], stretches)
-    rng = np.random.default_rng(0)
-    held: list[bool] = []
-    for _ in range(trials):
-        scatter = math.sqrt(own.bed_fraction) * rng.standard_normal(len(beds))[number]
-        scatter += math.sqrt(1.0 - own.bed_fraction) * rng.standard_normal(len(number))
-        values = iter(np.exp(own.run_std * scatter).tolist())
-        again = []
-        for run, count in zip(runs, stretches, strict=True):
-            first, *further = ({name: next(values)} for _ in range(count))
-            again.append(replace(run, values=first, further=further))
-        errors = compare_quantity(
-            replace(own.quantity, signed=False), again, tradeoff.reference
-        ).errors
-        held += [
-            not error.significant for one, error in errors.items() if one != tradeoff.reference
-        ]
-    return float(np.mean(held))
 
 
 @dataclass(frozen=True)
@@ -177,18 +127,15 @@ class Chance:
     tested, significant : int
     expected : int
         Significant ones if there were no differences.
-    coverage : float or None
-        How often intervals of the mean drag hold the truth, from simulated runs.
     """
 
     tested: int
     significant: int
     expected: int
-    coverage: float | None
 
 
 def chance(tradeoff: Tradeoff) -> Chance:
-    """How many differences chance alone would show, and what intervals hold in simulations."""
+    """How many differences are significant, and how many chance alone would make so."""
     errors = [
         error
         for comparison in tradeoff.comparisons.values()
@@ -197,4 +144,4 @@ def chance(tradeoff: Tradeoff) -> Chance:
     ]
     significant = sum(error.significant for error in errors)
     expected = round((1.0 - CONFIDENCE) * len(errors))
-    return Chance(len(errors), significant, expected, coverage(tradeoff, MAIN[0]))
+    return Chance(len(errors), significant, expected)

@@ -9,9 +9,9 @@ import numpy as np
 
 from dragchain.tradeoff.changes import Costs
 from dragchain.tradeoff.compare import Setting
-from dragchain.tradeoff.drops import Drop
+from dragchain.tradeoff.drops import ComparedDrop
 from dragchain.tradeoff.outcome import Tradeoff, breaks
-from dragchain.tradeoff.tradeoff_document import (
+from dragdeck.records.tradeoff import (
     DropEntry,
     ErrorEntry,
     FidelityParameters,
@@ -22,9 +22,9 @@ from dragchain.tradeoff.tradeoff_document import (
 )
 
 
-def record_of(
+def tradeoff_record(
     tradeoff: Tradeoff,
-    drops: Iterable[Drop],
+    drops: Iterable[ComparedDrop],
     costs: Costs,
     plan: str,
     commands: Sequence[str],
@@ -44,7 +44,7 @@ def record_of(
             "python": platform.python_version(),
             "numpy": np.__version__,
         },
-        machine=Machine(cores=os.cpu_count(), processor=_processor()),
+        machine=Machine(cores=os.cpu_count(), processor=processor()),
         runs=len(measures),
         engine_hours=sum(one.cost.cpu_time_s for one in measures) / 3600.0,
         scene=_scene_numbers(tradeoff),
@@ -71,7 +71,8 @@ def _joined(names: Iterable[object]) -> str:
     return ", ".join(sorted(set(map(str, names))))
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Name of the machine's processor, as far as it is known."""
     file = Path("/proc/cpuinfo")
     lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]

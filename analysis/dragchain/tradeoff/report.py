@@ -9,27 +9,34 @@ from dragchain.report.page import DASH, MINUS, data_uri, number, render_page, wr
 from dragchain.statistics.estimate import CONFIDENCE, Estimate
 from dragchain.tradeoff.changes import (
     RUINED,
-    effects,
     gains,
+    modulus_effects,
     modulus_levels,
     read_costs,
     softness,
     step_costs,
 )
-from dragchain.tradeoff.compare import Error, read_runs
-from dragchain.tradeoff.drops import Drop, choose_drop, read_drops
-from dragchain.tradeoff.figures import draw
+from dragchain.tradeoff.compare import Error, read_plan_runs
+from dragchain.tradeoff.drops import ComparedDrop, choose_drop, compare_drops
+from dragchain.tradeoff.figures import draw_tradeoff
 from dragchain.tradeoff.measure_run import LONG_WAVE, SHORT_WAVE
 from dragchain.tradeoff.measures import MAIN
-from dragchain.tradeoff.outcome import TOLERANCES, Tradeoff, choose, compare, error_table, run_table
-from dragchain.tradeoff.path_length import TRIALS, Reach, along, chance, reaches
-from dragchain.tradeoff.record import record_of
+from dragchain.tradeoff.outcome import (
+    TOLERANCES,
+    Tradeoff,
+    choose,
+    compare_settings,
+    errors_by_setting,
+    run_table,
+)
+from dragchain.tradeoff.path_length import Reach, along, chance, reaches
+from dragchain.tradeoff.record import tradeoff_record
 
 _FOLD = 2.0
 """Relative errors from this on are told as multiples."""
 
 
-def in_percent(value: float, sign: bool = True) -> str:
+def error_percent(value: float, sign: bool = True) -> str:
     """A share in per cent with as many digits as matter."""
     size = abs(100.0 * value)
     digits = 0 if size >= 9.95 else 1 if size >= 0.095 else 2 if size >= 0.0095 else 3
@@ -38,23 +45,18 @@ def in_percent(value: float, sign: bool = True) -> str:
     return text.replace("-", MINUS)
 
 
-def plainly(fraction: float) -> str:
-    """A round share, such as a tolerance, in per cent."""
-    return f"{100.0 * fraction:g}"
-
-
 def error_size(error: Error) -> str:
     """An error in per cent; a large one as a multiple."""
     if error.value >= _FOLD:
         return f"{number(1.0 + error.value, 2)}-fold"
-    return f"{in_percent(error.value)} %"
+    return f"{error_percent(error.value)} %"
 
 
 def error_interval(error: Error) -> str:
     """The interval of an error, in per cent; that of a large one in multiples."""
     if error.value >= _FOLD:
         return f"{number(1.0 + error.ci95_low, 2)} to {number(1.0 + error.ci95_high, 2)}"
-    return f"{in_percent(error.ci95_low)} to {in_percent(error.ci95_high)} %"
+    return f"{error_percent(error.ci95_low)} to {error_percent(error.ci95_high)} %"
 
 
 def times(ratio: float) -> str:
@@ -78,7 +80,7 @@ def span(gain: Estimate) -> str:
 
 FILTERS: Mapping[str, Callable[..., str]] = {
     function.__name__: function
-    for function in (in_percent, plainly, error_size, error_interval, times, cheaper, span)
+    for function in (error_percent, error_size, error_interval, times, cheaper, span)
 }
 """Filters of the page."""
 
@@ -133,27 +135,31 @@ def write_tradeoff(
     TableError
         No run is complete, or a drop cannot be used.
     """
-    priced, dropped = read_costs(costs), read_drops(drops)
-    tradeoff = compare(*read_runs(measures, reference_run), step_costs(priced), largest_step)
+    priced, dropped = read_costs(costs), compare_drops(drops)
+    tradeoff = compare_settings(
+        *read_plan_runs(measures, reference_run), step_costs(priced), largest_step
+    )
     commands = [command] if command else []
-    record = record_of(tradeoff, dropped, priced, plan, commands)
+    record = tradeoff_record(tradeoff, dropped, priced, plan, commands)
     known = reaches(tradeoff)
     with drawing():
-        figures = {name: png(drawn) for name, drawn in draw(tradeoff, known, dropped).items()}
-    page = render(tradeoff, known, dropped, figures, record=record, costs=priced)
+        figures = {
+            name: png(drawn) for name, drawn in draw_tradeoff(tradeoff, known, dropped).items()
+        }
+    page = tradeoff_page(tradeoff, known, dropped, figures, record=record, costs=priced)
     write_bundle(
         out_dir,
-        tables={"runs": run_table(tradeoff), "errors": error_table(tradeoff)},
+        tables={"runs": run_table(tradeoff), "errors": errors_by_setting(tradeoff)},
         figures=figures,
         documents={"tradeoff": record},
         pages={"report": page},
     )
 
 
-def render(
+def tradeoff_page(
     tradeoff: Tradeoff,
     known: Sequence[Reach],
-    drops: Sequence[Drop],
+    drops: Sequence[ComparedDrop],
     figures: Mapping[str, bytes],
     **content: object,
 ) -> str:
@@ -174,11 +180,10 @@ def render(
             name: [softness(tradeoff, own, level) for level in levels]
             for name, own in comparisons.items()
         },
-        effects=effects(tradeoff),
+        effects=modulus_effects(tradeoff),
         gains=gains(tradeoff),
         paths=[(reach, along(tradeoff, reach.quantity)) for reach in known],
         chance=chance(tradeoff),
-        trials=TRIALS,
         figures={name: data_uri(picture) for name, picture in figures.items()},
         tolerances=TOLERANCES,
         confidence=CONFIDENCE,

@@ -249,7 +249,7 @@ def of_one_run(blocks: Floats, value: float, known: Known) -> Estimate:
     )
 
 
-def needed(found: Joined, windows: int, tolerance: float, most: int) -> Need:
+def windows_needed(found: Joined, windows: int, tolerance: float, most: int) -> Need:
     """How many windows, at most so many, or else packings bring the half-width to a tolerance."""
     limit = tolerance * abs(found.value)
     enough = next((n for n in range(1, most + 1) if found.half_width(n) <= limit), most)

@@ -10,13 +10,11 @@ from dragchain.arrays import Floats
 from dragchain.errors import TableError
 from dragchain.network.write import write_chains
 from dragchain.report.values import LoadMap, Need
-from dragchain.run.case import load_case
-from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
 from dragchain.tables.by_step import read_table
 from dragchain.tables.write import write_tables
 from dragchain.tradeoff.measure_run import quantities_along
-from dragchain.tradeoff.measures import QUANTITIES, PathQuantities, Quantity
+from dragchain.tradeoff.measures import QUANTITIES, Measurand, PathQuantities
 from dragchain.windows.estimate import (
     UNKNOWN,
     Joined,
@@ -25,9 +23,11 @@ from dragchain.windows.estimate import (
     WindowOfRun,
     WindowsRecord,
     joined,
-    needed,
+    windows_needed,
 )
 from dragchain.windows.load_map import corrected
+from dragdeck.records.case import load_case
+from dragdeck.records.run import RunRecord
 
 _FEWEST = 2
 """Windows of which one alone says nothing of its scatter."""
@@ -107,7 +107,7 @@ def judged(
         )
         rows.append(row)
         if row.asked and found:
-            needs.append(needed(found, len(good), tolerance, most))
+            needs.append(windows_needed(found, len(good), tolerance, most))
     widths = {one.name: one.half_width for one in rows}
     reached = len(good) >= _FEWEST and all(
         widths.get(name, math.inf) <= tolerance for name in asked
@@ -142,7 +142,7 @@ def _joined(
     values: Mapping[str, float],
     windows: Sequence[WindowOfRun],
     record: WindowsRecord,
-) -> Iterator[tuple[Quantity, Joined | None]]:
+) -> Iterator[tuple[Measurand, Joined | None]]:
     """Each quantity of the soft run at physical stiffness, None if not all windows have it."""
     for quantity in QUANTITIES:
         if quantity.name not in values:
@@ -156,7 +156,7 @@ def _joined(
             yield quantity, joined(own, stretches, known)
 
 
-def _stretches(soft: PathQuantities, quantity: Quantity, arc_m: float) -> Floats:
+def _stretches(soft: PathQuantities, quantity: Measurand, arc_m: float) -> Floats:
     """Values of a quantity over stretches of the soft run as long as a window's sample."""
     blocks = soft.of_blocks(quantity.name)
     each = max(1, round(arc_m / soft.block_m))

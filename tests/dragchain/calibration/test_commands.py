@@ -70,5 +70,5 @@ def test_a_list_of_drops_names_what_it_lacks(
     listed.write_text(json.dumps({"schema": 2, **study, "contact_time_s": 2e-5, "drops": [drop]}))
     words = ["step", "calibrate", str(EXAMPLE), "--drops", str(listed), "--out", str(tmp_path)]
     assert main(words) == 1
-    assert "drops[0].purpose: is 'sweep'" in capsys.readouterr().err
+    assert "drops[0].purpose: Input should be 'production'" in capsys.readouterr().err
     assert not (tmp_path / "result.json").exists()

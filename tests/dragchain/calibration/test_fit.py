@@ -10,7 +10,7 @@ from make_record import Sensor, record_of
 from paper_drops import BIAS, FALL_S, HEIGHT, G, paper_drop, paper_drops, rebound
 
 from dragchain.calibration.fit import WIDTH_LIMIT, calibrate, observe, sample_impact
-from dragchain.calibration.measured_impacts import Measured, measure
+from dragchain.calibration.measured_impacts import Measured, measure_impacts
 from dragchain.calibration.results import bias_table, read_off, result
 from dragchain.calibration.simulated_drops import (
     Purpose,
@@ -34,7 +34,7 @@ def record(
 ) -> Measured:
     sensor = Sensor(rate, noise, offset_n=4.0, drift_n_per_s=1.0, resolution_n=0.005)
     made = record_of(paper_drop(e, height=height), sensor, np.random.default_rng(seed))
-    return measure(made, fall_time_s=FALL_S)
+    return measure_impacts(made, fall_time_s=FALL_S)
 
 
 # --- drops -----------------------------------------------------------------------------------
@@ -178,7 +178,7 @@ def test_a_slow_sensor_gives_its_times_only(sweep: Sweep) -> None:
     kernel = np.exp(-np.arange(600) / 60.0)
     slow = np.convolve(made.force_n, kernel / kernel.sum())[: len(made.force_n)]
     slow += np.random.default_rng(2).normal(0, 0.01, len(slow))
-    measured = measure(type(made)(made.time_s, slow, made.interval_s), fall_time_s=FALL_S)
+    measured = measure_impacts(type(made)(made.time_s, slow, made.interval_s), fall_time_s=FALL_S)
     got = calibrate(measured, sweep)
     assert not got.with_peaks
     assert got.width_ratio > WIDTH_LIMIT

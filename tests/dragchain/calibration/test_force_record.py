@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from dragchain.calibration.force_record import check_samples, parse_record, read_record
-from dragchain.calibration.measured_impacts import Measured, measure
+from dragchain.calibration.measured_impacts import Measured, measure_impacts
 from dragchain.errors import RecordError
 
 Floats = NDArray[np.float64]
@@ -48,7 +48,7 @@ def samples(
 
 
 def found(time_s: Floats, force_n: Floats) -> Measured:
-    return measure(check_samples(time_s, force_n), fall_time_s=FALL_S)
+    return measure_impacts(check_samples(time_s, force_n), fall_time_s=FALL_S)
 
 
 # --- what is found ---------------------------------------------------------------------------

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 import pyvista as pv
 from finished_runs import analysed_tiny_run
+from made_run import with_motion
 from tiny_run_files import (
     CHAIN_Z_M,
     LAST,
@@ -25,15 +26,15 @@ from dragchain.cli import main
 from dragchain.errors import ExportError, TableError
 from dragchain.export.frames import FrameSeries, Membership, Selection, chain_membership
 from dragchain.export.write import fresh_folder, write_export
-from dragchain.network.chain_table import chain_table
 from dragchain.network.chains import (
     WidestPath,
     dominant_path,
     peters_rows,
     widest_paths,
 )
-from dragchain.network.frame import NetworkFrame, read_frames
+from dragchain.network.frame import NetworkFrame, network_frames
 from dragchain.network.statistics import contact_counts
+from dragchain.network.write import chain_table
 from dragchain.tables.run_folder import Run
 
 STEPS = range(0, LAST + 1, 20)
@@ -181,10 +182,8 @@ def test_the_workpiece_is_where_the_force_was_measured(run: Path) -> None:
 
 def test_the_workpiece_turns_with_its_path(run: Path, edit_json) -> None:
     def circle(case: dict[str, Any]) -> None:
-        case["motion"] = {
-            "kind": "circle", "axis_speed_m_s": 1e-4, "radius_m": 0.02, "direction": "ccw",
-            "start_direction_rad": 0.0, "orientation": "follow_path",
-        }  # fmt: skip
+        path = {"kind": "circle", "radius_m": 0.02}
+        case.update(with_motion(case, path, 1e-4, orientation="follow_path"))
 
     edit_json(run / "case.json", circle)
     force = table(run, "workpiece_force").assign(direction_rad=np.pi / 2)
@@ -313,7 +312,7 @@ def test_xyz_holds_what_the_tables_hold(run: Path) -> None:
     frames = read_xyz(done.file)
     assert [int(keys["Timestep"]) for keys, _ in frames] == list(STEPS)
     last = None
-    for (keys, columns), last in zip(frames, read_frames(run, (0, LAST)), strict=True):
+    for (keys, columns), last in zip(frames, network_frames(run, (0, LAST)), strict=True):
         step = int(keys["Timestep"])
         rows = particles[particles["step"] == step].sort_values("particle_id")
         assert float(keys["Time"]) == rows["time_s"].iloc[0]

@@ -1,8 +1,21 @@
+import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dragchain.figures.panels import legend_below, new_panels
+from dragchain.figures.panels import (
+    compass,
+    compass_bars,
+    depth_bars,
+    legend_below,
+    log_ticks,
+    new_figure,
+    new_panels,
+    row,
+    row_names,
+)
 from dragchain.figures.style import WIDTH_IN, drawing
+from dragchain.statistics.estimate import Estimate, EstimateColumns
 
 
 @pytest.mark.parametrize(("count", "columns", "made"), [(1, 0, 1), (3, 0, 3), (5, 3, 6), (2, 3, 2)])
@@ -30,3 +43,52 @@ def test_a_legend_fits_into_the_figure(letters: int, count: int) -> None:
         (legend,) = figure.legends
         box = legend.get_window_extent()
     assert box.width <= WIDTH_IN * figure.dpi
+
+
+@pytest.fixture
+def axes() -> Axes:
+    _, (panel,) = new_panels(3.0)
+    return panel
+
+
+def test_the_first_row_is_at_the_top(axes: Axes) -> None:
+    row(axes, 0, 1.0, Estimate(1.0, 0.5, 1.5), "black")
+    row(axes, 1, 2.0, Estimate(2.0, 1.5, 4.0), "black")
+    row_names(axes, ["first", "second"])
+    assert axes.get_ylim() == (1.5, -0.5)
+    assert [tick.get_text() for tick in axes.get_yticklabels()] == ["first", "second"]
+    spans = [line.get_xdata() for line in axes.get_lines()[::2]]
+    np.testing.assert_equal(spans, [[0.5, 1.5], [1.5, 4.0]])
+
+
+def test_bars_of_depth_point_down_in_mm(axes: Axes) -> None:
+    columns = EstimateColumns.of([Estimate.around(1.0, 0.1), Estimate.around(2.0, 0.2)])
+    depth_bars(axes, [0.0, 0.001, 0.002], columns, 10.0)
+    assert axes.get_ylim() == (2.0, 0.0)
+    assert [bar.get_width() for bar in axes.patches] == [10.0, 20.0]
+    (reach,) = axes.collections
+    ends = [segment[:, 0].tolist() for segment in reach.get_segments()]
+    assert ends == [pytest.approx([9.0, 11.0]), pytest.approx([18.0, 22.0])]
+
+
+def test_an_interval_that_excludes_its_value_reaches_up_to_it(axes: Axes) -> None:
+    depth_bars(axes, [0.0, 0.001], EstimateColumns.of([Estimate(1.0, 1.5, 2.0)]))
+    (reach,) = axes.collections
+    assert reach.get_segments()[0][:, 0].tolist() == [1.0, 2.0]
+
+
+def test_ahead_and_behind_differ_in_colour() -> None:
+    axes = compass(new_figure(3.0))
+    columns = EstimateColumns.of([Estimate.around(1.0, 2.0)] * 4)
+    compass_bars(axes, [-np.pi, -np.pi / 2, 0.0, np.pi / 2, np.pi], columns)
+    behind, ahead, also_ahead, also_behind = (bar.get_facecolor() for bar in axes.patches)
+    assert ahead == also_ahead and behind == also_behind and ahead != behind
+    assert axes.get_rmin() == 0.0  # an interval beyond zero ends there
+
+
+def test_percent_ticks_are_plain_numbers(axes: Axes) -> None:
+    axes.set(yscale="log", ylim=(1e-3, 1.0))
+    log_ticks(axes.yaxis, 100.0)
+    axes.figure.draw_without_rendering()
+    labels = [tick.get_text() for tick in axes.get_yticklabels()]
+    assert {"0.1", "1", "10", "100"} <= set(labels)

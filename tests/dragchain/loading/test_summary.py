@@ -34,12 +34,12 @@ from dragchain.loading.document import FILE, Loading
 from dragchain.loading.figure import averaged_load
 from dragchain.loading.samples import sample
 from dragchain.loading.write import compute_loading, write_loading
-from dragchain.run.case import load_case
 from dragchain.run.kinematics import workpiece_velocity
-from dragchain.run.paths.circle import Circle
-from dragchain.run.workpiece import Surface, off_facet, read_surface, turned
+from dragchain.run.workpiece import Surface, off_facet, read_surface
 from dragchain.tables.workpiece_contacts import WallContacts
 from dragchain.tables.write import workpiece_contact_rows
+from dragdeck.records.case import load_case
+from dragdeck.study.rotation import rotated
 
 
 @pytest.fixture(scope="module")
@@ -277,10 +277,9 @@ def test_a_point_off_a_triangle_by_hand() -> None:
 
 def circle(turns: bool, sense: int = 1) -> dict[str, Any]:
     return {
-        "kind": "circle", "radius_m": 0.05, "direction": "ccw" if sense > 0 else "cw",
+        "path": {"kind": "circle", "radius_m": 0.05, "direction": "ccw" if sense > 0 else "cw"},
         "orientation": "follow_path" if turns else "fixed",
-        "start_direction_rad": sense * np.pi / 2,
-    }  # fmt: skip
+    }
 
 
 def made_case(tmp_path: Path, **motion: Any) -> Any:
@@ -335,11 +334,10 @@ def test_a_cylinder_is_turned_back_into_its_own_frame(tmp_path: Path) -> None:
     """Its STL file goes into the bed unturned: what looks ahead at the start becomes +x."""
     (tmp_path / "workpiece.stl").write_text(PLATE)
     case = made_case(tmp_path, **circle(True))
-    assert isinstance(case.motion, Circle)
     as_mesh = read_surface(tmp_path, case)
     np.testing.assert_allclose(as_mesh.normals, [[1, 0, 0]] * 2)
     case = changed(case, workpiece=changed(case.workpiece, kind="cylinder"))
     np.testing.assert_allclose(read_surface(tmp_path, case).normals, [[0, -1, 0]] * 2, atol=1e-12)
-    np.testing.assert_allclose(turned(np.array([0.0, 2.0, 1.0]), 0.0), [0, 2, 1])
-    quarter = turned(np.array([[0.0, 2.0, 1.0]]), np.array([-np.pi / 2]))
+    np.testing.assert_allclose(rotated(np.array([0.0, 2.0, 1.0]), 0.0), [0, 2, 1])
+    quarter = rotated(np.array([[0.0, 2.0, 1.0]]), np.array([-np.pi / 2]))
     np.testing.assert_allclose(quarter, [[2, 0, 1]], atol=1e-12)

@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from networks import R, make_frame, row
 
-from dragchain.network.chain_table import chain_table
 from dragchain.network.chains import (
     dominant_path,
     major_stress,
@@ -16,6 +15,7 @@ from dragchain.network.chains import (
     widest_paths,
 )
 from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame
+from dragchain.network.write import chain_table
 
 # a weak contact of two far particles brings the mean of the frame down
 WEAK = {91: (0.5, 0.5, 0.03), 92: (0.5, 0.5 + 2 * R, 0.03), 93: (0.5, 0.5 + 4 * R, 0.03)}

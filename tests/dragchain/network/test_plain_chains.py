@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from networks import random_frame, real_frame
 from plain_chains import plain_paths, plain_peters, plain_stress, plain_table
 
-from dragchain.network.chain_table import chain_table
 from dragchain.network.chains import (
     dominant_path,
     particle_stress,
@@ -18,6 +17,7 @@ from dragchain.network.chains import (
     widest_paths,
 )
 from dragchain.network.frame import NetworkFrame
+from dragchain.network.write import chain_table
 
 frames = st.builds(
     random_frame,

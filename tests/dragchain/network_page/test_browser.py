@@ -1,6 +1,7 @@
 """network.html in a real browser: what it shows is what the tables say."""
 
 import json
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from browser import MISSING, NO_WEBGL, Browser
-from figure_files import case_json
+from made_run import line
 from network_run_files import PEAK_N, PEAKS_S, accept, draw, write_network_run
 from selenium.webdriver import ActionChains, Keys
 from selenium.webdriver.support.ui import Select
@@ -30,8 +31,8 @@ HOSTILE = '</script><script>document.title="taken"</script>'
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A workpiece from an STL file, with contacts on its end face; the study has a hostile name."""
-    motion = case_json("process")["motion"] | {"direction_rad": 2.5, "start_direction_rad": 2.5}
     folder = tmp_path_factory.mktemp("made") / "run"
+    motion = line(0.1, start_m=[-0.01, 0.0], direction_deg=math.degrees(2.5))
     write_network_run(folder, "mesh", motion=motion, study=HOSTILE)
     contacts = pd.read_parquet(folder / "tables/contacts.parquet")
     touching = contacts["kind"] == "particle-workpiece"

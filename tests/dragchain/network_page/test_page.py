@@ -2,6 +2,7 @@
 
 import base64
 import json
+import math
 import re
 import zlib
 from pathlib import Path
@@ -13,14 +14,23 @@ import pytest
 from figure_files import case_json
 from hypothesis import given
 from hypothesis import strategies as st
+from made_run import line
 from network_run_files import PEAK_N, PEAKS_S, accept, draw, write_network_run
 from pages import Page
+from scipy.spatial.transform import Rotation
 
 from dragchain.cli import main
 from dragchain.errors import SeriesError, TableError
 from dragchain.network_page import scene as scene_module
 from dragchain.network_page.page import write_page
-from dragchain.network_page.scene import BODIES, DOMINANT, PATH, QUASI_LINEAR, ROUNDING, Columns
+from dragchain.network_page.scene import (
+    BODIES,
+    DOMINANT,
+    PATH,
+    QUASI_LINEAR,
+    ROUNDING,
+    PackedColumns,
+)
 from dragchain.report.page import TIMES
 
 _BYTES = {"u8": 1, "u16": 2, "u32": 4, "f24": 3}
@@ -85,7 +95,7 @@ def table(run: Path, name: str, step: int | None = None) -> pd.DataFrame:
     st.lists(st.floats(1e-12, 1e9), min_size=1, max_size=40), st.lists(st.integers(0, 2**32 - 1))
 )
 def test_columns_keep_what_they_promise(numbers: list[float], ids: list[int]) -> None:
-    columns = Columns()
+    columns = PackedColumns()
     columns.add("numbers", "f24", np.array(numbers))
     columns.add("ids", "u32", np.array(ids, dtype=np.int64))
     columns.add("zero", "f24", np.zeros(1))
@@ -203,16 +213,14 @@ def test_the_pose_puts_the_facets_where_the_run_has_them(
     tmp_path: Path, kind: str, turn: float
 ) -> None:
     """A cylinder lies in its file as it is put into the bowl, a mesh of a user looks along +x."""
-    motion = {"kind": "line", "axis_speed_m_s": 0.1, "start_m": [-0.01, 0.0], "direction_rad": turn,
-              "start_direction_rad": turn}  # fmt: skip
+    motion = line(0.1, start_m=[-0.01, 0.0], direction_deg=math.degrees(turn))
     folder = write_network_run(tmp_path / "run", kind, motion=motion)
     write_page(folder)
     page = Written(folder / "network.html")
     (workpiece,) = page.head["workpieces"]
-    x, y, z, angle = workpiece["poses"][0]
+    place, turn = workpiece["poses"][0][:3], workpiece["poses"][0][3:]
     corners = page.columns["corners"].reshape(-1, 3)
-    cos, sin = np.cos(angle), np.sin(angle)
-    placed = corners @ np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]]) + [x, y, z]
+    placed = Rotation.from_quat(turn).apply(corners) + place
     first = table(folder, "workpiece_force", page.head["steps"][0]).iloc[0]
     import meshio
 

@@ -20,15 +20,15 @@ from report_files import (
     write_quantities,
 )
 
-from dragchain.report.cases import cases_of, read_study
+from dragchain.report.cases import cases_of, read_study_runs
 from dragchain.report.cost_check import Option, answers, cost_rows, prediction_for, read_advice
-from dragchain.report.study_report import write_report
+from dragchain.report.study_report import write_study_report
 from dragchain.report.values import EXTRAPOLATED, Extrapolated, ExtrapolatedQuantity
 from dragchain.run.basis import QUANTITIES
-from dragchain.run.case import Case
-from dragchain.run.completeness import RunRecord
 from dragchain.statistics.estimate import Estimate
 from dragdeck.errors import DocumentError
+from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import RunRecord
 
 RECORD = RunRecord.model_validate(run_json())
 
@@ -63,7 +63,7 @@ def run(tmp_path: Path) -> Path:
 def test_the_report_compares_cost_and_tolerance(run: Path, tmp_path: Path) -> None:
     file = advice_file(tmp_path, option(ranks=1), option())
     write_physical(run, drag_mean=(-2.5, 0.1))
-    write_report(tmp_path, [run], file)
+    write_study_report(tmp_path, [run], file)
     words = " ".join(page_of(tmp_path).words.split())
     assert "Predicted and actual cost" in words
     assert "150 000 160 000 3000 2100 50 76 1.52 a short run" in spaced(tmp_path)
@@ -91,7 +91,7 @@ def spaced(folder: Path) -> str:
 
 
 def test_no_advice_no_comparison(run: Path, tmp_path: Path) -> None:
-    write_report(tmp_path, [run])
+    write_study_report(tmp_path, [run])
     words = page_of(tmp_path).words
     assert "Tolerance and settings" in words and "Predicted and actual" not in words
 
@@ -104,7 +104,7 @@ def test_no_advice_no_comparison(run: Path, tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_a_prediction_of_other_settings_is_not_compared(run: Path, other: dict[str, Any]) -> None:
-    case = Case.read(run / "case.json")
+    case = CaseOfRun.read(run / "case.json")
     wrong, right = (Option.model_validate(one) for one in (other, option()))
     assert prediction_for(case, [wrong]) is None
     assert prediction_for(case, [wrong, right]) == right
@@ -122,7 +122,7 @@ def test_each_asked_quantity_has_an_answer(tmp_path: Path) -> None:
     case = case_json("process", "stiff", asked={**ASKED, "quantities": quantities})
     folder = make_run(tmp_path, case, process_findings(), PICTURES)
     write_physical(folder, drag_mean=(-2.5, 0.1), chain_count=(40.0, 4.0))
-    drag, chains, forces = answers(cases_of([read_study(folder)])[0])
+    drag, chains, forces = answers(cases_of([read_study_runs(folder)])[0])
     assert drag.value == Estimate.around(-2.5, 0.1) and drag.half_width == pytest.approx(0.04)
     assert chains.half_width == pytest.approx(0.1)
     assert [one.reached for one in (drag, chains, forces)] == ["yes", "no", "not known"]
@@ -135,7 +135,7 @@ def test_a_restitution_is_inside_if_its_measured_error_is(
     asked = {**ASKED, "quantities": ["restitution"], "error": error}
     case = case_json("process", "run-1", asked=asked)
     folder = make_run(tmp_path, case, process_findings(), PICTURES)
-    (answer,) = answers(cases_of([read_study(folder)])[0])
+    (answer,) = answers(cases_of([read_study_runs(folder)])[0])
     assert (answer.half_width, answer.reached) == (error, reached)
 
 
@@ -147,7 +147,7 @@ def test_a_case_of_several_packings_is_judged_by_its_mean(tmp_path: Path) -> Non
         case["inputs"] |= {"seed": seed}
         folder = make_run(tmp_path, case, process_findings(), PICTURES)
         write_quantities(folder, corrected=0.8)
-        studies.append(read_study(folder))
+        studies.append(read_study_runs(folder))
     alone, together = (answers(cases_of(some)[0])[0] for some in (studies[:1], studies))
     assert alone.half_width == pytest.approx(0.1) and alone.reached == "no"
     assert together.half_width == pytest.approx(0.05) and together.reached == "yes"
@@ -171,7 +171,7 @@ def test_an_answer_from_windows_stands_beside_the_value_of_the_run(tmp_path: Pat
         measured=Estimate(32.1, math.nan, math.nan), value=Estimate(25.6, 24.0, 27.2),
     )  # fmt: skip
     Extrapolated(quantities=(contacts,), tolerance=REACHED).write(folder / EXTRAPOLATED)
-    write_report(tmp_path, [folder])
+    write_study_report(tmp_path, [folder])
     words = " ".join(page_of(tmp_path).words.split())
     assert "Values at the physical Young's modulus" in words
     assert "contacts on the workpiece at a time 25.6 (24.0 to 27.2) 32.1 from 3 windows" in words

@@ -20,13 +20,13 @@ from dragchain.report.page import (
     file_uri,
     fixed,
     fraction,
+    heading_key,
     interval,
     measured,
     number,
     page_environment,
     percent,
     sections,
-    slug,
     with_interval,
 )
 from dragchain.statistics.estimate import Estimate
@@ -86,13 +86,18 @@ def test_the_head_of_a_page_points_to_its_sections() -> None:
 
 
 def test_a_listing_writes_each_column_in_its_form() -> None:
-    rows = [{"name": "a & b", "drag": {"mean": 0.25}}, {"name": "c", "drag": {"mean": None}}]
+    drag = {"value": 1.5, "ci95_low": 1.0, "ci95_high": 2.0}
+    rows = [("a & b", {"mean": 0.25, "said": "confirmed", **drag}), ("a & b", {"mean": None})]
     text = """{% from "report/macros.html.j2" import listing %}
-{{ listing(rows, [("case", "name", ""), ("drag (N)", "drag.mean", "measured:3")]) }}"""
-    found = page_environment().from_string(text).render(rows=rows)
+{{ listing(rows, [("case", "0", {"a & b": "both"}), ("drag (N)", "1.mean", "measured:3")]) }}
+{{ listing(rows[:1], [("case", "0", ""), ("said", "1.said", "verdict"),
+                       ("", "1", "estimate:2")]) }}"""
+    found = page_environment().from_string(text).render(rows=rows).replace("\n", "")
     assert '<th>case</th><th class="n">drag (N)</th>' in found
-    assert '<td>a &amp; b</td><td class="n">0.250</td>' in found
-    assert f'<td>c</td><td class="n">{DASH}</td>' in found
+    assert '<td>both</td><td class="n">0.250</td>' in found
+    assert f'<td>both</td><td class="n">{DASH}</td>' in found
+    assert '<td>a &amp; b</td><td class="line good">confirmed</td>' in found
+    assert '<td class="n">1.5 <span class="interval">(1.0 to 2.0)</span></td>' in found
 
 
 def test_what_is_not_given_is_an_error() -> None:
@@ -127,7 +132,7 @@ def test_one_style_sheet_is_enough(name: str) -> None:
 
 
 def test_names_of_sections() -> None:
-    assert slug("Do chains explain the peaks?") == "do-chains-explain-the-peaks"
+    assert heading_key("Do chains explain the peaks?") == "do-chains-explain-the-peaks"
     body = '<h2 id="a">Load &amp; wear</h2><h2>no name</h2>\n<h2 id="b">B</h2>'
     assert sections(body) == [("a", "Load &amp; wear"), ("b", "B")]
 

@@ -7,7 +7,7 @@ import pytest
 from browser import MISSING, Browser
 from report_files import PICTURES, case_json, make_run, process_findings
 
-from dragchain.report.study_report import write_report
+from dragchain.report.study_report import write_study_report
 
 pytestmark = [
     pytest.mark.slow,
@@ -30,7 +30,7 @@ def test_the_embedded_page_is_loaded_only_when_it_is_opened(
         tmp_path / "results", case_json("process", "workpiece-1"), process_findings(), PICTURES
     )
     (run / "network.html").write_text("<title>the scene</title>")
-    write_report(tmp_path / "out", [run])
+    write_study_report(tmp_path / "out", [run])
     page = (tmp_path / "out/network.html").as_uri()
     window.driver.get((tmp_path / "out/report.html").as_uri())
 

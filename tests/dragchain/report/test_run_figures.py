@@ -18,7 +18,7 @@ from figure_files import (
     workpiece_force_table,
     write_process_run,
 )
-from made_run import output, save, write_documents
+from made_run import line, output, save, with_motion, write_documents
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -43,9 +43,11 @@ from dragchain.report.run_figures import (
     forces,
     write_figures,
 )
-from dragchain.run.case import Case, PublishedDrag, Reference, load_case
 from dragchain.run.reference import reference_drags
 from dragchain.statistics.estimate import Estimate
+from dragdeck.records.case import CaseOfRun, load_case
+from dragdeck.study.reference import Drag, Reference
+from dragdeck.study.rotation import Rotation
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
 
@@ -93,7 +95,7 @@ def test_a_frame_without_a_path_has_no_bottleneck() -> None:
 
 
 def reference(**drag: float) -> Reference:
-    return Reference(source="x", experiment=PublishedDrag(**drag))
+    return Reference(source="x", experiment=Drag(**drag))
 
 
 def test_comparison_is_relative_to_the_reference() -> None:
@@ -145,6 +147,9 @@ def test_a_short_drag_has_no_statistics(process: Path, tmp_path: Path) -> None:
 # --- the network's pictures ------------------------------------------------------------------
 
 
+UPRIGHT = Rotation(np.zeros(1))
+
+
 def network_frame(normal_force: list[float], *, direction_rad: float = 0.0) -> NetworkFrame:
     """Return two particles on the x axis in contact with each other and with the side."""
     return NetworkFrame(
@@ -181,9 +186,9 @@ def test_picture_is_of_the_nearest_frame_or_the_last(wanted: float, expected: in
 def test_times_of_a_faster_run_are_those_of_the_process(process: Path) -> None:
     """A workpiece 5 times as fast takes a fifth of the time; its own speed is that of the run."""
     case = load_case(process)
-    fast = case.model_copy(
-        update={"fidelity": case.fidelity.model_copy(update={"speed_factor": 5.0})}
-    )
+    fidelity = case.fidelity.model_copy(update={"speed_factor": 5.0})
+    data = case.model_copy(update={"fidelity": fidelity}).model_dump()
+    fast = CaseOfRun.model_validate(with_motion(data, **line(0.1, start_m=[-0.01, 0.0])))
     slow, quick = (process_findings(RunData(process, one)) for one in (case, fast))
     for name in ("process_time_s", "separation_s"):
         ours, theirs = (np.array(getattr(found.peaks, name)) for found in (quick, slow))
@@ -197,7 +202,7 @@ def test_times_of_a_faster_run_are_those_of_the_process(process: Path) -> None:
 def test_the_workpiece_moves_by_its_reference_point(process: Path) -> None:
     shown = scene.load_scene(process, load_case(process))
     assert shown.frame.step == LAST
-    assert shown.workpiece_turn_rad == pytest.approx(0.0)
+    np.testing.assert_allclose(shown.rotation.matrices[0], np.eye(3), atol=1e-15)
     assert shown.workpiece_m == pytest.approx([0.01, 0.0, 0.01])
     assert shown.process_time_s == pytest.approx(0.4)
     assert shown.dominant is not None
@@ -223,8 +228,8 @@ def test_a_rendered_contact_is_where_its_axes_say(
 ) -> None:
     case = load_case(process)
     far = np.array([0.015, 0.012, 0.01])
-    shown = scene.Scene(network_frame([2.0, 0.5]), far, 0.0, None, 0.2)
-    image, extent = scene.render(process, case, shown, view)
+    shown = scene.NetworkScene(network_frame([2.0, 0.5]), far, UPRIGHT, None, 0.2)
+    image, extent = scene.render_view(process, case, shown, view)
     assert is_strongest(pixel(image, extent, 0.0, level_mm))
     assert is_strongest(pixel(image, extent, -2.5, level_mm + 2.0))
     assert not is_strongest(pixel(image, extent, 0.0, level_mm + 3.5))
@@ -235,14 +240,16 @@ def test_a_rendered_contact_is_where_its_axes_say(
     assert min(pixel(image, extent, 5.0, level_mm + 1.5)) > 200
 
 
-def widened(case: Case, radius_m: float) -> Case:
+def widened(case: CaseOfRun, radius_m: float) -> CaseOfRun:
     assert case.bowl is not None
     return changed(case, bowl=changed(case.bowl, radius_m=radius_m))
 
 
 def test_a_bowl_not_much_wider_than_the_window_is_shown_whole(process: Path) -> None:
     case = load_case(process)
-    shown = scene.Scene(network_frame([1.0, 1.0]), np.array([0.01, 0.0, 0.01]), 0.0, None, 0.2)
+    shown = scene.NetworkScene(
+        network_frame([1.0, 1.0]), np.array([0.01, 0.0, 0.01]), UPRIGHT, None, 0.2
+    )
     part = scene.window(case, shown, "xy")
     assert part.contacts is None and part.low.tolist() == [-0.024, -0.024]
     assert scene.cut_words(case, "xz") == ""
@@ -255,7 +262,7 @@ def test_a_wide_bowl_is_cut_to_the_surroundings_of_the_workpiece(process: Path) 
     workpiece = np.array([0.5 + 0.004 - reach / 2, 0.1, 0.01])
     frame = network_frame([1.0, 1.0])
     places = np.array([[0.0, 1.1 * depth, 0.0], [-1.1 * reach, 0.0, 0.0]]) + workpiece
-    shown = scene.Scene(replace(frame, point=places), workpiece, 0.0, None, 0.2)
+    shown = scene.NetworkScene(replace(frame, point=places), workpiece, UPRIGHT, None, 0.2)
     above, side = (scene.window(case, shown, view) for view in ("xy", "xz"))
     assert above.low.tolist() == pytest.approx((workpiece[:2] - reach).tolist())
     assert above.high.tolist() == pytest.approx([0.504, 0.1 + reach])  # no farther than the bowl
@@ -267,17 +274,17 @@ def test_a_wide_bowl_is_cut_to_the_surroundings_of_the_workpiece(process: Path) 
 def test_a_picture_of_a_wide_bowl_has_no_more_pixels_than_vtk_takes(process: Path) -> None:
     case = widened(load_case(process), 2.0)
     frame = network_frame([2.0, 0.5])
-    shown = scene.Scene(frame, np.array([0.015, 0.012, 0.01]), 0.0, None, 0.2)
-    image, extent = scene.render(process, case, shown, "xy", 40.0)
+    shown = scene.NetworkScene(frame, np.array([0.015, 0.012, 0.01]), UPRIGHT, None, 0.2)
+    image, extent = scene.render_view(process, case, shown, "xy", 40.0)
     assert max(image.shape[:2]) <= 1401
     assert is_strongest(pixel(image, extent, 0.0, 0.0))
 
 
 def test_a_missing_workpiece_mesh_is_named(process: Path, tmp_path: Path) -> None:
     case = load_case(process)
-    shown = scene.Scene(network_frame([1.0, 1.0]), np.zeros(3), 0.0, None, 0.2)
+    shown = scene.NetworkScene(network_frame([1.0, 1.0]), np.zeros(3), UPRIGHT, None, 0.2)
     with pytest.raises(TableError, match=r"workpiece\.stl"):
-        scene.render(tmp_path, case, shown, "xy")
+        scene.render_view(tmp_path, case, shown, "xy")
 
 
 def test_a_machine_that_cannot_render_is_told_what_to_install(
@@ -328,7 +335,7 @@ def test_a_filling_is_drawn_from_its_thermo_table(filling: Path) -> None:
 
 
 def test_energy_ratio_of_particles_that_fell_their_diameter_is_one(filling: Path) -> None:
-    case: Case = load_case(filling)
+    case: CaseOfRun = load_case(filling)
     mass = 2500.0 * 4 / 3 * math.pi * R**3
     ratio = energy_ratio(np.array([2 * mass * 10.0 * 2 * R]), np.array([2.0]), case)
     assert ratio == pytest.approx([1.0])

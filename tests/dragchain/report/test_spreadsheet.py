@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 from report_files import PICTURES, case_json, make_run, process_findings, write_quantities
 
-from dragchain.report.cases import cases_of, read_study
+from dragchain.report.cases import cases_of, read_study_runs
 from dragchain.report.spreadsheet import definitions, summary_workbook, workbook
-from dragchain.run.case import Assumption
+from dragdeck.records.case import AssumptionOfRun
 
 FORMULAE = ["=1+1", "+1", "-1", "@SUM(A1)", "{=1}", "https://example.org", "=cmd|' /C calc'!A0"]
 
@@ -69,11 +69,11 @@ def test_a_column_that_nobody_describes_has_no_meaning() -> None:
 
 def test_the_sheets_say_what_there_is(tmp_path: Path) -> None:
     table = pd.DataFrame({"case": ["=a", "b"], "drag_mean_n": [-2.5, math.nan]})
-    assumed = {"run-1": [Assumption(field="bowl.radius_m", value=0.04, why="+plausible")]}
+    assumed = {"run-1": [AssumptionOfRun(field="bowl.radius_m", value=0.04, why="+plausible")]}
     folder = make_run(
         tmp_path, case_json("process", "workpiece-1"), process_findings(-2.5), PICTURES
     )
-    book = read(summary_workbook(table, assumed, cases_of([read_study(folder)])))
+    book = read(summary_workbook(table, assumed, cases_of([read_study_runs(folder)])))
     assert book.sheetnames == ["Overview", "Summary", "Definitions", "Assumptions"]
     rows = [list(sheet.iter_rows(values_only=True)) for sheet in book][1:]
     assert rows[0] == [("Case", "Drag mean (N)"), ("=a", -2.5), ("b", None)]
@@ -89,7 +89,7 @@ def test_the_overview_has_a_row_per_quantity_with_formats(tmp_path: Path) -> Non
     case = case_json("process", "workpiece-1")
     folder = make_run(tmp_path, case, process_findings(-2.5), PICTURES)
     write_quantities(folder, corrected=0.8)
-    book = read(summary_workbook(pd.DataFrame({"a": [1]}), {}, cases_of([read_study(folder)])))
+    book = read(summary_workbook(pd.DataFrame({"a": [1]}), {}, cases_of([read_study_runs(folder)])))
     rows = {row[0].value: row for row in book["Overview"].iter_rows()}
     assert [cell.value for cell in rows["quantity"]][2:] == [
         f"10 mm <workpiece>: {head}"

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from loading_files import made_contacts, write_run
-from made_run import particles_kept, run_json
+from made_run import particles_kept, run_json, with_motion
 from pages import stands_alone
 from report_files import (
     DROP,
@@ -28,11 +28,11 @@ from report_files import (
 from dragchain.errors import MissingRunsError, TableError
 from dragchain.loading.write import write_loading
 from dragchain.report.findings import FIGURES, FILE
-from dragchain.report.study_report import write_report
+from dragchain.report.study_report import write_study_report
 from dragchain.report.summary import input_column, main_numbers
 from dragchain.report.values import Need
-from dragchain.run.completeness import RunRecord, refusal
 from dragchain.tables.network_contacts import Corrections
+from dragdeck.records.run import RunRecord, refusal
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ def process(tmp_path: Path) -> Path:
 
 def test_summary_has_the_numbers_of_run_filling_and_drop(process: Path, tmp_path: Path) -> None:
     out = tmp_path / "report"
-    write_report(out, [process])
+    write_study_report(out, [process])
     table = pd.read_parquet(out / "summary.parquet")
     assert len(table) == 1
     row = table.iloc[0]
@@ -68,7 +68,7 @@ def test_summary_has_the_numbers_of_run_filling_and_drop(process: Path, tmp_path
 
 
 def test_csv_and_parquet_hold_the_same(process: Path, tmp_path: Path) -> None:
-    write_report(tmp_path / "report", [process])
+    write_study_report(tmp_path / "report", [process])
     table = pd.read_parquet(tmp_path / "report" / "summary.parquet")
     text = pd.read_csv(tmp_path / "report" / "summary.csv")
     assert list(text.columns) == list(table.columns)
@@ -79,7 +79,7 @@ def test_csv_and_parquet_hold_the_same(process: Path, tmp_path: Path) -> None:
 
 
 def test_page_is_whole_and_needs_nothing_else(process: Path, tmp_path: Path) -> None:
-    write_report(tmp_path, [process])
+    write_study_report(tmp_path, [process])
     page = stands_alone((tmp_path / "report.html").read_text(encoding="utf-8"))
     assert len(page.images) == len(PICTURES) + 1
     assert all(image.startswith("data:image/png;base64,") for image in page.images)
@@ -89,13 +89,13 @@ def test_page_is_whole_and_needs_nothing_else(process: Path, tmp_path: Path) -> 
 def test_page_shows_the_contacts_on_the_workpiece_if_they_are_known(
     process: Path, tmp_path: Path
 ) -> None:
-    write_report(tmp_path / "without", [process])
+    write_study_report(tmp_path / "without", [process])
     assert "force \N{MULTIPLICATION SIGN} sliding" not in page_of(tmp_path / "without").words
     made = write_run(tmp_path / "made", made_contacts())
     write_loading(made)
     for file in ("tables/loading.json", "figures/workpiece.png"):
         (process / file).write_bytes((made / file).read_bytes())
-    write_report(tmp_path / "with", [process])
+    write_study_report(tmp_path / "with", [process])
     page = page_of(tmp_path / "with")
     assert page.open == []
     assert len(page.images) == len(PICTURES) + 2
@@ -108,18 +108,18 @@ def test_page_shows_the_contacts_on_the_workpiece_if_they_are_known(
 
 
 def test_page_says_how_many_contacts_were_corrected(process: Path, tmp_path: Path) -> None:
-    write_report(tmp_path / "without", [process])
+    write_study_report(tmp_path / "without", [process])
     assert "Corrected contact forces" not in page_of(tmp_path / "without").words
     counts = np.array([1000, 171, 250, 10, 96, 4, 0.02, 1.0])
     Corrections.of(0.34, counts).write(process / "tables/corrections.json")
-    write_report(tmp_path / "with", [process])
+    write_study_report(tmp_path / "with", [process])
     words = page_of(tmp_path / "with").words
     row = words[words.index("that were merged") :].split("Definitions")[0]
     assert re.findall(r"[0-9.]+(?=\W%)", row)[:4] == ["17", "4.0", "2.0", "4.0"]
 
 
 def test_page_says_what_counts(process: Path, tmp_path: Path) -> None:
-    write_report(tmp_path, [process])
+    write_study_report(tmp_path, [process])
     words = page_of(tmp_path).words
     for expected in (
         "10 mm <workpiece>", "3.5 % less", "\N{MINUS SIGN}7.3 % to +0.4 %", "assumed",
@@ -133,7 +133,7 @@ def test_page_says_what_counts(process: Path, tmp_path: Path) -> None:
 def test_two_cases_have_two_rows_and_an_overview(process: Path, tmp_path: Path) -> None:
     case = case_json("process", "workpiece-2", case="second")
     other = make_run(tmp_path / "results", case, process_findings(-3.0), PICTURES)
-    write_report(tmp_path, [process, other])
+    write_study_report(tmp_path, [process, other])
     table = pd.read_parquet(tmp_path / "summary.parquet")
     assert table["drag_mean_n"].tolist() == [-2.5, -3.0]
     assert table["solid_fraction"].isna().tolist() == [False, True]
@@ -143,7 +143,7 @@ def test_two_cases_have_two_rows_and_an_overview(process: Path, tmp_path: Path) 
 
 
 def test_one_case_is_not_repeated_in_an_overview(process: Path, tmp_path: Path) -> None:
-    write_report(tmp_path, [process])
+    write_study_report(tmp_path, [process])
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     first, *others = re.findall(r"<h2 id=[^>]*>([^<]+)", page)
     assert first.startswith("Values")
@@ -154,10 +154,10 @@ def test_the_page_on_the_contact_network_is_beside_the_report(
     process: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    write_report(out, [process])
+    write_study_report(out, [process])
     assert "There is no interactive page of this run" in page_of(out).words
     (process / "network.html").write_text("the scene")
-    write_report(out, [process])
+    write_study_report(out, [process])
     assert (out / "network.html").read_text() == "the scene"
     page = stands_alone((out / "report.html").read_text(encoding="utf-8"), ["network.html"])
     assert page.references.count("network.html") == 2
@@ -168,7 +168,7 @@ def test_each_case_has_its_own_page_on_the_contact_network(process: Path, tmp_pa
     case = case_json("process", "workpiece-2")
     other = make_run(tmp_path / "results", case, process_findings(-3.0), PICTURES)
     (other / "network.html").write_text("the second")
-    write_report(tmp_path / "out", [process, other])
+    write_study_report(tmp_path / "out", [process, other])
     assert (tmp_path / "out/network-workpiece-2.html").read_text() == "the second"
     page = page_of(tmp_path / "out")
     assert "network-workpiece-2.html" in page.references
@@ -178,7 +178,7 @@ def test_each_case_has_its_own_page_on_the_contact_network(process: Path, tmp_pa
 
 def test_folders_of_filling_and_drop_may_be_given_too(process: Path, tmp_path: Path) -> None:
     small = process.parent.parent
-    write_report(
+    write_study_report(
         tmp_path, [small / "filling" / "filling-1", process, small / "drop_test" / "drop-1"]
     )
     assert len(pd.read_parquet(tmp_path / "summary.parquet")) == 1
@@ -186,7 +186,7 @@ def test_folders_of_filling_and_drop_may_be_given_too(process: Path, tmp_path: P
 
 def test_no_process_run_is_no_report(process: Path, tmp_path: Path) -> None:
     with pytest.raises(TableError, match="no folder of a process run"):
-        write_report(tmp_path / "report", [process.parent.parent / "filling" / "filling-1"])
+        write_study_report(tmp_path / "report", [process.parent.parent / "filling" / "filling-1"])
 
 
 @pytest.fixture
@@ -204,7 +204,7 @@ def test_a_run_that_failed_a_check_is_listed_and_the_others_are_reported(
     file.write_text(json.dumps(run_json(state="failed", checks=[particles_kept(1421)])))
     (file.parent / "run.json").unlink()
     with pytest.raises(MissingRunsError, match=r"(?s)no particle lost: 1421.*timestep_fraction"):
-        write_report(tmp_path / "report", [process, other])
+        write_study_report(tmp_path / "report", [process, other])
     table = pd.read_parquet(tmp_path / "report" / "summary.parquet")
     assert table["drag_mean_n"].tolist() == [-3.0]
     words = page_of(tmp_path / "report").words
@@ -216,7 +216,7 @@ def test_a_run_that_failed_a_check_is_listed_and_the_others_are_reported(
 def test_a_drop_test_without_a_result_takes_no_process_along(process: Path, tmp_path: Path) -> None:
     (process.parent.parent / "drop_test/drop-1/run.json").unlink()
     with pytest.raises(MissingRunsError, match=r"1 run\(s\) have no result.*\n  drop_test"):
-        write_report(tmp_path / "report", [process])
+        write_study_report(tmp_path / "report", [process])
     table = pd.read_parquet(tmp_path / "report" / "summary.parquet")
     assert table["restitution_effective"].isna().all()
 
@@ -230,7 +230,7 @@ def test_a_run_that_was_never_written_points_to_the_run_before_it(
         "step 5\ndragdeck: results: no engine\n  remedy: install it\n"
     )
     with pytest.raises(MissingRunsError) as caught:
-        write_report(tmp_path / "report", [process, never, filling])
+        write_study_report(tmp_path / "report", [process, never, filling])
     assert str(caught.value).splitlines()[1:] == [
         "  filling filling-2: results: no engine",
         "    remedy: install it",
@@ -243,7 +243,7 @@ def test_an_interrupted_run_goes_on(process: Path, other: Path, tmp_path: Path) 
     (process / "run.json").unlink()
     (process / "state.json").write_text(json.dumps(run_json(state="stopped", checks=[])))
     with pytest.raises(MissingRunsError, match=r"(?s)interrupted.*goes on"):
-        write_report(tmp_path / "report", [process, other])
+        write_study_report(tmp_path / "report", [process, other])
 
 
 @pytest.mark.parametrize(("log", "said"), [
@@ -258,13 +258,13 @@ def test_the_step_that_failed_says_why(
         f"line\ndragchain: it {said}\n  value: 3\n  remedy: do so\n"
     )
     with pytest.raises(MissingRunsError, match=rf"it {said} value: 3\n    remedy: do so"):
-        write_report(tmp_path / "report", [process, other])
+        write_study_report(tmp_path / "report", [process, other])
 
 
 def test_without_any_result_there_is_no_report(process: Path, tmp_path: Path) -> None:
     (process / "run.json").unlink()
     with pytest.raises(MissingRunsError, match="there is no report"):
-        write_report(tmp_path / "report", [process])
+        write_study_report(tmp_path / "report", [process])
     assert not (tmp_path / "report").exists()
 
 
@@ -284,13 +284,13 @@ def test_refusal_gives_its_reason(change: dict[str, Any], reason: str) -> None:
 def test_a_missing_picture_names_the_command(process: Path, tmp_path: Path) -> None:
     (process / "figures" / "forces.png").unlink()
     with pytest.raises(MissingRunsError, match=r"forces\.png.*dragchain figures"):
-        write_report(tmp_path / "report", [process])
+        write_study_report(tmp_path / "report", [process])
 
 
 def test_missing_findings_name_the_command(process: Path, tmp_path: Path) -> None:
     (process / "tables" / "figures.json").unlink()
     with pytest.raises(MissingRunsError, match=r"(?s)figures\.json.*dragchain figures"):
-        write_report(tmp_path / "report", [process])
+        write_study_report(tmp_path / "report", [process])
 
 
 def test_input_columns_are_names() -> None:
@@ -298,7 +298,7 @@ def test_input_columns_are_names() -> None:
 
 
 def test_every_figure_of_a_run_has_a_caption(process: Path, tmp_path: Path) -> None:
-    write_report(tmp_path, [process])
+    write_study_report(tmp_path, [process])
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     shown = re.findall(r'<img src="[^"]*" alt="([^"]+)"><figcaption>[A-Z]', page)
     assert len(shown) == len(FIGURES["process"]) + len(FIGURES["drop_test"])
@@ -313,6 +313,8 @@ def with_settings(process: Path, **settings: float) -> Path:
     """The process run with other settings and with its loading."""
     case = json.loads((process / "case.json").read_text())
     case["fidelity"] |= settings
+    circle = {"kind": "circle", "radius_m": 0.02}
+    case = with_motion(case, circle, 0.01, orientation="follow_path")
     (process / "case.json").write_text(json.dumps(case))
     made = write_run(process.parent / "made", made_contacts())
     write_loading(made)
@@ -337,7 +339,7 @@ def test_a_faster_run_says_so_first_and_gives_no_number_of_contacts(
     """Fewer and larger contact forces, not more and smaller; times are those of the process."""
     run = with_settings(process, youngs_modulus_scale=1.0, speed_factor=5.0)
     write_quantities(run)
-    write_report(tmp_path, [run])
+    write_study_report(tmp_path, [run])
     words = summary_box(tmp_path)
     assert "10 mm/s; simulated at 50 mm/s" not in words  # 10 mm/s are the simulated ones here
     assert "2 mm/s; simulated at 10 mm/s" in words
@@ -353,7 +355,7 @@ def test_a_faster_run_says_so_first_and_gives_no_number_of_contacts(
 def test_the_number_of_contacts_from_windows_comes_first(process: Path, tmp_path: Path) -> None:
     run = with_settings(process, youngs_modulus_scale=0.01)
     write_quantities(run, corrected=0.8)
-    write_report(tmp_path, [run])
+    write_study_report(tmp_path, [run])
     words = summary_box(tmp_path)
     assert "more and smaller contact forces" in words
     assert "fewer and larger" not in words
@@ -376,7 +378,7 @@ def test_the_first_screen_says_what_the_windows_reached(
     run = with_settings(process, youngs_modulus_scale=0.01)
     refused = {"window-4": "no particle lost: 1421"}
     write_quantities(run, corrected=0.8, reached=reached, needed=Need(9, 1), refused=refused)
-    write_report(tmp_path, [run])
+    write_study_report(tmp_path, [run])
     words = summary_box(tmp_path)
     assert "from 3 windows at the physical Young's modulus" in words
     assert ("do not give the mean drag to within 10 %" in words) != reached
@@ -388,7 +390,7 @@ def test_a_reduced_modulus_without_windows_says_what_would_help(
     process: Path, tmp_path: Path
 ) -> None:
     run = with_settings(process, youngs_modulus_scale=1e-4)
-    write_report(tmp_path, [run])
+    write_study_report(tmp_path, [run])
     words = summary_box(tmp_path)
     assert "not available contacts on the workpiece at a time" in words
     assert "not corrected for Young's modulus \N{MULTIPLICATION SIGN} 0.0001" in words
@@ -399,7 +401,7 @@ def test_a_reduced_modulus_without_windows_says_what_would_help(
 def test_at_the_settings_of_the_process_all_is_as_measured(process: Path, tmp_path: Path) -> None:
     run = with_settings(process, youngs_modulus_scale=1.0)
     write_quantities(run)
-    write_report(tmp_path, [run])
+    write_study_report(tmp_path, [run])
     words = page_of(tmp_path).words
     assert "not available" not in summary_box(tmp_path)
     assert "this run" not in words[words.index("Values") : words.index("Force on the workpiece")]
@@ -411,7 +413,7 @@ def test_the_first_screen_says_what_was_simulated(process: Path, tmp_path: Path)
     case["inputs"] |= {"workpiece.material": "steel", "motion.path.kind": "circle"}
     (process / "case.json").write_text(json.dumps(case))
     (tmp_path / "set_up.png").write_bytes(PNG)
-    write_report(tmp_path, [process], preview=tmp_path / "set_up.png")
+    write_study_report(tmp_path, [process], preview=tmp_path / "set_up.png")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<h1>A rod in &lt;ceramic&gt;</h1>" in page
     assert page.index("seen obliquely") < page.index("<h2 id=")
@@ -429,7 +431,7 @@ def test_each_run_shows_its_own_settings(process: Path, tmp_path: Path) -> None:
     case = json.loads(drop.read_text())
     case["fidelity"] |= {"youngs_modulus_scale": 1.0, "timestep_fraction": 0.02}
     drop.write_text(json.dumps(case))
-    write_report(tmp_path, [process])
+    write_study_report(tmp_path, [process])
     words = words_of((tmp_path / "report.html").read_text(encoding="utf-8"))
     assert "drop-1 E \N{MULTIPLICATION SIGN} 1, time step 0.02 of the Rayleigh time 2.5" in words
     assert (
@@ -442,7 +444,7 @@ def test_forces_of_a_short_series_are_marked_everywhere(process: Path, tmp_path:
     short = replace(findings.forces["vertical_n"], reliable=False, effective_samples=2.7)
     forces = {**findings.forces, "vertical_n": short}
     findings.model_copy(update={"forces": forces}).write(process / FILE)
-    write_report(tmp_path, [process])
+    write_study_report(tmp_path, [process])
     words = page_of(tmp_path).words
     assert "2.7 (too few)" in words
     row = words[words.index("mean vertical force (N)") :]
@@ -468,7 +470,7 @@ def test_packings_of_one_case_have_one_row_and_one_headline(
     packings: list[Path], tmp_path: Path
 ) -> None:
     """Mean -2.6 with a standard error of 0.153: Student's t with 2 degrees of freedom, 4.303."""
-    write_report(tmp_path, packings[:3])
+    write_study_report(tmp_path, packings[:3])
     words = summary_box(tmp_path)
     low, high = (f"\N{MINUS SIGN}{value:.2f}" for value in (2.6 + 0.6572, 2.6 - 0.6572))
     assert "mean force of 2.60 N" in words
@@ -480,7 +482,7 @@ def test_packings_of_one_case_have_one_row_and_one_headline(
 
 
 def test_packings_of_another_case_are_apart(packings: list[Path], tmp_path: Path) -> None:
-    write_report(tmp_path, packings)
+    write_study_report(tmp_path, packings)
     words = words_of((tmp_path / "report.html").read_text(encoding="utf-8"))
     table = words[words.rindex("Drag by case") : words.rindex("Packings")]
     assert re.findall(r"\b(draft|other) (\d)", table) == [("draft", "3"), ("other", "1")]

@@ -1,12 +1,15 @@
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
+from made_run import with_motion
 
-from dragchain import DocumentError, load_case, load_outputs
-from dragchain.run.case import Statistics, changed_inputs
-from dragchain.run.paths.circle import Circle
-from dragchain.run.paths.line import Line
+from dragchain import DocumentError, TableError, load_case, load_outputs
+from dragchain.run.case import changed_inputs
+from dragchain.run.kinematics import motion_of
+from dragdeck.records.case import StatisticsOfRun
+from dragdeck.study.paths.circle import CirclePath
 
 
 def test_reads_a_process(tiny_run: Path) -> None:
@@ -14,44 +17,46 @@ def test_reads_a_process(tiny_run: Path) -> None:
     assert (case.scene, case.case, case.statistics) == (
         "process",
         "tiny",
-        Statistics(transient_s=0.02),
+        StatisticsOfRun(transient_s=0.02),
     )
-    assert case.bowl is not None
     assert case.bowl.radius_m == 0.04
-    assert case.motion == Line(
-        kind="line",
-        axis_speed_m_s=1e-4,
-        start_m=(0.0, 0.0),
-        direction_rad=0.0,
-        start_direction_rad=0.0,
-    )
+    assert case.motion is not None
+    assert (case.motion.kind, case.motion.start_direction_rad) == ("line", 0.0)
+    assert case.motion.axis_speed_m_s == pytest.approx(1e-4)
     assert [phase.name for phase in case.phases] == ["plunge", "drag"]
     assert case.restitution is None
 
 
 def test_reads_a_circle(tiny_run: Path, edit_json) -> None:
-    circle = {
-        "kind": "circle",
-        "axis_speed_m_s": 0.01,
-        "radius_m": 0.02,
-        "direction": "cw",
-        "orientation": "follow_path",
-    }
-    edit_json(
-        tiny_run / "case.json", lambda c: c.update(motion={**circle, "start_direction_rad": 1.5})
-    )
-    assert load_case(tiny_run).motion == Circle(**circle, start_direction_rad=1.5)
+    path = {"kind": "circle", "radius_m": 0.02, "direction": "cw"}
+    edit_json(tiny_run / "case.json", lambda case: case.update(with_motion(case, path, 0.01)))
+    found = motion_of(load_case(tiny_run)).motion.path
+    assert isinstance(found, CirclePath)
+    assert (found.radius_m, found.sign) == (0.02, -1)
 
 
-def test_a_drop_needs_neither_bowl_nor_workpiece(tiny_run: Path, edit_json) -> None:
+def test_a_motion_that_this_version_makes_otherwise_is_refused(tiny_run: Path, edit_json) -> None:
+    """The tables follow from the inputs; what was simulated stands beside them."""
+    path = {"kind": "circle", "radius_m": 0.02}
+
+    def slower(case: dict[str, Any]) -> None:
+        case.update(with_motion(case, path, 0.01, spin={"rpm": 60}))
+        case["superposed"][0]["stages"][0]["rate_rad_s"] *= 0.99
+
+    edit_json(tiny_run / "case.json", slower)
+    with pytest.raises(TableError, match="another version of dragdeck"):
+        motion_of(load_case(tiny_run))
+
+
+def test_a_drop_has_no_workpiece(tiny_run: Path, edit_json) -> None:
     def to_drop(case):
-        for key in ("case", "bowl", "workpiece", "motion", "surface_m", "statistics"):
+        for key in ("case", "workpiece", "motion", "surface_m", "statistics"):
             del case[key]
         case.update(scene="drop_test", restitution=0.68)
 
     edit_json(tiny_run / "case.json", to_drop)
     case = load_case(tiny_run)
-    assert (case.bowl, case.workpiece, case.restitution) == (None, None, 0.68)
+    assert (case.workpiece, case.restitution) == (None, 0.68)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +68,7 @@ def test_a_drop_needs_neither_bowl_nor_workpiece(tiny_run: Path, edit_json) -> N
         ),
         (
             lambda c: c.update(scene="stir"),
-            r"scene: Input should be 'drop_test', 'filling'",
+            r"scene: the scene is not one of a study\n  value:  stir",
         ),
         (
             lambda c: c["bowl"].pop("radius_m"),
@@ -85,7 +90,7 @@ def test_a_drop_needs_neither_bowl_nor_workpiece(tiny_run: Path, edit_json) -> N
             lambda c: c["media"].update(count=4.5),
             r"media\.count: Input should be a valid integer",
         ),
-        (lambda c: c.update(workpiece=None), "workpiece is missing, which a process has"),
+        (lambda c: c.update(workpiece=None), "workpiece: Input should be an object"),
         (lambda c: c["phases"][1].update(start_step=30), "drag does not start where plunge ends"),
         (lambda c: c["phases"][1].pop("name"), r"phases\[1\]\.name: a required key is missing"),
         (lambda c: c.update(gravity_m_s2=float("nan")), "is not a JSON object|finite number"),

@@ -7,27 +7,26 @@ import pytest
 from changed import changed
 from hypothesis import given
 from hypothesis import strategies as st
+from made_run import with_motion
 
 from dragchain import TableError, load_case
-from dragchain.run.case import Case, Phase, Statistics
 from dragchain.run.kinematics import (
+    bowl_velocity,
     counted_mask,
     directions,
+    motion_of,
     phase_codes,
     spins,
     workpiece_frame,
-    workpiece_turn,
+    workpiece_rotation,
     workpiece_velocity,
-    wrap_angle,
 )
-from dragchain.run.paths.circle import Circle
-from dragchain.run.paths.rest import Rest
-from dragchain.run.paths.waypoints import Waypoints, WaypointStage
-from dragchain.run.superposed.oscillation import Oscillation
-from dragchain.run.superposed.spin import Spin, SpinStage
-from dragchain.run.workpiece import turned
-from dragdeck.errors import DocumentError
+from dragdeck.records.case import CaseOfRun, StatisticsOfRun
+from dragdeck.records.run import Phase
+from dragdeck.study.rotation import wrap_angle
 
+DT = 1e-3
+CIRCLE = {"kind": "circle", "radius_m": 0.02}
 PHASES = (
     Phase(name="plunge", start_step=0, end_step=10),
     Phase(name="approach", start_step=10, end_step=20),
@@ -36,23 +35,25 @@ PHASES = (
 
 
 @pytest.fixture
-def case(tiny_run: Path) -> Case:
-    return changed(load_case(tiny_run), phases=PHASES, statistics=Statistics(transient_s=0.005))
+def case(tiny_run: Path) -> CaseOfRun:
+    return changed(
+        load_case(tiny_run), phases=PHASES, statistics=StatisticsOfRun(transient_s=0.005)
+    )
+
+
+def moving(
+    case: CaseOfRun, path: Any = CIRCLE, speed_m_s: float | None = 0.01, **motion: Any
+) -> CaseOfRun:
+    """The case with a workpiece on a path, which it follows."""
+    data = with_motion(
+        case.model_dump(), path, speed_m_s, **{"orientation": "follow_path", **motion}
+    )
+    return CaseOfRun.model_validate(data)
 
 
 @pytest.fixture
-def circling(case: Case) -> Case:
-    return changed(
-        case,
-        motion=Circle(
-            kind="circle",
-            axis_speed_m_s=0.01,
-            radius_m=0.02,
-            direction="ccw",
-            start_direction_rad=pi / 2,
-            orientation="follow_path",
-        ),
-    )
+def circling(case: CaseOfRun) -> CaseOfRun:
+    return moving(case)
 
 
 def test_a_step_belongs_to_the_phase_that_computed_it() -> None:
@@ -66,21 +67,23 @@ def test_a_step_without_a_phase_is_an_error(steps, phases) -> None:
         phase_codes(np.array(steps), phases)
 
 
-def test_samples_count_from_the_end_of_the_run_in(case: Case) -> None:
+def test_samples_count_from_the_end_of_the_run_in(case: CaseOfRun) -> None:
     steps = np.array([20, 24, 25, 26, 40])
     assert counted_mask(steps, case).tolist() == [False, False, True, True, True]
 
 
-def test_without_run_in_the_step_that_starts_the_drag_does_not_count(case: Case) -> None:
+def test_without_run_in_the_step_that_starts_the_drag_does_not_count(case: CaseOfRun) -> None:
     steps = np.array([19, 20, 21])
-    assert counted_mask(steps, changed(case, statistics=Statistics(transient_s=0.0))).tolist() == [
+    assert counted_mask(
+        steps, changed(case, statistics=StatisticsOfRun(transient_s=0.0))
+    ).tolist() == [
         False,
         False,
         True,
     ]
 
 
-def test_a_case_without_drag_is_an_error(case: Case) -> None:
+def test_a_case_without_drag_is_an_error(case: CaseOfRun) -> None:
     with pytest.raises(TableError, match="no phase named drag"):
         counted_mask(np.array([1]), changed(case, phases=PHASES[:2]))
 
@@ -96,19 +99,17 @@ def test_a_case_without_drag_is_an_error(case: Case) -> None:
     ],
 )
 def test_on_a_circle_the_workpiece_heads_along_the_tangent(circling, sense, place, heading) -> None:
-    turned = changed(
-        circling, motion=changed(circling.motion, direction="ccw" if sense > 0 else "cw")
-    )
+    turned = moving(circling, CIRCLE | {"direction": "ccw" if sense > 0 else "cw"})
     assert directions(np.array([30]), np.array([place]), turned) == pytest.approx(heading)
 
 
-def test_before_the_drag_the_heading_is_the_one_it_starts_with(circling: Case) -> None:
+def test_before_the_drag_the_heading_is_the_one_it_starts_with(circling: CaseOfRun) -> None:
     places = np.array([[0.0, 0.0], [0.01, 0.0], [0.0, 0.02]])
     np.testing.assert_allclose(directions(np.array([5, 15, 20]), places, circling), [pi / 2] * 3)
 
 
-def test_on_a_line_the_heading_is_the_lines(case: Case) -> None:
-    case = changed(case, motion=changed(case.motion, start_direction_rad=1.5 * pi))
+def test_on_a_line_the_heading_is_the_lines(case: CaseOfRun) -> None:
+    case = moving(case, {"kind": "line", "start_m": [0.0, 0.0], "direction_deg": 270})
     np.testing.assert_allclose(directions(np.array([0, 30]), np.ones((2, 2)), case), [-pi / 2] * 2)
 
 
@@ -135,18 +136,18 @@ def test_half_a_turn_wraps_to_plus_pi() -> None:
     np.testing.assert_array_equal(wrap_angle([pi, -pi]), [pi, pi])
 
 
-def test_a_workpiece_at_rest_has_no_velocity_and_one_direction(case: Case) -> None:
+def test_a_workpiece_at_rest_has_no_velocity_and_one_direction(case: CaseOfRun) -> None:
     """Relative to a bowl that rotates counter-clockwise it moves along -y."""
-    rest = Rest(
-        kind="rest", axis_speed_m_s=0.02, start_direction_rad=-pi / 2, radius_m=0.01, bowl_rad_s=2.0
-    )
-    case = changed(case, motion=rest)
+    rpm = 2.0 * 30 / pi
+    rest = {"kind": "rest", "radius_m": 0.01, "bowl_rpm": rpm, "revolutions": 20 * DT / pi}
+    case = moving(case, rest, None)
     steps, place = np.array([20, 30]), np.array([[0.01, 0.0, 0.0]] * 2)
     np.testing.assert_allclose(directions(steps, place[:, :2], case), [-pi / 2] * 2)
-    np.testing.assert_allclose(workpiece_turn(steps, np.full(2, -pi / 2), case), [-pi / 2] * 2)
+    turn = workpiece_rotation(steps, np.full(2, -pi / 2), case).turn_rad
+    np.testing.assert_allclose(turn, [-pi / 2] * 2)
     velocity = workpiece_velocity(steps, place + 0.001, place, case)
     assert not velocity[np.isfinite(velocity)].any() and np.isfinite(velocity).any()
-    np.testing.assert_allclose(rest.bowl_velocity(place), [[0.0, 0.02, 0.0]] * 2)
+    np.testing.assert_allclose(bowl_velocity(place, case), [[0.0, 0.02, 0.0]] * 2)
 
 
 # --- waypoints -----------------------------------------------------------------------------------
@@ -162,34 +163,37 @@ STAGES = (
 
 
 @pytest.fixture
-def on_waypoints(case: Case) -> Case:
-    stages = tuple(WaypointStage(steps=steps, velocity_m_s=v) for steps, v in STAGES)
-    path = Waypoints(
-        kind="waypoints", axis_speed_m_s=0.02, start_direction_rad=-pi / 2, stages=stages
-    )
-    return changed(case, motion=path)
+def on_waypoints(case: CaseOfRun) -> CaseOfRun:
+    times = np.cumsum([0, *(steps for steps, _ in STAGES)]) * DT
+    moved = [np.array(velocity) * steps * DT for steps, velocity in STAGES]
+    places = np.vstack([np.zeros(3), np.cumsum(moved, axis=0)])
+    points = np.column_stack([times, places]).tolist()
+    return moving(case, {"kind": "waypoints", "points": points}, None)
 
 
-def test_a_stretch_without_a_direction_keeps_the_last_one(on_waypoints: Case) -> None:
+def test_a_stretch_without_a_direction_keeps_the_last_one(on_waypoints: CaseOfRun) -> None:
     """The first one has that of the next; a stage owns its last step."""
     steps = np.array([0, 20, 21, 23, 24, 27, 28, 29, 30, 31, 32, 40])
     found = directions(steps, np.zeros((12, 2)), on_waypoints)
     np.testing.assert_allclose(found, [-pi / 2] * 10 + [pi] * 2)
 
 
-def test_the_workpiece_does_not_turn_on_waypoints(on_waypoints: Case) -> None:
+def test_the_workpiece_does_not_turn_on_waypoints(on_waypoints: CaseOfRun) -> None:
     steps = np.array([0, 21, 40])
     heading = directions(steps, np.zeros((3, 2)), on_waypoints)
-    np.testing.assert_allclose(workpiece_turn(steps, heading, on_waypoints), -pi / 2)
-    assert not on_waypoints.motion.keeps_direction
+    turn = workpiece_rotation(steps, heading, on_waypoints).turn_rad
+    np.testing.assert_allclose(turn, -pi / 2)
+    assert not motion_of(on_waypoints).keeps_direction
 
 
 @pytest.mark.parametrize("superposed", [False, True])
 def test_on_waypoints_the_velocity_is_that_of_the_stage(
-    on_waypoints: Case, superposed: bool
+    on_waypoints: CaseOfRun, superposed: bool
 ) -> None:
     steps = np.arange(21, 41)
-    case = changed(on_waypoints, superposed=(SPIN,)) if superposed else on_waypoints
+    path = on_waypoints.inputs["motion.path.points"]
+    spin = {"spin": SPIN} if superposed else {}
+    case = moving(on_waypoints, {"kind": "waypoints", "points": path}, None, **spin)
     reference = np.ones((20, 3))
     point = reference + np.array([0.01, 0.0, 0.005])
     wanted = np.repeat([v for _, v in STAGES], [n for n, _ in STAGES], axis=0)
@@ -201,52 +205,45 @@ def test_on_waypoints_the_velocity_is_that_of_the_stage(
     assert np.isnan(outside).all()
 
 
-def test_waypoints_are_read_from_case_json(tiny_run: Path, edit_json: Any, on_waypoints) -> None:
-    entry = on_waypoints.motion.model_dump()
-    edit_json(tiny_run / "case.json", lambda case: case.update(motion=entry))
-    assert load_case(tiny_run).motion == on_waypoints.motion
-    entry["stages"] = []
-    edit_json(tiny_run / "case.json", lambda case: case.update(motion=entry))
-    with pytest.raises(DocumentError, match="stages"):
-        load_case(tiny_run)
-
-
 # --- superposed on the path ----------------------------------------------------------------------
 
-SPIN = Spin(
-    kind="spin", stages=(SpinStage(steps=8, rate_rad_s=30.0), SpinStage(steps=12, rate_rad_s=-60.0))
-)
-OSCILLATION = Oscillation(kind="oscillation", amplitude_m=1e-3, rate_rad_s=40.0)
+SPIN = {
+    "schedule": [
+        {"until_s": 8 * DT, "rpm": 30.0 * 30 / pi},
+        {"until_s": 9, "rpm": -60.0 * 30 / pi},
+    ],
+    "ramp_s": 0,
+}
+OSCILLATION = {"amplitude_m": 1e-3, "frequency_hz": 20.0 / pi, "ramp_s": 0}
 
 
-def with_all(case: Case) -> Case:
-    return changed(case, superposed=(SPIN, OSCILLATION))
+def with_all(case: CaseOfRun, **motion: Any) -> CaseOfRun:
+    return moving(case, spin=SPIN, oscillation=OSCILLATION, **motion)
 
 
-def test_the_turn_adds_up_the_stages(circling: Case) -> None:
+def test_the_turn_adds_up_the_stages(circling: CaseOfRun) -> None:
     """In the drag, from step 20 to 40; the path's own turn beside it."""
     steps = np.array([0, 20, 24, 28, 30, 40, 50])
-    turn = workpiece_turn(steps, np.zeros(7), with_all(circling)) / circling.timestep_s
+    turn = workpiece_rotation(steps, np.zeros(7), with_all(circling)).turn_rad / DT
     np.testing.assert_allclose(turn, [0, 0, 120, 240, 120, -480, -480], atol=1e-9)
     assert spins(with_all(circling))
     assert not spins(circling)
 
 
-def place(case: Case, steps: np.ndarray, own_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def place(case: CaseOfRun, steps: np.ndarray, own_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A point that is fixed to the workpiece and the reference point, from angles alone."""
     time = (steps - 20) * case.timestep_s
     angle = 0.01 / 0.02 * time
     height = 1e-3 * np.sin(40.0 * time)
     reference = np.column_stack([0.02 * np.cos(angle), 0.02 * np.sin(angle), height])
-    turn = workpiece_turn(steps, directions(steps, reference[:, :2], case), case)
-    return reference + turned(np.tile(own_m, (len(steps), 1)), turn), reference
+    rotation = workpiece_rotation(steps, directions(steps, reference[:, :2], case), case)
+    return reference + rotation.out_of(np.tile(own_m, (len(steps), 1))), reference
 
 
 @pytest.mark.parametrize("orientation", ["follow_path", "fixed"])
-def test_the_velocity_is_the_change_of_the_place(circling: Case, orientation: str) -> None:
+def test_the_velocity_is_the_change_of_the_place(circling: CaseOfRun, orientation: str) -> None:
     """Of a point beside and above the reference point, apart from steps where the spin changes."""
-    case = with_all(circling)
-    case = changed(case, motion=changed(case.motion, orientation=orientation), timestep_s=1e-5)
+    case = with_all(changed(circling, timestep_s=1e-5), orientation=orientation)
     steps = np.array([22, 25, 31, 38])
     own = np.array([0.004, -0.003, 0.01])
     point, reference = place(case, steps, own)
@@ -256,7 +253,7 @@ def test_the_velocity_is_the_change_of_the_place(circling: Case, orientation: st
     )
 
 
-def test_a_stage_owns_its_last_step(circling: Case) -> None:
+def test_a_stage_owns_its_last_step(circling: CaseOfRun) -> None:
     case = with_all(circling)
     steps = np.array([28, 29])
     reference = np.tile([0.02, 0.0, 0.0], (2, 1))
@@ -264,13 +261,3 @@ def test_a_stage_owns_its_last_step(circling: Case) -> None:
     path = workpiece_velocity(steps, point, reference, circling)
     added = workpiece_velocity(steps, point, reference, case) - path
     np.testing.assert_allclose(added[:, 1], [0.3, -0.6])
-
-
-def test_superposed_motions_are_told_by_their_kind(tiny_run: Path, edit_json: Any) -> None:
-    entries = [one.model_dump() for one in (SPIN, OSCILLATION)]
-    edit_json(tiny_run / "case.json", lambda case: case.update(superposed=entries))
-    assert load_case(tiny_run).superposed == (SPIN, OSCILLATION)
-    entries[0]["kind"] = "wobble"
-    edit_json(tiny_run / "case.json", lambda case: case.update(superposed=entries))
-    with pytest.raises(DocumentError, match="wobble"):
-        load_case(tiny_run)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from made_run import with_motion
 from tiny_run_files import DENSITY_KG_M3, GRAVITY_M_S2, RADIUS_M, WORKPIECE_RADIUS_M, case_json
 
 from dragchain.cli import main
@@ -16,14 +17,14 @@ from dragchain.scaling.document import Expectation, ScalingFile
 from dragchain.scaling.fit import (
     draw_scalings,
     find,
-    read_runs,
+    read_scaled_runs,
     read_scalings,
     said,
     table,
     write_scaling,
 )
 from dragchain.statistics.estimate import Estimate
-from dragchain.statistics.power_law import Runs, fit_power_law
+from dragchain.statistics.power_law import RunMeans, fit_power_law
 from dragdeck.errors import DocumentError
 
 DEPTH = "motion.immersion_depth_m"
@@ -41,15 +42,9 @@ def write_run(tmp_path: Path) -> Writer:
         case["inputs"] |= {**inputs, "seed": seed}
         case["upstream"]["filling"] = f"filling-{seed}"
         case["workpiece"]["immersion_depth_m"] = inputs.get(DEPTH, 0.03)
-        case["motion"] = {
-            **{
-                "kind": "circle",
-                "axis_speed_m_s": 0.01,
-                "radius_m": 0.02,
-                "direction": "ccw",
-            },
-            **{"start_direction_rad": 1.57, "orientation": "follow_path"},
-        }
+        path = {"kind": "circle", "radius_m": 0.02, "revolutions": 1}
+        speed = float(str(inputs.get("motion.speed_m_s", 0.01)))
+        case = with_motion(case, path, speed, orientation="follow_path")
         folder = tmp_path / case["run"]
         (folder / "tables").mkdir(parents=True)
         (folder / "case.json").write_text(json.dumps(case))
@@ -88,7 +83,7 @@ def test_a_quadratic_drag_confirms_two_and_contradicts_one(quadratic: list[Path]
 
 
 def test_the_size_is_compared_with_the_weight_on_the_workpiece(quadratic: list[Path]) -> None:
-    run = read_runs(quadratic, DEPTH)[0]
+    run = read_scaled_runs(quadratic, DEPTH)[0]
     scale = DENSITY_KG_M3 * GRAVITY_M_S2 * 2.0 * WORKPIECE_RADIUS_M
     assert run.row.eta == pytest.approx(2000.0 * 1.03 / scale)
     assert find(quadratic, DEPTH, Expectation(exponent=2.0)).eta.contains(2000.0 * 1.045 / scale)
@@ -136,14 +131,14 @@ def test_runs_that_differ_in_more_than_the_field_are_refused(write_run: Writer) 
         for depth, count in zip(LEVELS, (4, 4, 5), strict=True)
     ]
     with pytest.raises(TableError, match=r"media\.count is 5.*it is 4"):
-        read_runs(folders, DEPTH)
+        read_scaled_runs(folders, DEPTH)
 
 
 @pytest.mark.parametrize("value", ["deep", None, True, -1.0])
 def test_a_field_without_a_number_is_refused(write_run: Writer, value: Any) -> None:
     folder = write_run(1.0, other=value)
     with pytest.raises(TableError, match="numbers above 0"):
-        read_runs([folder], "other")
+        read_scaled_runs([folder], "other")
 
 
 def test_a_drag_along_the_motion_is_refused(write_run: Writer, tmp_path: Path) -> None:
@@ -203,4 +198,4 @@ def _refit(found: ScalingFile) -> Estimate:
     runs = pd.DataFrame([dict(run) for run in found.runs])
     drag = runs.drag_n.to_numpy()
     errors = runs.standard_error_n.to_numpy() / drag
-    return fit_power_law(Runs(runs.level.to_numpy(), drag, errors, list(runs.bed))).exponent
+    return fit_power_law(RunMeans(runs.level.to_numpy(), drag, errors, list(runs.bed))).exponent

@@ -5,8 +5,7 @@ import pytest
 from scipy import stats
 
 from dragchain.errors import SeriesError
-from dragchain.statistics.power_law import Runs, fit_power_law
-from dragchain.statistics.power_law_forms import fit_shifted, fit_two_terms
+from dragchain.statistics.power_law import RunMeans, fit_power_law, fit_shifted, fit_two_terms
 
 DEPTHS = (10.0, 20.0, 30.0, 40.0, 50.0)
 SWEEPS = 300
@@ -22,7 +21,7 @@ def sweep(
     spread: float = 0.06,
     bed_fraction: float = 0.2,
     error: float = 0.03,
-) -> Runs:
+) -> RunMeans:
     """Runs of a power law, bent in logarithms, with beds, chance and errors of the means."""
     x = np.repeat(levels, seeds)
     beds = list(range(seeds)) * len(levels)
@@ -31,7 +30,7 @@ def sweep(
     errors = error * random.uniform(0.5, 1.5, len(x))
     law = exponent * np.log(x / 25.0) + bend * np.log(x / 25.0) ** 2
     noise = of_bed[beds] + own + random.normal(0.0, errors)
-    return Runs(x, np.exp(law + noise), errors, beds)
+    return RunMeans(x, np.exp(law + noise), errors, beds)
 
 
 def binomial(fraction: float) -> tuple[float, float]:
@@ -59,7 +58,7 @@ def test_the_interval_holds_the_exponent_as_often_as_it_says(
 
 def test_without_noise_the_law_is_found() -> None:
     x = np.repeat(DEPTHS, 2)
-    law = fit_power_law(Runs(x, 3.0 * x**1.7, np.full(10, 1e-3), [1, 2] * 5))
+    law = fit_power_law(RunMeans(x, 3.0 * x**1.7, np.full(10, 1e-3), [1, 2] * 5))
     assert law.exponent.value == pytest.approx(1.7, abs=1e-9)
     assert law.at(20.0).value == pytest.approx(3.0 * 20.0**1.7)
     assert [one.value for one in law.local_exponents()] == pytest.approx([1.7] * 4)
@@ -81,9 +80,9 @@ def test_a_less_certain_run_counts_less() -> None:
     values[-1] *= 2.0  # a run that is off
     beds = list(range(6))
     errors = np.full(6, 0.01)
-    same = fit_power_law(Runs(x, values, errors, beds)).exponent
+    same = fit_power_law(RunMeans(x, values, errors, beds)).exponent
     errors[-1] = 1.0
-    less = fit_power_law(Runs(x, values, errors, beds)).exponent
+    less = fit_power_law(RunMeans(x, values, errors, beds)).exponent
     assert abs(less.value - 1.0) < 0.2 * abs(same.value - 1.0)
 
 
@@ -96,7 +95,7 @@ def test_a_bent_law_is_found_out() -> None:
 
 def test_one_level_off_the_law_is_named() -> None:
     runs = sweep(np.random.default_rng(3), spread=0.01, error=0.01)
-    off = Runs(runs.x, np.where(runs.x == 30.0, 1.3, 1.0) * runs.values, runs.errors, runs.beds)
+    off = RunMeans(runs.x, np.where(runs.x == 30.0, 1.3, 1.0) * runs.values, runs.errors, runs.beds)
     law = fit_power_law(off)
     deviations = [law.deviation(number) for number in range(5)]
     third = deviations[2]
@@ -113,12 +112,12 @@ def test_an_offset_and_a_lower_term_are_found() -> None:
     x = np.repeat(DEPTHS, 2)
     errors, beds = np.full(10, 0.01), [1, 2] * 5
     noise = np.exp(np.random.default_rng(6).normal(0.0, 0.01, 10))
-    shifted = Runs(x, 0.01 * (x + 8.0) ** 2 * noise, errors, beds)
+    shifted = RunMeans(x, 0.01 * (x + 8.0) ** 2 * noise, errors, beds)
     found = fit_shifted(fit_power_law(shifted), 2.0)
     assert found.offset is not None and found.offset.contains(8.0)
     assert 6.0 < found.offset.ci95_low < found.offset.ci95_high < 10.0
     assert found.at(30.0) == pytest.approx(0.01 * 38.0**2, rel=0.03)
-    summed = Runs(x, (0.01 * x**2 + 0.3 * x) * noise, errors, beds)
+    summed = RunMeans(x, (0.01 * x**2 + 0.3 * x) * noise, errors, beds)
     terms = fit_two_terms(fit_power_law(summed), 2.0)
     assert terms.leading.contains(0.01) and terms.lower.contains(0.3)
     assert terms.lower_fraction.contains(15.0 / 40.0) and terms.lower.ci95_low > 0.2
@@ -135,11 +134,11 @@ def test_an_offset_without_bound_is_none() -> None:
 )
 def test_values_that_have_no_logarithm_are_refused(values: list[float], words: str) -> None:
     with pytest.raises(SeriesError, match=words):
-        Runs(np.array([1.0, 2.0, 3.0, 4.0]), np.array(values), np.full(4, 0.1), [1, 2, 3, 4])
+        RunMeans(np.array([1.0, 2.0, 3.0, 4.0]), np.array(values), np.full(4, 0.1), [1, 2, 3, 4])
 
 
 def test_too_few_levels_and_runs_are_refused() -> None:
     with pytest.raises(SeriesError, match="2 level"):
-        Runs(np.array([1.0, 2.0, 2.0]), np.ones(3), np.full(3, 0.1), [1, 2, 3])
+        RunMeans(np.array([1.0, 2.0, 2.0]), np.ones(3), np.full(3, 0.1), [1, 2, 3])
     with pytest.raises(SeriesError, match="more seeds"):
-        Runs(np.array([1.0, 2.0, 3.0]), np.ones(3), np.full(3, 0.1), [1, 1, 2])
+        RunMeans(np.array([1.0, 2.0, 3.0]), np.ones(3), np.full(3, 0.1), [1, 1, 2])

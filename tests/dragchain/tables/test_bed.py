@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dragchain import Frame, TableError, load_case
-from dragchain.tables.bed import bed_height, describe_bed
+from dragchain.tables.bed import describe_bed, probed_height
 
 NAMES = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s", "radius_m")
 
@@ -18,29 +18,29 @@ def frame(rows):
 
 
 def test_a_bed_of_nothing_has_no_height() -> None:
-    assert bed_height(np.empty((0, 3)), np.empty(0), 0.04) == 0.0
+    assert probed_height(np.empty((0, 3)), np.empty(0), 0.04) == 0.0
 
 
 def test_one_particle_under_the_only_probe() -> None:
     """The bowl is 1.4 wide, the particle 1: one probe, on the axis."""
-    assert bed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), 0.7) == 1.0
+    assert probed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), 0.7) == 1.0
 
 
 def test_a_probe_meets_a_particle_on_its_flank() -> None:
     """0.3 off the centre of a particle of radius 0.5: 0.4 above the centre."""
-    height = bed_height(np.array([[0.3, 0, 0.5]]), np.array([0.5]), 0.8)
+    height = probed_height(np.array([[0.3, 0, 0.5]]), np.array([0.5]), 0.8)
     assert height == pytest.approx(0.9)
 
 
 def test_where_no_particle_lies_the_probe_meets_the_floor() -> None:
     """Bowl of radius 1.5, pitch 1: probes on the axis and at distance 1, 5 in all."""
-    height = bed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), 1.5)
+    height = probed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), 1.5)
     assert height == pytest.approx(1.0 / 5)
 
 
 def test_the_highest_particle_counts() -> None:
     centres = np.array([[0, 0, 0.5], [0, 0, 1.5]])
-    assert bed_height(centres, np.array([0.5, 0.5]), 0.7) == 2.0
+    assert probed_height(centres, np.array([0.5, 0.5]), 0.7) == 2.0
 
 
 def test_a_large_particle_reaches_over_several_probes() -> None:
@@ -51,7 +51,7 @@ def test_a_large_particle_reaches_over_several_probes() -> None:
     bowl = 2.5 * pitch
     spots = [(i, j) for i in range(-3, 4) for j in range(-3, 4) if np.hypot(i, j) <= 2]
     exact = np.mean([3.1 + np.sqrt(3.1**2 - pitch**2 * (i * i + j * j)) for i, j in spots])
-    assert bed_height(centres, radius, bowl) == pytest.approx(exact)
+    assert probed_height(centres, radius, bowl) == pytest.approx(exact)
 
 
 @given(st.lists(st.tuples(*[st.floats(-1, 1)] * 2, st.floats(0.1, 3), st.floats(0.1, 0.4))))
@@ -68,12 +68,12 @@ def test_it_is_what_a_plain_search_finds(particles) -> None:
         rest = table[:, 3] ** 2 - ((table[:, :2] - spot) ** 2).sum(axis=1)
         hits = [z + np.sqrt(r) for z, r in zip(table[:, 2], rest, strict=True) if r >= 0]
         tops.append(max(hits, default=0.0))
-    assert bed_height(table[:, :3], table[:, 3], 1.2) == pytest.approx(np.mean(tops), rel=1e-6)
+    assert probed_height(table[:, :3], table[:, 3], 1.2) == pytest.approx(np.mean(tops), rel=1e-6)
 
 
 def test_a_bowl_narrower_than_a_particle_is_an_error() -> None:
     with pytest.raises(TableError, match="does not fit"):
-        bed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), 0.4)
+        probed_height(np.array([[0, 0, 0.5]]), np.array([0.5]), 0.4)
 
 
 def test_describes_a_bed_of_one_particle_by_hand(tiny_run: Path) -> None:

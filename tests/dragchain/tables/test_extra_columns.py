@@ -7,8 +7,8 @@ import pytest
 from fat_files import fatten
 
 from dragchain import load_outputs, write_tables
-from dragchain.dumps.run_parts import iter_frames
 from dragchain.network.write import write_chains
+from dragchain.run.run_parts import iter_frames
 
 TABLES = (
     "contacts",

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
 from dragchain.tables.network_contacts import KINDS, Corrections, contact_rows, count_corrections
 from dragchain.tables.workpiece_contacts import WallContacts
+from dragdeck.dumps.frame import Frame
 
 PARTICLES = (
     *("particle_id", "x_m", "y_m", "z_m", "radius_m"),

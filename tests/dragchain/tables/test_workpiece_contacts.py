@@ -4,13 +4,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from dragchain.dumps.frame import Frame
 from dragchain.errors import TableError
 from dragchain.tables.workpiece_contacts import (
     WallContacts,
     WorkpieceFrames,
     join_workpiece_frames,
 )
+from dragdeck.dumps.frame import Frame
 
 PARTICLES = ("particle_id", "x_m", "y_m", "z_m", "radius_m", "force_x_n", "force_y_n", "force_z_n")
 CONTACTS = (

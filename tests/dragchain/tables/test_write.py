@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from made_run import with_motion
 from tiny_run_files import (
     COLUMNS,
     LAST,
@@ -20,9 +21,9 @@ from tiny_run_files import (
 )
 
 from dragchain import DumpError, RejectedRunError, TableError, load_case, load_outputs, write_tables
-from dragchain.drag.force import read_counted, summarise_forces
-from dragchain.dumps.run_parts import iter_prints
+from dragchain.drag import read_counted, summarise_forces
 from dragchain.loading.write import write_loading
+from dragchain.run.run_parts import iter_prints
 from dragchain.tables.columns import FORCES, REFERENCE
 from dragchain.tables.write import WorkpieceSamples
 
@@ -137,9 +138,8 @@ def test_a_run_without_velocities_has_tables_but_no_slip(tiny_run: Path, edit_js
 
 def test_the_azimuth_is_measured_from_the_direction_of_motion(tiny_run: Path, edit_json) -> None:
     """The particle lies in +x; a workpiece that heads along +y has it on its right."""
-    edit_json(
-        tiny_run / "case.json", lambda case: case["motion"].update(start_direction_rad=pi / 2)
-    )
+    path = {"kind": "line", "start_m": [0.0, 0.0], "direction_deg": 90}
+    edit_json(tiny_run / "case.json", lambda case: case.update(with_motion(case, path, SPEED_M_S)))
     write_tables(tiny_run)
     contacts = pd.read_parquet(tiny_run / "tables" / "workpiece_contacts.parquet")
     np.testing.assert_allclose(contacts["azimuth_rad"], -pi / 2)

@@ -27,13 +27,13 @@ from tradeoff_files import (
 
 from dragchain.errors import TableError
 from dragchain.statistics.estimate import student_quantile
-from dragchain.tradeoff.compare import Setting, compare_quantity, read_runs
+from dragchain.tradeoff.compare import Setting, compare_quantity, read_plan_runs
 from dragchain.tradeoff.measures import QUANTITIES
 from dragchain.tradeoff.outcome import (
     Tradeoff,
     breaks,
     choose,
-    error_table,
+    errors_by_setting,
     largest_bound,
     run_table,
 )
@@ -118,14 +118,14 @@ def test_a_setting_that_only_failed_has_no_errors(tmp_path: Path) -> None:
     tradeoff = made(tmp_path, found)
     assert Setting(*FAST) in tradeoff.settings()
     assert all(Setting(*FAST) not in own.errors for own in tradeoff.comparisons.values())
-    assert not (error_table(tradeoff)["speed_factor"] == 5.0).any()
+    assert not (errors_by_setting(tradeoff)["speed_factor"] == 5.0).any()
 
 
 def test_the_longest_of_runs_that_differ_in_path_counts(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     long = [measures(REFERENCE, seed, rng, blocks=16) for seed in (1, 2)]
     files = write(tmp_path, contents() + long)
-    runs, _, arc_m = read_runs(files, files[0].parent)
+    runs, _, arc_m = read_plan_runs(files, files[0].parent)
     own = [run for run in runs if run.setting == Setting(*REFERENCE)]
     lengths = sorted(run.measures.arc_m / BLOCK_M for run in own)
     assert lengths == pytest.approx([8, 8, 16, 16])
@@ -181,14 +181,14 @@ def test_files_that_cannot_be_used_are_refused(tmp_path: Path) -> None:
     found = contents()
     files = write(tmp_path / "a", found)
     with pytest.raises(TableError, match="reference is not among"):
-        read_runs(files, tmp_path)
+        read_plan_runs(files, tmp_path)
     found[0]["schema"] = 99
     with pytest.raises(DocumentError, match=r"schema: .*another version"):
-        read_runs(write(tmp_path / "b", found), tmp_path)
+        read_plan_runs(write(tmp_path / "b", found), tmp_path)
     rng = np.random.default_rng(1)
     failed = write(tmp_path / "c", [measures(REFERENCE, 1, rng, failure=FAILURE)])
     with pytest.raises(TableError, match="no run of the trade-off is complete"):
-        read_runs(failed, failed[0].parent)
+        read_plan_runs(failed, failed[0].parent)
 
 
 def test_a_run_twice_as_long_counts_as_two_of_its_bed(tmp_path: Path) -> None:
@@ -196,7 +196,7 @@ def test_a_run_twice_as_long_counts_as_two_of_its_bed(tmp_path: Path) -> None:
     found = [measures(REFERENCE, seed, rng) for seed in (1, 2, 3)]
     found += [measures(SOFT, seed, rng, effects=SOFTNESS, blocks=17) for seed in (1, 2, 3)]
     files = write(tmp_path, found)
-    runs, _, _ = read_runs(files, files[0].parent)
+    runs, _, _ = read_plan_runs(files, files[0].parent)
     long = [run for run in runs if run.setting == Setting(*SOFT)]
     assert [len(run.stretches) for run in runs if run not in long] == [1, 1, 1]
     assert [len(run.stretches) for run in long] == [2, 2, 2]
@@ -210,7 +210,7 @@ def test_what_is_written_is_no_setting(tmp_path: Path) -> None:
     found = [measures(REFERENCE, 1, rng, inputs={"outputs.network_hz": 20.0})]
     found += [measures(REFERENCE, 2, rng, inputs={"outputs.network_hz": 100.0})]
     files = write(tmp_path, found)
-    runs, reference, _ = read_runs(files, files[0].parent)
+    runs, reference, _ = read_plan_runs(files, files[0].parent)
     assert {run.setting for run in runs} == {reference}
 
 
@@ -221,7 +221,7 @@ def test_intervals_hold_whatever_settings_do_together(tmp_path: Path) -> None:
     """
     rng, spread = np.random.default_rng(8), 0.03
     files = write(tmp_path, contents())
-    runs, reference, _ = read_runs(files, files[0].parent)
+    runs, reference, _ = read_plan_runs(files, files[0].parent)
     (drag,) = (one for one in QUANTITIES if one.name == "drag_mean")
     held, trials = 0, 300
     for _ in range(trials):

@@ -21,8 +21,8 @@ from tradeoff_files import (
 
 from dragchain.cli import main as dragchain
 from dragchain.tradeoff.changes import read_costs
-from dragchain.tradeoff.drops import choose_drop, read_drops
-from dragchain.tradeoff.report import in_percent, plainly, times
+from dragchain.tradeoff.drops import choose_drop, compare_drops
+from dragchain.tradeoff.report import error_percent, times
 from dragdeck.errors import DocumentError
 
 pytestmark = pytest.mark.slow  # its data take seconds to make
@@ -144,12 +144,12 @@ def test_drops_are_compared_with_the_finest(summary: dict[str, Any], tmp_path: P
     assert [row["timestep_fraction"] for row in summary["drop_test"]] == [0.02, 0.1, 0.2]
     assert summary["drop_test"][1]["restitution_error"] == pytest.approx(0.01)  # the worst impact
     assert summary["drop_test"][1]["relative_cost"] == pytest.approx(0.2)
-    found = read_drops(drops(tmp_path))
+    found = compare_drops(drops(tmp_path))
     assert found[1].bound == pytest.approx(0.01) and found[2].bound == pytest.approx(0.125)
     assert choose_drop(found, 0.02).drop == choose_drop(found, 0.02).nearest == found[1]
     assert choose_drop(found, 0.2).drop == found[2]
     assert choose_drop(found, 0.005).drop is None
-    assert read_drops([]) == []
+    assert compare_drops([]) == []
 
 
 def test_tables_and_figures_are_there(made: Path) -> None:
@@ -186,8 +186,7 @@ def test_costs_without_a_key_are_refused(tmp_path: Path) -> None:
 
 
 def test_numbers_in_words() -> None:
-    assert [in_percent(x) for x in (0.1234, -0.0123, 0.00049, 0.0)] == [
+    assert [error_percent(x) for x in (0.1234, -0.0123, 0.00049, 0.0)] == [
         "+12", "\N{MINUS SIGN}1.2", "+0.05", "0"
     ]  # fmt: skip
-    assert plainly(0.05) == "5" and plainly(0.2) == "20"
     assert times(41.7) == "42" and times(float("nan")) == "\N{EN DASH}"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dragchain.statistics.estimate import student_quantile
-from dragchain.windows.estimate import UNKNOWN, Known, joined, needed
+from dragchain.windows.estimate import UNKNOWN, Known, joined, windows_needed
 
 DRAG = Known(ratio_log=0.1, ratio_log_std=0.05, variance_ratio=1.0, degrees=10.0, packing_std=0.0)
 
@@ -43,12 +43,12 @@ def test_the_scatter_between_packings_is_not_reduced_by_windows() -> None:
     found = joined([1.0, 1.02, 0.98], np.array([0.99, 1.0, 1.01]), known)
     assert found.half_width(1000) > 0.12
     assert found.half_width(1000, packings=4) == pytest.approx(found.half_width(1000) / 2)
-    assert needed(found, 3, 0.1, 16).packings == 2
+    assert windows_needed(found, 3, 0.1, 16).packings == 2
 
 
 def test_as_many_windows_as_needed_bring_the_half_width_inside() -> None:
     known = DRAG.model_copy(update={"ratio_log_std": math.inf})
     found = joined([0.9, 1.0, 1.1], np.array([0.9, 1.0, 1.1]), known)
-    need = needed(found, 3, 0.05, 64)
+    need = windows_needed(found, 3, 0.05, 64)
     assert need.packings == 1
     assert found.half_width(need.windows) <= 0.05 < found.half_width(need.windows - 1)

@@ -14,14 +14,14 @@ from made_tradeoff import made_tradeoff
 from paths import ROOT
 
 from dragdeck import commands
-from dragdeck.advice.advise import advise, resolve
+from dragdeck.advice.advise import advised_settings, resolve
 from dragdeck.advice.forecast import question
 from dragdeck.advice.options import Work, consistent, plain_option, with_option
 from dragdeck.cases.bed import full_stiffness_number
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
-from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
 from dragdeck.project import Project
+from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff
 from dragdeck.scenes.drop_test import drop_scene
 from dragdeck.scenes.filling import filling_scene
 from dragdeck.scenes.lead import FIRST_WINDOWS, with_leads
@@ -36,7 +36,7 @@ SEVERAL = ["drag_mean", "workpiece_contacts"]
 
 
 @pytest.fixture
-def tradeoff() -> Tradeoff:
+def tradeoff() -> TradeoffRecord:
     return made_tradeoff()
 
 
@@ -67,9 +67,9 @@ def moved(case: Case, **motion: float) -> Case:
 
 
 def test_a_soft_run_with_windows_costs_less_than_the_plain_run(
-    paper: Case, tradeoff: Tradeoff
+    paper: Case, tradeoff: TradeoffRecord
 ) -> None:
-    found = advise(paper, asked(0.07, quantity=SEVERAL), tradeoff)
+    found = advised_settings(paper, asked(0.07, quantity=SEVERAL), tradeoff)
     chosen = found.chosen.fidelity
     assert chosen.youngs_modulus_scale < 0.01 and chosen.soft_start is None
     assert chosen.windows is not None
@@ -82,9 +82,9 @@ def test_a_soft_run_with_windows_costs_less_than_the_plain_run(
 
 
 def test_the_tolerance_changes_when_windows_stop_and_nothing_else(
-    paper: Case, tradeoff: Tradeoff
+    paper: Case, tradeoff: TradeoffRecord
 ) -> None:
-    first, second = (advise(paper, asked(one), tradeoff).chosen for one in (0.02, 0.5))
+    first, second = (advised_settings(paper, asked(one), tradeoff).chosen for one in (0.02, 0.5))
     assert first.relative_cost == second.relative_cost
     one, other = (chosen.fidelity.model_dump() for chosen in (first, second))
     assert (one["windows"].pop("tolerance"), other["windows"].pop("tolerance")) == (0.02, 0.5)
@@ -92,28 +92,32 @@ def test_the_tolerance_changes_when_windows_stop_and_nothing_else(
 
 
 def test_where_windows_would_take_the_path_the_whole_drag_is_stiff(
-    paper: Case, tradeoff: Tradeoff
+    paper: Case, tradeoff: TradeoffRecord
 ) -> None:
-    found = advise(moved(paper, speed_m_s=0.3), asked(), tradeoff).chosen
+    found = advised_settings(moved(paper, speed_m_s=0.3), asked(), tradeoff).chosen
     assert found.fidelity.windows is None and found.fidelity.youngs_modulus_scale == 1
     start = found.fidelity.soft_start
     assert start is not None and start.youngs_modulus_scale < 0.3
     assert found.relative_cost == found.largest_cost < 1
 
 
-def test_where_the_material_is_soft_nothing_is_softened(paper: Case, tradeoff: Tradeoff) -> None:
-    found = advise(changed(paper, youngs_modulus_pa=2e7), asked(), tradeoff).chosen
+def test_where_the_material_is_soft_nothing_is_softened(
+    paper: Case, tradeoff: TradeoffRecord
+) -> None:
+    found = advised_settings(changed(paper, youngs_modulus_pa=2e7), asked(), tradeoff).chosen
     assert (found.fidelity.youngs_modulus_scale, found.fidelity.soft_start) == (1, None)
     assert found.fidelity.windows is None
 
 
-def test_stiffer_and_lighter_particles_are_softened_more(paper: Case, tradeoff: Tradeoff) -> None:
+def test_stiffer_and_lighter_particles_are_softened_more(
+    paper: Case, tradeoff: TradeoffRecord
+) -> None:
     for values in (
         [{"youngs_modulus_pa": one} for one in (20e9, 77e9, 300e9)],
         [{"density_kg_m3": one} for one in (8000, 2656, 1000)],
     ):
         cases = [changed(paper, **one) for one in values]
-        chosen = [advise(case, asked(), tradeoff).chosen.fidelity for case in cases]
+        chosen = [advised_settings(case, asked(), tradeoff).chosen.fidelity for case in cases]
         scales = [one.youngs_modulus_scale for one in chosen]
         assert all(after < before for before, after in pairwise(scales))
         softened = [
@@ -128,7 +132,7 @@ def test_the_work_that_is_compared_is_that_of_the_runs(paper: Case, speed: float
     """Steps of lead, process and first windows, where every step costs the same."""
     case = moved(paper, speed_m_s=speed)
     tradeoff = made_tradeoff()
-    option = advise(case, asked(), tradeoff).chosen
+    option = advised_settings(case, asked(), tradeoff).chosen
     runs = with_leads([replace(case, study=with_option(case.study, option))])
     steps = [process_scene(one).steps for one in runs if one.rank_of_window <= FIRST_WINDOWS]
     assert len(steps) == (4 if option.fidelity.windows else 2)
@@ -140,12 +144,12 @@ def test_the_work_that_is_compared_is_that_of_the_runs(paper: Case, speed: float
 
 
 def test_strong_damping_shortens_the_steps_of_the_filling(
-    small: dict[str, Any], tradeoff: Tradeoff, made: Made
+    small: dict[str, Any], tradeoff: TradeoffRecord, made: Made
 ) -> None:
     for pair in small["pairs"].values():
         pair["restitution"] = 0.3
     damped = made()
-    found = advise(damped, asked(), tradeoff)
+    found = advised_settings(damped, asked(), tradeoff)
     standard = BUILT_IN_FIDELITIES["standard"]
     study = damped.study.model_copy(update={"fidelity": standard})
     for fidelity in (
@@ -159,7 +163,9 @@ def test_strong_damping_shortens_the_steps_of_the_filling(
 # --- the drop test -------------------------------------------------------------------------------
 
 
-def test_a_tolerance_about_restitution_sets_the_drop_alone(case: Case, tradeoff: Tradeoff) -> None:
+def test_a_tolerance_about_restitution_sets_the_drop_alone(
+    case: Case, tradeoff: TradeoffRecord
+) -> None:
     found = resolve(case, asked(0.005, quantity="restitution"), tradeoff)
     assert found.study.drop_test.timestep_fraction == 0.1
     assert found.study.fidelity == BUILT_IN_FIDELITIES["standard"]
@@ -169,21 +175,23 @@ def test_a_tolerance_about_restitution_sets_the_drop_alone(case: Case, tradeoff:
     assert strict.study.drop_test.timestep_fraction == 0.02
     drops = [one.model_copy(update={"restitution_error": 2e-3}) for one in tradeoff.drop_test]
     coarse = tradeoff.model_copy(update={"drop_test": drops})
-    beyond = advise(case, asked(1e-3, quantity="restitution"), coarse)
+    beyond = advised_settings(case, asked(1e-3, quantity="restitution"), coarse)
     assert beyond.fallback is not None and beyond.chosen.drop_timestep_fraction == 0.02
     assert "0.2 %" in beyond.fallback
 
 
-def test_restitution_goes_with_no_quantity_of_the_process(case: Case, tradeoff: Tradeoff) -> None:
+def test_restitution_goes_with_no_quantity_of_the_process(
+    case: Case, tradeoff: TradeoffRecord
+) -> None:
     with pytest.raises(InputError, match="restitution alone, or quantities of the process"):
-        advise(case, asked(quantity=["drag_mean", "restitution"]), tradeoff)
+        advised_settings(case, asked(quantity=["drag_mean", "restitution"]), tradeoff)
 
 
 # --- a study that asks ---------------------------------------------------------------------------
 
 
 @pytest.fixture
-def asking(small: dict[str, Any], write_study: Write, tradeoff: Tradeoff) -> Case:
+def asking(small: dict[str, Any], write_study: Write, tradeoff: TradeoffRecord) -> Case:
     (found,) = load_cases(
         write_study(small | {"fidelity": {"tolerance": 0.05, "quantity": SEVERAL}}),
         resolve=partial(resolve, tradeoff=tradeoff),
@@ -197,7 +205,7 @@ def test_a_study_that_asks_gets_settings_and_remembers(asking: Case) -> None:
     said = process_scene(asking).case
     assert said.fidelity.name == asking.fidelity_name
     assert said.asked is not None
-    assert (said.asked.tolerance, said.asked.quantities) == (0.05, SEVERAL)
+    assert (said.asked.tolerance, said.asked.quantities) == (0.05, tuple(SEVERAL))
     assert 0 < said.asked.relative_cost <= said.asked.largest_cost and said.asked.fallback is None
     others = filling_scene(asking).case, drop_scene(asking).case
     assert not any("asked" in json.loads(other.as_text()) for other in others)
@@ -213,7 +221,7 @@ def test_the_question_is_part_of_the_process_alone(asking: Case) -> None:
 
 
 def test_tolerances_of_a_sweep_are_resolved_each(
-    small: dict[str, Any], write_study: Write, tradeoff: Tradeoff
+    small: dict[str, Any], write_study: Write, tradeoff: TradeoffRecord
 ) -> None:
     small["fidelity"] = {"tolerance": 0.05, "quantity": "restitution"}
     small["sweep"] = {"fidelity.tolerance": [0.05, 0.001]}
@@ -234,7 +242,7 @@ def test_without_a_measured_tradeoff_there_is_a_remedy(tmp_path: Path) -> None:
 def test_the_packages_own_tradeoff_knows_costs_and_drop_tests(case: Case) -> None:
     tradeoff = measured_tradeoff()
     assert tradeoff.cost("modulus_1") and len(tradeoff.drop_test) > 4
-    assert advise(case, asked(), tradeoff).chosen.relative_cost > 0
+    assert advised_settings(case, asked(), tradeoff).chosen.relative_cost > 0
 
 
 # --- the command ---------------------------------------------------------------------------------
@@ -243,7 +251,7 @@ def test_the_packages_own_tradeoff_knows_costs_and_drop_tests(case: Case) -> Non
 def test_advise_prints_and_keeps_what_it_says(
     case: Case,
     project: Project,
-    tradeoff: Tradeoff,
+    tradeoff: TradeoffRecord,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -264,7 +272,7 @@ def test_advise_prints_and_keeps_what_it_says(
 
 
 def test_the_kept_advice_names_the_run_of_a_study_that_asks(
-    asking: Case, tradeoff: Tradeoff, project: Project, monkeypatch: pytest.MonkeyPatch
+    asking: Case, tradeoff: TradeoffRecord, project: Project, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(project.root)
     commands.advise("small", None, None, None, quick=True, tradeoff=tradeoff)
@@ -276,7 +284,7 @@ def test_the_kept_advice_names_the_run_of_a_study_that_asks(
 def test_an_advice_that_cannot_be_kept_is_still_shown(
     case: Case,
     project: Project,
-    tradeoff: Tradeoff,
+    tradeoff: TradeoffRecord,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -297,7 +305,7 @@ def test_the_command_line_goes_before_the_study(case: Case, asking: Case) -> Non
 def test_a_wrong_question_is_explained(
     case: Case,
     project: Project,
-    tradeoff: Tradeoff,
+    tradeoff: TradeoffRecord,
     monkeypatch: pytest.MonkeyPatch,
     tolerance: float | None,
     quantity: str | None,

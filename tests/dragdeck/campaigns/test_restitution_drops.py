@@ -1,7 +1,6 @@
 """The drops of a calibration, and the recovery of a known restitution on the real engine."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from make_record import Sensor, synthetic_record
 from scipy.integrate import solve_ivp
 
 from dragchain.calibration.fit import calibrate_file
-from dragchain.calibration.report import write_report
+from dragchain.calibration.report import write_calibration_report
 from dragchain.calibration.results import confirmed, write_calibration
 from dragchain.calibration.simulated_drops import prepare, read_drops
 from dragdeck.campaigns.restitution_drops import (
@@ -34,8 +33,6 @@ from dragdeck.errors import InputError
 from dragdeck.physics.contact_mechanics import hertz_contact_time, rayleigh_time
 from dragdeck.project import Project
 from dragdeck.scenes.drop_test import DROP_TEST, DropFidelity, drop_scene
-
-WriteStudy = Callable[..., Path]
 
 
 @pytest.fixture
@@ -177,7 +174,7 @@ def test_a_known_restitution_is_recovered(measured_case: Case, project: Project)
     values = (result.fit.restitution, result.fit_full.restitution)
     checked = confirmed(read_drops(run(list(confirmation(case.study, *values))[::2], "confirm")))
     assert checked.effective == pytest.approx(result.measured.value, abs=4 * checked.std)
-    write_report(folder / "trial-0.csv", folder)
+    write_calibration_report(folder / "trial-0.csv", folder)
     page = (folder / "report.html").read_text()
     assert f"<b>{result.put.value:.4g}</b>" in page
     assert page.count("data:image/") == 3

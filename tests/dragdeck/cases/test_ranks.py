@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from dragdeck.advice.advise import advise
+from dragdeck.advice.advise import advised_settings
 from dragdeck.advice.options import with_option
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import CORES_VARIABLE
-from dragdeck.outlook.measured import measured_tradeoff
+from dragdeck.records.tradeoff import measured_tradeoff
 from dragdeck.study.model import Fidelity, Tolerance
 
 
@@ -27,5 +27,5 @@ def test_advised_runs_of_a_small_bowl_have_one_rank(
 ) -> None:
     monkeypatch.setenv(CORES_VARIABLE, cores)
     for tolerance in (0.001, 0.5):
-        found = advise(case, Tolerance(tolerance=tolerance), measured_tradeoff())
+        found = advised_settings(case, Tolerance(tolerance=tolerance), measured_tradeoff())
         assert replace(case, study=with_option(case.study, found.chosen)).ranks == 1

@@ -133,36 +133,6 @@ def test_a_study_may_change_one_block(case: Case, project: Project) -> None:
     assert "base/process.in.j2" in changed  # the header names every template
 
 
-def test_a_missing_value_names_template_line_and_variable(case: Case, project: Project) -> None:
-    own_template(
-        case,
-        '{% extends "base/process.in.j2" %}\n{% block extra %}\n\n{{ deck.colour }}\n'
-        "{% endblock %}\n",
-    )
-    with pytest.raises(InputError) as caught:
-        render(case, project, "process")
-    assert caught.value.field == "line 4"
-    assert "process.in.j2" in str(caught.value)
-    assert "colour" in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("{% block extra %}", "template syntax"),
-        ('{% extends "base/nothing.in.j2" %}', "no such template"),
-        ('{% extends "base/process.in.j2" %}{% block extra %}{{ "x" | num }}{% endblock %}', "'x'"),
-    ],
-)
-def test_a_broken_template_is_explained(
-    case: Case, project: Project, text: str, words: str
-) -> None:
-    own_template(case, text)
-    with pytest.raises(InputError) as caught:
-        render(case, project, "process")
-    assert words in str(caught.value)
-
-
 def test_nothing_is_written_when_a_template_fails(
     case: Case, project: Project, tmp_path: Path
 ) -> None:

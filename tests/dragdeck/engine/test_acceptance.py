@@ -7,12 +7,17 @@ from pathlib import Path
 import pytest
 from made_run import Raw
 
-from dragdeck.decks.case_file import CountOfRun, RanksOfRun, SettlingCriterion, SteadyCriterion
 from dragdeck.decks.outputs import Kind, OutputOfRun
+from dragdeck.dumps.grammar import whole_frames
 from dragdeck.engine.acceptance import check_run
-from dragdeck.engine.completeness import whole_frames
-from dragdeck.engine.inputs import RunInputs
-from dragdeck.engine.record import RunPart
+from dragdeck.records.run import (
+    CaseFile,
+    CountOfRun,
+    RanksOfRun,
+    RunPart,
+    SettlingCriterion,
+    SteadyCriterion,
+)
 
 
 def written(kind: Kind, name: str, columns: Sequence[str], last_step: int | None) -> OutputOfRun:
@@ -36,9 +41,8 @@ CUSTOM = written("custom", "particles", ["a_id", "force_n"], None)
 
 def text_frame(step: int, rows: list[str]) -> str:
     box = "ITEM: BOX BOUNDS ff ff ff\n0 1\n0 1\n0 1\n"
-    head = (
-        f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ENTRIES\n{len(rows)}\n{box}ITEM: ENTRIES a b \n"
-    )
+    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ENTRIES\n{len(rows)}\n{box}"
+    head += "ITEM: ENTRIES a_id force_n \n"
     return head + "".join(row + "\n" for row in rows)
 
 
@@ -76,9 +80,14 @@ def test_the_last_frame_counts_only_if_whole(
     assert (frames.steps[-1] if frames.steps and not frames.problem else None) == step
 
 
-INPUTS = RunInputs(
+INPUTS = CaseFile(
+    study="any",
+    title="",
     scene="process",
     run="a",
+    timestep_s=1e-6,
+    rayleigh_time_s=1e-5,
+    versions={},
     fidelity=RanksOfRun(ranks=1),
     media=CountOfRun(count=2),
     files={},
@@ -92,7 +101,7 @@ GOOD = HEAD + "10 0.1 2 1e-9 0 0.1\n20 0.2 2 1e-9 0 0.1\n"
 
 
 def failed(
-    folder: Path, inputs: RunInputs, status: int = 0, begins: Sequence[int] = (0,)
+    folder: Path, inputs: CaseFile, status: int = 0, begins: Sequence[int] = (0,)
 ) -> set[str]:
     """Codes of the checks that did not pass, of parts that begin at some steps."""
     parts = [RunPart(part=k + 1, checkpoint=None, from_step=step) for k, step in enumerate(begins)]

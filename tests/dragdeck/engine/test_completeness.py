@@ -3,26 +3,26 @@
 import math
 import re
 import struct
+import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from made_run import Raw
-from spoilt_dumps import NAMES, ROWS, SPOILT, binary, spoilt, text
+from spoilt_dumps import NAMES, ROWS, SPOILT, binary, text
 
-from dragchain.dumps.careful_reader import read_carefully
-from dragchain.errors import DumpError
-from dragchain.run.case import Output
 from dragdeck.decks.outputs import OutputOfRun
+from dragdeck.dumps.grammar import whole_frames
+from dragdeck.dumps.reader import read_frames
 from dragdeck.engine.completeness import (
     coverage,
     cut_outputs,
     first_gap,
     some_frames,
-    whole_frames,
 )
-from dragdeck.engine.record import RunPart
+from dragdeck.errors import DumpError
+from dragdeck.records.run import RunPart
 
 FORCE = OutputOfRun(
     kind="print",
@@ -103,35 +103,34 @@ def dump(name: str) -> OutputOfRun:
     return OutputOfRun(
         kind="custom",
         binary=name.endswith(".bin"),
-        pattern=name,
+        pattern="{part}",
         columns=NAMES,
         engine_columns=NAMES,
         period_steps=7,
         first_step=0,
         last_step=21,
         rows_per_particle=1.0,
-    )
+    ).model_copy(update={"pattern": name})
 
 
 NUMBERS = re.compile(r"row \d+: |(id|x|c_f\[1\]) is |as numbers|are not text|names the columns")
 """What only a reader of every number and name can say."""
 
 
-def careful(file: Path) -> tuple[list[int], DumpError | None]:
-    """The steps that the careful reader reads, and the error that ends them."""
-    layout = dump(file.name).model_dump(exclude={"rows_per_particle"}) | {"pattern": "{part}"}
+def read(file: Path) -> tuple[list[int], DumpError | None]:
+    """The steps that the reader reads, and the error that ends them."""
     steps: list[int] = []
     try:
-        steps.extend(frame.step for frame in read_carefully(file, Output(**layout)))
+        steps.extend(frame.step for frame in read_frames([file], dump(file.name)))
     except DumpError as error:
         return steps, error
     return steps, None
 
 
-def agrees_with_the_careful_reader(file: Path) -> None:
+def agrees_with_the_reader(file: Path) -> None:
     """The same frames are whole, and what follows them begins at the same byte."""
     found = whole_frames(file, dump(file.name))
-    steps, error = careful(file)
+    steps, error = read(file)
     if error is None:
         assert (found.steps, found.problem) == (steps, "")
     elif NUMBERS.search(str(error)):
@@ -143,15 +142,13 @@ def agrees_with_the_careful_reader(file: Path) -> None:
 
 @pytest.mark.parametrize("goes_on", [False, True])
 @pytest.mark.parametrize("what", SPOILT)
-def test_the_whole_frames_of_a_damaged_dump_are_those_of_the_careful_reader(
+def test_the_whole_frames_of_a_damaged_dump_are_those_of_the_reader(
     tmp_path: Path, what: str, goes_on: bool
 ) -> None:
-    name, content, _ = spoilt(Raw)[what]
+    name, content, _ = SPOILT[what]
     write = binary if name == "a.bin" else text
-    (tmp_path / name).write_bytes(
-        write(Raw, [0, 7]) + content + (write(Raw, [21]) if goes_on else b"")
-    )
-    agrees_with_the_careful_reader(tmp_path / name)
+    (tmp_path / name).write_bytes(write([0, 7]) + content + (write([21]) if goes_on else b""))
+    agrees_with_the_reader(tmp_path / name)
 
 
 def damages(content: bytes) -> Iterator[tuple[int, bytes]]:
@@ -162,15 +159,14 @@ def damages(content: bytes) -> Iterator[tuple[int, bytes]]:
             yield place, content[:place] + bytes([byte]) + content[place + 1 :]
 
 
-@pytest.mark.filterwarnings("ignore:invalid value encountered in cast:RuntimeWarning")
 @pytest.mark.parametrize("name", ["a.bin", "a.dump"])
 def test_a_damaged_byte_leaves_the_frames_before_it(tmp_path: Path, name: str) -> None:
     file, write = tmp_path / name, binary if name == "a.bin" else text
-    ends = [len(write(Raw, [0, 7, 14][:number])) for number in (1, 2, 3)]
-    for place, damaged in damages(write(Raw, [0, 7, 14])):
+    ends = [len(write([0, 7, 14][:number])) for number in (1, 2, 3)]
+    for place, damaged in damages(write([0, 7, 14])):
         file.write_bytes(damaged)
         found = whole_frames(file, dump(name))
-        steps, error = careful(file)
+        steps, error = read(file)
         assert len(found.steps) >= min(len(steps), sum(end <= place for end in ends))
         if error is None or not NUMBERS.search(str(error)):
             assert found.steps == steps[: len(found.steps)]
@@ -183,7 +179,8 @@ def test_a_header_without_columns_ends_the_whole_frames(tmp_path: Path) -> None:
     output = dump("a.bin").model_copy(update={"first_step": 7, "last_step": 14})
     (damage,) = cut_outputs(tmp_path, {"a": output}, parts(0), 7)
     assert damage == (
-        f"a.bin, frame 1, byte {len(whole)}: 0 columns from 1 ranks, expected 3 columns"
+        f"a.bin, frame 1, byte {len(whole)}: the rows have 0 columns, "
+        "expected the header of a binary dump with 3 columns"
     )
     assert (tmp_path / "a.bin").read_bytes() == whole
 
@@ -195,7 +192,22 @@ def test_frames_in_a_tilted_box_are_whole(tmp_path: Path) -> None:
         for frame in frames
     ]
     (tmp_path / "a.bin").write_bytes(b"".join(tilted))
-    agrees_with_the_careful_reader(tmp_path / "a.bin")
+    agrees_with_the_reader(tmp_path / "a.bin")
     first, last = some_frames(tmp_path, dump("a.bin"), parts(0), 20)
     assert sorted(first.tolist()) == sorted(ROWS[0])
     np.testing.assert_array_equal(last, ROWS[14])
+
+
+@pytest.mark.parametrize("name", ["a.bin", "a.dump"])
+def test_the_size_of_a_dump_needs_no_memory(tmp_path: Path, name: str) -> None:
+    rows = [[n, 0.5, -0.25] for n in range(1, 20_001)]
+    binary = name.endswith(".bin")
+    frame = Raw.binary(7, rows, 3) if binary else Raw.text(7, rows, NAMES, "custom")
+    (tmp_path / name).write_bytes(frame * 20)
+    tracemalloc.start()
+    try:
+        found = whole_frames(tmp_path / name, dump(name))
+        assert tracemalloc.get_traced_memory()[1] < 4e6
+    finally:
+        tracemalloc.stop()
+    assert [end for _, end in found.ends] == [len(frame) * n for n in range(1, 21)]

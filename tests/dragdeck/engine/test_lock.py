@@ -7,12 +7,12 @@ from pathlib import Path
 
 import psutil
 
-from dragdeck.engine.lock import only_runner
+from dragdeck.engine.process import only_runner
 
 HOLD = """
 import sys
 from pathlib import Path
-from dragdeck.engine.lock import only_runner
+from dragdeck.engine.process import only_runner
 with only_runner(Path(sys.argv[1]), print):
     print("held", flush=True)
     sys.stdin.read()

@@ -20,13 +20,12 @@ from dragdeck.cases.case import Case
 from dragdeck.decks.render import write_run
 from dragdeck.decks.templates import environment
 from dragdeck.engine.checkpoints import checkpoint_files, checkpoint_step
-from dragdeck.engine.inputs import RunInputs
-from dragdeck.engine.record import RunRecord
 from dragdeck.engine.reports import silent
 from dragdeck.engine.run_folder import fingerprint, run
 from dragdeck.engine.watch import EngineEnded, Watcher, cut_screen
 from dragdeck.errors import EngineError, InputError, RejectedRunError
 from dragdeck.project import Project
+from dragdeck.records.run import CaseFile, RunRecord
 from dragdeck.scenes.drop_test import DROP_TEST, drop_scene
 from dragdeck.scenes.filling import FILLING, filling_scene
 
@@ -75,7 +74,7 @@ def test_a_disk_that_is_full_is_named_with_what_is_free_and_needed(filling: Path
 
 
 def test_a_comment_in_the_deck_changes_nothing(filling: Path) -> None:
-    inputs = RunInputs.read(filling / "case.json")
+    inputs = CaseFile.read(filling / "case.json")
     before = fingerprint(filling, inputs)
     deck = filling / "in.liggghts"
     deck.write_text("# another title\n" + deck.read_text())
@@ -248,7 +247,7 @@ def test_a_truncated_output_fails_its_check(filling: Path) -> None:
             "packing.restart",
         ),
     )
-    damage = r"frame \d+, byte \d+: the file ends within"
+    damage = r"frame \d+, byte \d+: the file ends after \d+ bytes, inside"
     with pytest.raises(EngineError, match=rf"(?s)particles\.1\.bin, {damage}.*disk has space"):
         run(filling, silent)
     assert not (filling / "run.json").exists()

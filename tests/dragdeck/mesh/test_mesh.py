@@ -144,14 +144,6 @@ def test_bowl_holds_the_round_bowl_and_opens_upwards():
     assert middle[~on_side, 2] == pytest.approx(0.0)
 
 
-@pytest.mark.parametrize("facet_size_m", [0.006, 1e-6])
-def test_cylinder_refuses_too_coarse_and_too_many_facets(facet_size_m: float):
-    with pytest.raises(InputError) as caught:
-        m.cylinder(0.005, 0.08, facet_size_m)
-    assert caught.value.field == "facet_size_m"
-    assert caught.value.remedy
-
-
 # --- placing and welding --------------------------------------------------------
 
 
@@ -395,14 +387,6 @@ def test_formats_come_back_in_metres(tmp_path: Path, name: str, options: dict[st
     assert again.bounds == pytest.approx(workpiece.bounds, abs=1e-9)
 
 
-@pytest.mark.parametrize("face", ["f 1 2 9", "f 1 2 3 9", "f 0 1 2", "f -9 1 2"])
-def test_an_obj_facet_that_names_a_missing_node_is_damage(tmp_path: Path, face: str):
-    file = tmp_path / "body.obj"
-    file.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n{face}\n")
-    with pytest.raises(InputError, match="damaged"):
-        m.read(file, "mm")
-
-
 def test_vtk_polygon_data_is_refused_with_a_way_out(tmp_path: Path):
     import pyvista
 
@@ -411,6 +395,45 @@ def test_vtk_polygon_data_is_refused_with_a_way_out(tmp_path: Path):
         m.read(tmp_path / "body.vtk", "mm")
     assert "POLYDATA" in str(caught.value.value)
     assert "unstructured grid" in str(caught.value.remedy)
+
+
+OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        *(("a.obj", OBJ + face, "damaged")
+          for face in (b"f 1 2 9\n", b"f 1 2 3 9\n", b"f 0 1 2\n", b"f -9 1 2\n")),
+        ("five.obj", b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv .5 2 0\nv 0 1 0\nf 1 2 3 4 5\n", "neither"),
+        ("bad.stl", b"solid\nfacet normal 0 0 1\nvertex 0 0 zero\nendsolid\n", "damaged"),
+        ("cut.stl", b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvert", "damaged"),
+        ("cut.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "damaged"),
+        ("part.iges", b"S", "unknown mesh format"),
+        ("empty.stl", b"", "the mesh is empty"),
+        ("no_facet.stl", b"solid x\nendsolid x\n", "the mesh is empty"),
+    ],
+)  # fmt: skip
+def test_a_file_that_is_no_mesh_is_refused(tmp_path: Path, name: str, content: bytes, problem: str):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=problem) as caught:
+        m.check(m.read(path, "mm"), file=path)
+    assert caught.value.file == path
+    assert caught.value.remedy
+
+
+def test_a_missing_file_and_what_cannot_be_a_length_are_refused(tmp_path: Path):
+    with pytest.raises(InputError, match="no such mesh file"):
+        m.read(tmp_path / "none.stl", "mm")
+    with pytest.raises(InputError, match="unknown length unit") as caught:
+        m.read(tmp_path / "none.stl", "furlong")
+    assert "mm" in str(caught.value.limit)
+    for facet_size_m in (0.006, 1e-6):  # too coarse, and too many
+        with pytest.raises(InputError) as caught:
+            m.cylinder(0.005, 0.08, facet_size_m)
+        assert caught.value.field == "facet_size_m"
+        assert caught.value.remedy
 
 
 @settings(max_examples=60)
@@ -442,39 +465,6 @@ def test_quadrilaterals_are_cut_along_the_shorter_diagonal(tmp_path: Path):
     longest = lengths(kite).max()
     assert len(kite.faces) == 4
     assert longest == pytest.approx(math.sqrt(10))
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "problem"),
-    [
-        ("five.obj", b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv .5 2 0\nv 0 1 0\nf 1 2 3 4 5\n", "neither"),
-        ("bad.stl", b"solid\nfacet normal 0 0 1\nvertex 0 0 zero\nendsolid\n", "damaged"),
-        ("cut.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "damaged"),
-        ("part.iges", b"S", "unknown mesh format"),
-    ],
-)
-def test_files_that_are_refused(tmp_path: Path, name: str, content: bytes, problem: str):
-    path = tmp_path / name
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=problem) as caught:
-        m.read(path, "mm")
-    assert caught.value.file == path
-    assert caught.value.remedy
-
-
-def test_missing_file_and_unknown_unit(tmp_path: Path):
-    with pytest.raises(InputError, match="no such mesh file"):
-        m.read(tmp_path / "none.stl", "mm")
-    with pytest.raises(InputError, match="unknown length unit") as caught:
-        m.read(tmp_path / "none.stl", "furlong")
-    assert "mm" in str(caught.value.limit)
-
-
-@pytest.mark.parametrize("content", [b"", b"solid x\nendsolid x\n"])
-def test_file_without_facets_is_an_empty_mesh(tmp_path: Path, content: bytes):
-    (tmp_path / "empty.stl").write_bytes(content)
-    with pytest.raises(InputError, match="the mesh is empty"):
-        m.check(m.read(tmp_path / "empty.stl", "m"))
 
 
 def test_words_in_capitals_and_names_of_solids_are_no_trouble(tmp_path: Path):

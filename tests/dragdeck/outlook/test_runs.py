@@ -8,10 +8,10 @@ import pytest
 from dragdeck.cases.case import Case
 from dragdeck.engine.space import expected_bytes
 from dragdeck.engine.status import RunStatus
-from dragdeck.outlook.explain import Cost, page
+from dragdeck.outlook.explain import Cost, scene_lines
 from dragdeck.outlook.runs import (
     StudyRun,
-    alike,
+    alike_but_for_seed,
     by_their_speeds,
     done_fraction,
     expected_runs,
@@ -117,7 +117,7 @@ def test_runs_that_differ_in_the_seed_are_built_once(case: Case) -> None:
     other = replace(case, study=case.study.model_copy(update={"seed": 7}))
     deeper = case.study.motion.model_copy(update={"immersion_depth_m": 0.01})
     third = replace(case, study=case.study.model_copy(update={"motion": deeper}))
-    groups = alike({Path("a"): case, Path("b"): other, Path("c"): third})
+    groups = alike_but_for_seed({Path("a"): case, Path("b"): other, Path("c"): third})
     assert [list(group) for group in groups] == [[Path("a"), Path("b")], [Path("c")]]
 
 
@@ -125,7 +125,7 @@ def test_a_page_of_all_scenes_fits_a_terminal(case: Case) -> None:
     lines = [
         line
         for kind in SCENES.values()
-        for line in page(kind.build(case, None), Cost(12345678, 5e5, "assumed"), 200, 80)
+        for line in scene_lines(kind.build(case, None), Cost(12345678, 5e5, "assumed"), 200, 80)
     ]
     assert len(lines) <= 22
     assert max(map(len, lines)) <= 80

@@ -128,9 +128,11 @@ def test_no_two_workpieces_share_a_name(carousel: Carousel, project: Project) ->
     for workpiece in process_scene(case, BED).deck.workpieces:
         for motion in workpiece.superposed.values():
             assert all(name.endswith(workpiece.ending) for name in motion.variables)
-            used = re.findall(r"\bv_(\w+)", " ".join([*motion.variables.values(), motion.mover]))
+            used = re.findall(
+                r"\bv_(\w+)", " ".join([*motion.variables.values(), *motion.movers.values()])
+            )
             assert set(used) <= set(motion.variables)
-        assert f"${{reference_x{workpiece.ending}}}" in workpiece.superposed["spin"].mover
+        assert f"${{reference_x{workpiece.ending}}}" in workpiece.superposed["spin"].movers[""]
 
 
 @pytest.mark.parametrize(("direction", "gaps"), [("ccw", [60, 110, 190]), ("cw", [190, 60, 110])])

@@ -8,25 +8,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dragchain.run.case import Case as ReadCase
-from dragchain.run.case import load_case, load_outputs
 from dragchain.run.kinematics import (
+    axis_speed,
     counted_mask,
     directions,
     drag_phase,
-    motion_of,
-    workpiece_turn,
+    workpiece_rotation,
     workpiece_velocity,
 )
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import AnyScene
-from dragdeck.decks.outputs import ColumnsFile
+from dragdeck.decks.outputs import ColumnsFile, load_outputs
 from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
 from dragdeck.preview.layout import layout
+from dragdeck.records.case import CaseOfRun as ReadCase
+from dragdeck.records.case import load_case
 from dragdeck.scenes.fit import clearances
 from dragdeck.scenes.legs import farthest_reach, path_heights
-from dragdeck.scenes.motion import course, driven_speed
+from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import process_scene
 from dragdeck.study.check import warnings
 from dragdeck.sweep.cases import load_cases
@@ -61,9 +61,10 @@ def made(small: dict[str, Any], write_study: Callable[..., Path]) -> Make:
 def last_place(case: Case) -> tuple[float, ...]:
     """Where the course has the workpiece after its last step; nothing is superposed."""
     way = course(case.study, BED)
-    *_, (leg, begun) = way.begun()
+    leg = way.legs[-1]
     assert way.drag.end == leg.end_step
-    return leg.pose(begun, leg.steps)
+    place, _ = way.poses(leg, np.array([leg.steps]))
+    return tuple(place[0].tolist())
 
 
 def path_end(path: dict[str, Any], tip_m: float) -> tuple[float, float, float]:
@@ -103,11 +104,11 @@ def test_the_last_pose_is_the_end_of_the_path(
     """Of every path: after the last step, and in the preview."""
     case = made(factor, path=path, orientation=orientation)
     end = path_end(path, BED.surface_m - 0.015)
-    assert last_place(case)[:3] == pytest.approx(end, abs=1e-12)
+    assert last_place(case) == pytest.approx(end, abs=1e-12)
     shown = layout(case).workpieces[0].drag.poses[[0, -1], :3, 3]
     assert shown[-1, :2] == pytest.approx(end[:2], abs=1e-12)
     drag = course(case.study, BED).drag
-    assert driven_speed(case.study) == pytest.approx(
+    assert drag.speed_m_s == pytest.approx(
         factor * case.study.motion.axis_speed_m_s, rel=0.6 / (drag.end - drag.start)
     )
 
@@ -127,7 +128,7 @@ def test_no_row_lies_behind_the_end_of_the_path(
         assert (output.last_step - output.first_step) % output.period_steps == 0
     steps = np.array([drag.end_step, drag.end_step + 1])
     assert counted_mask(steps, case).tolist() == [True, False]
-    length = motion_of(case).axis_speed_m_s * (drag.end_step - drag.start_step) * case.timestep_s
+    length = axis_speed(case) * (drag.end_step - drag.start_step) * case.timestep_s
     assert length == pytest.approx(path_length(path), rel=1e-12)
 
 
@@ -139,17 +140,18 @@ def test_both_packages_describe_the_same_motion(
     """What dragchain says of velocity and turn at each step is what the course does until then."""
     study = made(path=path, **superposed)
     way, case = course(study.study, BED), read_back(process_scene(study, BED), tmp_path)
-    *_, (leg, begun) = way.begun()
     steps = np.arange(way.drag.start, way.drag.end + 1)
-    places = np.array([way.pose(leg, begun, float(step - steps[0])) for step in steps])
-    velocity = workpiece_velocity(steps, places[:, :3], places[:, :3], case)
+    places, rotation = way.poses(way.legs[-1], steps - steps[0])
+    velocity = workpiece_velocity(steps, places, places, case)
     if path["kind"] != "rest":
         speed = np.linalg.norm(velocity[1:], axis=1).max()
-        went = places[:1, :3] + np.cumsum(velocity[1:], axis=0) * case.timestep_s
-        np.testing.assert_allclose(went, places[1:, :3], atol=2 * speed * case.timestep_s)
+        went = places[:1] + np.cumsum(velocity[1:], axis=0) * case.timestep_s
+        np.testing.assert_allclose(went, places[1:], atol=2 * speed * case.timestep_s)
     heading = directions(steps, places[:, :2], case)
-    turn = workpiece_turn(steps, heading, case) - motion_of(case).start_direction_rad
-    np.testing.assert_allclose(np.exp(1j * turn), np.exp(1j * places[:, 3]), atol=1e-9)
+    seen = (
+        workpiece_rotation(steps, heading, case).front_rad - study.study.motion.path.direction_rad
+    )
+    np.testing.assert_allclose(np.exp(1j * seen), np.exp(1j * rotation.front_rad), atol=1e-9)
 
 
 def read_back(scene: AnyScene, folder: Path) -> ReadCase:
@@ -231,7 +233,8 @@ def test_a_revolution_takes_its_length_over_the_speed(made: Make) -> None:
     plunge, approach, drag = way.legs
     assert [leg.name for leg in way.legs] == ["plunge", "approach", "drag"]
     assert drag.duration_s == pytest.approx(0.1 * math.tau * 0.01 / 0.02, abs=way.drag.timestep_s)
-    assert drag.angular_speed_rad_s * drag.duration_s == pytest.approx(0.1 * math.tau)
+    _, rotation = way.poses(drag, np.array([drag.steps]))
+    assert rotation.turn_rad[0] == pytest.approx(0.1 * math.tau)
     dive = way.start_m[2] - BED.surface_m + 0.015
     assert plunge.duration_s * plunge.velocity_m_s[2] == pytest.approx(-dive)
     assert approach.duration_s * approach.velocity_m_s[0] == pytest.approx(0.01)
@@ -239,13 +242,17 @@ def test_a_revolution_takes_its_length_over_the_speed(made: Make) -> None:
 
 def test_clockwise_turns_the_heading_and_the_spin(made: Make) -> None:
     way = course(made(path=CIRCLE | {"direction": "cw"}).study, BED)
-    assert way.legs[-1].direction_rad == pytest.approx(-math.pi / 2)
-    assert way.legs[-1].angular_speed_rad_s == pytest.approx(-2, rel=1e-3)
+    assert math.atan2(*way.legs[-1].velocity_m_s[1::-1]) == pytest.approx(-math.pi / 2)
+    _, rotation = way.poses(way.legs[-1], np.array([0, 100]))
+    rate = np.diff(rotation.turn_rad)[0] / 100 / way.drag.timestep_s
+    assert rate == pytest.approx(-2, rel=1e-3)
 
 
 def test_a_workpiece_that_keeps_its_orientation(made: Make) -> None:
-    assert course(made(path=CIRCLE).study, BED).legs[-1].kind == "rotate"
-    assert course(made(orientation="fixed").study, BED).legs[-1].kind == "circle"
+    for orientation in ("follow_path", "fixed"):
+        way = course(made(path=CIRCLE, orientation=orientation).study, BED)
+        _, rotation = way.poses(way.legs[-1], np.arange(9))
+        assert (np.ptp(rotation.turn_rad) == 0) == (orientation == "fixed")
 
 
 def test_a_line_that_starts_where_it_plunges_has_no_approach(made: Make) -> None:

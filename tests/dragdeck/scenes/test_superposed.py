@@ -24,10 +24,10 @@ from dragdeck.scenes.fit import fastest_motion
 from dragdeck.scenes.legs import surface_speed
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import workpiece_length
+from dragdeck.study.drive import Drive
 from dragdeck.study.model import Motion
-from dragdeck.study.superposed.kind import DragSteps
 from dragdeck.study.superposed.oscillation import Oscillation
-from dragdeck.study.superposed.spin import Spin, SpinOfRun
+from dragdeck.study.superposed.spin import Spin
 from dragdeck.sweep.cases import load_cases
 
 BED = Bed(surface_m=0.038, top_m=0.0446)
@@ -107,18 +107,16 @@ def test_the_stages_fill_the_drag() -> None:
     spin = Spin.model_validate({"schedule": [*SCHEDULE, {"until_s": 5, "rpm": 100}]})
 
     def steps(end: int) -> list[int]:
-        return [stage.steps for stage in spun(spin, 50 + end, 1e-3).stages]
+        return [steps for steps, _ in spin.stages(drag(end, 1e-3))]
 
     assert steps(400) == [100, 50, 250]
     assert steps(120) == [100, 20]
     assert steps(60) == [60]
 
 
-def spun(spin: Spin, end: int, timestep_s: float) -> SpinOfRun:
-    """A spin in a drag from step 50."""
-    found = spin.of_run(DragSteps(50, end, timestep_s))
-    assert isinstance(found, SpinOfRun)
-    return found
+def drag(steps: int, timestep_s: float) -> Drive:
+    """A drag from step 50."""
+    return Drive(50, 50 + steps, timestep_s, length_m=1.0)
 
 
 @pytest.mark.parametrize("timestep", [1e-5, 3.3e-4, 7e-3])
@@ -126,8 +124,8 @@ def test_stages_of_a_spin_end_where_they_should(timestep: float) -> None:
     """Their lengths are rounded to steps, not the angles at their ends."""
     spin = Spin.model_validate({"schedule": [*SCHEDULE, {"until_s": 5, "rpm": 100}], "ramp_s": 0})
     whole = round(0.4 / timestep)
-    stages = spun(spin, 50 + whole, timestep).stages
-    turns = [stage.steps * timestep * stage.rate_rad_s for stage in stages]
+    stages = spin.stages(drag(whole, timestep))
+    turns = [steps * timestep * rate for steps, rate in stages]
     last = (whole * timestep - 0.15) * RATE / 3
     assert turns == pytest.approx([0.1 * RATE, -0.05 * RATE, last], rel=1e-12)
 
@@ -135,21 +133,18 @@ def test_stages_of_a_spin_end_where_they_should(timestep: float) -> None:
 def test_a_motion_starts_smoothly_from_rest() -> None:
     """Speed and acceleration have no jump at either end of the ramp, and are never above it."""
     ramp, dt = 100, 1e-3
-    moving = [
-        spun(Spin(rpm=60, ramp_s=ramp * dt), 450, dt),
-        Oscillation(amplitude_m=1e-3, frequency_hz=9, ramp_s=ramp * dt).of_run(
-            DragSteps(50, 450, dt)
-        ),
-    ]
-    assert [one.ramp_steps for one in moving] == [ramp, ramp]
-    angle = np.array([moving[0].turn_rad(step, dt) for step in range(401)])
+    spin = Spin(rpm=60, ramp_s=ramp * dt)
+    oscillation = Oscillation(amplitude_m=1e-3, frequency_hz=9, ramp_s=ramp * dt)
+    drive, steps = drag(400, dt), np.arange(401)
+    assert [one.begin(drive).steps for one in (spin, oscillation)] == [ramp, ramp]
+    angle = spin.turn(drive, steps)
     assert angle[ramp] == pytest.approx(math.tau * dt * ramp / 2)
     assert angle[-1] == pytest.approx(math.tau * dt * (400 - ramp / 2))
     speed = np.diff(angle) / dt / math.tau
     assert speed[0] < 1e-4 and speed.max() < 1 + 1e-12 and (np.diff(speed) > -1e-12).all()
     assert np.abs(np.diff(speed)).max() < 1.51 / ramp
     assert np.abs(np.diff(speed, 2)).max() < 6.1 / ramp**2
-    lift = np.array([moving[1].lift_m(step, dt) for step in range(401)])
+    lift = oscillation.shift(drive, steps)[:, 2]
     most = math.tau * 9 * 1e-3
     assert abs(lift[1]) / dt < 1e-4 * most
     assert np.abs(np.diff(lift)).max() / dt <= most
@@ -161,8 +156,8 @@ def test_no_statistic_includes_the_start(with_motion: Callable[..., Case]) -> No
     ramp = {"spin": {"rpm": 60, "ramp_s": 0.2}}
     for factor in (1, 3):
         made = process_scene(with_motion({"speed_factor": factor}, **ramp), BED).case
-        (spin,) = made.superposed
-        assert spin.ramp_steps * made.timestep_s == pytest.approx(0.2 / factor, rel=1e-3)
+        (spin,) = made.model_dump()["superposed"]
+        assert spin["ramp_steps"] * made.timestep_s == pytest.approx(0.2 / factor, rel=1e-3)
         assert made.statistics.transient_s == pytest.approx(0.2 / factor, rel=1e-3)
     with pytest.raises(InputError, match=r"motion\.spin\.ramp_s") as caught:
         with_motion(spin={"rpm": 60, "ramp_s": 0.31})

@@ -12,9 +12,12 @@ from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
 from dragdeck.physics.packing import Bed
 from dragdeck.scenes.dimensionless import describe
+from dragdeck.scenes.motion import course
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import (
+    dip,
     farthest_surface,
+    reference_height,
     workpiece_length,
     workpiece_mesh,
     workpiece_reach,
@@ -97,7 +100,7 @@ def test_an_upright_study_keeps_its_run_id(moved: Callable[..., Case]) -> None:
 @pytest.mark.parametrize(
     ("motion", "says"),
     [
-        ({"tilt_deg": 10, "spin": {"rpm": 60}}, "tilt_deg and a rotation cannot be combined"),
+        ({"ramp_s": 0.6}, "motion.ramp_s: no path is left"),
         ({"tilt_deg": 60}, "at most 45"),
     ],
 )
@@ -109,3 +112,80 @@ def test_bad_input_is_named(moved: Callable[..., Case], motion: dict[str, Any], 
 def test_a_workpiece_that_leans_into_the_wall_is_refused(moved: Callable[..., Case]) -> None:
     with pytest.raises(InputError, match=r"between its path and the bowl|fits between"):
         process_scene(moved(tilt_deg=45, immersion_depth_m=0.03, orientation="fixed"), BED)
+
+
+# --- spin about an inclined axis, and waypoints that incline -----------------------------------
+
+INCLINED = [[0, 0, 0], [0.5, 0.002, 0, 0, 40, 20], [1, 0.004, 0, 0, 90, 0, -25]]
+
+
+def on_waypoints(points: Any) -> dict[str, Any]:
+    return {"path": {"kind": "waypoints", "points": points}, "speed_m_s": None}
+
+
+def test_a_tilted_workpiece_that_spins_has_its_reference_point_on_its_axis(
+    moved: Callable[..., Case],
+) -> None:
+    """Its lowest point, at whatever angle, is at the immersion depth."""
+    case = moved(tilt_deg=20, spin={"rpm": 60})
+    mesh, radius = workpiece_mesh(case), case.study.workpiece.shape.radius_m
+    assert -mesh.bounds[0, 2] == pytest.approx(radius * math.sin(math.radians(20)), rel=0.01)
+    assert reference_height(case) >= -mesh.bounds[0, 2] - 1e-9
+    scene = process_scene(case, BED)
+    way, drag = course(case.study, BED, reference_height(case)), scene.case.phases[-1]
+    places, _ = way.poses(way.legs[-1], np.array([drag.end_step - drag.start_step]))
+    tip = BED.surface_m - case.study.motion.immersion_depth_m
+    assert places[0, 2] - reference_height(case) == pytest.approx(tip, abs=1e-9)
+    assert workpiece_reach(case) >= workpiece_reach(moved(spin=None)) - 1e-6
+
+
+def test_waypoints_that_incline_take_the_lowest_point_down(moved: Callable[..., Case]) -> None:
+    case = moved(**on_waypoints(INCLINED))
+    radius = case.study.workpiece.shape.radius_m
+    assert dip(case) == pytest.approx(radius * math.sin(math.radians(25)), rel=0.02)
+    upright = moved(**on_waypoints([point[:5] for point in INCLINED]))
+    assert dip(upright) == 0
+    assert workpiece_reach(case) > workpiece_reach(upright)
+    assert process_scene(case, BED).case.workpiece.kind == "mesh"
+
+
+def test_waypoints_without_inclination_name_no_run_anew(moved: Callable[..., Case]) -> None:
+    short, long = ([[*point[:5], *[0] * more] for point in INCLINED] for more in (0, 2))
+    assert PROCESS.run_id(moved(**on_waypoints(short))) == PROCESS.run_id(
+        moved(**on_waypoints(long))
+    )
+
+
+@pytest.mark.parametrize(
+    ("points", "says"),
+    [
+        ([[0, 0, 0, 0, 0, 10], [1, 0.01, 0]], "the first waypoint has a pitch or a roll"),
+        ([[0, 0, 0], [1, 0.01, 0, 0, 200, 10]], "turns by 200 degrees from one waypoint"),
+    ],
+)
+def test_inclinations_that_cannot_be(moved: Callable[..., Case], points: Any, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        moved(**on_waypoints(points))
+
+
+@pytest.mark.parametrize("path", [{"kind": "rest", "radius_m": 0.01, "bowl_rpm": 10}, None])
+def test_only_a_path_without_its_own_speed_has_a_start(
+    moved: Callable[..., Case], path: Any
+) -> None:
+    motion = on_waypoints(INCLINED) if path is None else {"path": path, "speed_m_s": None}
+    with pytest.raises(InputError, match="ramp_s cannot be used"):
+        moved(**motion, ramp_s=0.1)
+
+
+@pytest.mark.parametrize("orientation", ["follow_path", "fixed"])
+def test_no_statistic_includes_the_start(moved: Callable[..., Case], orientation: str) -> None:
+    """The drag takes half the ramp longer; statistics begin after it at the earliest."""
+    slow, quick = (
+        process_scene(moved(ramp_s=ramp, orientation=orientation), BED).case for ramp in (0.2, 0)
+    )
+    lasts = [one.phases[-1].end_step - one.phases[-1].start_step for one in (slow, quick)]
+    assert (lasts[0] - lasts[1]) * slow.timestep_s == pytest.approx(0.1, rel=1e-3)
+    assert slow.statistics.transient_s == pytest.approx(0.2, rel=1e-3)
+    longer = process_scene(moved(transient_m=0.004), BED).case.statistics.transient_s
+    assert longer == pytest.approx(0.004 / 0.02, rel=1e-3)
+    assert slow.motion.axis_speed_m_s == pytest.approx(quick.motion.axis_speed_m_s, rel=1e-3)

@@ -23,10 +23,11 @@ from dragdeck.project import Project
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.fit import clearances, fastest_motion
 from dragdeck.scenes.legs import path_heights, surface_speed
-from dragdeck.scenes.motion import drag_leg
+from dragdeck.scenes.motion import driven
 from dragdeck.scenes.process import PROCESS, process_scene
 from dragdeck.scenes.workpiece import workpiece_length
 from dragdeck.study.check import warnings
+from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.stages import in_steps
 from dragdeck.sweep.cases import load_cases
 
@@ -127,7 +128,7 @@ HEADER = "time_s,x_m,y_m\n"
         ("time_s,x_m,y_m,y_m\n0,0,0,0\n", ": line 1", "the columns are not those"),
         ("0,0,0\n1,0.01,0\n", ": line 1", "the columns are not those"),
         (HEADER + "0,0,0\n\n1,0.01\n", ":4: y_m", "a number is required"),
-        (HEADER + "0,0,0\n1,0.01,0,0\n", ":3", "at most 5"),
+        (HEADER + "0,0,0\n1,0.01,0,0\n", ":3", "at most 7"),
         (HEADER + "0,0,0\n\n1,abc,0\n", ":4: x_m", "'abc' is text, not a number"),
         (HEADER + '0,0,0\n1,0,"0,01"\n', ":3: y_m", "is text, not a number"),
         (HEADER + "0,0,0\n1,nan,0\n", ":3: x_m", "is text, not a number"),
@@ -185,7 +186,7 @@ def test_a_missing_file_is_named(made: Made, name: str) -> None:
         ({"points": None}, "motion.path.points: a list is required"),
         ({"points": []}, "motion.path.points: the list has 0 entries"),
         ({"points": [[0, 0, 0], [1, 0]]}, "motion.path.points.1.2: a required"),
-        ({"points": [[0, 0, 0], [1, 0, 0, 0, 0, 0]]}, "points.1: the list has 6 entries"),
+        ({"points": [[0, 0, 0], [1, *[0] * 7]]}, "points.1: the list has 8 entries"),
         ({"points": [[0, 0, 0], [1, True, 0]]}, "motion.path.points.1.1: a number is required"),
         ({"points": [[0, 0, 0], [0, 0.01, 0]]}, "motion.path.points.1.0: the time does not"),
         ({"points": [[0, 0, 0], [1, 0, 0, 0.01]]}, "does not move horizontally"),
@@ -245,10 +246,6 @@ def test_neither_file_nor_points(small: dict[str, Any], write_study: Any) -> Non
             {"path": {"kind": "waypoints", "points": TURNING}, "spin": {"rpm": 9}},
             "spin and waypoints that turn cannot be combined",
         ),
-        (
-            {"path": {"kind": "waypoints", "points": TURNING}, "tilt_deg": 5},
-            "tilt_deg and a rotation cannot be combined",
-        ),
     ],
 )
 def test_fields_beside_it_that_cannot_be(made: Made, motion: Any, words: str) -> None:
@@ -304,13 +301,15 @@ def test_rounded_stages_reach_the_waypoints(made: Made, modulus: float) -> None:
     """Whatever the step: places after whole steps are the waypoints, also the last one."""
     study = made().study
     quick = study.chosen_fidelity().model_copy(update={"youngs_modulus_scale": modulus})
-    leg = drag_leg(study.model_copy(update={"fidelity": quick}))
-    dt = leg.duration_s / leg.steps
+    way = driven(study.model_copy(update={"fidelity": quick}))
+    dt, path = way.drive.timestep_s, way.motion.path
+    assert isinstance(path, WaypointsPath)
+    stages = path.stages(way.drive)
     at = np.diff([[0, 0, *point[1:], *[0] * (4 - len(point))][-3:] for point in POINTS], axis=0)
-    moved = np.array([one.steps * dt * np.array(one.velocity_m_s) for one in leg.stages])
+    moved = np.array([one.steps * dt * np.array(one.velocity_m_s) for one in stages])
     np.testing.assert_allclose(moved, at, atol=1e-15)
-    ends = np.cumsum([stage.steps for stage in leg.stages])
-    assert ends[-1] == leg.steps
+    ends = np.cumsum([stage.steps for stage in stages])
+    assert ends[-1] == way.drive.steps
     np.testing.assert_allclose(ends * dt, [0.2, 0.3, 0.5, 0.7], atol=dt)
 
 

@@ -29,7 +29,7 @@ from dragdeck.study.contact_law import (
 )
 from dragdeck.study.material import Material
 from dragdeck.sweep.cases import load_cases
-from evidence.verification.experiment import Body, Wall, collide_scene, experiment
+from evidence.verification.experiment import PlacedSphere, Wall, collide_scene, experiment
 
 OPTIONAL = [name for name, row in coefficients().items() if row.model]
 USED = 0.1
@@ -144,7 +144,7 @@ def test_a_rolling_particle_slows_down_by_five_sevenths_of_the_coefficient(
     mu, radius, speed, gravity, step = 0.02, 0.003, 0.1, 9.81, 1e-6
     steel = Material(youngs_modulus_pa=1e8, poissons_ratio=0.3, density_kg_m3=7800)
     pair = Pair(restitution=0.5, friction=0.5, rolling_friction=mu)
-    turning = Body(1, radius, (0, 0, radius), (speed, 0, 0), (0, speed / radius, 0))
+    turning = PlacedSphere(1, radius, (0, 0, radius), (speed, 0, 0), (0, speed / radius, 0))
     rolling = experiment(
         "rolling", 1, "A rolling particle", [],
         types=[("particle", steel), ("plane", steel)], pairs={(1, 2): pair}, bodies=[turning],

@@ -6,8 +6,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from dragchain.run.completeness import AcceptanceCheck, CheckCode, CheckReason
 from dragchain.statistics.estimate import Estimate
+from dragdeck.records.run import AcceptanceCheck, CheckCode, CheckReason
 from evidence.stability.judge import (
     ENERGY,
     ENERGY_LIMITS,
@@ -21,8 +21,8 @@ from evidence.stability.judge import (
     Seen,
     classify,
     conditions,
+    largest_safe,
     regimes,
-    safe_fraction,
 )
 
 
@@ -94,7 +94,7 @@ def table(*classes: str) -> pd.DataFrame:
 )
 def test_a_safe_step_has_no_unsafe_step_below(classes: tuple[str, ...], safe: float) -> None:
     shuffled = table(*classes).sample(frac=1, random_state=1)
-    assert safe_fraction(shuffled, UNSTABLE) == pytest.approx(safe, nan_ok=True)
+    assert largest_safe(shuffled, UNSTABLE) == pytest.approx(safe, nan_ok=True)
 
 
 def points(condition: str, classes: list[str], restitution: float = 0.9) -> pd.DataFrame:

@@ -15,7 +15,7 @@ from dragdeck.sweep.cases import load_cases
 from evidence.stability.measures import PointRun, read_points
 from evidence.stability.points import REGIMES, load_points
 from evidence.stability.runs import point_case
-from evidence.stability.scenes import Impact, impact_scene
+from evidence.stability.scenes import ImpactSettings, impact_scene
 
 MAP = ROOT / "studies" / "stability" / "map.yaml"
 
@@ -92,7 +92,7 @@ def test_like_particles_have_half_the_modulus_of_one(base: Case) -> None:
 
 def test_a_large_particle_is_almost_a_plate() -> None:
     def body(size_ratio: float) -> tuple[float, float]:
-        return Impact(1.0, 0.0, size_ratio).effective_body(1.0, 1.0)
+        return ImpactSettings(1.0, 0.0, size_ratio).effective_body(1.0, 1.0)
 
     radius, mass = body(100.0)
     assert radius == pytest.approx(100 / 101) and mass == pytest.approx(1.0, rel=1e-5)
@@ -102,7 +102,9 @@ def test_a_large_particle_is_almost_a_plate() -> None:
 
 def test_impacts_begin_at_different_moments_of_a_step(base: Case) -> None:
     settings = {"youngs_modulus_pa": 77e9, "restitution": 0.86, "friction": 0.34}
-    scene = impact_scene(point_case(base, settings, 0.2), "a-run", Impact(0.5, 0.0, 0.0), 0.2)
+    scene = impact_scene(
+        point_case(base, settings, 0.2), "a-run", ImpactSettings(0.5, 0.0, 0.0), 0.2
+    )
     rows = scene.files["particles.data"]().split("Atoms\n\n")[1].split("\n\n")[0].splitlines()
     radius = base.study.media.radius_mean_m
     gaps = [float(row.split()[-1]) - radius for row in rows]
@@ -143,7 +145,7 @@ def ended(run: PointRun, state: str, *failed: str) -> PointRun:
     (run.folder / "state.json").write_text(
         json.dumps(
             {"schema": 2, "state": state, "started": "2026-11-21", "engine_version": "3.8.0",
-             "ranks": 1, "parts": [], "checks": checks}
+             "ranks": 1, "parts": [], "checks": checks, "inputs": "0f"}
         )
     )  # fmt: skip
     return PointRun(run.point, run.folder)

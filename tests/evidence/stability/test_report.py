@@ -11,6 +11,7 @@ from pages import stands_alone
 from paths import DATA, ROOT
 
 from dragchain.cli import main as dragchain
+from dragdeck.records.stability import StabilityFile
 from evidence.__main__ import main as evidence
 from evidence.stability.judge import (
     ENERGY,
@@ -18,8 +19,7 @@ from evidence.stability.judge import (
     STABLE,
     TOLERANCE,
     UNSTABLE,
-    StabilityFile,
-    error_table,
+    restitution_errors,
 )
 from evidence.stability.points import bed_settings
 from evidence.stability.runs import map_runs
@@ -90,7 +90,7 @@ def test_an_elastic_impact_is_that_of_hertz(coarse: Path) -> None:
 
 
 def test_fewer_steps_in_a_contact_make_a_larger_error(coarse: Path) -> None:
-    errors = error_table(found(coarse)).worst
+    errors = restitution_errors(found(coarse)).worst
     assert len(errors) >= 2 and errors[0] > TOLERANCE > errors[-1]
 
 

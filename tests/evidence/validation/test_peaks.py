@@ -13,18 +13,18 @@ from made_run import save
 from networks import R, make_frame, row
 from scipy.stats import binom, false_discovery_control
 
-from dragchain.drag.peaks import find_drag_peaks
+from dragchain.drag import find_drag_peaks
 from dragchain.errors import TableError
 from dragchain.network.frame import FLOOR, SIDE, WORKPIECE, NetworkFrame
 from dragchain.report.page import page_environment
 from evidence.validation.peaks import (
-    Findings,
+    PeakFindings,
     PeakTest,
     chain_numbers,
     draw_shifts,
     holm,
     joint,
-    judge,
+    judge_statement,
     near_any,
     of_runs,
     read_run,
@@ -34,11 +34,11 @@ from evidence.validation.peaks import (
 )
 
 
-def verdicts(found: Findings) -> dict[str, str]:
+def verdicts(found: PeakFindings) -> dict[str, str]:
     return {row.statement: row.verdict for row in found.statements}
 
 
-def supported(found: Findings) -> set[str]:
+def supported(found: PeakFindings) -> set[str]:
     return {row.statement for row in found.statements if row.supported}
 
 
@@ -61,7 +61,7 @@ def test_one_packing_has_no_interval_and_confirms_nothing() -> None:
     found = found_of(15, 3.0, runs=1)
     assert all(math.isnan(test.ci95_low) for test in found.tests)
     assert "confirmed" not in verdicts(found).values() and "presence" in supported(found)
-    again = Findings.model_validate_json(found.as_text(), strict=True)
+    again = PeakFindings.model_validate_json(found.as_text(), strict=True)
     assert again.as_text() == found.as_text()
 
 
@@ -76,7 +76,7 @@ def test_a_conservative_test_supports_but_does_not_contradict() -> None:
                 ("strength_over_surroundings", ratio), ("strength_over_drag", drag)
             )
         ]  # fmt: skip
-        row = judge("dominance", tests)
+        row = judge_statement("dominance", tests)
         return row.verdict, row.supported
 
     assert judged((0.0, 0.5), (-1.0, 0.99)) == ("contradicted", False)

@@ -13,14 +13,15 @@ from scipy import stats
 
 from dragchain.errors import SeriesError
 from dragchain.report.page import MINUS, page_environment
-from dragchain.run.case import PublishedDrag, Reference, load_case
 from dragchain.scaling.fit import read_scalings
 from dragchain.statistics.estimate import Estimate
 from dragchain.tradeoff.measures import Measures, RunCost
 from dragdeck.errors import DocumentError
+from dragdeck.records.case import load_case
+from dragdeck.study.reference import Drag, Reference
 from evidence.validation import force
-from evidence.validation.force import effect_table, effects
-from evidence.validation.runs import MeasuredRun, RunsByBed, over_packings, read_runs
+from evidence.validation.force import effect_table, setting_effects
+from evidence.validation.runs import MeasuredRun, RunsByBed, packing_mean, read_validation_runs
 from evidence.validation.statements import Corridor, contacts_of, relative_places
 
 RATE_HZ = 1000.0
@@ -47,8 +48,8 @@ def made_run(
         run=folder.name,
         reference=Reference(
             source="a paper",
-            experiment=PublishedDrag(drag_mean_n=-2.5, drag_std_n=0.5),
-            simulation=PublishedDrag(drag_mean_n=-2.0),
+            experiment=Drag(drag_mean_n=-2.5, drag_std_n=0.5),
+            simulation=Drag(drag_mean_n=-2.0),
         ),
     )
     modulus, step = parameters
@@ -109,21 +110,21 @@ def runs(tiny_run: Path, tmp_path: Path) -> RunsByBed:
 def test_the_interval_over_packings_covers_as_often_as_it_says() -> None:
     rng = np.random.default_rng(3)
     trials = 2000
-    found = [over_packings(rng.normal(2.0, 0.3, 4).tolist()) for _ in range(trials)]
+    found = [packing_mean(rng.normal(2.0, 0.3, 4).tolist()) for _ in range(trials)]
     covered = sum(one.ci95_low <= 2.0 <= one.ci95_high for one in found)
     low, high = stats.binom.interval(0.999, trials, 0.95)
     assert low <= covered <= high
 
 
 def test_ratios_are_averaged_by_their_logarithms() -> None:
-    found = over_packings([0.5, 2.0], ratio=True)
+    found = packing_mean([0.5, 2.0], ratio=True)
     assert found.value == pytest.approx(1.0)
     assert found.ci95_low * found.ci95_high == pytest.approx(1.0)
 
 
 def test_one_filling_has_no_interval() -> None:
     with pytest.raises(SeriesError, match="needs 2 of them, not 1"):
-        over_packings([1.0])
+        packing_mean([1.0])
 
 
 def test_the_mean_over_packings_is_that_of_the_drag(runs: RunsByBed) -> None:
@@ -160,7 +161,7 @@ def test_half_of_a_sine_of_variance_lies_at_its_wave(tiny_run: Path, tmp_path: P
 
 def test_the_comparison_has_the_sign_of_more_drag(runs: RunsByBed) -> None:
     drag = force.Together(mean=Estimate(-2.75, -3.0, -2.5), std=Estimate(0.6, 0.5, 0.7))
-    measured, published = force.compare(drag, runs.packings[0].case)
+    measured, published = force.compare_drag(drag, runs.packings[0].case)
     assert vars(measured.difference) == pytest.approx(vars(Estimate(0.1, 0.0, 0.2)))
     assert measured.std_ratio is not None and published.std_ratio is None
     assert vars(measured.std_ratio) == pytest.approx(vars(Estimate(1.2, 1.0, 1.4)))
@@ -168,7 +169,7 @@ def test_the_comparison_has_the_sign_of_more_drag(runs: RunsByBed) -> None:
 
 
 def test_effects_are_found_against_what_they_change(runs: RunsByBed) -> None:
-    table = effect_table(effects(runs))
+    table = effect_table(setting_effects(runs))
     mean = table[table["quantity"] == "drag_mean"]
     control, soft, wide = (mean.iloc[i] for i in range(3))
     assert (control.timestep_fraction, control.field, control.runs) == (0.2, "", 1)
@@ -187,7 +188,7 @@ def test_a_shorter_run_counts_less(runs: RunsByBed) -> None:
     def half_width(arc_m: float) -> float:
         control, *others = runs.others
         shorter = dataclasses.replace(control, measures=changed(control.measures, arc_m=arc_m))
-        row = effects(RunsByBed(runs.packings, [shorter, *others]))[0]
+        row = setting_effects(RunsByBed(runs.packings, [shorter, *others]))[0]
         return row.ci95_high - row.ci95_low
 
     whole = runs.packings[0].measures.arc_m
@@ -271,7 +272,7 @@ def test_the_reach_lies_where_half_of_the_excess_is_left() -> None:
 
 def test_a_reference_that_is_not_measured_is_named(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match=r"measures.json: there is no such file"):
-        read_runs([tmp_path])
+        read_validation_runs([tmp_path])
 
 
 def test_the_section_of_the_validation_page_shows_every_scaling() -> None:

@@ -14,27 +14,29 @@ from evidence.verification.checks import (
     COULOMB,
     EXACT,
     QUANTITIES,
-    Comparison,
+    QuantityCheck,
+    abscissa,
+    check_rows,
     fitted_order,
+    flight_energy,
     incline_reference,
-    judged,
     momentum_changes,
-    published,
+    published_curve,
 )
-from evidence.verification.report import in_words, summarise, verdict
+from evidence.verification.report import in_words, verdict, worst_rows
 
 
 def test_a_verdict_depends_on_the_error_and_on_the_reference() -> None:
     run, rows = recording([[1.0]]), [(0.0, 2.0, 2.02), (1.0, 1.0, 1.1)]
-    same = judged(run, Comparison("force_n", EXACT, rows, 0.02))
+    same = check_rows(run, QuantityCheck("force_n", EXACT, rows, 0.02))
     assert same["verdict"].tolist() == ["pass", "fail"]
     assert same["error"].tolist() == pytest.approx([0.01, 0.05])
-    other = judged(run, Comparison("force_n", COULOMB, rows, 0.02))
+    other = check_rows(run, QuantityCheck("force_n", COULOMB, rows, 0.02))
     assert other["verdict"].tolist() == ["agrees", "differs"]
 
 
 def test_not_a_number_is_never_a_pass() -> None:
-    check = judged(recording([[1.0]]), Comparison("f", EXACT, [(0.0, 1.0, math.nan)], 1.0))
+    check = check_rows(recording([[1.0]]), QuantityCheck("f", EXACT, [(0.0, 1.0, math.nan)], 1.0))
     assert check["verdict"].tolist() == ["fail"]
 
 
@@ -68,15 +70,44 @@ def test_a_particle_rolls_or_slips_down_an_incline(friction: float, rolls: bool)
         assert speed + spin > 0.0
 
 
+def test_the_energy_of_flight_counts_the_impacts_before() -> None:
+    run = recording([[3.0], [2.0], [0.9], [2.0], [3.0]])
+    run.velocity_m_s[:, 0, 2] = (-2.0, -2.0, 0.0, 1.0, 1.0)
+    run.force_n[2, 0, 2] = 5.0
+    impacts, energy = flight_energy(run)
+    assert impacts.tolist() == [0, 0, 1, 1]
+    assert energy == pytest.approx([1.0, 1.0, 0.25, 0.25])
+
+
+@pytest.mark.parametrize(
+    ("test", "quantity", "expected"),
+    [
+        ("oblique_angle", "spin_rad_s", 40.0),
+        ("oblique_tangential", "scaled_spin", -2.0 / (0.2 * 0.2)),
+        ("spin_plane", "patch_restitution", 3.5 * 0.2 * 1.5 * 0.2 / -2.0),
+        ("spin_plane", "recoil_tangent", -2.0 / 0.2),
+        ("spin_pair", "tangential_m_s", -2.0),
+    ],
+)
+def test_a_quantity_is_drawn_against_what_the_paper_has(
+    test: str, quantity: str, expected: float
+) -> None:
+    """A particle of radius 1 m that comes down at 0.2 m/s and spins at -2 rad/s."""
+    fall = {"particle": 1, "partner": "plane", "value": 40.0}
+    run = recording([[1.1], [0.9], [1.1]], test=test, contacts=[fall])
+    run.spin_rad_s[0, 0, 1] = 2.0
+    assert abscissa(run.contact, quantity) == pytest.approx(expected)
+
+
 def test_a_fitted_order_is_the_exponent() -> None:
     assert fitted_order([(10, 1e-2), (100, 1e-4), (1000, 1e-6)]) == pytest.approx(2.0)
 
 
 def test_published_curves_are_in_order_and_only_where_they_belong() -> None:
-    x, y = published("oblique_angle", "aluminium_oxide on rigid", "spin_rad_s")
+    x, y = published_curve("oblique_angle", "aluminium_oxide on rigid", "spin_rad_s")
     assert (np.diff(x) > 0).all()
     assert np.interp(29.96, x, y) == pytest.approx(-616.5)
-    assert published("oblique_angle", "no such", "spin_rad_s").shape == (2, 0)
+    assert published_curve("oblique_angle", "no such", "spin_rad_s").shape == (2, 0)
 
 
 def test_every_published_point_is_a_number_of_a_test() -> None:
@@ -87,9 +118,11 @@ def test_every_published_point_is_a_number_of_a_test() -> None:
 
 def test_the_page_quotes_the_published_spins_of_two_tests() -> None:
     """Both at a scaled patch velocity of 4: tan(angle) = 4 x 0.092 in test 4, at 3.9 m/s."""
-    own = np.interp(4.0, *published("oblique_tangential", "steel_fem on rigid", "scaled_spin"))
+    own = np.interp(
+        4.0, *published_curve("oblique_tangential", "steel_fem on rigid", "scaled_spin")
+    )
     angle = math.atan(4 * 0.092)
-    curve = published("oblique_angle", "aluminium_oxide on rigid", "spin_rad_s")
+    curve = published_curve("oblique_angle", "aluminium_oxide on rigid", "spin_rad_s")
     scale = 0.0025 / (0.092 * 3.9 * math.cos(angle))
     other = scale * np.interp(math.degrees(angle), *curve)
     text = Path(checks.__file__).with_name("suite.yaml").read_text()
@@ -98,7 +131,9 @@ def test_the_page_quotes_the_published_spins_of_two_tests() -> None:
 
 def test_the_summary_keeps_the_worst_point_and_a_failure_is_named(tmp_path: Path) -> None:
     rows = [(0.0, 2.0, 2.0), (7.0, 2.0, 2.2)]
-    summary = summarise(judged(recording([[1.0]]), Comparison("force_n", EXACT, rows, 0.02)))
+    summary = worst_rows(
+        check_rows(recording([[1.0]]), QuantityCheck("force_n", EXACT, rows, 0.02))
+    )
     assert summary[["x", "points", "verdict"]].values.tolist() == [[7.0, 2, "fail"]]
     summary.to_parquet(tmp_path / "verification.parquet")
     with pytest.raises(RejectedRunError, match=r"elastic_plane, s on s, force_n: error 0\.1"):

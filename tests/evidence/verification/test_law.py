@@ -9,10 +9,16 @@ from scipy.integrate import quad
 
 from dragdeck.physics.contact_mechanics import hertz_overlap
 from evidence.verification import law
-from evidence.verification.law import Contact, HertzLaw, Motion, Particle, integrated_impact
+from evidence.verification.law import (
+    ContactPair,
+    HertzLaw,
+    Particle,
+    RelativeMotion,
+    integrated_impact,
+)
 
 PARTICLE = Particle(1.74e-4, 0.0025)
-PLANE = Contact(PARTICLE, None, 6e10, 1.3e10, 0.7, 0.3, True)
+PLANE = ContactPair(PARTICLE, None, 6e10, 1.3e10, 0.7, 0.3, True)
 ELASTIC = replace(PLANE, restitution=1.0)
 PAIR = replace(PLANE, partner=Particle(3.0e-4, 0.003))
 
@@ -61,8 +67,8 @@ def test_the_limit_changes_nothing_when_nothing_is_damped() -> None:
 
 
 @pytest.mark.parametrize("contact", [PLANE, PAIR])
-def test_a_rigid_slide_keeps_the_angular_momentum_about_the_contact(contact: Contact) -> None:
-    before = Motion(0.5, 3.0, 20.0, -10.0)
+def test_a_rigid_slide_keeps_the_angular_momentum_about_the_contact(contact: ContactPair) -> None:
+    before = RelativeMotion(0.5, 3.0, 20.0, -10.0)
     after = law.sliding_impact(contact, before)
     assert after is not None
     impulse = contact.mass_kg * (before.tangential_m_s - after.tangential_m_s)
@@ -73,15 +79,15 @@ def test_a_rigid_slide_keeps_the_angular_momentum_about_the_contact(contact: Con
 
 def test_a_rigid_slide_ends_where_the_surfaces_stop() -> None:
     limit = 3.5 * 0.3 * (1 + PLANE.rebound) * 0.5
-    just = law.sliding_impact(PLANE, Motion(0.5, 1.0001 * limit))
+    just = law.sliding_impact(PLANE, RelativeMotion(0.5, 1.0001 * limit))
     assert just is not None
     assert just.patch_m_s(PLANE) == pytest.approx(0.0, abs=1e-3 * limit)
-    assert law.sliding_impact(PLANE, Motion(0.5, 0.999 * limit)) is None
+    assert law.sliding_impact(PLANE, RelativeMotion(0.5, 0.999 * limit)) is None
 
 
 @pytest.mark.parametrize("contact", [ELASTIC, replace(PAIR, restitution=1.0)])
-def test_an_elastic_impact_is_hertzian(contact: Contact) -> None:
-    found = integrated_impact(contact, Motion(0.5))
+def test_an_elastic_impact_is_hertzian(contact: ContactPair) -> None:
+    found = integrated_impact(contact, RelativeMotion(0.5))
     deepest = law.largest_overlap(contact, 0.5)
     assert found.overlap_m == pytest.approx(deepest, rel=1e-3)  # read at steps, not at the peak
     assert found.duration_s == pytest.approx(law.elastic_time(contact, 0.5), rel=1e-4)
@@ -95,7 +101,7 @@ def test_the_integrated_rebound_is_the_exact_one(
     restitution: float, speed: float, limit: bool
 ) -> None:
     contact = replace(PLANE, restitution=restitution, limit_force=limit)
-    found = integrated_impact(contact, Motion(speed)).after.normal_m_s / speed
+    found = integrated_impact(contact, RelativeMotion(speed)).after.normal_m_s / speed
     assert found == pytest.approx(contact.rebound, rel=1e-5)
 
 
@@ -108,7 +114,7 @@ def test_the_rate_of_the_spring_limit_is_a_derivative() -> None:
 
 
 def test_an_elastic_slide_has_coulombs_impulse() -> None:
-    before = Motion(0.5, 4.0)
+    before = RelativeMotion(0.5, 4.0)
     after = integrated_impact(ELASTIC, before).after
     rigid = law.sliding_impact(ELASTIC, before)
     assert rigid is not None
@@ -119,7 +125,7 @@ def test_an_elastic_slide_has_coulombs_impulse() -> None:
 
 
 def test_a_damped_slide_exceeds_coulombs_impulse() -> None:
-    before = Motion(0.5, 4.0)
+    before = RelativeMotion(0.5, 4.0)
     after = integrated_impact(PLANE, before).after
     rigid = law.sliding_impact(PLANE, before)
     assert rigid is not None
@@ -130,21 +136,21 @@ def test_a_damped_slide_exceeds_coulombs_impulse() -> None:
 @pytest.mark.parametrize("limit", [True, False])
 def test_a_mirrored_impact_is_the_mirror_image(speed: float, limit: bool) -> None:
     contact = replace(PLANE, limit_force=limit)
-    one = integrated_impact(contact, Motion(0.5, speed)).after
-    other = integrated_impact(contact, Motion(0.5, -speed)).after
+    one = integrated_impact(contact, RelativeMotion(0.5, speed)).after
+    other = integrated_impact(contact, RelativeMotion(0.5, -speed)).after
     assert other.tangential_m_s == pytest.approx(-one.tangential_m_s, rel=1e-6)
     assert other.spin_rad_s == pytest.approx(-one.spin_rad_s, rel=1e-6)
 
 
 def test_a_huge_partner_is_a_plane() -> None:
     huge = replace(PLANE, partner=Particle(1e6, 1e6))
-    before = Motion(0.5, 0.4)
+    before = RelativeMotion(0.5, 0.4)
     on_plane, on_particle = (integrated_impact(c, before).after for c in (PLANE, huge))
     assert on_particle.tangential_m_s == pytest.approx(on_plane.tangential_m_s, rel=1e-5)
     assert on_particle.spin_rad_s == pytest.approx(on_plane.spin_rad_s, rel=1e-5)
 
 
-def explicit_impact(contact: Contact, before: Motion, steps: int) -> Motion:
+def explicit_impact(contact: ContactPair, before: RelativeMotion, steps: int) -> RelativeMotion:
     """The law in the engine's own steps: small, explicit, with the spring cut back."""
     model = HertzLaw(contact)
     state = np.array([0.0, before.normal_m_s, 0.0, before.tangential_m_s, before.spin_rad_s, 0.0])
@@ -160,13 +166,13 @@ def explicit_impact(contact: Contact, before: Motion, steps: int) -> Motion:
         state[2] = way * limit if way else state[2]
         rates = np.array(model.rates(way, 0.0, state))
         state[[1, 3, 4]] += dt * rates[[1, 3, 4]]
-    return Motion(-float(state[1]), float(state[3]), float(state[4]))
+    return RelativeMotion(-float(state[1]), float(state[3]), float(state[4]))
 
 
 @pytest.mark.parametrize("tangential", [0.1, 0.6, 3.0])
 @pytest.mark.parametrize("limit", [True, False])
 def test_events_find_the_same_motion_as_small_steps(tangential: float, limit: bool) -> None:
-    contact, before = replace(PLANE, limit_force=limit), Motion(0.5, tangential)
+    contact, before = replace(PLANE, limit_force=limit), RelativeMotion(0.5, tangential)
     exact = integrated_impact(contact, before).after
     stepped = explicit_impact(contact, before, 20_000)
     assert stepped.normal_m_s == pytest.approx(exact.normal_m_s, rel=1e-3)

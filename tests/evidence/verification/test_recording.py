@@ -4,7 +4,7 @@ import pytest
 from recordings import ON_PARTICLE, ON_PLANE, recording
 
 from dragchain.errors import TableError
-from evidence.verification.law import Motion
+from evidence.verification.law import RelativeMotion
 
 
 def test_overlap_is_measured_to_a_plane_and_to_a_particle() -> None:
@@ -38,5 +38,5 @@ def test_the_underside_of_a_particle_that_turns_about_y_moves_backwards() -> Non
     run = recording([[1.1], [0.9], [1.1]])
     run.spin_rad_s[0, 0, 1] = 2.0
     before = run.contact.before
-    assert before == Motion(pytest.approx(0.2), 0.0, -2.0)
+    assert before == RelativeMotion(pytest.approx(0.2), 0.0, -2.0)
     assert before.patch_m_s(run.contact.constants) == pytest.approx(-2.0)

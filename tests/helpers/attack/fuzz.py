@@ -13,9 +13,8 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from made_run import Raw
 
-from dragchain.dumps.any_dump import read_dump
-from dragchain.dumps.careful_reader import read_print_file
-from dragchain.run.case import Output
+from dragdeck.decks.outputs import OutputOfRun
+from dragdeck.dumps.reader import read_dump, read_prints
 from dragdeck.errors import DragdeckError
 from dragdeck.mesh.checks import findings
 from dragdeck.mesh.files import read
@@ -187,12 +186,12 @@ def _printed() -> list[bytes]:
 def _try_print_file(folder: Path, content: bytes) -> None:
     file = folder / "a.1.txt"
     file.write_bytes(content)
-    layout = Output(kind="print", binary=False, pattern="a.{part}.txt", columns=_PRINTED,
+    layout = OutputOfRun(kind="print", binary=False, pattern="a.{part}.txt", columns=_PRINTED,
                     engine_columns=None, period_steps=10, first_step=0, last_step=70)  # fmt: skip
     steps: list[float] = []
     values: list[float] = []
     try:
-        for block in read_print_file(file, layout):
+        for block in read_prints(file, layout):
             steps += block["step"].tolist()
             values += block["force_n"].tolist()
     except DragdeckError as error:

@@ -14,7 +14,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 import yaml
-from paths import DATA, ROOT
+from paths import DATA, PROJECT, ROOT
 
 from attack.calls import Said, call, command, main_of
 from dragdeck.project import Project
@@ -93,10 +93,7 @@ def _copied(root: Path, files: Sequence[str], target: Path) -> Path:
 def new_project(folder: Path, *, whole: bool = False) -> Path:
     """An empty project with the real templates and meshes; `whole`: with its workflow."""
     folder.mkdir(parents=True, exist_ok=True)
-    names = ["templates", "meshes"]
-    if whole:
-        names += ["workflow", "analysis", "config", "evidence", "profiles", "Snakefile"]
-    for name in names:
+    for name in PROJECT if whole else ("templates", "meshes"):
         (folder / name).symlink_to(ROOT / name)
     (folder / "studies").mkdir()
     return folder

@@ -16,9 +16,9 @@ from dragdeck.advice.options import (
     with_option,
 )
 from dragdeck.cases.case import Case
-from dragdeck.decks.advised import AdvisedSettings
 from dragdeck.errors import InputError
-from dragdeck.outlook.measured import Tradeoff, measured_tradeoff
+from dragdeck.records.advised import AdvisedSettings
+from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff
 from dragdeck.study.model import RESTITUTION, Tolerance
 
 
@@ -54,14 +54,14 @@ class Advice:
         )
 
 
-def resolve(case: Case, asked: Tolerance, tradeoff: Tradeoff | None = None) -> Case:
+def resolve(case: Case, asked: Tolerance, tradeoff: TradeoffRecord | None = None) -> Case:
     """The case with the settings that a tolerance asks for; it remembers the question.
 
     Parameters
     ----------
     case : Case
     asked : Tolerance
-    tradeoff : Tradeoff, optional
+    tradeoff : TradeoffRecord, optional
         Instead of `measured_tradeoff`.
 
     Raises
@@ -69,12 +69,12 @@ def resolve(case: Case, asked: Tolerance, tradeoff: Tradeoff | None = None) -> C
     InputError
         The quantities do not go together.
     """
-    advice = advise(case, asked, tradeoff or measured_tradeoff())
+    advice = advised_settings(case, asked, tradeoff or measured_tradeoff())
     study = with_option(case.study, advice.chosen)
     return replace(case, study=study, asked=asked, advised=advice.for_case)
 
 
-def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
+def advised_settings(case: Case, asked: Tolerance, tradeoff: TradeoffRecord) -> Advice:
     """The settings for a tolerance.
 
     Parameters
@@ -82,7 +82,7 @@ def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
     case : Case
         Its own fidelity does not matter.
     asked : Tolerance
-    tradeoff : Tradeoff
+    tradeoff : TradeoffRecord
         Errors of the drop test, and what steps cost.
 
     Raises
@@ -106,12 +106,13 @@ def advise(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Advice:
     if good:
         return Advice(asked, min(good, key=lambda one: one.relative_cost), finest)
     why = (
-        f"no measured time step has an error of the restitution below {percent(asked.tolerance)}: "
-        f"the smallest one is used, with {percent(finest.error or 0.0)}"
+        "no measured time step has an error of the restitution below "
+        f"{shown_share(asked.tolerance)}: the smallest one is used, with "
+        f"{shown_share(finest.error or 0.0)}"
     )
     return Advice(asked, finest, finest, why)
 
 
-def percent(fraction: float) -> str:
+def shown_share(fraction: float) -> str:
     """A share without its sign, as a percentage with two significant digits."""
     return f"{float(f'{100 * abs(fraction):.2g}'):g} %"

@@ -8,20 +8,19 @@ from pathlib import Path
 from rich.table import Table
 
 from dragdeck import __version__
-from dragdeck.advice.advise import Advice, percent
+from dragdeck.advice.advise import Advice, shown_share
 from dragdeck.advice.options import SCALE, Option, Speed, step_cost, with_option
 from dragdeck.cases.case import Case
-from dragdeck.decks.advised import AdvisedSettings
-from dragdeck.decks.deck import StudyScene
 from dragdeck.documents import Document, Part
 from dragdeck.engine.reports import shown_time
 from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds
-from dragdeck.outlook.measured import Tradeoff
+from dragdeck.records.advised import AdvisedSettings
+from dragdeck.records.tradeoff import TradeoffRecord
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import FIRST_WINDOWS, with_leads
 from dragdeck.scenes.process import PROCESS, process_scene
-from dragdeck.scenes.scene import SceneType
+from dragdeck.scenes.scene import SceneType, StudyScene
 from dragdeck.study.base import Json
 from dragdeck.study.model import Fidelity, Tolerance
 
@@ -201,7 +200,7 @@ def forecast(
     option: Option,
     speed: Speed | None,
     results: Path,
-    tradeoff: Tradeoff,
+    tradeoff: TradeoffRecord,
 ) -> Forecast:
     """Steps and wall time of an option.
 
@@ -215,7 +214,7 @@ def forecast(
         Of this machine; None: what earlier runs took, or an assumption.
     results : Path
         The study's results.
-    tradeoff : Tradeoff
+    tradeoff : TradeoffRecord
         What steps of soft particles cost.
     """
     chosen = replace(case, study=with_option(case.study, option))
@@ -240,7 +239,7 @@ def forecast(
 
 
 def _cost(
-    kind: SceneType, scene: StudyScene, speed: Speed | None, results: Path, tradeoff: Tradeoff
+    kind: SceneType, scene: StudyScene, speed: Speed | None, results: Path, tradeoff: TradeoffRecord
 ) -> Cost:
     """Steps and wall time of a scene, by the speed of this machine if it was measured."""
     if speed is None or kind.single_particle:
@@ -275,11 +274,11 @@ def advice_file(
     )
 
 
-def tables(case: Case, advice: Advice, rows: Sequence[Forecast]) -> Iterator[Table]:
+def advice_tables(case: Case, advice: Advice, rows: Sequence[Forecast]) -> Iterator[Table]:
     """What `dragdeck advise` prints of a case: the options, and what must be said of them."""
     asked = advice.asked
     what = ", ".join(asked.quantities)
-    title = f"{case.study_name} {case.name}: {what} within {percent(asked.tolerance)}"
+    title = f"{case.study_name} {case.name}: {what} within {shown_share(asked.tolerance)}"
     table = Table(title=title, title_justify="left")
     for name in ("", "settings", "cost", "steps", "wall time"):
         table.add_column(name)
@@ -306,7 +305,7 @@ def _about(case: Case, advice: Advice, advised: Forecast) -> Iterator[tuple[str,
     runs, chosen = " and ".join(advised.steps), advice.chosen.fidelity
     yield "cost", f"CPU time of {runs} / that of the reference"
     if advice.chosen.error is not None:
-        yield "error", f"largest measured error of an impact: {percent(advice.chosen.error)}"
+        yield "error", f"largest measured error of an impact: {shown_share(advice.chosen.error)}"
     elif chosen.windows is not None:
         yield "tolerance", _OF_WINDOWS
     elif chosen.soft_start is not None:

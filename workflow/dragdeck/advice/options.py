@@ -10,10 +10,10 @@ import numpy as np
 from dragdeck.cases.bed import bed_timestep, full_stiffness_number, widest_skin
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.documents import Part
-from dragdeck.outlook.measured import MeasuredDrop, Tradeoff
 from dragdeck.outlook.timestep import largest_fraction, stable_fraction, stable_step_cautions
 from dragdeck.physics.rounding import rounded
 from dragdeck.physics.similarity import softest_scale
+from dragdeck.records.tradeoff import DropEntry, TradeoffRecord
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.filling import FILLING, expected_surface, expected_time, filling_cautions
 from dragdeck.scenes.fit import process_cautions
@@ -59,7 +59,7 @@ class Work:
     Attributes
     ----------
     study : Study
-    tradeoff : Tradeoff
+    tradeoff : TradeoffRecord
     filling_s, process_s, entry_s : float
         Simulated time, that of the process and of what goes before its drag at the study's own
         speed, s.
@@ -68,21 +68,21 @@ class Work:
     """
 
     study: Study
-    tradeoff: Tradeoff
+    tradeoff: TradeoffRecord
     filling_s: float
     process_s: float
     entry_s: float
     facets: int
 
     @classmethod
-    def of(cls, case: Case, tradeoff: Tradeoff) -> "Work":
+    def of(cls, case: Case, tradeoff: TradeoffRecord) -> "Work":
         """Of a case; its own fidelity does not matter."""
         study, motion = case.study, case.study.motion
         way = math.dist(plunge_point(motion), motion.path.start_point)
         entry_s = (
             expected_surface(study) / motion.plunge_speed_m_s + way / motion.approach_speed_m_s
         )
-        process_s = entry_s + motion.path_length_m / motion.axis_speed_m_s
+        process_s = entry_s + motion.path_length_m / motion.axis_speed_m_s + motion.ramp_s / 2
         facets = sum(workpiece_facets(one) for one in of_each_workpiece(case))
         return cls(study, tradeoff, expected_time(study), process_s, entry_s, facets)
 
@@ -127,7 +127,7 @@ class Work:
         return steps * step_cost(chosen.youngs_modulus_scale, self.tradeoff)
 
 
-def step_cost(scale: float, tradeoff: Tradeoff) -> float:
+def step_cost(scale: float, tradeoff: TradeoffRecord) -> float:
     """Time of a step of the drag at a modulus scale, over that at the others that were timed.
 
     Soft particles have more contacts, and their steps cost more. Interpolated over
@@ -137,7 +137,7 @@ def step_cost(scale: float, tradeoff: Tradeoff) -> float:
     ----------
     scale : float
         Factor on every Young's modulus.
-    tradeoff : Tradeoff
+    tradeoff : TradeoffRecord
     """
     timed = sorted(
         (cost.level, cost.per_step)
@@ -259,7 +259,7 @@ def _step(stable: float) -> float:
     return min(rounded(stable, up=False), LARGEST_TIMESTEP_FRACTION)
 
 
-def process_option(case: Case, asked: Tolerance, tradeoff: Tradeoff) -> Option:
+def process_option(case: Case, asked: Tolerance, tradeoff: TradeoffRecord) -> Option:
     """The settings with which a tolerance is met in a case's own scene.
 
     A soft run over the whole path, and windows at the physical modulus until the tolerance is met.
@@ -290,7 +290,7 @@ def plain_option(case: Case) -> Option:
     return Option(consistent(_with(case, timestep_fraction=_PLAIN_FRACTION)), 1.0, 1.0)
 
 
-def drop_options(case: Case, tradeoff: Tradeoff) -> Iterator[Option]:
+def drop_options(case: Case, tradeoff: TradeoffRecord) -> Iterator[Option]:
     """Every measured step of the drop test that is within the stability limit."""
     process, limit = _beside_drop(case)
     for drop in tradeoff.drop_test:
@@ -298,7 +298,7 @@ def drop_options(case: Case, tradeoff: Tradeoff) -> Iterator[Option]:
             yield _drop_option(process, drop, drop.timestep_fraction)
 
 
-def finest_drop(case: Case, tradeoff: Tradeoff) -> Option:
+def finest_drop(case: Case, tradeoff: TradeoffRecord) -> Option:
     """The drop test with the smallest measured step, or a smaller one where damping is strong."""
     process, limit = _beside_drop(case)
     finest = min(tradeoff.drop_test, key=lambda drop: drop.timestep_fraction)
@@ -313,7 +313,7 @@ def _beside_drop(case: Case) -> tuple[Fidelity, float]:
     return consistent(replace(case, study=study)), limit
 
 
-def _drop_option(process: Fidelity, drop: MeasuredDrop, fraction: float) -> Option:
+def _drop_option(process: Fidelity, drop: DropEntry, fraction: float) -> Option:
     """A step of the drop test, whose error has no scatter."""
     cost = drop.relative_cost
     return Option(process, cost, cost, abs(drop.restitution_error), fraction)

@@ -5,7 +5,6 @@ run as the process runs: same modulus, step and contact options. Which drops
 those are stands here; what they say is for dragchain to find out.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -286,7 +285,7 @@ def _listed(case: Case, rows: Sequence[DropOfList]) -> DropsFile:
         gravity_m_s2=gravity,
         limit_force=study.contact.limit_force,
         restitution_now=study.pair(particle, plate).restitution,
-        fall_time_s=math.sqrt(2 * height / gravity),
+        fall_time_s=mechanics.fall_time(height, gravity),
         contact_time_s=mechanics.hertz_contact_time(mass, radius, modulus, speed),
         drops=rows,
     )

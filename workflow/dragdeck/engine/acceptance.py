@@ -7,16 +7,21 @@ from pathlib import Path
 import numpy as np
 
 from dragdeck.decks import CASE_FILE, PACKING_FILE
-from dragdeck.decks.case_file import CaseOfStudy, SteadyCriterion
 from dragdeck.decks.outputs import OutputOfRun
 from dragdeck.engine import log
 from dragdeck.engine.checkpoints import is_whole
 from dragdeck.engine.completeness import coverage, part_files, some_frames
-from dragdeck.engine.decomposition import decomposition, ranks_check
-from dragdeck.engine.inputs import RunInputs
-from dragdeck.engine.limits import breach, within
-from dragdeck.engine.record import AcceptanceCheck, CheckCode, CheckReason, RunPart
 from dragdeck.physics.contact_network import Floats, stability_number
+from dragdeck.records.case import CaseOfRun
+from dragdeck.records.run import (
+    AcceptanceCheck,
+    CaseFile,
+    CheckCode,
+    CheckReason,
+    Decomposition,
+    RunPart,
+    SteadyCriterion,
+)
 
 _FRAMES = 20
 """Frames whose contacts are evaluated. An assumption: the median of so many frames scatters little
@@ -25,7 +30,7 @@ _FRAMES = 20
 
 def check_run(
     folder: Path,
-    inputs: RunInputs,
+    inputs: CaseFile,
     outputs: Mapping[str, OutputOfRun],
     exit_status: int,
     parts: Sequence[RunPart],
@@ -37,7 +42,7 @@ def check_run(
     ----------
     folder : Path
         The run's folder.
-    inputs : RunInputs
+    inputs : CaseFile
         From ``case.json``.
     outputs : mapping of str to OutputOfRun
         From ``columns.json``.
@@ -66,12 +71,12 @@ def check_run(
         if inputs.steady is not None:
             checks.append(_steady(samples, inputs.steady))
     checks += [_complete(folder, name, output, parts) for name, output in outputs.items()]
-    checks.append(ranks_check(decomposition(screens[-1]), ranks))
+    checks.append(ranks_check(log.decomposition(screens[-1]), ranks))
     if inputs.scene in ("filling", "process") and "particles" in outputs:
         checks.append(_stable_timestep(folder, outputs["particles"], parts))
     if inputs.limits is not None and "thermo" in outputs:
         # once more on all rows: the watch may not have looked at the last ones
-        checks.append(breach(samples, inputs.limits) or within(inputs.limits))
+        checks.append(log.breach(samples, inputs.limits) or log.within(inputs.limits))
     return checks
 
 
@@ -200,7 +205,7 @@ def _stable_timestep(
     folder: Path, particles: OutputOfRun, parts: Sequence[RunPart]
 ) -> AcceptanceCheck:
     """Whether the median `stability_number` of the frames is 1 at most."""
-    case = CaseOfStudy.read(folder / CASE_FILE)
+    case = CaseOfRun.read(folder / CASE_FILE)
     wanted = [particles.columns.index(name) for name in ("x_m", "y_m", "z_m", "radius_m")]
     frames = some_frames(folder, particles, parts, _FRAMES)
     found = [_stability_number(case, rows[:, wanted]) for rows in frames]
@@ -216,10 +221,26 @@ def _stable_timestep(
     )  # fmt: skip
 
 
-def _stability_number(case: CaseOfStudy, rows: Floats) -> float:
+def _stability_number(case: CaseOfRun, rows: Floats) -> float:
     """That of centres and radii; infinite for those of no packing."""
     if not (rows.size and np.isfinite(rows).all()):
         return math.inf
     constants = [case.contact_moduli[name] for name in ("particle", "bowl")]
     of_case = case.media.density_kg_m3, case.bowl.radius_m, constants, case.timestep_s
     return stability_number(rows[:, :3], rows[:, 3], *of_case)
+
+
+def ranks_check(split: Decomposition | None, ranks: int) -> AcceptanceCheck:
+    """Whether LIGGGHTS ran on the ranks that were asked for.
+
+    A LIGGGHTS that was built for another MPI than its launcher's runs once per rank, each
+    with all particles, and all write the same files.
+    """
+    seen, passed = "LIGGGHTS printed no processor grid", False
+    if split is not None:
+        seen, passed = " by ".join(map(str, split.grid)), math.prod(split.grid) == ranks
+        if split.particles:
+            least, most = split.particles.least, split.particles.most
+            seen += f", {least:,} to {most:,} particles per rank"
+    limit = f"{ranks} rank{'s' if ranks > 1 else ''}"
+    return _check("ranks", "MPI ranks as requested", passed, seen, limit)

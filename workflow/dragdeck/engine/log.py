@@ -1,4 +1,4 @@
-"""What LIGGGHTS prints on its screen, and the rows of its ``thermo`` output."""
+"""What LIGGGHTS prints on its screen, the rows of its ``thermo`` output, and limits of these."""
 
 import math
 import re
@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from dragdeck.decks import END
+from dragdeck.physics.run_limits import SPEED_FACTOR, RunLimits
+from dragdeck.records.run import AcceptanceCheck, CheckReason, Decomposition, ParticlesPerRank
 
 
 def engine_errors(screen: str) -> list[str]:
@@ -63,6 +65,20 @@ def loops(screen: str) -> list[Loop]:
     return [Loop(float(seconds), int(steps)) for seconds, steps in found]
 
 
+def decomposition(screen: str) -> Decomposition | None:
+    """The split that LIGGGHTS printed; None where it printed none."""
+    grids = re.findall(r"^ *(\d+) by (\d+) by (\d+) MPI processor grid$", screen, re.MULTILINE)
+    if not grids:
+        return None
+    loads = re.findall(r"^Nlocal: +(\S+) ave (\d+) max (\d+) min$", screen, re.MULTILINE)
+    particles = None
+    if loads:
+        mean, most, least = loads[-1]
+        particles = ParticlesPerRank(mean=float(mean), most=int(most), least=int(least))
+    x, y, z = (int(count) for count in grids[-1])
+    return Decomposition(grid=(x, y, z), particles=particles)
+
+
 @dataclass(frozen=True)
 class Sample:
     """One row of ``thermo``: energies of all particles together, J; largest speed, m/s."""
@@ -109,3 +125,48 @@ def read_samples(rows: Sequence[str], columns: Sequence[str]) -> list[Sample]:
             )
         )
     return samples
+
+
+def breach(samples: Sequence[Sample], limits: RunLimits) -> AcceptanceCheck | None:
+    """The first sample past a limit, as an acceptance check that did not pass; None without."""
+    for sample in samples:
+        past = _past(sample, limits)
+        if past is not None:
+            reason, seen, limit = past
+            return _within_limits(False, f"{seen} at step {sample.step:,}", limit, reason)
+    return None
+
+
+def _past(sample: Sample, limits: RunLimits) -> tuple[CheckReason, str, str] | None:
+    """Reason, what was seen and the limit of a sample that is past one."""
+    energy, most = sample.mean_energy_j, limits.mean_kinetic_energy_j
+    if sample.n_particles < limits.n_particles:
+        return "particles", f"{sample.n_particles} particles", f"{limits.n_particles} particles"
+    if not math.isfinite(energy):
+        return "finite_numbers", f"a kinetic energy of {energy}", "finite numbers"
+    if energy > most:
+        seen = f"a mean kinetic energy of {energy:.3g} J per particle"
+        return "energy", seen, f"{most:.3g} J, {limits.why}"
+    if sample.fastest_particle_m_s > limits.speed_m_s:
+        limit = f"{limits.speed_m_s:.3g} m/s, {SPEED_FACTOR:g} times the speed of that energy"
+        return "speed", f"a particle at {sample.fastest_particle_m_s:.3g} m/s", limit
+    return None
+
+
+def within(limits: RunLimits) -> AcceptanceCheck:
+    """The acceptance check of a run that passed no limit."""
+    most = limits.mean_kinetic_energy_j
+    return _within_limits(True, "no limit exceeded", f"{most:.3g} J per particle, {limits.why}")
+
+
+def _within_limits(
+    passed: bool, seen: str, limit: str, reason: CheckReason | None = None
+) -> AcceptanceCheck:
+    return AcceptanceCheck(
+        code="within_limits",
+        reason=reason,
+        name="energy and speed within limits",
+        passed=passed,
+        seen=seen,
+        limit=limit,
+    )

@@ -16,14 +16,19 @@ from dragdeck.engine.checkpoints import (
     take_forced_restarts,
 )
 from dragdeck.engine.completeness import cut_outputs, first_gap, part_files
-from dragdeck.engine.decomposition import decomposition
-from dragdeck.engine.inputs import RunInputs
 from dragdeck.engine.process import Ending, Engine, command, execute
-from dragdeck.engine.record import REMEDIES, AcceptanceCheck, CheckCode, RunPart, RunRecord
 from dragdeck.engine.reports import Report
 from dragdeck.engine.space import SPARE_BYTES, check_space, free_bytes, space_left
 from dragdeck.engine.watch import EngineEnded, LimitMet, Watcher, cut_screen
 from dragdeck.errors import EngineError, RejectedRunError
+from dragdeck.records.run import (
+    REMEDIES,
+    AcceptanceCheck,
+    CaseFile,
+    CheckCode,
+    RunPart,
+    RunRecord,
+)
 
 STATE_FILE = "state.json"
 _WRITTEN: set[CheckCode] = {"output_complete", "packing_whole"}
@@ -37,7 +42,7 @@ class PartOfRun:
     Attributes
     ----------
     folder : Path
-    inputs : RunInputs
+    inputs : CaseFile
     columns : ColumnsFile
     record : RunRecord or None
         Of the parts before; None for a first start.
@@ -45,7 +50,7 @@ class PartOfRun:
     """
 
     folder: Path
-    inputs: RunInputs
+    inputs: CaseFile
     columns: ColumnsFile
     record: RunRecord | None
     report: Report
@@ -158,7 +163,7 @@ class PartOfRun:
         why = None if log.reached_end(screen) else self._interruption(screen, asked, ending)
         if why is not None:
             raise self._stopped(why)
-        self.record = self._record.model_copy(update={"decomposition": decomposition(screen)})
+        self.record = self._record.model_copy(update={"decomposition": log.decomposition(screen)})
         checks = check_run(
             self.folder,
             self.inputs,

@@ -1,12 +1,14 @@
-"""The engine as a process: find it, start it, watch it, stop it."""
+"""The engine as a process: find, start, watch and stop it; one runner in a folder at a time."""
 
 import contextlib
 import ctypes
+import fcntl
 import os
 import re
 import shlex
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -17,7 +19,8 @@ from pathlib import Path
 
 import psutil
 
-from dragdeck.engine.lock import end_tree
+from dragdeck.decks import DECK_FILE
+from dragdeck.engine.reports import Report
 from dragdeck.errors import EngineError
 
 ENGINE_VARIABLE = "DRAGDECK_ENGINE"
@@ -32,6 +35,7 @@ _QUEUE_VARIABLES = ("SLURM_", "PMI")
 OLDEST_VERSION = (3, 8, 0)
 """Oldest engine that the decks were run on."""
 
+LOCK_FILE = ".lock"
 _POLL_S = 0.2
 _PR_SET_PDEATHSIG = 1
 Watch = Callable[[float], None]
@@ -260,3 +264,58 @@ def _ends_with_us(number: signal.Signals) -> Callable[[], None] | None:
             os.kill(os.getpid(), number)
 
     return ask
+
+
+@contextlib.contextmanager
+def only_runner(folder: Path, report: Report) -> Iterator[None]:
+    """Hold the lock of a run folder, and end an engine that was left alone in it.
+
+    The system frees the lock when its holder dies, in whatever way. A living holder is named,
+    and waited for: it brings the run to its end.
+    """
+    with (folder / LOCK_FILE).open("a+", encoding="utf-8") as stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            stream.seek(0)
+            holder = stream.read().strip() or "an unknown process"
+            report(f"waiting for another process that runs this folder: {holder}")
+            fcntl.flock(stream, fcntl.LOCK_EX)
+        stream.truncate(0)
+        stream.write(f"process {os.getpid()} on {socket.gethostname()}\n")
+        stream.flush()
+        for orphan in _engines_in(folder):
+            report(f"ended LIGGGHTS, which had outlived its dragdeck process: process {orphan.pid}")
+            end_tree(orphan)
+            psutil.wait_procs([orphan], timeout=10)
+        yield
+
+
+def is_held(folder: Path) -> bool:
+    """Whether a living process runs a folder, here or on another machine that shares its disk."""
+    with contextlib.suppress(FileNotFoundError), (folder / LOCK_FILE).open() as stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError:
+            return True
+    return False
+
+
+def _engines_in(folder: Path) -> list[psutil.Process]:
+    """Processes of this machine that run the deck of a folder."""
+    found = []
+    for process in psutil.process_iter():
+        with contextlib.suppress(psutil.Error, OSError):
+            if DECK_FILE in process.cmdline() and Path(process.cwd()).samefile(folder):
+                found.append(process)
+    return found
+
+
+def end_tree(top: psutil.Process) -> None:
+    """Kill a process and all that it started: mpirun's ranks have groups of their own."""
+    with contextlib.suppress(psutil.NoSuchProcess):
+        family = [*top.children(recursive=True), top]
+        for process in family:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                process.kill()
+        psutil.wait_procs([process for process in family if process != top], timeout=10)

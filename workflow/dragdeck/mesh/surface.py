@@ -161,14 +161,15 @@ def upright(mesh: Trimesh, axis: str) -> Trimesh:
     return turned
 
 
-def tilted(mesh: Trimesh, angle_deg: float) -> Trimesh:
-    """Lean a placed mesh towards +x; its lowest point stays at z = 0."""
+def tilted(mesh: Trimesh, angle_deg: float, *, about_tip: bool = False) -> Trimesh:
+    """Lean a placed mesh towards +x; its lowest point stays at z = 0, or its tip in the origin."""
     angle = np.radians(angle_deg)
     turn = np.array(
         [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
     )
     corners = mesh.vertices @ turn.T
-    return surface(corners - [0.0, 0.0, corners[mesh.referenced_vertices, 2].min()], mesh.faces)
+    lowest = 0.0 if about_tip else corners[mesh.referenced_vertices, 2].min()
+    return surface(corners - [0.0, 0.0, lowest], mesh.faces)
 
 
 def points_below(mesh: Trimesh, height_m: float) -> Floats:

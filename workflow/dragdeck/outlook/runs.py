@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dragdeck.cases.case import Case
-from dragdeck.decks.deck import StudyScene
 from dragdeck.engine.reports import shown_bytes, shown_time
 from dragdeck.engine.space import expected_bytes
 from dragdeck.engine.status import RunStatus, run_status
@@ -13,7 +12,7 @@ from dragdeck.errors import InputError
 from dragdeck.outlook.explain import Cost, expected_cost, measured_speeds
 from dragdeck.scenes.filling import FILLING
 from dragdeck.scenes.lead import led
-from dragdeck.scenes.scene import SceneType
+from dragdeck.scenes.scene import SceneType, StudyScene
 
 WAITING = RunStatus("waiting")
 
@@ -99,7 +98,7 @@ class StudyRun:
         return f"{self.name}: {', '.join(filter(None, (self.status.state, *self.cells)))}"
 
 
-def alike(runs: Mapping[Path, Case]) -> list[dict[Path, Case]]:
+def alike_but_for_seed(runs: Mapping[Path, Case]) -> list[dict[Path, Case]]:
     """Runs by their folders, those that differ in the seed alone together: they cost the same."""
     found: dict[str, dict[Path, Case]] = {}
     for folder, case in runs.items():
@@ -125,7 +124,7 @@ def expected_runs(
         The scene of runs that differ in the seed alone, if not that of `kind`.
     """
     speeds = measured_speeds(next(iter(runs)).parent) if runs else []
-    for group in alike(runs):
+    for group in alike_but_for_seed(runs):
         first = next(iter(group.values()))
         try:
             scene = build(group) if build else kind.build(first, None)

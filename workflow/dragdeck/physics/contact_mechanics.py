@@ -88,6 +88,11 @@ def fall_speed(height_m: float, gravity_m_s2: float) -> float:
     return math.sqrt(2 * gravity_m_s2 * height_m)
 
 
+def fall_time(height_m: float, gravity_m_s2: float) -> float:
+    """Duration of a free fall from rest, s."""
+    return math.sqrt(2 * height_m / gravity_m_s2)
+
+
 def bed_height(volume_m3: float, bowl_radius_m: float, solid_fraction: float) -> float:
     """Height of a bed of particles of that total volume, m."""
     return volume_m3 / (solid_fraction * math.pi * bowl_radius_m**2)

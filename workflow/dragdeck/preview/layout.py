@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from dragdeck.cases.case import Case, of_each_workpiece
 from dragdeck.mesh import bowl, surface
 from dragdeck.scenes.filling import expected_bed
-from dragdeck.scenes.legs import Place
 from dragdeck.scenes.motion import Course, course, driven_surface_speed
-from dragdeck.scenes.workpiece import workpiece_mesh, workpiece_radius
+from dragdeck.scenes.workpiece import reference_height, workpiece_mesh, workpiece_radius
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -29,6 +28,9 @@ Floats = NDArray[np.float64]
 _POSES_PER_RADIUS = 4
 """Poses while a surface point moves by the workpiece's radius: a swept cylinder is then at most
 1 % of the radius too narrow between two of them."""
+
+_LOOKS = 400
+"""How often it is looked how far a workpiece turns in a leg."""
 
 _MOST_POSES = 2000
 """Of a leg: beyond, poses are farther apart."""
@@ -90,7 +92,7 @@ class MovingWorkpiece:
 
 
 @dataclass(frozen=True)
-class Layout:
+class CaseLayout:
     """What is drawn of a case; lengths in m.
 
     Attributes
@@ -112,7 +114,7 @@ class Layout:
     workpieces: Sequence[MovingWorkpiece]
 
 
-def layout(case: Case) -> Layout:
+def layout(case: Case) -> CaseLayout:
     """The geometry of a case in the expected bed, whether it fits or not.
 
     Raises
@@ -122,7 +124,7 @@ def layout(case: Case) -> Layout:
     """
     study = case.study
     radius, level = study.bowl.radius_m, expected_bed(study).surface_m
-    return Layout(
+    return CaseLayout(
         bowl=bowl(radius, study.bowl.height_m, radius / 10),
         bed=_disc(radius, level),
         bowl_radius_m=radius,
@@ -134,8 +136,9 @@ def layout(case: Case) -> Layout:
 
 
 def _moving(case: Case) -> MovingWorkpiece:
-    way = course(case.study, expected_bed(case.study))
-    turn = sum(one.turn_rad(1, way.drag.timestep_s) for one in way.superposed.values())
+    way = course(case.study, expected_bed(case.study), reference_height(case))
+    moving = way.driven.superposed.values()
+    turn = sum(float(one.turn(way.drag, np.ones(1))[0]) for one in moving)
     return MovingWorkpiece(
         name=f"workpiece {case.number or ''}".rstrip(),
         mesh=workpiece_mesh(case),
@@ -159,19 +162,16 @@ def _stages(case: Case, way: Course) -> Iterator[Stage]:
     """The legs as they are driven, with their times at the study's own speed."""
     study, radius = case.study, workpiece_radius(case)
     factor, fastest = study.chosen_fidelity().speed_factor, driven_surface_speed(study, radius)
-    for leg, start in way.begun():
+    for leg in way.legs:
         speed = max(leg.speed_m_s, fastest if leg.name == "drag" else 0.0)
-        travel = (speed + abs(leg.angular_speed_rad_s) * radius) * leg.duration_s
+        _, rotation = way.poses(leg, np.linspace(0.0, leg.steps, _LOOKS))
+        turned = np.abs(np.diff(np.unwrap(rotation.front_rad))).sum()
+        travel = speed * leg.duration_s + turned * radius
         count = min(_MOST_POSES, 2 + math.ceil(_POSES_PER_RADIUS * travel / radius))
-        steps = np.linspace(0.0, leg.steps, count)
-        poses = [_matrix(way.pose(leg, start, float(step))) for step in steps]
-        yield Stage(leg.name, np.array(poses), factor * leg.duration_s)
-
-
-def _matrix(place: Place) -> Floats:
-    x, y, z, turn = place
-    c, s = math.cos(turn), math.sin(turn)
-    return np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, z], [0, 0, 0, 1]])
+        places, rotation = way.poses(leg, np.linspace(0.0, leg.steps, count))
+        poses = np.tile(np.eye(4), (count, 1, 1))
+        poses[:, :3, :3], poses[:, :3, 3] = rotation.matrices, places
+        yield Stage(leg.name, poses, factor * leg.duration_s)
 
 
 # --- views ----------------------------------------------------------------------------------------
@@ -184,7 +184,7 @@ COLOURS: dict[str, str] = json.loads(
 
 
 @dataclass(frozen=True)
-class View:
+class Projection:
     """A parallel projection: what points right and up in it, as unit vectors."""
 
     title: str
@@ -199,7 +199,7 @@ class View:
         return np.array([self.right, self.up, np.cross(self.right, self.up)])
 
 
-def views(direction_rad: float) -> list[View]:
+def views(direction_rad: float) -> list[Projection]:
     """From above, along the motion at the start of the drag, from its right, and obliquely."""
     c, s = math.cos(direction_rad), math.sin(direction_rad)
     x, y, z = np.eye(3)
@@ -207,8 +207,10 @@ def views(direction_rad: float) -> list[View]:
     right, back = (beside + ahead) / math.sqrt(2), (beside - ahead) / math.sqrt(2)
     low = math.radians(28)
     return [
-        View("From above", x, y, "x (mm)", "y (mm)"),
-        View("In the direction of motion", beside, z, "to the right of the axis (mm)", "z (mm)"),
-        View("From the right of the motion", ahead, z, "along the motion (mm)", "z (mm)"),
-        View("Oblique", right, math.cos(low) * z - math.sin(low) * back, "", ""),
+        Projection("From above", x, y, "x (mm)", "y (mm)"),
+        Projection(
+            "In the direction of motion", beside, z, "to the right of the axis (mm)", "z (mm)"
+        ),
+        Projection("From the right of the motion", ahead, z, "along the motion (mm)", "z (mm)"),
+        Projection("Oblique", right, math.cos(low) * z - math.sin(low) * back, "", ""),
     ]

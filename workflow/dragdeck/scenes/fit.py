@@ -29,6 +29,7 @@ from dragdeck.scenes.motion import (
     driven_surface_speed,
 )
 from dragdeck.scenes.workpiece import (
+    dip,
     farthest_surface,
     workpiece_length,
     workpiece_radius,
@@ -70,7 +71,7 @@ def clearances(case: Case, surface_m: float) -> Clearances:
     """Clearances of a case's workpiece in a bed with its surface at this height, m."""
     motion = case.study.motion
     tip = surface_m - motion.immersion_depth_m
-    return Clearances(_wall_gap(case), tip, tip + vertical_range(motion)[0])
+    return Clearances(_wall_gap(case), tip, tip + vertical_range(motion)[0] - dip(case))
 
 
 def _wall_gap(case: Case) -> float:
@@ -145,10 +146,8 @@ def closest(each: Sequence[Case], bed: Bed) -> tuple[float, int, int] | None:
 def _way(case: Case, bed: Bed) -> NDArray[np.float64]:
     """X and y, (N, 2), of the workpiece's axis along all its legs."""
     fractions = np.linspace(0.0, 1.0, _PLACES_PER_LEG + 1)
-    begun = course(case.study, bed).begun()
-    return np.array(
-        [leg.pose(start, part * leg.steps)[:2] for leg, start in begun for part in fractions]
-    )
+    way = course(case.study, bed)
+    return np.concatenate([way.poses(leg, fractions * leg.steps)[0][:, :2] for leg in way.legs])
 
 
 def process_cautions(case: Case) -> Iterator[Caution]:
@@ -235,8 +234,9 @@ def _up_and_down(case: Case, tip_m: float) -> Iterator[InputError]:
     """Refuse a path or superposed motions that take a workpiece to the floor or out of the bed."""
     motion = case.study.motion
     depth, (low, high) = motion.immersion_depth_m, vertical_range(motion)
+    low -= dip(case)
     deepest = min(depth + tip_m - _largest_particle(case), workpiece_length(case))
-    moving = ["path"] if any(path_heights(motion)) else []
+    moving = ["path"] if any(path_heights(motion)) or motion.path.leans else []
     moving += [name for name, one in motion.superposed().items() if one.vertical_reach_m]
     problems = (
         (depth <= deepest < depth - low, "takes the workpiece too deep", deepest - depth),

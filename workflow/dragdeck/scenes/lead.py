@@ -14,10 +14,10 @@ from dragdeck.cases.case import Case, Stretch, of_each_workpiece
 from dragdeck.errors import InputError
 from dragdeck.physics.rounding import round_to
 from dragdeck.scenes.legs import Stop
-from dragdeck.scenes.motion import drag_leg, driven_speed
+from dragdeck.scenes.motion import driven
 from dragdeck.scenes.periods import output_periods
+from dragdeck.study.drive import Drive
 from dragdeck.study.model import SoftStart, Study
-from dragdeck.study.superposed.kind import DragSteps
 
 LEAD = "lead"
 """Part of a case that only leads to another one's process."""
@@ -90,7 +90,7 @@ def windows_of(case: Case) -> list[Case]:
     if lead.study.chosen_fidelity().windows is None:
         return []
     study = _window_study(lead.study)
-    length = (_before_s(study) + _sample_s(study)) / drag_leg(study).duration_s
+    length = (_before_s(study) + _sample_s(study)) / driven(study).drive.duration_s
     for rank, number in enumerate(_spread_out(len(lead.stretch.marks)), 1):
         begin = lead.stretch.marks[number]
         stretch = Stretch(begin, min(begin + length, 1.0))
@@ -103,7 +103,7 @@ def windows_of(case: Case) -> list[Case]:
 def _too_short(case: Case) -> InputError:
     """Refuses a path on which hardly a window fits."""
     study = _window_study(case.study)
-    speed = driven_speed(study)
+    speed = driven(study).drive.speed_m_s
     before, sample = _before_s(study) * speed, _sample_s(study) * speed
     least = max(before, study.motion.uncounted_m) + _FEWEST * sample
     return InputError(
@@ -125,7 +125,7 @@ def window_count(study: Study) -> int:
 def window_fraction(study: Study) -> float:
     """Part of the drag that a window takes."""
     stiff = _window_study(study)
-    return float((_before_s(stiff) + _sample_s(stiff)) / drag_leg(stiff).duration_s)
+    return float((_before_s(stiff) + _sample_s(stiff)) / driven(stiff).drive.duration_s)
 
 
 def covered_fraction(study: Study) -> float:
@@ -144,19 +144,19 @@ def mark_file(number: int) -> str:
     return f"state.{number}.restart"
 
 
-def covered(case: Case, drag: DragSteps) -> Covered:
+def covered(case: Case, drag: Drive) -> Covered:
     """The steps that the process of a case runs.
 
     Parameters
     ----------
     case : Case
         As `led` returns it.
-    drag : DragSteps
+    drag : Drive
         The whole drag.
     """
     study, stretch = case.study, case.stretch
     end = drag.end if stretch.end == 1 else step_at(stretch.end, drag)
-    uncounted = _seconds(study.motion.uncounted_m, study)
+    uncounted = _until_counted(study)
     own = drag.start + math.ceil(uncounted / drag.timestep_s)
     if not stretch.begin:
         return Covered(0, end, 0, own)
@@ -167,13 +167,13 @@ def covered(case: Case, drag: DragSteps) -> Covered:
     return Covered(entry, end, ramp_end, max(settled, own))
 
 
-def step_at(fraction: float, drag: DragSteps) -> int:
+def step_at(fraction: float, drag: Drive) -> int:
     """The step at a fraction of the drag."""
     return drag.start + round(fraction * (drag.end - drag.start))
 
 
 def stops(
-    case: Case, drag: DragSteps, steps: Covered, youngs_moduli_pa: Sequence[float]
+    case: Case, drag: Drive, steps: Covered, youngs_moduli_pa: Sequence[float]
 ) -> Iterator[Stop]:
     """Where the engine stops in the drag: at marks, where the moduli change, and at the end.
 
@@ -181,7 +181,7 @@ def stops(
     ----------
     case : Case
         As `led` returns it.
-    drag : DragSteps
+    drag : Drive
     steps : Covered
     youngs_moduli_pa : sequence of float
         Of the run, one per type.
@@ -208,21 +208,27 @@ def _before_counted(study: Study) -> tuple[float, float]:
 
 
 def _seconds(path_m: float, study: Study) -> float:
-    """Time in which the workpiece is driven along a path, s."""
-    return float(path_m / study.motion.path_length_m * drag_leg(study).duration_s)
+    """Time in which the workpiece is driven along a path at full speed, s."""
+    return float(path_m / study.motion.path_length_m * driven(study).drive.full_duration_s)
+
+
+def _until_counted(study: Study) -> float:
+    """Time from the start of the drag until the statistics may begin, s."""
+    drive = driven(study).drive
+    return _seconds(study.motion.uncounted_m, study) + drive.begin.steps / 2 * drive.timestep_s
 
 
 def _frame(study: Study) -> float:
     """A frame of the network as a fraction of the drag."""
     timestep = bed_timestep(study, "timestep_fraction")
-    return float(output_periods(study, timestep).network / drag_leg(study).steps)
+    return float(output_periods(study, timestep).network / driven(study).drive.steps)
 
 
 def _entry_fraction(study: Study) -> float:
     """Where a run with a soft start enters its drag: at a frame of the network."""
     frame = _frame(study)
-    before_s = max(0.0, _seconds(study.motion.uncounted_m, study) - _before_s(study))
-    return float(max(1, math.floor(before_s / drag_leg(study).duration_s / frame)) * frame)
+    before_s = max(0.0, _until_counted(study) - _before_s(study))
+    return float(max(1, math.floor(before_s / driven(study).drive.duration_s / frame)) * frame)
 
 
 def _window_study(study: Study) -> Study:
@@ -276,8 +282,8 @@ def _marks(study: Study) -> tuple[float, ...]:
     """Where windows begin: each samples blocks of its own of the counted path."""
     stiff, windows = _window_study(study), study.chosen_fidelity().windows
     assert windows is not None
-    drag, frame, sample = drag_leg(stiff).duration_s, _frame(stiff), _sample_s(stiff)
-    first = max(_seconds(study.motion.uncounted_m, stiff), _before_s(stiff) + frame * drag)
+    drag, frame, sample = driven(stiff).drive.duration_s, _frame(stiff), _sample_s(stiff)
+    first = max(_until_counted(stiff), _before_s(stiff) + frame * drag)
     places = math.floor((drag - first) / sample + 1e-9)
     chosen = sorted(_spread_out(places)[: windows.most])
     starts = ((first + number * sample - _before_s(stiff)) / drag for number in chosen)

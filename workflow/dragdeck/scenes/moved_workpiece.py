@@ -2,13 +2,17 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from dragdeck.cases.case import Case
 from dragdeck.decks.deck import Deck
-from dragdeck.scenes.legs import Place, Stop, TimedLeg
-from dragdeck.scenes.motion import Course, on_engine
-from dragdeck.study.superposed.kind import EngineMotion
+from dragdeck.scenes.legs import Leg, Stop
+from dragdeck.scenes.motion import Course
+from dragdeck.study.drive import EngineMotion
+from dragdeck.study.driven import DrivenMotion
+from dragdeck.study.rotation import Floats, rotation_vector
 
 
 @dataclass(frozen=True)
@@ -25,10 +29,12 @@ class MovedWorkpiece:
         Its reference point as it starts.
     turn_deg : float
         About +z, as it starts.
-    legs : sequence of TimedLeg
+    own_turn : sequence of float
+        Before that, in its own frame: axis, and angle in degrees; empty for none.
+    legs : sequence of Leg
         Those that the run moves it along.
-    staged : EngineMotion or None
-        Of a drag in stages.
+    driven : DrivenMotion
+        The motion in the drag.
     superposed : mapping
         What is superposed on the drag, by name.
     """
@@ -37,11 +43,20 @@ class MovedWorkpiece:
     mesh: str
     start_m: tuple[float, float, float]
     turn_deg: float
-    legs: Sequence[TimedLeg]
-    staged: EngineMotion | None
+    own_turn: Sequence[float]
+    legs: Sequence[Leg]
+    driven: DrivenMotion
     superposed: Mapping[str, EngineMotion]
 
-    name = property(lambda self: f"workpiece{self.ending}")
+    @property
+    def name(self) -> str:
+        """Name of its mesh."""
+        return f"workpiece{self.ending}"
+
+    @property
+    def about_reference(self) -> bool:
+        """Whether a motion turns it about its live reference point, or might."""
+        return bool(self.superposed) or self.legs[-1].motion.about_reference
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,9 +73,15 @@ class ProcessDeck(Deck):
     entry_step: int = 0
 
     @property
-    def legs(self) -> Sequence[TimedLeg]:
+    def legs(self) -> Sequence[Leg]:
         """Those of the first workpiece; the others' take as many steps."""
         return self.workpieces[0].legs
+
+
+def _axis_and_angle(matrix: Floats) -> Sequence[float]:
+    vector = rotation_vector(matrix)
+    angle = float(np.linalg.norm(vector))
+    return [*(vector / angle).tolist(), math.degrees(angle)] if angle else ()
 
 
 def moved_workpiece(case: Case, motion: Course, mesh: str, entry_step: int) -> MovedWorkpiece:
@@ -76,19 +97,22 @@ def moved_workpiece(case: Case, motion: Course, mesh: str, entry_step: int) -> M
     entry_step : int
         Step of the drag at which it starts; 0: it starts with the plunge.
     """
-    ending, start = f"_{case.number}" if case.number > 1 else "", motion.drag.start
-    staged = on_engine(motion.legs[-1].stages, start)
-    moving = {name: one.on_engine(start) for name, one in motion.superposed.items()}
-    place: Place = (*motion.start_m, motion.turn_rad)
+    ending = f"_{case.number}" if case.number > 1 else ""
+    place, turn, own = motion.start_m, motion.turn_rad, None
+    legs = motion.legs[-1:] if entry_step else motion.legs
     if entry_step:
-        *_, (drag, begun) = motion.begun()
-        place = motion.pose(drag, begun, entry_step - start)
+        places, rotation = motion.poses(legs[-1], np.array([entry_step - motion.drag.start]))
+        x, y, z = places[0].tolist()
+        place, turn = (x, y, z), float(rotation.turn_rad[0])
+        own = rotation.own
+    moving = motion.driven.superposed_on_engine()
     return MovedWorkpiece(
         ending=ending,
         mesh=mesh,
-        start_m=place[:3],
-        turn_deg=math.degrees(place[3]),
-        legs=motion.legs[-1:] if entry_step else motion.legs,
-        staged=staged and staged.ending(ending),
+        start_m=place,
+        turn_deg=math.degrees(turn),
+        own_turn=() if own is None else _axis_and_angle(own[0]),
+        legs=[replace(leg, motion=leg.motion.ending(ending)) for leg in legs],
+        driven=motion.driven,
         superposed={name: one.ending(ending) for name, one in moving.items()},
     )

@@ -8,14 +8,8 @@ from functools import partial
 from dragdeck.cases.bed import bed_radii, bed_rayleigh_time, bed_timestep, skin
 from dragdeck.cases.case import Case, Stretch, materials_content, mesh_file, of_each_workpiece
 from dragdeck.decks import PACKING_FILE, WORKPIECE_MESH, outputs
-from dragdeck.decks.case_file import Phase, SteadyCriterion
 from dragdeck.decks.deck import LeftOut, Scene
 from dragdeck.decks.outputs import Output
-from dragdeck.decks.process_case import (
-    ProcessCase,
-    StatisticsOfRun,
-    WorkpieceOfRun,
-)
 from dragdeck.errors import Caution
 from dragdeck.files import file_checksum
 from dragdeck.mesh import bowl, stl_text
@@ -24,6 +18,8 @@ from dragdeck.physics.engine_limits import ENGINE_NEIGHBOURS
 from dragdeck.physics.packing import Bed
 from dragdeck.physics.rounding import round_to
 from dragdeck.physics.run_limits import RunLimits
+from dragdeck.records.case import ProcessCase, StatisticsOfRun, WorkpieceOfRun
+from dragdeck.records.run import Phase, SteadyCriterion
 from dragdeck.scenes.dimensionless import describe
 from dragdeck.scenes.drop_test import DROP_TEST
 from dragdeck.scenes.filling import (
@@ -43,12 +39,13 @@ from dragdeck.scenes.fit import (
     process_cautions,
 )
 from dragdeck.scenes.lead import Covered, covered, led, mark_file, stops
-from dragdeck.scenes.motion import Course, course, driven_speed
+from dragdeck.scenes.motion import Course, course
 from dragdeck.scenes.moved_workpiece import ProcessDeck, moved_workpiece
 from dragdeck.scenes.periods import Periods, output_periods
 from dragdeck.scenes.scene import SceneType, case_of_study, material_table
 from dragdeck.scenes.workpiece import (
     PARTICLE_STEPS_PER_S,
+    reference_height,
     workpiece_facets,
     workpiece_length,
     workpiece_mesh,
@@ -88,13 +85,13 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
     dt, top = bed_timestep(study, "timestep_fraction"), box_top(study)
     periods, meshes = output_periods(study, dt), _mesh_files(each)
     check_apart(each, bed)
-    courses, moved = [course(one.study, bed) for one in each], []
+    courses, moved = [course(one.study, bed, reference_height(one)) for one in each], []
     drag = courses[0].drag
     steps = covered(whole, drag)
     for one, way in zip(each, courses, strict=True):
         check_fit(one, bed.surface_m, dt)
         moved.append(moved_workpiece(one, way, meshes[one.study.workpiece.shape], steps.entry))
-        check_headroom(one, way.start_m[2], top)
+        check_headroom(one, way.start_m[2] - reference_height(one), top)
     types, parts = study.type_names(), rank_split(whole)
     materials = material_table(study, types, fidelity.youngs_modulus_scale, whole)
     deck = ProcessDeck(
@@ -118,7 +115,7 @@ def process_scene(case: Case, bed: Bed | None = None) -> Scene[ProcessCase]:
         bowl_type=types.index(study.bowl.material) + 1,
         bowl_radius_m=study.bowl.radius_m,
         bowl_facets=facets,
-        bowl_rad_s=study.motion.path.bowl_rad_s(driven_speed(study)),
+        bowl_rad_s=courses[0].driven.bowl_rad_s,
         workpiece_type=types.index(study.workpiece.material) + 1,
         workpieces=moved,
         stops=list(stops(whole, drag, steps, materials.youngs_moduli_pa)),
@@ -208,8 +205,8 @@ def _process_case(
     steps: Covered,
 ) -> ProcessCase:
     case, drag = each[number], way.drag
-    study, motion, speed = case.study, case.study.motion, driven_speed(case.study)
-    transient_s = motion.uncounted_m / speed
+    study, motion = case.study, case.study.motion
+    transient_s = drag.time_to(motion.uncounted_m)
     if steps.entry:
         transient_s = (steps.counted - drag.start) * drag.timestep_s
     return case_of_study(
@@ -230,7 +227,7 @@ def _process_case(
         numbers=describe(case),
         surface_m=surface_m,
         workpiece=WorkpieceOfRun(
-            kind="mesh" if motion.tilt_deg else study.workpiece.shape.kind,
+            kind="mesh" if motion.leans else study.workpiece.shape.kind,
             radius_m=workpiece_reach(case),
             length_m=workpiece_length(case),
             mesh=WORKPIECE_MESH,
@@ -240,8 +237,8 @@ def _process_case(
             wake_from_m=_wake_from(each, number),
         ),
         output_of=PROCESS.run_id(case.all_workpieces) if case.number > 1 else None,
-        motion=motion.path.of_run(speed, motion.orientation, way.legs[-1].stages),
-        superposed=list(way.superposed.values()),
+        motion=way.driven.path_entry(),
+        superposed=way.driven.superposed_entries(),
         phases=[
             Phase(name=leg.name, start_step=leg.start_step, end_step=min(leg.end_step, steps.end))
             for leg in way.legs

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from dragdeck.cases.bed import bed_timestep
 from dragdeck.cases.case import Case, mesh_file
 from dragdeck.errors import Caution
 from dragdeck.mesh import (
@@ -23,11 +24,14 @@ from dragdeck.mesh import (
     place,
     points_below,
     read,
+    surface,
     tilted,
     upright,
 )
 from dragdeck.physics.rounding import round_to, rounded
 from dragdeck.scenes.legs import deepest, farthest_reach, plunge_point, surface_speed
+from dragdeck.study.driven import DrivenMotion
+from dragdeck.study.rotation import by_vector
 from dragdeck.study.workpiece import CylinderShape, MeshShape
 
 if TYPE_CHECKING:
@@ -43,24 +47,68 @@ _MOST_TIMES, _ALWAYS_FACETS = 5, 5000
 """Facets are too many if they take this many times as long as the particles, and never below that
 number."""
 
+_LOOKS = 100
+"""How often it is looked how a workpiece leans on its path."""
+
 _FREEBOARD_DIAMETERS = 4
 """A generated workpiece stands this many particle diameters out of the bed."""
 
 
 def workpiece_mesh(case: Case) -> "Trimesh":
-    """The workpiece with its tip in the origin, leaning towards +x if it is tilted.
+    """The workpiece with its reference point in the origin, leaning towards +x if it is tilted.
 
     Raises
     ------
     InputError
         The mesh file is missing or cannot be used.
     """
-    shape, tilt = case.study.workpiece.shape, case.study.motion.tilt_deg
+    mesh, motion = _upright(case), case.study.motion
+    if not motion.tilt_deg:
+        return mesh
+    return tilted(mesh, motion.tilt_deg, about_tip=motion.turns_about_inclined_axis)
+
+
+def _upright(case: Case) -> "Trimesh":
+    """The workpiece as it stands upright on its tip."""
+    shape = case.study.workpiece.shape
     if isinstance(shape, CylinderShape):
-        mesh = _workpiece(shape, _generated_length(case))
-    else:
-        mesh, _ = _of_case(case, shape)
-    return tilted(mesh, tilt) if tilt else mesh
+        return _workpiece(shape, _generated_length(case))
+    return _of_case(case, shape)[0]
+
+
+def reference_height(case: Case) -> float:
+    """Height of the reference point above the lowest point of the workpiece as it starts, m.
+
+    A workpiece that spins about an inclined axis has it on the axis, and counts as low as it
+    is at any angle of its spin.
+    """
+    motion = case.study.motion
+    if not motion.turns_about_inclined_axis:
+        return 0.0
+    x, y, z = _upright(case).vertices.T
+    tilt = math.radians(motion.tilt_deg or 0.0)
+    lowest = z * math.cos(tilt) - np.hypot(x, y) * abs(math.sin(tilt))
+    return round_to(float(-lowest.min()), 9)
+
+
+def dip(case: Case) -> float:
+    """How far a workpiece that leans on its path reaches below its lowest point at the start, m."""
+    if not case.study.motion.path.leans:
+        return 0.0
+    return max(0.0, *(float(-points[:, 2].min()) for points in _postures(case)))
+
+
+def _postures(case: Case) -> Iterator[NDArray[np.float64]]:
+    """Corners of the workpiece, (N, 3), as it leans and spins, its front along +x, m."""
+    mesh, motion = workpiece_mesh(case), case.study.motion
+    way = DrivenMotion.of(motion, bed_timestep(case.study, "timestep_fraction"), 1.0)
+    since = np.linspace(0.0, way.drive.steps, _LOOKS)
+    own = motion.path.own(way.drive, since)
+    if motion.turns_about_inclined_axis:
+        tilt, angle = math.radians(way.drive.tilt_deg), np.linspace(0.0, math.tau, 25)[:, None]
+        own = by_vector(angle * [math.sin(tilt), 0.0, math.cos(tilt)])
+    for rotation in np.eye(3)[None] if own is None else own:
+        yield mesh.vertices @ rotation.T
 
 
 def workpiece_warnings(case: Case) -> list[Caution]:
@@ -127,7 +175,7 @@ def workpiece_radius(case: Case) -> float:
 
 def workpiece_reach(case: Case) -> float:
     """Radius of the upright cylinder about the tip around what is in the bed, m."""
-    if not case.study.motion.tilt_deg:
+    if not case.study.motion.leans:
         return workpiece_radius(case)
     return float(np.hypot(*_in_bed(case)).max())
 
@@ -151,13 +199,16 @@ def farthest_surface(case: Case) -> float:
 
 def _in_bed(case: Case) -> NDArray[np.float64]:
     """X and y, (2, N), of the corners of what is in the bed, its front along +x, m."""
-    return points_below(workpiece_mesh(case), deepest(case.study.motion))[:, :2].T
+    mesh, height = workpiece_mesh(case), deepest(case.study.motion) - reference_height(case)
+    found = [points_below(surface(points, mesh.faces), height)[:, :2] for points in _postures(case)]
+    return np.concatenate(found).T
 
 
 def fastest_surface(case: Case) -> float:
     """Highest speed of the workpiece's surface in the drag, at the study's own speed, m/s."""
     motion = case.study.motion
-    return surface_speed(motion, workpiece_radius(case) if motion.superposed() else 0.0)
+    turns = motion.superposed() or motion.path.leans
+    return surface_speed(motion, workpiece_radius(case) if turns else 0.0)
 
 
 def workpiece_facets(case: Case) -> int:

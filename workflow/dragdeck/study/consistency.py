@@ -99,10 +99,13 @@ def _motion(study: Study) -> _Found:
             "two frames of the contact network (outputs.network_hz)"
         )
         yield "motion.transient_m", problem, limit
-    for name, one in motion.superposed().items():
-        if one.ramp_s * speed > most:
-            limit = f"at most {most / speed:.3g} s; or use a longer path"
-            yield f"motion.{name}.ramp_s", problem, limit
+    own = {"": motion.ramp_s} if motion.ramp_s else {}
+    moving = {f"{name}.": one.ramp_s for name, one in motion.superposed().items()}
+    for name, ramp in {**own, **moving}.items():
+        if motion.passed_m(ramp) > most:
+            longest = most / speed + motion.ramp_s / 2 if name else 2 * most / speed
+            limit = f"at most {longest:.3g} s; or use a longer path"
+            yield f"motion.{name}ramp_s", problem, limit
     if motion.uncounted_m > most and motion.counted_from_revolution is not None:
         limit = "a revolution that begins before the drag ends (motion.path.revolutions)"
         yield "motion.counted_from_revolution", problem, limit

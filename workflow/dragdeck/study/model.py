@@ -5,10 +5,8 @@ run.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from functools import reduce
-from operator import or_
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     Discriminator,
@@ -30,13 +28,14 @@ from dragdeck.study.base import (
 from dragdeck.study.contact_law import Contact, Pair
 from dragdeck.study.material import Material
 from dragdeck.study.paths.circle import CirclePath
-from dragdeck.study.paths.kind import PathOfRun, turned
+from dragdeck.study.paths.figure_eight import FigureEightPath
 from dragdeck.study.paths.line import LinePath
+from dragdeck.study.paths.path import turned
 from dragdeck.study.paths.rest import RestPath
 from dragdeck.study.paths.waypoints import WaypointsPath
 from dragdeck.study.reference import Reference
 from dragdeck.study.remarks import Accepted, Assumption
-from dragdeck.study.superposed.kind import SuperposedMotion, SuperposedOfRun
+from dragdeck.study.superposed.motion import SuperposedMotion
 from dragdeck.study.superposed.oscillation import Oscillation
 from dragdeck.study.superposed.spin import Spin, SpinStage
 from dragdeck.study.workpiece import Carousel, Station, Workpiece
@@ -96,23 +95,12 @@ class Superposed(Model):
         return {name: one.faster(speed_factor) for name, one in found.items() if one is not None}
 
 
-AnyPath = CirclePath | LinePath | RestPath | WaypointsPath
+AnyPath = CirclePath | FigureEightPath | LinePath | RestPath | WaypointsPath
 """The registry of paths."""
 
 
-if TYPE_CHECKING:
-    AnyPathOfRun = PathOfRun
-    AnySuperposedOfRun = SuperposedOfRun
-else:
-
-    def _of_run(kinds: Iterable[type]) -> object:
-        """The models in ``case.json`` of some kinds of motion; an entry is told by its kind."""
-        return Annotated[reduce(or_, [one.part for one in kinds]), Field(discriminator="kind")]
-
-    AnyPathOfRun = _of_run(get_args(AnyPath))
-    AnySuperposedOfRun = _of_run(
-        get_args(field.annotation)[0] for field in Superposed.model_fields.values()
-    )
+_MOST_TURNED_DEG = 180
+"""From one waypoint to the next: beyond, the shortest rotation is another one."""
 
 
 class Motion(Superposed):
@@ -124,6 +112,13 @@ class Motion(Superposed):
         description="speed of the workpiece's axis along the path, m/s; required, but not for the "
         "paths `rest`, whose `bowl_rpm` gives it, and `waypoints`, whose times do",
     )
+    ramp_s: NonNegative = Field(
+        default=0.0,
+        exclude_if=lambda value: value == 0,
+        description="time in which the workpiece starts smoothly from rest along its path, in "
+        "seconds at the study's own speed; no statistic includes it; not for the paths `rest` and "
+        "`waypoints`",
+    )
     immersion_depth_m: Positive = Field(description="depth of the tip below the settled surface, m")
     orientation: Literal["follow_path", "fixed"] = Field(
         default="follow_path",
@@ -132,7 +127,8 @@ class Motion(Superposed):
     tilt_deg: Annotated[Number, Field(ge=-45, le=45)] | None = Field(
         default=None,
         description="angle between the workpiece's axis and the vertical, degrees; positive: its "
-        "upper end leans in the direction of motion, with orientation fixed in the first direction",
+        "upper end leans in the direction of motion, with orientation fixed in the first "
+        "direction; with `spin` the workpiece turns about its inclined axis",
     )
     plunge_at_m: tuple[Number, Number] | None = Field(
         default=None,
@@ -160,10 +156,15 @@ class Motion(Superposed):
             raise ValueError(
                 "counted_from_revolution applies to circles only: this path has no revolutions"
             )
-        if self.path.turning and self.spin is not None:
+        if (self.path.turning or self.path.leans) and self.spin is not None:
             raise ValueError("spin and waypoints that turn cannot be combined: remove one of them")
-        if self.tilt_deg and (self.spin is not None or self.path.turning):
-            raise ValueError("tilt_deg and a rotation cannot be combined: remove one of them")
+        if self.leans and self.path.most_turned_deg >= _MOST_TURNED_DEG:
+            raise ValueError(
+                f"an inclined workpiece turns by {self.path.most_turned_deg:g} degrees from one "
+                f"waypoint to the next, not by less than {_MOST_TURNED_DEG}: add waypoints"
+            )
+        if self.ramp_s and self.path.own_speed_m_s is not None:
+            raise ValueError("ramp_s cannot be used: the path itself gives the speed")
         if self.speed_m_s is None and self.path.own_speed_m_s is None:
             raise ValueError("speed_m_s is missing: give the speed along the path, m/s")
         if self.speed_m_s is not None and self.path.own_speed_m_s is not None:
@@ -176,10 +177,20 @@ class Motion(Superposed):
     def superposed(self, speed_factor: float = 1.0) -> Mapping[str, SuperposedMotion]:
         """What is superposed on the path, the rotation that it gives included."""
         found = super().superposed(speed_factor)
-        if not self.path.turning:
+        if not self.path.turning or self.leans:
             return found
         stages = [SpinStage(until_s=end, rpm=rpm) for end, rpm in self.path.turning]
         return {**found, "spin": Spin(schedule=stages, ramp_s=0.0).faster(speed_factor)}
+
+    @property
+    def leans(self) -> bool:
+        """Whether the workpiece's axis is ever inclined."""
+        return bool(self.tilt_deg) or self.path.leans
+
+    @property
+    def turns_about_inclined_axis(self) -> bool:
+        """Whether the workpiece spins about an axis that is not upright."""
+        return bool(self.tilt_deg) and self.spin is not None
 
     @property
     def axis_speed_m_s(self) -> float:
@@ -200,8 +211,12 @@ class Motion(Superposed):
     def uncounted_m(self) -> float:
         """Length of the drag before the statistics begin, m: what is superposed has started."""
         whole = (self.path.revolution_m or 0.0) * ((self.counted_from_revolution or 1) - 1)
-        starts = (one.ramp_s * self.axis_speed_m_s for one in self.superposed().values())
-        return max(self.transient_m, whole, *starts)
+        starts = (self.passed_m(one.ramp_s) for one in self.superposed().values())
+        return max(self.transient_m, whole, self.passed_m(self.ramp_s), *starts)
+
+    def passed_m(self, time_s: float) -> float:
+        """Length of the path after a time, at the end of its start or later, m."""
+        return (max(time_s, self.ramp_s) - self.ramp_s / 2) * self.axis_speed_m_s
 
     def turned(self, angle_deg: float) -> "Motion":
         """The same motion turned about the bowl's axis, immersed where the drag begins."""
@@ -224,6 +239,7 @@ class Motion(Superposed):
                 "path": self.path.with_length(length_m).faster(pace),
                 "speed_m_s": speed,
                 "transient_m": 0.0,
+                "ramp_s": 0.0,
                 "counted_from_revolution": None,
                 **self.superposed(pace),
             }

@@ -66,11 +66,12 @@ def _read(file: Path) -> tuple[list[list[Any]], Places]:
             rows = [(reader.line_num, row) for row in islice(reader, MOST_POINTS + 1)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"not a CSV file: {error}", file=file) from None
-    needed, optional = set(_COLUMNS[:-2]), _COLUMNS[-2:]
-    if not needed <= set(header) <= set(_COLUMNS) or len(set(header)) < len(header):
-        limit = f"{','.join(_COLUMNS[:-2])}, optionally {', '.join(optional)}, separated by commas"
+    optional = tuple(Waypoint._field_defaults)
+    needed = _COLUMNS[: -len(optional)]
+    if not set(needed) <= set(header) <= set(_COLUMNS) or len(set(header)) < len(header):
+        limit = f"{','.join(needed)}, optionally {', '.join(optional)}, separated by commas"
         problem = "the columns are not those of waypoints"
-        value = ",".join(header)[:200] if needed & set(header) else None  # quote only a table
+        value = ",".join(header)[:200] if set(needed) & set(header) else None  # quote only a table
         raise InputError(problem, file=file, field="line 1", value=value, limit=limit)
     surplus: Any = None  # the key of values beyond the header
     points = [[*(row.get(key, "0") for key in _COLUMNS), *row.get(surplus, ())] for _, row in rows]

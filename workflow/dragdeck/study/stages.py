@@ -4,6 +4,11 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import takewhile
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dragdeck.study.rotation import StepCounts
+
 
 def chain(
     name: str, start: int, stages: Iterable[tuple[int, float]], per_formula: int = 1
@@ -17,7 +22,7 @@ def chain(
     start : int
         The step at which the first stage begins.
     stages : iterable
-        Steps of each stage, and its value.
+        StepCounts of each stage, and its value.
     per_formula : int
         Stages that one formula adds: many would be too long a line, and few are slower.
     """
@@ -81,3 +86,18 @@ def integral(stages: Sequence[tuple[float, float]], time_s: float) -> float:
         total += rate * max(0.0, min(time_s, end) - begun)
         begun = end
     return total
+
+
+def stage_at(steps: StepCounts, lengths: Sequence[int]) -> NDArray[np.int64]:
+    """Index of the stage of each step, (N,); a stage owns its last step.
+
+    Parameters
+    ----------
+    steps : (N,) ndarray of int
+        Counted from the start of the drag. Those before it belong to the first stage, those
+        after it to the last one.
+    lengths : sequence of int
+        StepCounts of each stage.
+    """
+    stage = np.searchsorted(np.cumsum(lengths), steps, side="left")
+    return np.minimum(stage, len(lengths) - 1)

@@ -31,7 +31,7 @@ Settings = Mapping[str, Any]
 """Dotted name of a field to its value."""
 
 
-def combinations(vary: Mapping[str, Sequence[Any]]) -> Iterator[dict[str, Any]]:
+def combinations(vary: Mapping[str, Sequence[Any]]) -> Iterator[Settings]:
     """Every combination of the values that fields take."""
     for values in itertools.product(*vary.values()):
         yield dict(zip(vary, values, strict=True))
@@ -41,7 +41,7 @@ class DesignPoint(NamedTuple):
     """A point of a design: what it sets, and the field that is varied alone there (or none)."""
 
     axis: str
-    values: dict[str, Any]
+    values: Settings
 
 
 class Variation(Model):

@@ -7,7 +7,7 @@ the reference that errors are measured against.
 
 import copy
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -139,8 +139,8 @@ def _check_counted(case: Case, plan_file: Path) -> None:
 
 
 def _settings(
-    plan: Plan, block: PlannedPoints, study: Study, scene: Mapping[str, Any]
-) -> Iterator[dict[str, Any]]:
+    plan: Plan, block: PlannedPoints, study: Study, scene: Settings
+) -> Iterator[Settings]:
     """The fields that each point of a block sets in a scene, path and seed included."""
     field, length = _path_length(study)
     arc = {field: scene.get(field, length) * (block.arc or plan.arc)}
@@ -149,7 +149,7 @@ def _settings(
             yield {**values, **arc, "seed": scene.get("seed", study.seed) + number}
 
 
-def _unnamed(settings: Settings) -> dict[str, Any]:
+def _unnamed(settings: Settings) -> Settings:
     """The fields to name a point by.
 
     Not those that the name of a fidelity without a name says already, nor what is written.

@@ -1,34 +1,21 @@
 """A straight line."""
 
 import math
-from typing import ClassVar, Literal, Self
+from collections.abc import Callable
+from typing import Any, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import Field
 
-from dragdeck.study.base import Model, Number, Positive
-from dragdeck.study.paths.kind import (
-    Leg,
-    Orientation,
-    PathOfRun,
-    Point,
-    Stages,
-    WorkpiecePath,
-    turned,
-)
+from dragdeck.study.base import Json, Number, Positive
+from dragdeck.study.drive import Drive, EngineMotion, Orientation
+from dragdeck.study.paths.path import Point, WorkpiecePath, as_rows, turned
+from dragdeck.study.rotation import Floats, StepCounts, wrap_angle
 
 
-class LineOfRun(PathOfRun):
+class LinePath(WorkpiecePath):
     """A straight line."""
 
-    kind: Literal["line"] = "line"
-    start_m: tuple[float, float]
-    direction_rad: float
-
-
-class LinePath(WorkpiecePath, Model):
-    """A straight line."""
-
-    part: ClassVar[type[PathOfRun]] = LineOfRun
     length_field: ClassVar[str] = "length_m"
 
     kind: Literal["line"] = Field(description="line: the path is a straight line")
@@ -40,10 +27,19 @@ class LinePath(WorkpiecePath, Model):
     )
     length_m: Positive = Field(description="length of the drag, m")
 
+    def words(self, number: Callable[[float], str]) -> str:
+        """A line."""
+        return "straight line"
+
     @property
     def path_length_m(self) -> float:
         """The length."""
         return self.length_m
+
+    @property
+    def peak_speed_ratio(self) -> float:
+        """It has one speed."""
+        return 1.0
 
     @property
     def start_point(self) -> Point:
@@ -54,6 +50,21 @@ class LinePath(WorkpiecePath, Model):
     def direction_rad(self) -> float:
         """The direction."""
         return math.radians(self.direction_deg)
+
+    @property
+    def corners(self) -> Floats:
+        """Its ends."""
+        return as_rows(self.place(np.array([0.0, 1.0])))
+
+    def place(self, share: Any) -> tuple[Any, Any, Any]:
+        """Straight on."""
+        x, y, _ = self.tangent(share)
+        return self.start_m[0] + x * share, self.start_m[1] + y * share, 0.0
+
+    def tangent(self, share: Any) -> tuple[Any, Any, Any]:
+        """The same everywhere."""
+        heading = self.direction_rad
+        return self.length_m * math.cos(heading), self.length_m * math.sin(heading), 0.0
 
     def turned(self, angle_deg: float) -> Self:
         """From another place in another direction."""
@@ -68,16 +79,34 @@ class LinePath(WorkpiecePath, Model):
         """As long as that."""
         return self.model_copy(update={"length_m": length_m})
 
-    def drag(self, speed_m_s: float, orientation: Orientation) -> Leg:
-        """Straight on."""
-        return self.steady_leg("linear", speed_m_s)
+    def turns(self, orientation: Orientation) -> bool:
+        """It has one direction."""
+        return False
 
-    def of_run(self, speed_m_s: float, orientation: Orientation, stages: Stages) -> LineOfRun:
-        """The line as it is driven."""
-        return LineOfRun(
-            axis_speed_m_s=speed_m_s,
-            start_direction_rad=self.direction_rad,
-            orientation=orientation,
-            start_m=self.start_m,
-            direction_rad=self.direction_rad,
-        )
+    def keeps_direction(self, orientation: Orientation) -> bool:
+        """It has one direction."""
+        return True
+
+    def places(self, drive: Drive, since: StepCounts, begun: Floats) -> Floats:
+        """As far as its velocity takes it."""
+        moved = drive.time_s(since)[:, None] * np.array(self.first_velocity(drive))
+        return np.asarray(begun + moved)
+
+    def directions(self, drive: Drive, since: StepCounts, ref_xy_m: Floats) -> Floats:
+        """The line's direction everywhere."""
+        return np.full(len(ref_xy_m), wrap_angle(self.direction_rad))
+
+    def velocity(self, drive: Drive, since: StepCounts, point_m: Floats, ref_m: Floats) -> Floats:
+        """The same everywhere."""
+        return self.straight_on(drive, since, self.directions(drive, since, ref_m[:, :2]))
+
+    def on_engine(self, drive: Drive) -> EngineMotion:
+        """A constant velocity."""
+        if drive.begin.steps:
+            return super().on_engine(drive)
+        x, y, z = self.first_velocity(drive)
+        return EngineMotion({"": f"linear {x!r} {y!r} {z!r}"})
+
+    def entry(self, drive: Drive) -> Json:
+        """Start and direction."""
+        return {"start_m": list(self.start_m), "direction_rad": self.direction_rad}

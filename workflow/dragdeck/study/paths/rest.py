@@ -1,30 +1,23 @@
 """A workpiece that stands still in a rotating bowl (stream finishing)."""
 
 import math
-from collections.abc import Mapping
-from typing import ClassVar, Literal, Self
+from collections.abc import Callable, Mapping
+from typing import Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, field_validator
 
-from dragdeck.study.base import Model, Number, Positive
-from dragdeck.study.paths.kind import AroundBowl, Leg, Orientation, PathOfRun, Stages
+from dragdeck.study.base import Json, Number, Positive
+from dragdeck.study.drive import Drive, EngineMotion, Orientation
+from dragdeck.study.paths.path import AroundBowl
+from dragdeck.study.rotation import Floats, StepCounts
 
 
-class RestOfRun(PathOfRun):
-    """A workpiece at rest in a rotating bowl: its distance from the axis, and the rotation."""
-
-    kind: Literal["rest"] = "rest"
-    radius_m: float
-    bowl_rad_s: float
-
-
-class RestPath(AroundBowl, Model):
+class RestPath(AroundBowl):
     """A place, and the bowl's rotation.
 
     Seen from the bowl, the workpiece goes round against the rotation.
     """
-
-    part: ClassVar[type[PathOfRun]] = RestOfRun
 
     kind: Literal["rest"] = Field(
         description="rest: the workpiece stands still and the bowl rotates"
@@ -51,10 +44,6 @@ class RestPath(AroundBowl, Model):
         return value
 
     @property
-    def _bowl_rad_s(self) -> float:
-        return self.bowl_rpm * 2 * math.pi / 60
-
-    @property
     def direction_rad(self) -> float:
         """Against the rotation of the bowl."""
         return self.start_rad - math.copysign(math.pi / 2, self.bowl_rpm)
@@ -62,12 +51,16 @@ class RestPath(AroundBowl, Model):
     @property
     def own_speed_m_s(self) -> float:
         """Speed of the bowl where the workpiece stands."""
-        return abs(self._bowl_rad_s) * self.radius_m
+        return abs(self.bowl_rpm * 2 * math.pi / 60) * self.radius_m
 
     @property
     def implied(self) -> Mapping[str, float]:
         """Its speed."""
         return {"motion.path.speed_m_s": self.own_speed_m_s}
+
+    def words(self, number: Callable[[float], str]) -> str:
+        """With its radius."""
+        return f"at rest at {number(1e3 * self.radius_m)} mm from the axis of a rotating bowl"
 
     def one_side_inwards(self, orientation: Orientation) -> bool:
         """It stands still."""
@@ -81,24 +74,38 @@ class RestPath(AroundBowl, Model):
         """With a bowl that rotates faster."""
         return self.model_copy(update={"bowl_rpm": factor * self.bowl_rpm})
 
-    def turned(self, angle_deg: float) -> Self:
-        """Begun at another angle."""
-        return self.model_copy(update={"start_deg": self.start_deg + angle_deg})
+    def place(self, share: Any) -> tuple[Any, Any, Any]:
+        """Where it stands."""
+        return (*self.start_point, 0.0)
 
-    def with_length(self, length_m: float) -> Self:
-        """As many revolutions of the bowl as give the length."""
-        return self.model_copy(update={"revolutions": length_m / self.revolution_m})
+    def tangent(self, share: Any) -> tuple[Any, Any, Any]:
+        """None."""
+        return 0.0, 0.0, 0.0
 
-    def drag(self, speed_m_s: float, orientation: Orientation) -> Leg:
-        """No motion, for as long as the revolutions of the bowl take."""
-        return self.steady_leg("rest", speed_m_s)
+    def turns(self, orientation: Orientation) -> bool:
+        """It stands still."""
+        return False
 
-    def of_run(self, speed_m_s: float, orientation: Orientation, stages: Stages) -> RestOfRun:
+    def keeps_direction(self, orientation: Orientation) -> bool:
+        """It has one direction."""
+        return True
+
+    def places(self, drive: Drive, since: StepCounts, begun: Floats) -> Floats:
+        """Where it begins."""
+        return np.tile(begun, (len(since), 1))
+
+    def directions(self, drive: Drive, since: StepCounts, ref_xy_m: Floats) -> Floats:
+        """The same at all times."""
+        return np.full(len(ref_xy_m), self.direction_rad)
+
+    def velocity(self, drive: Drive, since: StepCounts, point_m: Floats, ref_m: Floats) -> Floats:
+        """None."""
+        return np.zeros_like(point_m)
+
+    def on_engine(self, drive: Drive) -> EngineMotion:
+        """No motion."""
+        return EngineMotion({})
+
+    def entry(self, drive: Drive) -> Json:
         """The place and the rotation."""
-        return RestOfRun(
-            axis_speed_m_s=speed_m_s,
-            start_direction_rad=self.direction_rad,
-            orientation=orientation,
-            radius_m=self.radius_m,
-            bowl_rad_s=self.bowl_rad_s(speed_m_s),
-        )
+        return {"radius_m": self.radius_m, "bowl_rad_s": self.bowl_rad_s(drive.speed_m_s)}

@@ -1,56 +1,21 @@
 """A vertical oscillation of the workpiece about its immersion depth."""
 
 import math
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Self
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, JsonValue
 
-from dragdeck.study.base import Model, NonNegative, Positive
-from dragdeck.study.superposed.kind import (
-    RAMP,
-    DragSteps,
-    EngineMotion,
-    SuperposedMotion,
-    SuperposedOfRun,
-)
+from dragdeck.study.base import Positive
+from dragdeck.study.drive import Drive, EngineMotion
+from dragdeck.study.rotation import Floats, Rotation, StepCounts
+from dragdeck.study.superposed.motion import SuperposedMotion
 
 
-class OscillationOfRun(SuperposedOfRun):
-    """An oscillation as simulated: ``z = amplitude sin(rate t)``, t the time at full speed.
+class Oscillation(SuperposedMotion):
+    """A vertical sine, upwards first: ``z = amplitude sin(rate t)``, t the time at full speed."""
 
-    Attributes
-    ----------
-    rate_rad_s : float
-        2 pi times the frequency.
-    ramp_steps : int
-        Steps in which it starts from rest; absent if it starts at full speed.
-    """
-
-    kind: Literal["oscillation"] = "oscillation"
-    amplitude_m: float
-    rate_rad_s: float
-
-    def lift_m(self, steps: float, timestep_s: float) -> float:
-        """The sine."""
-        return self.amplitude_m * math.sin(self.rate_rad_s * timestep_s * self.advance(steps))
-
-    def on_engine(self, start_step: int) -> EngineMotion:
-        """The mean velocity of each step: the places add up to the sine, also after a restart."""
-        angle = f"{self.rate_rad_s!r}*dt"
-        now, before = (f"sin({angle}*{self.advance_formula(start_step + late)})" for late in (0, 1))
-        speed = f"{self.amplitude_m!r}*({now}-{before})/dt"
-        return EngineMotion(
-            {"oscillation_zero": "0.0", "oscillation_vz": speed},
-            "linear/variable v_oscillation_zero v_oscillation_zero v_oscillation_vz",
-        )
-
-
-class Oscillation(Model, SuperposedMotion):
-    """A vertical sine, upwards first."""
-
-    part: ClassVar[type[SuperposedOfRun]] = OscillationOfRun
-
-    ramp_s: NonNegative = RAMP
+    kind: ClassVar[str] = "oscillation"
 
     amplitude_m: Positive = Field(
         description="amplitude of the vertical oscillation about the immersion depth, m"
@@ -75,10 +40,32 @@ class Oscillation(Model, SuperposedMotion):
         """The amplitude."""
         return self.amplitude_m
 
-    def of_run(self, drag: DragSteps) -> OscillationOfRun:
-        """Amplitude and rate."""
-        return OscillationOfRun(
-            amplitude_m=self.amplitude_m,
-            rate_rad_s=self._rate_rad_s,
-            ramp_steps=self.ramp_steps(drag),
+    def shift(self, drive: Drive, since: StepCounts) -> Floats:
+        """The sine."""
+        height = self.amplitude_m * np.sin(self._angle(drive, since))
+        return np.column_stack([np.zeros((len(since), 2)), height])
+
+    def velocity(self, drive: Drive, since: StepCounts, arm_m: Floats, before: Rotation) -> Floats:
+        """Of the whole workpiece, up and down."""
+        velocity, pace = np.zeros_like(arm_m), self.begin(drive).pace(since)
+        most = self.amplitude_m * self._rate_rad_s
+        velocity[:, 2] = most * np.cos(self._angle(drive, since)) * pace
+        return velocity
+
+    def _angle(self, drive: Drive, since: StepCounts) -> Floats:
+        return self._rate_rad_s * drive.timestep_s * self.begin(drive).advance(since)
+
+    def on_engine(self, drive: Drive, heading: str | float) -> EngineMotion:
+        """The mean velocity of each step: the places add up to the sine, also after a restart."""
+        angle, begin = f"{self._rate_rad_s!r}*dt", self.begin(drive)
+        now, before = (f"sin({angle}*{begin.formula(drive.start + late)})" for late in (0, 1))
+        speed = f"{self.amplitude_m!r}*({now}-{before})/dt"
+        return EngineMotion(
+            {"": "linear/variable v_oscillation_zero v_oscillation_zero v_oscillation_vz"},
+            {"oscillation_zero": "0.0", "oscillation_vz": speed},
         )
+
+    def entry(self, drive: Drive) -> dict[str, JsonValue]:
+        """Amplitude and rate."""
+        rate = {"amplitude_m": self.amplitude_m, "rate_rad_s": self._rate_rad_s}
+        return super().entry(drive) | rate

@@ -1,63 +1,18 @@
-"""Spin of the workpiece about its own vertical axis, through its reference point."""
+"""Spin of the workpiece about its own axis, through its reference point."""
 
 import math
 from collections.abc import Sequence
-from itertools import accumulate, pairwise
-from typing import ClassVar, Literal, Self
+from itertools import pairwise
+from typing import ClassVar, Self
 
-from markupsafe import Markup
-from pydantic import Field, model_validator
+import numpy as np
+from pydantic import Field, JsonValue, model_validator
 
-from dragdeck.study.base import Model, NonNegative, Number, Positive
-from dragdeck.study.stages import chain, in_steps, integral
-from dragdeck.study.superposed.kind import (
-    LIVE_REFERENCE,
-    RAMP,
-    DragSteps,
-    EngineMotion,
-    SuperposedMotion,
-    SuperposedOfRun,
-)
-
-
-class SpinStageOfRun(Model):
-    """A stage of constant spin: its number of steps, and the rate about +z."""
-
-    steps: int
-    rate_rad_s: float
-
-
-class SpinOfRun(SuperposedOfRun):
-    """A spin as simulated: consecutive stages from the start of the drag.
-
-    Attributes
-    ----------
-    stages : sequence of SpinStageOfRun
-    ramp_steps : int
-        Steps in which it starts from rest; absent if it starts at full speed.
-    """
-
-    kind: Literal["spin"] = "spin"
-    stages: Sequence[SpinStageOfRun]
-
-    def turn_rad(self, steps: float, timestep_s: float) -> float:
-        """The sum over its stages."""
-        ends = accumulate(stage.steps for stage in self.stages)
-        rates = [
-            (self.advance(end), timestep_s * stage.rate_rad_s)
-            for end, stage in zip(ends, self.stages, strict=True)
-        ]
-        return integral(rates, self.advance(steps))
-
-    def on_engine(self, start_step: int) -> EngineMotion:
-        """A rotation about the live reference point: a restart does not keep the moved centre."""
-        stages = [(stage.steps, stage.rate_rad_s) for stage in self.stages]
-        rates = chain("spin_rate", start_step, stages)
-        if self.ramp_steps:
-            now, before = (self.advance_formula(start_step + late) for late in (0, 1))
-            rates["spin_started"] = f"v_{[*rates][-1]}*({now}-{before})"
-        mover = Markup("rotate/variable origin {} axis 0. 0. 1. omega v_{}")
-        return EngineMotion(rates, mover.format(LIVE_REFERENCE, [*rates][-1]))
+from dragdeck.study.base import Model, Number, Positive
+from dragdeck.study.drive import Drive, EngineMotion, rotating, rotating_by
+from dragdeck.study.rotation import Floats, Rotation, StepCounts, about_vertical, by_vector
+from dragdeck.study.stages import chain, in_steps, integral, stage_at
+from dragdeck.study.superposed.motion import SuperposedMotion
 
 
 class SpinStage(Model):
@@ -70,12 +25,12 @@ class SpinStage(Model):
     rpm: Number = Field(description="rotational speed, 1/min; positive: counter-clockwise")
 
 
-class Spin(Model, SuperposedMotion):
+class Spin(SuperposedMotion):
     """A constant spin, or a schedule of them."""
 
-    part: ClassVar[type[SuperposedOfRun]] = SpinOfRun
+    kind: ClassVar[str] = "spin"
+    turns: ClassVar[bool] = True
 
-    ramp_s: NonNegative = RAMP
     rpm: Number | None = Field(
         default=None,
         description="rotational speed during the drag, relative to `orientation`, 1/min; positive: "
@@ -116,19 +71,104 @@ class Spin(Model, SuperposedMotion):
         """Circumferential speed."""
         return radius_m * max(abs(_rate(stage.rpm)) for stage in self._stages())
 
-    def of_run(self, drag: DragSteps) -> SpinOfRun:
-        """The stages that begin before the drag ends, each as far as it should turn the workpiece.
+    # --- as a run drives it --------------------------------------------------------------------
 
-        The ramp is not counted here: while it lasts, the workpiece turns less.
+    def stages(self, drive: Drive) -> Sequence[tuple[int, float]]:
+        """Steps and rate about the axis, rad/s, of those that begin before the drag ends.
+
+        Each is as far as it should turn the workpiece. The ramp is not counted here: while it
+        lasts, the workpiece turns less.
         """
         rates = [(stage.until_s, _rate(stage.rpm)) for stage in self._stages()]
         ends = (end for end, _ in rates)
         stages = []
-        for steps, begin, end in in_steps(ends, drag.end - drag.start, drag.timestep_s):
+        for steps, begin, end in in_steps(ends, drive.steps, drive.timestep_s):
             turned = integral(rates, end) - integral(rates, begin)
-            rate = turned / (steps * drag.timestep_s)
-            stages.append(SpinStageOfRun(steps=steps, rate_rad_s=rate))
-        return SpinOfRun(stages=stages, ramp_steps=self.ramp_steps(drag))
+            stages.append((steps, turned / (steps * drive.timestep_s)))
+        return stages
+
+    def turn(self, drive: Drive, since: StepCounts) -> Floats:
+        """The angle about the axis after (N,) steps, rad."""
+        stages, begin = self.stages(drive), self.begin(drive)
+        ends = np.cumsum([steps for steps, _ in stages])
+        begun = np.r_[0, ends[:-1]]
+        done = np.maximum(np.asarray(since)[:, None], 0)
+        within = begin.advance(np.clip(done, begun, ends)) - begin.advance(begun)
+        return np.asarray(within @ np.array([rate for _, rate in stages]) * drive.timestep_s)
+
+    def rotated(self, drive: Drive, since: StepCounts, before: Rotation) -> Rotation:
+        """About the vertical, or the axis of a tilted workpiece."""
+        angle = self.turn(drive, since)
+        if not drive.tilt_deg:
+            return Rotation(before.turn_rad + angle, before.own)
+        return Rotation(before.turn_rad, by_vector(angle[:, None] * _axis(drive)))
+
+    def velocity(self, drive: Drive, since: StepCounts, arm_m: Floats, before: Rotation) -> Floats:
+        """The rate of the stage that a step belongs to, cross the arm."""
+        stages = self.stages(drive)
+        rates = np.array([rate for _, rate in stages])
+        rate = rates[stage_at(since, [steps for steps, _ in stages])]
+        rate = rate * self.begin(drive).pace(since)
+        if not drive.tilt_deg:
+            return about_vertical(rate, arm_m)
+        axis = before.out_of(np.tile(_axis(drive), (len(since), 1)))
+        return np.cross(rate[:, None] * axis, arm_m)
+
+    def on_engine(self, drive: Drive, heading: str | float) -> EngineMotion:
+        """A rotation about the live reference point: a restart does not keep the moved centre."""
+        begin = self.begin(drive)
+        rates = chain("spin_rate", drive.start, self.stages(drive))
+        if begin.steps:
+            now, before = (begin.formula(drive.start + late) for late in (0, 1))
+            rates["spin_started"] = f"v_{[*rates][-1]}*({now}-{before})"
+        return _about_own_axis(drive, heading, rates)
+
+    def entry(self, drive: Drive) -> dict[str, JsonValue]:
+        """Its stages; ``tilt_deg`` is absent where it is about the vertical."""
+        stages: list[JsonValue] = [
+            {"steps": steps, "rate_rad_s": rate} for steps, rate in self.stages(drive)
+        ]
+        tilt = {"tilt_deg": drive.tilt_deg} if drive.tilt_deg else {}
+        return super().entry(drive) | {"stages": stages} | tilt
+
+
+def _axis(drive: Drive) -> Floats:
+    """Axis of a tilted workpiece in the frame of its front, (3,)."""
+    tilt = math.radians(drive.tilt_deg)
+    return np.array([math.sin(tilt), 0.0, math.cos(tilt)])
+
+
+def _about_own_axis(drive: Drive, heading: str | float, rates: dict[str, str]) -> EngineMotion:
+    """A rotation with the last of some rates about the axis of the workpiece.
+
+    The engine never carries an axis along. While the path does not turn the workpiece, the axis
+    stays; otherwise three rotations about the axes of the bowl make one about the axis as it is
+    after the step (docs/development/liggghts.md).
+    """
+    omega = [*rates][-1]
+    if not drive.tilt_deg:
+        return EngineMotion({"": rotating(omega)}, rates)
+    sine, _, cosine = _axis(drive).tolist()
+    if isinstance(heading, float):
+        x, y = sine * math.cos(heading), sine * math.sin(heading)
+        axis = f"{x!r} {y!r} {cosine!r}"
+        return EngineMotion({"": rotating(omega, axis)}, rates)
+    parts = {
+        "spin_x": f"{sine!r}*cos({heading})",
+        "spin_y": f"{sine!r}*sin({heading})",
+        "spin_angle": f"v_{omega}*dt",
+        "spin_k": "1.0-cos(v_spin_angle)",
+        "spin_s": "sin(v_spin_angle)",
+        "spin_m13": f"v_spin_x*{cosine!r}*v_spin_k+v_spin_y*v_spin_s",
+        "spin_m23": f"v_spin_y*{cosine!r}*v_spin_k-v_spin_x*v_spin_s",
+        "spin_m33": f"1.0-v_spin_k+{cosine * cosine!r}*v_spin_k",
+        "spin_m11": "1.0-v_spin_k+v_spin_x*v_spin_x*v_spin_k",
+        "spin_m12": f"v_spin_x*v_spin_y*v_spin_k-{cosine!r}*v_spin_s",
+        "spin_wx": "atan(-v_spin_m23/v_spin_m33)/dt",
+        "spin_wy": "asin(v_spin_m13)/dt",
+        "spin_wz": "atan(-v_spin_m12/v_spin_m11)/dt",
+    }
+    return EngineMotion(rotating_by([f"spin_w{axis}" for axis in "xyz"]), rates | parts)
 
 
 def _rate(rpm: float) -> float:

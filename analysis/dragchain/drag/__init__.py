@@ -1,1 +1,0 @@
-"""The force on the workpiece."""

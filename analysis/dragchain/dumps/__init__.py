@@ -1,1 +1,0 @@
-"""Readers of what LIGGGHTS writes, frame by frame."""

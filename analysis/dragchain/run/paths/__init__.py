@@ -1,1 +1,0 @@
-"""Paths of the workpiece's axis: one module for each kind."""

@@ -1,0 +1,157 @@
+"""What a run says of the quantities of a trade-off: bands of the drag, blocks, a run by hand."""
+
+import json
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dragchain.errors import TableError
+from dragchain.tables.bed import Packing
+from dragchain.tradeoff.measure_run import CountedPath, band_pass, write_measures
+from dragchain.tradeoff.measures import QUANTITIES, Measures
+from dragdeck.records.run import AcceptanceCheck
+
+SPACING, COUNT = 0.1, 600
+BED = Packing(
+    bed_height_m=0.07,
+    top_m=0.08,
+    solid_fraction=0.6,
+    n_particles=4,
+    radius_mean_m=0.003,
+    radius_std_m=0.0,
+    kinetic_energy_ratio=0.0,
+)
+
+
+def series() -> np.ndarray:
+    noise = np.random.default_rng(2).normal(size=COUNT)
+    return noise - noise.mean()
+
+
+def wave(length: float) -> np.ndarray:
+    return np.sin(2.0 * np.pi * SPACING * np.arange(COUNT) / length)
+
+
+@pytest.mark.parametrize("count", [COUNT, COUNT - 1])
+def test_bands_add_up_and_so_do_their_squares(count: int) -> None:
+    whole = series()[:count] - series()[:count].mean()
+    limits = [0.0, 0.7, 3.0, math.inf]
+    bands = [band_pass(whole, SPACING, a, b) for a, b in pairwise(limits)]
+    assert np.sum(bands, axis=0) == pytest.approx(whole, abs=1e-12)
+    assert sum(np.sum(one**2) for one in bands) == pytest.approx(np.sum(whole**2))
+    assert min(np.sum(one**2) for one in bands) > 0.0
+
+
+def test_a_wave_is_in_the_band_of_its_length() -> None:
+    both = wave(5.0) + 0.5 * wave(0.5)
+    assert band_pass(both, SPACING, 2.0, math.inf) == pytest.approx(wave(5.0), abs=1e-12)
+    assert band_pass(both, SPACING, 0.0, 1.0) == pytest.approx(0.5 * wave(0.5), abs=1e-12)
+    assert band_pass(both, SPACING, 1.0, 2.0) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_wave_at_a_limit_is_in_the_longer_band() -> None:
+    # 5.0 is the exact inverse of a frequency of the series
+    assert band_pass(wave(5.0), SPACING, 5.0, math.inf) == pytest.approx(wave(5.0), abs=1e-12)
+    assert band_pass(wave(5.0), SPACING, 0.0, 5.0) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_mean_belongs_to_the_longest_waves() -> None:
+    assert band_pass(wave(5.0) + 3.0, SPACING, 2.0, math.inf) == pytest.approx(wave(5.0) + 3.0)
+    assert band_pass(wave(5.0) + 3.0, SPACING, 0.0, 2.0) == pytest.approx(0.0, abs=1e-12)
+
+
+PATH = CountedPath(first_step=100, last_step=500, length_m=0.04, diameter_m=0.01, blocks=4)
+
+
+def test_a_step_belongs_to_the_block_that_it_ends_in() -> None:
+    steps = np.array([50, 100, 101, 200, 201, 300, 301, 500, 501])
+    assert PATH.block(steps).tolist() == [0, 0, 0, 0, 1, 1, 2, 3, 3]
+
+
+STEPS, VALUES = np.array([110, 150, 200, 210, 500]), np.array([1.0, 2.0, 6.0, 5.0, 7.0])
+
+
+def test_means_of_blocks() -> None:
+    assert PATH.mean(STEPS, VALUES) == pytest.approx([3.0, 5.0, np.nan, 7.0], nan_ok=True)
+
+
+@pytest.mark.parametrize("cuts", [[], [1], [3], [1, 2, 3, 4]])
+def test_a_block_is_whole_wherever_the_table_is_cut(cuts: list[int]) -> None:
+    pieces = zip(np.split(STEPS, cuts), np.split(VALUES, cuts), strict=True)
+    found = {number: values.tolist() for number, values in PATH.parts(pieces)}
+    assert found == {0: [1.0, 2.0, 6.0], 1: [5.0], 3: [7.0]}
+
+
+def test_squares_are_rooted_after_their_mean() -> None:
+    named = {quantity.name: quantity for quantity in QUANTITIES}
+    blocks = np.array([1.0, 7.0])
+    assert named["drag_mean"].of_blocks(blocks) == 4.0
+    assert named["drag_std"].of_blocks(blocks) == 2.0
+
+
+OUTCOME = {
+    "schema": 2, "inputs": "0f", "state": "complete", "checks": [],
+    "steps": 50, "wall_time_s": 2.0, "ranks": 2,
+    "engine_version": "3.8.0", "started": "2026-01-01T00:00:00+00:00",
+}  # fmt: skip
+
+
+def measured(folder: Path, **outcome: object) -> Measures:
+    """The measures of the tiny run as they are read from their file."""
+    (folder / "outcome.json").write_text(json.dumps(OUTCOME | outcome))
+    (folder / "packing.json").write_text(BED.as_text())
+    found = write_measures(folder, folder / "packing.json")
+    assert Measures.read(folder / "measures.json") == found
+    return found
+
+
+def test_a_run_by_hand(tiny_run: Path) -> None:
+    """One contact of (4 N + 1e5 N/m workpiece_x) / 3, seven frames and 31 samples of the force."""
+    found = measured(tiny_run)
+    blocks = {name: values[0] for name, values in found.blocks.items()}
+    assert set(blocks) | set(found.single) == {quantity.name for quantity in QUANTITIES}
+    assert found.arc_m == pytest.approx(6.2e-6) and found.block_m == found.arc_m
+    assert blocks["drag_mean"] == pytest.approx(-1.5)
+    assert blocks["drag_std"] == pytest.approx((31**2 - 1) / 12 / 150**2)
+    bands = [blocks[f"drag_std_{name}"] for name in ("long", "middle", "short")]
+    assert math.fsum(one or 0.0 for one in bands) == pytest.approx(blocks["drag_std"])
+    assert blocks["workpiece_contacts"] == 1.0
+    assert blocks["contact_force_mean"] == pytest.approx(1.5)
+    assert blocks["contact_force_p50"] == pytest.approx(1.5)
+    assert blocks["contact_force_p90"] == pytest.approx(1.58)
+    assert sum(found.force_histogram) == 7
+    assert blocks["normal_load"] == pytest.approx(1.5)
+    assert sum(found.load_map) == pytest.approx(1.5)
+    assert blocks["chain_count"] == 0.0 and blocks["chain_length"] is None
+    assert found.single == {"bed_height": 0.07, "solid_fraction": 0.6}
+
+
+def test_a_failed_run_says_only_how_it_failed(tiny_run: Path) -> None:
+    limits = AcceptanceCheck(
+        code="within_limits",
+        name="energy and speed within limits",
+        passed=False,
+        seen="3 m/s",
+        limit="1",
+    )
+    checks = [
+        {"code": "particles_kept", "name": "no particle lost", "passed": False,
+         "seen": "3 particles", "limit": "4"},
+        {"code": "finite_numbers", "name": "finite numbers", "passed": True, "seen": "all",
+         "limit": "no NaN"},
+        limits.model_dump(),
+    ]  # fmt: skip
+    found = measured(tiny_run, state="failed", checks=checks)
+    assert not found.complete and not found.blocks
+    assert [check.code for check in found.failure] == ["particles_kept", "within_limits"]
+    assert found.telling_failure == limits
+    assert found.cost.cpu_time_s == 4.0
+    assert found.cost.steps_per_m == pytest.approx(1.0 / (1e-4 * 1e-3))
+
+
+def test_a_run_without_outcome_is_refused(tiny_run: Path) -> None:
+    with pytest.raises(TableError, match="run --outcome"):
+        write_measures(tiny_run, tiny_run / "packing.json")

@@ -1,0 +1,106 @@
+"""Numbers from rows of text, and columns from numbers."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dragdeck.dumps.frame import Columns, is_integer_column
+
+Cells = NDArray[np.float64]
+"""Numbers of M columns and N rows, (M, N)."""
+
+
+_SHORT_BYTES = 8192
+"""Of a shorter text pyarrow takes longer to begin than Python to read it."""
+
+
+class WrongRow(Exception):
+    """A row that is not what it should be: its number from 0, what is wrong, what was expected."""
+
+    def __init__(self, row: int, problem: str, expected: str) -> None:
+        self.row, self.problem, self.expected = row, problem, expected
+        super().__init__(problem)
+
+
+def cells_of_text(text: bytes, width: int) -> Cells:
+    """Numbers of whole lines, each of so many: those of Python's ``float``, bit for bit.
+
+    Raises
+    ------
+    WrongRow
+        At the first line that is not so many numbers.
+    """
+    cells = _quickly(text, width) if len(text) > _SHORT_BYTES else None
+    return _one_by_one(text, width) if cells is None else cells
+
+
+def _quickly(text: bytes, width: int) -> Cells | None:
+    """The numbers by pyarrow, whose rounding is correct; None if it is not sure of them."""
+    import pyarrow as pa
+    from pyarrow import csv
+
+    if not text.isascii():
+        return None
+    types = {str(number): pa.float64() for number in range(width)}
+    if text[: text.find(b"\n")].endswith(b" "):  # as the engine writes it: then nothing follows
+        types["end"] = pa.null()
+    try:
+        table = csv.read_csv(
+            pa.BufferReader(text),
+            csv.ReadOptions(column_names=list(types)),
+            csv.ParseOptions(delimiter=" ", quote_char=False, ignore_empty_lines=False),
+            csv.ConvertOptions(column_types=types, null_values=[""]),
+        )
+    except pa.ArrowInvalid:
+        return None
+    columns = table.columns[:width]
+    if len(table) != text.count(b"\n") or any(column.null_count for column in columns):
+        return None
+    return np.array([column.to_numpy() for column in columns])
+
+
+def _one_by_one(text: bytes, width: int) -> Cells:
+    """The numbers in any form that Python reads, but for ``_`` between digits."""
+    rows = []
+    for row, line in enumerate(text.split(b"\n")[:-1]):
+        try:
+            numbers = [float(word) for word in line.split()]
+        except ValueError:
+            numbers = []
+        if len(numbers) != width or b"_" in line:
+            found = line[:120] + b"\n"
+            raise WrongRow(row, f"found {found!r}", f"{width} numbers")
+        rows.append(numbers)
+    return np.ascontiguousarray(np.array(rows, dtype=np.float64).reshape(-1, width).T)
+
+
+def first_rows(text: bytes, count: int) -> bytes:
+    """The first lines of a text."""
+    return text[: len(text) - len(text.split(b"\n", count)[-1])]
+
+
+def named_columns(cells: Cells, names: Sequence[str]) -> Columns:
+    """Columns by name: ids as int64.
+
+    Raises
+    ------
+    WrongRow
+        At the first number that is not finite, or that is not whole and should be.
+    """
+    if not np.isfinite(cells).all():
+        row, column = np.argwhere(~np.isfinite(cells.T))[0]
+        raise WrongRow(int(row), f"{names[column]} is {cells[column, row]}", "a finite number")
+    return {
+        name: _whole(column, name) if is_integer_column(name) else column
+        for name, column in zip(names, cells, strict=True)
+    }
+
+
+def _whole(column: Cells, name: str) -> NDArray[np.int64]:
+    with np.errstate(invalid="ignore"):
+        whole = column.astype(np.int64)
+    if (whole != column).any():
+        row = int(np.flatnonzero(whole != column)[0])
+        raise WrongRow(row, f"{name} is {column[row]}", "a whole number")
+    return whole

@@ -1,0 +1,206 @@
+"""The frames of any output of LIGGGHTS, and the rows of its ``fix print`` files."""
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dragdeck.dumps.content import CODECS, Cursor
+from dragdeck.dumps.frame import Columns, Frame, Layout
+from dragdeck.dumps.grammar import frame_cells, print_rows
+from dragdeck.dumps.numbers import WrongRow, first_rows, named_columns
+from dragdeck.errors import DumpError
+
+_KINDS = {"ENTRIES": "local", "ATOMS": "custom"}
+
+
+def read_frames(files: Iterable[Path], layout: Layout) -> Iterator[Frame]:
+    """Frames of files of one ``dump custom`` or ``dump local``.
+
+    Parameters
+    ----------
+    files : iterable of Path
+        The files, one after the other; compressed if their names end in one of
+        `dragdeck.dumps.content.CODECS`.
+    layout : Layout
+        What they hold. A text dump may have its columns in any order, as its header says.
+
+    Yields
+    ------
+    Frame
+        In the order of the file. At most one is in memory.
+
+    Raises
+    ------
+    TruncatedDumpError
+        If a file ends inside a frame.
+    DumpError
+        If a file is not such a dump, has other columns, or holds something
+        that is not a finite number. The frames before have come by then.
+    """
+    for file in files:
+        with Cursor(file, layout) as at:
+            for number in at.frames():
+                try:
+                    step, cells = frame_cells(at)
+                    columns = named_columns(cells, layout.columns)
+                except WrongRow as wrong:
+                    at.fail(f"row {wrong.row}: {wrong.problem}", wrong.expected)
+                yield Frame(step, columns, number == 0)
+
+
+def read_prints(file: Path, layout: Layout, *, block_rows: int = 20_000) -> Iterator[Columns]:
+    """Blocks of rows of one ``fix print`` file.
+
+    Parameters
+    ----------
+    file : Path
+        The file; its header line may come again between the rows.
+    layout : Layout
+        What ``columns.json`` says about it.
+    block_rows : int
+        Rows to read at once.
+
+    Yields
+    ------
+    dict of str to (N,) ndarray
+        The columns of at most `block_rows` rows, steps strictly increasing.
+
+    Raises
+    ------
+    TruncatedDumpError
+        If the file ends inside a row.
+    DumpError
+        If the header is another one, a row is not finite numbers, or the steps
+        do not increase.
+    """
+    last_step = -1.0
+    with Cursor(file, layout) as at:
+        for rows in print_rows(at, block_rows):
+            try:
+                columns = named_columns(rows.cells, layout.columns)
+                jumps = np.diff(rows.cells[0], prepend=last_step)
+                if (jumps <= 0).any():
+                    row = int(np.flatnonzero(jumps <= 0)[0])
+                    found = f"the steps go back to {int(rows.cells[0, row])}"
+                    raise WrongRow(row, found, "rising steps")
+            except WrongRow as wrong:
+                at.frame += wrong.row
+                at.offset += len(first_rows(rows.text, wrong.row))
+                at.fail(wrong.problem, wrong.expected)
+            if rows.text:
+                last_step = rows.cells[0, -1]
+                yield columns
+
+
+def read_dump(source: Path | str, columns: Sequence[str] | None = None) -> Iterator[Frame]:
+    """Read the frames of a ``dump custom`` or ``dump local``, text or binary.
+
+    Parameters
+    ----------
+    source : Path or str
+        The file; or, for a dump with one file per frame, its pattern with ``*`` for the step.
+        The ending ``.bin`` marks a binary dump; an additional ``.gz``, ``.zst``, ``.bz2`` or
+        ``.lz4`` marks a compressed one.
+    columns : sequence of str, optional
+        Names of the columns: required for a binary dump, in the order of its dump command; a text
+        dump must contain all of them, in any order. By default those in its header.
+
+    Yields
+    ------
+    Frame
+        In the order of the file, or of the steps in the names of the files. Columns
+        named ``id``, ``type`` or ``..._id`` are int64, all others float64. At most one frame is in
+        memory.
+
+    Raises
+    ------
+    TruncatedDumpError
+        If a file ends inside a frame.
+    DumpError
+        If there is no such file, it is not such a dump, or a number is not finite. Both errors
+        name file, frame and byte; the frames before it have been yielded by then.
+    """
+    files = dump_files(source)
+    yield from read_frames(files, layout_of(files[0], columns))
+
+
+def dump_files(source: Path | str) -> list[Path]:
+    """Files of a dump; those that ``*`` stands for in the order of their steps.
+
+    Raises
+    ------
+    DumpError
+        If there is none.
+    """
+    source = Path(source)
+    before, star, after = source.name.partition("*")
+    if not star:
+        files = [source] if source.is_file() else []
+    else:
+        name = re.compile(re.escape(before) + r"([0-9]+)" + re.escape(after))
+        found = [(name.fullmatch(file.name), file) for file in source.parent.glob(source.name)]
+        files = [file for _, file in sorted((int(m.group(1)), file) for m, file in found if m)]
+    if not files:
+        raise DumpError(source, "there is no such file", remedy="check the name of the dump")
+    return files
+
+
+@dataclass(frozen=True)
+class DumpLayout:
+    """What a single dump says of itself; see `dragdeck.dumps.frame.Layout`."""
+
+    kind: str
+    columns: tuple[str, ...]
+    binary: bool = False
+
+    @property
+    def header(self) -> tuple[str, ...]:
+        """The columns, which have the names that LIGGGHTS gives them."""
+        return self.columns
+
+
+def layout_of(file: Path, columns: Sequence[str] | None) -> DumpLayout:
+    """Layout of a dump file, from its name and first lines.
+
+    Raises
+    ------
+    DumpError
+        If it is no dump, or columns of a binary one are not given, or one comes twice.
+    """
+    name = file.with_suffix("") if file.suffix in CODECS else file
+    binary = name.suffix == ".bin"
+    kind, names = ("custom", []) if binary else _header(file)
+    wanted = tuple(columns or names)
+    if not wanted:
+        raise DumpError(
+            file,
+            "a binary dump does not contain the names of its columns",
+            remedy="give their names in the order of the dump command in the input script",
+        )
+    if len(set(wanted)) < len(wanted):
+        raise DumpError(file, f"a column is given twice: {' '.join(wanted)}")
+    return DumpLayout(kind, wanted, binary)
+
+
+def _header(file: Path) -> tuple[str, list[str]]:
+    """Kind of a text dump, and the names of its columns."""
+    expected = "the header of a text dump of LIGGGHTS"
+    with Cursor(file, DumpLayout("custom", ())) as at:
+        lines = b"".join(at.lines(9)).split(b"\n")
+        if len(lines) < 10:
+            at.check_end(expected)
+    words = [word.decode("ascii", "replace") for word in lines[8].split()] if lines[9:] else []
+    if len(words) < 3 or words[0] != "ITEM:" or words[1] not in _KINDS:
+        raise DumpError(
+            file,
+            f"found {lines[0][:60]!r}, but no names of columns",
+            frame=0,
+            offset=0,
+            expected=expected,
+            remedy="give a file of dump custom or dump local; the name of a binary file "
+            "must end with .bin",
+        )
+    return _KINDS[words[1]], words[2:]

@@ -1,0 +1,430 @@
+"""What the rules of the workflow share: a study, its cases, and the paths and options of its runs.
+
+Rules name patterns of paths by `of_run` and `tables_of`, and ask a `Workflow` for the rest. What
+they pass as wildcards is anything with the attributes of `Wildcards`.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache, cached_property
+from pathlib import Path
+from shlex import quote
+from typing import Any, NoReturn, Protocol, TypeVar
+
+from jsonschema import Draft202012Validator
+from snakemake_interface_common.exceptions import WorkflowError
+
+from dragdeck.campaigns.restitution_drops import record_file
+from dragdeck.cases.case import Case
+from dragdeck.decks.templates import environment, template_files
+from dragdeck.errors import DragdeckError, InputError, choices
+from dragdeck.outlook.runs import StudyRun, expected_runs
+from dragdeck.physics.contact_mechanics import fall_time
+from dragdeck.project import (
+    OUTCOMES,
+    PLACES,
+    POINTS,
+    WINDOWS,
+    Project,
+    by_folder,
+    by_run,
+    run_path,
+    study_files,
+    study_templates,
+)
+from dragdeck.scenes.lead import FIRST_WINDOWS, led, windows_of, with_leads
+from dragdeck.scenes.registry import SCENES
+from dragdeck.sweep.plan import Points
+
+RECORD = {place: "outcome.json" if place in OUTCOMES else "run.json" for place in PLACES}
+"""How a run in each folder of runs ended."""
+
+ENGINE_RUN = "[A-Za-z0-9._-]+-[0-9a-f]{8}"
+"""A run of LIGGGHTS, as a pattern."""
+
+FURTHER_WORKPIECE = f"{ENGINE_RUN}[.][0-9]+"
+"""A further workpiece of one: its number follows the run's name."""
+
+WINDOWS_RECORD = "workflow/dragdeck/data/windows.json"
+
+_PAGES = "analysis/dragchain"
+
+V = TypeVar("V")
+
+
+class Wildcards(Protocol):
+    """What a rule knows of a run."""
+
+    study: str
+    run: str
+
+
+class RoundOfRun(Wildcards, Protocol):
+    """What a rule knows of a round of windows of a run."""
+
+    round: str
+
+
+class RuleOfJob(Protocol):
+    """The rule of a job."""
+
+    name: str
+
+
+class Job(Protocol):
+    """A job of Snakemake."""
+
+    rule: RuleOfJob
+    output: list[str]
+    wildcards: Wildcards
+
+
+FromRun = Callable[[Wildcards], V]
+"""A parameter or an input of a rule for runs."""
+
+
+def or_stop(function: Callable[..., V], *arguments: object) -> V:
+    """The value of a function; what is wrong with its input stops the workflow."""
+    try:
+        return function(*arguments)
+    except DragdeckError as error:
+        _stop(error)
+
+
+def _stop(error: DragdeckError) -> NoReturn:
+    raise WorkflowError(str(error)) from None
+
+
+def checked_settings(config: Mapping[str, object], schema: Mapping[str, Any]) -> dict[str, str]:
+    """The keys of config/config.yaml and of --config as text.
+
+    Raises
+    ------
+    WorkflowError
+        A key is unknown, or a value does not fit.
+    """
+    known: Mapping[str, Mapping[str, Any]] = schema["properties"]
+    texts = {key: "" if value is None else str(value) for key, value in config.items()}
+    for key, text in texts.items():
+        rule = known.get(key)
+        if rule is None:
+            problem, limit = "unknown key", choices(key, known)
+        elif not Draft202012Validator(rule).is_valid(text):
+            problem, limit = rule["title"], rule["description"]
+        else:
+            continue
+        raise WorkflowError(f"--config {key}={text}: {problem}\n  limit:  {limit}")
+    return texts
+
+
+def of_run(place: str, file: str) -> str:
+    """Path of a file of a run, as a pattern."""
+    return f"{run_path('{study}', place, '{run}')}/{file}"
+
+
+def tables_of(place: str, names: Iterable[str]) -> list[str]:
+    """Paths of tables of a run, as patterns."""
+    return [of_run(place, f"tables/{name}") for name in names]
+
+
+def of_whole_run(place: str, file: str) -> FromRun[str]:
+    """A file of the run that a further workpiece shares."""
+    return lambda wildcards: (
+        f"{run_path(wildcards.study, place, wildcards.run.rpartition('.')[0])}/{file}"
+    )
+
+
+class Workflow:
+    """What a call of Snakemake works on.
+
+    Parameters
+    ----------
+    project : Project
+    study, fidelity, plan, validation : str
+        Names; that of the fidelity is empty for the study's own.
+    judged : callable
+        The file of a round of windows of a run, once the round was judged.
+
+    Raises
+    ------
+    WorkflowError
+        The study or the plan cannot be used.
+    """
+
+    def __init__(
+        self,
+        project: Project,
+        study: str,
+        fidelity: str,
+        plan: str,
+        validation: str,
+        judged: Callable[[str, str, int], str],
+    ) -> None:
+        or_stop(project.plan_file, plan)
+        self.project, self.study, self.fidelity = project, study, fidelity
+        self.plan, self.validation, self.judged = plan, validation, judged
+        self.cases: list[Case] = or_stop(project.cases, study, fidelity or None)
+        self.points_by_run = cache(self._points_by_run)
+        self.templates_of = cache(self._templates_of)
+
+    # --- paths -----------------------------------------------------------------------------
+
+    def of_study(self, folder: str, file: str) -> str:
+        """Path of a file about the study as a whole."""
+        return f"results/{self.study}/{folder}/{file}"
+
+    def of_tradeoff(self, file: str) -> str:
+        """Path of a file of the report on a plan's points."""
+        return self.of_study(f"tradeoff/{Path(self.plan).stem}", file)
+
+    @property
+    def advice(self) -> str:
+        """Path of the advice of the study."""
+        return f"results/{self.study}/advice.json"
+
+    def every_folder(self, place: str) -> list[str]:
+        """The folder of every run of the study's cases."""
+        return [run_path(self.study, place, run) for run in by_folder(self.cases, PLACES[place])]
+
+    def every(self, place: str, *files: str) -> list[str]:
+        """Files of every run of the study's cases."""
+        return [f"{folder}/{file}" for folder in self.every_folder(place) for file in files]
+
+    def every_table(self, place: str) -> list[str]:
+        """The tables of every run of the study's cases."""
+        return self.every(place, *(f"tables/{name}" for name in PLACES[place].tables))
+
+    def every_point(self, file: str, plan: str = "") -> list[str]:
+        """One file of every process run of a plan, that of the trade-off if no other is named."""
+        runs = self.points_by_run("process", plan or self.plan)
+        return [f"{run_path(self.study, POINTS, run)}/{file}" for run in runs]
+
+    def every_drop_point(self, file: str) -> list[str]:
+        """One file of every drop test of the trade-off."""
+        runs = self.points_by_run("drop_test", self.plan)
+        return [f"{run_path(self.study, 'drop_test', run)}/{file}" for run in runs]
+
+    def every_packing(self, file: str) -> list[str]:
+        """One file of every run of the validation that differs from its first by the seed alone."""
+        runs = self.points_by_run("process", self.validation)
+        first = next(iter(runs.values())).study
+        alike = [
+            run
+            for run, case in runs.items()
+            if case.study.model_copy(update={"seed": first.seed}) == first
+        ]
+        return [f"{run_path(self.study, POINTS, run)}/{file}" for run in alike]
+
+    def relative(self, file: Path) -> str:
+        """Path from the project, where the workflow runs; other paths stay as they are."""
+        root = self.project.root
+        return str(file.relative_to(root) if file.is_relative_to(root) else file)
+
+    # --- templates and other inputs --------------------------------------------------------
+
+    def _templates_of(self, scene: str) -> list[str]:
+        """Every template that a scene's deck is made of."""
+        own = study_templates(self.cases[0])
+        templates = or_stop(environment, self.project.templates, own)
+        return [self.relative(file) for file in or_stop(template_files, templates, scene)]
+
+    def files(self, pattern: str) -> list[str]:
+        """The project's files of this pattern."""
+        return sorted(map(self.relative, self.project.root.glob(pattern)))
+
+    def page_templates(self, *names: str, package: str = _PAGES) -> list[str]:
+        """The templates of a page, with those that all pages are made of."""
+        shared = [f"{_PAGES}/report/{name}.html.j2" for name in ("page", "macros")]
+        own = [f"{package}/{name}" for name in names]
+        return [str(self.project.root / name) for name in (*own, *shared)]
+
+    def drop_record(self, _: object = None) -> str:
+        """The measured drop test of the study."""
+        return self.relative(or_stop(record_file, self.cases[0]))
+
+    def calibration_inputs(self) -> list[str]:
+        """What the drops of a calibration are made from: the study and the drop's templates."""
+        return [self.relative(self.cases[0].file), *self.templates_of("drop_test")]
+
+    def crate_inputs(self) -> list[str]:
+        """Study files, templates and meshes of all scenes."""
+        files = map(self.relative, or_stop(study_files, self.cases))
+        templates = (file for scene in SCENES for file in self.templates_of(scene))
+        return list(dict.fromkeys([*files, *templates]))
+
+    # --- cases and runs --------------------------------------------------------------------
+
+    @cached_property
+    def points(self) -> Points:
+        """The points of the trade-off's plan."""
+        return self._points(self.plan)
+
+    def _points(self, plan: str) -> Points:
+        return or_stop(self.project.points, self.study, plan)
+
+    def _points_by_run(self, scene: str, plan: str, leads: bool = False) -> dict[str, Case]:
+        """A case of a plan for each run of a scene; those that lead to others too, if asked."""
+        points = self.points if plan == self.plan else self._points(plan)
+        kind, cases = SCENES[scene], points.of(SCENES[scene])
+        return by_run(with_leads(cases) if leads and kind.needs_bed else cases, kind)
+
+    def _origins(self, place: str) -> Iterator[tuple[str, dict[str, Case]]]:
+        """Where cases of a folder's runs come from: how to name them, and by run."""
+        scene, own = PLACES[place], self.cases
+        if place == WINDOWS:
+            own = [window for case in own for window in windows_of(case)]
+        elif scene.needs_bed:
+            own = with_leads(own)
+        if place != POINTS:
+            yield self.fidelity_option, by_folder(own, scene)
+        for plan in (self.plan, self.validation):
+            yield f"--plan {plan}", self.points_by_run(scene.name, plan, leads=True)
+
+    def _origin(self, place: str, run: str) -> tuple[str, Case]:
+        """How to name the cases among which a run is, and its case: a study's before a plan's."""
+        return next((option, runs[run]) for option, runs in self._origins(place) if run in runs)
+
+    def case_of(self, place: str, run: str) -> Case:
+        """A case that a run belongs to."""
+        return self._origin(place, run)[1]
+
+    def planned_runs(self, jobs: Iterable[Job]) -> list[StudyRun]:
+        """The engine runs of jobs: what is expected of each, and how far it is."""
+        places = {f"run_{place}": place for place in PLACES}
+        found: dict[str, dict[Path, Case]] = {}
+        for job in jobs:
+            if place := places.get(job.rule.name):
+                folder = self.project.root / Path(job.output[0]).parent
+                found.setdefault(place, {})[folder] = self.case_of(place, job.wildcards.run)
+        several = (expected_runs(PLACES[place], folders) for place, folders in found.items())
+        return [run.now() for runs in several for run in runs]
+
+    # --- parameters of rules ---------------------------------------------------------------
+
+    @property
+    def fidelity_option(self) -> str:
+        """How to name the fidelity on the command line."""
+        return f"--fidelity {self.fidelity}" if self.fidelity else ""
+
+    def digest_of(self, place: str) -> FromRun[str]:
+        """Hash of what a run's files say."""
+        return lambda wildcards: PLACES[place].digest(self.case_of(place, wildcards.run))
+
+    def ranks_of(self, place: str) -> int | FromRun[int]:
+        """Number of LIGGGHTS processes of a run."""
+        if PLACES[place].single_particle:
+            return 1
+        return lambda wildcards: self.case_of(place, wildcards.run).ranks
+
+    def cases_option(self, place: str) -> FromRun[str]:
+        """How to name the cases among which a run is on the command line."""
+        return lambda wildcards: self._origin(place, wildcards.run)[0]
+
+    def of_its_bed(self, place: str, file: str) -> FromRun[str] | list[str]:
+        """A file of the filling that a run starts from; none for a run that starts from none."""
+
+        def name(wildcards: Wildcards) -> str:
+            filling = SCENES["filling"].run_id(self.case_of(place, wildcards.run))
+            return f"{run_path(wildcards.study, 'filling', filling)}/{file}"
+
+        return name if PLACES[place].needs_bed else []
+
+    def of_its_lead(self, place: str) -> FromRun[list[str]] | list[str]:
+        """The record of the run from which a run goes on, if there is one."""
+
+        def names(wildcards: Wildcards) -> list[str]:
+            lead = led(self.case_of(place, wildcards.run)).lead
+            if lead is None:
+                return []
+            run = SCENES["process"].run_id(lead)
+            return [f"{run_path(wildcards.study, 'process', run)}/run.json"]
+
+        return names if PLACES[place].needs_bed else []
+
+    def needed_advice(self, place: str) -> list[str]:
+        """The advice of a study in which a case asks for a tolerance; nothing for other runs."""
+        asked = any(case.asked for case in self.cases)
+        concerned = place != POINTS and not PLACES[place].single_particle
+        return [self.advice] if asked and concerned else []
+
+    def advice_option(self, _: object = None) -> str:
+        """How to name the advice on the command line, if there is or will be one."""
+        known = self.needed_advice("process") or (self.project.root / self.advice).is_file()
+        return f"--advice {self.advice}" if known else ""
+
+    def fall_time_s(self, _: object = None) -> float:
+        """Free fall before the first impact of the drop test, s."""
+        study = self.cases[0].study
+        return fall_time(study.drop_test.height_m, study.gravity_m_s2)
+
+    def licence_option(self, _: object = None) -> str:
+        """How to name the licence of the results on the command line, if the study states one."""
+        licence = self.cases[0].study.licence
+        return quote(f"--licence={licence}") if licence else ""
+
+    def scaling_options(self, _: object = None) -> str:
+        """What the study's block scaling asks for, as options of the command line."""
+        case = self.cases[0]
+        scaling = case.study.scaling
+        if scaling is None:
+            _stop(
+                InputError(
+                    "a required key is missing",
+                    file=self.relative(case.file),
+                    field="scaling",
+                    remedy="name the field to fit a power law over, see docs/howto/sweep.md",
+                )
+            )
+        given: dict[str, Sequence[object]] = {
+            "--field": [scaling.field],
+            "--expected": [scaling.expected_exponent],
+            "--source": [scaling.source],
+            "--fit-range": scaling.fit_range or [None],
+        }
+        options = [[name, *values] for name, values in given.items() if values[0] is not None]
+        return " ".join(quote(str(word)) for option in options for word in option)
+
+    # --- windows ---------------------------------------------------------------------------
+
+    def windows_of_run(self, wildcards: Wildcards) -> list[Case]:
+        """All windows that a run may have."""
+        return windows_of(self.case_of("process", wildcards.run))
+
+    def round_before(self, wildcards: RoundOfRun) -> list[str]:
+        """The file of the round before, if there is one; it is judged first."""
+        number = int(wildcards.round)
+        return [self.judged(wildcards.study, wildcards.run, number - 1)] if number > 1 else []
+
+    def windows_of_round(self, wildcards: RoundOfRun) -> list[str]:
+        """The folders of the windows that a round judges: of those that the one before wanted."""
+        wanted = FIRST_WINDOWS
+        for before in self.round_before(wildcards):
+            wanted = json.loads(Path(before).read_text())["wanted"]
+        windows = self.windows_of_run(wildcards)[:wanted]
+        runs = [SCENES["process"].run_id(window) for window in windows]
+        return [run_path(wildcards.study, WINDOWS, run) for run in runs]
+
+    def records_of_round(self, wildcards: RoundOfRun) -> list[str]:
+        """How the windows of a round ended."""
+        return [f"{folder}/{RECORD[WINDOWS]}" for folder in self.windows_of_round(wildcards)]
+
+    def last_round(self, wildcards: Wildcards) -> str | list[str]:
+        """The last round of windows of a run, if it has any."""
+        if not self.windows_of_run(wildcards):
+            return []
+        number, file = 1, self.judged(wildcards.study, wildcards.run, 1)
+        while not json.loads(Path(file).read_text())["last"]:
+            number += 1
+            file = self.judged(wildcards.study, wildcards.run, number)
+        return file
+
+    def windows_options(self, wildcards: Wildcards, input: Any) -> str:
+        """What the windows of a run are asked for, as options of the command line."""
+        asked = self.case_of("process", wildcards.run).study.chosen_fidelity().windows
+        assert asked is not None
+        quantities = " ".join(map(quote, asked.quantities))
+        before = f"--before {input.before}" if input.before else ""
+        return (
+            f"--tolerance {asked.tolerance} --quantities {quantities} {before}"
+            f" --most {len(self.windows_of_run(wildcards))}"
+        )

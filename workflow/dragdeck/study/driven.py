@@ -1,0 +1,187 @@
+"""A study's motion as a run drives it: the poses, velocities and entries that follow from it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from dragdeck.study.drive import Drive, EngineMotion, Orientation, SmoothStart
+from dragdeck.study.model import Motion
+from dragdeck.study.rotation import Floats, Rotation, StepCounts
+from dragdeck.study.superposed.motion import SuperposedMotion
+
+
+class PathEntry(BaseModel):
+    """The simulated drag: speed of the workpiece's axis, its initial direction, and its path.
+
+    Attributes
+    ----------
+    kind : str
+        Of the path, which adds fields of its own.
+    axis_speed_m_s : float
+        Mean speed of the workpiece's axis relative to the bowl.
+    start_direction_rad : float
+        Direction of that motion when the drag begins, from x towards y.
+    orientation : str
+        With ``follow_path`` the workpiece turns with its path.
+    """
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="allow")
+
+    kind: str
+    axis_speed_m_s: float = Field(gt=0)
+    start_direction_rad: float
+    orientation: Orientation = "fixed"
+
+
+class SuperposedEntry(BaseModel):
+    """A motion superposed on the path, in whole steps; its kind adds fields of its own."""
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False, extra="allow")
+
+    kind: str
+
+
+@dataclass(frozen=True)
+class DrivenMotion:
+    """A motion in whole steps, counted from the start of the drag."""
+
+    motion: Motion
+    drive: Drive
+
+    @classmethod
+    def of(
+        cls, motion: Motion, timestep_s: float, speed_factor: float, start: int = 0
+    ) -> "DrivenMotion":
+        """The motion at a factor on its speeds.
+
+        Its speed is as much higher or lower than asked as its steps take less or more time: it
+        ends at the end of the path.
+
+        Parameters
+        ----------
+        motion : Motion
+        timestep_s, speed_factor : float
+        start : int
+            Step at which the drag begins.
+        """
+        length, asked = motion.path_length_m, motion.axis_speed_m_s * speed_factor
+        begin = SmoothStart(round(motion.ramp_s / speed_factor / timestep_s))
+        steps = max(1, round(length / asked / timestep_s + begin.steps / 2))
+        return cls(
+            motion,
+            Drive(
+                start=start,
+                end=start + steps,
+                timestep_s=timestep_s,
+                length_m=length,
+                orientation=motion.orientation,
+                tilt_deg=motion.tilt_deg or 0.0,
+                begin=begin,
+            ),
+        )
+
+    @property
+    def factor(self) -> float:
+        """Its speed over the study's own: about the speed factor."""
+        return self.drive.speed_m_s / self.motion.axis_speed_m_s
+
+    @cached_property
+    def superposed(self) -> Mapping[str, SuperposedMotion]:
+        """What is superposed on the path, at the speeds that are driven, by name."""
+        return self.motion.superposed(self.factor)
+
+    @property
+    def fastest_m_s(self) -> float:
+        """Highest speed of the workpiece's axis along the path."""
+        return self.motion.path.fastest_m_s(self.drive)
+
+    @property
+    def turns(self) -> bool:
+        """Whether the workpiece turns in the frame of its path."""
+        moving = any(one.turns for one in self.superposed.values())
+        return moving or self.motion.path.own(self.drive, np.zeros(1)) is not None
+
+    @property
+    def keeps_direction(self) -> bool:
+        """Whether the direction of motion is always the same in the workpiece's own frame."""
+        return not self.turns and self.motion.path.keeps_direction(self.drive.orientation)
+
+    def places(self, since: StepCounts, begun: Floats) -> Floats:
+        """Places of the reference point, (N, 3), after (N,) steps from where it begins, m."""
+        place = self.motion.path.places(self.drive, since, begun)
+        for one in self.superposed.values():
+            place = place + one.shift(self.drive, since)
+        return place
+
+    def rotation(self, since: StepCounts, start_rad: float) -> Rotation:
+        """Orientations after (N,) steps of a workpiece whose front begins in a direction."""
+        path = self.motion.path
+        turn = start_rad + path.turn(self.drive, since)
+        return self._rotated(since, Rotation(turn, path.own(self.drive, since)))
+
+    def rotation_along(self, since: StepCounts, direction_rad: Floats) -> Rotation:
+        """Orientations after (N,) steps, at (N,) directions of motion."""
+        return self._rotated(since, self._by_path(since, direction_rad))
+
+    def _by_path(self, since: StepCounts, direction_rad: Floats) -> Rotation:
+        path = self.motion.path
+        first = np.full_like(direction_rad, path.direction_rad)
+        turn = direction_rad if path.turns(self.drive.orientation) else first
+        return Rotation(turn, path.own(self.drive, since))
+
+    def _rotated(self, since: StepCounts, rotation: Rotation) -> Rotation:
+        for one in self.superposed.values():
+            rotation = one.rotated(self.drive, since, rotation)
+        return rotation
+
+    def directions(self, since: StepCounts, ref_xy_m: Floats) -> Floats:
+        """Direction of motion along the path, (N,), after (N,) steps and at (N, 2) places, rad."""
+        return self.motion.path.directions(self.drive, since, ref_xy_m)
+
+    def velocity(self, since: StepCounts, point_m: Floats, ref_m: Floats) -> Floats:
+        """Velocities of points that are fixed to the workpiece, (N, 3) in m/s.
+
+        Parameters
+        ----------
+        since : (N,) ndarray of int
+        point_m, ref_m : (N, 3) ndarray
+            The points, and the reference point, after these steps, m.
+        """
+        found = self.motion.path.velocity(self.drive, since, point_m, ref_m)
+        before = self._by_path(since, self.directions(since, ref_m[:, :2]))
+        for one in self.superposed.values():
+            found = found + one.velocity(self.drive, since, point_m - ref_m, before)
+        return found
+
+    @property
+    def bowl_rad_s(self) -> float:
+        """Angular speed of the bowl about +z."""
+        return self.motion.path.bowl_rad_s(self.drive.speed_m_s)
+
+    def superposed_on_engine(self) -> Mapping[str, EngineMotion]:
+        """How the engine makes what is superposed, by name."""
+        heading = self.motion.path.heading_formula(self.drive)
+        return {name: one.on_engine(self.drive, heading) for name, one in self.superposed.items()}
+
+    def path_entry(self) -> PathEntry:
+        """The path in ``case.json``."""
+        path, drive = self.motion.path, self.drive
+        return PathEntry.model_validate(
+            {
+                "kind": path.kind,
+                "axis_speed_m_s": drive.speed_m_s,
+                "start_direction_rad": path.direction_rad,
+                "orientation": drive.orientation,
+                **path.entry(drive),
+            }
+        )
+
+    def superposed_entries(self) -> list[SuperposedEntry]:
+        """What is superposed in ``case.json``."""
+        entries: list[dict[str, JsonValue]] = [
+            one.entry(self.drive) for one in self.superposed.values()
+        ]
+        return [SuperposedEntry.model_validate(entry) for entry in entries]
