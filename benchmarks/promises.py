@@ -25,7 +25,7 @@ from dragchain.report.values import Extrapolated
 from dragchain.tradeoff.measure_run import quantities_along
 from dragchain.windows.estimate import Round, WindowsRecord
 from dragchain.windows.rounds import judged
-from dragdeck.advice.options import Work, plain_option, stiff_settings
+from dragdeck.advice.advise import Work, plain_option, stiff_settings
 from dragdeck.cases.case import Case
 from dragdeck.project import Project, by_run
 from dragdeck.records.case import load_case

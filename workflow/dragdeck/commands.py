@@ -14,16 +14,14 @@ import jinja2
 from pydantic import ValidationError
 from rich.table import Table
 
-from dragdeck.advice.advise import Advice, advised_settings
+from dragdeck.advice.advise import Advice, advised_settings, with_option
 from dragdeck.advice.forecast import (
-    AdviceFile,
     advice_file,
     advice_tables,
     forecast,
     question,
     roles,
 )
-from dragdeck.advice.options import Speed, with_option
 from dragdeck.campaigns.machine_speed import measure_machine_speed
 from dragdeck.cases.case import Case
 from dragdeck.cases.ranks import check_ranks, cores_here
@@ -57,6 +55,7 @@ from dragdeck.preview.layout import CaseLayout, layout
 from dragdeck.preview.page import Words, page, picture, small_picture
 from dragdeck.preview.swept import swept_volume
 from dragdeck.project import Project, by_folder, by_run, find_project, study_templates
+from dragdeck.records.advice import AdviceFile, Speed
 from dragdeck.records.tradeoff import TradeoffRecord, measured_tradeoff, tradeoff_if_measured
 from dragdeck.scenes.lead import with_leads
 from dragdeck.scenes.registry import SCENES

@@ -267,6 +267,9 @@ def _tubes(axis: Floats, force: Floats, radius: Floats) -> Any:
     return mesh.tube(scalars="radius", absolute=True, n_sides=_SIDES, capping=True)
 
 
+# --- on axes in mm -------------------------------------------------------------------------------
+
+
 def show_network(axes: Axes, shown: NetworkScene, view: View, image: Image, extent: Floats) -> None:
     """Set a rendered view on axes in mm, with the dominant path and the motion marked.
 

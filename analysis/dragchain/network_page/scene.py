@@ -35,6 +35,9 @@ from dragchain.tables.columns import CENTRE, POINT, VELOCITY
 from dragchain.tables.run_folder import Run
 from dragdeck.records.case import CaseOfRun
 
+# --- columns as bytes ----------------------------------------------------------------------------
+
+
 Kind = Literal["u8", "u16", "u32", "f24"]
 """Whole numbers of 1, 2 or 4 bytes, or the first 3 bytes of a single-precision number."""
 
@@ -74,6 +77,9 @@ class PackedColumns:
     def text(self) -> str:
         """All columns, one after another, compressed (zlib) and in base64."""
         return base64.b64encode(zlib.compress(b"".join(self._parts))).decode("ascii")
+
+
+# --- shown frames --------------------------------------------------------------------------------
 
 
 FRAMES = 100
@@ -196,6 +202,9 @@ def _near(frame: NetworkFrame, workpiece_m: Floats) -> NDArray[np.bool_]:
     if away.size <= MOST_PARTICLES:
         return np.ones(away.size, dtype=bool)
     return np.asarray(away < np.partition(away, MOST_PARTICLES)[MOST_PARTICLES])
+
+
+# --- scene ---------------------------------------------------------------------------------------
 
 
 _LOADS = {

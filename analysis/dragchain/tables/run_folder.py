@@ -127,6 +127,9 @@ class Run:
             yield _joined(batch)
 
 
+# --- place of the workpiece ----------------------------------------------------------------------
+
+
 WorkpiecePlaces = Callable[[int], tuple[Floats, Rotation]]
 
 _WORKPIECE = ["step", "ref_x_m", "ref_y_m", "ref_z_m", "direction_rad"]

@@ -14,9 +14,15 @@ from made_tradeoff import made_tradeoff
 from paths import ROOT
 
 from dragdeck import commands
-from dragdeck.advice.advise import advised_settings, resolve
+from dragdeck.advice.advise import (
+    Work,
+    advised_settings,
+    consistent,
+    plain_option,
+    resolve,
+    with_option,
+)
 from dragdeck.advice.forecast import question
-from dragdeck.advice.options import Work, consistent, plain_option, with_option
 from dragdeck.cases.bed import full_stiffness_number
 from dragdeck.cases.case import Case
 from dragdeck.errors import InputError
